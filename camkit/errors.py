@@ -13,6 +13,7 @@ A message says what was expected, what came, and what to do.
 from typing import Final
 
 _MOST_CHARACTERS: Final = 1000
+_LAST_CHARACTERS: Final = 300
 
 
 class CamkitError(Exception):
@@ -23,10 +24,13 @@ class CamkitError(Exception):
 
 
 def one_line(text: str) -> str:
-    """Give a text as one printable line of bounded length, whatever files put into it."""
+    """Return a text as one printable line of bounded length, whatever files put into it."""
     line = " ".join(text.split())
     shown = "".join(letter if letter.isprintable() else "?" for letter in line)
-    return shown if len(shown) <= _MOST_CHARACTERS else shown[: _MOST_CHARACTERS - 3] + "..."
+    if len(shown) <= _MOST_CHARACTERS:
+        return shown
+    # the reason stands behind a long name
+    return shown[: _MOST_CHARACTERS - _LAST_CHARACTERS - 3] + "..." + shown[-_LAST_CHARACTERS:]
 
 
 def unexpected(error: Exception) -> str:

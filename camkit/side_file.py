@@ -85,7 +85,7 @@ def parse_toml(data: bytes, what: str) -> dict[str, Any]:
     except RecursionError as error:
         raise ContractError(too_deep) from error
     except ValueError as error:  # also of numbers that are no dates, or have thousands of digits
-        raise ContractError(f"{what} is no TOML, or is not valid TOML: {error}") from error
+        raise ContractError(f"{what} is not valid TOML: {error}") from error
     if tables is None or _is_deeper(tables, MOST_DEPTH):
         raise ContractError(too_deep)
     return tables

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from camkit.caller import option_text
 from camkit.contracts import CFA_PATTERNS, CfaPattern, FloatArray, InputContract, NoiseModel
 from camkit.errors import ContractError
-from camkit.runtime.field_types import check_fields
+from camkit.field_types import check_fields
+from camkit.picture_window import PictureWindow
 from camkit.runtime.machine.memory import mapping_of
 from camkit.runtime.metadata import Metadata
-from camkit.runtime.picture_window import PictureWindow
 
 SATURATION_SHARE: Final = 0.99
 """A sample at this share of the white level is taken as clipped.

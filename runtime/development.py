@@ -9,9 +9,9 @@ from typing import Any, Final, Literal, Self
 
 from camkit.caller import option_text
 from camkit.errors import ContractError, one_line
+from camkit.field_types import check_fields
 from camkit.runtime.cancel import Cancel
 from camkit.runtime.capture import Capture, MosaicOptions
-from camkit.runtime.field_types import check_fields
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.machine.memory import peak_rss_mb
 from camkit.runtime.network.tiling import Progress

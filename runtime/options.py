@@ -9,8 +9,8 @@ from typing import Any, Final, Literal
 
 from camkit.caller import option_list, option_text
 from camkit.errors import ContractError
+from camkit.field_types import check_fields, check_value
 from camkit.kinds import Kind, KindOption, all_kinds
-from camkit.runtime.field_types import check_fields, check_value
 from camkit.runtime.unit import Unit
 from camkit.units import MM_PER_M
 

@@ -25,10 +25,10 @@ from camkit.bundle.stages import Wiener
 from camkit.caller import option_list, option_text
 from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ContractError, UnsupportedError
+from camkit.field_types import check_value
 from camkit.kinds import Kind, find_kind
 from camkit.runtime.cancel import Cancel, cancellable
 from camkit.runtime.capture import Capture, MosaicOptions
-from camkit.runtime.field_types import check_value
 from camkit.runtime.files.in_memory import FilePath, Source, stored
 from camkit.runtime.job.choices import check_choices
 from camkit.runtime.job.reconstruction import Reconstruction, check_out

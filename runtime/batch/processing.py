@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Unpack
 
 from camkit.caller import option_text
 from camkit.errors import ContractError
+from camkit.field_types import check_value
 from camkit.kinds import Kind
 from camkit.runtime.batch.making import Common, FileProgress, Pipelines, run_task
 from camkit.runtime.batch.sources import expand
@@ -17,7 +18,6 @@ from camkit.runtime.batch.tasks import NO_BUNDLE, Task, list_tasks
 from camkit.runtime.cancel import Cancel
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.development import FileResult, WriteOptions
-from camkit.runtime.field_types import check_value
 from camkit.runtime.files.in_memory import FilePath, list_paths
 from camkit.runtime.keywords import ProcessKeywords
 from camkit.runtime.kind import kind_without_bundle

@@ -6,8 +6,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.picture_window import PictureWindow
 from camkit.runtime.metadata import Metadata
-from camkit.runtime.picture_window import PictureWindow
 from camkit.runtime.unit import Unit
 
 

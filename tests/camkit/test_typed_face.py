@@ -13,9 +13,9 @@ import pytest
 import camkit
 from camkit.bundle.stages import Color, Linearise
 from camkit.cli.app import run
+from camkit.field_types import check_value
 from camkit.kinds import KINDS
 from camkit.runtime.development import WriteOptions
-from camkit.runtime.field_types import check_value
 from camkit.runtime.keywords import KindKeywords, LoadKeywords, ProcessKeywords
 from camkit.runtime.options import Options
 from tests.bundle_factory import write_tiny_bundle

@@ -78,7 +78,7 @@ def test_resume_makes_anew_what_other_options_wrote(shot: Path, tmp_path: Path) 
         ({"format": "jpeg", "jpeg_quality": 0}, r"1\.\.100; got 0"),
         ({"format": "jpeg", "jpeg_quality": 101}, r"1\.\.100; got 101"),
         ({"format": "jpeg", "linear": True}, "8 bits hold no linear light"),
-        ({"format": "jpg"}, "exr, tiff, png, jpeg, dng; got 'jpg'"),
+        ({"format": "bmp"}, "exr, tiff, png, jpeg, dng; got 'bmp'"),
     ],
 )
 def test_options_that_mean_nothing_are_refused(choices: dict[str, object], message: str) -> None:

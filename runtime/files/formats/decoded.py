@@ -5,8 +5,8 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from camkit.picture_window import PictureWindow
 from camkit.runtime.files.formats.color_space import ColorSpace
-from camkit.runtime.picture_window import PictureWindow
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 from camkit.colorimetry import D65, REC709_PRIMARIES, Matrix, rgb_to_xyz
 from camkit.contracts import FloatArray
 from camkit.errors import DecodeError
+from camkit.picture_window import PictureWindow
 from camkit.runtime.files.exr_attributes import metadata_of_exr
 from camkit.runtime.files.formats.color_space import ColorSpace, matrix_to_rec709, power_curve
 from camkit.runtime.files.formats.decoded import Decoded
 from camkit.runtime.files.raw_checks import MAX_PIXELS
 from camkit.runtime.metadata import Metadata
-from camkit.runtime.picture_window import PictureWindow
 
 MAGIC: Final = b"\x76\x2f\x31\x01"
 MOST_PX_PER_BYTE: Final = 4096

@@ -100,7 +100,7 @@ def test_files_round_trip(tmp_path: Path) -> None:
         (("object_distance_mm = inf", "object_distance_mm = -5"), "object_distance_mm"),
         (("even_asphere = [0.0, 1e-6]", "even_asphere = 1"), "list of numbers"),
         (('name = "one"', "name = 1"), "must be text"),
-        (('name = "one"', "name = "), "must be TOML"),
+        (('name = "one"', "name = "), "is not valid TOML"),
     ],
 )
 def test_wrong_prescription_is_refused(change: tuple[str, str], message: str) -> None:

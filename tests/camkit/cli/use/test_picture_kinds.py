@@ -82,7 +82,7 @@ def test_a_mosaic_without_its_options_is_asked_about(tmp_path: Path, camkit_comm
     cv2.imwrite(str(tmp_path / "m.png"), (60000 * LIGHT * cells + noise + 999).astype(np.uint16))
     done = camkit_command("process", tmp_path / "m.png", "--bundle", "none", "--out-dir", tmp_path)
     assert done.code == 1
-    assert "--mosaic RGGB --black-level N" in done.err
+    assert "--mosaic RGGB with --black-level and --white-level" in done.err
 
 
 @pytest.mark.parametrize("square_px", [1, 2, 3, 8])
