@@ -26,7 +26,6 @@ FLAGS: Final = {
     "max_mem_bytes": "--max-mem",
     "cfa": "--mosaic",
     "times_s": "--times",
-    "flats": "--flat",
     "first": "--fine-tune",
 }
 """Options whose flag is not their name."""

@@ -12,8 +12,10 @@ def test_a_message_is_one_printable_line(kind: type[CamkitError]) -> None:
 
 
 def test_a_long_message_is_cut() -> None:
-    text = str(BundleError("x" * 10**6))
-    assert (len(text), text[-4:]) == (1000, "x...")
+    """In its middle: the reason stands behind a long name."""
+    text = str(BundleError("x" * 10**6 + ": the reason"))
+    assert (len(text), text[-12:]) == (1000, ": the reason")
+    assert "x...x" in text
 
 
 def test_a_plain_message_stays_as_it_is() -> None:
