@@ -39,6 +39,7 @@ MASKED_SPREAD: Final = 0.01
 MASKED_OFFSET: Final = 0.005
 GREEN_OFFSET: Final = 0.15
 LEAST_GREEN: Final = 0.01
+BLACKS_APART: Final = 0.04
 SWAPPED_GREENS: Final = 2.5
 LEAST_LIGHT: Final = 0.01
 LEAST_BREAK_PX: Final = 8
@@ -130,6 +131,12 @@ def _level_doubts(samples: Samples, levels: Levels) -> list[str]:
     )
     top = (float(samples.max()) - black) / span
     found = [_above_white_doubt(samples, levels)]
+    apart = float(np.ptp(levels.black))
+    if levels.black.ndim == 2 and apart > BLACKS_APART * span:
+        found.append(
+            f"black levels of the cell lie {apart:g} apart: the black level is damaged "
+            "(--black-level says it)"
+        )
     if low > FAR_ABOVE_BLACK and high - low > LEAST_CONTRAST:
         found.append(
             f"{NOTHING_DARK} {low:.0%} of the range above black {black:g}: fog, "

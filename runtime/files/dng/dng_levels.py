@@ -106,7 +106,7 @@ def black_map(
         (DELTA_H, "BlackLevelDeltaH", right - left, offset[1], shape[1]),
     ):
         values = np.array(numbers_of(picture.directory, tag))
-        fits = len(values) == whole and bool(np.isfinite(values).all())
+        fits = 0 < values.size == whole and bool(np.isfinite(values).all())
         if values.size and not fits:
             notes.append(
                 f"{name} has {len(values)} values for {whole}, or one that is no number: the "

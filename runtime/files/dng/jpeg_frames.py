@@ -73,6 +73,6 @@ def _frame(file: BinaryIO, offset: int) -> tuple[int, int, int] | None:
             if len(body) < 6:
                 return None
             _, height, width, planes = struct.unpack(">BHHB", body)
-            return (height, width, planes) if width and planes else None
+            return (height, width, planes) if height * width * planes else None
         file.seek(max(length - 2, 0), 1)
     return None

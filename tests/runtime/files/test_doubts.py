@@ -182,3 +182,10 @@ def test_a_rim_without_light_is_named(side):
 def test_pictures_too_small_to_judge_raise_no_doubt():
     noise = np.random.default_rng(0).integers(0, 60000, (LEAST_SIDE_PX - 2, 200)).astype(np.uint16)
     assert find_doubts(noise, levels(), "RGGB") == []
+
+
+def test_one_black_of_a_cell_far_from_the_others_is_named():
+    odd = Levels(black=np.array([[0, 256], [256, 256]], dtype=np.float32), white=WHITE)
+    assert any("lie 256 apart" in doubt for doubt in find_doubts(photograph(), odd, "RGGB"))
+    near = Levels(black=np.array([[250, 256], [262, 256]], dtype=np.float32), white=WHITE)
+    assert find_doubts(photograph(), near, "RGGB") == []
