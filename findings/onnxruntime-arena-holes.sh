@@ -5,11 +5,11 @@
 # Valid input: a U-Net of three levels, 16 channels at full size, window 768x768, made here.
 # Behaviour: with the arena (the default) the peak of the process rises by about 2.3 times what the
 #   tensors need that are alive together, because tensors of many sizes leave holes. Without the
-#   arena, with memory patterns and arrays that glibc maps one by one, it rises by about 1.1 times.
+#   arena, with memory patterns and arrays that glibc maps one by one, it rises by about 1.2 times.
 #   A cap computed from live tensors does not hold with the default.
 # Output seen:
-#   arena    rose by OUT_ARENA MB
-#   pattern  rose by OUT_PATTERN MB
+#   arena    rose by 338 MB
+#   pattern  rose by 177 MB
 set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT

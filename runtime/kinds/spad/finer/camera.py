@@ -14,7 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from camkit.bundle.reader import Bundle
+from camkit.bundle.reader import Bundle, is_built_in
 from camkit.bundle.sensor import SpadSensor
 from camkit.bundle.stages import Sharpen, SuperResolve
 from camkit.caller import option_text
@@ -208,9 +208,12 @@ class FineCamera:
             if size not in self._engines:
                 facts = self.bundle.network_facts(self.stage.role, size)
                 data = self.bundle.network_bytes(self.stage.role, size)
-                check_graph(data, facts)
+                found = check_graph(data, facts)
                 self._engines[size] = NetworkEngine(
-                    data, threads=self.threads, scale=facts.output_scale
+                    data,
+                    threads=self.threads,
+                    scale=facts.output_scale,
+                    block_bytes=None if is_built_in(self.bundle) else found.block_bytes_per_pixel,
                 )
             return self._engines[size]
 
