@@ -29,12 +29,12 @@ from camkit.field_types import check_value
 from camkit.kinds import Kind, find_kind
 from camkit.runtime.cancel import Cancel, cancellable
 from camkit.runtime.capture import Capture, MosaicOptions
+from camkit.runtime.face.keywords import LoadKeywords
 from camkit.runtime.files.in_memory import FilePath, Source, stored
 from camkit.runtime.job.choices import check_choices
 from camkit.runtime.job.reconstruction import Reconstruction, check_out
 from camkit.runtime.job.setup import Setup
 from camkit.runtime.job.stream import Stream
-from camkit.runtime.keywords import LoadKeywords
 from camkit.runtime.kind import kind_without_bundle, part_of, runtime_part
 from camkit.runtime.maker import Made, Maker, Making
 from camkit.runtime.network.engine import NetworkEngine, available_threads

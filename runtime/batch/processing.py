@@ -18,8 +18,8 @@ from camkit.runtime.batch.tasks import NO_BUNDLE, Task, list_tasks
 from camkit.runtime.cancel import Cancel
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.development import FileResult, WriteOptions
+from camkit.runtime.face.keywords import ProcessKeywords
 from camkit.runtime.files.in_memory import FilePath, list_paths
-from camkit.runtime.keywords import ProcessKeywords
 from camkit.runtime.kind import kind_without_bundle
 from camkit.runtime.options import (
     LEAST_MAX_MEM_BYTES,

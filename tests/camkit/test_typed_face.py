@@ -16,7 +16,7 @@ from camkit.cli.app import run
 from camkit.field_types import check_value
 from camkit.kinds import KINDS
 from camkit.runtime.development import WriteOptions
-from camkit.runtime.keywords import KindKeywords, LoadKeywords, ProcessKeywords
+from camkit.runtime.face.keywords import KindKeywords, LoadKeywords, ProcessKeywords
 from camkit.runtime.options import Options
 from tests.bundle_factory import write_tiny_bundle
 from tests.capture_factory import write_tiny_captures

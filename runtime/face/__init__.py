@@ -1,0 +1,1 @@
+"""What type checkers see of `camkit.load` and `camkit.process`: their keywords."""
