@@ -26,6 +26,8 @@ FLAGS: Final = {
     "max_mem_bytes": "--max-mem",
     "cfa": "--mosaic",
     "times_s": "--times",
+    "darks": "--dark",
+    "flats": "--flat",
     "first": "--fine-tune",
 }
 """Options whose flag is not their name."""

@@ -129,7 +129,7 @@ def measure_sensor(
         DecodeError: If files do not come in pairs, a frame cannot be read or used, or an ISO lacks
             its darks or flats.
     """
-    dark_paths, flat_paths = in_pairs(darks, "dark"), in_pairs(flats, "flat")
+    dark_paths, flat_paths = in_pairs(darks, "darks"), in_pairs(flats, "flats")
     reader = PairReader(mosaic, iso)
     dark_pairs = _by_iso(reader.dark(paths) for paths in dark_paths)
     means = {at: _means(pairs) for at, pairs in dark_pairs.items()}
