@@ -32,7 +32,7 @@ def white_xyz(white: Chromaticity) -> Matrix:
 
 
 def rgb_to_xyz(primaries: tuple[Chromaticity, ...], white: Chromaticity) -> Matrix:
-    """Give the (3, 3) matrix from linear RGB to XYZ for the primaries and white point.
+    """Return the (3, 3) matrix from linear RGB to XYZ for the primaries and white point.
 
     Primaries may lie outside all colours, with y of 0 as those of XYZ itself; the white may not.
     """

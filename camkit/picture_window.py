@@ -1,4 +1,4 @@
-"""Where the pixels of a file lie in a larger picture, and the shape of its pixels (OpenEXR).
+"""Place of the pixels of a file in a larger picture, and the shape of its pixels (OpenEXR).
 
 Reference: OpenEXR, "Technical Introduction" (data window, display window, pixel aspect ratio).
 """
@@ -30,7 +30,7 @@ class PictureWindow:
 
     @property
     def is_whole(self) -> bool:
-        """Tell whether the data are the whole display."""
+        """Return whether the data are the whole display."""
         return self.data == self.display
 
     @property

@@ -5,7 +5,7 @@
 #
 # Met with: periods of 25 ns in 16 to 399 bins, photons in bin 7 alone.
 # Seen: "bins of the image: 8", and "one bin too few for 25 of 384 periods" (26, 51, 52, 53, 97, ...).
-# camkit takes the period over the bin width, rounded (tests/runtime/kinds/spad/files/test_axes.py).
+# What the product does: the period over the bin width, rounded (tests/runtime/kinds/spad/files/test_axes.py).
 set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT

@@ -108,7 +108,7 @@ class Painter:
     def light_up(
         self, planes: FloatArray, clipped: Mask, top: int, gains: tuple[float, ...]
     ) -> None:
-        """Put lights in colours of their own into rows of a cleared picture, in place.
+        """Paint lights in colours of their own into rows of a cleared picture, in place.
 
         Args:
             planes: As `paint`; see `rims.colour_by_surroundings` for the rows.

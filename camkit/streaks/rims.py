@@ -75,7 +75,7 @@ def no_brighter(lit: FloatArray, seen: FloatArray, near: Mask) -> None:
 
 
 def colour_by_surroundings(planes: FloatArray, clipped: Mask, lit: Mask) -> None:
-    """Give pixels beside clipped samples the colour of what lies around, in place.
+    """Paint pixels beside clipped samples in the colour of what lies around, in place.
 
     Args:
         planes: (3, h, w) balanced, before lights are put in; rows within `MARGIN_PX` of a cut are

@@ -66,7 +66,7 @@ def _is_unreachable(path: Path) -> bool:
 
 
 def is_result(path: Path) -> bool:
-    """Tell whether the sidecar of a picture calls it an output."""
+    """Return whether the sidecar of a picture calls it an output."""
     record = read_sidecar(path)
     if record is None:
         return False

@@ -135,7 +135,7 @@ def _level_doubts(samples: Samples, levels: Levels) -> list[str]:
     if levels.black.ndim == 2 and apart > BLACKS_APART * span:
         found.append(
             f"black levels of the cell lie {apart:g} apart: the black level is damaged "
-            "(--black-level says it)"
+            f"({option_text('black_level')} says it)"
         )
     if low > FAR_ABOVE_BLACK and high - low > LEAST_CONTRAST:
         found.append(
@@ -303,7 +303,7 @@ def _noise_doubt(cells: Cells) -> str:
 
 
 def _noise_share(cells: Cells) -> float:
-    """Give the share of bands in which a cell has nothing in common with those beside it."""
+    """Return the share of bands in which a cell has nothing in common with those beside it."""
     half, step = cells.shape[1] // 2, max(1, cells.shape[1] // 512)
     noisy = []
     for top in range(0, len(cells) - _BAND_CELLS + 1, _BAND_CELLS):

@@ -104,7 +104,7 @@ def _with_tags(
 
 
 def _cfa(raw: Any) -> CfaPattern | None:
-    """Give the 2x2 cell at the first visible pixel; None if the file is no 2x2 mosaic."""
+    """Return the 2x2 cell at the first visible pixel; None if the file is no 2x2 mosaic."""
     import rawpy
 
     pattern = raw.raw_pattern
@@ -127,7 +127,7 @@ def _black_level(raw: Any, cfa: CfaPattern | None) -> NDArray[np.float32]:
 
 
 def _levels(raw: Any, cfa: CfaPattern | None, said: MosaicOptions) -> raw_checks.Levels:
-    """Give the levels of the file where the caller says no others."""
+    """Return the levels of the file where the caller says no others."""
     black, white = _black_level(raw, cfa), float(raw.white_level)
     if said.black_level is not None:
         black = np.full_like(black, said.black_level)
@@ -137,7 +137,7 @@ def _levels(raw: Any, cfa: CfaPattern | None, said: MosaicOptions) -> raw_checks
 
 
 def _masked(raw: Any) -> list[NDArray[Any]]:
-    """Give the areas left of and above the picture, which see no light; not their rims."""
+    """Return the areas left of and above the picture, which see no light; not their rims."""
     import rawpy
 
     if raw.raw_type != rawpy.RawType.Flat:
@@ -154,7 +154,7 @@ def _samples(
     notes: list[str],
     said: MosaicOptions,
 ) -> tuple[NDArray[Any], raw_checks.Levels]:
-    """Give the samples, as far as possible in LibRaw's own memory, and their levels."""
+    """Return the samples, as far as possible in LibRaw's own memory, and their levels."""
     import rawpy
 
     stacked = raw.raw_type == rawpy.RawType.Stack
@@ -173,7 +173,7 @@ def _samples(
 def develop_linear(
     raw: Any, notes: list[str], said: MosaicOptions = NOTHING_SAID
 ) -> tuple[NDArray[Any], raw_checks.Levels]:
-    """Let LibRaw demosaic what is no Bayer mosaic (X-Trans, sRAW, four colours).
+    """Demosaic with LibRaw what is no Bayer mosaic (X-Trans, sRAW, four colours).
 
     Returns:
         (3, h, w) uint16 in camera space without white balance, and black 0, white 65535.

@@ -120,7 +120,7 @@ def _grey_notes(path: Path, samples: NDArray[Any]) -> list[str]:
 
 
 def _is_mosaic(samples: NDArray[Any]) -> bool:
-    """Tell whether neighbours differ more than next neighbours do, both ways and always alike."""
+    """Return whether neighbours differ more than next neighbours do, both ways and always alike."""
     top, left = (max(0, (side - _TESTED_PX) // 4 * 2) for side in samples.shape)
     middle = samples[top : top + _TESTED_PX, left : left + _TESTED_PX].astype(np.float32)
     if min(middle.shape) < 3:

@@ -32,7 +32,7 @@ _BASELINE_EXPOSURE: Final = 50730
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RawDecode:
-    """What a decoder made of a file.
+    """Result of a decoder.
 
     Attributes:
         samples: (h, w) mosaic or (3, h, w) planes, which may be one plane seen three times.

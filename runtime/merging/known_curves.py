@@ -17,8 +17,8 @@ from camkit.runtime.merging.response import Response, response_of, srgb_response
 
 GAMMAS: Final = (1.0, 3.0)
 MOST_MISFIT_CODES: Final = 0.75
-"""What rounding leaves: JPEGs of sRGB at most 0.57 with a noise of one code, other curves 1.4 and
-more (tests/runtime/merging/test_known_curves.py)."""
+"""Residual that rounding leaves: JPEGs of sRGB at most 0.57 with a noise of one code, other curves
+1.4 and more (tests/runtime/merging/test_known_curves.py)."""
 _BIN_CODES: Final = 8
 _LEAST_SAMPLES: Final = 50
 

@@ -59,7 +59,7 @@ class _Block:
         self.top = max(self.top, start + size)
 
     def rename(self, old: str, new: str) -> None:
-        """Let a tensor take the place of one that nobody needs any more."""
+        """Reuse memory: a tensor takes the place of one that nobody needs any more."""
         self.places[new] = self.places.pop(old)
 
 

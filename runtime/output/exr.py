@@ -75,7 +75,7 @@ class ExrWriter(PictureWriter):
         return OpenEXR.OutputFile(str(self.path), header)
 
     def _place(self, header: Any) -> None:
-        """Put the pixels where those of the capture lie, as far as they are still the same."""
+        """Place the pixels where those of the capture lie, as far as they are still the same."""
         window = self.picture.origin.window
         same = window is not None and window.size_px == self.picture.file_size
         if window is None or not same or self.picture.orientation != UPRIGHT:

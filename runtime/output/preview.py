@@ -50,7 +50,7 @@ class Averages:
         self._waiting = rows[:, count * self._step_y :].copy()
 
     def planes(self) -> FloatArray:
-        """Give (c, h, w) float32 of what has come, at most `longest_px` each way."""
+        """Return (c, h, w) float32 of what has come, at most `longest_px` each way."""
         return np.concatenate(self._made, axis=1)
 
     def _shrunk(self, plane: NDArray[Any], rows: int) -> FloatArray:

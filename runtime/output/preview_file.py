@@ -1,4 +1,4 @@
-"""Where the tone-mapped preview of a picture lies, and what it takes; free of what makes it."""
+"""Place and memory of the tone-mapped preview of a picture; free of what makes it."""
 
 from pathlib import Path
 from typing import Final

@@ -39,7 +39,7 @@ NAMES_OF_FILES = {
     "models_def/kinds/bayer/fine_tuning/pairs.py": "keys of a TOML",
     "camkit/bundle/sensor.py": "a key of the manifest",
 }
-"""Where a message names what has the name of an option and is none."""
+"""Files in which a message names what has the name of an option and is none."""
 
 
 @cache
@@ -168,7 +168,8 @@ def test_an_option_with_its_value_is_what_the_caller_can_write(
 
 
 def test_names_of_the_two_languages_are_names_of_options() -> None:
-    assert set(FLAGS) - {"cfa", "times_s", "first", "darks", "flats"} <= set(Options.__dataclass_fields__)
+    elsewhere = {"cfa", "times_s", "first", "darks", "flats"}
+    assert set(FLAGS) - elsewhere <= set(Options.__dataclass_fields__)
     assert set(PARAMETERS) == set(camkit.MosaicOptions.__dataclass_fields__)
 
 
@@ -181,7 +182,7 @@ def test_a_thread_may_speak_another_language_than_its_process() -> None:
 
 
 def _refused(folder: Path) -> dict[str, Callable[[], object]]:
-    """Give calls that are refused, by the arguments of the command that is refused alike."""
+    """Return calls that are refused, by the arguments of the command that is refused alike."""
     tiny, crop = folder / "tiny.camkit", folder / "crop.png"
     a = folder / "a.dng"
     cv2.imwrite(str(crop), np.full((16, 24, 3), 90, np.uint8))

@@ -1,4 +1,4 @@
-"""What a type checker refuses of a foreign program is refused at run time too, and the reverse."""
+"""A type checker refuses of a foreign program what run time refuses, and the reverse."""
 
 import json
 import subprocess
@@ -76,7 +76,7 @@ WRONG_TO_WRITE: dict[str, dict[str, Any]] = {
 
 
 def _check(folder: Path, program: str) -> tuple[int, str]:
-    """Give exit code and output of a strict type checker that sees camkit as a library."""
+    """Return exit code and output of a strict type checker that sees camkit as a library."""
     (folder / "program.py").write_text(program)
     done = subprocess.run(
         [
@@ -175,7 +175,7 @@ def test_numbers_of_any_library_are_numbers(choices: dict[str, Any], tmp_path: P
 
 
 def _captures(folder: Path) -> dict[str, tuple[Path | None, Path]]:
-    """Give a bundle and a capture of each kind of camera and of each way to make its picture."""
+    """Return a bundle and a capture of each kind of camera and of each way to make its picture."""
     tiny = write_tiny_captures(folder, ["a"])
     found: dict[str, tuple[Path | None, Path]] = {
         "bayer": (tiny, folder / "a.dng"),

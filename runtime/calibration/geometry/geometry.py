@@ -301,7 +301,7 @@ def _check_focal(chosen: Judged) -> None:
 
 
 def _held_notes(found: Determined, size: tuple[int, int]) -> list[str]:
-    """Say what the pictures do not determine, and what stands for it."""
+    """Return what the pictures do not determine, and what stands for it."""
     notes = []
     if "centre_px" in found.undetermined:
         x, y = found.chosen.fit.camera.centre_px

@@ -39,7 +39,7 @@ _FISHEYE_MIDDLE: Final = Model(name="fisheye_middle", free=(), fisheye=True)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Nominal:
-    """What is not fitted.
+    """Reasons why something is not fitted.
 
     Attributes:
         centre: Whether the optical centre is held at the middle of the picture; then nothing is

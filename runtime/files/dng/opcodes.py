@@ -78,7 +78,7 @@ def field_gains(picture: DngPicture) -> tuple[FieldGains, list[str]]:
 
 
 def _opcodes(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """Give number and data of each opcode.
+    """Return number and data of each opcode.
 
     Raises:
         DecodeError: If the list ends early or claims more than can be.

@@ -54,23 +54,23 @@ class ColorSpace:
 
     @property
     def is_rec709(self) -> bool:
-        """Tell whether its primaries and white are those of Rec.709."""
+        """Return whether its primaries and white are those of Rec.709."""
         return bool(np.abs(self.to_rec709 - np.eye(3)).max() < _MATRIX_ERROR)
 
     @property
     def is_srgb(self) -> bool:
-        """Tell whether its codes are those of sRGB, within what no eye sees."""
+        """Return whether its codes are those of sRGB, within what no eye sees."""
         return self.means(SRGB)
 
     def means(self, other: "ColorSpace") -> bool:
-        """Tell whether its codes are those of another space of one curve; grey of any primaries."""
+        """Return whether its codes are those of a space of one curve; grey of any primaries."""
         if self.tables is not None:
             return False
         alike = np.abs(self.to_rec709 - other.to_rec709).max() < _MATRIX_ERROR
         return bool(alike or len(self.curves) == 1) and self.has_curve(other.curves[0])
 
     def has_curve(self, curve: Curve) -> bool:
-        """Tell whether every channel has a curve."""
+        """Return whether every channel has a curve."""
         wanted = curve(_TESTED)
         return all(np.abs(own(_TESTED) - wanted).max() < _CURVE_ERROR for own in self.curves)
 

@@ -1,4 +1,4 @@
-"""What every decoder of pictures gives."""
+"""Result of every decoder of pictures."""
 
 from dataclasses import dataclass
 from typing import Any

@@ -35,7 +35,7 @@ _PREFERRED: Final = ("rgba", "rgb", "beauty", "combined", "color", "colour")
 _WHOLE: Final = "samples are whole numbers (UINT), taken as light with 1 as white"
 _TOLERANCE: Final = 2e-3
 _DAMAGED: Final = (RuntimeError, ValueError, TypeError, KeyError, IndexError, AttributeError)
-"""What the package raises, depending on where the damage lies."""
+"""Errors that the package raises, depending on where the damage lies."""
 
 # OpenEXR.File prints its warnings; they must not land in stdout, which may carry JSON
 _lock = threading.Lock()

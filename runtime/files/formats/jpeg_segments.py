@@ -21,7 +21,7 @@ _START_OF_SCAN: Final = 0xDA
 _END: Final = 0xD9
 _FRAMES: Final = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 _OF_SCANS: Final = frozenset({0xC4, 0xCC, *range(0xDA, 0xE0), *range(0xE0, 0xF0), 0xFE})
-"""What may follow a scan: tables, the next scan, lines, restarts, applications, a comment."""
+"""Markers that may follow a scan: tables, next scan, lines, restarts, applications, comment."""
 _ARITHMETIC: Final = (0xC9, 0xCA)
 _MOST_PX_PER_BYTE: Final = 1024
 """Huffman codes take a bit or more of every block of 8x8 samples."""

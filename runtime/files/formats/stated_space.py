@@ -31,7 +31,7 @@ _UNIT: Final = 100_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StatedSpace:
-    """What a file states of its colours.
+    """Colours as a file states them.
 
     Attributes:
         space: None where it states nothing that can be honoured.

@@ -77,7 +77,7 @@ def _looked_up(indices: NDArray[Any], page: TiffPage) -> NDArray[np.uint8]:
 
 
 def is_lab(page: TiffPage) -> bool:
-    """Tell whether samples are Lab."""
+    """Return whether samples are Lab."""
     return page.photometric in (CIE_LAB, ICC_LAB)
 
 

@@ -109,7 +109,7 @@ class TiffPage:
 
     @property
     def is_planar(self) -> bool:
-        """Tell whether each sample has a plane of its own."""
+        """Return whether each sample has a plane of its own."""
         return self.number_of(284, 1) == 2 and self.samples > 1
 
     @property
@@ -148,7 +148,7 @@ def picture_page(tags: TiffTags) -> tuple[TiffPage, tuple[str, ...]]:
 
 
 def _is_beside(page: TiffPage) -> bool:
-    """Tell whether a page is marked as a reduced one or as a mask."""
+    """Return whether a page is marked as a reduced one or as a mask."""
     return bool(page.number_of(254, 0) & (_REDUCED | _MASK)) or page.number_of(255, 0) == (
         _OLD_REDUCED
     )

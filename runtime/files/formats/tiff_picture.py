@@ -47,7 +47,7 @@ _INSIDE_TIFFFILE: Final = (
         AttributeError,
     ),
 )
-"""What tifffile and its codecs raise of files that are damaged or of a kind that they lack."""
+"""Errors of tifffile and its codecs on files that are damaged or of a kind that they lack."""
 _COMPRESSIONS: Final = {
     2: "CCITT RLE",
     3: "CCITT group 3",

@@ -21,7 +21,7 @@ TIMES = {"three": (4.0, 1.0, 0.25), "five": (1.0, 0.5, 0.25, 0.125, 0.0625), "tw
 
 
 def _one_hue(y: FloatArray, x: FloatArray) -> FloatArray:
-    """Give colours of one ratio everywhere, whose codes a JPEG always rounds alike."""
+    """Return colours of one ratio everywhere, whose codes a JPEG always rounds alike."""
     light = 2.0 ** (-9 + 10 * x * (0.5 + 0.5 * y))
     return np.stack([light, 0.8 * light, 0.6 * light])
 
@@ -62,7 +62,7 @@ def _bracket(
 
 
 def _error(folder: Path, light: FloatArray, times_s: Sequence[float], quality: int) -> float:
-    """Give by what share the shadows of the merged light are wrong, in the median."""
+    """Return the median relative error of the shadows of merged light."""
     bracket = survey(_bracket(folder, light, times_s, quality=quality), times_s)
     merged = merge(bracket, choose_response(bracket, None)[0])
     shadows = (light * times_s[0] > 0.003) & (light * times_s[0] < 0.03)

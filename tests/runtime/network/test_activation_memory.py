@@ -28,7 +28,7 @@ from tests.small_network import small_network
 CAP_MB = 930
 SIZE_PX = 2400, 1600
 MORE_MB = 8
-"""What a run rises by besides: threads, tables."""
+"""Memory of a run besides: threads, tables."""
 
 
 def _child(*words: str) -> dict[str, float]:

@@ -14,7 +14,7 @@ from camkit.runtime.output.tone_mapping import ToneMappedPreview, tone_mapped
 
 
 def _night() -> FloatArray:
-    """Give (3, h, w) light over twenty stops, rising to the right."""
+    """Return (3, h, w) light over twenty stops, rising to the right."""
     x = np.linspace(-14, 6, 96, dtype=np.float32)
     return np.broadcast_to(2.0**x, (3, 64, 96)).astype(np.float32)
 

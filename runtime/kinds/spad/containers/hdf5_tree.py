@@ -22,12 +22,12 @@ SMALL_BYTES: Final = 1_000_000
 HEAP_BYTES: Final = 64_000_000
 """Of a file, beside its data sets, where text of any length is read from it."""
 REFERENCES: Final = "#refs#"
-"""Where MATLAB keeps the cells; whoever refers to them finds them."""
+"""Place in which MATLAB keeps the cells; whoever refers to them finds them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tree:
-    """What a file holds.
+    """Content of a file.
 
     Attributes:
         sets: Data sets by name.

@@ -1,4 +1,4 @@
-"""How much memory a variable of a MATLAB 5 file takes, found before it is read.
+"""Memory that a variable of a MATLAB 5 file takes, found before it is read.
 
 A file of some kilobytes may hold cells of gigabytes of zeros, packed, and cells in cells without an
 end. So every element of the variable is passed by in small pieces, and what it would unpack to is

@@ -17,7 +17,7 @@ BROKEN_HEADER: Final = (
     *(ValueError, SyntaxError, TypeError, KeyError, IndexError, AttributeError, OverflowError),
     *(RecursionError, MemoryError, EOFError, struct.error, tokenize.TokenError),
 )
-"""What numpy raises of headers that are damaged; it parses them as Python."""
+"""Errors that numpy raises for headers that are damaged; it parses them as Python."""
 
 
 def read_header(start: io.BytesIO, what: str) -> Header:

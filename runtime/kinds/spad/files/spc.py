@@ -32,7 +32,7 @@ MACRO_TICKS: Final = 4096
 LAST_ADC: Final = 4095
 ROUTINGS: Final = 16
 MICRO_BYTES: Final = 4
-"""What a photon takes while the parts are put together."""
+"""Bytes that a photon takes while the parts are put together."""
 MARKER: Final = np.uint32(1 << 28)
 OVERFLOW: Final = np.uint32(1 << 30)
 NO_PHOTON: Final = np.uint32(1 << 31)

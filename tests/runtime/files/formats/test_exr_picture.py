@@ -167,7 +167,7 @@ def test_chromaticities_that_cannot_be_are_refused(tmp_path, points):
 @pytest.mark.parametrize("origin", [(0, 0), (-4, 6)])
 @pytest.mark.parametrize("step", [1, 2])
 def test_luminance_and_chroma_become_colour(tmp_path, origin, step):
-    """What varies slowly comes back whole, since chroma is filled in linearly."""
+    """Light that varies slowly comes back whole, since chroma is filled in linearly."""
     ramp = np.linspace(0.4, 1.2, WIDE)[None, :] * np.linspace(0.7, 1, HIGH)[:, None]
     colour = np.array([0.9, 1.0, 0.7])[:, None, None] * np.ones((3, HIGH, WIDE))
     planes = (ramp * colour).astype(np.float32)
