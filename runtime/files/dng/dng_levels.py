@@ -22,6 +22,7 @@ DELTA_H: Final = 50715
 DELTA_V: Final = 50716
 WHITE: Final = 50717
 MAX_REPEAT: Final = 64
+MOST_LEVEL: Final = 2.0**32
 
 Floats = NDArray[np.float64]
 
@@ -105,7 +106,7 @@ def black_map(
         (DELTA_V, "BlackLevelDeltaV", bottom - top, offset[0], shape[0]),
         (DELTA_H, "BlackLevelDeltaH", right - left, offset[1], shape[1]),
     ):
-        values = np.array(numbers_of(picture.directory, tag))
+        values = _levels(picture, tag)
         fits = 0 < values.size == whole and bool(np.isfinite(values).all())
         if values.size and not fits:
             notes.append(
@@ -116,9 +117,16 @@ def black_map(
     return BlackMap(pattern=pattern, rows=added[0], columns=added[1]), notes
 
 
+def _levels(picture: DngPicture, tag: int) -> Floats:
+    """Return the numbers of a tag, NaN for those that no level can be."""
+    values = np.array(numbers_of(picture.directory, tag), dtype=np.float64)
+    values[~(np.abs(values) <= MOST_LEVEL)] = np.nan
+    return values
+
+
 def _pattern(picture: DngPicture) -> tuple[Floats, list[str]]:
     """Return (r, c, plane) BlackLevel from the first active pixel on, in scan order."""
-    values = np.array(numbers_of(picture.directory, BLACK), dtype=np.float64)
+    values = _levels(picture, BLACK)
     repeat = [int(n) for n in numbers_of(picture.directory, BLACK_REPEAT)]
     rows, cols = repeat if len(repeat) == 2 else (1, 1)
     planes = picture.planes
@@ -138,7 +146,7 @@ def _pattern(picture: DngPicture) -> tuple[Floats, list[str]]:
 
 def white_levels(picture: DngPicture) -> FloatArray:
     """Return (plane,) white: WhiteLevel, else 1 of float samples and all bits of others."""
-    stated = [n for n in numbers_of(picture.directory, WHITE) if np.isfinite(n) and n > 0]
+    stated = [n for n in numbers_of(picture.directory, WHITE) if 0 < n <= MOST_LEVEL]
     default = 1.0 if picture.is_float else 2.0 ** min(picture.bits, 32) - 1
     if len(stated) != picture.planes:
         stated = [max(stated, default=default)] * picture.planes
