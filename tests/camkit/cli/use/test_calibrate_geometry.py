@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from camkit.cli.exit_code import ExitCode
-from camkit.runtime.calibration.geometry.camera import MODELS
+from camkit.runtime.calibration.geometry.camera import MODELS, project
 from tests.runtime.calibration.geometry.board_factory import (
+    BOARD,
     Shot,
     camera_of,
     photograph,
@@ -127,3 +128,21 @@ def test_a_board_that_is_not_there_fails_the_input(camkit_command, pictures, tmp
     assert done.code == ExitCode.INPUT_FAILED
     assert "no picture shows a board of 9x6 inner corners" in done.err
     assert not (tmp_path / "c.toml").exists()
+
+
+def test_a_corner_file_takes_the_place_of_photographs(camkit_command, tmp_path: Path) -> None:
+    poses = poses_around(BARREL, SHOT.size, 5, seed=1)
+    pictures = [project(BARREL, pose, BOARD.points)[0].tolist() for pose in poses]
+    given, out = tmp_path / "corners.json", tmp_path / "camera.toml"
+    document = {"board": "7x5", "width_px": 400, "height_px": 300, "pictures": pictures}
+    given.write_text(json.dumps(document))
+    done = camkit_command("calibrate", "geometry", given, "--focal-px", 300, "-o", out, "--json")
+    assert done.code == 0, done.err
+    assert json.loads(done.out)["focal_px"] == pytest.approx(340, rel=0.01)
+    asked = ("-o", tmp_path / "other.toml")
+    wrong = camkit_command("calibrate", "geometry", given, "--board", "9x6", *asked)
+    assert wrong.code == ExitCode.USAGE
+    assert "holds corners of a board of 7x5, not 9x6" in wrong.err
+    lacking = camkit_command("calibrate", "geometry", tmp_path / "a.png", *asked)
+    assert lacking.code == ExitCode.USAGE
+    assert "--board is needed" in lacking.err
