@@ -62,7 +62,7 @@ UNFIT = {
     "machine": (OTHER_MACHINE, "is riscv64, this machine "),
     "folders": (OTHER_FOLDERS, "where the pictures go"),
     "disk": (FULL_DISK, "No space left on device"),
-    "memory": (None, "MB for files, one may take 930 MB: give it more or lower --max-mem"),
+    "memory": (None, "MB for files, one may take 930 MB: give it more or lower max_mem_bytes"),
 }
 
 
