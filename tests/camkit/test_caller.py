@@ -14,7 +14,15 @@ import pytest
 import typer
 
 import camkit
-from camkit.caller import FLAGS, PARAMETERS, language, option_text, speaking, speaking_here
+from camkit.caller import (
+    FLAGS,
+    PARAMETERS,
+    Language,
+    language,
+    option_text,
+    speaking,
+    speaking_here,
+)
 from camkit.cli.app import app, run
 from camkit.runtime.development import WriteOptions
 from camkit.runtime.options import Options
@@ -242,3 +250,28 @@ def test_notes_of_results_are_in_the_language_of_their_caller(
     assert run(["process", str(dark), "--bundle", "none", "--out-dir", str(out), "--json"]) == 0
     assert "(--white-level says it)" in capsys.readouterr().out
     assert "MosaicOptions" not in (out / "dark.camkit.json").read_text()
+
+
+def test_a_worker_of_a_cluster_speaks_as_the_caller_of_its_run() -> None:
+    from camkit.runtime.batch.cluster.remote import Needs, look
+
+    class Worker:
+        """As much of a dask worker as `look` asks for: one without memory."""
+
+        local_directory = "nowhere"
+        state = type("State", (), {"nthreads": 1})
+        memory_manager = type("Manager", (), {"memory_limit": 1})
+
+    told = {}
+    for spoken in typing.get_args(Language):
+        needs = Needs(
+            run="r",
+            bundles=(),
+            file_bytes=10**9,
+            token=Path("token"),
+            sources=(),
+            language=spoken,
+        )
+        told[spoken], _ = look(needs, Worker())  # type: ignore[arg-type]
+    assert str(told["command"]).endswith("lower --max-mem")
+    assert str(told["python"]).endswith("lower max_mem_bytes")
