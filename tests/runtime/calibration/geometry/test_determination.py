@@ -33,7 +33,7 @@ def _seen(poses: FloatGrid, scatter_px: float, seed: int = 0, camera: Camera = L
 
 
 def _poses(tilts_deg: FloatGrid, places: FloatGrid, distances: FloatGrid) -> FloatGrid:
-    """Return poses by tilts about x and y, the place of the middle, and how far it is in squares."""
+    """Return poses by tilts about x and y, the place of the middle, and its distance in squares."""
     middle = POINTS.mean(axis=0)
     poses = []
     for tilt, place, away in zip(np.radians(tilts_deg), places, distances, strict=True):
@@ -44,7 +44,7 @@ def _poses(tilts_deg: FloatGrid, places: FloatGrid, distances: FloatGrid) -> Flo
 
 
 def _bent(poses: FloatGrid, bend: float, seed: int = 1) -> FloatGrid:
-    """Return corners of boards that are not flat, each bent otherwise: their scatter is no chance."""
+    """Return corners of boards that are each bent otherwise: their scatter is no chance."""
     rng, corners = np.random.default_rng(seed), []
     for pose in poses:
         x, y, _ = POINTS.T / 6
