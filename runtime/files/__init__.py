@@ -13,8 +13,7 @@ raw_decode    a decode, judged, as a capture
 raw_checks    refuses unbelievable decodes
 lone_pixels   hot or damaged pixels counted
 doubts        what of a decode is not likely, as notes
-row_order     rows that go on at another place
-tile_edges    tiles that break off
+order/        rows and tiles that broke off, from the samples
 white_level   white where the data contradict the file
 formats       EXR, TIFF, PNG, JPEG and Radiance HDR decoded, and their colour spaces
 picture       pictures as captures or scenes

@@ -21,9 +21,9 @@ from camkit.caller import option_text
 from camkit.contracts import CfaPattern
 from camkit.haze import Haze
 from camkit.runtime.capture import Capture
+from camkit.runtime.files.order.row_order import order_doubt
+from camkit.runtime.files.order.tile_edges import TileGrid, tile_doubt
 from camkit.runtime.files.raw_checks import Levels, Samples
-from camkit.runtime.files.row_order import order_doubt
-from camkit.runtime.files.tile_edges import TileGrid, tile_doubt
 
 ABOVE_WHITE: Final = 1.02
 ABOVE_WHITE_SHARE: Final = 2e-5

@@ -14,10 +14,10 @@ from camkit.runtime.files import raw_checks
 from camkit.runtime.files.dng import dng_checks
 from camkit.runtime.files.dng.applied_tags import SeenPixels, apply_tags
 from camkit.runtime.files.dng.picture_tags import DngPicture
+from camkit.runtime.files.order.tile_edges import TileGrid
 from camkit.runtime.files.raw_decode import RawDecode, stated_orientation
 from camkit.runtime.files.raw_metadata import raw_metadata
 from camkit.runtime.files.tiff_tags import TiffTags
-from camkit.runtime.files.tile_edges import TileGrid
 
 # LibRaw's flip has three bits (1 mirror columns, 2 mirror rows, 4 transpose); EXIF counts 1..8
 FLIP_TO_EXIF: Final = {0: 1, 1: 2, 2: 4, 3: 3, 4: 5, 5: 8, 6: 6, 7: 7}

@@ -15,9 +15,9 @@ from camkit.runtime.files.dng import dng_checks, white_point
 from camkit.runtime.files.dng.picture_tags import DngPicture, first_of
 from camkit.runtime.files.doubts import find_doubts
 from camkit.runtime.files.lone_pixels import count_lone
+from camkit.runtime.files.order.tile_edges import TileGrid
 from camkit.runtime.files.raw_checks import Levels
 from camkit.runtime.files.tiff_tags import TiffTags
-from camkit.runtime.files.tile_edges import TileGrid
 from camkit.runtime.files.white_level import believable_white, check_said_white
 from camkit.runtime.metadata import Metadata
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
-from camkit.runtime.files.dng.picture_tags import DngPicture, numbers_of
+from camkit.runtime.files.dng.picture_tags import DngPicture, numbers_of, whole_of
 
 BLACK_REPEAT: Final = 50713
 BLACK: Final = 50714
@@ -127,7 +127,7 @@ def _levels(picture: DngPicture, tag: int) -> Floats:
 def _pattern(picture: DngPicture) -> tuple[Floats, list[str]]:
     """Return (r, c, plane) BlackLevel from the first active pixel on, in scan order."""
     values = _levels(picture, BLACK)
-    repeat = [int(n) for n in numbers_of(picture.directory, BLACK_REPEAT)]
+    repeat = whole_of(picture.directory, BLACK_REPEAT)
     rows, cols = repeat if len(repeat) == 2 else (1, 1)
     planes = picture.planes
     if not values.size:

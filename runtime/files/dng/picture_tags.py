@@ -34,6 +34,12 @@ def first_of(directory: Directory, tag: int, default: float = 0.0) -> float:
     return value if math.isfinite(value) else default
 
 
+def whole_of(directory: Directory, tag: int) -> tuple[int, ...]:
+    """Return the numbers of a tag as whole ones; none if one of them is no number."""
+    values = numbers_of(directory, tag)
+    return tuple(int(n) for n in values) if all(math.isfinite(n) for n in values) else ()
+
+
 def octets_of(directory: Directory, tag: int) -> bytes:
     """Return the bytes of an opaque tag, which some programs store as numbers."""
     value = directory.get(tag, b"")
@@ -92,9 +98,9 @@ class DngPicture:
     @property
     def active_area(self) -> Rectangle:
         """Return the ActiveArea, or the whole picture where there is none that can be."""
-        area = numbers_of(self.directory, 50829)
-        if len(area) == 4 and all(math.isfinite(n) for n in area):
-            top, left, bottom, right = (int(n) for n in area)
+        area = whole_of(self.directory, 50829)
+        if len(area) == 4:
+            top, left, bottom, right = area
             if 0 <= top < bottom <= self.height and 0 <= left < right <= self.width:
                 return top, left, bottom, right
         return 0, 0, self.height, self.width
@@ -112,8 +118,8 @@ class DngPicture:
     @property
     def repeat(self) -> tuple[int, int]:
         """Return rows and columns of the cell of the CFA."""
-        size = numbers_of(self.directory, 33421)
-        return (int(size[0]), int(size[1])) if len(size) == 2 else (0, 0)
+        size = whole_of(self.directory, 33421)
+        return (size[0], size[1]) if len(size) == 2 else (0, 0)
 
 
 def sensor_picture(tags: TiffTags) -> DngPicture | None:

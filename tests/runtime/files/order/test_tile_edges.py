@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from camkit.runtime.files.doubts import find_doubts
-from camkit.runtime.files.tile_edges import TileGrid
-from tests.runtime.files.test_row_order import LEVELS, PATTERNS, mosaic_of, photograph
+from camkit.runtime.files.order.tile_edges import TileGrid
+from tests.runtime.files.order.test_row_order import LEVELS, PATTERNS, mosaic_of, photograph
 
 GRID = TileGrid(size=(10_000, 100), first=(0, 0))
 
