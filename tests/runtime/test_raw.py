@@ -271,7 +271,7 @@ def test_missing_and_empty_files_are_refused(tmp_path):
 
 
 def test_a_pattern_for_a_raw_file_is_refused(scene):
-    with pytest.raises(ContractError, match="omit MosaicOptions.cfa"):
+    with pytest.raises(ContractError, match=r"omit MosaicOptions.cfa"):
         read_capture(scene[0], mosaic=MosaicOptions(cfa="RGGB", black_level=0, white_level=1))
 
 
@@ -398,7 +398,7 @@ def test_the_headerless_nokia_mosaic_decodes_with_its_options():
     capture = read_capture(path, mosaic=options)
     assert (capture.samples.shape, capture.samples.max()) == ((1968, 2592), 959)
     assert (capture.cfa, capture.white_level) == ("GRBG", 1023)
-    with pytest.raises(DecodeError, match="MosaicOptions.cfa"):
+    with pytest.raises(DecodeError, match=r"MosaicOptions.cfa"):
         read_capture(path)
 
 

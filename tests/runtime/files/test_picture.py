@@ -131,7 +131,7 @@ def test_a_headerless_mosaic_needs_its_options_and_then_takes_them(tmp_path):
     mosaic = planes_of(np.uint16, 1000)[0]
     write_png(tmp_path / "x.png", mosaic)
     with pytest.raises(
-        DecodeError, match="MosaicOptions.cfa=.RGGB. with MosaicOptions.black_level"
+        DecodeError, match=r"MosaicOptions.cfa=.RGGB. with MosaicOptions.black_level"
     ):
         read_capture(tmp_path / "x.png")
     capture = read_capture(tmp_path / "x.png", mosaic=OPTIONS)
@@ -148,7 +148,7 @@ def test_mosaic_options_that_contradict_the_file_are_refused(tmp_path):
     with pytest.raises(DecodeError, match="levels"):
         read_mosaic(tmp_path / "8.png", OPTIONS)
     write_png(tmp_path / "16.png", planes_of(np.uint16, 60000)[0])
-    with pytest.raises(DecodeError, match="MosaicOptions.white_level"):
+    with pytest.raises(DecodeError, match=r"MosaicOptions.white_level"):
         read_mosaic(tmp_path / "16.png", OPTIONS)
 
 

@@ -39,5 +39,5 @@ def test_pure_noise_keeps_its_white_and_is_refused_later():
 
 def test_a_white_of_the_caller_that_the_data_contradict_is_refused_by_name():
     check_said_white(photograph(), 4095.0)
-    with pytest.raises(DecodeError, match="MosaicOptions.white_level=600 "):
+    with pytest.raises(DecodeError, match=r"MosaicOptions.white_level=600 "):
         check_said_white(photograph(), 600.0)

@@ -312,7 +312,7 @@ def test_what_means_nothing_is_refused(
 
 def test_counts_have_no_depth(tmp_path: Path) -> None:
     np.savez(tmp_path / "a.npz", counts=np.ones((4, 4)))
-    with pytest.raises(ContractError, match="this capture holds counts alone; say product=.int"):
+    with pytest.raises(ContractError, match=r"this capture holds counts alone; say product=.int"):
         camkit.load(None, kind="spad", product="depth").make(tmp_path / "a.npz")
 
 
