@@ -320,8 +320,8 @@ def _focal_text(found: Determined) -> str:
         return f"it is held at its nominal {focal_px:g} px; tilt the board by 20 degrees or more"
     return (
         f"{focal_px:.0f} px explains them best, with a standard error of {found.focal_error:.0%} "
-        f"by leaving out one after the other; give the nominal one ({option_text('focal_px')}), or tilt "
-        "the board by 20 degrees or more"
+        "by leaving out one after the other; give the nominal one "
+        f"({option_text('focal_px')}), or tilt the board by 20 degrees or more"
     )
 
 
