@@ -52,7 +52,7 @@ def test_a_unit_without_a_name_has_that_of_its_file(tmp_path: Path) -> None:
         (f'bundle_sha256 = "{HASH}"\n[facts]\na = "b"', r"facts\.a must be a number; got 'b'"),
         (f'bundle_sha256 = "{HASH}"\n[facts]\na = true', r"facts\.a must be a number; got True"),
         (f'lens_sha256 = "{HASH}"\n[facts]\na = 1{"0" * 400}', r"facts\.a must be a number"),
-        ("no toml at all", "is no TOML"),
+        ("no toml at all", "is not valid TOML"),
     ],
 )
 def test_what_is_no_unit_is_refused(tmp_path: Path, text: str, message: str) -> None:

@@ -221,7 +221,7 @@ def test_what_is_no_toml_is_refused(tmp_path: Path) -> None:
     with pytest.raises(DecodeError, match="cannot read"):
         read_source(path)
     path.write_bytes(b"\xff\xfe = [")
-    with pytest.raises(DecodeError, match="is no TOML"):
+    with pytest.raises(DecodeError, match="is not valid TOML"):
         read_source(path)
 
 
