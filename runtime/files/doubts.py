@@ -34,6 +34,7 @@ FAR_ABOVE_BLACK: Final = 0.08
 NOTHING_DARK: Final = "nothing is darker than"
 LEAST_CONTRAST: Final = 0.2
 FAR_BELOW_BLACK: Final = 0.02
+BELOW_BLACK: Final = 0.005
 NEVER_BRIGHT: Final = 0.03
 MASKED_SPREAD: Final = 0.01
 MASKED_OFFSET: Final = 0.005
@@ -142,7 +143,13 @@ def _level_doubts(samples: Samples, levels: Levels) -> list[str]:
             f"{NOTHING_DARK} {low:.0%} of the range above black {black:g}: fog, "
             f"optics with a haze, or a damaged black level ({option_text('black_level')} says it)"
         )
-    if low < -FAR_BELOW_BLACK:
+    middle, least = float(np.median(_thinned(samples))), float(levels.black.min())
+    if middle < least - BELOW_BLACK * span:
+        found.append(
+            f"half of the samples lie at or below {middle:g}, black is {least:g}: the black level "
+            "or the pixel data are damaged (--black-level says it)"
+        )
+    elif low < -FAR_BELOW_BLACK:
         found.append(
             f"the darkest samples lie {-low:.0%} of the range below black {black:g}: the black "
             f"level or the pixel data are damaged ({option_text('black_level')} says it)"

@@ -189,3 +189,11 @@ def test_one_black_of_a_cell_far_from_the_others_is_named():
     assert any("lie 256 apart" in doubt for doubt in find_doubts(photograph(), odd, "RGGB"))
     near = Levels(black=np.array([[250, 256], [262, 256]], dtype=np.float32), white=WHITE)
     assert find_doubts(photograph(), near, "RGGB") == []
+
+
+def test_a_picture_that_lies_below_black_but_for_a_rim_is_named():
+    lost = np.full((256, 320), BLACK - 60, dtype=np.uint16)
+    lost[:, :4] = photograph()[:, :4]
+    assert any(
+        "half of the samples lie at" in doubt for doubt in find_doubts(lost, levels(), "RGGB")
+    )
