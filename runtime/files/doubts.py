@@ -147,7 +147,7 @@ def _level_doubts(samples: Samples, levels: Levels) -> list[str]:
     if middle < least - BELOW_BLACK * span:
         found.append(
             f"half of the samples lie at or below {middle:g}, black is {least:g}: the black level "
-            "or the pixel data are damaged (--black-level says it)"
+            f"or the pixel data are damaged ({option_text('black_level')} says it)"
         )
     elif low < -FAR_BELOW_BLACK:
         found.append(
