@@ -1,1 +1,1 @@
-"""What type checkers see of `camkit.load` and `camkit.process`: their keywords."""
+"""Types that checkers see of `camkit.load` and `camkit.process`: their keywords."""

@@ -23,7 +23,7 @@ from camkit.runtime.unit import Unit
 
 
 class KindKeywords(TypedDict, total=False):
-    """What the kinds of cameras that come with camkit add."""
+    """Options that the kinds of cameras that come with camkit add."""
 
     timing: str | PathLike[str] | None
     product: Literal["depth", "intensity", "transient", "lifetime"] | None

@@ -1,4 +1,4 @@
-"""What the tags of a RAW file say beyond LibRaw: noise profile, place, camkit's own.
+"""Facts that the tags of a RAW file state beyond LibRaw: noise profile, place, camkit's own.
 
 Nothing here raises on odd values: a tag that is missing or not believable becomes None.
 Tag numbers and meanings: DNG specification 1.7, chapter 4; Exif 2.32, section 4.6.

@@ -1,4 +1,4 @@
-"""What views determine of a camera; the rest is held at its nominal value.
+"""Parts of a camera that views determine; the rest is held at its nominal value.
 
     all free -> is the optical centre determined? the focal length? -> held where not -> again
 

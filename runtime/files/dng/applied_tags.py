@@ -1,4 +1,4 @@
-"""What the tags of a DNG do to decoded samples: levels, black of every pixel, gains, and notes.
+"""Effect of the tags of a DNG on decoded samples: levels, black of every pixel, gains, and notes.
 
 samples + tags -> black_map, masked_black, white_levels, field_gains -> Correction -> samples
 """

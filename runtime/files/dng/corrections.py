@@ -25,7 +25,7 @@ FULL: Final = 65535
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Correction:
-    """What the samples of a picture need before one black and one white hold for them.
+    """Corrections that samples of a picture need before one black and one white hold for them.
 
     Attributes:
         black: Black of every pixel.

@@ -1,4 +1,4 @@
-"""What the codes of a picture mean: a curve for each channel, then a matrix to Rec.709.
+"""Meaning of the codes of a picture: a curve for each channel, then a matrix to Rec.709.
 
 References: IEC 61966-2-1 (sRGB); Adobe RGB (1998) Color Image Encoding, 4.3; ITU-T H.273, tables 2
 and 3 (code points of primaries and curves); SMPTE EG 432-1 (P3); ITU-R BT.2020-2.

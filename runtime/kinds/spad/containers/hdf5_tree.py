@@ -1,4 +1,4 @@
-"""What an HDF5 file holds, found without following links and without reading any of it.
+"""Content of an HDF5 file, found without following links and without reading any of it.
 
 A file of some kilobytes may announce arrays, texts and packed pieces of any size, groups without an
 end, and groups that hold themselves; so depth and number are bounded here, and everything is

@@ -1,4 +1,4 @@
-"""What poor views determine, what is held in its place, and that good views are not touched."""
+"""Tests of what poor views determine and what is held, and that good views are not touched."""
 
 import json
 from pathlib import Path
