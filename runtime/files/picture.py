@@ -281,8 +281,9 @@ def _light_of_floats(path: Path, decoded: Decoded) -> FloatArray:
 def read_light(path: Path) -> FloatArray:
     """Read a sharp scene whose faint negative samples are taken as dark.
 
-    Noise and colours outside Rec.709 leave samples a little below 0 in linear files. What lies
-    deeper than `FAINT` of the brightest sample is no such thing and stays, for others to refuse.
+    Noise leaves samples a little below 0 in linear files, and colours outside Rec.709 are below 0
+    in its primaries alone. What lies deeper than `FAINT` of the brightest sample in the file's own
+    primaries is no such thing and stays, for others to refuse.
 
     Returns:
         (3, h, w) float32 linear Rec.709.
@@ -290,8 +291,9 @@ def read_light(path: Path) -> FloatArray:
     Raises:
         DecodeError: As `read_scene`.
     """
-    scene = read_scene(path)
-    if scene.min() >= -FAINT * scene.max():
+    scene, space = read_scene_and_space(path)
+    own = scene if space.is_rec709 else apply_matrix(np.linalg.inv(space.to_rec709), scene)
+    if own.min() >= -FAINT * own.max():
         np.maximum(scene, 0, out=scene)
     return scene
 

@@ -19,7 +19,7 @@ from camkit.runtime.files.formats.color_space import (
     REC2020_PRIMARIES,
 )
 from camkit.runtime.files.formats.icc_profile import PCS_WHITE
-from camkit.runtime.files.picture import read_picture, read_scene
+from camkit.runtime.files.picture import read_light, read_picture, read_scene
 from camkit.runtime.output.icc import SRGB_CURVE, _assemble, _curve, _text, _xyz
 from camkit.runtime.raw import read_capture
 from tests.data_folder import data_path
@@ -114,6 +114,14 @@ def test_profiles_are_honoured_as_littlecms_does(tmp_path, suffix, name):
     assert np.abs(encode_srgb(capture.linear_rows(0, 16)) - expected).max() < TWO_CODES
     assert np.abs(encode_srgb(read_scene(path)) - expected).max() < TWO_CODES
     assert any(name in note for note in capture.notes)
+
+
+@pytest.mark.parametrize("name", SPACES)
+def test_colours_outside_rec709_are_light_of_a_scene(tmp_path, name):
+    pure = np.kron(np.eye(3, dtype=np.uint8)[None] * 255, np.ones((8, 8, 1), np.uint8))
+    write(tmp_path / "pure.png", pure, profile_of(name))
+    scene = read_scene(tmp_path / "pure.png")
+    np.testing.assert_array_equal(read_light(tmp_path / "pure.png"), np.maximum(scene, 0))
 
 
 def test_the_adobe_rgb_jpeg_of_reports_has_the_colours_of_littlecms():
