@@ -7,11 +7,14 @@ DEV_STAMP := $(DEV)/.dev-installed
 FUZZ_SECONDS ?= 600
 SOURCES := camkit runtime export models_def tests tools setup.py
 
-.PHONY: demo test test-slow fuzz check format docs clean
+.PHONY: demo pictures test test-slow fuzz check format docs clean
 
 demo: $(RUNTIME_STAMP)  ## main job on the demo capture, runtime only (no torch)
 	$(VENV)/bin/python -m tools.hdr.gallery --out-dir out
 	$(VENV)/bin/python -m tools.demo --out-dir out
+
+pictures: $(RUNTIME_STAMP)  ## the pictures of the README and of docs/gallery.md
+	$(VENV)/bin/python -m tools.pictures.gallery --out-dir docs/images
 
 test: check  ## set-up with everything, gate, tests with branch coverage
 	$(DEV)/bin/python -m coverage erase

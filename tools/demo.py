@@ -12,39 +12,22 @@ import json
 import subprocess
 import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 import camkit
-from camkit.bundle.reader import Bundle, find_bundle, open_bundle
-from camkit.bundle.sensor import BayerSensor
-from camkit.colorimetry import apply_matrix, encode_srgb
+from camkit.bundle.reader import find_bundle, open_bundle
 from camkit.contracts import FloatArray
 from camkit.runtime.files.picture import read_scene
-from camkit.runtime.geometry.illumination import divide_illumination
-from camkit.runtime.network.engine import available_threads
-from camkit.runtime.signal.demosaic import demosaic
-from camkit.runtime.twin.simulate import (
-    Simulation,
-    SimulationOptions,
-    photograph,
-    write_capture,
-)
+from camkit.runtime.twin.simulate import Simulation, write_capture
 from camkit.scenes import procedural_scene
-from tools.capture.simulated import rec709_of
 from tools.pictures.captions import write_captioned
+from tools.pictures.crops import Place, crop_pictures, mosaic_sensor, psnr_db, take
 
 CROP_PX = 384
-MARGIN_PX = 96
-"""Margin that is processed around a crop: its borders look as in the whole picture then."""
 DETAIL = 3
 DETAIL_AT = (0.56, 0.5)
 """Top and left of what is shown `DETAIL` times as large, as shares of the photograph's crop."""
 BORDER_PX = 32
-EXPOSURE = 0.5
 FIELDS = (0.0, 0.25, 0.5, 0.75, 0.95)
 PHOTO = Path(__file__).parent / "scenes" / "coffee.png"
 """600x400, by Rachel Michetti, CC0; see scenes/README.md."""
@@ -72,14 +55,14 @@ def main() -> None:
     began = time.perf_counter()
 
     bundle = open_bundle(find_bundle(arguments.bundle))
-    sensor = _mosaic_sensor(bundle)
+    sensor = mosaic_sensor(bundle)
     width, height = sensor.width_px // 4 * 2, sensor.height_px // 4 * 2
     confetti = procedural_scene(arguments.seed, height, width)
     photo = read_scene(PHOTO)
     half_way = (width * 3 - photo.shape[2]) // 2, (height * 3 - photo.shape[1]) // 2
     taken = {
-        "confetti": _photograph(confetti, bundle, (width, height), arguments.iso),
-        "photo": _photograph(photo, bundle, half_way, arguments.iso),
+        "confetti": take(confetti, bundle, (width, height), iso=arguments.iso),
+        "photo": take(photo, bundle, half_way, iso=arguments.iso),
     }
     for name, simulation in taken.items():
         write_capture(out_dir / f"{name}.dng", simulation, sensor, bundle.manifest.name)
@@ -96,26 +79,6 @@ def main() -> None:
     _show_quality(taken, arguments.bundle, arguments.iso, picture)
     print(f"all of it in {time.perf_counter() - began:.0f} s")
     print(f"Open {picture} first.")
-
-
-def _photograph(
-    scene: FloatArray, bundle: Bundle, origin_px: tuple[int, int], iso: float
-) -> Simulation:
-    options = SimulationOptions(
-        iso=iso,
-        seed=1,
-        exposure=EXPOSURE,
-        origin_px=(origin_px[0] // 2 * 2, origin_px[1] // 2 * 2),
-        workers=available_threads(None),
-    )
-    return photograph(scene, bundle, options)
-
-
-def _mosaic_sensor(bundle: Bundle) -> BayerSensor:
-    sensor = bundle.manifest.sensor
-    if not isinstance(sensor, BayerSensor):
-        raise SystemExit(f"{bundle.manifest.name} has no mosaic; the demo shows cameras with one")
-    return sensor
 
 
 def _process(capture: Path, bundle: str, out_dir: Path, suffix: str) -> None:
@@ -151,18 +114,17 @@ def _show_quality(taken: dict[str, Simulation], name: str, iso: float, picture: 
     rows: dict[str, dict[str, FloatArray]] = {}
     for scene, field in (("photo", 0.5), *(("confetti", field) for field in FIELDS)):
         simulation = taken[scene]
-        height, width = simulation.samples.shape
         # the photograph lies half way out, and its middle is shown
-        x, y = (int((side - CROP_PX) * field) // 2 * 2 for side in (width, height))
-        *made, sharp = _crop(simulation, bundle, methods, (x, y), iso)
-        decibels = [_psnr(tile, sharp) for tile in made]
+        place = Place.along_diagonal(simulation.samples.shape, (CROP_PX, CROP_PX), field)
+        *tiles, sharp = crop_pictures(simulation, bundle, [*methods.values()], place, iso=iso)
+        decibels = [psnr_db(tile, sharp, BORDER_PX) for tile in tiles]
         print(f"{scene:<10}{field:<20.2f}" + "".join(f"{value:10.2f}" for value in decibels))
         captions = [f"{head}: {value:.2f} dB" for head, value in zip(heads, decibels, strict=True)]
-        tiles = dict(zip((*captions, "truth"), (*made, sharp), strict=True))
-        place = f"{100 * field:.0f} % of the way from the axis to the corner"
-        rows[f"{TITLES[scene]}, {place}"] = tiles
+        row = dict(zip((*captions, "truth"), (*tiles, sharp), strict=True))
+        way = f"{100 * field:.0f} % of the way from the axis to the corner"
+        rows[f"{TITLES[scene]}, {way}"] = row
         if scene == "photo":
-            enlarged = zip((*heads, "truth"), map(_detail, tiles.values()), strict=True)
+            enlarged = zip((*heads, "truth"), map(_detail, row.values()), strict=True)
             rows[f"Part of the same, {DETAIL} times as large"] = dict(enlarged)
     write_captioned(picture, HEADING.format(bundle=bundle.manifest, iso=iso), rows)
     print(f"\n{picture}: columns {', '.join(heads)}, truth; rows as in the table")
@@ -174,54 +136,6 @@ def _detail(tile: FloatArray) -> FloatArray:
     top, left = (int(share * tile.shape[1]) for share in DETAIL_AT)
     part = tile[:, top : top + side, left : left + side]
     return part.repeat(DETAIL, axis=1).repeat(DETAIL, axis=2)
-
-
-def _crop(
-    simulation: Simulation,
-    bundle: Bundle,
-    methods: dict[str, camkit.Pipeline],
-    corner: tuple[int, int],
-    iso: float,
-) -> list[FloatArray]:
-    """Return a crop as taken, by every method, and sharp; (3, CROP_PX, CROP_PX), sRGB values."""
-    x, y = corner
-    left, top = (max(first - MARGIN_PX, 0) for first in corner)
-    around = np.s_[top : y + CROP_PX + MARGIN_PX, left : x + CROP_PX + MARGIN_PX]
-    shown = np.s_[:, y - top : y - top + CROP_PX, x - left : x - left + CROP_PX]
-    mosaic = np.ascontiguousarray(simulation.samples[around])
-    x0, y0 = (int(v) for v in simulation.window.origin_px)
-    red, green, blue = simulation.white_balance
-    pictures = [_seen(mosaic, simulation, bundle, x0 + left, y0 + top)]
-    for pipeline in methods.values():
-        image = pipeline.process_array(
-            mosaic, iso=iso, white_balance=(red, green, blue), origin_px=(x0 + left, y0 + top)
-        )
-        pictures.append(image)
-    sharp = simulation.clean[..., y : y + CROP_PX, x : x + CROP_PX]
-    matrix = rec709_of(_mosaic_sensor(bundle))
-    tiles = (*(picture[shown] for picture in pictures), apply_matrix(matrix, sharp))
-    return [encode_srgb(tile) for tile in tiles]
-
-
-def _seen(
-    mosaic: NDArray[np.uint16], simulation: Simulation, bundle: Bundle, x: int, y: int
-) -> FloatArray:
-    """Give a crop demosaicked, white-balanced and without vignetting: what the lens saw."""
-    sensor = _mosaic_sensor(bundle)
-    height, width = mosaic.shape
-    window = replace(simulation.window, size_px=(width, height), origin_px=(float(x), float(y)))
-    signal = mosaic.astype(np.float32) - np.float32(sensor.black_level)
-    signal /= np.float32(sensor.white_level - sensor.black_level)
-    planes = demosaic(signal, sensor.cfa)
-    planes *= np.array(simulation.white_balance, np.float32)[:, None, None]
-    planes = divide_illumination(planes, 0, bundle.psf, window)
-    return apply_matrix(rec709_of(sensor), planes)
-
-
-def _psnr(image: FloatArray, sharp: FloatArray) -> float:
-    inside = np.s_[:, BORDER_PX:-BORDER_PX, BORDER_PX:-BORDER_PX]
-    error = float(np.mean((np.clip(image, 0, 1)[inside] - sharp[inside]) ** 2))
-    return float(-10 * np.log10(max(error, 1e-12)))
 
 
 if __name__ == "__main__":

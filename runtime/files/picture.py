@@ -292,7 +292,8 @@ def read_light(path: Path) -> FloatArray:
         DecodeError: As `read_scene`.
     """
     scene, space = read_scene_and_space(path)
-    own = scene if space.is_rec709 else apply_matrix(np.linalg.inv(space.to_rec709), scene)
+    from_rec709 = np.linalg.inv(space.to_rec709).astype(np.float64)
+    own = scene if space.is_rec709 else apply_matrix(from_rec709, scene)
     if own.min() >= -FAINT * own.max():
         np.maximum(scene, 0, out=scene)
     return scene

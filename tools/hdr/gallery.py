@@ -9,6 +9,7 @@ plate with its masks in a folder `plate`.
 """
 
 import argparse
+import math
 import subprocess
 import sys
 from importlib.util import find_spec
@@ -59,35 +60,19 @@ def show_gallery(name: str, out_dir: Path) -> None:
     """Write the gallery of a bundle, and print what was gained."""
     out_dir.mkdir(parents=True, exist_ok=True)
     bundle = open_bundle(find_bundle(name))
-    sensor = bundle.manifest.sensor
-    if not isinstance(sensor, BayerSensor):
-        raise SystemExit(f"{name} has no mosaic; the gallery shows cameras with one")
-    scene = named_scene(SCENE, *SIDES_PX)
-    found = exposure_for_share(scene, sensor, SHARE)
-    shot = photograph(
-        with_exposure(scene, found.exposure),
-        bundle,
-        SimulationOptions(seed=1, workers=available_threads(None)),
-    )
     dng = out_dir / "night.dng"
-    write_capture(dng, shot, sensor, bundle.manifest.name)
+    pictures = night_pictures(bundle, dng)
     camkit.process(dng, bundle=name, out_dir=out_dir, overwrite=True)
-    network = camkit.load(name)
-    pictures = {
-        "developed": camkit.load(None).process(dng).image,
-        "physics": camkit.load(name, method="physics").process(dng).image,
-        "network": network.process(dng).image,
-    }
-    truth = ideal_picture(shot, bundle)
     print(f"{dng}: {SCENE}, {SHARE:.1%} of the scene above white; linear PSNR at 2^8 times white")
     columns = {}
-    for title, picture in pictures.items():
-        decibels = _psnr_db(picture, truth)
-        print(f"  {title:<18}{decibels:6.2f} dB")
-        columns[f"{title}: {decibels:.2f} dB"] = picture
-    columns["truth"] = truth
+    for title, (picture, decibels) in pictures.items():
+        if title != "truth":
+            print(f"  {title:<18}{decibels:6.2f} dB")
+        columns[title if title == "truth" else f"{title}: {decibels:.2f} dB"] = picture
     camera = f"{bundle.manifest.name} {bundle.manifest.version}"
-    heading = HEADING.format(camera=camera, share=SHARE, size=network.size, ceiling=CEILING)
+    heading = HEADING.format(
+        camera=camera, share=SHARE, size=camkit.load(name).size, ceiling=CEILING
+    )
     write_captioned(out_dir / "night.png", heading, night_rows(columns))
     write_captioned(
         out_dir / "streaks.png",
@@ -97,6 +82,38 @@ def show_gallery(name: str, out_dir: Path) -> None:
     print(f"{out_dir / 'night.png'}: columns {', '.join(pictures)}, truth")
     if "plate.toml" in bundle.names:
         _draw_plate(name, out_dir / "plate")
+
+
+def night_pictures(bundle: Bundle, dng: Path) -> dict[str, tuple[FloatArray, float]]:
+    """Photograph the night with a camera, and restore it.
+
+    Args:
+        bundle: The camera.
+        dng: Where its capture is written.
+
+    Returns:
+        Way -> picture (3, h, w), linear Rec.709, and its PSNR in dB; "truth" is the last way.
+    """
+    sensor = bundle.manifest.sensor
+    if not isinstance(sensor, BayerSensor):
+        raise SystemExit(
+            f"{bundle.manifest.name} has no mosaic; the gallery shows cameras with one"
+        )
+    scene = named_scene(SCENE, *SIDES_PX)
+    found = exposure_for_share(scene, sensor, SHARE)
+    options = SimulationOptions(seed=1, workers=available_threads(None))
+    shot = photograph(with_exposure(scene, found.exposure), bundle, options)
+    write_capture(dng, shot, sensor, bundle.manifest.name)
+    truth = ideal_picture(shot, bundle)
+    pipelines = {
+        "developed": camkit.load(None),
+        "physics": camkit.load(bundle.path, method="physics"),
+        "network": camkit.load(bundle.path),
+    }
+    made = {way: pipeline.process(dng).image for way, pipeline in pipelines.items()}
+    return {way: (picture, _psnr_db(picture, truth)) for way, picture in made.items()} | {
+        "truth": (truth, math.inf)
+    }
 
 
 def _draw_plate(bundle: str, out_dir: Path) -> None:

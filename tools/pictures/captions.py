@@ -1,4 +1,4 @@
-"""Rows of pictures in one PNG, pixel for pixel, with a caption over each."""
+"""Rows of pictures in one PNG or JPEG, pixel for pixel, with a caption over each."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -12,6 +12,11 @@ from camkit.contracts import FloatArray
 from camkit.report.figure import new_figure, to_png
 
 GAP_PX: Final = 6
+JPEG: Final = (
+    *(cv2.IMWRITE_JPEG_QUALITY, 90),
+    *(cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444),
+)
+"""What OpenCV is told of a JPEG: colours as fine as brightness."""
 LEAST_TEXT_PX: Final = 12
 TEXT_SHARE: Final = 1 / 24
 """Size of the text as a share of a picture's width: 16 px over pictures of 384 px."""
@@ -24,7 +29,7 @@ def write_captioned(path: Path, heading: str, rows: Mapping[str, Mapping[str, Fl
     """Write rows of pictures under a heading; text lies in white strips, never on a picture.
 
     Args:
-        path: PNG.
+        path: PNG or JPEG.
         heading: Text above all rows; may hold line breaks.
         rows: Title -> caption -> (3, h, w) sRGB values in 0..1, all of one size.
 
@@ -49,7 +54,7 @@ def write_captioned(path: Path, heading: str, rows: Mapping[str, Mapping[str, Fl
     for left, upper, picture in tiles:
         pixels = (np.clip(picture, 0, 1) * 255 + 0.5).astype(np.uint8).transpose(1, 2, 0)
         page[upper : upper + height, left : left + width] = pixels[..., ::-1]
-    if not cv2.imwrite(str(path), page):
+    if not cv2.imwrite(str(path), page, JPEG):
         raise OSError(f"cannot write {path}")
 
 
