@@ -68,7 +68,12 @@ def test_every_runnable_block_runs_and_leaves_what_the_readme_says(tmp_path: Pat
         for old, new in STAND_IN.items():
             blocks = [(kind, text.replace(old, new)) for kind, text in blocks]
     printed = [_run(kind, text, tmp_path) for kind, text in blocks]
-    for name in ("out/shot.exr", "out/shot.camkit.json", "developed/shot.png", "out-python/shot.tif"):
+    for name in (
+        "out/shot.exr",
+        "out/shot.camkit.json",
+        "developed/shot.png",
+        "out-python/shot.tif",
+    ):
         assert (tmp_path / name).is_file(), name
     assert "['ok']" in printed[1]
 
