@@ -19,9 +19,9 @@ from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.rows import ArrayRows
 from tests.bundle_factory import make_model, make_weight
+from tests.network_bundle import write_network_bundle
 from tests.network_graphs import nafnet
 from tests.planes_bundle import facts_of
-from tests.runtime.network.test_activation_memory import write_network_bundle
 
 NODE = helper.make_node
 SIZE_PX = (64, 96)
@@ -265,7 +265,7 @@ def test_process_plan_and_check_of_a_camera_that_would_be_tiled_say_so(tmp_path:
     report = check_bundle(path, "tiling")
     assert not report.passed
     (layer,) = [one for one in report.layers if one.name == "tiling"]
-    assert "one window of the 2400x1600 px of the sensor takes about" in layer.message
+    assert "the 2400x1600 px of the sensor do not fit in one window: of the cap" in layer.message
 
 
 def test_a_small_camera_is_processed_in_one_window_and_its_plan_says_why(tmp_path: Path) -> None:
@@ -281,3 +281,17 @@ def test_a_small_camera_is_processed_in_one_window_and_its_plan_says_why(tmp_pat
     report = check_bundle(path, "tiling")
     assert report.passed
     assert "one window holds the 320x240 px of the sensor" in report.layers[-1].message
+
+
+@pytest.mark.parametrize("width", [1210, 1240, 1260, 1280, 1310])
+def test_check_passes_exactly_where_a_whole_picture_is_taken(tmp_path: Path, width: int) -> None:
+    path = write_network_bundle(tmp_path, {"M": nafnet()}, (width, 860))
+    pipeline = Pipeline(open_bundle(path), Options(threads=1))
+    capture = np.full((860, width), 500, np.uint16)
+    given = pipeline.capture_of(capture, iso=100, white_balance=None, origin_px=None)
+    try:
+        pipeline.start(given)
+        taken = True
+    except ContractError:
+        taken = False
+    assert check_bundle(path, "tiling").passed == taken
