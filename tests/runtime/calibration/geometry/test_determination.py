@@ -130,7 +130,7 @@ def _parallel(scatter_px: float, tilt_deg: float = 0.0) -> FloatGrid:
 @pytest.mark.parametrize("scatter_px", [0.0, 0.05, 0.3])
 def test_exactly_parallel_views_need_the_nominal_focal_length(scatter_px: float) -> None:
     corners = _parallel(scatter_px)
-    with pytest.raises(DecodeError, match="do not tell the focal length.* or give focal_px$"):
+    with pytest.raises(DecodeError, match=r"do not tell the focal length.* or give focal_px$"):
         _measured(corners)
     found = _measured(corners, LENS.focal_px)
     assert "focal_px" in found.undetermined
