@@ -116,9 +116,9 @@ def _held(
     if not fits:
         raise DecodeError("no camera explains the corners: the pictures are not of one flat board")
     found = _chosen([judge(fit, corners, points) for fit in fits], corners, size)
-    undetermined = ("centre_px",) if nominal.centre else ()
-    undetermined += ("focal_px",) if nominal.focal_px is not None else ()
-    return replace(found, undetermined=undetermined, nominal=nominal)
+    centre = ("centre_px",) if nominal.centre else ()
+    focal = ("focal_px",) if nominal.focal_px is not None else ()
+    return replace(found, undetermined=(*centre, *focal), nominal=nominal)
 
 
 def _is_open(judged: Judged, size: tuple[int, int]) -> bool:
