@@ -48,7 +48,7 @@ def check_iso(iso: Any) -> None:
     """
     known: Any = iso if isinstance(iso, Real) else math.nan
     if iso is not None and not 0 < known <= MAX_ISO:
-        raise ContractError(f"iso must be a number in 0..{MAX_ISO:g}; got {str(iso)[:20]}")
+        raise ContractError(f"iso must be a number in 0..{MAX_ISO:g}; got {repr(iso)[:20]}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

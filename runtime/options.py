@@ -117,6 +117,8 @@ class Options:
             raise ContractError(f"exposure must lie within -20..20 EV; got {self.exposure_ev}")
         if self.threads is not None and self.threads < 1:
             raise ContractError(f"threads must be >= 1; got {self.threads}")
+        if self.tile_px is not None and self.tile_px < 1:
+            raise ContractError(f"tiles have a side of at least 1 px; got {self.tile_px}")
         if self.max_mem_bytes is not None and self.max_mem_bytes < LEAST_MAX_MEM_BYTES:
             raise ContractError(
                 f"the memory cap must be at least {LEAST_MAX_MEM_BYTES // 10**6} MB; "

@@ -199,8 +199,10 @@ class Pipeline:
         Raises:
             DecodeError: If the file cannot be read.
             Cancelled: If `cancel` said so.
-            ContractError: If a place is given and the sensor has no size.
+            ContractError: If an argument is of another type, or a place is given and the sensor has
+                no size.
         """
+        check_value("mosaic", mosaic, MosaicOptions | None)
         manifest = None if self.bundle is None else self.bundle.manifest
         with cancellable(cancel), stored(file) as path:
             capture = self._part.read(path, mosaic, manifest)
@@ -462,7 +464,7 @@ class Pipeline:
             ContractError: If shape, type or size do not fit the bundle.
         """
         if self.bundle is None:
-            raise ContractError("process_array needs a bundle: it says what the numbers mean")
+            raise ContractError("an array needs a bundle: it says what the numbers mean")
         manifest = self.bundle.manifest
         return self._part.from_array(
             image, manifest, iso=iso, white_balance=white_balance, origin_px=origin_px

@@ -1,11 +1,12 @@
 """A network or a picture in a process of its own; prints the memory as JSON.
 
-python -m tests.network_child run NAME SIDE...     windows of some sides
-python -m tests.network_child picture BUNDLE MAX_MB
+python -m tests.network_child run NAME SIDE...        windows of some sides
+python -m tests.network_child picture NAME MAX_MB  a picture of 2400x1600 px
 """
 
 import json
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.graph import inspect_graph
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
+from tests.network_bundle import write_network_bundle
 from tests.network_graphs import GRAPHS
 
 
@@ -36,9 +38,10 @@ def run(name: str, sides: list[int]) -> dict[str, float]:
     return {"rose_mb": peak_rss_mb() - before, "counted_mb": counted * largest**2 / 1e6}
 
 
-def picture(path: Path, max_mb: int) -> dict[str, float]:
+def picture(name: str, max_mb: int) -> dict[str, float]:
     """Process noise of the size of the sensor."""
-    bundle = open_bundle(path)
+    with tempfile.TemporaryDirectory() as folder:
+        bundle = open_bundle(write_network_bundle(Path(folder), {"M": GRAPHS[name]()}))
     extent = bundle.manifest.sensor.known_extent
     size = extent.height_px, extent.width_px
     given = np.random.default_rng(1).integers(64, 1000, size, dtype=np.uint16)
@@ -50,5 +53,5 @@ def picture(path: Path, max_mb: int) -> dict[str, float]:
 if __name__ == "__main__":
     what, given, *numbers = sys.argv[1:]
     values = [int(number) for number in numbers]
-    told = run(given, values) if what == "run" else picture(Path(given), values[0])
+    told = run(given, values) if what == "run" else picture(given, values[0])
     print(json.dumps(told))

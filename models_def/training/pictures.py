@@ -1,9 +1,10 @@
 """Where sharp training crops come from: a folder of pictures and procedural scenes.
 
-Pictures are decoded once and held as 8-bit sRGB, scenes as float16; a crop is decoded to linear
-Rec.709 when it is cut.
+Pictures are decoded once, brought to sRGB by their profiles and held with 8 bits, scenes as
+float16; a crop is decoded to linear Rec.709 when it is cut.
 """
 
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,7 @@ from typing import Any, Final
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image, ImageCms
 
 from camkit.colorimetry import decode_srgb
 from camkit.contracts import FloatArray
@@ -46,16 +48,46 @@ def list_pictures(folder: Path | None) -> tuple[Path, ...]:
 
 
 def read_picture(path: Path) -> NDArray[np.uint8]:
-    """Read an 8-bit sRGB picture as (h, w, 3), R first.
+    """Read a picture as (h, w, 3) 8-bit sRGB, R first; the colour profile in it is applied.
 
     Raises:
-        DecodeError: If it cannot be decoded.
+        DecodeError: If it cannot be decoded, or its profile is none of RGB or grey.
     """
     data = np.fromfile(path, dtype=np.uint8)
     decoded = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
     if decoded is None:
         raise DecodeError(f"{path.name} cannot be decoded as a picture")
-    return np.ascontiguousarray(decoded[..., ::-1], dtype=np.uint8)
+    picture = np.ascontiguousarray(decoded[..., ::-1], dtype=np.uint8)
+    profile = _profile(path)
+    return picture if profile is None else _to_srgb(picture, profile, path.name)
+
+
+def _profile(path: Path) -> bytes | None:
+    """Return the colour profile (ICC) of a picture; None without one."""
+    try:
+        with Image.open(path) as opened:
+            profile = opened.info.get("icc_profile")
+    except (OSError, ValueError):  # what OpenCV alone reads has none that is known
+        return None
+    return profile or None
+
+
+def _to_srgb(picture: NDArray[np.uint8], profile: bytes, name: str) -> NDArray[np.uint8]:
+    """Return a picture in sRGB by LittleCMS; one that says it is sRGB is left as it is."""
+    try:
+        known = ImageCms.ImageCmsProfile(io.BytesIO(profile))
+        space = known.profile.xcolor_space.strip()
+        described = ImageCms.getProfileDescription(known)
+        if described.lower().startswith("srgb"):
+            return picture
+        if space not in ("RGB", "GRAY"):
+            raise DecodeError(f"{name} has a colour profile of {space}; convert it to RGB")
+        given = Image.fromarray(picture if space == "RGB" else picture[..., 0])
+        srgb = ImageCms.createProfile("sRGB")
+        made = ImageCms.profileToProfile(given, known, srgb, outputMode="RGB")
+    except (OSError, ImageCms.PyCMSError) as error:
+        raise DecodeError(f"{name} has a colour profile that cannot be applied: {error}") from error
+    return np.array(made, dtype=np.uint8)
 
 
 def to_linear(picture: NDArray[np.uint8]) -> FloatArray:

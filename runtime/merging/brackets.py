@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from camkit.caller import option_text
-from camkit.errors import ContractError
+from camkit.errors import ContractError, DecodeError
 from camkit.runtime.batch.sources import CAPTURE_SUFFIXES, is_result
 from camkit.runtime.merging.times import stated_times
 from camkit.runtime.output.preview_file import PREVIEW_SUFFIX
@@ -50,7 +50,10 @@ def find_brackets(paths: Sequence[Path]) -> list[Bracket]:
 
     Raises:
         ContractError: If files and folders are mixed, or a folder holds no frames.
+        DecodeError: If a path is not there.
     """
+    if absent := [path for path in paths if not path.exists()]:
+        raise DecodeError(f"there is no file or folder {absent[0]}")
     folders = [path for path in paths if path.is_dir()]
     if not folders:
         return [Bracket(files=tuple(paths))]

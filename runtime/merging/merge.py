@@ -80,7 +80,10 @@ def choose_response(survey: Survey, wanted: ResponseName | None) -> tuple[Respon
             f"a response is estimated from 8-bit pictures; say {option_text('response', 'srgb')}"
         )
     if wanted == "linear" or (wanted is None and codes is None):
-        return None, ""
+        is_choice = wanted is None and coded and not survey.is_raw
+        cure = option_text("response", "srgb")
+        note = f"frames of 16 bits are taken as linear light; if they are coded, say {cure}"
+        return None, note if is_choice else ""
     plain = srgb_response(int(survey.like.white_level) + 1)
     if wanted == "srgb" or codes is None:
         return plain, ""

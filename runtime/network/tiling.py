@@ -247,7 +247,7 @@ def lay_windows(height_px: int, width_px: int, limits: TileLimits) -> TileLayout
 
 
 def _least_work(size: tuple[int, int], halo: int, limits: TileLimits) -> tuple[int, int]:
-    """Give the window of least computation within the cap; of equals, that of least memory."""
+    """Give the window of least computation within the cap; of equals, that of the fewest runs."""
     if limits.whole:
         heights, widths = {size[0]}, {size[1]}
     else:
@@ -257,14 +257,15 @@ def _least_work(size: tuple[int, int], halo: int, limits: TileLimits) -> tuple[i
     costs = {
         (h, w): (
             len(rows[h]) * columns[w] * h * w,
+            len(rows[h]) * columns[w],
             _needed_bytes((h, w), rows[h], size[1], limits.cost),
         )
         for h in rows
         for w in columns
     }
-    fitting = [window for window in costs if costs[window][1] <= limits.max_bytes]
+    fitting = [window for window in costs if costs[window][2] <= limits.max_bytes]
     if not fitting:
-        least = min(memory for _, memory in costs.values())
+        least = min(memory for *_, memory in costs.values())
         raise ContractError(
             f"{size[1]}x{size[0]} pixels with a halo of {halo} need at least "
             f"{least / 2**20:.0f} MiB for one window; got {limits.max_bytes / 2**20:.0f} MiB: "

@@ -1,5 +1,6 @@
 """What one rule decided, the work that results, and what rules may look at."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -69,11 +70,11 @@ class Subject:
         extra_px = [stage.extra_reach_px for stage in stages if isinstance(stage, Network)]
         return self.facts(size).reach_px + max(extra_px, default=0)
 
-    @property
-    def global_text(self) -> str:
-        """Return the operators of a network that see the whole picture; "" for none."""
+    def global_text(self, sizes: Iterable[str]) -> str:
+        """Return the operators that see the whole picture, of networks of some sizes."""
         networks = self.bundle.manifest.networks.values()
-        return next((f.global_text for one in networks for f in one.values() if f.global_text), "")
+        seen = (one[size].global_text for size in sizes for one in networks if size in one)
+        return next(filter(None, seen), "")
 
     @property
     def megapixels(self) -> float:

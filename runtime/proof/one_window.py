@@ -3,19 +3,14 @@
 import numpy as np
 
 from camkit.bundle.reader import Bundle
-from camkit.bundle.stages import Network
-from camkit.errors import ParityError
-from camkit.runtime.job.walker import FIXED_BYTES
-from camkit.runtime.network.graph import inspect_graph
-from camkit.runtime.network.tiling import TileLimits, lay_windows
-from camkit.runtime.network.windows import SizedNetwork
-from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES
-
-_SAMPLE_BYTES = 2
+from camkit.bundle.sensor import BayerSensor, SpadSensor
+from camkit.errors import ContractError, ParityError
+from camkit.runtime.options import Options
+from camkit.runtime.pipeline import Pipeline
 
 
 def prove_one_window(bundle: Bundle, role: str, size: str) -> str:
-    """Show that the usual memory cap holds a whole picture of the sensor in one window.
+    """Show that a whole picture of the sensor is planned in one window within the usual memory cap.
 
     Args:
         bundle: The bundle.
@@ -26,31 +21,36 @@ def prove_one_window(bundle: Bundle, role: str, size: str) -> str:
         What was shown.
 
     Raises:
-        ParityError: If it does not, or the sensor takes pictures of any size: then pictures would
+        ParityError: If it is not, or the sensor takes pictures of any size: then pictures would
             have to be tiled, and that is refused in mode exact.
     """
-    facts = bundle.network_facts(role, size)
-    found = inspect_graph(bundle.network_bytes(role, size))
-    cannot = f"cannot be tiled ({facts.global_text})"
-    extent = bundle.manifest.sensor.extent
-    if extent is None:
+    cannot = f"cannot be tiled ({bundle.network_facts(role, size).global_text})"
+    sensor = bundle.manifest.sensor
+    if isinstance(sensor, SpadSensor):
+        return f"{cannot}; photons are never tiled"
+    if sensor.extent is None:
         raise ParityError(
             f"size {size}: {cannot}, and the sensor takes pictures of any size: state its extent, "
             "or export a network that looks at windows"
         )
-    stage = next(one for one in bundle.manifest.stages_of(Network) if one.role == role)
-    ratio = bundle.manifest.all_planes[stage.takes[0]].grid.pitch_ratio
-    height, width = round(extent.height_px / ratio), round(extent.width_px / ratio)
-    network = SizedNetwork(
-        size=size, run=np.copy, facts=facts, block_bytes=found.block_bytes_per_pixel
-    )
-    whole = TileLimits(stride_px=network.stride_px, halo_px=0, max_bytes=2**62, whole=True)
-    window = lay_windows(height, width, whole).needed_bytes(network.cost)
-    needed = window + FIXED_BYTES + _SAMPLE_BYTES * extent.height_px * extent.width_px
-    if needed > DEFAULT_MAX_MEM_BYTES:
+    pixels = f"{sensor.extent.width_px}x{sensor.extent.height_px} px of the sensor"
+    try:
+        _plan(bundle, size, (sensor.extent.height_px, sensor.extent.width_px), sensor.noise[0].iso)
+    except ContractError as error:
         raise ParityError(
-            f"size {size}: {cannot}, and one window of the {width}x{height} px of the sensor takes "
-            f"about {needed // 10**6} MB, more than the usual {DEFAULT_MAX_MEM_BYTES // 10**6} MB: "
-            "export a network that looks at windows"
-        )
-    return f"{cannot}; one window holds the {width}x{height} px of the sensor"
+            f"size {size}: {cannot}, and the {pixels} do not fit in one window: {error}; or export "
+            "a network that looks at windows"
+        ) from error
+    return f"{cannot}; one window holds the {pixels}"
+
+
+def _plan(bundle: Bundle, size: str, size_px: tuple[int, int], iso: float) -> None:
+    """Plan a grey capture of the whole sensor."""
+    sensor = bundle.manifest.sensor
+    if isinstance(sensor, BayerSensor):
+        grey = np.full(size_px, sensor.white_level // 4, np.uint16)
+    else:
+        grey = np.full((len(sensor.channels), *size_px), 0.25, np.float32)
+    pipeline = Pipeline(bundle, Options(size=size, threads=1))
+    given = pipeline.capture_of(grey, iso=iso, white_balance=None, origin_px=None)
+    pipeline.start(given)

@@ -139,6 +139,11 @@ def test_a_wrong_choice_of_writing_is_a_contract_error(case: str, tmp_path: Path
         lambda: camkit.process([], mosaic="RGGB"),  # type: ignore[arg-type]
         lambda: camkit.MosaicOptions(white_level="4095"),  # type: ignore[arg-type]
         lambda: camkit.load(None).plan(3),  # type: ignore[arg-type]
+        lambda: camkit.load(None).plan("a.dng", mosaic="RGGB"),  # type: ignore[arg-type]
+        lambda: camkit.load(None).plan("a.dng", mosaic={"cfa": "RGGB"}),  # type: ignore[arg-type]
+        lambda: camkit.load(None).process("a.dng", mosaic="RGGB"),  # type: ignore[arg-type]
+        lambda: camkit.load(None, tile_px=0),
+        lambda: camkit.load(None, tile_px=-64),
     ],
 )
 def test_a_wrong_argument_is_a_contract_error(call: Any) -> None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
@@ -17,6 +18,7 @@ from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ContractError
 from camkit.runtime.batch import process
 from camkit.runtime.cancel import Cancelled
+from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.network import graph
 from camkit.runtime.options import Options
 from camkit.runtime.output.dng import DngTags, write_bayer_dng
@@ -24,6 +26,7 @@ from camkit.runtime.pipeline import Pipeline, load
 from camkit.runtime.twin.simulate import Simulation, SimulationOptions, simulate
 from tests.bundle_factory import tiny_manifest, tiny_members, write_tiny_bundle
 from tests.capture_factory import write_tiny_captures
+from tests.data_folder import data_path
 from tests.deep_bundle import write_deep_bundle
 from tests.psf_factory import psnr_db, texture
 
@@ -408,3 +411,33 @@ def test_graphs_of_built_in_bundles_are_sound_so_that_no_process_looks_again(
     assert looked == []
     load(shutil.copy(built_in_bundles()["duet"], tmp_path))
     assert len(looked) == 1
+
+
+LEVELS = MosaicOptions(cfa="RGGB", black_level=256.0, white_level=4095.0)
+
+
+def _even(folder: Path, level: float) -> Path:
+    """Write a noisy even mosaic that lies at a share of white."""
+    rng = np.random.default_rng(0)
+    codes = rng.normal(256 + 3839 * level, 20 * level**0.5, (256, 256))
+    path = folder / "even.png"
+    assert cv2.imwrite(str(path), np.clip(np.rint(codes), 0, 4095).astype(np.uint16))
+    return path
+
+
+@pytest.mark.parametrize("gains", [(1.0, 1.0, 1.0), (2.0, 1.0, 1.6), (0.7, 1.0, 0.8)])
+@pytest.mark.parametrize("level", [0.1, 0.4, 0.8])
+def test_even_light_stays_whatever_its_level_and_white_balance(
+    tmp_path: Path, level: float, gains: tuple[float, float, float]
+) -> None:
+    pipeline = load("trio-edof", assume="centre", color="camera", white_balance=gains, threads=1)
+    made = pipeline.process(_even(tmp_path, level), mosaic=LEVELS).image
+    np.testing.assert_allclose(made.mean(axis=(1, 2)), level * np.array(gains), rtol=0.01)
+
+
+def test_the_even_mosaic_of_a_report_keeps_its_light() -> None:
+    pipeline = load(
+        "trio-edof", assume="centre", color="camera", white_balance=(1.0, 1.0, 1.0), threads=1
+    )
+    made = pipeline.process(data_path("reports/flat_grey_wb111.png"), mosaic=LEVELS).image
+    np.testing.assert_allclose(made.mean(axis=(1, 2)), 0.4, rtol=0.01)

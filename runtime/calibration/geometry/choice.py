@@ -28,6 +28,8 @@ OUTLIER: Final = 3.5
 """Times the held-out error that is expected."""
 LEAST_OUTLIER_PX: Final = 0.4
 LEAST_VIEWS: Final = 3
+LEAST_SCATTER_PX: Final = 0.02
+"""Of corners, however exactly they fit: about what detectors reach."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -71,17 +73,27 @@ class Judged:
         return np.asarray(np.minimum(usual_px, self.others_px) * self.leverage)
 
     @property
+    def formal(self) -> FloatGrid:
+        """Return the standard errors (intrinsics,) by the covariance; inf where it is singular."""
+        variances = np.diagonal(self.fit.spread) / 2
+        known = np.where(variances >= 0, variances, np.inf)
+        return np.asarray(np.sqrt(known) * max(self.fit.rms_px, LEAST_SCATTER_PX))
+
+    @property
     def spread(self) -> FloatGrid:
         """Return the standard errors (intrinsics,) by the jackknife over views.
 
-        Those of the covariance hold for corners that err by chance alone. What a board that is not
-        flat, or light that is bent on its way, does to all corners of a view is seen here only.
+        Those of the covariance, which they are no less than, hold for corners that err by chance
+        alone. What a board that is not flat, or light that is bent on its way, does to all corners
+        of a view is seen by the jackknife only; that no view determines something, by neither of
+        them where corners are exact: then a scatter of `LEAST_SCATTER_PX` is taken.
 
         References: Tukey 1958; Efron and Stein 1981, "The jackknife estimate of variance".
         """
         count = len(self.others)
         off = self.others - self.others.mean(axis=0)
-        return np.asarray(np.sqrt((count - 1) / count * np.square(off).sum(axis=0)))
+        jackknife = np.sqrt((count - 1) / count * np.square(off).sum(axis=0))
+        return np.asarray(np.maximum(jackknife, self.formal))
 
     @property
     def worst_px(self) -> float:

@@ -13,12 +13,18 @@ from typing import Final
 
 import numpy as np
 
+from camkit.caller import option_text
 from camkit.errors import DecodeError
 from camkit.runtime.calibration.geometry.camera import CENTRE, FOCAL, FloatGrid
 from camkit.runtime.calibration.geometry.choice import Judged, judge, simplest
 from camkit.runtime.calibration.geometry.coverage import Coverage
 from camkit.runtime.calibration.geometry.profile import Profile
-from camkit.runtime.calibration.geometry.start import FREE, Nominal, fit_models
+from camkit.runtime.calibration.geometry.start import (
+    FREE,
+    Nominal,
+    fit_models,
+    is_lens,
+)
 from camkit.runtime.calibration.geometry.unfolded import unfolded
 
 WORST_CENTRE: Final = 0.01
@@ -26,6 +32,8 @@ WORST_CENTRE: Final = 0.01
 public sets of photographs have 0.001 and 0.002."""
 WORST_FOCAL: Final = 0.03
 """Likewise of the focal length, of itself; they have 0.001 and 0.005."""
+WORST_GUESS: Final = 0.1
+"""Likewise by the covariance, beyond which what explains the corners best is no guess either."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -71,23 +79,28 @@ def determine(
         focal_px: Nominal focal length, taken where the views do not determine it.
 
     Raises:
-        DecodeError: If no model that a lens may have explains the corners.
+        DecodeError: If no model that a lens may have explains the corners, or the focal length is
+            as good as unknown and no nominal one is given.
     """
+    best, held = simplest(judged), Nominal(centre=True)
     try:
         found = _chosen(judged, corners, size)
     except DecodeError:
         # What folds or cancels itself may do so because nothing ties it down.
-        if not _is_open(simplest(judged), size):
+        if _is_loose(best, size):
+            _check_nominal(best, size, focal_px)
+            held = replace(held, focal_px=focal_px)
+        elif not _is_open(best, size):
             raise
         found = None
     if found is None or _is_open(found.chosen, size):
-        found = _held(Nominal(centre=True), corners, points, size)
-    if found.focal_error > WORST_FOCAL:
-        undetermined = (*found.undetermined, "focal_px")
-        if focal_px is not None:
-            found = _held(replace(found.nominal, focal_px=focal_px), corners, points, size)
-        found = replace(found, undetermined=undetermined)
-    return found
+        found = _held(held, corners, points, size)
+    if not _is_loose(found.chosen, size):
+        return found
+    if focal_px is not None:
+        return _held(replace(found.nominal, focal_px=focal_px), corners, points, size)
+    _check_nominal(found.chosen, size, focal_px)
+    return replace(found, undetermined=(*found.undetermined, "focal_px"))
 
 
 def _chosen(judged: Sequence[Judged], corners: FloatGrid, size: tuple[int, int]) -> Determined:
@@ -103,11 +116,32 @@ def _held(
     if not fits:
         raise DecodeError("no camera explains the corners: the pictures are not of one flat board")
     found = _chosen([judge(fit, corners, points) for fit in fits], corners, size)
-    undetermined = ("centre_px",) if nominal.centre else ()
-    return replace(found, undetermined=undetermined, nominal=nominal)
+    centre = ("centre_px",) if nominal.centre else ()
+    focal = ("focal_px",) if nominal.focal_px is not None else ()
+    return replace(found, undetermined=(*centre, *focal), nominal=nominal)
 
 
 def _is_open(judged: Judged, size: tuple[int, int]) -> bool:
     """Return whether the optical centre is not determined."""
     error = float(np.hypot(*judged.spread[list(CENTRE)]))
     return not error <= WORST_CENTRE * float(np.hypot(*size))
+
+
+def _is_loose(judged: Judged, size: tuple[int, int]) -> bool:
+    """Return whether the focal length is not determined."""
+    camera = judged.fit.camera
+    error = float(judged.spread[FOCAL]) / camera.focal_px
+    return not (is_lens(camera, size) and error <= WORST_FOCAL)
+
+
+def _check_nominal(judged: Judged, size: tuple[int, int], focal_px: float | None) -> None:
+    """Refuse a focal length that nothing determines and nobody states."""
+    camera = judged.fit.camera
+    error = float(judged.formal[FOCAL]) / camera.focal_px
+    if focal_px is not None or (is_lens(camera, size) and error <= WORST_GUESS):
+        return
+    known = is_lens(camera, size) and error < 1
+    raise DecodeError(
+        f"the pictures do not tell the focal length{f' ({error:.0%} uncertain)' if known else ''}: "
+        f"tilt the board by 20 degrees or more, to every side, or give {option_text('focal_px')}"
+    )

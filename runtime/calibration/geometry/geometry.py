@@ -12,7 +12,7 @@ from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.calibration.geometry.adjustment import rms
 from camkit.runtime.calibration.geometry.board import Board
-from camkit.runtime.calibration.geometry.camera import Camera, FloatGrid, distance
+from camkit.runtime.calibration.geometry.camera import FOCAL, Camera, FloatGrid, distance
 from camkit.runtime.calibration.geometry.choice import (
     LEAST_VIEWS,
     Judged,
@@ -33,9 +33,8 @@ from camkit.runtime.raw import file_sha256
 MOST_PICTURES: Final = 256
 MOST_ERROR: Final = 2e-3
 """Held-out error, of the diagonal, beyond which nothing was explained."""
-WORST_FOCAL: Final = 0.1
 WEAK_FOCAL: Final = 0.01
-"""Standard error of the focal length, of itself: refused, and worth a word."""
+"""Standard error of the focal length, of itself, that is worth a word."""
 MISSED_PX: Final = 0.2
 """By the polynomial, from which on it is worth a word."""
 MOST_FOCAL_PX: Final = 1e6
@@ -192,7 +191,6 @@ def _measured(views: Sequence[View], board: Board, focal_px: float | None) -> Ge
     judged, outliers = judge_all(corners, board.points, size)
     _check_agree(judged, outliers, seen, size)
     found = determine(judged, corners, board.points, size, focal_px)
-    _check_focal(found.chosen)
     radial = fit_radial(found.profile, float(np.hypot(*size)) / 2, found.coverage.corner_px)
     return Geometry(
         board=board,
@@ -284,22 +282,6 @@ def _check_agree(
         )
 
 
-def _focal_error(chosen: Judged) -> float:
-    """Give the standard error of the focal length, of itself."""
-    fit = chosen.fit
-    variance = float(fit.spread[0, 0]) * fit.rms_px**2 / 2
-    return float(np.sqrt(max(variance, 0.0))) / fit.camera.focal_px
-
-
-def _check_focal(chosen: Judged) -> None:
-    error = _focal_error(chosen)
-    if not error <= WORST_FOCAL:
-        raise DecodeError(
-            f"the pictures do not tell the focal length ({error:.0%} uncertain): tilt the board, "
-            "to every side"
-        )
-
-
 def _held_notes(found: Determined, size: tuple[int, int]) -> list[str]:
     """Return what the pictures do not determine, and what stands for it."""
     notes = []
@@ -340,7 +322,7 @@ def _notes(
             "within a board); the distortion beyond is a guess: do not use it"
         )
     notes += _held_notes(found, size)
-    error = _focal_error(chosen)
+    error = float(chosen.formal[FOCAL]) / chosen.fit.camera.focal_px
     if error > WEAK_FOCAL and not found.undetermined:
         notes.append(f"the focal length is uncertain by {error:.1%}: tilt the board more")
     middle = ((size[0] - 1) / 2, (size[1] - 1) / 2)

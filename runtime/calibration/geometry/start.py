@@ -30,6 +30,8 @@ from camkit.runtime.calibration.geometry.camera import (
 
 FOCALS: Final = (0.2, 0.3, 0.45, 0.7, 1.0, 1.5, 2.2, 3.3, 5.0, 8.0)
 """Tried, of the longer side."""
+POSSIBLE_FOCALS: Final = (0.1, 20.0)
+"""Least and most that a lens has, likewise."""
 TRIED: Final = 3
 WIDEST_RAD: Final = 1.45
 """Half angle beyond which a direction is no place on a plane."""
@@ -84,14 +86,21 @@ def fit_models(
     for model in nominal.models:
         kin = [fit for fit in fits if fit.camera.model.fisheye == model.fisheye]
         first = bent if model.fisheye else straight
-        starts = kin[-1:] or first
+        starts = [fit for fit in kin[-1:] if is_lens(fit.camera, size)] or first
         tried = [
             adjust(with_model(start.camera, model), start.poses, corners, points)
             for start in starts
         ]
         tried = [fit for fit in tried if np.isfinite(fit.residuals).all()]
+        tried = [fit for fit in tried if is_lens(fit.camera, size)] or tried
         fits += [min(tried, key=lambda fit: fit.rms_px)] if tried else []
     return fits
+
+
+def is_lens(camera: Camera, size: tuple[int, int]) -> bool:
+    """Return whether a lens may have the focal length of a camera with pictures of a size."""
+    least, most = (share * max(size) for share in POSSIBLE_FOCALS)
+    return least <= camera.focal_px <= most
 
 
 def _started(

@@ -14,13 +14,12 @@ from camkit.runtime.calibration.geometry.camera import Camera, FloatGrid
 from camkit.runtime.calibration.geometry.choice import Judged, simplest
 from camkit.runtime.calibration.geometry.coverage import Coverage, coverage_of
 from camkit.runtime.calibration.geometry.profile import Profile, profile_of
+from camkit.runtime.calibration.geometry.start import is_lens
 
 MOST_FACTOR: Final = 1e6
 """A coefficient beyond it is none of a lens: its terms cancel where corners are, nowhere else."""
 MOST_TERM: Final = 2.0
 """Of a coefficient at the covered radius, against the radius: likewise."""
-FOCALS: Final = (0.1, 20.0)
-"""Least and most focal length, of the longer side of the picture."""
 MIDDLE: Final = 0.5
 """Of either side of the picture: the middle part, in which the optical centre lies."""
 FOLDED: Final = 1.25
@@ -69,8 +68,7 @@ def unfolded(
 
 def _doubt(camera: Camera, profile: Profile, size: tuple[int, int]) -> str:
     """Return what of a camera no lens has; "" for nothing."""
-    least, most = (share * max(size) for share in FOCALS)
-    if not least <= camera.focal_px <= most:
+    if not is_lens(camera, size):
         return f"a focal length of {camera.focal_px:.0f} px, which is none of a lens"
     for at, side in zip(camera.centre_px, size, strict=True):
         if abs(at - (side - 1) / 2) > MIDDLE * side / 2:

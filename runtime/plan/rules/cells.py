@@ -32,8 +32,8 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
     if subject.content is None:
         reason = f"quality {subject.options.quality} skips nothing"
         return work, Decision(what="cells", choice="all full", reason=reason)
-    if seen := subject.global_text:
-        reason = f"the network looks at the whole picture ({seen})"
+    if seen := subject.global_text(subject.bundle.manifest.sizes):
+        reason = f"a network looks at the whole picture ({seen})"
         return work, Decision(what="cells", choice="all full", reason=reason)
     if model is None:
         reason = "the bundle carries no calibrated plan (tools/plan_report.py calibrate writes it)"

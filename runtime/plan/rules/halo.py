@@ -14,7 +14,7 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
     With less, pixels near a window's border would depend on where the windows lie, that is on tile
     size and memory cap; for a few percent of the network's time that promise is not given up.
     """
-    if work.networks and work.mode == "exact" and (seen := subject.global_text):
+    if work.networks and work.mode == "exact" and (seen := subject.global_text(work.sizes())):
         reason = f"the network looks at the whole picture ({seen})"
         return work, Decision(what="halo", choice="one window", reason=reason)
     if not work.networks or subject.role is None:

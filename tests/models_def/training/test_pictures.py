@@ -3,6 +3,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from PIL import Image, ImageCms
 
 from camkit.colorimetry import decode_srgb
 from camkit.errors import ContractError, DecodeError
@@ -34,6 +35,62 @@ def test_red_comes_first(tmp_path):
     linear = to_linear(read_picture(tmp_path / "red.png"))
     assert linear.shape == (3, 4, 4)
     assert np.allclose(linear[:, 0, 0], [1, 0, 0])
+
+
+PATCHES = np.random.default_rng(1).integers(20, 236, (6, 8, 3), dtype=np.uint8)
+
+
+def _profile(primaries, gamma: float) -> bytes:
+    """Return a matrix profile, made from XYZ of the primaries at D50 by LittleCMS's own sRGB."""
+    made = bytearray(ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes())
+    count = int.from_bytes(made[128:132], "big")
+    for entry in range(132, 132 + 12 * count, 12):
+        tag, at = bytes(made[entry : entry + 4]), int.from_bytes(made[entry + 4 : entry + 8], "big")
+        if tag in (b"rXYZ", b"gXYZ", b"bXYZ"):
+            numbers = primaries["rgb".index(chr(tag[0]))]
+            made[at + 8 : at + 20] = b"".join(
+                round(number * 65536).to_bytes(4, "big") for number in numbers
+            )
+        if tag in (b"rTRC", b"gTRC", b"bTRC"):
+            curve = b"para" + bytes(4) + bytes(4) + round(gamma * 65536).to_bytes(4, "big")
+            made[at : at + 16] = curve
+        if tag == b"desc":
+            made[at + 28 : at + 32] = "wi".encode("utf-16-be")
+    return bytes(made)
+
+
+WIDE = ((0.6097, 0.3111, 0.0195), (0.2053, 0.6257, 0.0609), (0.1492, 0.0632, 0.7446))
+"""Adobe RGB (1998) at D50, as its specification states it."""
+NARROW = ((0.4361, 0.2225, 0.0139), (0.3851, 0.7169, 0.0971), (0.1431, 0.0606, 0.7141))
+"""Rec.709 likewise."""
+
+
+@pytest.mark.parametrize("ending", ["png", "tif", "jpg"])
+@pytest.mark.parametrize(("primaries", "gamma"), [(WIDE, 2.2), (WIDE, 1.8), (NARROW, 1.0)])
+def test_the_profile_of_a_picture_is_applied(tmp_path, ending, primaries, gamma):
+    path = tmp_path / f"a.{ending}"
+    codes = PATCHES.repeat(16, axis=0).repeat(16, axis=1)
+    options = {"quality": 100, "subsampling": 0} if ending == "jpg" else {}
+    Image.fromarray(codes).save(path, icc_profile=_profile(primaries, gamma), **options)
+    matrix = np.linalg.inv(np.transpose(NARROW)) @ np.transpose(primaries)
+    wanted = np.clip((PATCHES / 255.0) ** gamma @ matrix.T, 0, 1)
+    found = to_linear(read_picture(path)).transpose(1, 2, 0)[8::16, 8::16]
+    assert np.abs(np.sqrt(found) - np.sqrt(wanted)).max() < (0.05 if ending == "jpg" else 0.02)
+
+
+def test_a_picture_that_says_srgb_or_nothing_keeps_its_codes(tmp_path):
+    srgb = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    for number, profile in enumerate((None, srgb)):
+        path = tmp_path / f"{number}.png"
+        Image.fromarray(PATCHES).save(path, icc_profile=profile)
+        assert np.array_equal(read_picture(path), PATCHES)
+
+
+@pytest.mark.parametrize("profile", [b"no profile", b"x" * 200, bytes(128)])
+def test_a_profile_that_is_none_is_refused_by_name(tmp_path, profile):
+    Image.fromarray(PATCHES).save(tmp_path / "a.png", icc_profile=profile)
+    with pytest.raises(DecodeError, match=r"a\.png has a colour profile that cannot be applied"):
+        read_picture(tmp_path / "a.png")
 
 
 def test_8_bit_values_are_decoded_by_the_srgb_curve():

@@ -215,6 +215,19 @@ def test_planned_windows_equal_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     assert np.array_equal(_infer(ENGINES[1].run, picture, limits), whole)
 
 
+@pytest.mark.parametrize("stride", [1, 3, 16])
+@pytest.mark.parametrize("share", [1.0, 0.5, 0.05])
+def test_a_network_that_looks_at_single_cells_runs_as_rarely_as_its_memory_allows(
+    stride: int, share: float
+) -> None:
+    whole = lay_windows(600, 903, TileLimits(stride_px=stride, halo_px=0, max_bytes=ROOMY))
+    assert whole.window_count == 1
+    cap = int(share * whole.needed_bytes(PixelCost()))
+    layout = lay_windows(600, 903, TileLimits(stride_px=stride, halo_px=0, max_bytes=cap))
+    assert layout.needed_bytes(PixelCost()) <= cap
+    assert layout.window_count <= 2 / share
+
+
 def test_halo_below_the_reach_does_differ() -> None:
     picture = _picture(200, 200)
     whole = _infer(ENGINES[1].run, picture, _limits(whole=True))

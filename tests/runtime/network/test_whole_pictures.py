@@ -19,9 +19,9 @@ from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.rows import ArrayRows
 from tests.bundle_factory import make_model, make_weight
+from tests.network_bundle import write_network_bundle
 from tests.network_graphs import nafnet
 from tests.planes_bundle import facts_of
-from tests.runtime.network.test_activation_memory import write_network_bundle
 
 NODE = helper.make_node
 SIZE_PX = (64, 96)
@@ -229,6 +229,19 @@ def test_cells_are_not_skipped_by_a_network_that_looks_at_all() -> None:
     assert windows.to_json()["windows"] == 1
 
 
+@pytest.mark.parametrize("size", ["M", "S"])
+def test_the_plan_says_it_of_the_size_that_runs_alone(tmp_path: Path, size: str) -> None:
+    models = {"M": nafnet(), "S": nafnet(pooled=False)}
+    path = write_network_bundle(tmp_path, models, (320, 240))
+    pipeline = Pipeline(open_bundle(path), Options(threads=1, size=size))
+    capture = np.full((240, 320), 500, np.uint16)
+    given = pipeline.capture_of(capture, iso=100, white_balance=None, origin_px=None)
+    work = pipeline.start(given)
+    (halo,) = [one for one in work.record["decisions"] if one["what"] == "halo"]
+    assert (halo["choice"] == "one window") == (size == "M")
+    assert ("looks at the whole picture" in halo["reason"]) == (size == "M")
+
+
 def test_mode_fast_tiles_where_a_curve_was_measured_and_says_what_that_means() -> None:
     curve = (HaloError(halo_px=0, max_abs=1e-5, psnr_db=90.0),)
     network = _sized(GLOBALS["global average"], halo_error=curve)
@@ -242,7 +255,7 @@ def test_mode_fast_tiles_where_a_curve_was_measured_and_says_what_that_means() -
 
 def test_process_plan_and_check_of_a_camera_that_would_be_tiled_say_so(tmp_path: Path) -> None:
     size_px = 2400, 1600
-    path = write_network_bundle(tmp_path, nafnet(), size_px)
+    path = write_network_bundle(tmp_path, {"M": nafnet()}, size_px)
     capture = np.full(size_px[::-1], 500, np.uint16)
     pipeline = Pipeline(open_bundle(path), Options(threads=1))
     said = r"\(GlobalAveragePool_\d+ \(GlobalAveragePool\), .* and 2 more\) and cannot be tiled"
@@ -252,11 +265,11 @@ def test_process_plan_and_check_of_a_camera_that_would_be_tiled_say_so(tmp_path:
     report = check_bundle(path, "tiling")
     assert not report.passed
     (layer,) = [one for one in report.layers if one.name == "tiling"]
-    assert "one window of the 2400x1600 px of the sensor takes about" in layer.message
+    assert "the 2400x1600 px of the sensor do not fit in one window: of the cap" in layer.message
 
 
 def test_a_small_camera_is_processed_in_one_window_and_its_plan_says_why(tmp_path: Path) -> None:
-    path = write_network_bundle(tmp_path, nafnet(), (320, 240))
+    path = write_network_bundle(tmp_path, {"M": nafnet()}, (320, 240))
     pipeline = Pipeline(open_bundle(path), Options(threads=1))
     capture = np.full((240, 320), 500, np.uint16)
     given = pipeline.capture_of(capture, iso=100, white_balance=None, origin_px=None)
@@ -268,3 +281,17 @@ def test_a_small_camera_is_processed_in_one_window_and_its_plan_says_why(tmp_pat
     report = check_bundle(path, "tiling")
     assert report.passed
     assert "one window holds the 320x240 px of the sensor" in report.layers[-1].message
+
+
+@pytest.mark.parametrize("width", [1210, 1240, 1260, 1280, 1310])
+def test_check_passes_exactly_where_a_whole_picture_is_taken(tmp_path: Path, width: int) -> None:
+    path = write_network_bundle(tmp_path, {"M": nafnet()}, (width, 860))
+    pipeline = Pipeline(open_bundle(path), Options(threads=1))
+    capture = np.full((860, width), 500, np.uint16)
+    given = pipeline.capture_of(capture, iso=100, white_balance=None, origin_px=None)
+    try:
+        pipeline.start(given)
+        taken = True
+    except ContractError:
+        taken = False
+    assert check_bundle(path, "tiling").passed == taken

@@ -241,6 +241,33 @@ def test_a_merged_picture_and_its_preview_are_no_frames_of_their_folder(
     assert "x.preview.jpg exists" in again.err
 
 
+@pytest.mark.parametrize("files", [["absent"], ["night", "absent.jpg"], ["absent/a.dng"]])
+def test_what_is_not_there_is_named(
+    camkit_command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, files
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    _folder(tmp_path / "night")
+    done = camkit_command("merge", *files, "-o", "a.exr", "--times", TIMES)
+    assert done.code == ExitCode.INPUT_FAILED, done.err
+    assert f"there is no file or folder {files[-1]}" in done.err
+
+
+@pytest.mark.parametrize("response", [None, "linear", "srgb"])
+def test_deep_codes_that_are_taken_as_light_are_said_to_be(
+    camkit_command, tmp_path: Path, response
+) -> None:
+    names = []
+    for number, time_s in enumerate((1.0, 0.25)):
+        names.append(tmp_path / f"{number}.png")
+        codes = np.rint(65535 * np.clip(scene(48, 64) * time_s, 0, 1)).astype(np.uint16)
+        assert cv2.imwrite(str(names[-1]), np.dstack([np.atleast_3d(codes.squeeze())[..., 0]] * 3))
+    chosen = () if response is None else ("--response", response)
+    done = camkit_command("merge", *names, "-o", tmp_path / "a.exr", "--times", "1,1/4", *chosen)
+    assert done.code == 0, done.err
+    said = "taken as linear light; if they are coded, say --response srgb" in done.out + done.err
+    assert said == (response is None)
+
+
 @pytest.mark.parametrize(
     ("files", "out", "told"),
     [

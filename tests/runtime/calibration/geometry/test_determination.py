@@ -119,6 +119,31 @@ def test_what_views_determine_is_fitted_whatever_the_nominal_focal_length(name: 
     assert np.hypot(*np.subtract(found.camera.centre_px, LENS.centre_px)) < 5
 
 
+def _parallel(scatter_px: float, tilt_deg: float = 0.0) -> FloatGrid:
+    """Return corners of boards at several places, all tilted alike."""
+    rng = np.random.default_rng(6)
+    tilts = np.tile((tilt_deg, tilt_deg / 2), (6, 1))
+    places = MIDDLE + rng.uniform(-1, 1, (6, 2)) * (80, 50)
+    return _seen(_poses(tilts, places, rng.uniform(18, 24, 6)), scatter_px)
+
+
+@pytest.mark.parametrize("scatter_px", [0.0, 0.05, 0.3])
+def test_exactly_parallel_views_need_the_nominal_focal_length(scatter_px: float) -> None:
+    corners = _parallel(scatter_px)
+    with pytest.raises(DecodeError, match=r"do not tell the focal length.* or give focal_px$"):
+        _measured(corners)
+    found = _measured(corners, LENS.focal_px)
+    assert "focal_px" in found.undetermined
+    assert found.camera.focal_px == LENS.focal_px
+    assert found.chosen.rms_px < 1.2 * scatter_px + 0.05
+
+
+def test_views_of_one_tilt_do_not_run_away_to_no_focal_length() -> None:
+    found = _measured(_parallel(0.1, 20.0), LENS.focal_px)
+    assert found.camera.focal_px == pytest.approx(LENS.focal_px, rel=0.05)
+    assert found.camera.model.name == "radial_1"
+
+
 def test_views_of_another_camera_among_many_are_named() -> None:
     corners = _seen(GOOD["all over the picture"], 0.1)
     other = camera_of(MODELS[0], 640, (203.0, 147.0))
