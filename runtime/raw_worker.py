@@ -30,7 +30,7 @@ from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.files import raw_checks
 from camkit.runtime.files.dng.jpeg_frames import frame_doubt
 from camkit.runtime.files.dng.picture_tags import sensor_picture
-from camkit.runtime.files.dng.plain_samples import check_readable, is_plain
+from camkit.runtime.files.dng.readable import check_readable, is_plain
 from camkit.runtime.files.libraw import NOTHING_SAID, decode_with_libraw
 from camkit.runtime.files.plain_dng import plain_decode
 from camkit.runtime.files.raw_decode import noted, to_capture
