@@ -47,7 +47,6 @@ _PICTURE_MAGIC: Final = (b"\x89PNG\r\n\x1a\n", b"\x76\x2f\x31\x01", b"#?RADIANCE
 _PICTURE_SUFFIXES: Final = frozenset(
     {".jpg", ".jpeg", ".jpe", ".jfif", ".mpo", ".hdr", ".png", ".exr", ".bmp"}
 )
-_JPEG_MAGIC: Final = b"\xff\xd8\xff"
 _TIFF_SUFFIXES: Final = frozenset({".tif", ".tiff"})
 _DNG_VERSION: Final = 50706
 _CFA_PHOTOMETRIC: Final = 32803
@@ -106,10 +105,7 @@ def _read(
         if is_picture(file):
             capture = _read_picture(file, mosaic, keep_codes=keep_codes)
             return replace(capture, sha256=file_sha256(file))
-        if head.startswith(_JPEG_MAGIC):
-            raise DecodeError(
-                "a JPEG, under another name; call it .jpg if it is meant as a picture"
-            )
+        foreign.check_no_jpeg(head)
         if mosaic is not None and mosaic.cfa is not None:
             raise ContractError(
                 f"a pattern is for headerless PNG or TIFF; {file.name} has its own, omit "

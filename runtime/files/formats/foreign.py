@@ -9,6 +9,7 @@ from typing import Final
 from camkit.errors import DecodeError
 
 HEAD_BYTES: Final = 32
+_JPEG: Final = b"\xff\xd8\xff"
 _STARTS: Final = (
     (b"GIF8", "a GIF"),
     (b"8BPS", "a Photoshop PSD"),
@@ -52,3 +53,13 @@ def check_not_foreign(head: bytes) -> None:
         raise DecodeError(
             f"{name} file is not read; save it as EXR, TIFF or PNG, or give the camera's RAW file"
         )
+
+
+def check_no_jpeg(head: bytes) -> None:
+    """Refuse a JPEG that is named as a RAW file or not at all.
+
+    Raises:
+        DecodeError: If it is one.
+    """
+    if head.startswith(_JPEG):
+        raise DecodeError("a JPEG, under another name; call it .jpg if it is meant as a picture")

@@ -64,7 +64,7 @@ def test_names_that_pictures_have_are_known(tmp_path, suffix):
 @pytest.mark.parametrize("suffix", [".nef", ".raw", ".thm", ""])
 def test_a_jpeg_under_another_name_is_called_one(tmp_path, suffix):
     (tmp_path / f"x{suffix}").write_bytes(by_pillow("JPEG"))
-    with pytest.raises(DecodeError, match="a JPEG, under another name; call it .jpg"):
+    with pytest.raises(DecodeError, match="a JPEG, under another name"):
         read_capture(tmp_path / f"x{suffix}")
 
 
