@@ -55,7 +55,7 @@ _DAMAGE: Final = re.compile(r"corrupt|premature end|unexpected end", re.IGNORECA
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Limits:
-    """What the child may use."""
+    """Limits of the child."""
 
     timeout_s: float
     max_memory_mb: int
@@ -124,7 +124,7 @@ def _read(
 
 
 def is_picture(path: Path) -> bool:
-    """Tell a picture (PNG, EXR, HDR, JPEG, plain TIFF) from a RAW file by content, then by name.
+    """Return whether a file is a picture, no RAW file: by its content, then by its name.
 
     Raises:
         OSError: If the file cannot be read.
@@ -145,7 +145,7 @@ def _head(path: Path) -> bytes:
 
 
 def named_bundle(path: str | os.PathLike[str]) -> str | None:
-    """Give the name of the bundle that a capture made by camkit names; None for other files.
+    """Return the name of the bundle that a capture made by camkit names; None for other files.
 
     Reads the tags only, so a long list of files can be planned before any is decoded.
     """
@@ -157,7 +157,7 @@ def named_bundle(path: str | os.PathLike[str]) -> str | None:
 
 
 def file_sha256(path: Path) -> str:
-    """Give the SHA-256 of a file as hexadecimal digits."""
+    """Return the SHA-256 of a file as hexadecimal digits."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

@@ -66,7 +66,7 @@ def decode_raw(path: Path, said: MosaicOptions = NOTHING_SAID) -> Capture:
 
 @contextmanager
 def _decoded(path: Path, said: MosaicOptions) -> Iterator[Capture]:
-    """Give a capture whose samples lie in LibRaw's memory, which ends with the block."""
+    """Yield a capture whose samples lie in LibRaw's memory, which ends with the block."""
     import rawpy
 
     tags = read_tiff_tags(path)
@@ -94,7 +94,7 @@ def _decoded(path: Path, said: MosaicOptions) -> Iterator[Capture]:
 
 @contextmanager
 def _named_in_utf8(path: Path) -> Iterator[str]:
-    """Give a name that rawpy takes: that of an open file where the path is no UTF-8."""
+    """Yield a name that rawpy takes: that of an open file where the path is no UTF-8."""
     try:
         path.as_posix().encode()
     except UnicodeEncodeError:
@@ -105,7 +105,7 @@ def _named_in_utf8(path: Path) -> Iterator[str]:
 
 
 def header_of(capture: Capture) -> dict[str, Any]:
-    """Give everything but the samples as plain JSON values."""
+    """Return everything but the samples as plain JSON values."""
     header: dict[str, Any] = {
         f.name: getattr(capture, f.name) for f in fields(capture) if f.name != "samples"
     }
@@ -182,7 +182,7 @@ def end_with(parent: int) -> None:
 
 
 def _awaited(parent: str) -> list[str]:
-    """Give the arguments that come once the parent knows them; none if it ends before."""
+    """Return the arguments that come once the parent knows them; none if it ends before."""
     import rawpy  # noqa: F401 - what takes time is done while the parent is not ready
 
     end_with(int(parent))

@@ -1,4 +1,4 @@
-"""What of a decode is possible but not likely: each doubt is one sentence that names the damage.
+"""Doubts of a decode that is possible but not likely: each one sentence that names the damage.
 
     levels    samples above white, below black, far above black; masked pixels beside black
     pattern   two greens that disagree
@@ -68,7 +68,7 @@ def find_doubts(
     masked: Sequence[Samples] = (),
     grid: TileGrid | None = None,
 ) -> list[str]:
-    """Say what makes a decode hard to believe; nothing for a sound photograph.
+    """Return what makes a decode hard to believe; nothing for a sound photograph.
 
     Args:
         samples: (h, w) mosaic or (c, h, w) planes, unsigned integers.
@@ -115,7 +115,7 @@ def notes_behind(capture: Capture, haze: Haze) -> list[str]:
 
 
 def is_noise(samples: Samples, levels: Levels, cfa: CfaPattern | None) -> bool:
-    """Tell whether most of a picture is noise of a large part of its range, white left aside.
+    """Return whether most of a picture is noise of a large part of its range, white left aside.
 
     So damaged streams decode. Arguments as for `find_doubts`.
     """
@@ -170,7 +170,7 @@ def _thinned(samples: NDArray[Any]) -> NDArray[Any]:
 
 
 def _above_white_doubt(samples: Samples, levels: Levels) -> str:
-    """Tell samples that go on beyond white from those that pile up a little above it."""
+    """Return a doubt of samples that go on beyond white, not of those that pile up above it."""
     top = int(samples.max())
     if top <= levels.white * ABOVE_WHITE:
         return ""
@@ -241,7 +241,7 @@ def _averages(plane: Samples, black: float) -> Cells:
 
 
 def _cells(samples: Samples, levels: Levels, cfa: CfaPattern | None) -> Cells:
-    """Give (h, w) float32 green light of the cells, or the middle plane; white is 1.
+    """Return (h, w) float32 green light of the cells, or the middle plane; white is 1.
 
     Columns between are left out of a wide picture.
     """

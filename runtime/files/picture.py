@@ -297,7 +297,7 @@ def read_light(path: Path) -> FloatArray:
 
 
 def read_orientation(path: Path) -> int:
-    """Give the EXIF orientation 1..8 that a file states, 1 where it states none.
+    """Return the EXIF orientation 1..8 that a file states, 1 where it states none.
 
     Raises:
         OSError: If it cannot be read.

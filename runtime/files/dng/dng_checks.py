@@ -93,7 +93,7 @@ def unapplied(picture: DngPicture) -> list[str]:
 
 
 def find_doubts(tags: TiffTags) -> list[str]:
-    """Say where the sensor picture of a DNG contradicts itself, or of any file has no data."""
+    """Return where the sensor picture of a DNG contradicts itself, or of any file has no data."""
     directories = [d for d in sensor_directories(tags.directories) if numbers_of(d, _WIDTH)]
     found = [
         "the header does not say where the pixels of the mosaic lie"
@@ -132,13 +132,13 @@ def _chunk_doubt(picture: Directory) -> str:
 
 
 def _curve_doubt(picture: Directory) -> str:
-    """See whether 8 bits of lossy JPEG come with the curve that makes light of them."""
+    """Check that 8 bits of lossy JPEG come with the curve that makes light of them."""
     lossy = first_of(picture, _COMPRESSION) == LOSSY_JPEG
     return "" if not lossy or any(tag in picture for tag in _CURVES) else "its curve is missing"
 
 
 def _depth_doubt(picture: Directory) -> str:
-    """See whether the bits of a mosaic hold its white; 8 may stand for more behind a curve."""
+    """Check that the bits of a mosaic hold its white; 8 may stand for more behind a curve."""
     bits, white = first_of(picture, _BITS), first_of(picture, WHITE)
     mosaic = picture.get(_PHOTOMETRIC) == (CFA,) and _LINEARIZATION not in picture
     if (
@@ -162,7 +162,7 @@ def _table_doubt(picture: Directory) -> str:
 
 
 def _area_doubt(picture: Directory) -> str:
-    """See whether the active area lies in the picture and the crop in the active area."""
+    """Check that the active area lies in the picture and the crop in the active area."""
     width, height = first_of(picture, _WIDTH), first_of(picture, _HEIGHT)
     samples = first_of(picture, _SAMPLES, 1)
     if picture.get(_CFA_REPEAT) and samples != 1:
