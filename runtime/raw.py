@@ -29,6 +29,7 @@ from camkit.runtime.cancel import current_wish, watched
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.files import raw_checks
 from camkit.runtime.files.decoder import given
+from camkit.runtime.files.formats import foreign
 from camkit.runtime.files.in_memory import Source, stored
 from camkit.runtime.files.raw_tags import sensor_place
 from camkit.runtime.files.tiff_tags import read_tiff_tags
@@ -42,8 +43,10 @@ DEFAULT_MAX_MEMORY_MB: Final = 4096
 MAX_HEADER_BYTES: Final = 1 << 20
 PIPE_BYTES: Final = 1 << 20
 _SET_PIPE_SIZE: Final = 1031  # F_SETPIPE_SZ of Linux; other systems keep their own size
-_PICTURE_MAGIC: Final = (b"\x89PNG\r\n\x1a\n", b"\x76\x2f\x31\x01")
-_PICTURE_SUFFIXES: Final = frozenset({".jpg", ".jpeg", ".hdr", ".png", ".exr"})
+_PICTURE_MAGIC: Final = (b"\x89PNG\r\n\x1a\n", b"\x76\x2f\x31\x01", b"#?RADIANCE", b"#?RGBE")
+_PICTURE_SUFFIXES: Final = frozenset(
+    {".jpg", ".jpeg", ".jpe", ".jfif", ".mpo", ".hdr", ".png", ".exr", ".bmp"}
+)
 _TIFF_SUFFIXES: Final = frozenset({".tif", ".tiff"})
 _DNG_VERSION: Final = 50706
 _CFA_PHOTOMETRIC: Final = 32803
@@ -52,7 +55,7 @@ _DAMAGE: Final = re.compile(r"corrupt|premature end|unexpected end", re.IGNORECA
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Limits:
-    """What the child may use."""
+    """Limits of the child."""
 
     timeout_s: float
     max_memory_mb: int
@@ -97,9 +100,12 @@ def _read(
     """Read a file, RAW in a child within its limits; None decodes it here."""
     try:
         check_regular(file)
+        head = _head(file)
+        foreign.check_not_foreign(head)
         if is_picture(file):
             capture = _read_picture(file, mosaic, keep_codes=keep_codes)
             return replace(capture, sha256=file_sha256(file))
+        foreign.check_no_jpeg(head)
         if mosaic is not None and mosaic.cfa is not None:
             raise ContractError(
                 f"a pattern is for headerless PNG or TIFF; {file.name} has its own, omit "
@@ -118,14 +124,12 @@ def _read(
 
 
 def is_picture(path: Path) -> bool:
-    """Tell a picture (PNG, EXR, HDR, JPEG, plain TIFF) from a RAW file by content, then by name.
+    """Return whether a file is a picture, no RAW file: by its content, then by its name.
 
     Raises:
         OSError: If the file cannot be read.
     """
-    with path.open("rb") as file:
-        head = file.read(8)
-    suffix = path.suffix.lower()
+    head, suffix = _head(path), path.suffix.lower()
     if any(head.startswith(magic) for magic in _PICTURE_MAGIC) or suffix in _PICTURE_SUFFIXES:
         return True
     if suffix not in _TIFF_SUFFIXES:
@@ -135,8 +139,13 @@ def is_picture(path: Path) -> bool:
     return not sensor and not any(_DNG_VERSION in d for d in tags.directories)
 
 
+def _head(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.read(foreign.HEAD_BYTES)
+
+
 def named_bundle(path: str | os.PathLike[str]) -> str | None:
-    """Give the name of the bundle that a capture made by camkit names; None for other files.
+    """Return the name of the bundle that a capture made by camkit names; None for other files.
 
     Reads the tags only, so a long list of files can be planned before any is decoded.
     """
@@ -148,7 +157,7 @@ def named_bundle(path: str | os.PathLike[str]) -> str | None:
 
 
 def file_sha256(path: Path) -> str:
-    """Give the SHA-256 of a file as hexadecimal digits."""
+    """Return the SHA-256 of a file as hexadecimal digits."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

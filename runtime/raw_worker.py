@@ -30,7 +30,7 @@ from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.files import raw_checks
 from camkit.runtime.files.dng.jpeg_frames import frame_doubt
 from camkit.runtime.files.dng.picture_tags import sensor_picture
-from camkit.runtime.files.dng.plain_samples import check_readable, is_plain
+from camkit.runtime.files.dng.readable import check_readable, is_plain
 from camkit.runtime.files.libraw import NOTHING_SAID, decode_with_libraw
 from camkit.runtime.files.plain_dng import plain_decode
 from camkit.runtime.files.raw_decode import noted, to_capture
@@ -66,7 +66,7 @@ def decode_raw(path: Path, said: MosaicOptions = NOTHING_SAID) -> Capture:
 
 @contextmanager
 def _decoded(path: Path, said: MosaicOptions) -> Iterator[Capture]:
-    """Give a capture whose samples lie in LibRaw's memory, which ends with the block."""
+    """Yield a capture whose samples lie in LibRaw's memory, which ends with the block."""
     import rawpy
 
     tags = read_tiff_tags(path)
@@ -94,7 +94,7 @@ def _decoded(path: Path, said: MosaicOptions) -> Iterator[Capture]:
 
 @contextmanager
 def _named_in_utf8(path: Path) -> Iterator[str]:
-    """Give a name that rawpy takes: that of an open file where the path is no UTF-8."""
+    """Yield a name that rawpy takes: that of an open file where the path is no UTF-8."""
     try:
         path.as_posix().encode()
     except UnicodeEncodeError:
@@ -105,7 +105,7 @@ def _named_in_utf8(path: Path) -> Iterator[str]:
 
 
 def header_of(capture: Capture) -> dict[str, Any]:
-    """Give everything but the samples as plain JSON values."""
+    """Return everything but the samples as plain JSON values."""
     header: dict[str, Any] = {
         f.name: getattr(capture, f.name) for f in fields(capture) if f.name != "samples"
     }
@@ -182,7 +182,7 @@ def end_with(parent: int) -> None:
 
 
 def _awaited(parent: str) -> list[str]:
-    """Give the arguments that come once the parent knows them; none if it ends before."""
+    """Return the arguments that come once the parent knows them; none if it ends before."""
     import rawpy  # noqa: F401 - what takes time is done while the parent is not ready
 
     end_with(int(parent))

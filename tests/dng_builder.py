@@ -39,6 +39,7 @@ def build_dng(
     rows_per_strip: int | None = None,
     bits: int | None = None,
     order: str = "<",
+    pieces: Sequence[bytes] | None = None,
 ) -> Path:
     """Write a DNG and return its path.
 
@@ -52,12 +53,13 @@ def build_dng(
         rows_per_strip: Rows of a strip; None for all.
         bits: Of a sample; None for those of the type.
         order: "<" or ">".
+        pieces: Bytes of the strips, in place of those of the samples.
     """
     planes = 1 if samples.ndim == 2 else samples.shape[2]
     depth = bits or samples.dtype.itemsize * 8
     height, width = samples.shape[:2]
     tall, wide = chunk or (rows_per_strip or height, width)
-    pieces = [
+    pieces = pieces or [
         _packed(_piece(samples, (top, left), (tall, wide), whole=chunk is not None), depth, order,
                 predictor, compression)
         for top in range(0, height, tall)
@@ -175,10 +177,10 @@ def _octets(part: NDArray[Any], depth: int) -> NDArray[np.uint8]:
 
 
 def _float24(rows: NDArray[Any]) -> NDArray[np.uint8]:
-    """Return the bytes of DNG's float24: sign, 7 bits of exponent (bias 64), 16 of mantissa."""
+    """Return the bytes of DNG's float24: sign, 7 bits of exponent (bias 63), 16 of mantissa."""
     mantissa, exponent = np.frexp(np.abs(rows).astype(np.float64))
     whole = np.where(mantissa > 0, np.floor((2 * mantissa - 1) * 65536), 0).astype(np.uint32)
-    power = np.where(mantissa > 0, exponent - 1 + 64, 0).astype(np.uint32)
+    power = np.where(mantissa > 0, exponent - 1 + 63, 0).astype(np.uint32)
     word = (np.signbit(rows).astype(np.uint32) << 23) | (power << 16) | whole
     return word.astype(">u4")[..., None].view(np.uint8)[..., 1:]
 

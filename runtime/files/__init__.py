@@ -1,4 +1,4 @@
-"""What capture files say, and whether it can be believed.
+"""Contents of capture files, and checks whether they can be believed.
 
 tiff_tags     tags of TIFF-based files, read within bounds
 exif_tags     what a photograph says of itself, from EXIF anywhere

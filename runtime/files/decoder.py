@@ -38,7 +38,7 @@ class Decoder:
     complaints: IO[bytes]
 
     def take(self, order: Sequence[str]) -> bool:
-        """Give a waiting child its order; tell whether it still waited."""
+        """Hand a waiting child its order; return whether it still waited."""
         pipe = self.child.stdin
         if pipe is None or self.child.poll() is not None:
             return False
@@ -63,7 +63,7 @@ _AHEAD: Final[deque[Decoder]] = deque()
 
 @contextmanager
 def decoder_ahead() -> Iterator[None]:
-    """Have a child make itself ready; the first order of any thread is given to it."""
+    """Start a child that makes itself ready; the first order of any thread is given to it."""
     decoder = _started([str(os.getpid())], stdin=subprocess.PIPE)
     _AHEAD.append(decoder)
     try:
@@ -76,7 +76,7 @@ def decoder_ahead() -> Iterator[None]:
 
 @contextmanager
 def given(order: Sequence[str]) -> Iterator[Decoder]:
-    """Give a child that has its order; it ends with the block.
+    """Yield a child that has its order; it ends with the block.
 
     Args:
         order: The worker's arguments.
@@ -89,7 +89,7 @@ def given(order: Sequence[str]) -> Iterator[Decoder]:
 
 
 def _waiting(order: Sequence[str]) -> Decoder | None:
-    """Give the child that was started ahead, with its order; None without one."""
+    """Return the child that was started ahead, with its order; None without one."""
     try:
         decoder = _AHEAD.pop()
     except IndexError:
@@ -125,7 +125,7 @@ def _started(arguments: Sequence[str], *, stdin: int) -> Decoder:
 
 
 def child_environment() -> dict[str, str]:
-    """Let the child find this camkit also when it runs from a checkout that is not installed.
+    """Return variables that lead the child to this camkit, also one that is not installed.
 
     Threads reserve address space (stacks, arenas), which on a machine with many cores would fill
     the memory limit by itself; decoding uses few of them anyway. LibRaw takes the date of a file

@@ -1,4 +1,4 @@
-"""What of a decode is possible but not likely: each doubt is one sentence that names the damage.
+"""Doubts of a decode that is possible but not likely: each one sentence that names the damage.
 
     levels    samples above white, below black, far above black; masked pixels beside black
     pattern   two greens that disagree
@@ -42,6 +42,7 @@ GREEN_OFFSET: Final = 0.15
 LEAST_GREEN: Final = 0.01
 BLACKS_APART: Final = 0.04
 SWAPPED_GREENS: Final = 2.5
+_GREEN_SQUARE: Final = 16
 LEAST_LIGHT: Final = 0.01
 LEAST_BREAK_PX: Final = 8
 LEAST_SIDE_PX: Final = 64
@@ -67,7 +68,7 @@ def find_doubts(
     masked: Sequence[Samples] = (),
     grid: TileGrid | None = None,
 ) -> list[str]:
-    """Say what makes a decode hard to believe; nothing for a sound photograph.
+    """Return what makes a decode hard to believe; nothing for a sound photograph.
 
     Args:
         samples: (h, w) mosaic or (c, h, w) planes, unsigned integers.
@@ -114,7 +115,7 @@ def notes_behind(capture: Capture, haze: Haze) -> list[str]:
 
 
 def is_noise(samples: Samples, levels: Levels, cfa: CfaPattern | None) -> bool:
-    """Tell whether most of a picture is noise of a large part of its range, white left aside.
+    """Return whether most of a picture is noise of a large part of its range, white left aside.
 
     So damaged streams decode. Arguments as for `find_doubts`.
     """
@@ -169,7 +170,7 @@ def _thinned(samples: NDArray[Any]) -> NDArray[Any]:
 
 
 def _above_white_doubt(samples: Samples, levels: Levels) -> str:
-    """Tell samples that go on beyond white from those that pile up a little above it."""
+    """Return a doubt of samples that go on beyond white, not of those that pile up above it."""
     top = int(samples.max())
     if top <= levels.white * ABOVE_WHITE:
         return ""
@@ -209,7 +210,7 @@ def _green_doubt(samples: Samples, levels: Levels, cfa: CfaPattern | None) -> st
     greens = _green_places(cfa)
     pair, others = (
         [
-            samples[dy:height:step, dx:width:2].astype(np.float32) - levels.black[dy, dx]
+            _averages(samples[dy:height:step, dx:width:2], float(levels.black[dy, dx]))
             for dy, dx in places
         ]
         for places in (greens, [place for place in np.ndindex(2, 2) if place not in greens])
@@ -218,7 +219,9 @@ def _green_doubt(samples: Samples, levels: Levels, cfa: CfaPattern | None) -> st
     bias = abs(float(np.median(pair[0] - pair[1])))
     bright = level > LEAST_GREEN * (levels.white - float(levels.black.mean()))
     # red and blue that go together better than the greens are the greens
-    swapped = apart > SWAPPED_GREENS * np.median(np.abs(others[0] - others[1]))
+    swapped = apart > GREEN_OFFSET * level and apart > SWAPPED_GREENS * np.median(
+        np.abs(others[0] - others[1])
+    )
     biased = bias > GREEN_OFFSET * level and bias > 0.5 * apart
     if bright and (biased or swapped):
         share = (bias if biased else float(apart)) / level
@@ -226,8 +229,19 @@ def _green_doubt(samples: Samples, levels: Levels, cfa: CfaPattern | None) -> st
     return ""
 
 
+def _averages(plane: Samples, black: float) -> Cells:
+    """Return light of one place in the cell, averaged over squares, so that fine patterns go.
+
+    Stripes along a diagonal of the cell are seen by one green and not by the other.
+    """
+    high, wide = (side // _GREEN_SQUARE for side in plane.shape)
+    squares = plane[: high * _GREEN_SQUARE, : wide * _GREEN_SQUARE]
+    squares = squares.reshape(high, _GREEN_SQUARE, wide, _GREEN_SQUARE)
+    return np.asarray(squares.mean(axis=(1, 3), dtype=np.float32) - np.float32(black))
+
+
 def _cells(samples: Samples, levels: Levels, cfa: CfaPattern | None) -> Cells:
-    """Give (h, w) float32 green light of the cells, or the middle plane; white is 1.
+    """Return (h, w) float32 green light of the cells, or the middle plane; white is 1.
 
     Columns between are left out of a wide picture.
     """
@@ -310,17 +324,16 @@ def _noise_doubt(cells: Cells) -> str:
 
 
 def _noise_share(cells: Cells) -> float:
-    """Return the share of bands in which a cell has nothing in common with those beside it."""
+    """Return the share of bands in which a cell has nothing in common with those around it."""
     half, step = cells.shape[1] // 2, max(1, cells.shape[1] // 512)
     noisy = []
     for top in range(0, len(cells) - _BAND_CELLS + 1, _BAND_CELLS):
         rows = cells[top : top + _BAND_CELLS : 2]
         here, away = rows[:, : half - _LAGS : step], rows[:, half : 2 * half - _LAGS : step]
         # a fine pattern has something in common with itself one period on, noise never has
-        near = min(
-            float(np.median(np.abs(rows[:, lag : half - _LAGS + lag : step] - here)))
-            for lag in range(1, _LAGS + 1)
-        )
+        below = cells[top + 1 : top + _BAND_CELLS : 2, : half - _LAGS : step]
+        others = [rows[:, lag : half - _LAGS + lag : step] for lag in range(1, _LAGS + 1)]
+        near = min(float(np.median(np.abs(other - here))) for other in (*others, below))
         far = float(np.median(np.abs(away - here)))
         noisy.append(near > max(_NOISE_LEVEL, _NOISE_RATIO * far))
     return float(np.mean(noisy)) if noisy else 0.0

@@ -39,7 +39,7 @@ _NO_TAGS: Final = TiffTags(directories=(), file_bytes=0)
 
 
 def exif_of_picture(data: bytes) -> TiffTags:
-    """Give the EXIF tags of a PNG or JPEG; none where there are none or they cannot be found."""
+    """Return the EXIF tags of a PNG or JPEG; none where there are none or they cannot be found."""
     blocks = []
     if data.startswith(png_chunks.MAGIC):
         blocks = [content for name, content in png_chunks.png_chunks(data) if name == b"eXIf"]
@@ -53,14 +53,14 @@ def exif_of_picture(data: bytes) -> TiffTags:
 
 
 def orientation_of(tags: TiffTags) -> int:
-    """Give the EXIF orientation of the first picture, 1 where none is stated that exists."""
+    """Return the EXIF orientation of the first picture, 1 where none is stated that exists."""
     first = tags.directories[0].get(ORIENTATION) if tags.directories else None
     stated = first[0] if first else 1
     return int(stated) if stated in range(1, 9) else 1
 
 
 def metadata_of(tags: TiffTags) -> Metadata:
-    """Give what tags say of a photograph."""
+    """Return what tags say of a photograph."""
     told: dict[str, object] = {name: tags.text(tag) for name, tag in TEXT_TAGS.items()}
     told |= {name: (tags.numbers(tag) or (None,))[0] for name, tag in NUMBER_TAGS.items()}
     if told["iso"] == ISO_IN_OTHER_TAG:
@@ -69,13 +69,13 @@ def metadata_of(tags: TiffTags) -> Metadata:
 
 
 def is_stated(tags: TiffTags, name: str) -> bool:
-    """Tell whether a file has the tag of a field, be it empty or zero."""
+    """Return whether a file has the tag of a field, be it empty or zero."""
     tag = TEXT_TAGS.get(name) or NUMBER_TAGS[name]
     return any(tag in directory for directory in tags.directories)
 
 
 def _place(tags: TiffTags) -> dict[str, float | None]:
-    """Give latitude, longitude and altitude with their signs."""
+    """Return latitude, longitude and altitude with their signs."""
     height = (tags.numbers(ALTITUDE) or (math.nan,))[0]
     below = _is_below(tags)
     return {
@@ -91,7 +91,7 @@ def _is_below(tags: TiffTags) -> bool:
 
 
 def _degrees(tags: TiffTags, tag: int, reference: int, signs: str) -> float | None:
-    """Give degrees, minutes and seconds as one signed number; None if they are incomplete."""
+    """Return degrees, minutes and seconds as one signed number; None if they are incomplete."""
     parts, side = tags.numbers(tag), (tags.text(reference) or "").upper()[:1]
     if parts is None or len(parts) != 3 or not side or side not in signs:
         return None

@@ -33,7 +33,7 @@ _HALF_MINUTE_S: Final = 30
 
 
 def exr_attributes(metadata: Metadata) -> dict[str, bytes | float]:
-    """Give the attributes of what is stated, text as UTF-8."""
+    """Return the attributes of what is stated, text as UTF-8."""
     told = metadata.stated()
     found: dict[str, bytes | float] = {
         name: str(told[key]).encode() for key, name in TEXTS.items() if key in told
@@ -45,14 +45,14 @@ def exr_attributes(metadata: Metadata) -> dict[str, bytes | float]:
 
 
 def metadata_of_exr(header: Mapping[str, Any]) -> Metadata:
-    """Give what a header says of the photograph."""
+    """Return what a header says of the photograph."""
     told: dict[str, Any] = {key: header.get(name) for key, name in TEXTS.items()}
     told |= {key: _short(header.get(name)) for key, name in NUMBERS.items()}
     return Metadata.believable(**told, utc_offset=_offset(header.get(UTC_OFFSET)))
 
 
 def _short(value: Any) -> Any:
-    """Give a 32-bit number by the digits that it holds."""
+    """Return a 32-bit number by the digits that it holds."""
     return float(f"{value:.7g}") if isinstance(value, float) else value
 
 

@@ -31,13 +31,13 @@ _SENSOR_PHOTOMETRICS: Final = (32803, 34892)
 
 
 def is_path(source: Any) -> TypeGuard[FilePath]:
-    """Tell a path from data."""
+    """Return whether a source is a path, not data."""
     return isinstance(source, str | os.PathLike)
 
 
 @contextmanager
 def stored(source: Source) -> Iterator[Path]:
-    """Give a path that holds a capture: its own, or a temporary one for data in memory.
+    """Yield a path that holds a capture: its own, or a temporary one for data in memory.
 
     Args:
         source: A path; bytes; or an object opened in binary mode, read from where it stands.
@@ -63,7 +63,7 @@ def stored(source: Source) -> Iterator[Path]:
 
 
 def list_paths(files: Any) -> Sequence[FilePath]:
-    """Give one path or several as a list.
+    """Return one path or several as a list.
 
     Raises:
         ContractError: If any is data in memory, after which no picture can be named.
@@ -91,7 +91,7 @@ def _copy(source: Any, file: IO[bytes]) -> None:
 
 
 def _file_name(source: Any, path: Path) -> str:
-    """Give a name whose suffix tells pictures from RAW files, the one that the object has first."""
+    """Return a name whose suffix tells pictures from RAW files: the object's own, if it has one."""
     own = getattr(source, "name", None)
     if isinstance(own, str) and Path(own).suffix:
         return Path(own).name
@@ -104,7 +104,7 @@ def _file_name(source: Any, path: Path) -> str:
 
 
 def _is_plain(tags: TiffTags) -> bool:
-    """Tell a plain TIFF from the RAW files that are built like one."""
+    """Return whether a TIFF is plain, no RAW file that is built like one."""
     return not any(
         directory.get(_PHOTOMETRIC, (0,))[0] in _SENSOR_PHOTOMETRICS
         or any(tag in directory for tag in (_MAKE, _SUB_IFDS, _DNG_VERSION))

@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.contracts import CfaPattern
+from camkit.errors import DecodeError
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.files import raw_checks
 from camkit.runtime.files.dng import dng_checks
 from camkit.runtime.files.dng.applied_tags import SeenPixels, apply_tags
 from camkit.runtime.files.dng.picture_tags import DngPicture
+from camkit.runtime.files.dng.readable import X_TRANS
 from camkit.runtime.files.order.tile_edges import TileGrid
 from camkit.runtime.files.raw_decode import RawDecode, stated_orientation
 from camkit.runtime.files.raw_metadata import raw_metadata
@@ -22,6 +24,7 @@ from camkit.runtime.files.tiff_tags import TiffTags
 # LibRaw's flip has three bits (1 mirror columns, 2 mirror rows, 4 transpose); EXIF counts 1..8
 FLIP_TO_EXIF: Final = {0: 1, 1: 2, 2: 4, 3: 3, 4: 5, 5: 8, 6: 6, 7: 7}
 MASKED_RIM_PX: Final = 2
+LEAST_X_TRANS_PX: Final = 512
 NOTHING_SAID: Final = MosaicOptions()
 DEVELOPED: Final = (
     "not a Bayer mosaic: decoded by LibRaw's own demosaic (values below black are cut)"
@@ -177,9 +180,18 @@ def develop_linear(
 
     Returns:
         (3, h, w) uint16 in camera space without white balance, and black 0, white 65535.
+
+    Raises:
+        DecodeError: If it is an X-Trans picture that is too small for LibRaw.
     """
     import rawpy
 
+    height, width = raw.sizes.height, raw.sizes.width
+    if np.shape(raw.raw_pattern) == X_TRANS and min(height, width) < LEAST_X_TRANS_PX:
+        raise DecodeError(
+            f"LibRaw demosaics X-Trans from {LEAST_X_TRANS_PX}x{LEAST_X_TRANS_PX} px on; got "
+            f"{width}x{height}"
+        )
     picture = raw.postprocess(
         output_color=rawpy.ColorSpace.raw,
         gamma=(1, 1),

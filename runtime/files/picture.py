@@ -25,7 +25,7 @@ from camkit.errors import DecodeError
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.files import raw_checks
 from camkit.runtime.files.exif_tags import exif_of_picture, metadata_of, orientation_of
-from camkit.runtime.files.formats import exr_picture, jpeg_segments
+from camkit.runtime.files.formats import exr_picture, foreign, jpeg_segments
 from camkit.runtime.files.formats.color_space import SRGB, ColorSpace, power_curve
 from camkit.runtime.files.formats.decoded import Decoded
 from camkit.runtime.files.formats.opencv_picture import decode_picture
@@ -300,7 +300,7 @@ def read_light(path: Path) -> FloatArray:
 
 
 def read_orientation(path: Path) -> int:
-    """Give the EXIF orientation 1..8 that a file states, 1 where it states none.
+    """Return the EXIF orientation 1..8 that a file states, 1 where it states none.
 
     Raises:
         OSError: If it cannot be read.
@@ -325,11 +325,16 @@ def _counts_advice() -> str:
 
 
 def _begins(path: Path, magic: bytes) -> bool:
+    return _head(path).startswith(magic)
+
+
+def _head(path: Path) -> bytes:
     with path.open("rb") as file:
-        return file.read(len(magic)) == magic
+        return file.read(foreign.HEAD_BYTES)
 
 
 def _decode(path: Path) -> _Picture:
+    foreign.check_not_foreign(_head(path))
     if _begins(path, exr_picture.MAGIC):
         decoded, metadata = exr_picture.decode_exr(path)
         return _Picture(decoded=decoded, metadata=metadata)

@@ -6,7 +6,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import CFA_PATTERNS, CfaPattern
+from camkit.contracts import CFA_PATTERNS
 from camkit.errors import DecodeError
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.files import raw_checks
@@ -23,20 +23,19 @@ LINEARIZATION: Final = 50712
 
 
 def plain_decode(path: Path, tags: TiffTags, picture: DngPicture, said: MosaicOptions) -> RawDecode:
-    """Read a float or deflated DNG.
+    """Read a DNG of floats, of deflated samples or of planes that lie apart.
 
     Args:
         path: The file.
         tags: Of the file.
-        picture: Its sensor picture, which can be read.
+        picture: Its sensor picture, which `check_readable` has passed.
         said: Levels that the caller says in place of the file's.
 
     Raises:
-        DecodeError: If the picture is no Bayer mosaic and no planes of one or three colours, or
-            its data are damaged.
+        DecodeError: If its data are damaged.
         OSError: If the file cannot be read.
     """
-    cfa = _pattern(picture)
+    cfa = next((cfa for cfa in CFA_PATTERNS if cfa == picture.pattern), None)
     raw_checks.check_size(picture.height, picture.width, tags.file_bytes)
     dng_checks.check_layout(picture)
     whole = _linear(read_plain(path, picture), picture)
@@ -66,24 +65,6 @@ def plain_decode(path: Path, tags: TiffTags, picture: DngPicture, said: MosaicOp
         metadata=found if found.camera else found.completed(model=tags.text(UNIQUE_CAMERA_MODEL)),
         notes=notes + more,
     )
-
-
-def _pattern(picture: DngPicture) -> CfaPattern | None:
-    """Return the 2x2 cell of a mosaic; None for planes.
-
-    Raises:
-        DecodeError: If the picture is any other mosaic, or has another number of planes.
-    """
-    letters, planes = picture.pattern, picture.planes
-    kind = "floating-point" if picture.is_float else "deflated"
-    if not letters and planes in (1, 3):
-        return None
-    for cfa in CFA_PATTERNS:
-        if (letters, picture.repeat, planes) == (cfa, (2, 2), 1):
-            return cfa
-    rows, cols = picture.repeat
-    name = f"a CFA of {rows}x{cols} pixels ({letters[:8]})" if letters else f"{planes} planes"
-    raise DecodeError(f"the {kind} DNG holds {name}, which is not read: a Bayer cell is, and RGB")
 
 
 def _linear(whole: NDArray[Any], picture: DngPicture) -> NDArray[Any]:

@@ -40,7 +40,7 @@ Samples = NDArray[Any]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Levels:
-    """What the checks need to know of the levels, in file units."""
+    """Levels that the checks need, in file units."""
 
     black: FloatArray
     white: float
@@ -85,7 +85,7 @@ def check_chunks_inside(tags: TiffTags) -> None:
 def sensor_directories(
     directories: tuple[Mapping[int, TagValue], ...],
 ) -> list[Mapping[int, TagValue]]:
-    """Give the directories that hold a sensor picture: CFA or LinearRaw, else the largest."""
+    """Return the directories that hold a sensor picture: CFA or LinearRaw, else the largest."""
 
     def first(directory: Mapping[int, TagValue], tag: int) -> float:
         value = directory.get(tag)
@@ -114,7 +114,7 @@ def check_size(height: int, width: int, file_bytes: int) -> None:
 
 
 def check_pattern(letters: str) -> CfaPattern:
-    """Give the CFA letters as a pattern.
+    """Return the CFA letters as a pattern.
 
     Raises:
         DecodeError: If they are not a Bayer cell.
@@ -174,7 +174,7 @@ def check_content(samples: Samples, levels: Levels) -> None:
 
 
 def share_over_white(samples: Samples, white: float) -> float:
-    """Give the share of samples clearly above white, in bands that stay in cache."""
+    """Return the share of samples clearly above white, in bands that stay in cache."""
     rows = samples.shape[-2]
     limit = white * OVER_WHITE_FACTOR
     bands = (samples[..., top : top + _BAND_ROWS, :] for top in range(0, rows, _BAND_ROWS))

@@ -16,7 +16,7 @@ _EPOCH_YEAR: Final = 1970
 
 
 def raw_metadata(raw: Any, tags: TiffTags) -> Metadata:
-    """Give what a RAW file says of its photograph.
+    """Return what a RAW file says of its photograph.
 
     A tag that is there and empty or zero means that the camera did not know, so that LibRaw, which
     then assumes something, is asked only for what the file has no tag of.
@@ -49,7 +49,7 @@ def _of_libraw(raw: Any) -> dict[str, Any]:
 
 
 def _short(value: float | None) -> float | None:
-    """Give a float32 of LibRaw by the digits that it holds."""
+    """Return a float32 of LibRaw by the digits that it holds."""
     return None if value is None else float(f"{value:.7g}")
 
 

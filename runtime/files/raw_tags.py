@@ -28,7 +28,7 @@ _BUNDLE_IN_MODEL: Final = re.compile(r"camkit ([A-Za-z0-9_.-]{1,64})")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SensorPlace:
-    """What a capture made by camkit records of itself; all None for other files."""
+    """Records that camkit leaves in a capture of its own; all None for other files."""
 
     bundle_name: str | None = None
     origin_px: tuple[int, int] | None = None
@@ -37,19 +37,19 @@ class SensorPlace:
 
 
 def camera_name(tags: TiffTags, metadata: Metadata) -> str:
-    """Give the camera as people read it; empty if not stated."""
+    """Return the camera as people read it; empty if not stated."""
     return clean_text(tags.text(UNIQUE_CAMERA_MODEL)) or metadata.camera
 
 
 def sample_bits(tags: TiffTags) -> int:
-    """Give the bits of a sample of the sensor picture; 0 if not stated or not believable."""
+    """Return the bits of a sample of the sensor picture; 0 if not stated or not believable."""
     stated = [d.get(BITS_PER_SAMPLE, b"") for d in sensor_directories(tags.directories)]
     bits = [value[0] for value in stated if value and not isinstance(value, bytes)]
     return int(max(bits)) if bits and 1 <= max(bits) <= 16 else 0
 
 
 def noise_profile(tags: TiffTags, cfa: CfaPattern | None) -> NoiseModel | None:
-    """Give the DNG NoiseProfile as R, G, B; None if absent or not believable.
+    """Return the DNG NoiseProfile as R, G, B; None if absent or not believable.
 
     The tag holds (scale, offset) once, per colour plane in CFAPlaneColor order, or (as some
     cameras write it) per position of the 2x2 cell.
@@ -86,7 +86,7 @@ def _pairs_by_color(
 
 
 def sensor_place(tags: TiffTags) -> SensorPlace:
-    """Give what camkit wrote into ImageDescription, else the bundle of UniqueCameraModel."""
+    """Return what camkit wrote into ImageDescription, else the bundle of UniqueCameraModel."""
     match = _BUNDLE_IN_MODEL.fullmatch(tags.text(UNIQUE_CAMERA_MODEL) or "")
     named = match.group(1) if match else None
     try:

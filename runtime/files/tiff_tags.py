@@ -53,7 +53,7 @@ class TiffTags:
     interoperability: str = ""
 
     def numbers(self, tag: int) -> tuple[float, ...] | None:
-        """Give the numbers of a tag from the first directory that has it."""
+        """Return the numbers of a tag from the first directory that has it."""
         for directory in self.directories:
             value = directory.get(tag)
             if value and not isinstance(value, bytes):
@@ -61,7 +61,7 @@ class TiffTags:
         return None
 
     def text(self, tag: int) -> str | None:
-        """Give the text of a tag from the first directory that has it."""
+        """Return the text of a tag from the first directory that has it."""
         for directory in self.directories:
             value = directory.get(tag)
             if isinstance(value, bytes):
@@ -84,7 +84,7 @@ class _Reader:
     interoperability: str = ""
 
     def unpack(self, code: str, offset: int) -> tuple[float, ...] | None:
-        """Give numbers at an offset, or None where the file does not reach."""
+        """Return numbers at an offset, or None where the file does not reach."""
         size = struct.calcsize(self.order + code)
         if offset < 0 or offset + size > self.file_bytes:
             return None

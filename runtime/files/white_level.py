@@ -35,7 +35,7 @@ def check_said_white(samples: Samples, white: float) -> None:
 def believable_white(
     samples: Samples, levels: Levels, cfa: CfaPattern | None, bits: int
 ) -> tuple[Levels, str]:
-    """Give the levels of a decode, white raised where the data go far beyond it, and a note.
+    """Return the levels of a decode, white raised where the data go far beyond it, and a note.
 
     Args:
         samples: (h, w) mosaic or (c, h, w) planes, unsigned integers.

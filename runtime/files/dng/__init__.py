@@ -9,6 +9,7 @@ field_gain     GainMap and FixVignetteRadial as a gain of each pixel
 corrections    black and gain applied to samples
 white_point    gains of AsShotNeutral and AsShotWhiteXY
 predictors     bytes of a decompressed strip or tile as numbers
-jpeg_frames    the size that a JPEG in it states of itself
-plain_samples  float and deflated samples, read without LibRaw
+jpeg_frames    the size that a JPEG in a strip or tile states of itself
+readable       kinds that LibRaw reads, that are read without it, and names of all others
+plain_samples  samples that are read without LibRaw
 """

@@ -19,6 +19,7 @@ from camkit.runtime.files.dng.opcodes import LISTS
 from camkit.runtime.files.dng.picture_tags import (
     CFA,
     LOSSY_JPEG,
+    UNCOMPRESSED,
     Directory,
     DngPicture,
     first_of,
@@ -29,14 +30,13 @@ from camkit.runtime.files.dng.picture_tags import (
 from camkit.runtime.files.raw_checks import Levels, sensor_directories
 from camkit.runtime.files.tiff_tags import TiffTags
 
-UNCOMPRESSED: Final = 1
 LEVEL_TOLERANCE: Final = 1.0
 ROW_PADDING_BYTES: Final = 16
 MOST_BITS: Final = 64
 TABLE_TOLERANCE: Final = 0.1
 
 _BITS, _COMPRESSION, _SAMPLES, _SAMPLE_FORMAT = 258, 259, 277, 339
-_WIDTH, _HEIGHT, _STRIP_BYTES = 256, 257, 279
+_WIDTH, _HEIGHT, _STRIP_BYTES, _PLANAR = 256, 257, 279, 284
 _PHOTOMETRIC: Final = 262
 _CHUNKS: Final = (("strip", 273, 0, 278), ("tile", 324, 322, 323))
 _CROP_ORIGIN, _CROP_SIZE, _ACTIVE_AREA = 50719, 50720, 50829
@@ -93,7 +93,7 @@ def unapplied(picture: DngPicture) -> list[str]:
 
 
 def find_doubts(tags: TiffTags) -> list[str]:
-    """Say where the sensor picture of a DNG contradicts itself, or of any file has no data."""
+    """Return where the sensor picture of a DNG contradicts itself, or of any file has no data."""
     directories = [d for d in sensor_directories(tags.directories) if numbers_of(d, _WIDTH)]
     found = [
         "the header does not say where the pixels of the mosaic lie"
@@ -112,6 +112,7 @@ def find_doubts(tags: TiffTags) -> list[str]:
 def _chunk_doubt(picture: Directory) -> str:
     """Compare the number of strips or tiles with the size (TIFF 6.0, sections 3 and 15)."""
     width, height = first_of(picture, _WIDTH), first_of(picture, _HEIGHT)
+    groups = int(first_of(picture, _SAMPLES, 1)) if first_of(picture, _PLANAR, 1) == 2 else 1
     for noun, offsets_tag, wide_tag, high_tag in _CHUNKS:
         count = len(numbers_of(picture, offsets_tag))
         wide, high = first_of(picture, wide_tag, width), first_of(picture, high_tag, height)
@@ -119,7 +120,7 @@ def _chunk_doubt(picture: Directory) -> str:
             continue
         if min(wide, high) < 1:
             return f"a {noun} of {wide:.0f}x{high:.0f} pixels holds nothing"
-        needed = math.ceil(width / wide) * math.ceil(height / high)
+        needed = math.ceil(width / wide) * math.ceil(height / high) * groups
         if count != needed:
             return f"{width:.0f}x{height:.0f} pixels need {needed} {noun}(s), there are {count}"
     stated = sum(numbers_of(picture, _STRIP_BYTES))
@@ -131,13 +132,13 @@ def _chunk_doubt(picture: Directory) -> str:
 
 
 def _curve_doubt(picture: Directory) -> str:
-    """See whether 8 bits of lossy JPEG come with the curve that makes light of them."""
+    """Check that 8 bits of lossy JPEG come with the curve that makes light of them."""
     lossy = first_of(picture, _COMPRESSION) == LOSSY_JPEG
     return "" if not lossy or any(tag in picture for tag in _CURVES) else "its curve is missing"
 
 
 def _depth_doubt(picture: Directory) -> str:
-    """See whether the bits of a mosaic hold its white; 8 may stand for more behind a curve."""
+    """Check that the bits of a mosaic hold its white; 8 may stand for more behind a curve."""
     bits, white = first_of(picture, _BITS), first_of(picture, WHITE)
     mosaic = picture.get(_PHOTOMETRIC) == (CFA,) and _LINEARIZATION not in picture
     if (
@@ -161,7 +162,7 @@ def _table_doubt(picture: Directory) -> str:
 
 
 def _area_doubt(picture: Directory) -> str:
-    """See whether the active area lies in the picture and the crop in the active area."""
+    """Check that the active area lies in the picture and the crop in the active area."""
     width, height = first_of(picture, _WIDTH), first_of(picture, _HEIGHT)
     samples = first_of(picture, _SAMPLES, 1)
     if picture.get(_CFA_REPEAT) and samples != 1:
@@ -222,6 +223,9 @@ def _check_white(picture: Directory, levels: Levels) -> None:
     if rescaled or first_of(picture, _SAMPLE_FORMAT, 1) != 1:
         return
     stated = numbers_of(picture, WHITE)
+    # LibRaw moves white by what the blacks of planes differ
+    if len(set(numbers_of(picture, BLACK))) > 1 and picture.get(_PHOTOMETRIC) != (CFA,):
+        return
     if stated and abs(max(stated) - levels.white) > LEVEL_TOLERANCE:
         raise DecodeError(
             f"the DNG states white {max(stated):g}, LibRaw found {levels.white:g}; "

@@ -7,7 +7,7 @@ DNG specification 1.7.1, chapter 4. LibRaw repeats the pattern from another pixe
 odd, keeps the mean of the deltas and one white of all planes.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -151,8 +151,3 @@ def white_levels(picture: DngPicture) -> FloatArray:
     if len(stated) != picture.planes:
         stated = [max(stated, default=default)] * picture.planes
     return np.array(stated, dtype=np.float32)
-
-
-def moved(black: BlackMap, step: float) -> BlackMap:
-    """Return black with a number added to all of it."""
-    return replace(black, pattern=black.pattern + step)

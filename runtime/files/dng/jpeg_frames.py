@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import BinaryIO, Final
 
 from camkit.runtime.files.dng.picture_tags import LOSSY_JPEG, DngPicture, first_of, numbers_of
+from camkit.runtime.files.formats.jpeg_segments import FRAMES, MAGIC, header_segments
 
 LOSSLESS_JPEG: Final = 7
 MOST_CHUNKS: Final = 256
-_MOST_SEGMENTS: Final = 32
-_FRAMES: Final = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
-_SCAN: Final = 0xDA
+_MOST_HEAD_BYTES: Final = 65_536
+_SIZES: Final = struct.Struct(">BHHB")
 
 
 def frame_doubt(path: Path, picture: DngPicture) -> str:
@@ -49,6 +49,8 @@ def frame_doubt(path: Path, picture: DngPicture) -> str:
                 for rows in (tall, picture.height - top)
                 for columns in (wide, picture.width - left)
             }
+            if frame == (0, 0, 0):
+                return "no JPEG lies in a strip or tile that should be one"
             if frame is not None and math.prod(frame) not in sizes:
                 height, width, planes = frame
                 return (
@@ -59,20 +61,17 @@ def frame_doubt(path: Path, picture: DngPicture) -> str:
 
 
 def _frame(file: BinaryIO, offset: int) -> tuple[int, int, int] | None:
-    """Return height, width and components of the JPEG at an offset; None if it states none."""
+    """Return height, width and components of the JPEG at an offset.
+
+    Returns:
+        None if it states none; zeros if there is no JPEG.
+    """
     file.seek(offset)
-    if file.read(2) != b"\xff\xd8":
-        return None
-    for _ in range(_MOST_SEGMENTS):
-        head = file.read(4)
-        if len(head) < 4 or head[0] != 0xFF or head[1] == _SCAN:
-            return None
-        (length,) = struct.unpack(">H", head[2:])
-        if head[1] in _FRAMES:
-            body = file.read(6)
-            if len(body) < 6:
-                return None
-            _, height, width, planes = struct.unpack(">BHHB", body)
+    head = file.read(_MOST_HEAD_BYTES)
+    if not head.startswith(MAGIC):
+        return 0, 0, 0
+    for segment in header_segments(head):
+        if segment.marker in FRAMES and len(segment.content) >= _SIZES.size:
+            _, height, width, planes = _SIZES.unpack_from(segment.content)
             return (height, width, planes) if height * width * planes else None
-        file.seek(max(length - 2, 0), 1)
     return None

@@ -14,6 +14,7 @@ from camkit.runtime.files.tiff_tags import TagValue, TiffTags
 DNG_VERSION: Final = 50706
 CFA: Final = 32803
 FLOAT_FORMAT: Final = 3
+UNCOMPRESSED: Final = 1
 LOSSY_JPEG: Final = 34892
 _COLOURS: Final = "RGB"
 
@@ -83,6 +84,11 @@ class DngPicture:
     def is_float(self) -> bool:
         """Return whether samples are floating-point numbers."""
         return first_of(self.directory, 339, 1) == FLOAT_FORMAT
+
+    @property
+    def is_planar(self) -> bool:
+        """Return whether each sample of a pixel lies in a plane of its own."""
+        return first_of(self.directory, 284, 1) == 2 and self.planes > 1
 
     @property
     def is_rescaled(self) -> bool:

@@ -1,6 +1,7 @@
-"""Float and deflated samples of a DNG, read without LibRaw.
+"""Samples of a DNG that are read without LibRaw: floats, deflated ones, planes that lie apart.
 
-LibRaw scales floats by their largest sample and takes Deflate without a predictor for one with.
+LibRaw scales floats by their largest sample, takes Deflate without a predictor for one with, and
+mixes up planes that lie apart.
 
     strips or tiles -> zlib, in bounds -> predictor undone -> numbers at their place
 """
@@ -9,68 +10,15 @@ import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO, Final
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from camkit.errors import DecodeError
 from camkit.runtime.files.dng.picture_tags import DngPicture, first_of, numbers_of
-from camkit.runtime.files.dng.predictors import (
-    PIXELS_BACK,
-    as_floats,
-    as_whole_numbers,
-    unpredicted,
-)
-
-UNCOMPRESSED: Final = 1
-DEFLATE: Final = (8, 32946)
-FLOAT_BITS: Final = (16, 24, 32)
-WHOLE_BITS: Final = (8, 16)
-_COMPRESSIONS: Final = {
-    5: "LZW", 6: "old JPEG", 32773: "PackBits", 34925: "LZMA", 50000: "Zstandard", 50001: "WebP",
-    50002: "JPEG XL", 52546: "JPEG XL",
-}  # fmt: skip
-_LIBRAW_READS: Final = (UNCOMPRESSED, 7, 34892)
-_INTERLEAVED: Final = {
-    50974: "SubTileBlockSize", 50975: "RowInterleaveFactor", 52547: "ColumnInterleaveFactor"
-}  # fmt: skip
-
-
-def is_plain(picture: DngPicture) -> bool:
-    """Return whether the samples of a picture are read here: floats, and deflated numbers."""
-    return picture.is_float or picture.compression in DEFLATE
-
-
-def check_readable(picture: DngPicture) -> None:
-    """Refuse by its name what neither LibRaw nor this module reads.
-
-    Raises:
-        DecodeError: If the samples are compressed or laid out so.
-    """
-    known = UNCOMPRESSED, *DEFLATE
-    if picture.compression not in (known if picture.is_float else (*known, *_LIBRAW_READS)):
-        name = _COMPRESSIONS.get(picture.compression)
-        if name is not None or picture.is_float:
-            raise DecodeError(
-                f"the DNG is compressed with {name or f'method {picture.compression}'}, which is "
-                "not read; save it uncompressed or with lossless JPEG"
-            )
-    for tag, name in _INTERLEAVED.items():
-        values = numbers_of(picture.directory, tag)
-        if values and max(values) > 1:
-            raise DecodeError(
-                f"the DNG interleaves its rows or columns ({name} {max(values):g}), which is not "
-                "read; save it without"
-            )
-    if not is_plain(picture):
-        return
-    bits, predictor = picture.bits, int(first_of(picture.directory, 317, 1))
-    kind = "floating-point" if picture.is_float else "deflated whole"
-    if bits not in (FLOAT_BITS if picture.is_float else WHOLE_BITS):
-        raise DecodeError(f"the DNG holds {kind} samples of {bits} bits, which are not read")
-    if picture.compression in DEFLATE and predictor not in PIXELS_BACK:
-        raise DecodeError(f"the DNG is deflated with predictor {predictor}, which is not read")
+from camkit.runtime.files.dng.predictors import as_floats, as_whole_numbers, unpredicted
+from camkit.runtime.files.dng.readable import DEFLATE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,8 +64,7 @@ def _chunks(picture: DngPicture) -> Iterator[_Chunk]:
     tall = int(first_of(tags, 323 if tiled else 278, height))
     wide = int(first_of(tags, 322, width)) if tiled else width
     tall = tall if tiled else min(tall, height)
-    apart = first_of(tags, 284, 1) == 2
-    together, groups = (1, picture.planes) if apart else (picture.planes, 1)
+    together, groups = (1, picture.planes) if picture.is_planar else (picture.planes, 1)
     if min(tall, wide) < 1 or max(tall, wide) > 1 << 16:
         raise DecodeError(f"strips or tiles of {wide}x{tall} pixels cannot be; header damaged?")
     places = [

@@ -65,8 +65,8 @@ def as_floats(octets: NDArray[np.uint8]) -> NDArray[np.float32]:
     for place in range(3):
         word = (word << np.uint32(8)) | octets[..., place]
     exponent, mantissa = (word >> 16) & 0x7F, word & 0xFFFF
-    value = np.ldexp(1 + mantissa / 65536, exponent.astype(np.int32) - 64)
-    value = np.where(exponent == 0, np.ldexp(mantissa / 65536, -63), value)
+    value = np.ldexp(1 + mantissa / 65536, exponent.astype(np.int32) - 63)
+    value = np.where(exponent == 0, np.ldexp(mantissa / 65536, -62), value)
     value = np.where(exponent == 0x7F, np.where(mantissa, np.nan, np.inf), value)
     return np.where(word >> 23, -value, value).astype(np.float32)
 

@@ -24,6 +24,7 @@ SIGNATURES: Final = (50931, 50932)
 """Of the camera's calibration and of the profile; the calibration holds if they are the same."""
 LIGHTS: Final = ((50721, 50723, 50778), (50722, 50724, 50779))
 """ColorMatrix, CameraCalibration, CalibrationIlluminant."""
+_THIRD_LIGHT: Final = (52529, 52530, 52531)
 MAX_FACTOR: Final = 1e3
 """Of a colour matrix or a balance that a camera can have."""
 
@@ -83,7 +84,7 @@ def color_matrix(tags: TiffTags) -> tuple[Matrix, str | None] | None:
 
     Returns:
         The (3, 3) matrix with AnalogBalance and CameraCalibration applied, and a note if its light
-        is not D65; None if the file has no believable matrix.
+        is not D65 or the file has a third light; None if the file has no believable matrix.
     """
     found = light_matrices(tags)
     if not found:
@@ -94,8 +95,10 @@ def color_matrix(tags: TiffTags) -> tuple[Matrix, str | None] | None:
     source = (
         f"EXIF light source {one.light}" if one.light else "a light that the file does not state"
     )
-    is_d65 = one.kelvin == _D65_KELVIN
-    return one.matrix, None if is_d65 else f"colour matrix is for {source}, not D65"
+    notes = [] if one.kelvin == _D65_KELVIN else [f"colour matrix is for {source}, not D65"]
+    if any(tags.numbers(tag) is not None for tag in _THIRD_LIGHT):
+        notes.append("ColorMatrix3, of a third light, is not applied")
+    return one.matrix, "; ".join(notes) or None
 
 
 def neutral(tags: TiffTags) -> NDArray[np.float64] | None:

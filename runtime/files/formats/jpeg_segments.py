@@ -19,7 +19,7 @@ MAGIC: Final = b"\xff\xd8"
 _MOST_SEGMENTS: Final = 65_536
 _START_OF_SCAN: Final = 0xDA
 _END: Final = 0xD9
-_FRAMES: Final = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+FRAMES: Final = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 _OF_SCANS: Final = frozenset({0xC4, 0xCC, *range(0xDA, 0xE0), *range(0xE0, 0xF0), 0xFE})
 """Markers that may follow a scan: tables, next scan, lines, restarts, applications, comment."""
 _ARITHMETIC: Final = (0xC9, 0xCA)
@@ -112,7 +112,7 @@ def _check_kind(segment: Segment, file_bytes: int) -> None:
     kind = _UNREAD.get(segment.marker)
     if kind is not None:
         raise DecodeError(f"a {kind} JPEG is not read; save it as baseline or progressive JPEG")
-    if segment.marker not in _FRAMES or len(segment.content) < 6:
+    if segment.marker not in FRAMES or len(segment.content) < 6:
         return
     bits, channels = segment.content[0], segment.content[5]
     high, wide = int.from_bytes(segment.content[1:3]), int.from_bytes(segment.content[3:5])

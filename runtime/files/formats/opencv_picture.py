@@ -45,13 +45,16 @@ def decode_picture(data: bytes, exif: TiffTags) -> Decoded:
 
 
 def decoded_samples(
-    samples: NDArray[Any], stated: StatedSpace, notes: tuple[str, ...] = ()
+    samples: NDArray[Any], stated: StatedSpace, notes: tuple[str, ...] = (), top: int | None = None
 ) -> Decoded:
-    """Return samples whose white is the top of their type."""
-    is_code = np.issubdtype(samples.dtype, np.integer)
+    """Return samples with the space that their file states, white at the top of their type."""
+    if top is None:
+        is_code = np.issubdtype(samples.dtype, np.integer)
+        top = int(np.iinfo(samples.dtype).max) if is_code else 0
+    stated = stated.of_channels(samples.ndim)
     return Decoded(
         samples=samples,
-        top=int(np.iinfo(samples.dtype).max) if is_code else 0,
+        top=top,
         space=stated.space,
         doubt=stated.doubt,
         notes=notes,

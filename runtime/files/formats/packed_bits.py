@@ -77,6 +77,8 @@ def read_packed(path: Path, page: TiffPage, codec: Codec | None) -> NDArray[np.u
             plane, (down, across) = number // count, divmod(number % count, grid.across)
             top, left = down * grid.height, across * grid.width
             rows = grid.height if _TILE_OFFSETS in page.tags else min(grid.height, high - top)
+            if grid.offsets[number] == grid.lengths[number] == 0:
+                continue  # a sparse one, of which the page tells
             file.seek(grid.offsets[number])
             part = _unpacked(file.read(grid.lengths[number]), page, codec, (rows, grid.width, each))
             found[plane, top : top + rows, left : left + grid.width] = part[

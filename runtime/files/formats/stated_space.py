@@ -41,6 +41,13 @@ class StatedSpace:
     space: ColorSpace | None = None
     doubt: str = ""
 
+    def of_channels(self, dimensions: int) -> "StatedSpace":
+        """Return the space for samples (h, w) or (3, h, w); a doubt for colours in a grey one."""
+        space = self.space
+        if dimensions == 2 or space is None or space.tables is not None or len(space.curves) == 3:
+            return self
+        return StatedSpace(doubt=f"the colour profile {space.name!r} of grey for colours")
+
 
 NOTHING: Final = StatedSpace()
 

@@ -37,6 +37,8 @@ _UNREAD_PHOTOMETRICS: Final = {
     34892: "linear RAW",
     51177: "a depth map",
 }
+_OF_THREE: Final = {YCBCR: "YCbCr", CIE_LAB: "Lab", ICC_LAB: "Lab"}
+_IMAGE_DEPTH: Final = 32997
 _REDUCED, _MASK = 1, 4
 _OLD_REDUCED: Final = 2
 
@@ -113,6 +115,17 @@ class TiffPage:
         return self.number_of(284, 1) == 2 and self.samples > 1
 
     @property
+    def empty_chunks(self) -> int:
+        """Return how many strips or tiles have no place in the file, as sparse ones have."""
+        places = ((273, 279), (324, 325))
+        pairs = [
+            pair
+            for one, two in places
+            for pair in zip(self.numbers(one), self.numbers(two), strict=False)
+        ]
+        return sum(pair == (0, 0) for pair in pairs)
+
+    @property
     def colours(self) -> int:
         """Return the samples that are colour: 1 or 3."""
         is_triple = self.samples == 3 or (self.samples > 3 and not self.extra)
@@ -142,6 +155,8 @@ def picture_page(tags: TiffTags) -> tuple[TiffPage, tuple[str, ...]]:
         notes.append(
             f"page {chosen.number} is read, which is the picture; page 1 has {wide}x{high} px"
         )
+    if chosen.empty_chunks:
+        notes.append(f"{chosen.empty_chunks} strips or tiles hold no data: their samples are 0")
     if len(full) > 1:
         notes.append(f"one page is read; {len(full) - 1} more of the TIFF are not")
     return chosen, tuple(notes)
@@ -171,7 +186,12 @@ def _check(page: TiffPage, file_bytes: int) -> None:
             f"a TIFF of {page.samples} samples per pixel is not read; expected 1 or 3, and alpha"
         )
     if page.samples < page.colours:
-        raise DecodeError(f"an RGB TIFF of {page.samples} samples per pixel is damaged")
+        name = _OF_THREE.get(page.photometric, "RGB")
+        raise DecodeError(f"a TIFF of {name} with {page.samples} of its 3 samples is not read")
+    if page.number_of(_IMAGE_DEPTH, 1) > 1:
+        raise DecodeError(
+            f"a TIFF of {page.number_of(_IMAGE_DEPTH, 1)} layers in depth is not read; save one"
+        )
     if page.compression in _WITHOUT_PREDICTOR and page.predictor > 1:
         name = _WITHOUT_PREDICTOR[page.compression]
         raise DecodeError(f"a TIFF of {name} with a predictor is not read: programs disagree on it")

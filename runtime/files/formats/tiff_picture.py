@@ -19,7 +19,11 @@ from camkit.errors import DecodeError
 from camkit.runtime.files.formats import tiff_page
 from camkit.runtime.files.formats.decoded import Decoded
 from camkit.runtime.files.formats.mapped_tiff import map_plain_tiff
-from camkit.runtime.files.formats.opencv_picture import decode_array, split_alpha
+from camkit.runtime.files.formats.opencv_picture import (
+    decode_array,
+    decoded_samples,
+    split_alpha,
+)
 from camkit.runtime.files.formats.packed_bits import Codec, read_packed
 from camkit.runtime.files.formats.stated_space import space_of_tiff
 from camkit.runtime.files.formats.tiff_meaning import is_lab, light_of_lab, to_grey_or_rgb
@@ -57,6 +61,7 @@ _COMPRESSIONS: Final = {
     7: "JPEG",
     8: "Deflate",
     32773: "PackBits",
+    32909: "PixarLog",
     32946: "Deflate",
     33003: "JPEG 2000",
     33004: "JPEG 2000",
@@ -65,10 +70,21 @@ _COMPRESSIONS: Final = {
     34887: "LERC",
     34892: "lossy JPEG",
     34925: "LZMA",
+    34933: "PNG",
+    34934: "JPEG XR",
     50000: "Zstandard",
     50001: "WebP",
     50002: "JPEG XL",
+    22610: "JPEG XR",
     52546: "JPEG XL",
+}
+_UNREAD: Final = {
+    32766: "NeXT RLE",
+    32771: "CCITT RLE in words",
+    32809: "ThunderScan",
+    34661: "JBIG",
+    34676: "SGILog",
+    34677: "SGILog24",
 }
 _WITHOUT_EXTRA: Final = (
     tiff_page.PLAIN,
@@ -94,33 +110,18 @@ def decode_tiff(path: Path, tags: TiffTags) -> Decoded:
     mapped = map_plain_tiff(path) if page.number == 1 else None
     if mapped is not None:
         planes = mapped if mapped.ndim == 2 else np.moveaxis(mapped, -1, 0)
-        top = int(np.iinfo(planes.dtype).max)
-        return Decoded(samples=planes, top=top, space=stated.space, doubt=stated.doubt, notes=notes)
+        return decoded_samples(planes, stated, notes)
     ready = _by_opencv(path, page)
     if ready is not None:
-        samples, top = ready, _top(ready)
-        more: tuple[str, ...] = ("alpha channel dropped",) if page.samples > page.colours else ()
-    else:
-        stored = _read(path, page)
-        if is_lab(page):
-            light = light_of_lab(stored, page)
-            return Decoded(samples=light, top=0, notes=notes)
-        samples, more = to_grey_or_rgb(stored, page)
-        is_code = np.issubdtype(samples.dtype, np.integer)
-        top = (
-            0
-            if not is_code
-            else 255
-            if samples.ndim == 3 and page.colours == 1
-            else ((1 << page.bits) - 1)
-        )
-    return Decoded(
-        samples=samples, top=top, space=stated.space, doubt=stated.doubt, notes=(*notes, *more)
-    )
-
-
-def _top(samples: NDArray[Any]) -> int:
-    return int(np.iinfo(samples.dtype).max) if np.issubdtype(samples.dtype, np.integer) else 0
+        more = ("alpha channel dropped",) if page.samples > page.colours else ()
+        return decoded_samples(ready, stated, (*notes, *more))
+    stored = _read(path, page)
+    if is_lab(page):
+        return Decoded(samples=light_of_lab(stored, page), top=0, notes=notes)
+    samples, told = to_grey_or_rgb(stored, page)
+    is_packed = page.kind != tiff_page.FLOAT and page.photometric != tiff_page.PALETTE
+    top = (1 << page.bits) - 1 if is_packed else None
+    return decoded_samples(samples, stated, (*notes, *told), top)
 
 
 def _by_opencv(path: Path, page: TiffPage) -> NDArray[Any] | None:
@@ -152,7 +153,9 @@ def _by_opencv(path: Path, page: TiffPage) -> NDArray[Any] | None:
 
 
 def _is_of_opencv(page: TiffPage) -> bool:
-    if page.is_planar or page.compression not in _OF_OPENCV or page.samples == 2:
+    if page.is_planar or page.empty_chunks or page.samples == 2:
+        return False
+    if page.compression not in _OF_OPENCV:
         return False
     if page.photometric == tiff_page.MIN_IS_BLACK and page.colours == 3:
         return False
@@ -173,6 +176,9 @@ def _read(path: Path, page: TiffPage) -> NDArray[Any]:
     """Read (sample, h, w) as stored: unsigned integers, or float32."""
     if page.photometric == tiff_page.YCBCR:
         raise DecodeError("a YCbCr TIFF of this kind is not read; save it as RGB")
+    if page.compression not in (tiff_page.PLAIN, *_COMPRESSIONS):
+        name = _UNREAD.get(page.compression, f"compression {page.compression}")
+        raise DecodeError(f"a TIFF packed by {name} is not read; save it without compression")
     try:
         found = _read_by_tifffile(path, page)
     except _INSIDE_TIFFFILE as error:

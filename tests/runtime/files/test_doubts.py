@@ -141,6 +141,30 @@ def test_a_pattern_whose_greens_disagree_is_named(cfa):
     assert f"two greens of the CFA {cfa}" in doubt
 
 
+PLACES = np.mgrid[:300, :420].astype(np.float64)
+PATTERNS = {
+    **{f"stripes along {name} of {size} px": (turn(*PLACES) // size) % 2
+       for size in (4, 6, 8, 16, 32, 64)
+       for name, turn in (("a diagonal", np.add), ("the other diagonal", np.subtract),
+                          ("rows", lambda y, _: y), ("columns", lambda _, x: x))},
+    **{f"star of {count}": np.sin(count * np.arctan2(PLACES[0] - 149.7, PLACES[1] - 209.7)) > 0
+       for count in (8, 16, 36, 72)},
+    **{f"bars of {size} px": np.where(
+           PLACES[0] > 150, np.random.default_rng(1).random(420).repeat(size)[:420] > 0.5, 0.5)
+       for size in (1, 2, 5)},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", PATTERNS)
+def test_fine_patterns_behind_a_lens_are_neither_noise_nor_a_wrong_pattern(name):
+    light = cv2.GaussianBlur(0.02 + 0.8 * PATTERNS[name].astype(np.float64), (0, 0), 0.8)
+    linear = light * np.tile(COLOURS, (150, 210))
+    noise = np.random.default_rng(0).normal(0, 4, linear.shape)
+    dn = np.clip(np.round(BLACK + (WHITE - BLACK) * linear + noise), 0, WHITE).astype(np.uint16)
+    found = find_doubts(dn, levels(), "RGGB")
+    assert [doubt for doubt in found if "greens" in doubt or "noise" in doubt] == []
+
+
 def test_rows_that_go_on_shifted_are_named_with_the_place():
     lost = photograph().ravel()
     lost = np.concatenate([lost[: 128 * 320], lost[128 * 320 + 74 :], lost[:74]]).reshape(256, 320)

@@ -13,7 +13,7 @@ from camkit.runtime.files import raw_checks, raw_tags
 from camkit.runtime.files.dng import dng_checks, white_point
 from camkit.runtime.files.dng.applied_tags import SeenPixels, apply_tags
 from camkit.runtime.files.dng.picture_tags import sensor_picture
-from camkit.runtime.files.dng.plain_samples import check_readable
+from camkit.runtime.files.dng.readable import check_readable
 from camkit.runtime.files.exif_tags import metadata_of
 from camkit.runtime.files.tiff_tags import TiffTags
 

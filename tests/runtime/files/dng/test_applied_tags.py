@@ -16,6 +16,10 @@ TOLERANCE = 1.5 / (WHITE - 256)
 """Rounding of the samples, made larger by the gains."""
 
 
+QUAD = (0, 0, 1, 1, 0, 0, 1, 1, 1, 1, 2, 2, 1, 1, 2, 2)
+X_TRANS = tuple("RGB".index(c) for c in "GBGGRGRGRBGBGBGGRGGRGGBGBGBRGRGRGGBG")
+
+
 def scene(height=HEIGHT, width=WIDTH):
     """Return light of a smooth scene, every place different."""
     y, x = np.mgrid[:height, :width]
@@ -282,7 +286,9 @@ def test_a_list_that_is_damaged_is_named_and_left_out(tmp_path, data):
     assert light == pytest.approx(scene(), abs=TOLERANCE)
 
 
-@pytest.mark.parametrize("blacks", [(100, 200, 300), (0, 64, 64), (256, 256, 256)])
+@pytest.mark.parametrize(
+    "blacks", [(100, 200, 300), (256, 300, 200), (300, 90, 0), (0, 64, 64), (256, 256, 256)]
+)
 @pytest.mark.parametrize("whites", [(4095, 4095, 4095), (4095, 4000, 3800)])
 def test_planes_have_their_own_black_and_white(tmp_path, blacks, whites):
     light = np.stack([scene() * n for n in (1, 0.8, 0.6)], axis=-1)
@@ -312,6 +318,15 @@ def test_a_pattern_of_black_holds_for_each_plane(tmp_path):
         ({259: ("short", (34925,))}, "LZMA"),
         ({50975: ("long", (2,))}, "RowInterleaveFactor 2"),
         ({52547: ("long", (2,))}, "ColumnInterleaveFactor 2"),
+        ({259: ("short", (9,))}, "VC-5"),
+        ({259: ("short", (34712,))}, "JPEG 2000"),
+        ({259: ("short", (65000,))}, "method 65000"),
+        ({50711: ("short", (2,))}, "staggered rows or columns .CFALayout 2"),
+        ({258: ("short", (32,))}, "whole samples of 32 bits"),
+        ({33421: ("short", (4, 4)), 33422: ("byte", QUAD)}, "CFA of 4x4 pixels .RRGGRRGG"),
+        ({33421: ("short", (2, 4)), 33422: ("byte", QUAD[:8])}, "CFA of 2x4 pixels"),
+        ({33422: ("byte", (3, 4, 5, 1)), 50710: ("byte", (3, 4, 5, 1))}, "other colours"),
+        ({33422: ("byte", (0, 1, 1, 1))}, "CFA of 2x2 pixels .RGGG"),
     ],
 )
 def test_what_is_not_read_is_refused_by_its_name(tmp_path, tags, message):
@@ -319,6 +334,37 @@ def test_what_is_not_read_is_refused_by_its_name(tmp_path, tags, message):
         read(tmp_path, stored(scene()), tags)
     assert "damage" not in str(error.value)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("planes", [2, 4, 5])
+def test_other_numbers_of_planes_are_named(tmp_path, planes):
+    with pytest.raises(DecodeError, match=f"holds {planes} planes, which is not read"):
+        read(tmp_path, np.stack([stored(scene())] * planes, axis=-1))
+
+
+@pytest.mark.parametrize("compression", [7, 34892])
+def test_packed_planes_that_lie_apart_are_named(tmp_path, compression):
+    samples = np.stack([stored(scene())] * 3, axis=-1)
+    with pytest.raises(DecodeError, match="in planes that lie apart, which is not read"):
+        read(tmp_path, samples, {284: ("short", (2,))}, compression=compression)
+
+
+def test_a_third_light_is_noted(tmp_path):
+    matrix = ("srational", (1.0, 0, 0, 0, 1, 0, 0, 0, 1))
+    capture, _ = read(tmp_path, stored(scene()), {52531: matrix, 52529: ("short", (24,))})
+    assert any("ColorMatrix3, of a third light, is not applied" in note for note in capture.notes)
+
+
+def test_tags_behind_the_demosaic_of_x_trans_are_noted_and_small_ones_named(tmp_path):
+    tags = {
+        33421: ("short", (6, 6)), 33422: ("byte", X_TRANS),
+        50716: ("srational", tuple(8 * np.sin(np.arange(520)))),
+        51009: opcode_list((9, gain_map(np.ones((2, 2)), (0, 0, 520, 530)))),
+    }  # fmt: skip
+    capture, _ = read(tmp_path, stored(scene(520, 530)), tags)
+    assert any("demosaic: BlackLevelDeltaV, OpcodeList2" in note for note in capture.notes)
+    with pytest.raises(DecodeError, match="X-Trans from 512x512 px on; got 128x96"):
+        read(tmp_path, stored(scene()), tags)
 
 
 def test_a_linearization_table_stands_before_black(tmp_path):

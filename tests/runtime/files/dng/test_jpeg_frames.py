@@ -38,9 +38,14 @@ def test_another_number_of_samples_is_named(tmp_path, frame, compression):
     assert f"a JPEG of {frame[1]}x{frame[0]} pixels and {frame[2]} sample(s)" in message
 
 
-@pytest.mark.parametrize("stream", [b"", b"\xff\xd8", b"\xff\xd8\xff", b"\xff\xd8\xff\xc3\0\x09"])
+@pytest.mark.parametrize("stream", [b"\xff\xd8", b"\xff\xd8\xff", b"\xff\xd8\xff\xc3\0\x09"])
 def test_a_stream_without_a_frame_says_nothing(tmp_path, stream):
     assert doubt(tmp_path, stream) == ""
+
+
+@pytest.mark.parametrize("stream", [b"", b"\xff\xd9", b"rows of plain samples"])
+def test_a_strip_without_a_jpeg_is_named(tmp_path, stream):
+    assert doubt(tmp_path, stream) == "no JPEG lies in a strip or tile that should be one"
 
 
 def test_other_compressions_say_nothing(tmp_path):

@@ -1,9 +1,13 @@
-"""Float and deflated samples come back bit by bit, whatever their layout; damage is named."""
+"""Floats, deflated samples and planes that lie apart come back bit by bit; damage is named."""
+
+import zlib
 
 import numpy as np
 import pytest
+import rawpy
 
 from camkit.errors import DecodeError
+from camkit.runtime.files.dng.predictors import as_floats
 from camkit.runtime.raw import read_capture
 from tests.dng_builder import build_dng
 
@@ -29,6 +33,19 @@ FORMS = [
     {}, {"rows_per_strip": 16}, {"chunk": (32, 48)}, {"chunk": (16, 16), "order": ">"},
     {"order": ">"}, {"rows_per_strip": 70, "order": ">"},
 ]  # fmt: skip
+
+
+def planar(samples, rows=None, pack=bytes):
+    """Return strips of each plane after the other, and the tags that say so."""
+    height, planes = samples.shape[0], samples.shape[2]
+    strips = [
+        pack(samples[top : top + (rows or height), :, plane].tobytes())
+        for plane in range(planes)
+        for top in range(0, height, rows or height)
+    ]
+    return strips, {284: ("short", (2,))}
+
+
 PREDICTORS = [1, 2, 3, 34892, 34893, 34894, 34895]
 
 
@@ -159,3 +176,39 @@ def test_the_child_sends_floats_as_they_are(tmp_path):
     path = build_dng(tmp_path / "x.dng", scene(), compression=8)
     capture = read_capture(path)
     assert np.array_equal(capture.samples, scene().astype(np.float32))
+
+
+@pytest.mark.parametrize("light", [1e-6, 0.25, 0.5, 1.0, 3.75])
+def test_exponents_of_24_bits_are_those_that_libraw_reads(tmp_path, light):
+    samples = scene().astype(np.float32)
+    samples[20:24, 20:24] = light
+    tags = {50717: ("long", (4,))}
+    build_dng(tmp_path / "x.dng", samples, tags, bits=24)
+    with rawpy.imread(str(tmp_path / "x.dng")) as file:
+        by_libraw = file.raw_image_visible / (16383 / 4)
+    found = read_capture(tmp_path / "x.dng", isolate=False).samples
+    assert np.abs(found - by_libraw).max() <= 4 / 16383
+    assert found[20, 20] == pytest.approx(light, rel=2**-15)
+
+
+@pytest.mark.parametrize("word", [(0x3F0000, 1.0), (0x3F8000, 1.5), (0xBF0000, -1.0), (1, 2**-78)])
+def test_words_of_24_bits_are_numbers(word):
+    octets = np.array([[list(word[0].to_bytes(3, "big"))]], dtype=np.uint8)
+    assert as_floats(octets)[0, 0] == word[1]
+
+
+@pytest.mark.parametrize("rows", [None, 16])
+@pytest.mark.parametrize("compression", [1, 8])
+@pytest.mark.parametrize("dtype", ["<u2", ">u2", "u1", "<f4"])
+def test_planes_that_lie_apart_are_read(tmp_path, rows, compression, dtype):
+    light = scene(3).astype(np.float64)
+    is_float = dtype.endswith("f4")
+    top = {"f4": 1, "u2": 60000, "u1": 255}[dtype[-2:]]
+    samples = (light * top if is_float else np.rint(light * top)).astype(dtype)
+    strips, tags = planar(samples, rows, zlib.compress if compression == 8 else bytes)
+    tags |= {50717: ("long", (top,) * 3), 50714: ("long", (0,) * 3)}
+    build_dng(tmp_path / "x.dng", samples, tags, compression=compression, pieces=strips,
+              rows_per_strip=rows, order=">" if dtype[0] == ">" else "<")  # fmt: skip
+    capture = read_capture(tmp_path / "x.dng", isolate=False)
+    assert np.array_equal(np.moveaxis(capture.samples, 0, -1), samples)
+    assert not any("damage" in note for note in capture.notes)

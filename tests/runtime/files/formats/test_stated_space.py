@@ -152,6 +152,14 @@ def test_grey_profiles_are_honoured(tmp_path, suffix, gamma):
     assert np.abs(read_scene(path) - expected).max() < 1e-4
 
 
+@pytest.mark.parametrize("suffix", [".jpg", ".png", ".tif"])
+def test_a_grey_profile_of_colours_is_named_and_not_applied(tmp_path, suffix):
+    plain = read_picture(write(tmp_path / f"a{suffix}", COLOURS))
+    found = read_picture(write(tmp_path / f"b{suffix}", COLOURS, grey_profile(1.8)))
+    assert np.array_equal(found.samples, plain.samples)
+    assert any("of grey for colours: codes are taken as sRGB" in note for note in found.notes)
+
+
 def test_a_grey_picture_of_an_rgb_profile_has_its_curve(tmp_path):
     path = write(tmp_path / "a.png", COLOURS[..., 0], profile_of("Adobe RGB"))
     expected = np.stack([(COLOURS[..., 0] / 255) ** ADOBE_RGB_GAMMA] * 3)

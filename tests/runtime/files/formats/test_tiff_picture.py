@@ -2,6 +2,8 @@
 
 import importlib.util
 import lzma
+import struct
+import tracemalloc
 import zlib
 
 import cv2
@@ -236,6 +238,15 @@ def test_alpha_does_not_change_colours(tmp_path):
         ({339: ("H", [1, 1, 1])}, 3, 32, "integers of 32 bits"),
         ({259: ("H", 32773), 317: ("H", 2)}, 3, 8, "PackBits with a predictor"),
         ({258: ("H", [5, 6, 5])}, 3, 8, r"samples of \[5, 6\] bits"),
+        ({259: ("H", 34887), 317: ("H", 2)}, 3, 8, "LERC with a predictor"),
+        ({262: ("H", 8)}, 1, 8, "Lab with 1 of its 3 samples"),
+        ({262: ("H", 6)}, 2, 8, "YCbCr with 2 of its 3 samples"),
+        ({32997: ("I", 16)}, 1, 16, "16 layers in depth"),
+        ({259: ("H", 34661)}, 1, 1, "JBIG"),
+        ({259: ("H", 32771)}, 1, 1, "CCITT RLE in words"),
+        ({259: ("H", 34676)}, 3, 16, "SGILog"),
+        ({259: ("H", 32809)}, 1, 4, "ThunderScan"),
+        ({259: ("H", 65000)}, 3, 8, "compression 65000"),
     ],
 )
 def test_what_is_not_read_is_refused_by_its_name(tmp_path, tags, samples, bits, words):
@@ -276,6 +287,55 @@ def test_strips_that_become_too_large_are_refused(tmp_path, compression, pack, s
         return
     with pytest.raises(DecodeError, match="holds more than its"):
         read_picture(path)
+
+
+@pytest.mark.parametrize("bits", [1, 4, 12, 14])
+def test_packed_strips_that_become_too_large_take_no_memory(tmp_path, bits):
+    codes = (DEEP[..., 0] >> (16 - bits)).astype(np.uint16)
+    tags, segments = packed_page(codes, bits)
+    segments = [zlib.compress(segments[0] + bytes(200_000_000))]
+    path = write_tiff(tmp_path / "a.tif", [(tags | {259: ("H", 8)}, segments)])
+    tracemalloc.start()
+    try:
+        read_picture(path)
+        assert tracemalloc.get_traced_memory()[1] < 5_000_000
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize("size", [(200_000, 200_000), (2**31, 1), (0, 5)])
+@pytest.mark.parametrize("planar", [False, True])
+def test_sizes_that_a_file_cannot_hold_are_refused(tmp_path, size, planar):
+    tags, segments = packed_page(DEEP, 16, planar=planar)
+    tags |= {256: ("I", size[0]), 257: ("I", size[1])}
+    with pytest.raises(DecodeError, match=f"claims {size[0]}x{size[1]} pixels"):
+        read_picture(write_tiff(tmp_path / "a.tif", [(tags, segments)]))
+
+
+@pytest.mark.parametrize("bits", [4, 8, 12, 16])
+@pytest.mark.parametrize("photometric", [0, 1])
+def test_sparse_tiles_are_dark_and_told(tmp_path, bits, photometric):
+    codes = (DEEP[..., 0] >> (16 - bits)).astype(np.uint16)
+    tags, tiles = packed_page(codes, bits, tile=(16, 16), photometric=photometric)
+    tags[339] = ("H", 1)
+    path = write_tiff(tmp_path / "a.tif", [(tags, tiles)])
+    sparse_tiff(path, 5)
+    found = read_picture(path, keep_codes=True)
+    assert "1 strips or tiles hold no data: their samples are 0" in found.notes
+    wanted = read_picture(write_tiff(tmp_path / "b.tif", [(tags, tiles)]), keep_codes=True).samples
+    hole = np.zeros(wanted.shape[1:], dtype=bool)
+    hole[16:32, 16:32] = True
+    assert np.array_equal(found.samples[:, ~hole], wanted[:, ~hole])
+    assert len(np.unique(found.samples[:, hole])) == 1
+
+
+def sparse_tiff(path, number):
+    """Take the place and the length of a tile out of a file."""
+    data = bytearray(path.read_bytes())
+    with tifffile.TiffFile(path) as file:
+        for tag in (324, 325):
+            struct.pack_into("<I", data, file.pages[0].tags[tag].valueoffset + 4 * number, 0)
+    path.write_bytes(data)
 
 
 @pytest.mark.parametrize("orientation", range(1, 9))
