@@ -141,8 +141,9 @@ def _level_doubts(samples: Samples, levels: Levels) -> list[str]:
         )
     if low > FAR_ABOVE_BLACK and high - low > LEAST_CONTRAST:
         found.append(
-            f"{NOTHING_DARK} {low:.0%} of the range above black {black:g}: fog, "
-            f"optics with a haze, or a damaged black level ({option_text('black_level')} says it)"
+            f"{NOTHING_DARK} {low:.0%} of the range above black {black:g}: a "
+            f"bright scene, fog, veiling glare, or a stated black level that is too low "
+            f"({option_text('black_level')} corrects it)"
         )
     middle, least = float(np.median(_thinned(samples))), float(levels.black.min())
     if middle < least - BELOW_BLACK * span:
@@ -158,7 +159,7 @@ def _level_doubts(samples: Samples, levels: Levels) -> list[str]:
     if top < NEVER_BRIGHT:
         found.append(
             f"nothing is brighter than {top:.1%} of white {levels.white:g}: a dark picture, or a "
-            f"damaged white level ({option_text('white_level')} says it)"
+            f"stated white level that is too high ({option_text('white_level')} corrects it)"
         )
     return found
 

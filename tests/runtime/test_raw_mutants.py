@@ -1,5 +1,6 @@
 """A thousand damaged copies of real RAW files: each is refused in a line, sound, or warned of."""
 
+import re
 import time
 from collections import Counter
 from pathlib import Path
@@ -24,7 +25,8 @@ COUNTS = {
     "sony_a7rm3_crop_DSC2164.ARW": 50,
     "derived_24mp_rggb12.dng": 20,
 }
-SEED = 20
+SEED = 26128
+DOUBT = re.compile("damage|too low|too high")
 TIMEOUT_S, MAX_MEMORY_MB = 30.0, 2048
 OTHER_DIFFERENCE, OTHER_SIDE = 0.1, 0.01
 SILENT_SHARE, LEAST_SILENT = 0.01, 1
@@ -72,7 +74,7 @@ def test_of_a_thousand_mutants_none_passes_for_another_picture_without_a_word(
                 continue
             finally:
                 assert time.monotonic() - started < TIMEOUT_S + 10, mutant.detail
-            warned = any("damage" in note for note in set(capture.notes) - known)
+            warned = any(DOUBT.search(note) for note in set(capture.notes) - known)
             other = _is_other(capture, sound, light)
             counts[f"{'other' if other else 'the same'}, {'warned' if warned else 'silent'}"] += 1
             if other and not warned:

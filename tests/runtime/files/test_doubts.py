@@ -85,7 +85,7 @@ def test_levels_that_do_not_fit_the_data_are_named(black, white, message):
     doubts = find_doubts(mosaic, levels(black, white), "RGGB")
     if white == 65535:
         message = "nothing is brighter"
-    assert any(message in doubt and "damaged" in doubt for doubt in doubts)
+    assert any(message in doubt for doubt in doubts)
 
 
 def test_a_black_level_of_zero_in_data_that_never_come_near_is_named():
