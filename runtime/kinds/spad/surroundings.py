@@ -131,7 +131,7 @@ class _Pulses:
             of_bins = (near * np.log1p(pulse / dark[:, None])).sum(axis=1)
             of_all = photons * np.log(dark / even) - members * (seen + bins * (dark - even))
             gains.append(of_bins + of_all)
-        return np.maximum(*gains)
+        return np.asarray(np.maximum(*gains))
 
 
 def _patches(
