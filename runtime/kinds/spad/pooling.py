@@ -3,15 +3,15 @@
     counts -> fit -> believed?  yes: done
                   `-> squares of 3, then of 5 pixels, each fitted anew, and
 
-a pixel takes what its square found only if its own photons speak for it, and either those around it
-on all sides do too, or its own prove it (`camkit.runtime.kinds.spad.surroundings`). Photons speak
-by their gain: with the pulse that each pixel of the square would have on average, a s_k, over its
-background b, the sum of log(1 + a s_k / b) less a S. Otherwise surfaces would grow over their
-edges, for beside them every square holds a return.
+a pixel takes what its square found only if its own photons speak for it, and either all small
+blocks around it prove it too, or its own do (`camkit.runtime.kinds.spad.surroundings`). Otherwise
+surfaces would grow over their edges, for beside them every square holds a return.
 
 Who chooses a side wants every pixel to share: there it is enough that its own photons do not refute
 the square at a level of one in twenty, neither by their silence nor by speaking so much more for
-another time, the search for it counted.
+another time, the search for it counted. Photons speak by their gain: with the pulse that each pixel
+of the square would have on average, a s_k, over its background b, the sum of log(1 + a s_k / b)
+less a S.
 """
 
 from collections.abc import Callable
@@ -110,7 +110,7 @@ def fit_pooled(
         if side > 1 and pool == "auto":
             near = np.flatnonzero(good)
             good[near] = are_believed(
-                *(fitter, cube, sound, rows[near], taken(new, near), side),
+                *(fitter.bank, cube, sound, rows[near], taken(new, near), side),
                 rate=false_alarms / len(sides),
             )
         elif side > 1:

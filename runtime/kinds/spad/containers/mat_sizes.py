@@ -29,6 +29,18 @@ TEXT_TIMES: Final = 4
 OBJECT_BYTES: Final = 200
 """Of an array beside its numbers."""
 COMPLEX: Final = 0x800
+LOGICAL: Final = 0x200
+CLASSES: Final = dict(
+    enumerate(
+        (
+            *("cell", "struct", "object", "char", "sparse", "double", "single", "int8", "uint8"),
+            *("int16", "uint16", "int32", "uint32", "int64", "uint64", "function", "opaque"),
+        ),
+        start=1,
+    )
+)
+Listed = tuple[str, tuple[int, ...], str]
+"""Name, shape and class of a variable."""
 MOST_DEPTH: Final = 8
 PIECE: Final = 1 << 16
 
@@ -37,6 +49,19 @@ def is_version_5(path: Path) -> bool:
     """Return whether a file says that it is MATLAB 5."""
     with path.open("rb") as file:
         return file.read(HEADER_BYTES)[-4:] in (b"\x00\x01IM", b"\x01\x00MI")
+
+
+def listed_variables(path: Path) -> list[Listed]:
+    """Return name, shape and class of every variable of a MATLAB 5 file, in little memory.
+
+    scipy unpacks 128 kB of a packed variable at once to list it, up to 130 MB.
+
+    Raises:
+        DecodeError: If it is cut off, or a name or shape is none.
+    """
+    listed: list[Listed] = []
+    _walked(path, (), 0, listed)
+    return listed
 
 
 def bytes_of(path: Path, names: Collection[str], most_bytes: int) -> int:
@@ -50,6 +75,10 @@ def bytes_of(path: Path, names: Collection[str], most_bytes: int) -> int:
     Raises:
         DecodeError: If it is cut off, or cells lie too deep in one another.
     """
+    return _walked(path, names, most_bytes, [])
+
+
+def _walked(path: Path, names: Collection[str], most_bytes: int, listed: list[Listed]) -> int:
     total = 0
     with path.open("rb") as file:
         end = "<" if file.read(HEADER_BYTES)[-2:] == b"IM" else ">"
@@ -58,10 +87,10 @@ def bytes_of(path: Path, names: Collection[str], most_bytes: int) -> int:
             begin = file.tell()
             try:
                 if kind == PACKED:
-                    walk = _Walk(_Unpacked(file, size), end, most_bytes - total)
+                    walk = _Walk(_Unpacked(file, size), end, most_bytes - total, listed)
                     kind, size = walk.tag()
                 else:
-                    walk = _Walk(_Plain(file), end, most_bytes - total)
+                    walk = _Walk(_Plain(file), end, most_bytes - total, listed)
                 if kind == MATRIX:
                     total += walk.matrix(size, 0, names)
             except (EOFError, zlib.error) as error:
@@ -116,11 +145,13 @@ class _Walk:
         source: Where bytes come from.
         end: Order of bytes, as `struct` names it.
         left: Bytes of memory that may still be counted.
+        listed: Where variables are put down.
     """
 
     source: _Plain | _Unpacked
     end: str
     left: int
+    listed: list[Listed]
 
     def tag(self) -> tuple[int, int]:
         """Read type and bytes of an element that is no small one."""
@@ -137,9 +168,13 @@ class _Walk:
         shape_bytes, shape = self._element()
         name_bytes, name = self._element()
         rest = size - start - shape_bytes - name_bytes
-        if names is not None and name.decode("latin-1") not in names:
-            return 0
         sides = struct.unpack(f"{self.end}{len(shape) // 4}i", shape[: len(shape) // 4 * 4])
+        if names is not None:
+            own_name = name.decode("latin-1")
+            own_class = "logical" if flags & LOGICAL else CLASSES.get(kind, "unknown")
+            self.listed.append((own_name, sides, own_class))
+            if own_name not in names:
+                return 0
         count = 1
         for side in sides:
             count *= max(side, 0)

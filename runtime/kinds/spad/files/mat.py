@@ -14,7 +14,12 @@ import scipy.io
 
 from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError
-from camkit.runtime.kinds.spad.containers.mat_sizes import bytes_of, is_version_5
+from camkit.runtime.kinds.spad.containers.mat_sizes import (
+    Listed,
+    bytes_of,
+    is_version_5,
+    listed_variables,
+)
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
 from camkit.runtime.kinds.spad.files.chosen import chosen_name, stated_values
 from camkit.runtime.kinds.spad.files.counts_file import KEYS, CountsFile, Hints
@@ -55,13 +60,7 @@ def open_mat(path: Path, hints: Hints) -> CountsFile:
     if HDF5_MAGIC in (head[: len(HDF5_MAGIC)], head[USER_BLOCK:]):
         return open_hdf5(path, hints, is_matlab=True)
     is_walked = is_version_5(path)
-    if is_walked:  # names and shapes of any length are refused before scipy reads them
-        bytes_of(path, (), 0)
-    try:
-        with _doubts_raised():
-            listed = scipy.io.whosmat(str(path), appendmat=False)
-    except BROKEN as error:
-        raise DecodeError(f"{path.name} is damaged, or no MATLAB file: {error}") from error
+    listed = listed_variables(path) if is_walked else _listed_by_scipy(path)
     kinds = {name: (shape, kind) for name, shape, kind in listed if min(shape, default=0) > 0}
     large = [name for name, (shape, kind) in kinds.items() if _may_be(name, shape, kind)]
     asked = [name for name in kinds if name == hints.key]
@@ -95,6 +94,15 @@ def open_mat(path: Path, hints: Hints) -> CountsFile:
         )
     usual = "tyx" if name in KEYS else None
     return ArrayFile(path, values, hints, kind=KEYS.get(name), usual=usual, stated=stated)
+
+
+def _listed_by_scipy(path: Path) -> list[Listed]:
+    """Return the variables of a file that is not packed."""
+    try:
+        with _doubts_raised():
+            return list(scipy.io.whosmat(str(path), appendmat=False))
+    except BROKEN as error:
+        raise DecodeError(f"{path.name} is damaged, or no MATLAB file: {error}") from error
 
 
 @contextmanager

@@ -46,6 +46,7 @@ def open_sdt_zip(path: Path, hints: Hints) -> CountsFile:
             if len(members) != 1:
                 named = ", ".join(i.filename for i in members) or "none"
                 raise DecodeError(f"{path.name} must hold one .sdt file; it holds {named}")
+            _check_total(path, members[0].file_size, TIMES * hints.max_bytes)
             data = member_bytes(archive, members[0], hints.max_bytes)
             with plain.open("wb") as file:
                 for start in range(0, members[0].file_size, PIECE):
@@ -106,11 +107,6 @@ def _check_size(path: Path, file: IO[bytes], most_bytes: int) -> None:
     count = int(header["reserved1"]) if count == MANY_BLOCKS else count
     total, offset = 0, int(header["data_block_offs"])
     for _ in range(count):
-        if total > most_bytes:
-            raise ContractError(
-                f"{path.name} takes {total / 1e9:.3g} GB or more, and such files are read whole; "
-                f"raise {option_text('max_mem_bytes')}, or save its histograms as .h5 or .npz"
-            )
         file.seek(offset)
         block = np.fromfile(file, record, 1)[0]
         start, offset = int(block["data_offs"]), int(block["next_block_offs"])
@@ -119,4 +115,13 @@ def _check_size(path: Path, file: IO[bytes], most_bytes: int) -> None:
             file.seek(start)
             with zipfile.ZipFile(io.BytesIO(file.read(max(offset - start, 0)))) as packed:
                 total += packed.filelist[0].file_size
+        _check_total(path, total, most_bytes)
     file.seek(0)
+
+
+def _check_total(path: Path, total: int, most_bytes: int) -> None:
+    if total > most_bytes:
+        raise ContractError(
+            f"{path.name} takes {total / 1e9:.3g} GB or more, and such files are read whole; "
+            f"raise {option_text('max_mem_bytes')}, or save its histograms as .h5 or .npz"
+        )

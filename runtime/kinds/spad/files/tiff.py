@@ -4,7 +4,9 @@ import logging
 import lzma
 import math
 import struct
+import tempfile
 import zlib
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -14,6 +16,7 @@ import tifffile
 from numpy.typing import NDArray
 
 from camkit.errors import CamkitError, DecodeError
+from camkit.runtime.cancel import check_wish
 from camkit.runtime.kinds.spad.containers.packed import MOST_UNPACKED
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
 from camkit.runtime.kinds.spad.files.channels import chosen_places
@@ -66,13 +69,27 @@ def _stack(path: Path, file: tifffile.TiffFile, hints: Hints) -> tuple[str | Non
         if series.dataoffset + size > path.stat().st_size:
             raise DecodeError(f"{path.name} is cut off")
         return axes, np.memmap(path, series.dtype, "r", series.dataoffset, series.shape)
-    check_pages(path, file.pages if series is None else series, hints.max_bytes)
-    out = "memmap" if size > hints.max_bytes else None
+    pages = file.pages if series is None else series
+    check_pages(path, pages, hints.max_bytes)
+    if size > hints.max_bytes:
+        return axes, _spilled(pages, first).reshape(whole)
     if series is None:
-        found = file.asarray(key=slice(None), out=out, maxworkers=1)
+        found = file.asarray(key=slice(None), maxworkers=1)
     else:
-        found = series.asarray(out=out, maxworkers=1)
+        found = series.asarray(maxworkers=1)
     return axes, np.asarray(found).reshape(whole)
+
+
+def _spilled(pages: Iterable[Any], first: Any) -> NDArray[Any]:
+    """Return pages unpacked one by one to a file without a name, and mapped."""
+    with tempfile.TemporaryFile() as file:
+        for page in pages:
+            check_wish()
+            # tifffile has None for a page that its series lacks
+            found = np.zeros(first.shape, first.dtype) if page is None else page.asarray()
+            file.write(np.ascontiguousarray(found, first.dtype).data)
+        file.flush()
+        return np.memmap(file, first.dtype, "r")
 
 
 def _series(

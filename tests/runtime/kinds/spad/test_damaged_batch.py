@@ -1,19 +1,22 @@
 """Damaged files of every type in one batch: a line each, little memory, the rest is made."""
 
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.runtime.kinds.spad.files.bombs import BOMBS
 from tests.runtime.kinds.spad.files.bulky import BULKY
 from tests.runtime.kinds.spad.files.test_bulky import SLOW
 from tests.spad_files import STAMPS, WRITERS, small_cube, write_npz
 
-CAP_MB = 600
+CAP_MB = 400
 TIMING = (
     '[timing]\norientation = "histogram"\ntime_bin_ps = 20\nbins = 40\n[laser]\nfwhm_ps = 100\n'
 )
@@ -67,6 +70,13 @@ def _empty(_data: bytearray, _rng: np.random.Generator) -> bytes:
     return b""
 
 
+UNREADABLE: dict[str, Callable[[Path], None]] = {
+    "pipe": os.mkfifo,
+    "device": lambda path: path.symlink_to("/dev/zero"),
+    "loop": lambda path: path.symlink_to(path),
+    "nowhere": lambda path: path.symlink_to("no such file"),
+}
+SUFFIXES = (".npz", ".h5", ".mat", ".tif", ".ptu", ".sdt", ".spc", ".zip")
 DAMAGES: tuple[Callable[[bytearray, np.random.Generator], bytes], ...] = (
     *(_cut, _zeros, _noise, _largest, _other, _turned, _empty, _cut, _noise),
 )
@@ -85,18 +95,14 @@ def _fill(folder: Path, count: int, seed: int) -> None:
     for name, write in BULKY.items():
         if name not in SLOW:
             write(folder / name)
+    for name, suffix in product(UNREADABLE, SUFFIXES):
+        UNREADABLE[name](folder / f"{name}{suffix}")
     write_npz(folder / "zz_sound.npz", small_cube())
 
 
-@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
-@pytest.mark.parametrize(("count", "seed"), [(24, 1), pytest.param(120, 2, marks=pytest.mark.slow)])
-def test_damaged_files_end_no_batch_and_keep_to_the_memory(
-    count: int, seed: int, tmp_path: Path
-) -> None:
-    folder, timing = tmp_path / "in", tmp_path / "t.toml"
-    folder.mkdir()
+def _run(folder: Path, timing: Path) -> list[tuple[str, str, str]]:
+    """Return name, status and error of every file of a batch; hold what must hold of all."""
     timing.write_text(TIMING, encoding="utf-8")
-    _fill(folder, count, seed)
     done = subprocess.run(
         [sys.executable, "-c", CHILD.format(cap=CAP_MB), str(folder), str(timing)],
         capture_output=True,
@@ -105,11 +111,39 @@ def test_damaged_files_end_no_batch_and_keep_to_the_memory(
         check=True,
     )
     peak_mb, found = json.loads(done.stdout.splitlines()[-1])
+    failed = [one for one in found if one[1] == "failed"]
+    print(f"{len(found)} files, {len(failed)} refused, peak {peak_mb} MB under {CAP_MB} MB")
     assert peak_mb < CAP_MB
     assert not done.stderr
     assert len(found) == len([p for p in folder.iterdir() if p.name != "out"])
+    for name, _, error in failed:
+        assert "\n" not in error, name
+        assert "unexpected" not in error, name
+    return [tuple(one) for one in found]
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
+@pytest.mark.parametrize(("count", "seed"), [(24, 1), pytest.param(120, 2, marks=pytest.mark.slow)])
+def test_damaged_files_end_no_batch_and_keep_to_the_memory(
+    count: int, seed: int, tmp_path: Path
+) -> None:
+    folder = tmp_path / "in"
+    folder.mkdir()
+    _fill(folder, count, seed)
+    found = _run(folder, tmp_path / "t.toml")
     assert found[-1][1] == "ok"
-    for name, status, error in found:
-        if status == "failed":
-            assert "\n" not in error, name
-            assert "unexpected" not in error, name
+    unreadable = [status for name, status, _ in found if Path(name).stem in UNREADABLE]
+    assert unreadable == ["failed"] * len(UNREADABLE) * len(SUFFIXES)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
+def test_bombs_are_refused_in_one_line_and_keep_to_the_memory(tmp_path: Path) -> None:
+    folder = tmp_path / "in"
+    folder.mkdir()
+    for name, write in {**BOMBS, **BULKY}.items():
+        write(folder / name)
+    write_npz(folder / "zz_sound.npz", small_cube())
+    found = {Path(name).name: status for name, status, _ in _run(folder, tmp_path / "t.toml")}
+    assert found.pop("zz_sound.npz") == "ok"
+    assert {found[name] for name in BOMBS} == {"failed"}
