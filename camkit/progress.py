@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from typing import Final, TypeVar
 
 Item = TypeVar("Item")
-LEAST_SHARE: Final = 0.02
+LEAST_SHARE: Final = 0.05
 """No time left is known before so much is done."""
 
 
@@ -56,16 +56,15 @@ class Task:
         self.done = self.skipped = done
         self.since_s = time.monotonic()
 
-    def left_s(self, within: float = 0.0, now_s: float | None = None) -> float | None:
+    def left_s(self, now_s: float | None = None) -> float | None:
         """Return the time left, by the work done so far; None where that says nothing.
 
         Args:
-            within: Share of the next unit that is done.
             now_s: Seconds of `time.monotonic`; None for now.
         """
         if not self.total or not self.is_even:
             return None
-        fresh, left = self.done + within - self.skipped, self.total - self.done - within
+        fresh, left = self.done - self.skipped, self.total - self.done
         if fresh < LEAST_SHARE * self.total or left <= 0:
             return None
         spent_s = (time.monotonic() if now_s is None else now_s) - self.since_s
@@ -137,10 +136,12 @@ def note(line: str) -> None:
 
 def duration(seconds: float) -> str:
     """Return a time as people say it."""
-    if seconds < 100:
-        return f"{seconds:.0f} s"
-    minutes = seconds / 60
-    return f"{minutes:.0f} min" if minutes < 100 else f"{minutes / 60:.1f} h"
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 600:
+        return f"{whole // 60} min {whole % 60:02} s"
+    return f"{whole / 60:.0f} min" if whole < 6000 else f"{whole / 3600:.1f} h"
 
 
 def left_text(task: Task) -> str:

@@ -43,7 +43,7 @@ class Display:
     def tick(self, now_s: float) -> None:
         """Show what has changed, if it is time to."""
         with self._lock:
-            tasks = list(self.board.tasks)
+            tasks = outer(list(self.board.tasks))
             self._has_begun |= bool(tasks)
             spent_s = now_s - self._start_s
             if spent_s < SILENT_S or not (self._has_begun or spent_s > LINE_S):
@@ -85,41 +85,36 @@ class Display:
             say(line, err=True)
 
 
+def outer(tasks: Sequence[Task]) -> list[Task]:
+    """Return nested tasks down to the first that is counted evenly; what lies in it comes often."""
+    for number, task in enumerate(tasks):
+        if task.total and task.is_even:
+            return list(tasks[: number + 1])
+    return list(tasks)
+
+
 def tasks_text(tasks: Sequence[Task]) -> str:
     """Return nested tasks as one line."""
-    texts = [_text(tasks[number:]) for number in range(len(tasks))]
-    return " ".join("; ".join(texts or ["working"]).split())
+    return " ".join("; ".join(map(_text, tasks) if tasks else ["working"]).split())
 
 
 def time_left(tasks: Sequence[Task], now_s: float) -> str:
-    """Return the end of a line: the time left of the first task that is counted, or nothing."""
-    for number, task in enumerate(tasks):
-        if task.total is not None and task.is_even:
-            left_s = task.left_s(_within(tasks[number:]), now_s)
-            of_it = " of this step" if number else ""
-            return "" if left_s is None else f", about {duration(left_s)} left{of_it}"
-    return ""
+    """Return the end of a line: the time left of the innermost task, or nothing."""
+    left_s = tasks[-1].left_s(now_s) if tasks else None
+    if left_s is None:
+        return ""
+    return f", about {duration(left_s)} left" + (" of this step" if len(tasks) > 1 else "")
 
 
-def _within(tasks: Sequence[Task]) -> float:
-    """Return how much of its next unit the first of nested tasks has done: what the second has."""
-    if len(tasks) < 2 or tasks[0].unit is None or not tasks[1].total:
-        return 0.0
-    return min(1.0, (tasks[1].done + _within(tasks[1:])) / tasks[1].total)
-
-
-def _text(tasks: Sequence[Task]) -> str:
-    task = tasks[0]
+def _text(task: Task) -> str:
     if not task.total:
         return task.what
     if task.unit is None and not task.is_even:
         return f"step {min(task.done + 1, task.total):.0f} of {task.total:.0f}: {task.what}"
     counts = task.unit is not None and task.total > 1
     count = f", {int(task.done)} of {task.total:.0f} {task.unit}" if counts else ""
-    if not task.is_even:
-        return task.what + count
-    percent = 100 * min(1.0, (task.done + _within(tasks)) / task.total)
-    return f"{task.what}{count}, {percent:.0f} %"
+    percent = f", {100 * min(1.0, task.done / task.total):.0f} %" if task.is_even else ""
+    return task.what + count + percent
 
 
 @contextmanager

@@ -49,7 +49,7 @@ from camkit.progress import Task, duration, left_text, note, working
 from camkit.stopwatch import Stopwatch
 
 LOG_STEPS: Final = 50
-Judged = TypeVar("Judged")
+Made = TypeVar("Made")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -319,8 +319,8 @@ class _Run:
             self._restore(read_checkpoint(self.path))
         until = self.step if options.resume else None
         self.log = RunLog(self.path.with_suffix(".jsonl"), keep_until_step=until)
-        self.closing_s = (0.0, 0.0)
-        self.baselines = dict(self._judged(self.judge.baselines))
+        self.closing_s: dict[str, tuple[float, float]] = {}
+        self.baselines = dict(self._closing("judge", self.judge.baselines))
 
     def _restore(self, saved: Checkpoint) -> None:
         known = (self.material_digest, self.role, self.entry.network, dict(self.entry.config))
@@ -342,12 +342,13 @@ class _Run:
     def cpu_s(self, pool: SamplePool) -> float:
         return self.cpu_before_s + self.stopwatch.cpu_s() + pool.workers_cpu_s()
 
-    def _judged(self, judge: Callable[[], Judged]) -> Judged:
-        """Judge, and keep what that took: the last validation of the run will take as long."""
+    def _closing(self, name: str, work: Callable[[], Made]) -> Made:
+        """Do what the end of the run will do again, and keep (wall, CPU) seconds of it."""
         begin = self.stopwatch.wall_s(), self.stopwatch.cpu_s()
-        found = judge()
-        self.closing_s = self.stopwatch.wall_s() - begin[0], self.stopwatch.cpu_s() - begin[1]
-        return found
+        made = work()
+        wall_s, cpu_s = self.stopwatch.wall_s(), self.stopwatch.cpu_s()
+        self.closing_s[name] = wall_s - begin[0], cpu_s - begin[1]
+        return made
 
     def loop(self, pool: SamplePool, task: Task) -> None:
         """Fit until the schedule, the time or the asked step ends; checkpoint and validate."""
@@ -383,10 +384,10 @@ class _Run:
 
     def _progress(self, pool: SamplePool) -> float:
         options = self.options
-        closing_s, closing_cpu_s = self.closing_s
+        walls_s, cpus_s = zip(*self.closing_s.values(), strict=True)
         spent = (
-            (self.elapsed_s() + closing_s, options.max_minutes),
-            (self.cpu_s(pool) + closing_cpu_s, options.max_cpu_minutes),
+            (self.elapsed_s() + sum(walls_s), options.max_minutes),
+            (self.cpu_s(pool) + sum(cpus_s), options.max_cpu_minutes),
         )
         return max(
             progress_of(self.step, self.steps, seconds, None if most is None else 60 * most)
@@ -403,7 +404,7 @@ class _Run:
         self.log.write({"step": self.step, "loss": loss} | self.fitter.notes() | clock | waited)
 
     def _validate(self, pool: SamplePool, task: Task) -> None:
-        self.valid = self._judged(lambda: self.judge.score(self.fitter.restore))
+        self.valid = self._closing("judge", lambda: self.judge.score(self.fitter.restore))
         if self.picks_best and (self.best_db is None or self.valid.mean_db > self.best_db):
             self.best, self.best_db = self.fitter.average(), self.valid.mean_db
         entry: dict[str, Any] = {
@@ -460,7 +461,7 @@ class _Run:
             best=self.best,
             best_db=self.best_db,
         )
-        write_checkpoint(self.path, saved)
+        self._closing("save", lambda: write_checkpoint(self.path, saved))
 
     def result(self) -> TrainResult:
         saved = read_checkpoint(self.path)

@@ -12,7 +12,7 @@ import pytest
 
 from camkit.cli import progress as display_module
 from camkit.cli.app import run
-from camkit.cli.progress import Display, shown, tasks_text, time_left
+from camkit.cli.progress import Display, outer, shown, tasks_text, time_left
 from camkit.cli.say import say
 from camkit.progress import Task, counted, duration, note, working
 from tests.capture_factory import write_tiny_captures
@@ -93,11 +93,13 @@ def test_time_left_leaves_out_what_was_done_before(clock) -> None:
     assert time_left([task], clock.now_s + 50) == ", about 50 s left"
 
 
-def test_parts_of_a_unit_count_in_the_time_left(clock) -> None:
-    whole, part = _begun(clock, total=2, unit="pictures"), _begun(clock, total=10)
-    part.count(5)
-    assert time_left([whole, part], clock.now_s + 10) == ", about 30 s left"
-    assert tasks_text([whole, part]).startswith("blurring, 0 of 2 pictures, 25 %")
+def test_work_within_a_unit_changes_neither_the_line_nor_the_time_left(clock) -> None:
+    whole, part = _begun(clock, total=4, unit="pictures"), _begun(clock, total=10)
+    whole.count(1)
+    part.count(9)
+    told = outer([whole, part])
+    assert tasks_text(told) == "blurring, 1 of 4 pictures, 25 %"
+    assert time_left(told, clock.now_s + 10) == ", about 30 s left"
 
 
 def test_steps_that_differ_promise_no_end_but_that_of_the_step(clock) -> None:
@@ -105,9 +107,10 @@ def test_steps_that_differ_promise_no_end_but_that_of_the_step(clock) -> None:
     whole.count(6)
     part = _begun(clock, what="measuring", total=4)
     part.count(1)
-    assert tasks_text([whole, part]) == "step 7 of 7: checking laws; measuring, 25 %"
-    assert time_left([whole, part], clock.now_s + 10) == ", about 30 s left of this step"
-    assert time_left([whole], clock.now_s + 10) == ""
+    told = outer([whole, part])
+    assert tasks_text(told) == "step 7 of 7: checking laws; measuring, 25 %"
+    assert time_left(told, clock.now_s + 10) == ", about 30 s left of this step"
+    assert time_left(outer([whole]), clock.now_s + 10) == ""
 
 
 def test_lines_of_the_work_stand_for_those_of_the_clock(clock, capsys) -> None:
@@ -150,7 +153,7 @@ def test_on_a_terminal_one_line_is_rewritten_and_results_take_its_place(
 
 @pytest.mark.parametrize(
     ("seconds", "text"),
-    [(0.4, "0 s"), (99, "99 s"), (100, "2 min"), (5940, "99 min"), (9000, "2.5 h")],
+    [(0.4, "0 s"), (59.7, "1 min 00 s"), (185, "3 min 05 s"), (640, "11 min"), (9000, "2.5 h")],
 )
 def test_times_are_said_as_people_say_them(seconds: float, text: str) -> None:
     assert duration(seconds) == text
