@@ -52,7 +52,8 @@ class Display:
                 say(line, err=True)
             self._held.clear()
             left = time_left(tasks, now_s)
-            line = f"{self._name}: {tasks_text(tasks)}; {duration(spent_s)} so far{left}"
+            text = tasks_text(tasks) or ("working" if self._has_begun else "starting")
+            line = f"{self._name}: {text}; {duration(spent_s)} so far{left}"
             if self._is_terminal:
                 say_over(line[: shutil.get_terminal_size().columns - 1])
             elif self._is_time(tasks, now_s, is_first_left=bool(left) and not self._has_left):
@@ -88,14 +89,14 @@ class Display:
 def outer(tasks: Sequence[Task]) -> list[Task]:
     """Return nested tasks down to the first that is counted evenly; what lies in it comes often."""
     for number, task in enumerate(tasks):
-        if task.total and task.is_even:
+        if task.is_even and (task.total or task.unit):
             return list(tasks[: number + 1])
     return list(tasks)
 
 
 def tasks_text(tasks: Sequence[Task]) -> str:
     """Return nested tasks as one line."""
-    return " ".join("; ".join(map(_text, tasks) if tasks else ["working"]).split())
+    return " ".join("; ".join(map(_text, tasks)).split())
 
 
 def time_left(tasks: Sequence[Task], now_s: float) -> str:
