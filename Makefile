@@ -10,13 +10,16 @@ SOURCES := camkit runtime export models_def tests tools setup.py
 .PHONY: demo pictures test test-slow fuzz check format docs clean
 
 demo: $(RUNTIME_STAMP)  ## main job on the demo capture, runtime only (no torch)
+	@echo "1 of 2: a night scene with streak-hdr, on the way to out/night.png (about ten seconds)"
 	$(VENV)/bin/python -m tools.hdr.gallery --out-dir out
+	@echo "2 of 2: two scenes with duet, photographed, planned, restored, compared (about a minute)"
 	$(VENV)/bin/python -m tools.demo --out-dir out
 
 pictures: $(RUNTIME_STAMP)  ## the pictures of the README and of docs/gallery.md
 	$(VENV)/bin/python -m tools.pictures.gallery --out-dir docs/images
 
 test: check  ## set-up with everything, gate, tests with branch coverage
+	@echo "Running all tests: about eleven minutes on two cores"
 	$(DEV)/bin/python -m coverage erase
 	OMP_NUM_THREADS=1 $(DEV)/bin/python -m coverage run -m pytest -q -n auto --dist loadfile
 	$(DEV)/bin/python -m coverage combine -q
@@ -30,6 +33,7 @@ fuzz: $(DEV_STAMP)  ## search for bundles that camkit does not stand (Linux); FU
 	OMP_NUM_THREADS=1 FUZZ_SECONDS=$(FUZZ_SECONDS) $(DEV)/bin/python -m tests.hostile.fuzz
 
 check: $(DEV_STAMP)  ## format, lint, types, layers, spelling
+	@echo "Checking format, lint, types, layers and spelling: about a minute"
 	$(DEV)/bin/ruff format --check $(SOURCES)
 	$(DEV)/bin/ruff check $(SOURCES)
 	$(DEV)/bin/mypy
@@ -41,11 +45,15 @@ format: $(DEV_STAMP)
 	$(DEV)/bin/ruff check --fix $(SOURCES)
 
 $(RUNTIME_STAMP): pyproject.toml constraints.txt
+	@echo "Installing camkit and 40 packages, without torch, into $(VENV): about 210 MB to fetch,"
+	@echo "0.7 GB on disk, one to four minutes. Nothing outside this folder changes."
 	$(PYTHON) -m venv $(VENV)
 	$(VENV)/bin/python -m pip install -q --disable-pip-version-check -c constraints.txt -e .
 	touch $@
 
 $(DEV_STAMP): pyproject.toml constraints.txt
+	@echo "Installing camkit, torch and what the tests need into $(DEV): 1.8 GB on disk,"
+	@echo "two to five minutes. Nothing outside this folder changes."
 	$(PYTHON) -m venv $(DEV)
 	$(DEV)/bin/python -m pip install -q --disable-pip-version-check torch==2.13.0
 	$(DEV)/bin/python -m pip install -q --disable-pip-version-check -c constraints.txt -e ".[dev]"

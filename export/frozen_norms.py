@@ -23,6 +23,7 @@ from camkit.models_def.training.checkpoint import (
 )
 from camkit.models_def.training.kind import Material, Restorer, read_recipe, training_kind
 from camkit.models_def.training.pictures import list_pictures
+from camkit.progress import counted, working
 
 FIRST_SAMPLE: Final = 50_000_000
 """Number of the first calibration sample: noise and place of none are those of training; tiles of
@@ -116,21 +117,25 @@ def freeze_checkpoint(
         ) from error
     if material is None:
         options.cache_folder.mkdir(parents=True, exist_ok=True)
-        material = kind.prepare(recipe, recipe_path.parent, options.cache_folder)
+        with working(f"preparing the kernels of {recipe.name}"):
+            material = kind.prepare(recipe, recipe_path.parent, options.cache_folder)
     if material.digest() != saved.bank_digest:
         raise ContractError(f"{source} was trained with other kernels than those of {recipe_path}")
     layout = kind.layout(recipe, saved.role)
     maker = kind.maker(recipe, saved.role, material, options.pictures, seed)
     numbers = range(FIRST_SAMPLE, FIRST_SAMPLE + options.samples)
-    pictures = [maker.make(number).stacked(layout)[None] for number in numbers]
-    norms = freeze_norms(live, frozen, pictures)
-    judge = kind.judge(recipe, saved.role, material, options.valid)
-    report = FrozenReport(
-        norms=norms,
-        samples=options.samples,
-        live_db=judge.score(_restorer(live)).mean_db,
-        frozen_db=judge.score(_restorer(frozen)).mean_db,
-    )
+    making = counted(numbers, "making samples", "samples")
+    pictures = [maker.make(number).stacked(layout)[None] for number in making]
+    with working("freezing the norms"):
+        norms = freeze_norms(live, frozen, pictures)
+    with working("judging the network with live and with frozen norms"):
+        judge = kind.judge(recipe, saved.role, material, options.valid)
+        report = FrozenReport(
+            norms=norms,
+            samples=options.samples,
+            live_db=judge.score(_restorer(live)).mean_db,
+            frozen_db=judge.score(_restorer(frozen)).mean_db,
+        )
     write_checkpoint(out, _twin(saved, config, frozen, report))
     return report
 

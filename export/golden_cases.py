@@ -12,6 +12,7 @@ from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import MOSAIC, Extent
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
+from camkit.progress import working
 from camkit.runtime.kind import part_of
 from camkit.runtime.proof.golden_run import case_work
 from camkit.runtime.twin.light import stated_balance
@@ -93,6 +94,7 @@ def photograph(
     return case, simulation.samples, ideal_picture(simulation, bundle)
 
 
+@working("photographing golden cases")
 def photograph_all(bundle: Bundle) -> Cases:
     """Photograph all golden cases, their outputs still to be added."""
     proving = part_of(bundle.manifest).proving
@@ -105,6 +107,7 @@ def photograph_all(bundle: Bundle) -> Cases:
     return cases
 
 
+@working("computing golden cases")
 def add_outputs(bundle: Bundle, cases: Cases) -> dict[str, GoldenArrays]:
     """Give the cases with what the pipeline makes of them, for every product and size."""
     return {

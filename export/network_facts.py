@@ -17,6 +17,7 @@ from camkit.errors import ContractError, UnsupportedError
 from camkit.export.onnx_graph import check_parity, to_fp16, to_onnx
 from camkit.models_def.networks.instance_norm import live_norms
 from camkit.models_def.training.sample import SampleLayout
+from camkit.progress import working
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.graph import inspect_graph
 from camkit.runtime.network.graph_walk import GraphFacts
@@ -42,6 +43,7 @@ class ExportedNetwork:
     members: dict[str, bytes]
 
 
+@working("turning a network into ONNX")
 def draft_network(name: str, network: nn.Module, layout: SampleLayout) -> ExportedNetwork:
     """Export a network with what its graph says of it; nothing is measured yet.
 
@@ -79,6 +81,7 @@ def draft_network(name: str, network: nn.Module, layout: SampleLayout) -> Export
     return ExportedNetwork(facts=facts, members={facts.member: model})
 
 
+@working("measuring a network")
 def measure_network(
     draft: ExportedNetwork, network: nn.Module, windows: list[FloatArray]
 ) -> ExportedNetwork:

@@ -53,6 +53,7 @@ def main() -> None:
     out_dir: Path = arguments.out_dir
     out_dir.mkdir(parents=True, exist_ok=True)
     began = time.perf_counter()
+    print("photographing two scenes ...", flush=True)
 
     bundle = open_bundle(find_bundle(arguments.bundle))
     sensor = mosaic_sensor(bundle)
@@ -108,6 +109,7 @@ def _show_quality(taken: dict[str, Simulation], name: str, iso: float, picture: 
         f"network {network.size}": network,
     }
     heads = ("developed", *methods)
+    print("comparing crops with the sharp scenes ...", flush=True)
     print("\nPSNR in dB against the sharp scene, on sRGB values, before undistortion")
     print(f"{'scene':<10}{'distance from axis':<20}" + "".join(f"{head:>10}" for head in heads))
     print(f"{'':<10}{'share of half field':<20}" + f"{'dB':>10}" * len(heads))

@@ -5,7 +5,8 @@
     design    a camera made at design time (torch): design, freeze, train, export, lens ...
 
 `app` joins the commands and turns errors into one line and an exit code (`exit_code`). `choices`
-are options that several commands share. A new command is a file in the folder of its task and a
+are options that several commands share. `progress` shows what long work counts, `say` is the one
+way to a terminal. A new command is a file in the folder of its task and a
 line in `app`.
 """
 

@@ -26,6 +26,7 @@ from camkit.cli.judge.bench import bench
 from camkit.cli.judge.check import check
 from camkit.cli.judge.doctor import doctor
 from camkit.cli.judge.stress import stress
+from camkit.cli.progress import shown
 from camkit.cli.say import plain, say
 from camkit.cli.use.calibrate.app import calibrate_app
 from camkit.cli.use.info import info
@@ -34,6 +35,7 @@ from camkit.cli.use.plan import plan
 from camkit.cli.use.process import process
 from camkit.cli.use.simulate import simulate
 from camkit.errors import CamkitError
+from camkit.stopwatch import Stopwatch
 
 DEBUG_FLAG = "--debug"
 
@@ -63,10 +65,9 @@ for command in (
     export,
 ):
     app.command()(command)
-app.add_typer(analyse_app)
-app.add_typer(lens_app)
-app.add_typer(calibrate_app)
-app.add_typer(plate_app)
+GROUPS = (analyse_app, lens_app, calibrate_app, plate_app)
+for group in GROUPS:
+    app.add_typer(group)
 
 
 @app.callback(invoke_without_command=True)
@@ -83,19 +84,28 @@ def options(
 
 def main() -> None:
     """Run the command line and end the process with its exit code."""
-    sys.exit(run(sys.argv[1:]))
+    sys.exit(run(sys.argv[1:], Stopwatch.of_process()))
 
 
-def run(arguments: Sequence[str]) -> int:
+def run(arguments: Sequence[str], stopwatch: Stopwatch | None = None) -> int:
     """Run one command line; every expected error becomes one line on stderr.
+
+    Args:
+        arguments: Without the name of the program.
+        stopwatch: What commands with a budget of time count by; None begins now.
 
     Returns:
         The exit code. A reader that closes the pipe early ends the run with 1, without a word.
     """
     debug = DEBUG_FLAG in arguments
     try:
-        with speaking("command"), _messages(shown=debug), none_is_lost():
-            app(list(arguments), prog_name="camkit")
+        with (
+            speaking("command"),
+            _messages(shown=debug),
+            none_is_lost(),
+            shown(_command_name(arguments)),
+        ):
+            app(list(arguments), prog_name="camkit", obj=stopwatch or Stopwatch())
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else ExitCode.INPUT_FAILED
         if code == ExitCode.INTERRUPTED:
@@ -107,6 +117,13 @@ def run(arguments: Sequence[str]) -> int:
         say(f"camkit: {_one_line(error)}", err=True)
         return exit_code_of(error)
     return ExitCode.DONE
+
+
+def _command_name(arguments: Sequence[str]) -> str:
+    """Return the command of a command line, with that of its group: camkit lens peak."""
+    words = [word for word in arguments if not word.startswith("-")]
+    count = 2 if words and words[0] in {group.info.name for group in GROUPS} else 1
+    return " ".join(["camkit", *words[:count]])
 
 
 class _PlainFormatter(logging.Formatter):

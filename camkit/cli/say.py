@@ -1,6 +1,8 @@
 """The one way to a terminal: texts of files, bundles and errors lose what would steer it."""
 
 import re
+import sys
+import threading
 from typing import Final
 
 import typer
@@ -9,6 +11,10 @@ _STEERING: Final = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]"
 )
 """Control characters but tab and newline, what turns the direction of text, lone surrogates."""
+_ERASED: Final = "\r\033[K"
+_rewritten = threading.Event()
+"""Set while the last line of the terminal is one that `say_over` printed."""
+_lock = threading.RLock()
 
 
 def plain(text: str) -> str:
@@ -17,10 +23,23 @@ def plain(text: str) -> str:
 
 
 def say(text: str, *, err: bool = False) -> None:
-    """Print a text of any origin, on stdout or stderr."""
-    typer.echo(plain(text), err=err)
+    """Print a text of any origin, on stdout or stderr, in place of a line of `say_over`."""
+    with _lock:
+        erase()
+        typer.echo(plain(text), err=err)
 
 
-def say_over(text: str, *, last: bool = False) -> None:
-    """Print a line on stderr over the one before it, for progress on a terminal."""
-    typer.echo(f"\r\033[K{plain(text)}", err=True, nl=last)
+def say_over(text: str) -> None:
+    """Print a line on the stderr of a terminal over the one before it."""
+    with _lock:
+        _rewritten.set()
+        typer.echo(_ERASED + plain(text), err=True, nl=False)
+
+
+def erase() -> None:
+    """Take the line of `say_over` away, if one is there."""
+    with _lock:
+        if _rewritten.is_set():
+            _rewritten.clear()
+            if sys.stderr.isatty():
+                typer.echo(_ERASED, err=True, nl=False)

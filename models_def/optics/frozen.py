@@ -28,6 +28,7 @@ from camkit.errors import ContractError
 from camkit.models_def.optics.optics import FieldLayout, FloatGrid, Optics, radial_layout
 from camkit.models_def.optics.psf import TracedPsf
 from camkit.models_def.sensors.psf import wavelength_weights
+from camkit.progress import working
 from camkit.units import MM_PER_M, UM_PER_MM
 
 STRESS_OFFSETS_PER_M: Final = (0.02, 0.05, 0.1, 0.2)
@@ -233,6 +234,7 @@ def stress_depths_mm(depths_mm: tuple[float, ...]) -> tuple[float, ...]:
     return tuple(sorted({*found, *depths_mm}))
 
 
+@working("freezing kernels off the design point")
 def freeze_stress(optics: Optics, sensor: ColorSensor, grid: FreezeGrid | None = None) -> Frozen:
     """Freeze kernels off the design point: object distances, at three fields of radial optics.
 

@@ -8,7 +8,7 @@
     losses, schedule, fitter       one step
     fitting                        the steps that a kind brings
     adversarial                    such a step: content terms, and a critic
-    trainer, progress, log         the run, its bar and its log
+    trainer, log                   the run and its log
     similarity                     SSIM with gradients
     checkpoint, credits            what is kept, and what it was trained on
     first_weights, refinement      what was trained before goes on

@@ -180,9 +180,10 @@ class SamplePool:
                 worker.stdin.close()
             worker.wait()
         self._workers.clear()
+        self._files.cpu_s[:] = 0  # counted as that of ended children from now on
 
     def workers_cpu_s(self) -> float:
-        """Give the CPU time of the worker processes so far."""
+        """Return the CPU time of the worker processes at work, from their start."""
         return float(self._files.cpu_s.sum())
 
     def span(self, step: int) -> tuple[int, int]:

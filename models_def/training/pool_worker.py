@@ -3,25 +3,36 @@
 import select
 import signal
 import sys
+import threading
 import time
 from pathlib import Path
+from typing import Final
 
 import torch
 
-from camkit.models_def.training.pool import POLL_S, read_job
+from camkit.models_def.training.pool import POLL_S, PoolFiles, read_job
+
+REPORT_S: Final = 0.2
 
 
 def work(folder: Path, share: tuple[int, int]) -> None:
     """Make samples up to the goal until the trainer says stop or is gone."""
     torch.set_num_threads(1)
     files, maker = read_job(folder).open()
+    threading.Thread(target=_report, args=(files, share[0]), daemon=True).start()
     while files.goal[0] >= 0 and not _parent_is_gone():
         index = files.next_missing(share)
         if index is None:
             time.sleep(POLL_S)
         else:
             files.store(index, maker.make(index))
-            files.cpu_s[share[0]] = time.process_time()
+
+
+def _report(files: PoolFiles, number: int) -> None:
+    """Tell the trainer the CPU time so far, also while a sample is being made."""
+    while files.goal[0] >= 0:
+        files.cpu_s[number] = time.process_time()
+        time.sleep(REPORT_S)
 
 
 def _parent_is_gone() -> bool:

@@ -4,11 +4,10 @@ pool of samples -> patches of a step -> network -> loss in the square-root domai
                                                         -> average of the weights -> validation
 """
 
-import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import torch
 from torch import nn
@@ -42,13 +41,15 @@ from camkit.models_def.training.kind import (
 )
 from camkit.models_def.training.log import RunLog
 from camkit.models_def.training.pool import SamplePool, open_pool
-from camkit.models_def.training.progress import TrainingBar
 from camkit.models_def.training.recipe import Recipe
 from camkit.models_def.training.refinement import Refinement
 from camkit.models_def.training.sample import SampleLayout
 from camkit.models_def.training.schedule import progress_of
+from camkit.progress import Task, duration, left_text, note, working
+from camkit.stopwatch import Stopwatch
 
 LOG_STEPS: Final = 50
+Made = TypeVar("Made")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,8 +63,9 @@ class TrainOptions:
         data_folder: Pictures to train on; None for procedural scenes alone.
         valid_folder: Pictures to choose by; None for procedural scenes.
         steps: Steps of the whole schedule; None for the recipe's.
-        max_minutes: Wall time after which the schedule, decay included, ends; None for its steps.
-        max_cpu_minutes: The same of CPU time, that of the workers included.
+        max_minutes: Wall time after which the run, decay included, ends; None for its steps.
+        max_cpu_minutes: The same of CPU time, that of the workers included. Both count all of the
+            run: kernels that are traced, samples, and validations, the last one too.
         start: Checkpoint or bundle with the same network, of another camera say, whose weights
             are the first ones; None for random weights.
         stop_at_step: Stop there though the schedule goes on, as an interruption would.
@@ -161,6 +163,7 @@ def train(
     *,
     material: Material | None = None,
     refinement: Refinement | None = None,
+    stopwatch: Stopwatch | None = None,
 ) -> TrainResult:
     """Train one network of a recipe.
 
@@ -170,11 +173,13 @@ def train(
         material: What samples are made with; None has the kind prepare it (kernels of a lens take
             about a minute, and are kept in `out_dir`).
         refinement: Later training; None fits a new network to the recipe's loss.
+        stopwatch: What budgets of time count by; None begins now.
 
     Raises:
         ContractError: If recipe, options or the checkpoint to resume do not fit.
         UnsupportedError: If cameras of this kind cannot be trained.
     """
+    stopwatch = stopwatch or Stopwatch()
     torch.set_num_threads(options.threads)
     recipe = read_recipe(recipe_path)
     kind, role = training_kind(recipe.kind), recipe.role(options.role)
@@ -213,16 +218,18 @@ def train(
         )
     options.out_dir.mkdir(parents=True, exist_ok=True)
     if material is None:
-        material = kind.prepare(recipe, recipe_path.parent, options.out_dir)
+        with working(f"preparing the kernels of {recipe.name}"):
+            material = kind.prepare(recipe, recipe_path.parent, options.out_dir)
     # A pool of its own: another size may be trained beside this one.
     samples = options.out_dir / f"samples_{_label(role, options.size)}"
     seed = entry.schedule.seed
     pool = open_pool(samples, recipe_path, material, options.data_folder, seed=seed, role=role)
-    with pool, TrainingBar(f"{recipe.name} {_label(role, options.size)}") as bar:
+    what = f"training {recipe.name} {_label(role, options.size)}"
+    with pool, working(what, total=1.0, writes_lines=True) as task:
         pool.start_workers(options.workers)
-        run = _Run(recipe_path, kind, material, options, refinement, first, own)
-        run.loop(pool, bar)
-        return run.result()
+        run = _Run(recipe_path, kind, material, options, refinement, first, own, stopwatch)
+        run.loop(pool, task)
+    return run.result()
 
 
 def check_layout(name: str, network: nn.Module, layout: SampleLayout) -> None:
@@ -274,7 +281,9 @@ class _Run:
         refinement: Refinement | None,
         first: FirstWeights | None,
         own: OwnFitting | None,
+        stopwatch: Stopwatch,
     ) -> None:
+        self.stopwatch = stopwatch
         self.options, self.material_digest = options, material.digest()
         self.toml = recipe_path.read_text(encoding="utf-8")
         self.designed = dict(material.designed)
@@ -300,6 +309,8 @@ class _Run:
         self.path = checkpoint_path(self.recipe, options, refinement)
         self.step, self.elapsed_before_s, self.cpu_before_s = 0, 0.0, 0.0
         self.valid: Score | None = None
+        self.loss: float | None = None
+        self.spent_s = (0.0, 0.0)
         # a loss of its own, an adversary say, wants something else than the decibels
         self.picks_best = refinement is None and own is None
         self.best: State = {}
@@ -308,8 +319,8 @@ class _Run:
             self._restore(read_checkpoint(self.path))
         until = self.step if options.resume else None
         self.log = RunLog(self.path.with_suffix(".jsonl"), keep_until_step=until)
-        self.baselines = dict(self.judge.baselines())
-        self.start_s, self.start_cpu_s = time.perf_counter(), time.process_time()
+        self.closing_s: dict[str, tuple[float, float]] = {}
+        self.baselines = dict(self._closing("judge", self.judge.baselines))
 
     def _restore(self, saved: Checkpoint) -> None:
         known = (self.material_digest, self.role, self.entry.network, dict(self.entry.config))
@@ -326,16 +337,26 @@ class _Run:
         self.elapsed_before_s, self.cpu_before_s = saved.elapsed_s, saved.cpu_s
 
     def elapsed_s(self) -> float:
-        return self.elapsed_before_s + time.perf_counter() - self.start_s
+        return self.elapsed_before_s + self.stopwatch.wall_s()
 
     def cpu_s(self, pool: SamplePool) -> float:
-        own = time.process_time() - self.start_cpu_s
-        return self.cpu_before_s + own + pool.workers_cpu_s()
+        return self.cpu_before_s + self.stopwatch.cpu_s() + pool.workers_cpu_s()
 
-    def loop(self, pool: SamplePool, bar: TrainingBar) -> None:
+    def _closing(self, name: str, work: Callable[[], Made]) -> Made:
+        """Do what the end of the run will do again, and keep (wall, CPU) seconds of it."""
+        begin = self.stopwatch.wall_s(), self.stopwatch.cpu_s()
+        made = work()
+        wall_s, cpu_s = self.stopwatch.wall_s(), self.stopwatch.cpu_s()
+        self.closing_s[name] = wall_s - begin[0], cpu_s - begin[1]
+        return made
+
+    def loop(self, pool: SamplePool, task: Task) -> None:
         """Fit until the schedule, the time or the asked step ends; checkpoint and validate."""
         schedule, options = self.entry.schedule, self.options
-        pool.draw_batch(self.step, 1, schedule.patch_px)
+        note(self._plan_line())
+        with working("making the first samples"):
+            pool.draw_batch(self.step, 1, schedule.patch_px)
+        task.begin(self._progress(pool))
         self.log.write(
             {"step": self.step, "seconds": self.elapsed_s(), "cpu_s": self.cpu_s(pool)}
             | self._baseline_entries()
@@ -343,26 +364,30 @@ class _Run:
         saved_s = validated_s = self.elapsed_s()
         losses: list[float] = []
         while not self._is_over(progress := self._progress(pool)):
+            task.count(progress)
             batch = pool.draw_batch(self.step, schedule.batch, schedule.patch_px)
             losses.append(self.fitter.fit(batch, self.step, progress))
             self.step += 1
             if self.step % LOG_STEPS == 0:
-                self._note(pool, bar, progress, sum(losses) / len(losses))
+                self._log(pool, progress, sum(losses) / len(losses))
                 losses.clear()
             if self.elapsed_s() - validated_s > options.validate_s:
-                self._validate(pool)
+                self._validate(pool, task)
                 validated_s = self.elapsed_s()
             if self.elapsed_s() - saved_s > options.checkpoint_s:
                 self._save(pool)
                 saved_s = self.elapsed_s()
-        self._validate(pool)
+        task.count(1.0)
+        self._validate(pool, task)
         self._save(pool)
+        self.spent_s = self.elapsed_s(), self.cpu_s(pool)
 
     def _progress(self, pool: SamplePool) -> float:
         options = self.options
+        walls_s, cpus_s = zip(*self.closing_s.values(), strict=True)
         spent = (
-            (self.elapsed_s(), options.max_minutes),
-            (self.cpu_s(pool), options.max_cpu_minutes),
+            (self.elapsed_s() + sum(walls_s), options.max_minutes),
+            (self.cpu_s(pool) + sum(cpus_s), options.max_cpu_minutes),
         )
         return max(
             progress_of(self.step, self.steps, seconds, None if most is None else 60 * most)
@@ -372,15 +397,14 @@ class _Run:
     def _is_over(self, progress: float) -> bool:
         return progress >= 1 or self.step == self.options.stop_at_step
 
-    def _note(self, pool: SamplePool, bar: TrainingBar, progress: float, loss: float) -> None:
-        valid_db = None if self.valid is None else self.valid.mean_db
-        bar.show(progress, self.step, loss, valid_db)
+    def _log(self, pool: SamplePool, progress: float, loss: float) -> None:
+        self.loss = loss
         clock = {"seconds": self.elapsed_s(), "cpu_s": self.cpu_s(pool)}
         waited = {"waited_s": pool.waited_s, "progress": progress}
         self.log.write({"step": self.step, "loss": loss} | self.fitter.notes() | clock | waited)
 
-    def _validate(self, pool: SamplePool) -> None:
-        self.valid = self.judge.score(self.fitter.restore)
+    def _validate(self, pool: SamplePool, task: Task) -> None:
+        self.valid = self._closing("judge", lambda: self.judge.score(self.fitter.restore))
         if self.picks_best and (self.best_db is None or self.valid.mean_db > self.best_db):
             self.best, self.best_db = self.fitter.average(), self.valid.mean_db
         entry: dict[str, Any] = {
@@ -391,6 +415,28 @@ class _Run:
         }
         parts = {f"valid_{name}": dict(part) for name, part in self.valid.parts.items()}
         self.log.write(entry | parts | self._baseline_entries())
+        note(self._line(pool, task, self.valid.mean_db))
+
+    def _plan_line(self) -> str:
+        """Return what ends the run."""
+        ends = [f"{self.steps} steps"]
+        budgets = {"minutes": self.options.max_minutes, "CPU-minutes": self.options.max_cpu_minutes}
+        ends += [f"{most:g} {unit}" for unit, most in budgets.items() if most is not None]
+        known = "".join(f", {name} {db:.2f} dB" for name, db in self.baselines.items())
+        every = f"a line at every validation, about every {duration(self.options.validate_s)}"
+        return f"{self.path.stem}: {' or '.join(ends)}{known}; {every}"
+
+    def _line(self, pool: SamplePool, task: Task, valid_db: float) -> str:
+        """Return the line of a validation."""
+        loss = "" if self.loss is None else f", loss {self.loss:.4f}"
+        line = f"{self.path.stem}: step {self.step} of {self.steps}{loss}, {valid_db:.2f} dB"
+        for spent_s, most, unit in (
+            (self.elapsed_s(), self.options.max_minutes, "minutes"),
+            (self.cpu_s(pool), self.options.max_cpu_minutes, "CPU-minutes"),
+        ):
+            if most is not None:
+                line += f", {spent_s / 60:.1f} of {most:g} {unit}"
+        return line + left_text(task)
 
     def _baseline_entries(self) -> dict[str, float]:
         return {f"{name}_db": db for name, db in self.baselines.items()}
@@ -415,7 +461,7 @@ class _Run:
             best=self.best,
             best_db=self.best_db,
         )
-        write_checkpoint(self.path, saved)
+        self._closing("save", lambda: write_checkpoint(self.path, saved))
 
     def result(self) -> TrainResult:
         saved = read_checkpoint(self.path)
@@ -423,8 +469,8 @@ class _Run:
             checkpoint=self.path,
             log=self.path.with_suffix(".jsonl"),
             steps=saved.step,
-            elapsed_s=saved.elapsed_s,
-            cpu_s=saved.cpu_s,
+            elapsed_s=self.spent_s[0],
+            cpu_s=self.spent_s[1],
             baselines=self.baselines,
             valid_db=float(saved.best_db or saved.valid_db or 0.0),
         )

@@ -12,6 +12,8 @@ from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.field_types import check_value
 from camkit.kinds import Kind
+from camkit.progress import working
+from camkit.runtime.batch.counting import PictureCount
 from camkit.runtime.batch.making import Common, FileProgress, Pipelines, run_task
 from camkit.runtime.batch.sources import expand
 from camkit.runtime.batch.tasks import NO_BUNDLE, Task, list_tasks
@@ -109,27 +111,33 @@ def process(  # noqa: PLR0913 - each says one thing to its caller
     for folder in {task.target.parent for task in tasks}:
         folder.mkdir(parents=True, exist_ok=True)
     common = Common(write=write, mosaic=mosaic, progress=progress, cancel=cancel)
-    if client is None:
-        return _process_here(tasks, pipelines, common, on_result)
-    from camkit.runtime.batch.cluster.run import Wishes, process_on_cluster
+    with working("making pictures", len(tasks), unit="pictures") as task:
+        count = PictureCount(task, progress, on_result)
+        if client is None:
+            common = replace(common, progress=count.progress)
+            return _process_here(tasks, pipelines, common, count.result)
+        from camkit.runtime.batch.cluster.run import Wishes, process_on_cluster
 
-    notice = on_notice or logger.warning
-    wishes = Wishes(
-        options=options, common=common, pipelines=pipelines, on_result=on_result, notice=notice
-    )
-    return process_on_cluster(client, tasks, wishes)
+        # only results are counted: shares of pictures would cost messages
+        wishes = Wishes(
+            options=options,
+            common=common,
+            pipelines=pipelines,
+            on_result=count.result,
+            notice=on_notice or logger.warning,
+        )
+        return process_on_cluster(client, tasks, wishes)
 
 
 def _process_here(
     tasks: Sequence[Task],
     pipelines: Pipelines,
     common: Common,
-    on_result: Callable[[FileResult], None] | None,
+    on_result: Callable[[FileResult], None],
 ) -> list[FileResult]:
     def run(task: Task) -> FileResult:
         result = run_task(task, pipelines, common)
-        if on_result is not None:
-            on_result(result)
+        on_result(result)
         return result
 
     if common.write.jobs == 1:

@@ -22,6 +22,7 @@ from scipy import optimize, special
 
 from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError
+from camkit.progress import working
 from camkit.runtime.calibration.darks import Darks
 from camkit.runtime.calibration.edges import (
     FloatGrid,
@@ -179,6 +180,7 @@ def fit_edge(profile: EdgeProfile, dark: float | None) -> EdgeFit:
     return EdgeFit(psf=psf, moved_px=moved, step=step, told=table @ found + (dark or 0.0))
 
 
+@working("measuring the PSF of an edge")
 def measure_edge(survey: Survey, options: PsfOptions, darks: Darks | None) -> MeasuredPsf:
     """Measure a round PSF on frames of one straight edge.
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError
+from camkit.progress import working
 from camkit.runtime.calibration.darks import Darks
 from camkit.runtime.calibration.disc import (
     DiscCore,
@@ -73,6 +74,7 @@ class _Centred:
     cores: list[LightCore]
 
 
+@working("measuring the PSF of a light")
 def measure_psf(survey: Survey, options: PsfOptions, darks: Darks | None) -> MeasuredPsf:
     """Measure the PSF of a bracket of a small light.
 

@@ -22,6 +22,7 @@ from scipy import optimize
 
 from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError
+from camkit.progress import counted
 from camkit.runtime.calibration.flat.picture import MOST_CLIPPED, check_one_camera, green_of
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.merging.survey import read_frame, without_pixels
@@ -161,7 +162,8 @@ def measure_tone(
         raise ContractError("a picture is given twice; give one of each step")
     captures: list[Capture] = []
     found = []
-    for path, level in zip(files, levels, strict=True):
+    steps_seen = list(zip(files, levels, strict=True))
+    for path, level in counted(steps_seen, "reading", "pictures"):
         capture = read_frame(path, mosaic)
         light, error = _middle(path, capture)
         captures.append(without_pixels(capture))

@@ -8,12 +8,14 @@ Optics that are the same everywhere need no blocks: one kernel, in tiles that ov
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from itertools import product
 from typing import Final
 
 import numpy as np
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
+from camkit.progress import counted
 from camkit.runtime.geometry.sensor_window import SensorWindow
 
 # Against blocks of 32 px, the lens `duet` loses 48 dB at 256 px and 52 to 55 dB at 128 px.
@@ -87,22 +89,22 @@ def scatter_light(
         )
     out = np.zeros((planes.shape[0], height, width), dtype=np.float32)
     light = np.zeros_like(out)
-    for top, bottom, row_weight in _spans(planes.shape[1], step_px):
-        for left, right, column_weight in _spans(planes.shape[2], step_px):
-            weight = row_weight[:, None] * column_weight
-            x_px, y_px = (left + right - 1) / 2 - margin_px, (top + bottom - 1) / 2 - margin_px
-            x_mm, y_mm = window.to_mm(x_px, y_px)
-            kernels = kernels_at(float(x_mm), float(y_mm))
-            # of a kernel wider than the window, what throws light of this block into it
-            sides = kernels.shape[1:]
-            down, y = _reaching(sides[0], top - margin_px, bottom - margin_px, height)
-            across, x = _reaching(sides[1], left - margin_px, right - margin_px, width)
-            if min(down.stop - down.start, across.stop - across.start) < 1:
-                continue
-            blocks = (planes[:, top:bottom, left:right] * weight, weight[None])
-            spreads = convolve_full(blocks, kernels[:, down, across], workers=workers)
-            for total, spread in zip((out, light), spreads, strict=True):
-                _add_inside(total, spread, y, x)
+    places = list(product(_spans(planes.shape[1], step_px), _spans(planes.shape[2], step_px)))
+    for (top, bottom, row_weight), (left, right, column_weight) in counted(places, "blurring"):
+        weight = row_weight[:, None] * column_weight
+        x_px, y_px = (left + right - 1) / 2 - margin_px, (top + bottom - 1) / 2 - margin_px
+        x_mm, y_mm = window.to_mm(x_px, y_px)
+        kernels = kernels_at(float(x_mm), float(y_mm))
+        # of a kernel wider than the window, what throws light of this block into it
+        sides = kernels.shape[1:]
+        down, y = _reaching(sides[0], top - margin_px, bottom - margin_px, height)
+        across, x = _reaching(sides[1], left - margin_px, right - margin_px, width)
+        if min(down.stop - down.start, across.stop - across.start) < 1:
+            continue
+        blocks = (planes[:, top:bottom, left:right] * weight, weight[None])
+        spreads = convolve_full(blocks, kernels[:, down, across], workers=workers)
+        for total, spread in zip((out, light), spreads, strict=True):
+            _add_inside(total, spread, y, x)
     return out, light
 
 

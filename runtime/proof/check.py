@@ -23,6 +23,7 @@ from camkit.bundle.optics import PSF
 from camkit.bundle.reader import Bundle, open_bundle, read_container_manifest
 from camkit.contracts import depth_name
 from camkit.errors import CamkitError, ContractError, one_line
+from camkit.progress import working
 from camkit.runtime.kind import part_of
 from camkit.runtime.kind_parts.proving import GoldenRun
 from camkit.runtime.network.graph import COST_RTOL, check_graph
@@ -112,12 +113,16 @@ def check_bundle(
     }
     layers = [_layer("schema", lambda: (True, _describe(Path(path))))]
     opened: list[Bundle] = []
-    for name in (name for name in wanted[1:] if name not in without):
-        failed = [one.name for one in layers if one.status == "fail" and one.name in _GROUND]
-        if failed:
-            layers.append(Layer(name=name, status="skip", message=f"needs {failed[0]}"))
-        else:
-            layers.append(_layer(name, partial(_prove, proofs[name], Path(path), opened)))
+    names = [name for name in wanted[1:] if name not in without]
+    with working(f"checking {Path(path).name}", len(names), is_even=False) as task:
+        for number, name in enumerate(names):
+            task.count(number)
+            task.tell(f"checking {name} of {Path(path).name}")
+            failed = [one.name for one in layers if one.status == "fail" and one.name in _GROUND]
+            if failed:
+                layers.append(Layer(name=name, status="skip", message=f"needs {failed[0]}"))
+            else:
+                layers.append(_layer(name, partial(_prove, proofs[name], Path(path), opened)))
     return CheckReport(path=Path(path), layers=tuple(layers))
 
 

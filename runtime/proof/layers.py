@@ -4,6 +4,7 @@ Each gives (True, what was shown), or (False, why there was nothing to show), an
 bundle does not keep its word.
 """
 
+import itertools
 import math
 import sys
 from collections.abc import Iterator
@@ -18,6 +19,7 @@ from camkit.bundle.manifest import GoldenCase
 from camkit.bundle.reader import GOLDEN, Bundle, is_built_in
 from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ParityError
+from camkit.progress import counted
 from camkit.runtime.kind_parts.proving import GoldenRun
 from camkit.runtime.machine.limits import PROOF_MB, PROOF_WORK
 from camkit.runtime.network.engine import NetworkEngine
@@ -71,11 +73,11 @@ def _prove_cases(bundle: Bundle, run: GoldenRun | None) -> Result:
     if run is None:
         return False, "nothing to compare: no pipeline was given"
     worst, compared = 0.0, 0
-    for size in bundle.manifest.sizes or (None,):
-        for name, case in cases.items():
-            for share in _compared(bundle, case, arrays[name], size, run):
-                worst = max(worst, share)
-                compared += 1
+    runs = list(itertools.product(bundle.manifest.sizes or (None,), cases.items()))
+    for size, (name, case) in counted(runs, "computing golden cases", "cases"):
+        for share in _compared(bundle, case, arrays[name], size, run):
+            worst = max(worst, share)
+            compared += 1
     if not compared:
         return False, "nothing to compare: no output is stored"
     return True, f"{compared} results, worst at {worst:.3g} of what is allowed"

@@ -64,3 +64,13 @@ def test_make_demo_ends_with_the_file_to_open() -> None:
     recipe = [line for line in lines if " -m tools." in line and line.endswith("--out-dir out")]
     assert "tools.demo " in recipe[-1]
     assert len(recipe) == 2
+
+
+@pytest.mark.parametrize("target", ["RUNTIME_STAMP", "DEV_STAMP"])
+def test_make_says_what_it_installs_before_it_does(target: str) -> None:
+    rules = (Path(demo.__file__).parents[1] / "Makefile").read_text("utf-8").split("\n\n")
+    (recipe,) = (rule.splitlines()[1:] for rule in rules if rule.startswith(f"$({target}):"))
+    told = recipe[0] + recipe[1]
+    assert all(line.startswith("\t@echo ") for line in recipe[:2])
+    assert "on disk" in told
+    assert "minutes" in told

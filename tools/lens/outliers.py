@@ -44,7 +44,7 @@ def main() -> int:
             if label in found:
                 raise ContractError(f"two cameras are called {label}; say LABEL=FILE")
             scenes = stress_scenes(bundle, chosen.pictures, chosen.data)
-            report = analyse(bundle, scenes, Options(iso=chosen.iso), print)
+            report = analyse(bundle, scenes, Options(iso=chosen.iso))
             found[label] = report.method(report.control.method)
     except CamkitError as error:
         raise SystemExit(f"error: {error}") from error

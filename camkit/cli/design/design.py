@@ -9,6 +9,7 @@ import typer
 from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.cli.say import say
 from camkit.errors import ContractError
+from camkit.progress import left_text, working
 
 if TYPE_CHECKING:
     from camkit.models_def.design.loop import Progress
@@ -64,19 +65,21 @@ def design(
         seed=seed,
         search=search,
     )
-    if chosen.starts.count and chosen.schedule.lens_rate and not resume:
+    searches = chosen.starts.count and chosen.schedule.lens_rate and not resume
+    if searches:
         say(f"trying {chosen.starts.count} starts", err=True)
-    run = DesignRun(
-        chosen,
-        DesignOptions(
-            out_dir=out_dir or Path("runs") / chosen.name,
-            recipe_folder=recipe.parent,
-            pictures=data,
-            threads=threads,
-            resume=resume,
-            overwrite=overwrite,
-        ),
-    )
+    with working("trying starts" if searches else "reading the lens"):
+        run = DesignRun(
+            chosen,
+            DesignOptions(
+                out_dir=out_dir or Path("runs") / chosen.name,
+                recipe_folder=recipe.parent,
+                pictures=data,
+                threads=threads,
+                resume=resume,
+                overwrite=overwrite,
+            ),
+        )
     for variable, own in run.loop.parts.lens.problem.free.outside():
         say(
             f"{variable.kind} of surface {variable.surface}: the given lens has {own:.6g}, outside "
@@ -85,10 +88,14 @@ def design(
         )
     if run.searched_s:
         say(f"starts tried in {run.searched_s:.0f} s", err=True)
-    for moment in run.go():
-        say(_line(moment), err=True)
-        if pictures and run.leads and moment.step % pictures == 0:
-            _draw(run, moment)
+    total = chosen.schedule.steps
+    with working(f"designing {chosen.name}", total, unit="steps", writes_lines=True) as task:
+        task.begin(run.loop.step)
+        for moment in run.go():
+            task.count(moment.step)
+            say(_line(moment) + left_text(task), err=True)
+            if pictures and run.leads and moment.step % pictures == 0:
+                _draw(run, moment)
     if run.leads:
         report = run.finish()
         say(json.dumps(report) if json_ else _text(report))

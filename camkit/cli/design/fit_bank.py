@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
-from camkit.cli.say import say
+from camkit.progress import note, working
 
 
 def fit_bank(
@@ -43,19 +43,17 @@ def fit_bank(
     plan, text = read_recipe(recipe), read_side_text(recipe, "recipe")
     check_text(text)
     output.parent.mkdir(parents=True, exist_ok=True)
-    found = bank_fitting_kind(plan.kind).fit(
-        plan,
-        BankFitOptions(
-            pictures=data,
-            recipe_folder=recipe.parent,
-            output_folder=output.parent,
-            cache_folder=cache_dir,
-            samples=samples,
-            steps=steps,
-            seed=seed,
-        ),
-        lambda line: say(line, err=True),
+    options = BankFitOptions(
+        pictures=data,
+        recipe_folder=recipe.parent,
+        output_folder=output.parent,
+        cache_folder=cache_dir,
+        samples=samples,
+        steps=steps,
+        seed=seed,
     )
+    with working(f"fitting the bank of {plan.name}"):
+        found = bank_fitting_kind(plan.kind).fit(plan, options, note)
     with atomic_output(output) as part:
         part.write_text(with_bank(text, found.together), encoding="utf-8")
     numbers = found.together.model_dump(mode="json", exclude={"spread"})

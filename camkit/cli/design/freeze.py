@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Final, NamedTuple
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
-from camkit.cli.say import say
 from camkit.errors import ContractError, UnsupportedError
+from camkit.progress import note, working
 
 if TYPE_CHECKING:
     from camkit.bundle.frozen_optics import FrozenOptics
@@ -176,6 +176,7 @@ def _report(told: dict[str, int | float | str], report: Path | None, json_: bool
     print_report(told, json_)
 
 
+@working("freezing peaks and haze of the lens")
 def _freeze_hazy(
     optics: "Optics",
     paths: tuple[Path, Path],
@@ -193,10 +194,10 @@ def _freeze_hazy(
 
     if not isinstance(optics, LensOptics):
         raise UnsupportedError("only a lens is frozen as core and haze; leave --haze out")
-    frozen, report = freeze_hazy(optics.lens, sensor, tell=_tell)
+    frozen, report = freeze_hazy(optics.lens, sensor, tell=note)
     told = report.to_json()
     if stress is not None:
-        nearer = freeze_distances(optics.lens, sensor, tell=_tell)
+        nearer = freeze_distances(optics.lens, sensor, tell=note)
         _write_optics(nearer, *stress)
         told["distances"] = ", ".join(map(depth_name, nearer.psf.depths_mm))
     _write_optics(frozen, *paths)
@@ -225,6 +226,7 @@ class _Wanted(NamedTuple):
     focus_um: float
 
 
+@working("freezing the optics")
 def _freeze(optics: "Optics", out: Path, wanted: _Wanted) -> "FreezeReport | PlateReport":
     from camkit.models_def.optics.diffraction.freezing import freeze_plate
     from camkit.models_def.optics.diffraction.plate_optics import PlateOptics
@@ -233,7 +235,7 @@ def _freeze(optics: "Optics", out: Path, wanted: _Wanted) -> "FreezeReport | Pla
     if isinstance(optics, PlateOptics):
         if wanted.focus_um:
             raise UnsupportedError("a plate is frozen at its nominal focus; leave --focus-um out")
-        return freeze_plate(optics, out, sensor=wanted.sensor, grid=wanted.grid, tell=_tell)
+        return freeze_plate(optics, out, sensor=wanted.sensor, grid=wanted.grid, tell=note)
     return freeze_optics(
         optics,
         out,
@@ -242,7 +244,7 @@ def _freeze(optics: "Optics", out: Path, wanted: _Wanted) -> "FreezeReport | Pla
         limit_db=wanted.limit_db,
         grid=wanted.grid,
         focus_um=wanted.focus_um,
-        tell=_tell,
+        tell=note,
     )
 
 
@@ -264,10 +266,6 @@ def _check_unit(*, unit: bool, beside: Sequence[str]) -> None:
         raise ContractError("captures are for --unit, which measures the camera that took them")
     if beside:
         raise ContractError(f"--unit freezes nothing; leave {', '.join(beside)} out")
-
-
-def _tell(line: str) -> None:
-    say(line, err=True)
 
 
 def _depths(text: str | None) -> tuple[float, ...]:

@@ -7,7 +7,7 @@ import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.cli.design.export import HAZE_NAME, PSF_NAME
-from camkit.cli.say import say
+from camkit.progress import note, working
 
 
 def prepare(
@@ -51,4 +51,6 @@ def prepare(
         runs=out_dir,
         seed=seed,
     )
-    print_report(kind.prepare(plan, options, lambda line: say(line, err=True)), json_)
+    with working(f"preparing frames of {plan.name}"):
+        report = kind.prepare(plan, options, note)
+    print_report(report, json_)

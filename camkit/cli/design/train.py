@@ -8,6 +8,7 @@ import typer
 from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.cli.say import say
 from camkit.errors import ContractError
+from camkit.stopwatch import Stopwatch
 
 WITHOUT_VGG = (
     "no --vgg FILE: the perceptual term of eq. (6.12) compares sRGB values, not VGG-19 features"
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 
 def train(
+    context: typer.Context,
     recipe: Annotated[Path, typer.Argument(help="The recipe (TOML).")],
     size: Annotated[str, typer.Option(help="Which of the recipe's networks: S, M, ...")] = "M",
     role: Annotated[
@@ -109,6 +111,7 @@ def train(
             pairs=None if refinement is not None else pairs,
         ),
         refinement=refinement,
+        stopwatch=context.find_object(Stopwatch),
     )
     print_report(result.to_json(), json_)
 

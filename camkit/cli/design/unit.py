@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from camkit.errors import ContractError, UnsupportedError
+from camkit.progress import working
 
 if TYPE_CHECKING:
     from camkit.models_def.optics.optics import Optics
@@ -22,6 +23,7 @@ LEAST_ENERGY: Final = 0.9
 UNIT_SUFFIX: Final = ".toml"
 
 
+@working("measuring the focus of a unit")
 def measure_unit(
     optics: Path,
     captures: list[Path],

@@ -1,19 +1,17 @@
 """`camkit bench`: speed against accuracy, as a table, a chart and a page."""
 
 import json
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from camkit.cli.choices import Debug, Json
-from camkit.cli.say import say, say_over
+from camkit.cli.say import say
 from camkit.errors import ContractError
+from camkit.progress import working
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from camkit.report.bench.row import Row
     from camkit.report.bench.settings import Settings
 
@@ -137,9 +135,8 @@ def _run(settings: "Settings", out_dir: Path, *, as_json: bool) -> None:
     from camkit.report.bench.own.table import own_lines
     from camkit.report.bench.run import run_bench
 
-    tell = _teller()
-    result = run_bench(settings, tell)
-    tell("")
+    with working("preparing") as task:
+        result = run_bench(settings, task.tell)
     files = write_bench(result, out_dir)
     if as_json:
         say(json.dumps(result.report, allow_nan=False))
@@ -150,13 +147,6 @@ def _run(settings: "Settings", out_dir: Path, *, as_json: bool) -> None:
     for skip in result.report["skipped"]:
         say(f"camkit: not measured: {skip['what']}: {skip['reason']}", err=True)
     say(f"written: {', '.join(str(file) for file in files)}")
-
-
-def _teller() -> "Callable[[str], None]":
-    """Give what shows progress: one line on a terminal's stderr, nothing elsewhere."""
-    if not sys.stderr.isatty():
-        return lambda _text: None
-    return lambda text: say_over(text[:100])
 
 
 def _lines(rows: "list[Row]") -> list[str]:

@@ -1,15 +1,18 @@
 """`camkit stress`: where a bundle's networks stop helping."""
 
 import json
-import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from camkit.cli.choices import Debug
-from camkit.cli.say import say, say_over
+from camkit.cli.say import say
 from camkit.errors import ContractError
+from camkit.progress import Task, working
+
+if TYPE_CHECKING:
+    from camkit.report.stress.run import Progress
 
 
 def stress(
@@ -69,7 +72,8 @@ def stress(
         out_dir=out_dir,
     )
     before = None if compare is None else open_bundle(find_bundle(compare))
-    result = run_stress(opened, options, before=before, progress=_progress)
+    with working("sweeping", unit="points") as task:
+        result = run_stress(opened, options, before=before, progress=_teller(task))
     if write:
         write_envelope(opened, result.envelope)
     if json_:
@@ -98,7 +102,9 @@ def _line(row: dict[str, object]) -> str:
     return f"{head}{row['method']} breaks at {point} [{low} to {high}]: {row['break_reason']}"
 
 
-def _progress(scenario: str, done: int, total: int) -> None:
-    """Show the progress on stderr, on a terminal only."""
-    if sys.stderr.isatty():
-        say_over(f"{done}/{total} {scenario}", last=done == total)
+def _teller(task: Task) -> "Progress":
+    def progress(scenario: str, done: int, total: int) -> None:
+        task.tell(f"sweeping {scenario}")
+        task.count(done, total)
+
+    return progress

@@ -1,6 +1,6 @@
 """Commands of daily use.
 
-    process   captures in, pictures out (`progress`: bars and results)
+    process   captures in, pictures out (`results`: what is printed of each)
     plan      what `process` would do, why, and what it would take (`plan_text`)
     simulate  the digital twin: a scene to a DNG
     merge     a bracket of exposures to one linear EXR

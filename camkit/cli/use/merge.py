@@ -10,6 +10,7 @@ from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.cli.exit_code import ExitCode
 from camkit.cli.say import say
 from camkit.errors import CamkitError, ContractError
+from camkit.progress import counted
 
 if TYPE_CHECKING:
     from camkit.runtime.merging.response import ResponseName
@@ -80,7 +81,8 @@ def merge(
         if path.exists() and not overwrite:
             raise ContractError(f"{path} exists; say --overwrite or another name")
     failed = False
-    for bracket, path, shown in zip(brackets, outs, previews, strict=True):
+    jobs = list(zip(brackets, outs, previews, strict=True))
+    for bracket, path, shown in counted(jobs, "merging", "brackets"):
         try:
             found = survey(bracket.files, bracket.times_s(times), mosaic=said)
             path.parent.mkdir(parents=True, exist_ok=True)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from camkit.cli.say import say
 from camkit.errors import BundleError, CamkitError, ContractError, unexpected
+from camkit.progress import counted
 
 if TYPE_CHECKING:
     from camkit.runtime.batch import Pipelines, Task
@@ -47,7 +48,7 @@ def print_plans(
     tasks = list_tasks(
         sources, bundle=bundle, write=write, options=options, kind=kind, writes=False
     )
-    for task in tasks:
+    for task in counted(tasks, "planning", "captures"):
         facts: dict[str, Any] = {"input": str(task.source), "output": str(task.target)}
         try:
             facts |= _planned(task, pipelines, write, headerless)

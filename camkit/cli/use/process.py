@@ -119,7 +119,7 @@ def process(
     """Turn captures into pictures through the camera's bundle."""
     from camkit.cli.use.cluster import cluster_client
     from camkit.cli.use.mosaic import mosaic_options
-    from camkit.cli.use.progress import TileProgress
+    from camkit.cli.use.results import print_result
     from camkit.runtime.batch import process as run
     from camkit.runtime.development import WriteOptions
     from camkit.runtime.options import Options, parse_memory, with_choices
@@ -168,17 +168,16 @@ def process(
 
         done = print_plans(files, bundle, options, write, headerless, as_json=json_)
     else:
-        with cluster_client(scheduler, workers, jobs) as client, TileProgress() as progress:
+        with cluster_client(scheduler, workers, jobs) as client:
             results = run(
                 files,
                 bundle=bundle,
                 options=options,
                 write=write,
                 mosaic=headerless,
-                progress=progress.teller,
-                on_result=lambda result: progress.result(result, as_json=json_),
+                on_result=lambda result: print_result(result, as_json=json_),
                 client=client,
-                on_notice=progress.notice,
+                on_notice=lambda text: say(f"camkit: {text}", err=True),
             )
         done = all(result.status != "failed" for result in results) if results else None
     if done is None:

@@ -10,6 +10,7 @@ import typer
 from camkit.cli.choices import Debug, DepthM, Json, Overwrite, whole_pair
 from camkit.cli.say import say
 from camkit.errors import ContractError
+from camkit.progress import working
 from camkit.units import MM_PER_M
 
 if TYPE_CHECKING:
@@ -135,8 +136,9 @@ def simulate(
     )
     drawn = _scene(scene, size, surround_px, is_cut=size_px is not None)
     drawn, saturation = _exposed(drawn, sensor, options, saturate)
-    simulation = part.simulate(drawn, opened, options)
-    shown = None if truth is None else ideal_picture(simulation, opened)
+    with working(f"photographing {scene}"):
+        simulation = part.simulate(drawn, opened, options)
+        shown = None if truth is None else ideal_picture(simulation, opened)
     out.parent.mkdir(parents=True, exist_ok=True)
     part.write(out, simulation, opened)
     if truth is not None and shown is not None:
@@ -249,6 +251,7 @@ def _focus_um(path: Path | None, bundle: "Bundle") -> float:
     return unit.focus_um
 
 
+@working("reading or drawing the scene")
 def _scene(scene: str, size_px: tuple[int, int], surround_px: int, *, is_cut: bool) -> "FloatArray":
     """Draw or read a scene with its surround.
 

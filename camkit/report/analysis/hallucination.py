@@ -20,6 +20,7 @@ from camkit.bundle.reader import Bundle
 from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
+from camkit.progress import counted
 from camkit.report.analysis.patches import MEASURES, Patch, corners_of, measure_patches, summary
 from camkit.report.analysis.perceptual import SUBSTITUTE, Measure, looks_different
 from camkit.report.analysis.planted import plant
@@ -37,7 +38,6 @@ WORST: Final = 16
 TRUTH: Final = "truth"
 """The method whose chi^2 must be about 1."""
 PLANTED: Final = " planted"
-"""Marks the control."""
 Tell = Callable[[str], None]
 
 
@@ -169,16 +169,13 @@ class Report:
         return next(method for method in self.methods if method.name == name)
 
 
-def analyse(
-    bundle: Bundle, scenes: Sequence[Scene], options: Options, tell: Tell | None = None
-) -> Report:
+def analyse(bundle: Bundle, scenes: Sequence[Scene], options: Options) -> Report:
     """Restore the captures of scenes and judge the patches.
 
     Args:
         bundle: The camera.
         scenes: Sharp, at their places on the sensor.
         options: What is measured.
-        tell: Takes lines about what is being done.
 
     Raises:
         ContractError: If a scene holds no whole patch.
@@ -188,9 +185,7 @@ def analyse(
     primary = rig.primary if rig.networks else filtered
     gathered: dict[str, _Gathered] = {}
     places: set[tuple[str, tuple[int, int]]] = set()
-    for scene in scenes:
-        if tell is not None:
-            tell(scene.name)
+    for scene in counted(scenes, "judging", "pictures"):
         light = rig.light_in_place(scene)
         shot = rig.record(scene, light, Setting(iso=options.iso))
         pictures = _restored(rig, shot)

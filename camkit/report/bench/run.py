@@ -10,6 +10,7 @@ from typing import Any, Final
 from camkit.bundle.manifest import NOT_TRAINED
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.errors import CamkitError, ContractError
+from camkit.progress import counted, working
 from camkit.report.bench.accuracy import Key, Restorers, Scores, measure_accuracy, score_key
 from camkit.report.bench.crops import MOST_CAPTURES, CropCollector, Patch
 from camkit.report.bench.edge import Edges, measure_edges
@@ -216,11 +217,10 @@ def time_trials(
     with tempfile.TemporaryDirectory(prefix="camkit-bench-") as name:
         folder = Path(name)
         twins = {label: _twins(camera.capture, folder / label) for label, camera in cameras.items()}
-        for number, trial in enumerate(interleaved(trials, repeat)):
+        for trial in counted(list(interleaved(trials, repeat)), "timing", "runs"):
             if any(run.error is not None for run in runs[trial]):
                 continue
-            step = f"{number + 1}/{repeat * len(trials)}"
-            tell(f"{trial.camera}: timing {trial.label} ({step})")
+            tell(f"{trial.camera}: timing {trial.label}")
             job = Job(
                 files=twins[trial.camera],
                 bundle="none" if trial.path is None else str(trial.path.resolve()),
@@ -262,9 +262,11 @@ def _judge(
     collector = CropCollector(plain, every=max(1, count // MOST_CAPTURES))
 
     def told(found: Iterable[KnownCapture]) -> Iterable[KnownCapture]:
-        for number, known in enumerate(found, start=1):
-            tell(f"{label}: judging {known.caption} ({number}/{count})")
-            yield known
+        with working("judging", count, unit="captures") as task:
+            for number, known in enumerate(found):
+                task.count(number)
+                tell(f"{label}: judging {known.caption}")
+                yield known
 
     restorers = Restorers(bundle, available_threads(None))
     try:

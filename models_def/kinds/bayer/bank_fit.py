@@ -43,6 +43,7 @@ from camkit.models_def.sensors.together import Numbers, restore_together
 from camkit.models_def.sensors.wiener import block_facts, to_otf, wiener_restore
 from camkit.models_def.training.bank_fitting import BankFit, BankFitOptions
 from camkit.models_def.training.pictures import open_source
+from camkit.progress import counted
 
 FREQUENCIES: Final = (0.0, 0.015, 0.03, 0.05, 0.075, 0.1, 0.14, 0.18, 0.23, 0.3, 0.4, 0.75)
 """Of the table of the spread, cycles per pixel."""
@@ -189,7 +190,7 @@ def fit_bank(
     values = _to_values(first).requires_grad_()
     optimiser = torch.optim.Adam([values], lr=RATE, betas=(0.9, 0.99))
     rng = np.random.default_rng(seed)
-    for step in range(steps):
+    for step in counted(range(steps), "descending", "steps"):
         for group in optimiser.param_groups:
             group["lr"] = LAST_RATE + (RATE - LAST_RATE) * (1 - step / steps)
         optimiser.zero_grad()
@@ -226,7 +227,7 @@ def _photographed(
         scene_px=recipe.data.scene_px,
     )
     shots = []
-    for index in range(count):
+    for index in counted(range(count), "photographing", "samples"):
         rng = np.random.default_rng((seed, index))
         exposure = draw_exposure(rng, recipe, bank)
         crop = tint_crop(rng, source.draw_crop(rng, scene_side_px(recipe, bank)))

@@ -21,6 +21,7 @@ from camkit.models_def.optics.kernel_bank import (
 )
 from camkit.models_def.optics.prescription import Lens, format_prescription
 from camkit.models_def.optics.psf import with_object_distance
+from camkit.progress import counted
 
 WAVELENGTHS: Final = 27
 LEAST_ENERGY: Final = 0.97
@@ -62,7 +63,7 @@ def _trace(recipe: BayerRecipe, lens: Lens) -> PsfBank:
     if choices.bank_in_focus:
         places.append((copies[0], lens.object_distance_mm))
     kernels = []
-    for copy, depth_mm in places:
+    for copy, depth_mm in counted(places, "tracing the lens and its copies", "copies"):
         traced, kept = colour_kernels(
             with_object_distance(copy, depth_mm),
             response,

@@ -10,6 +10,8 @@ from typing import Final
 import torch
 from torch import Tensor
 
+from camkit.progress import counted
+
 Residuals = Callable[[Tensor], Tensor]
 """(start, variable) in 0..1 to (start, residual)."""
 
@@ -54,7 +56,7 @@ def descend(residuals: Residuals, scaled: Tensor, steps: int, held: Tensor) -> D
     """
     damping = torch.full((len(scaled), 1), 1e-2, dtype=torch.float64)
     with torch.no_grad():
-        for _ in range(steps):
+        for _ in counted(range(steps), "lowering the merit", "steps"):
             value, slope = jacobian(residuals, scaled)
             moved = _step(value, slope, scaled, damping, held)
             better = (residuals(moved) ** 2).sum(1) < (value**2).sum(1)

@@ -27,6 +27,7 @@ from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.thin.middle import MOST_RAD, Middle, corner_angle_rad, find_middles
 from camkit.models_def.optics.thin.peak import LandedLight, land_light
+from camkit.progress import counted
 from camkit.units import to_mm
 
 Array = NDArray[np.float64]
@@ -148,7 +149,8 @@ def freeze_hazy(
     core = np.zeros((fields, wavelengths, 2 * core_px + 1, 2 * core_px + 1))
     haze = np.zeros((fields, wavelengths, MOST_CELLS, MOST_CELLS))
     wanted = np.zeros((fields, wavelengths))
-    for field, (angle, height) in enumerate(zip(angles, heights, strict=True)):
+    places = list(enumerate(zip(angles, heights, strict=True)))
+    for field, (angle, height) in counted(places, "tracing", "fields"):
         for fine, of_sample in zip(fine_um, bands.numpy().T, strict=True):
             landed = land_light(lens, float(angle), float(fine), pitch_um, rays)
             parts = _split(landed, float(height), corner_px, core_px, cell_px)

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from camkit.caller import option_text
 from camkit.contracts import FloatArray
 from camkit.errors import CamkitError, ContractError, DecodeError
+from camkit.progress import counted
 from camkit.runtime.calibration.display.alignment import Patch, align, map_places
 from camkit.runtime.calibration.display.camera_file import Illumination, Lens, Tone
 from camkit.runtime.calibration.display.primaries import Primaries, fit_primaries
@@ -176,7 +177,7 @@ def find_pairs(files: Sequence[Path], given: Given) -> Pairs:
     if len(files) > MOST_CAPTURES:
         raise ContractError(f"expected at most {MOST_CAPTURES} captures; got {len(files)}")
     found: list[Sorted] = []
-    for path in files:
+    for path in counted(files, "finding marks", "captures"):
         view, _ = read_view(path, given.lens)
         found.append(sort_view(view, given.lens, given.targets))
     check_whole(found, given.targets)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError
+from camkit.progress import counted
 from camkit.runtime.calibration.flat.picture import FlatPicture, check_one_camera, read_flat
 from camkit.runtime.calibration.flat.pose import Pose, orientation_turn_deg, poses_of
 from camkit.runtime.calibration.flat.separate import MOST_OFFSET, Parts, Views, separate
@@ -122,7 +123,7 @@ def measure_flat(
     if len({path.resolve() for path in files}) < len(files):
         raise ContractError("a picture is given twice; give every one once")
     poses_of(shifts, turns, [0.0] * len(files))  # refuses what is wrong before any work
-    pictures = [read_flat(path, mosaic) for path in files]
+    pictures = [read_flat(path, mosaic) for path in counted(files, "reading", "pictures")]
     poses = poses_of(shifts, turns, [orientation_turn_deg(p.like.orientation) for p in pictures])
     for picture in pictures[1:]:
         check_one_camera(pictures[0].like, files[0], picture.like, picture.path)

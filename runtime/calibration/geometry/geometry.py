@@ -10,6 +10,7 @@ import numpy as np
 
 from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError
+from camkit.progress import counted
 from camkit.runtime.calibration.geometry.adjustment import rms
 from camkit.runtime.calibration.geometry.board import Board
 from camkit.runtime.calibration.geometry.camera import FOCAL, Camera, FloatGrid, distance
@@ -217,7 +218,7 @@ def look_for(files: Sequence[Path], board: Board) -> list[View]:
         raise DecodeError(f"expected at most {MOST_PICTURES} pictures; got {len(files)}")
     views: list[View] = []
     hashes: dict[str, Path] = {}
-    for path in files:
+    for path in counted(files, "finding corners", "pictures"):
         grey = read_grey(path)
         sha256 = file_sha256(path)
         if sha256 in hashes:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.errors import DecodeError
+from camkit.progress import counted
 from camkit.runtime.calibration.noise.pairs import Pair, PairReader, in_pairs
 from camkit.runtime.calibration.noise.rounding import LEAST_BOUND, OF_ROUNDING, Spread, spread_of
 from camkit.runtime.calibration.noise.site import SitePair
@@ -131,9 +132,13 @@ def measure_sensor(
     """
     dark_paths, flat_paths = in_pairs(darks, "darks"), in_pairs(flats, "flats")
     reader = PairReader(mosaic, iso)
-    dark_pairs = _by_iso(reader.dark(paths) for paths in dark_paths)
+    dark_pairs = _by_iso(
+        reader.dark(paths) for paths in counted(dark_paths, "reading darks", "pairs")
+    )
     means = {at: _means(pairs) for at, pairs in dark_pairs.items()}
-    flat_pairs = _by_iso(reader.flat(paths, means) for paths in flat_paths)
+    flat_pairs = _by_iso(
+        reader.flat(paths, means) for paths in counted(flat_paths, "reading flats", "pairs")
+    )
     for at in dark_pairs:
         count = len(flat_pairs.get(at, ()))
         if count < LEAST_FLATS:

@@ -8,6 +8,7 @@ from camkit.bundle.facts import StatedLaw
 from camkit.bundle.manifest import LIGHT_VERSION, Manifest
 from camkit.bundle.reader import Bundle
 from camkit.errors import ParityError
+from camkit.progress import counted
 from camkit.runtime.kind import part_of
 from camkit.runtime.proof.laws.law import Law, Laws
 
@@ -36,7 +37,7 @@ def measure_laws(bundle: Bundle, *, threads: int = 1) -> Found:
     module = import_module(part_of(bundle.manifest).laws)
     laws = cast("Laws", module.LAWS)
     found: dict[str | None, tuple[Law, ...]] = {}
-    for size in bundle.manifest.sizes or (None,):
+    for size in counted(bundle.manifest.sizes or (None,), "measuring laws", "sizes"):
         made = laws(bundle, size, threads)
         if isinstance(made, str):
             return made

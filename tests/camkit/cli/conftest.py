@@ -23,8 +23,9 @@ Command = Callable[..., Outcome]
 
 
 @pytest.fixture
-def camkit_command(capsys: pytest.CaptureFixture[str]) -> Command:
-    """Run one command line."""
+def camkit_command(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Command:
+    """Run one command line, which shows no progress however slow the machine is."""
+    monkeypatch.setattr("camkit.cli.progress.SILENT_S", 1e6)
 
     def call(*arguments: object) -> Outcome:
         capsys.readouterr()

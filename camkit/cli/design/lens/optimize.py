@@ -9,6 +9,7 @@ import typer
 from camkit.cli.choices import Debug, GlassFiles, Json, Overwrite
 from camkit.cli.say import say
 from camkit.errors import ContractError
+from camkit.progress import working
 
 if TYPE_CHECKING:
     from camkit.models_def.optics.prescription import Lens
@@ -62,7 +63,8 @@ def optimize(
     problem = _problem(lens, vary, merit=merit, core_mm=core_um / 1000, rays=rays)
     begin = problem.free.scaled()
     problem = in_own_frame(problem, begin)
-    found = improve(problem, begin, starts=starts, spread=spread, steps=steps, seed=seed)
+    with working(f"improving {lens.name}"):
+        found = improve(problem, begin, starts=starts, spread=spread, steps=steps, seed=seed)
     better = problem.free.made(found.scaled)
     write_lens(better, out)
     notes = [

@@ -1,7 +1,6 @@
 """`camkit lens peak`: how much light lies near the peak of a point, and how far haze reaches."""
 
 import json
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -9,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from camkit.cli.choices import Debug, GlassFiles, Json
-from camkit.cli.say import say, say_over
+from camkit.cli.say import say
+from camkit.progress import working
 
 if TYPE_CHECKING:
     from camkit.models_def.optics.prescription import Lens
@@ -70,16 +70,12 @@ def measured(
 
     fields = between(field_angles_rad)
     chosen = sorted({0, len(fields) // 2, len(fields) - 1}) if waves else []
-    found = report_peaks(
-        lens,
-        fields,
-        pitch_um,
-        wave_fields_rad=[fields[i] for i in chosen],
-        progress=_progress,
-    )
+    with working("measuring peaks", unit="peaks", is_even=not waves) as task:
+        found = report_peaks(
+            lens,
+            fields,
+            pitch_um,
+            wave_fields_rad=[fields[i] for i in chosen],
+            progress=task.count,
+        )
     return to_json(found)
-
-
-def _progress(done: int, total: int) -> None:
-    if sys.stderr.isatty():
-        say_over(f"{done} of {total} peaks", last=done == total)

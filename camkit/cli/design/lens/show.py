@@ -8,6 +8,7 @@ import typer
 
 from camkit.cli.choices import Debug, GlassFiles, Json, Overwrite
 from camkit.cli.say import say
+from camkit.progress import working
 
 
 def show(
@@ -49,8 +50,10 @@ def show(
     if folder is not None:
         refuse_existing([page_path(folder, file.stem)], overwrite=overwrite)
     lens, notes = read_noted_lens(file, [read_agf(path) for path in glass or ()])
-    facts = analyse(lens, chosen, notes)
-    written = [] if folder is None else write_lens_page(facts, folder, file.stem)
+    with working(f"measuring {lens.name}"):
+        facts = analyse(lens, chosen, notes)
+    with working("drawing the page"):
+        written = [] if folder is None else write_lens_page(facts, folder, file.stem)
     if json_:
         say(json.dumps(to_json(facts), allow_nan=False))
         return

@@ -10,6 +10,7 @@ import typer
 from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.cli.design.lens.peak import PitchUm, ToolRadiusUm, WithWaves, measured
 from camkit.cli.say import say
+from camkit.progress import working
 
 
 def thin(
@@ -46,8 +47,9 @@ def thin(
     ready_for_lens(out)
     wanted = find_thin_recipe(recipe)
     began = time.process_time()
-    solved = solve_plate(wanted)
-    lens = plate_lens(wanted, solved)
+    with working("solving the plate"):
+        solved = solve_plate(wanted)
+        lens = plate_lens(wanted, solved)
     if tool_radius_um is not None:
         lens = with_tool(lens, tool_radius_um)
     seconds = time.process_time() - began

@@ -1,15 +1,15 @@
 """`camkit lens tolerance`: what fabrication costs, and what to tighten first."""
 
 import json
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from camkit.cli.choices import Debug, GlassFiles, Json, Overwrite
-from camkit.cli.say import say, say_over
+from camkit.cli.say import say
 from camkit.errors import ContractError
+from camkit.progress import working
 
 if TYPE_CHECKING:
     from camkit.models_def.optics.tolerance.errors import Tolerances
@@ -65,7 +65,8 @@ def tolerance(
     run = ToleranceRun(
         copies=samples, seed=seed, pictures=data, pitch_um=pitch_um, noise=noise, rays=rays
     )
-    result = run_tolerance(lens, _tolerances(file, errors), run, _progress)
+    with working("judging copies", unit="copies") as task:
+        result = run_tolerance(lens, _tolerances(file, errors), run, task.count)
     written = () if folder is None else write_tolerance(result, folder, file.stem)
     if json_:
         say(json.dumps(to_json(result), allow_nan=False))
@@ -86,8 +87,3 @@ def _tolerances(file: Path, errors: Path | None) -> "Tolerances":
         return found
     own = read_tolerances(file) if file.suffix.lower() == ".toml" else None
     return own or Tolerances()
-
-
-def _progress(done: int, total: int) -> None:
-    if sys.stderr.isatty():
-        say_over(f"{done} of {total} copies", last=done == total)

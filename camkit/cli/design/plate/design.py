@@ -10,6 +10,7 @@ import typer
 from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.cli.say import say
 from camkit.errors import ContractError
+from camkit.progress import left_text, working
 
 if TYPE_CHECKING:
     from camkit.models_def.design.plate.loop import Moment
@@ -56,8 +57,12 @@ def design(
             overwrite=overwrite,
         ),
     )
-    for moment in run.go():
-        say(_line(moment), err=True)
+    total = run.recipe.schedule.steps
+    with working(f"designing {run.recipe.name}", total, unit="steps", writes_lines=True) as task:
+        task.begin(run.loop.step)
+        for moment in run.go():
+            task.count(moment.step)
+            say(_line(moment) + left_text(task), err=True)
     report = run.finish()
     say(json.dumps(report) if json_ else _text(report))
 

@@ -9,6 +9,7 @@ import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.cli.say import say
+from camkit.progress import working
 
 _SUM_TOLERANCE = 1e-4
 _POOR = 0.999
@@ -48,7 +49,8 @@ def match(
     target = to_target(given)
     refuse_existing(older_files(out_dir), overwrite=overwrite)
     began = time.process_time()
-    found = match_dots(target, camera, levels, np.random.default_rng(seed))
+    with working(f"matching {psf}"):
+        found = match_dots(target, camera, levels, np.random.default_rng(seed))
     cpu_seconds = time.process_time() - began
     told = write_dots(found, target, out_dir)
     told |= {"cpu_seconds": round(cpu_seconds, 2), "notes": _notes(float(given.sum()), told)}

@@ -11,6 +11,7 @@ from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.cli.design.plate.sensor import recipe_sensor
 from camkit.cli.say import say
 from camkit.errors import ContractError
+from camkit.progress import working
 from camkit.units import MM_PER_M
 
 
@@ -53,8 +54,10 @@ def show(
         refuse_existing([page_path(folder, plate.stem)], overwrite=overwrite)
     depth_mm = None if depth_m is None else math.inf if math.isinf(depth_m) else depth_m * MM_PER_M
     look = Look(sensor=recipe_sensor(recipe), depth_mm=depth_mm, side_px=side_px)
-    facts = analyse(read_plate(plate), look)
-    written = [] if folder is None else write_plate_page(facts, folder, plate.stem)
+    with working(f"measuring {plate}"):
+        facts = analyse(read_plate(plate), look)
+    with working("drawing the page"):
+        written = [] if folder is None else write_plate_page(facts, folder, plate.stem)
     if json_:
         say(json.dumps(to_json(facts), allow_nan=False))
         return

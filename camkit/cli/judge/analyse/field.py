@@ -6,9 +6,10 @@ from typing import Annotated
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
-from camkit.cli.judge.analyse.outputs import deliver, tell
+from camkit.cli.judge.analyse.outputs import deliver
 from camkit.cli.use.calibrate.outputs import Page, check_page
 from camkit.errors import ContractError
+from camkit.progress import working
 
 
 def field(
@@ -70,7 +71,11 @@ def field(
         pictures=() if data is None else tuple(map(read_picture, list_set(data, pictures or 1))),
         frame_px=frame_px,
     )
-    found = [measure_field(subject, options, tell) for subject in subjects]
+    with working("measuring", len(subjects), unit="lenses") as task:
+        found = []
+        for number, subject in enumerate(subjects):
+            task.count(number)
+            found.append(measure_field(subject, options, task.tell))
 
     def html() -> str:
         from camkit.report.analysis.field_page import field_html

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
-from camkit.cli.judge.analyse.outputs import deliver, tell
+from camkit.cli.judge.analyse.outputs import deliver
 from camkit.cli.use.calibrate.outputs import Page, check_page
 from camkit.errors import ContractError
 
@@ -47,7 +47,7 @@ def hallucination(
 
     options = _options(iso, patch_px, sizes, vgg)
     bundle = open_bundle(find_bundle(name))
-    report = analyse(bundle, stress_scenes(bundle, pictures, data), options, tell)
+    report = analyse(bundle, stress_scenes(bundle, pictures, data), options)
     files = [] if crops is None else _write_crops(report, crops)
 
     def html() -> str:

@@ -1,7 +1,6 @@
 """What a command of `camkit analyse` leaves: a page if one is asked for, and what is said."""
 
 import json
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -34,9 +33,3 @@ def deliver(
             part.write_text(html(), encoding="utf-8")
         told = {**told, "page": str(page)}
     say(json.dumps(told, allow_nan=False) if as_json else text(told))
-
-
-def tell(line: str) -> None:
-    """Say on stderr what is being done, where a person sees it."""
-    if sys.stderr.isatty():
-        say(line, err=True)

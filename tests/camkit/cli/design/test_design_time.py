@@ -9,6 +9,7 @@ import pytest
 
 from camkit.cli.choices import INSTALLED_BY
 from camkit.cli.exit_code import ExitCode
+from camkit.stopwatch import Stopwatch
 
 RECIPE = Path(__file__).resolve().parents[4] / "models_def" / "recipes" / "duet.toml"
 COMMANDS = {
@@ -59,9 +60,14 @@ def test_train_hands_every_option_on(camkit_command, tmp_path, monkeypatch) -> N
     seen = []
 
     def fake(
-        recipe: Path, options: trainer.TrainOptions, *, refinement: Refinement | None
+        recipe: Path,
+        options: trainer.TrainOptions,
+        *,
+        refinement: Refinement | None,
+        stopwatch: Stopwatch,
     ) -> trainer.TrainResult:
         assert refinement is None
+        assert stopwatch.cpu_s() > 0, "budgets count from the start of the command"
         seen.append((recipe, options))
         return trainer.TrainResult(
             checkpoint=options.out_dir / "x.pt",

@@ -40,6 +40,7 @@ def test_frames_are_prepared_once(
     _write_optics(tmp_path)
     frozen = (hazy_optics(0.48), hazy_optics(0.5), hazy_optics(0.52))
     monkeypatch.setattr(bayer, "freeze_copies", lambda *_: frozen)
+    monkeypatch.setattr("camkit.cli.progress.SILENT_S", 0.0)
     words = ("prepare", _recipe(tmp_path, SMALL), "--out-dir", tmp_path, "--json")
     outcome = camkit_command(*words)
     assert outcome.code == 0, outcome.err

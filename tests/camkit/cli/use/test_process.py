@@ -230,9 +230,12 @@ def test_on_a_terminal_progress_goes_to_stderr_and_results_stay_on_stdout(
 ) -> None:
     terminal = _Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
+    monkeypatch.setattr("camkit.cli.progress.SILENT_S", 0.0)
+    monkeypatch.setattr("camkit.cli.progress.REDRAW_S", 0.001)
     outcome = camkit_command("process", "*.dng", "--bundle", "tiny.camkit", "--json")
     assert [json.loads(line)["status"] for line in outcome.out.splitlines()] == ["ok", "ok"]
-    assert "a.dng" in terminal.getvalue()
+    assert "\r\x1b[Kcamkit process: making" in terminal.getvalue()
+    assert terminal.getvalue().endswith("\r\x1b[K"), "nothing of it stays"
     assert "status" not in terminal.getvalue()
 
 
