@@ -5,6 +5,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from functools import cache
 from numbers import Integral, Real
+from os import PathLike
+from pathlib import Path
 from typing import Any, Final, Literal, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -18,6 +20,8 @@ _PLAIN: Final[dict[Any, tuple[tuple[type, ...], str]]] = {
     float: ((Real,), "a number"),
     str: ((str,), "a text"),
     type(None): ((type(None),), "None"),
+    Path: ((Path,), "a path"),
+    PathLike: ((PathLike,), "a path"),
 }
 """Annotation -> what may stand for it, and its name for people. A truth value is no number."""
 

@@ -1,5 +1,6 @@
 """What a caller may choose about a reconstruction, checked once."""
 
+import difflib
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, fields, replace
 from operator import index
@@ -184,11 +185,13 @@ def check_names(choices: Mapping[str, object], known: Set[str]) -> None:
     """Refuse names that are no options.
 
     Raises:
-        ContractError: Names them and those there are.
+        ContractError: Names them, and near names or all there are.
     """
     if unknown := sorted(set(choices) - known):
+        near = {n for name in unknown for n in difflib.get_close_matches(name, known, n=2)}
+        hint = f"did you mean {' or '.join(sorted(near))}? " if near else ""
         raise ContractError(
-            f"unknown option(s) {', '.join(unknown)}; known are {', '.join(sorted(known))}"
+            f"unknown option(s) {', '.join(unknown)}; {hint}known are {', '.join(sorted(known))}"
         )
 
 

@@ -83,9 +83,12 @@ def list_tasks(
     folders = _folders(sources, write)
     made = options or Options()
     makers = [runtime_part((kind or kind_without_bundle(s, made)).name).maker for s in sources]
+    outputs = [_outputs(s, m, made, write) for s, m in zip(sources, makers, strict=True)]
+    if outputs and all(isinstance(names, ContractError) for names in outputs):
+        raise next(names for names in outputs if isinstance(names, ContractError))
     tasks = [
-        _make_task(source, bundle, folder, maker, _names(source, maker, made, write))
-        for source, folder, maker in zip(sources, folders, makers, strict=True)
+        _make_task(source, bundle, folder, maker, names)
+        for source, folder, maker, names in zip(sources, folders, makers, outputs, strict=True)
     ]
     sound = [t for t in tasks if t.refusal is None]
     if writes:
@@ -120,26 +123,35 @@ def _folders(sources: Sequence[Path], write: WriteOptions) -> list[Path]:
     return [write.out_dir / parent.relative_to(common) for parent in parents]
 
 
-def _names(
+def _outputs(
     source: Path, maker: Maker | None, options: Options, write: WriteOptions
-) -> tuple[str, ...]:
-    """Name the files of an input, the main one first."""
+) -> tuple[str, ...] | ContractError:
+    """Name the files of an input, the main one first; or return why it cannot be written so."""
     if maker is None:
         name = f"{source.stem}{write.suffix}"
         return (name, preview_path(Path(name)).name) if write.preview else (name,)
     if write.preview:
-        raise ContractError(
+        return ContractError(
             f"{option_text('preview')} is for photographs; {source.name} becomes products, which "
             f"have pictures as {option_text('format')}: leave it out"
         )
-    return maker.names(source, options, write.format)
+    try:
+        return maker.names(source, options, write.format)
+    except ContractError as error:
+        return error
 
 
 def _make_task(
-    source: Path, bundle: str | None, folder: Path, maker: Maker | None, names: tuple[str, ...]
+    source: Path,
+    bundle: str | None,
+    folder: Path,
+    maker: Maker | None,
+    names: tuple[str, ...] | ContractError,
 ) -> Task:
-    target, *beside = (folder / name for name in names)
     refusal = refusal_of(source)
+    if isinstance(names, ContractError):
+        names, refusal = (source.stem,), refusal or f"{source}: {names}"
+    target, *beside = (folder / name for name in names)
     chosen = bundle
     if chosen is None and refusal is None:
         try:

@@ -32,6 +32,7 @@ _LEAST_VARIANCE: Final = 1e-14
 _LEAST_CERTAINTY: Final = 1e-3
 _EXPOSURE_ROUNDS: Final = 2
 _SAME_FACTOR: Final = 0.005
+_NAMED_FRAMES: Final = 3
 _NOTED_FACTOR: Final = 0.02
 
 DarkRows = Callable[[Frame, int, int], tuple[FloatArray, BoolArray]]
@@ -116,11 +117,19 @@ def _estimated(codes: NDArray[np.uint8], times_s: NDArray[np.float64]) -> Respon
 
 
 def _exposure_note(survey: Survey, response: Response) -> str:
-    pairs = zip(survey.frames, response.factors, strict=False)
-    told = [f"{f.path.name} {x:.2f}" for f, x in pairs if abs(x - 1) > _NOTED_FACTOR]
-    if not told:
+    pairs = list(zip(survey.frames, response.factors, strict=False))
+    off = sorted(
+        ((f.path.name, x) for f, x in pairs if abs(x - 1) > _NOTED_FACTOR),
+        key=lambda pair: -abs(np.log(pair[1])),
+    )
+    if not off:
         return ""
-    return f"frames differ from their stated times, by what all agree on: {', '.join(told)} times"
+    named = ", ".join(f"{name} {factor:.2f} times" for name, factor in off[:_NAMED_FRAMES])
+    more = f", {len(off) - _NAMED_FRAMES} more by less" if len(off) > _NAMED_FRAMES else ""
+    return (
+        "exposures differ from the stated times (the brightness of all frames together tells it) "
+        f"and were corrected: {named}{more}"
+    )
 
 
 def merge(survey: Survey, response: Response | None, dark: DarkRows | None = None) -> Merged:

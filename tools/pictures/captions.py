@@ -16,7 +16,6 @@ JPEG: Final = (
     *(cv2.IMWRITE_JPEG_QUALITY, 90),
     *(cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444),
 )
-"""What OpenCV is told of a JPEG: colours as fine as brightness."""
 LEAST_TEXT_PX: Final = 12
 TEXT_SHARE: Final = 1 / 24
 """Size of the text as a share of a picture's width: 16 px over pictures of 384 px."""
@@ -54,7 +53,16 @@ def write_captioned(path: Path, heading: str, rows: Mapping[str, Mapping[str, Fl
     for left, upper, picture in tiles:
         pixels = (np.clip(picture, 0, 1) * 255 + 0.5).astype(np.uint8).transpose(1, 2, 0)
         page[upper : upper + height, left : left + width] = pixels[..., ::-1]
-    if not cv2.imwrite(str(path), page, JPEG):
+    write_pixels(path, page)
+
+
+def write_pixels(path: Path, pixels: NDArray[np.uint8]) -> None:
+    """Write (h, w, 3) BGR as PNG, or as JPEG with colours as fine as brightness.
+
+    Raises:
+        OSError: If the file cannot be written.
+    """
+    if not cv2.imwrite(str(path), pixels, JPEG if path.suffix == ".jpg" else ()):
         raise OSError(f"cannot write {path}")
 
 

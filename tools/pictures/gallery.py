@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 from camkit.contracts import FloatArray
-from tools.pictures.captions import JPEG, write_captioned
+from tools.pictures.captions import write_captioned, write_pixels
 from tools.pictures.front import write_front
 from tools.pictures.views import VIEWS, View
 
@@ -60,8 +60,7 @@ def _write_small(out_dir: Path, name: str, view: View) -> Path:
     gap = np.ones((3, taken.shape[1], GAP_PX), np.float32)
     page = np.clip(np.concatenate([taken, gap, restored], axis=2), 0, 1)
     pixels = (page * 255 + 0.5).astype(np.uint8).transpose(1, 2, 0)[..., ::-1]
-    if not cv2.imwrite(str(path), pixels, JPEG):
-        raise OSError(f"cannot write {path}")
+    write_pixels(path, pixels)
     return path
 
 

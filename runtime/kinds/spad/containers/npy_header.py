@@ -33,4 +33,4 @@ def read_header(start: io.BytesIO, what: str) -> Header:
             warnings.simplefilter("ignore")  # headers of Python 2 are read as well
             return read(start)
     except BROKEN_HEADER as error:
-        raise DecodeError(f"{what} is no array: its header is damaged: {error}") from error
+        raise DecodeError(f"{what} is no array: its header is damaged") from error

@@ -37,9 +37,11 @@ def chosen_places(
     if not is_known:
         several = {name: known for name, known in numbers.items() if len(known) > 1} or numbers
         listed = "; ".join(_listed(n, k, is_summed=n == summed) for n, k in several.items())
+        asked = "" if key is None else f", and no {key!r}"
+        first = ", ".join(f"{name} {known[0]}" for name, known in several.items())
         raise ContractError(
-            f"{path.name} holds {listed}; say which by [array] key in a file for "
-            f"{option_text('timing')}"
+            f"{path.name} holds {listed}{asked}; choose in the file of {option_text('timing')}: "
+            f'under [array] the line key = "{first}"'
         )
     return {
         name: ALL if found[name] == ALL else list(known).index(found[name])
