@@ -4,7 +4,7 @@
     judge     what a camera and this machine are worth: check, stress, bench, doctor
     design    a camera made at design time (torch): design, freeze, train, export, lens ...
 
-`app` joins the commands and turns errors into one line and an exit code (`exit_code`). `choices`
+`groups` are those of the help. `app` joins the commands and turns errors into one line and an exit code (`exit_code`). `choices`
 are options that several commands share. A new command is a file in the folder of its task and a
 line in `app`.
 """

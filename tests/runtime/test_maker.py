@@ -226,7 +226,7 @@ def test_the_command_line_has_the_options_of_the_kind(
     refused = camkit_run("process", *common, "--sign", "both", "--overwrite")
     assert refused.returncode == 2
     assert "sign must be one of plus, minus" in refused.stderr
-    assert "counting: Which counts. plus, minus." in " ".join(
+    assert "Which counts (counting: plus, minus)." in " ".join(
         camkit_run("process", "--help").stdout.replace("│", " ").split()
     )
 
