@@ -4,9 +4,9 @@
     judge     what a camera and this machine are worth: check, stress, bench, doctor
     design    a camera made at design time (torch): design, freeze, train, export, lens ...
 
-`groups` are those of the help. `app` joins the commands and turns errors into one line and an exit code (`exit_code`). `choices`
-are options that several commands share. A new command is a file in the folder of its task and a
-line in `app`.
+`app` joins the commands, in the groups of the help (`groups`), and turns errors into one line and
+an exit code (`exit_code`). `choices` are options that several commands share. A new command is a
+file in the folder of its task and a line in `app`.
 """
 
 import os

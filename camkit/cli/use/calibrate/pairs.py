@@ -23,7 +23,7 @@ def pairs(
     captures: Annotated[
         list[Path],
         typer.Argument(
-            help="Linear captures of the screen or their folders; the --targets folder may come last.",
+            help="Linear captures of the screen, or folders; the --targets folder may come last.",
         ),
     ],
     geometry: Annotated[
