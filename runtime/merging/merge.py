@@ -77,7 +77,7 @@ def choose_response(survey: Survey, wanted: ResponseName | None) -> tuple[Respon
         )
     if wanted == "estimate" and codes is None:
         raise ContractError(
-            f"a response is estimated from 8-bit pictures; say {option_text('response', 'srgb')}"
+            f"a response is estimated from 8-bit pictures; use {option_text('response', 'srgb')}"
         )
     if wanted == "linear" or (wanted is None and codes is None):
         return None, ""
@@ -87,16 +87,19 @@ def choose_response(survey: Survey, wanted: ResponseName | None) -> tuple[Respon
     known = known_curve(codes, survey.times_s)
     if known is not None:
         curve, name = known
-        return curve, f"{name} explains the frames to within the rounding of their codes"
+        return curve, f"the response {name} fits the frames to within rounding"
     try:
         found = _estimated(codes, survey.times_s)
     except DecodeError:
         if wanted == "estimate":
             raise
-        return plain, "too little is unclipped in two frames to estimate a response: sRGB is taken"
+        return (
+            plain,
+            "too few pixels are unclipped in two frames to estimate a response: sRGB is used",
+        )
     misses = [disagreement(codes, survey.times_s, r) for r in (found, plain)]
     if wanted is None and misses[0] >= misses[1]:
-        return plain, "sRGB explains the frames as well as an estimate: sRGB is taken"
+        return plain, "sRGB fits the frames as well as an estimate: sRGB is used"
     return found, _exposure_note(survey, found)
 
 
@@ -117,7 +120,7 @@ def _exposure_note(survey: Survey, response: Response) -> str:
     told = [f"{f.path.name} {x:.2f}" for f, x in pairs if abs(x - 1) > _NOTED_FACTOR]
     if not told:
         return ""
-    return f"frames differ from their stated times, by what all agree on: {', '.join(told)} times"
+    return f"exposures differ from the stated times by the factors: {', '.join(told)}"
 
 
 def merge(survey: Survey, response: Response | None, dark: DarkRows | None = None) -> Merged:

@@ -70,7 +70,7 @@ def design(
     from camkit.models_def.design.run import DesignOptions, DesignRun
 
     if resume and overwrite:
-        raise ContractError("--resume goes on, --overwrite starts anew: give one of them")
+        raise ContractError("--resume continues, --overwrite starts again: use one of them")
     chosen = with_choices(
         read_design(recipe),
         steps=steps,

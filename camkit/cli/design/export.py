@@ -75,7 +75,7 @@ def export(
     frozen = psf or _beside(folder, PSF_NAME)
     if frozen is None:
         raise ContractError(
-            f"there is no {folder / PSF_NAME}; make it with `camkit freeze`, or say --psf"
+            f"there is no {folder / PSF_NAME}; make it with `camkit freeze`, or add --psf"
         )
     stress = stress_psf or _beside(folder, STRESS_NAME)
     beside = None if stress is None else _beside(stress.parent, STRESS_HAZE_NAME)

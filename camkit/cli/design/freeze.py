@@ -147,7 +147,9 @@ def freeze(
     sensor, bank = _camera_of(recipe)
     found = read_optics(optics)
     if (stress_haze is None) != (haze is None or stress_out is None):
-        raise ContractError("of a lens with a haze, --stress-out and --stress-haze go together")
+        raise ContractError(
+            "with --haze, --stress-out and --stress-haze go together; else omit --stress-haze"
+        )
     if haze is not None:
         chosen = {
             "--depths-mm": depths_mm is not None,
@@ -157,7 +159,7 @@ def freeze(
             "--focus-um": focus_um is not None,
         }
         if named := [name for name, said in chosen.items() if said]:
-            raise ContractError(f"with --haze nothing is chosen; leave {', '.join(named)} out")
+            raise ContractError(f"--haze conflicts with {', '.join(named)}")
         stress = None if stress_out is None or stress_haze is None else (stress_out, stress_haze)
         told = _freeze_hazy(found, (out, haze), stress, sensor)
         _report(told, report, json_)
@@ -206,7 +208,7 @@ def _freeze_hazy(
     from camkit.models_def.optics.thin.nearer import freeze_distances
 
     if not isinstance(optics, LensOptics):
-        raise UnsupportedError("only a lens is frozen as core and haze; leave --haze out")
+        raise UnsupportedError("--haze is for lenses only; leave it out")
     frozen, report = freeze_hazy(optics.lens, sensor, tell=_tell)
     told = report.to_json()
     if stress is not None:

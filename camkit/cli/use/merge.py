@@ -77,7 +77,7 @@ def merge(
     previews = [preview_path(path) if preview else None for path in outs]
     for path in (*outs, *filter(None, previews)):
         if path.exists() and not overwrite:
-            raise ContractError(f"{path} exists; say --overwrite or another name")
+            raise ContractError(f"{path} exists; add --overwrite or choose another name")
     failed = False
     for bracket, path, shown in zip(brackets, outs, previews, strict=True):
         try:

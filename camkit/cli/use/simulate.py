@@ -104,7 +104,7 @@ def simulate(
         raise ContractError("--saturate finds the exposure: leave --exposure out")
     for path in filter(None, (out, truth)):
         if path.exists() and not overwrite:
-            raise ContractError(f"{path} exists; say --overwrite or another name")
+            raise ContractError(f"{path} exists; add --overwrite or choose another name")
     opened = open_bundle(find_bundle(bundle))
     part, sensor = part_of(opened.manifest), opened.manifest.sensor
     counted = light_of(photons, sbr, seed, opened)

@@ -91,11 +91,12 @@ def color_matrix(tags: TiffTags) -> tuple[Matrix, str | None] | None:
     one = min(found, key=lambda each: abs(each.kelvin - _D65_KELVIN))
     if abs(np.linalg.det(one.matrix)) < 1e-9:
         return None
-    source = (
-        f"EXIF light source {one.light}" if one.light else "a light that the file does not state"
-    )
+    source = f"EXIF light source {one.light}" if one.light else "an unknown light source"
     is_d65 = one.kelvin == _D65_KELVIN
-    return one.matrix, None if is_d65 else f"colour matrix is for {source}, not D65"
+    return (
+        one.matrix,
+        None if is_d65 else f"the colour matrix is for {source}, not D65: colours may be off",
+    )
 
 
 def neutral(tags: TiffTags) -> NDArray[np.float64] | None:

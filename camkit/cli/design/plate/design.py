@@ -51,7 +51,7 @@ def design(
     from camkit.models_def.design.plate.run import PlateRun, PlateRunOptions
 
     if resume and overwrite:
-        raise ContractError("--resume goes on, --overwrite starts anew: give one of them")
+        raise ContractError("--resume continues, --overwrite starts again: use one of them")
     if minutes is not None and not minutes > 0:
         raise ContractError(f"--minutes must be > 0; got {minutes:g}")
     run = PlateRun(

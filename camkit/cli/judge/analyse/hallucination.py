@@ -93,7 +93,7 @@ def _check_crops(folder: Path, *, overwrite: bool) -> None:
     if folder.exists() and not folder.is_dir():
         raise ContractError(f"--crops is a folder; {folder} is a file")
     if folder.exists() and not overwrite:
-        raise ContractError(f"{folder} exists; say --overwrite or another name")
+        raise ContractError(f"{folder} exists; add --overwrite or choose another name")
 
 
 def _write_crops(report: "Report", folder: Path) -> list[str]:

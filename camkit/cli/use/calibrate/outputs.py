@@ -126,4 +126,4 @@ def named(out: Path | str, page: Path | str | None) -> str:
 
 def _check_free(path: Path, *, overwrite: bool) -> None:
     if path.exists() and not overwrite:
-        raise ContractError(f"{path} exists; say --overwrite or another name")
+        raise ContractError(f"{path} exists; add --overwrite or choose another name")

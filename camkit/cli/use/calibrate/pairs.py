@@ -100,7 +100,7 @@ def _apart(named: list[Path], targets: Path | None) -> tuple[list[Path], Path]:
     if targets is None:
         *named, targets = named
         if not targets.is_dir():
-            raise ContractError("say what was shown: --targets DIR, or its folder after the files")
+            raise ContractError("add --targets DIR, or its folder after the files")
     inside = [expand([path]) if path.is_dir() else [path] for path in named]
     shots = [path for paths in inside for path in paths]
     if not shots:

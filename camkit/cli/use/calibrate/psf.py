@@ -73,7 +73,7 @@ def psf(
     if out.suffix.lower() != ".safetensors":
         raise ContractError(f"a PSF is safetensors; expected a name in .safetensors, got {out}")
     if out.exists() and not overwrite:
-        raise ContractError(f"{out} exists; say --overwrite or another name")
+        raise ContractError(f"{out} exists; add --overwrite or choose another name")
     check_page(page, overwrite=overwrite)
     _check_target(disc_px, dots, edge=edge)
     from camkit.bundle.psf_file import psf_to_bytes, read_psf
@@ -117,7 +117,7 @@ def _check_target(disc_px: float | None, dots: Path | None, *, edge: bool) -> No
     named = {"--disc-px": disc_px is not None, "--edge": edge, "--dots": dots is not None}
     said = [name for name, is_said in named.items() if is_said]
     if len(said) > 1:
-        raise ContractError(f"the light is one thing; say one of {' and '.join(said)}")
+        raise ContractError(f"the light is one thing; use one of {' and '.join(said)}")
 
 
 def _times(

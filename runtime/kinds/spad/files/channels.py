@@ -38,7 +38,7 @@ def chosen_places(
         several = {name: known for name, known in numbers.items() if len(known) > 1} or numbers
         listed = "; ".join(_listed(n, k, is_summed=n == summed) for n, k in several.items())
         raise ContractError(
-            f"{path.name} holds {listed}; say which by [array] key in a file for "
+            f"{path.name} holds {listed}; choose one by [array] key in a file for "
             f"{option_text('timing')}"
         )
     return {
