@@ -206,7 +206,7 @@ def test_a_disc_becomes_a_psf_a_page_and_one_object(camkit_command, tmp_path: Pa
     assert "psf.html exists" in camkit_command("calibrate", "psf", *files, *dark, *asked).err
     missing = camkit_command("calibrate", "psf", *files, *asked, "--overwrite")
     assert missing.code == ExitCode.INPUT_FAILED
-    assert "haze fills the frame" in missing.err
+    assert "veiling glare fills the frame" in missing.err
     assert len(missing.err.strip().splitlines()) == 1
     assert not out.exists()
 
