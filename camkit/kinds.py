@@ -136,19 +136,25 @@ SPAD: Final = Kind(
     file_types=(".npz", ".h5", ".hdf5", ".mat", ".ptu", ".sdt", ".zip", ".spc"),
     shared_types=(".tif", ".tiff"),
     options=(
-        KindOption(name="timing", text="TOML that says what time each bin is.", is_file=True),
+        KindOption(
+            name="timing",
+            text="File (.toml) with the time of each bin; default: as the capture states.",
+            is_file=True,
+        ),
         KindOption(
             name="product",
-            text="What to make; default: depth of histograms, intensity of counts.",
+            text="Result; default: depth or intensity.",
             choices=("depth", "intensity", "transient", "lifetime"),
         ),
         KindOption(
             name="pool",
-            text="Side of the squares whose photons are put together; default auto, as needed.",
+            text="Side in px of the squares of pooled photons; default: auto.",
             choices=("auto", "1", "3", "5"),
         ),
         KindOption(
-            name="returns", text="Surfaces that a pixel may show; default 1.", choices=("1", "2")
+            name="returns",
+            text="Largest number of surfaces per pixel; default: 1.",
+            choices=("1", "2"),
         ),
     ),
 )

@@ -208,8 +208,8 @@ def _optics(parts: Parts, recipe: Recipe, design: Design) -> FrozenOptics:
     undone = any(isinstance(stage, Dehaze) for stage in design.stages)
     if undone == (parts.haze is None):
         raise ContractError(
-            f"the recipe {recipe.name} undoes a haze: make it with `camkit freeze --haze`, say "
-            f"{option_text('haze')}"
+            f"the recipe {recipe.name} removes veiling glare: make it with "
+            f"`camkit freeze --haze`, add {option_text('haze')}"
             if undone
             else f"the recipe {recipe.name} undoes no haze, but there is {parts.haze}: freeze the "
             "PSF without it, or keep the two in a folder of their own"
@@ -294,7 +294,7 @@ def _stress_members(parts: Parts, optics: FrozenOptics) -> dict[str, bytes]:
     if parts.stress_psf is None or optics.haze is None:
         raise ContractError(
             f"{parts.stress_haze} is the haze of kernels off the design point, for optics with a "
-            f"haze; say {option_text('stress_psf')} too, or keep it in a folder of its own"
+            f"haze; add {option_text('stress_psf')} too, or keep it in a folder of its own"
         )
     stress = FrozenOptics(psf=read_psf(parts.stress_psf), haze=read_haze(parts.stress_haze))
     assert stress.haze is not None

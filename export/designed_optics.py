@@ -141,5 +141,5 @@ def _check_plate(plate: Plate, psf: FrozenPsf, path: Path) -> None:
         raise ContractError(
             f"{path} was not frozen from the plate {plate.name}: {elsewhere:.1%} of the light lies "
             "elsewhere; freeze, train and export the same plate. A PSF that was measured has none: "
-            f"say {option_text('plate', 'none')}"
+            f"use {option_text('plate', 'none')}"
         )

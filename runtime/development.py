@@ -68,7 +68,7 @@ class WriteOptions:
             )
         if self.format == "jpeg" and self.linear:
             raise ContractError(
-                f"8 bits hold no linear light; say {option_text('format')} png or tiff"
+                f"8 bits hold no linear light; add {option_text('format')} png or tiff"
             )
         if self.jpeg_quality is not None and self.format != "jpeg":
             raise ContractError(f"a quality is for JPEG; leave it out for {self.picture}")

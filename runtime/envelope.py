@@ -128,12 +128,13 @@ def verdict(found: tuple[str, ...], bundle: str, on_unsafe: OnUnsafe) -> str | N
     """
     if not found:
         return None
-    text = f"outside the range in which bundle {bundle} was shown to help: {'; '.join(found)}"
+    text = f"outside the measured range of bundle {bundle}: {'; '.join(found)}"
     if on_unsafe == "fail":
         raise ContractError(
-            f"{text}; say {option_text('on_unsafe', 'warn')} or fallback, or another "
+            f"{text}; use {option_text('on_unsafe', 'warn')} or fallback, or another "
             f"{option_text('bundle')}"
         )
     if on_unsafe == "fallback":
-        return f"{text}; what came before the network is given in its place"
-    return f"{text}; {option_text('on_unsafe', 'fallback')} gives what came before the network"
+        return f"{text}; the network is left out and its input is used instead"
+    fallback = option_text("on_unsafe", "fallback")
+    return f"{text}; the network may harm the picture, and {fallback} leaves it out"

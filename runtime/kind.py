@@ -116,7 +116,7 @@ def kind_without_bundle(file: Path | None, options: Options) -> Kind:
         fitting = [k for k in all_kinds() if names <= {option.name for option in k.options}]
         if not fitting:
             raise ContractError(
-                f"no kind of camera knows all of {', '.join(sorted(names))}; choose those of one"
+                f"no kind of camera has all options {', '.join(sorted(names))}; choose those of one"
             )
         return fitting[0]
     return (None if file is None else kind_of_file(file)) or BAYER

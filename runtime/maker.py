@@ -144,7 +144,7 @@ class Maker:
             known |= self.with_bundle
         if foreign := [name for name in given_options(options) if name not in known]:
             raise ContractError(
-                f"{option_list(foreign)} means nothing to captures of the kind "
+                f"{option_list(foreign)} does not apply to captures of the kind "
                 f"{kind.name}; leave it out"
             )
         if options.method is not None and options.method not in self.methods:

@@ -238,7 +238,7 @@ def check_kind_options(options: Options, kind: Kind, where: str) -> None:
     if foreign := [name for name, _ in options.of_kind if name not in own]:
         makers = [k for k in all_kinds() if any(o.name == foreign[0] for o in k.options)]
         raise ContractError(
-            f"{option_list(foreign)} means nothing {where}: it is for cameras of the "
+            f"{option_list(foreign)} does not apply {where}: it is for cameras of the "
             f"kind {makers[0].name}; leave it out"
         )
 

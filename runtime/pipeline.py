@@ -350,7 +350,7 @@ class Pipeline:
         given = {"mosaic": mosaic, "origin_px": origin_px}
         if said := [name for name, value in given.items() if value is not None]:
             raise ContractError(
-                f"{option_list(said)} means nothing to captures of the kind {self.kind.name}; "
+                f"{option_list(said)} does not apply to captures of the kind {self.kind.name}; "
                 "leave it out"
             )
         with cancellable(cancel), stored(file) as path:
@@ -535,7 +535,7 @@ def _engine(
     if size not in sizes:
         raise ContractError(
             f"bundle {bundle.manifest.name} holds size(s) {', '.join(sorted(sizes))}; "
-            f"asked for {size}; say {option_text('size', min(sizes))}"
+            f"asked for {size}; use {option_text('size', min(sizes))}"
             if sizes
             else f"bundle {bundle.manifest.name} holds no network; use method wiener"
         )

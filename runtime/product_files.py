@@ -82,6 +82,6 @@ def _check_free(source: Path, paths: list[Path], write: WriteOptions) -> None:
             )
         if path.exists() and not (write.overwrite or write.resume):
             raise ContractError(
-                f"{path} exists; say {option_text('overwrite')}, or another "
+                f"{path} exists; add {option_text('overwrite')}, or another "
                 f"{option_text('out_dir')}"
             )

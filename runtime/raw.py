@@ -169,7 +169,7 @@ def _read_picture(path: Path, mosaic: MosaicOptions | None, *, keep_codes: bool)
         return read_picture(path, keep_codes=keep_codes)
     if mosaic.cfa is None:
         raise ContractError(
-            f"{path.name} is a picture, levels are for RAW files; say {option_text('cfa')} too if "
+            f"{path.name} is a picture, levels are for RAW files; add {option_text('cfa')} too if "
             "it is a headerless mosaic"
         )
     return read_mosaic(path, mosaic)

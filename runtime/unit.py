@@ -93,7 +93,7 @@ class Unit:
         if PRESCRIPTION not in bundle.names:
             raise ContractError(
                 f"the unit {self.name} is of a lens, and bundle {bundle.manifest.name} does not "
-                "say which lens it has; measure the unit with the bundle itself"
+                "state which lens it has; measure the unit with the bundle itself"
             )
         found = lens_hash(bundle.member(PRESCRIPTION))
         if found != self.lens_sha256:
@@ -148,7 +148,7 @@ def _identity(table: Mapping[str, Any], path: Path) -> dict[str, str]:
     given = {key: table[key] for key in _HASHES if key in table}
     if len(given) != 1:
         raise ContractError(
-            f"{path}: one of {' and '.join(_HASHES)} must say what the unit belongs to; got "
+            f"{path}: one of {' and '.join(_HASHES)} must state what the unit belongs to; got "
             f"{' and '.join(given) or 'none'}"
         )
     for key, digest in given.items():

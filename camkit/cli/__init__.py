@@ -4,10 +4,10 @@
     judge     what a camera and this machine are worth: check, stress, bench, doctor
     design    a camera made at design time (torch): design, freeze, train, export, lens ...
 
-`app` joins the commands and turns errors into one line and an exit code (`exit_code`). `choices`
-are options that several commands share. `progress` shows what long work counts, `say` is the one
-way to a terminal. A new command is a file in the folder of its task and a
-line in `app`.
+`app` joins the commands, in the groups of the help (`groups`), and turns errors into one line and
+an exit code (`exit_code`). `choices` are options that several commands share. `progress` shows what
+long work counts, `say` is the one way to a terminal. A new command is a file in the folder of its
+task and a line in `app`.
 """
 
 import os

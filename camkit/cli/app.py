@@ -20,6 +20,7 @@ from camkit.cli.design.plate.app import plate_app
 from camkit.cli.design.prepare import prepare
 from camkit.cli.design.train import train
 from camkit.cli.exit_code import ExitCode, exit_code_of
+from camkit.cli.groups import JUDGE, MAKE, MEASURE, USE, add_application, add_command
 from camkit.cli.interrupts import none_is_lost
 from camkit.cli.judge.analyse.app import analyse_app
 from camkit.cli.judge.bench import bench
@@ -41,33 +42,31 @@ DEBUG_FLAG = "--debug"
 
 app = typer.Typer(
     name="camkit",
-    help="Computational cameras from design to daily use.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (
-    process,
-    plan,
-    info,
-    check,
-    simulate,
-    merge,
-    stress,
-    doctor,
-    bench,
-    design,
-    freeze,
-    prepare,
-    train,
-    fit_bank,
-    freeze_norms,
-    export,
-):
-    app.command()(command)
-GROUPS = (analyse_app, lens_app, calibrate_app, plate_app)
-for group in GROUPS:
-    app.add_typer(group)
+GROUPS = (analyse_app, lens_app, plate_app, calibrate_app)
+add_command(app, process, USE, "Restore captures to finished pictures.")
+add_command(app, plan, USE, "Preview what process would do.")
+add_command(app, simulate, USE, "Simulate captures of a scene.")
+add_command(app, merge, USE, "Merge exposures into one EXR.")
+add_command(app, info, USE, "Describe a bundle or capture.")
+add_command(app, check, JUDGE, "Verify that a bundle works.")
+add_command(app, bench, JUDGE, "Compare speed, accuracy and memory.")
+add_command(app, stress, JUDGE, "Find where a network fails.")
+add_application(app, analyse_app, JUDGE, "Measure resolution and invented detail.")
+add_command(app, doctor, JUDGE, "Examine this computer's camkit installation.")
+add_application(app, lens_app, MAKE, "Draw, improve or convert lenses.")
+add_application(app, plate_app, MAKE, "Design diffractive plates and masks.")
+add_command(app, design, MAKE, "Design lens and network together.")
+add_command(app, freeze, MAKE, "Compute the PSF of optics.")
+add_command(app, prepare, MAKE, "Prepare training with veiling glare.")
+add_command(app, train, MAKE, "Train a camera's restoration network.")
+add_command(app, fit_bank, MAKE, "Fit a joint-colour filter bank.")
+add_command(app, freeze_norms, MAKE, "Replace instance norms with constants.")
+add_command(app, export, MAKE, "Pack results into a bundle.")
+add_application(app, calibrate_app, MEASURE, "Measure a camera from photographs.")
 
 
 @app.callback(invoke_without_command=True)

@@ -10,30 +10,35 @@ from camkit.errors import ContractError
 INSTALLED_BY: Final = 'pip install -c constraints.txt -e ".[train]"'
 """What the design side needs."""
 
-Debug = Annotated[
-    bool, typer.Option("--debug", help="Show tracebacks and what the modules log on stderr.")
-]
+Debug = Annotated[bool, typer.Option("--debug", help="Show tracebacks and log messages on stderr.")]
 """Read by `camkit.cli.app.run`, which sees all arguments; commands only declare it."""
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace what is there already.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace existing output files.")]
 Quality = Annotated[
     str,
-    typer.Option(help="exact (M, skips nothing), best (largest size), adaptive or draft."),
+    typer.Option(
+        help="Quality: exact (size M), best (largest size), adaptive (as needed) or draft "
+        "(fastest)."
+    ),
 ]
 MaxSeconds = Annotated[
-    float | None, typer.Option(help="The best plan that should take no longer on this machine.")
+    float | None, typer.Option(help="Time limit in s; the best plan expected to meet it is chosen.")
 ]
 MaxErrorDb = Annotated[
     float | None,
-    typer.Option(help="The cheapest plan that should lose no more against exact, in dB."),
+    typer.Option(
+        help="Largest loss against exact in dB; the fastest plan expected to meet it is chosen."
+    ),
 ]
 DepthM = Annotated[
     float | None,
-    typer.Option(help="Object distance in m, where the bundle knows several; 'inf' is infinity."),
+    typer.Option(
+        help="Object distance in m ('inf' for infinity), for bundles with several distances."
+    ),
 ]
 GlassFiles = Annotated[
     list[Path] | None,
-    typer.Option("--glass", help="A glass catalogue (.agf) of yours; may be given again."),
+    typer.Option("--glass", help="Your own glass catalogue (.agf); may be repeated."),
 ]
 
 

@@ -128,15 +128,15 @@ def recover(
     regions, notes = [], []
     if blind:
         notes.append(
-            f"{share:.0%} of the picture clipped: its lights were left as the sensor saw them, "
-            f"since streaks tell nothing where more than {MOST_CLIPPED:.0%} did"
+            f"{share:.0%} of the picture is clipped: its lights are not restored, since streaks "
+            f"determine them only up to {MOST_CLIPPED:.0%}"
         )
     for window in () if blind else windows_of(clipped, reach):
         if pause is not None:
             pause()
         regions.append(_region(window, (cells, coarse), veil, kernels))
     if not blind and _at_border(clipped):
-        notes.append("lights reach the border of the picture: those outside it were not sought")
+        notes.append("a light reaches the border of the picture: lights beyond it are not restored")
     return Recovery(
         fine=cells,
         coarse=coarse,

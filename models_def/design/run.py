@@ -156,7 +156,7 @@ class DesignRun:
         if table["digest"] != recipe_digest(self.recipe):
             raise ContractError(
                 f"{self.checkpoint} belongs to another recipe, or to other {option_text('steps')}, "
-                f"{option_text('lens_rate')} and the like; say the same again, or give "
+                f"{option_text('lens_rate')} and the like; repeat the same options, or give "
                 f"{option_text('overwrite')} or {option_text('out_dir')}"
             )
         self._spent_s, self._spent_cpu_s = table["spent_s"], table["spent_cpu_s"]

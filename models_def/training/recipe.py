@@ -250,7 +250,7 @@ class Recipe:
         if name is None and len(self.networks) == 1:
             return next(iter(self.networks))
         if name is None:
-            raise ContractError(f"recipe {self.name} has networks of the roles {have}; say which")
+            raise ContractError(f"recipe {self.name} has networks of the roles {have}; choose one")
         if name not in self.networks:
             raise ContractError(f"recipe {self.name} has networks of the role {have}; not {name!r}")
         return name

@@ -112,7 +112,9 @@ class TrainOptions:
         if self.start is not None and self.resume:
             raise ContractError("a run that is resumed has begun; leave start away")
         if self.overwrite and self.resume:
-            raise ContractError("resume goes on from the checkpoint, overwrite drops it: say one")
+            raise ContractError(
+                "resume goes on from the checkpoint, overwrite drops it: choose one"
+            )
         if self.threads < 1 or self.workers < 0:
             raise ContractError(
                 f"threads must be >= 1, workers >= 0; got {self.threads}, {self.workers}"

@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 import scipy.ndimage
 
+from camkit.caller import option_text
 from camkit.runtime.bank.psf import FieldKernels, FloatGrid
 from camkit.units import MM_PER_M
 
@@ -73,12 +74,15 @@ class NearnessMap:
         """Return for people how far the scene was found to be."""
         found = self.to_json()
         if not found:
-            return "nothing in the capture tells its distance: the bank has mean kernels"
+            return (
+                "the object distance cannot be estimated from the capture: the mean kernels of all "
+                f"distances are used; if you know the distance, add {option_text('depth_m')}"
+            )
         near, middle, far = (
             f"{found[name]:.3g}" for name in ("nearest_m", "median_m", "farthest_m")
         )
         spread = "" if near == far else f" ({near} to {far} m over the picture)"
-        return f"distance found in the capture: {middle} m{spread}"
+        return f"object distance estimated from the capture: {middle} m{spread}"
 
 
 class KernelsByDistance:

@@ -95,7 +95,7 @@ def process(  # noqa: PLR0913 - each says one thing to its caller
     if write.format == "dng":
         if options.color == "acescg":
             raise ContractError(
-                f"a DNG holds camera RGB; leave {option_text('color')} out or say camera"
+                f"a DNG holds camera RGB; leave {option_text('color')} out or use camera"
             )
         options = replace(options, color="camera")
     if client is not None and write.jobs > 1:

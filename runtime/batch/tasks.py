@@ -104,14 +104,14 @@ def list_tasks(
     if existing and not (write.resume or write.overwrite):
         listed = ", ".join(map(str, existing[:5]))
         raise ContractError(
-            f"{len(existing)} output(s) exist ({listed}); say {option_text('resume')}, "
+            f"{len(existing)} output(s) exist ({listed}); add {option_text('resume')}, "
             f"{option_text('overwrite')}, or another {option_text('out_dir')}"
         )
     return tasks
 
 
 def _bundle_options() -> str:
-    return f"{option_text('bundle')}, or say {option_text('bundle', 'none')}"
+    return f"{option_text('bundle')}, or use {option_text('bundle', 'none')}"
 
 
 def _folders(sources: Sequence[Path], write: WriteOptions) -> list[Path]:

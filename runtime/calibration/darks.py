@@ -78,7 +78,7 @@ class Darks:
             why = "states no exposure time" if time_s is None else _why_not(times_s, bracket)
             if time_s is None or why:
                 raise ContractError(
-                    f"the dark frame {path.name} {why}; say {option_text('times_s')} with one for "
+                    f"the dark frame {path.name} {why}; add {option_text('times_s')} with one for "
                     "each of FILES and then for each dark frame"
                 )
             light = capture.linear_rows(0, capture.height)

@@ -254,8 +254,8 @@ class _Colour:
         hazy = float(self.fit.psf.shares[wide].sum())
         if dark is None and hazy > MOST_WIDE:
             raise DecodeError(
-                f"haze fills the frame: {hazy:.0%} of the light of the edge cannot be told from "
-                f"the background; give frames without light by {option_text('dark')}"
+                f"veiling glare fills the frame: {hazy:.0%} of the edge's light cannot be told "
+                f"from the background; give frames without light by {option_text('dark')}"
             )
         self.peak_share = self.fit.psf.share_within(PEAK_PX)
         without = [

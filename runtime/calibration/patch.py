@@ -55,7 +55,7 @@ class Patch:
                 dark.
 
         Raises:
-            DecodeError: If haze fills the frame and nothing says what dark is.
+            DecodeError: If veiling glare fills the frame and nothing says what dark is.
         """
         reach = half + BORDER_PX
         # an even first row and column keep the phase of the mosaic
@@ -165,8 +165,8 @@ def _refuse_haze(
     rise = _darker_half(values) - _darker_half(np.concatenate([p[border(p)] for p, _, _ in planes]))
     if rise > HAZE_SPREADS * spread / np.sqrt(values.size) and rise * within > MOST_HAZE * total:
         raise DecodeError(
-            f"haze fills the frame: {rise * within / max(total, 1e-300):.0%} of the light or more "
-            "cannot be told from the background; give frames without light by "
+            f"veiling glare fills the frame: {rise * within / max(total, 1e-300):.0%} of the light "
+            "or more cannot be told from the background; give frames without light by "
             f"{option_text('dark')}"
         )
 

@@ -138,7 +138,7 @@ def checked_pitch_um(survey: Survey, options: PsfOptions) -> float:
     if survey.codes is not None:
         raise ContractError("a PSF is measured on linear frames: RAW, EXR, 16-bit TIFF or PNG")
     if pitch_um is None:
-        raise ContractError(f"the frames state no pixel pitch; say {option_text('pixel_pitch_um')}")
+        raise ContractError(f"the frames state no pixel pitch; add {option_text('pixel_pitch_um')}")
     return pitch_um
 
 

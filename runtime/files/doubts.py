@@ -136,30 +136,30 @@ def _level_doubts(samples: Samples, levels: Levels) -> list[str]:
     apart = float(np.ptp(levels.black))
     if levels.black.ndim == 2 and apart > BLACKS_APART * span:
         found.append(
-            f"black levels of the cell lie {apart:g} apart: the black level is damaged "
-            f"({option_text('black_level')} says it)"
+            f"the black levels of the CFA differ by {apart:g}: the black level is damaged "
+            f"(set it with {option_text('black_level')})"
         )
     if low > FAR_ABOVE_BLACK and high - low > LEAST_CONTRAST:
         found.append(
             f"{NOTHING_DARK} {low:.0%} of the range above black {black:g}: a "
             f"bright scene, fog, veiling glare, or a stated black level that is too low "
-            f"({option_text('black_level')} corrects it)"
+            f"(set it with {option_text('black_level')})"
         )
     middle, least = float(np.median(_thinned(samples))), float(levels.black.min())
     if middle < least - BELOW_BLACK * span:
         found.append(
             f"half of the samples lie at or below {middle:g}, black is {least:g}: the black level "
-            f"or the pixel data are damaged ({option_text('black_level')} says it)"
+            f"or the pixel data are damaged (set it with {option_text('black_level')})"
         )
     elif low < -FAR_BELOW_BLACK:
         found.append(
             f"the darkest samples lie {-low:.0%} of the range below black {black:g}: the black "
-            f"level or the pixel data are damaged ({option_text('black_level')} says it)"
+            f"level or the pixel data are damaged (set it with {option_text('black_level')})"
         )
     if top < NEVER_BRIGHT:
         found.append(
             f"nothing is brighter than {top:.1%} of white {levels.white:g}: a dark picture, or a "
-            f"stated white level that is too high ({option_text('white_level')} corrects it)"
+            f"stated white level that is too high (set it with {option_text('white_level')})"
         )
     return found
 
@@ -183,7 +183,7 @@ def _above_white_doubt(samples: Samples, levels: Levels) -> str:
         return ""
     return (
         f"{above} samples lie above white {levels.white:g}, up to {top}: the white level or the "
-        f"pixel data are damaged ({option_text('white_level')} says it)"
+        f"pixel data are damaged (set it with {option_text('white_level')})"
     )
 
 
@@ -197,7 +197,7 @@ def _masked_doubt(masked: Sequence[Samples], levels: Levels) -> str:
         if high - low < MASKED_SPREAD * span and abs(middle - black) > MASKED_OFFSET * span:
             return (
                 f"black is {black:g}, the masked pixels of the sensor lie at {middle:g}: the black "
-                f"level is damaged ({option_text('black_level')} says it)"
+                f"level is damaged (set it with {option_text('black_level')})"
             )
     return ""
 

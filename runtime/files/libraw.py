@@ -26,9 +26,7 @@ FLIP_TO_EXIF: Final = {0: 1, 1: 2, 2: 4, 3: 3, 4: 5, 5: 8, 6: 6, 7: 7}
 MASKED_RIM_PX: Final = 2
 LEAST_X_TRANS_PX: Final = 512
 NOTHING_SAID: Final = MosaicOptions()
-DEVELOPED: Final = (
-    "not a Bayer mosaic: decoded by LibRaw's own demosaic (values below black are cut)"
-)
+DEVELOPED: Final = "not a Bayer mosaic: LibRaw demosaicked it and cut the values below black"
 
 
 def decode_with_libraw(
@@ -50,7 +48,9 @@ def decode_with_libraw(
     raw_checks.check_size(sizes.raw_height, sizes.raw_width, tags.file_bytes)
     notes: list[str] = []
     if abs(sizes.pixel_aspect - 1) > 0.01:
-        notes.append(f"pixels are not square (aspect {sizes.pixel_aspect:.3f}); shape kept")
+        notes.append(
+            f"pixels are not square (aspect {sizes.pixel_aspect:.3f}); the picture is not rescaled"
+        )
     cfa = _cfa(raw)
     # black levels are read before any postprocess, which subtracts and overwrites them
     levels = _levels(raw, cfa, said)
@@ -164,10 +164,10 @@ def _samples(
     if cfa is not None:
         return raw.raw_image_visible, levels
     if stacked and raw.num_colors == 3:
-        notes.append("linear RGB file: already demosaicked, taken as it is")
+        notes.append("linear RGB file: already demosaicked, so demosaicking is skipped")
         return np.moveaxis(raw.raw_image_visible[..., :3], -1, 0), levels
     if not stacked and raw.num_colors == 1:
-        notes.append("monochrome sensor: one plane stands for all three colours")
+        notes.append("monochrome sensor: its plane is used as red, green and blue")
         plane = raw.raw_image_visible
         return np.broadcast_to(plane, (3, *plane.shape)), levels
     return develop_linear(raw, notes, said)

@@ -114,9 +114,9 @@ def _grey_notes(path: Path, samples: NDArray[Any]) -> list[str]:
             f"do; {mosaic_advice()}"
         )
     if np.issubdtype(samples.dtype, np.floating):
-        return ["single channel: taken as a grey picture"]
+        return ["single channel: read as a grey picture"]
     counted = f"; {_counts_advice()}" if path.suffix.lower() in COUNTS_SUFFIXES else ""
-    return [f"single channel: taken as a grey picture; {mosaic_advice()}{counted}"]
+    return [f"single channel: read as a grey picture; {mosaic_advice()}{counted}"]
 
 
 def _is_mosaic(samples: NDArray[Any]) -> bool:
@@ -159,13 +159,13 @@ def _full_codes(decoded: Decoded) -> NDArray[np.uint8]:
 def _notes_on_eight(decoded: Decoded, *, keep_codes: bool) -> list[str]:
     space, doubt = decoded.space, decoded.doubt
     if doubt:
-        return [f"the file states {doubt}: codes are taken as sRGB"]
+        return [f"the file states {doubt}, which is ignored: codes are read as sRGB"]
     if space is not None and not space.is_srgb and keep_codes:
         return [f"colour space {space.name!r} is not applied: codes are merged as they are"]
     if keep_codes:
         return []
     name = "sRGB" if space is None or space.is_srgb else repr(space.name)
-    return [f"8-bit picture: decoded from {name}; 16-bit linear files are more exact"]
+    return [f"8-bit picture: decoded from {name}; a 16-bit linear file would be more exact"]
 
 
 def _notes_on_linear(decoded: Decoded) -> list[str]:
@@ -174,13 +174,13 @@ def _notes_on_linear(decoded: Decoded) -> list[str]:
     if decoded.window is not None:
         return [exr_picture.NOT_REC709] if space is not None else []
     if doubt:
-        return [f"the file states {doubt}: samples are taken as linear light"]
+        return [f"the file states {doubt}, which is ignored: samples are read as linear light"]
     is_plain = space is None or (
         space.tables is None and space.is_rec709 and space.has_curve(power_curve(1.0))
     )
     if is_plain or space is None:
         return []
-    return [f"colour space {space.name!r} is not applied: samples are taken as linear light"]
+    return [f"colour space {space.name!r} is not applied: samples are read as linear light"]
 
 
 def read_mosaic(path: Path, options: MosaicOptions) -> Capture:
@@ -193,7 +193,7 @@ def read_mosaic(path: Path, options: MosaicOptions) -> Capture:
     """
     if _begins(path, jpeg_segments.MAGIC):
         raise DecodeError(
-            f"{path.name} is a JPEG, which no mosaic is: tones are coded and noise is lost; give "
+            f"{path.name} is a JPEG, which cannot be a mosaic: its tones are coded; give "
             "RAW files, or a PNG or TIFF of the sensor's own samples"
         )
     picture = _decode(path)
@@ -204,7 +204,7 @@ def read_mosaic(path: Path, options: MosaicOptions) -> Capture:
             f"{samples.dtype} {samples.shape}; omit the mosaic options for an RGB picture"
         )
     if options.black_level is None or options.white_level is None:
-        raise DecodeError(f"levels alone are for RAW files; {mosaic_advice()}")
+        raise DecodeError(f"levels without a CFA are for RAW files; {mosaic_advice()}")
     levels = raw_checks.Levels(
         black=np.full((2, 2), options.black_level, dtype=np.float32), white=options.white_level
     )
@@ -218,7 +218,10 @@ def read_mosaic(path: Path, options: MosaicOptions) -> Capture:
         orientation=picture.orientation,
         camera=picture.metadata.camera,
         metadata=picture.metadata,
-        notes=("headerless mosaic: pattern and levels as given", *picture.decoded.notes),
+        notes=(
+            "headerless mosaic: CFA and levels are those of the options",
+            *picture.decoded.notes,
+        ),
     )
 
 
@@ -314,14 +317,14 @@ def read_orientation(path: Path) -> int:
 def mosaic_advice() -> str:
     """Return what to say of a picture that may be a headerless mosaic."""
     return (
-        f"if it is a Bayer mosaic, say {option_text('cfa', 'RGGB')} with "
+        f"if it is a Bayer mosaic, add {option_text('cfa', 'RGGB')} with "
         f"{option_text('black_level')} and {option_text('white_level')} (RGGB, BGGR, GRBG or GBRG "
         "at the top-left pixel)"
     )
 
 
 def _counts_advice() -> str:
-    return f"if it counts single photons, say {option_text('product', 'intensity')}, or depth"
+    return f"if it counts single photons, add {option_text('product', 'intensity')} or depth"
 
 
 def _begins(path: Path, magic: bytes) -> bool:

@@ -47,15 +47,17 @@ def plain_decode(path: Path, tags: TiffTags, picture: DngPicture, said: MosaicOp
     if cfa is not None:
         samples = visible[..., 0]
     elif picture.planes == 1:
-        notes.append("monochrome sensor: one plane stands for all three colours")
+        notes.append("monochrome sensor: its plane is used as red, green and blue")
         samples = np.broadcast_to(visible[..., 0], (3, *visible.shape[:2]))
     else:
-        notes.append("linear RGB file: already demosaicked, taken as it is")
+        notes.append("linear RGB file: already demosaicked, so demosaicking is skipped")
         samples = np.moveaxis(visible, -1, 0)
     seen = SeenPixels(samples=samples, cfa=cfa, whole=whole, first=(top, left))
     samples, levels, more = apply_tags(picture, seen, said)
     if picture.is_float:
-        notes.insert(0, f"floating-point DNG: samples are as stored, white is {levels.white:g}")
+        notes.insert(
+            0, f"floating-point DNG: samples are used as stored, white is {levels.white:g}"
+        )
     found = metadata_of(tags)
     return RawDecode(
         samples=samples,

@@ -167,7 +167,8 @@ def check_content(samples: Samples, levels: Levels) -> None:
     if over > OVER_WHITE_SHARE:
         raise DecodeError(
             f"{over:.0%} of the pixels lie above the white level {levels.white:g}; "
-            f"the white level or the pixel data are damaged ({option_text('white_level')} says it)"
+            f"the white level or the pixel data are damaged "
+            f"(set it with {option_text('white_level')})"
         )
     if low == 0:
         _check_unread(samples, levels)

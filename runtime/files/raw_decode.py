@@ -153,7 +153,9 @@ def _codes(
     if low == high:
         raise DecodeError(f"every pixel is {low:g}: the pixel data are missing or were not decoded")
     if not finite.all():
-        notes.append(f"{np.count_nonzero(~finite)} samples are no numbers: they count as invalid")
+        notes.append(
+            f"{np.count_nonzero(~finite)} samples are NaN or infinite: they count as invalid"
+        )
     above = np.count_nonzero(samples > levels.white)
     if above:
         notes.append(
@@ -174,7 +176,9 @@ def _note_lone(
     count = sum(count_lone(plane, levels, cell) for plane in planes)
     share = count / samples.size
     if share >= LONE_NOTE_SHARE:
-        notes.append(f"{count} pixels ({share:.4%}) stand out alone: hot pixels or damage")
+        notes.append(
+            f"{count} pixels ({share:.4%}) differ from all neighbours: hot pixels or damage"
+        )
 
 
 def _exposure_note(picture: DngPicture | None) -> list[str]:
@@ -182,8 +186,8 @@ def _exposure_note(picture: DngPicture | None) -> list[str]:
     if abs(stops) < GREATER_STOPS:
         return []
     return [
-        f"BaselineExposure {stops:+.2f} EV is not applied: other programs show the picture so much "
-        f"{'brighter' if stops > 0 else 'darker'}"
+        f"BaselineExposure {stops:+.2f} EV is not applied: other programs show the picture "
+        f"{'brighter' if stops > 0 else 'darker'} by that"
     ]
 
 

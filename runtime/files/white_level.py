@@ -55,8 +55,7 @@ def believable_white(
     fitting = [n for n in (bits, *usual) if 2**n > largest]
     white = float(2 ** fitting[0] - 1) if fitting else float(np.iinfo(samples.dtype).max)
     note = (
-        f"{over:.0%} of the pixels lie above white {levels.white:g} that the file states, which is "
-        f"damaged or of another scale: {white:g} is taken ({option_text('white_level')} says "
-        "another)"
+        f"{over:.0%} of the pixels lie above the stated white {levels.white:g}, which is damaged "
+        f"or of another scale: {white:g} is used (set it with {option_text('white_level')})"
     )
     return replace(levels, white=white), note

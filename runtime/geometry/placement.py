@@ -61,7 +61,7 @@ def place(capture: Capture, extent: Extent | None, assume: Assumption | None) ->
         origin = (axis_x - (size[0] - 1) / 2, axis_y - (size[1] - 1) / 2)
         return Placement(
             window=_window(size, origin, extent),
-            note=f"assumed centred on the axis at {pitch} um pitch, origin {origin}",
+            note=f"assumed to be a centred crop at {pitch} um pitch, origin {origin}",
         )
     _check_pitch(capture, pitch)
     if capture.origin_px is not None and capture.sensor_size_px == sensor:
@@ -70,7 +70,7 @@ def place(capture: Capture, extent: Extent | None, assume: Assumption | None) ->
         return Placement(window=_window(size, (0.0, 0.0), extent))
     raise ContractError(
         f"the capture has {size[0]}x{size[1]} pixels, the bundle's sensor {sensor[0]}x{sensor[1]}; "
-        f"for a crop say where it lies ({option_text('origin_px')}), else use another bundle, or "
+        f"for a crop add its position ({option_text('origin_px')}), else use another bundle, or "
         f"{option_text('assume', 'centre')} (same pitch) or {option_text('assume', 'scale')}"
     )
 
@@ -97,7 +97,7 @@ def _scaled(size: tuple[int, int], extent: Extent) -> Placement:
             axis_px=axis and ((axis[0] + 0.5) * ratio - 0.5, (axis[1] + 0.5) * ratio - 0.5),
         ),
         kernel_scale=ratio,
-        note=f"assumed to span the sensor: kernels scaled by {ratio:.4g}",
+        note=f"assumed to show the whole sensor: kernels are scaled by {ratio:.4g}",
     )
 
 

@@ -50,8 +50,8 @@ def check_choices(bundle: Bundle | None, options: Options) -> None:
     given = [name for name in given_options(options) if name not in own]
     if foreign := [name for name in given if name not in known]:
         raise ContractError(
-            f"{option_list(foreign)} means nothing {where}: "
-            f"{'nothing there' if bundle is None else 'no stage of it'} knows of that; leave it out"
+            f"{option_list(foreign)} does not apply {where}: "
+            f"{'nothing' if bundle is None else 'none of its stages'} uses it; leave it out"
         )
     if options.size is not None and bundle is not None:
         sizes = bundle.manifest.sizes
@@ -93,6 +93,6 @@ def check_idle(bundle: Bundle | None, options: Options) -> None:
     idle = known_options(left_out) - known_options(others)
     if said := [name for name in given_options(options) if name in idle]:
         raise ContractError(
-            f"{option_list(said)} means nothing with {option_text('method', options.method)}: what "
-            "knows of that is left out; leave it out too"
+            f"{option_list(said)} does not apply with {option_text('method', options.method)}, "
+            "which runs no stage that uses it; leave it out"
         )

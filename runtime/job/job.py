@@ -177,7 +177,7 @@ class Job:
             self._check_cfa(bundle.manifest.sensor.cfa)
         if self.capture.contract != wanted[0]:
             self.notes.append(
-                "the capture holds full colours in place of a mosaic: it is not demosaicked"
+                "the capture has full colour instead of a mosaic: demosaicking is skipped"
             )
 
     def _check_camera(self, name: str) -> None:
@@ -193,14 +193,14 @@ class Job:
             told = f"the capture names bundle {capture.bundle_name}, not {name}"
             if not options.force_bundle:
                 raise ContractError(
-                    f"{told}; leave {option_text('bundle')} out, or say "
+                    f"{told}; leave {option_text('bundle')} out, or add "
                     f"{option_text('force_bundle')}"
                 )
-            self.notes.append(f"{told}: the blur of another lens is undone")
+            self.notes.append(f"{told}: the result is right only if both have the same lens")
         elif capture.bundle_name is None and capture.camera and manifest.has_kernels:
             self.notes.append(
-                f"the file names the camera {capture.camera}: unless the lens of bundle {name} was "
-                "on it, the blur of another lens is undone"
+                f"the capture is from the camera {capture.camera}: the result is right only with "
+                f"the lens of bundle {name}"
             )
 
     def _check_cfa(self, cfa: CfaPattern) -> None:

@@ -306,7 +306,7 @@ class Reconstruction:
             if below is None:
                 raise ContractError(
                     f"bundle {bundle.manifest.name} has nothing to fall back to: its networks "
-                    f"cannot be left out; say {option_text('on_unsafe', 'warn')}"
+                    f"cannot be left out; use {option_text('on_unsafe', 'warn')}"
                 )
             options = replace(options, method=below.method)
         content = self._measure_content() if needs_content(options) else None

@@ -63,8 +63,8 @@ class Limit:
         most = self.value()
         if not wanted <= most:
             raise BundleError(
-                f"{what} takes {wanted:.4g} {self.unit}; at most {most:.4g} are admitted. Who "
-                f"trusts the bundle says {self.variable}={_rounded_up(wanted)}"
+                f"{what} takes {wanted:.4g} {self.unit}; at most {most:.4g} are admitted. "
+                f"If you trust the bundle, set {self.variable}={_rounded_up(wanted)}"
             )
 
 

@@ -109,7 +109,7 @@ def _curve(codes: NDArray[np.intp], log_times: FloatTable, start: Response) -> F
     if pixels < LEAST_PIXELS or np.ptp(log_times) == 0:
         raise DecodeError(
             f"a response is estimated from {LEAST_PIXELS} pixels or more that two frames of "
-            f"different times hold unclipped; there are {pixels}: say "
+            f"different times hold unclipped; there are {pixels}: use "
             f"{option_text('response', 'srgb')} or linear"
         )
     prior = start.log_light[0].astype(np.float64)

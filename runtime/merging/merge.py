@@ -78,7 +78,7 @@ def choose_response(survey: Survey, wanted: ResponseName | None) -> tuple[Respon
         )
     if wanted == "estimate" and codes is None:
         raise ContractError(
-            f"a response is estimated from 8-bit pictures; say {option_text('response', 'srgb')}"
+            f"a response is estimated from 8-bit pictures; use {option_text('response', 'srgb')}"
         )
     if wanted == "linear" or (wanted is None and codes is None):
         is_choice = wanted is None and coded and not survey.is_raw
@@ -91,16 +91,19 @@ def choose_response(survey: Survey, wanted: ResponseName | None) -> tuple[Respon
     known = known_curve(codes, survey.times_s)
     if known is not None:
         curve, name = known
-        return curve, f"{name} explains the frames to within the rounding of their codes"
+        return curve, f"the response {name} fits the frames to within rounding"
     try:
         found = _estimated(codes, survey.times_s)
     except DecodeError:
         if wanted == "estimate":
             raise
-        return plain, "too little is unclipped in two frames to estimate a response: sRGB is taken"
+        return (
+            plain,
+            "too few pixels are unclipped in two frames to estimate a response: sRGB is used",
+        )
     misses = [disagreement(codes, survey.times_s, r) for r in (found, plain)]
     if wanted is None and misses[0] >= misses[1]:
-        return plain, "sRGB explains the frames as well as an estimate: sRGB is taken"
+        return plain, "sRGB fits the frames as well as an estimate: sRGB is used"
     return found, _exposure_note(survey, found)
 
 

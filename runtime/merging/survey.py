@@ -184,7 +184,7 @@ def _refuse_untimed(names: Sequence[str], count: int) -> NoReturn:
     listed = "" if len(names) == 1 else f" ({', '.join(names[:3])}{', ...' * (len(names) > 3)})"
     state = "states" if len(names) == 1 else "state"
     raise ContractError(
-        f"{which} {state} no exposure time{listed}; say {option_text('times_s')} with one for each "
+        f"{which} {state} no exposure time{listed}; add {option_text('times_s')} with one for each "
         "file"
     )
 
@@ -197,7 +197,7 @@ def _check_settings(frames: Sequence[tuple[Path, Capture]]) -> None:
         if len(values) > 1:
             raise ContractError(
                 f"frames differ in {what} ({', '.join(f'{v:g}' for v in sorted(values))}), so "
-                f"their times do not tell their exposures; say {option_text('times_s')} with "
+                f"their times do not tell their exposures; add {option_text('times_s')} with "
                 "relative exposures"
             )
 
@@ -254,8 +254,8 @@ def _registered(like: Capture, frames: Sequence[Frame]) -> tuple[Capture, tuple[
     )
     wide, high = common.size_px
     note = (
-        f"frames are registered by their data windows: {wide}x{high} px from ({box[0]}, {box[1]}) "
-        "lie in all of them"
+        f"frames are aligned by their data windows: only the {wide}x{high} px from "
+        f"({box[0]}, {box[1]}) that all of them share are merged"
     )
     return cropped(like, common), (note,)
 

@@ -79,14 +79,14 @@ class TileGuard:
                 f"the network gave {trouble} in {tile}, and what came before it is not finite "
                 "either; the capture holds what no repair found"
             )
-        self.replaced.append(f"{tile}: {trouble}")
+        self.replaced.append(f"{tile}: {trouble.rstrip(',')}")
         return instead
 
 
 def _hint() -> str:
     return (
-        f"; say {option_text('on_unsafe', 'fallback')} for what came before the network there, or "
-        f"{option_text('method')} for the whole picture without it"
+        f"; {option_text('on_unsafe', 'fallback')} uses the network's input there, "
+        f"{option_text('method')} leaves the network out"
     )
 
 

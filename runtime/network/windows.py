@@ -183,8 +183,8 @@ class NetworkWindows:
         if count < 2 or not seen:
             return ()
         return (
-            f"the network looks at the whole picture ({seen}), and mode {self.mode} shows it "
-            f"{count} windows, each by itself: brightness or contrast may change between them",
+            f"the network looks at the whole picture ({seen}), and mode {self.mode} processes "
+            f"{count} windows separately: brightness or contrast may change between them",
         )
 
     @property
@@ -311,12 +311,12 @@ def _check_one_window(
     cure = f"one window of {width}x{height} px takes {needed // 10**6} MB"
     cure += f": raise {option_text('max_mem_bytes', limits.spent_bytes + needed)}"
     if layout.window_count > 1:
-        cure = f"leave out the size of tiles, which asks for {layout.window_count} windows"
+        cure = f"leave out the tile size, which makes {layout.window_count} windows"
     elif _has_fast(network.facts):
-        cure += f", or say {option_text('mode', 'fast')}, which shows it windows each by itself"
+        cure += f", or use {option_text('mode', 'fast')}, which processes windows separately"
     raise ContractError(
-        f"the network looks at the whole picture ({network.facts.global_text}) and cannot be tiled "
-        f"exactly: {cure}"
+        f"the network looks at the whole picture ({network.facts.global_text}) and cannot be "
+        f"tiled exactly: {cure}"
     )
 
 

@@ -219,8 +219,8 @@ def _within_seconds(subject: Subject, work: Work, model: LossModel | None, speed
     chosen = next((plan for plan in ordered if seconds(plan) <= limit), cheapest)
     note = ""
     if seconds(chosen) > limit:
-        least = "the least work" if last is None else "the bank alone"
+        least = "the least work" if last is None else "the filter bank alone"
         note = f"even {least} is expected to take more than {limit:g} s"
     elif most_db is not None and model is not None and chosen.cost_db > model.budget_db(most_db):
-        note = f"{limit:g} s allow no plan within {most_db:g} dB"
+        note = f"no plan keeps within both {limit:g} s and {most_db:g} dB"
     return replace(chosen, note=note)

@@ -29,7 +29,7 @@ def prepare(_entry: Color, job: Job) -> StageWork:
     options = job.options
     matrix = job.color_matrix
     if matrix is None and job.capture.cfa is not None:
-        job.notes.append("the file states no colour matrix: camera RGB is taken as Rec.709")
+        job.notes.append("no colour matrix: camera RGB is used as Rec.709, colours are approximate")
     job.color = color = color_stage(matrix, options.color, exposure_ev=options.exposure_ev)
 
     def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:

@@ -64,8 +64,8 @@ def prepare(entry: Highlights, job: Job) -> StageWork:
     light, mask = _looked_at(entry, job.setup.stages)
     if min(height, width) < LEAST_PX:
         note = (
-            f"lights are sought in pictures of {LEAST_PX} px and more on each side; this one has "
-            f"{width} x {height}: it was left as the sensor saw it"
+            f"clipped lights are not restored: that needs {LEAST_PX} px on each side, and the "
+            f"picture has {width} x {height}"
         )
         return StageWork(run=lambda taken: (taken[0],), warnings=lambda: (note,))
     notes: list[str] = []

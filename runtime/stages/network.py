@@ -203,7 +203,9 @@ class _NetworkStage:
     def warnings(self) -> tuple[str, ...]:
         """Name the tiles that were not believed, and say where the network moved light."""
         replaced = () if self._guard is None else self._guard.replaced
-        tiles = tuple(f"what came before the network was taken in {tile}" for tile in replaced)
+        tiles = tuple(
+            f"the network's result was rejected and its input used in {tile}" for tile in replaced
+        )
         return (*tiles, *self._moved_light(), *self._broken_laws())
 
     def _broken_laws(self) -> tuple[str, ...]:
@@ -212,8 +214,8 @@ class _NetworkStage:
         if not broken:
             return ()
         return (
-            f"bundle {bundle.manifest.name} breaks laws of a picture ({', '.join(broken)}); "
-            "its card says by how much",
+            f"bundle {bundle.manifest.name} exceeds its stated limits ({', '.join(broken)}): "
+            "`camkit info` lists by how much",
         )
 
     def _moved_light(self) -> tuple[str, ...]:
@@ -221,12 +223,13 @@ class _NetworkStage:
         if keeper is None or not keeper.measured or keeper.large_fraction <= NOTED_FRACTION:
             return ()
         moved = (
-            f"in {keeper.large_fraction:.1%} of the picture the network changed the brightness of "
-            f"the filter by more than {FAR:.0%}, which noise and lens errors do not explain"
+            f"in {keeper.large_fraction:.1%} of the picture the network changed the brightness "
+            f"of the filter's result by more than {FAR:.0%}, which noise and lens errors do not "
+            "explain"
         )
         if keeper.bound is not None:
-            return (f"{moved}; the filter's brightness was kept there. {_CAUSES}",)
-        kept = f"{option_text('laws', 'enforce')} keeps the filter's brightness there"
+            return (f"{moved}; the brightness of the filter was kept there. {_CAUSES}",)
+        kept = f"{option_text('laws', 'enforce')} keeps the brightness of the filter there"
         return (f"{moved}; {kept}. {_CAUSES}",)
 
     def run(self, taken: Sequence[Stream]) -> tuple[Stream, ...]:

@@ -51,9 +51,11 @@ def _choose(job: Job) -> Gains:
         return (1.0, 1.0, 1.0)
     sensor = None if job.bundle is None else job.bundle.manifest.sensor
     if sensor is None or sensor.type != "bayer":
-        job.notes.append("the file states no white balance: gains of 1 are used")
+        job.notes.append(
+            "the capture states no white balance: gains of 1 are used, colours may have a cast"
+        )
         return (1.0, 1.0, 1.0)
-    job.notes.append(f"the capture states no white balance: that of {sensor.illuminant} is used")
+    job.notes.append(f"the capture states no white balance: {sensor.illuminant} is assumed")
     return camera_from_rec709(np.array(sensor.color_matrix))[1]
 
 

@@ -243,12 +243,12 @@ def test_notes_of_results_are_in_the_language_of_their_caller(
     dark = tmp_path / "dark.dng"
     write_bayer_dng(dark, scene_mosaic(96, 128) // 8, tags=dng_tags(black=0, white=65_000))
     found = camkit.process(dark, bundle="none", out_dir=tmp_path / "python")[0]
-    assert any("MosaicOptions.white_level says it" in note for note in found.warnings)
+    assert any("set it with MosaicOptions.white_level" in note for note in found.warnings)
     told = (tmp_path / "python" / "dark.camkit.json").read_text()
     assert "--white-level" not in told
     out = tmp_path / "command"
     assert run(["process", str(dark), "--bundle", "none", "--out-dir", str(out), "--json"]) == 0
-    assert "(--white-level says it)" in capsys.readouterr().out
+    assert "(set it with --white-level)" in capsys.readouterr().out
     assert "MosaicOptions" not in (out / "dark.camkit.json").read_text()
 
 

@@ -240,5 +240,7 @@ def test_a_plan_takes_captures_in_memory_and_what_is_said_of_them(tmp_path: Path
 
 def test_what_means_nothing_to_captures_that_are_no_mosaics_is_refused(tmp_path: Path) -> None:
     pipeline = camkit.load(write_spad_bundle(tmp_path).path)
-    with pytest.raises(camkit.ContractError, match="origin_px means nothing to captures of the ki"):
+    with pytest.raises(
+        camkit.ContractError, match="origin_px does not apply to captures of the ki"
+    ):
         pipeline.plan(b"", origin_px=(1, 2))

@@ -282,7 +282,7 @@ def test_what_it_is_at_other_distances_goes_with_its_haze(
 def test_a_haze_and_the_stage_that_undoes_it_come_together(
     parts: Parts, hazy_parts: Parts, tmp_path: Path
 ) -> None:
-    with pytest.raises(ContractError, match=r"the recipe small undoes a haze: .* say haze"):
+    with pytest.raises(ContractError, match=r"the recipe small removes veiling glare: .* add haze"):
         export_bundle(replace(hazy_parts, haze=None), tmp_path / "x.camkit")
     with pytest.raises(ContractError, match=r"undoes no haze, but there is .*haze\.safetensors"):
         export_bundle(replace(parts, haze=hazy_parts.haze), tmp_path / "x.camkit")

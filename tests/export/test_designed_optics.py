@@ -120,7 +120,7 @@ def test_another_plate_may_be_named_and_none_too(
     ids=["more light", "turned"],
 )
 def test_a_psf_of_another_plate_is_refused(other: Plate, psf: FrozenPsf) -> None:
-    with pytest.raises(ContractError, match=r"not frozen from the plate star: .*say plate=.none."):
+    with pytest.raises(ContractError, match=r"not frozen from the plate star: .*use plate=.none."):
         designed_members(PARTS, [_checkpoint(plate_members(other))], psf)
 
 

@@ -138,7 +138,7 @@ def test_copies_are_frozen_at_the_distances_of_the_recipe_in_turn(
     usual = replace(recipe, lens=replace(recipe.lens, copies=1, validation_copies=1))
     frames.freeze_copies(usual, lens, told.append)
     assert seen == [lens.object_distance_mm] * 2
-    with pytest.raises(ContractError, match=r"say lens\.bank_in_focus = true"):
+    with pytest.raises(ContractError, match=r"state lens\.bank_in_focus = true"):
         replace(deep, lens=replace(choices, bank_in_focus=False))
     with pytest.raises(ContractError, match="must be 3 at least, got 2 and 3"):
         replace(deep, lens=replace(choices, copies=2))
@@ -301,7 +301,7 @@ def test_frames_of_other_pictures_or_another_recipe_are_refused(
         read_frames(tmp_path, recipe)
     for damaged in ("", "[]", '{"camera": ""}', "\0"):
         (tmp_path / "tiles.json").write_text(damaged)
-        with pytest.raises(ContractError, match=r"tiles\.json is damaged; say `camkit prepare`"):
+        with pytest.raises(ContractError, match=r"tiles\.json is damaged; run `camkit prepare`"):
             read_frames(tmp_path)
 
 
@@ -313,7 +313,7 @@ def test_tiles_that_were_cut_short_or_are_gone_are_one_line(runs: Path, tmp_path
     whole = planes.read_bytes()
     for left in (whole[:-1000], whole[:40], b""):
         planes.write_bytes(left)
-        with pytest.raises(ContractError, match=r"\(train\) in .* are damaged; say `camkit prep"):
+        with pytest.raises(ContractError, match=r"\(train\) in .* are damaged; run `camkit prep"):
             frames.tiles("train", None)
     planes.unlink()
     with pytest.raises(ContractError, match="are damaged"):

@@ -110,7 +110,7 @@ def test_the_verdict_follows_the_choice() -> None:
     assert verdict((), "duet", "fail") is None
     for choice, words in (
         ("warn", 'on_unsafe="fallback"'),
-        ("fallback", "what came before the network is given"),
+        ("fallback", "the network is left out"),
     ):
         text = verdict(("it is dark",), "duet", choice)  # type: ignore[arg-type]
         assert text is not None

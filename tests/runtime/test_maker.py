@@ -124,13 +124,13 @@ def test_a_folder_stands_for_the_captures_of_the_kind(capture: Path, tmp_path: P
 
 
 def test_what_means_nothing_is_refused(capture: Path, tmp_path: Path) -> None:
-    with pytest.raises(ContractError, match="exposure_ev means nothing to captures of the kind"):
+    with pytest.raises(ContractError, match="exposure_ev does not apply to captures of the kind"):
         camkit.load(None, kind="counting", exposure_ev=1.0)
     with pytest.raises(ContractError, match="method must be one of running"):
         camkit.load(None, kind="counting", method="wiener")
     with pytest.raises(ContractError, match="sign must be one of plus, minus; got 'both'"):
         camkit.load(None, sign="both")
-    with pytest.raises(ContractError, match="sign means nothing to bundle duet: it is for cam"):
+    with pytest.raises(ContractError, match="sign does not apply to bundle duet: it is for cam"):
         camkit.load("duet", sign="plus")
     with pytest.raises(ContractError, match=r"unknown option.*colour.*known are.*sign.*weights"):
         camkit.load(None, colour="red")
@@ -226,7 +226,7 @@ def test_the_command_line_has_the_options_of_the_kind(
     refused = camkit_run("process", *common, "--sign", "both", "--overwrite")
     assert refused.returncode == 2
     assert "sign must be one of plus, minus" in refused.stderr
-    assert "counting: Which counts. plus, minus." in " ".join(
+    assert "Which counts (counting: plus, minus)." in " ".join(
         camkit_run("process", "--help").stdout.replace("│", " ").split()
     )
 

@@ -204,7 +204,7 @@ def test_linear_planes_are_taken_with_a_note(bundle: Path) -> None:
     work = pipeline.start(
         pipeline.capture_of(planes, iso=100.0, white_balance=None, origin_px=None)
     )
-    assert any("in place of a mosaic" in warning for warning in work.warnings)
+    assert any("instead of a mosaic" in warning for warning in work.warnings)
     assert np.isfinite(work.fill()).all()
 
 
@@ -286,7 +286,7 @@ def test_a_depth_without_kernels_is_refused_before_any_work(bundle: Path, deep: 
         Pipeline(deep, Options(depth_m=3.0))
     with pytest.raises(ContractError, match="the one depth infinity; got 3 m"):
         load(bundle, depth_m=3.0)
-    with pytest.raises(ContractError, match="depth_m means nothing without a bundle"):
+    with pytest.raises(ContractError, match="depth_m does not apply without a bundle"):
         load(None, depth_m=3.0)
 
 
@@ -330,7 +330,7 @@ def test_a_crop_without_a_place_is_taken_where_the_caller_says(tmp_path: Path) -
         camera_model="another camera",
     )
     write_bayer_dng(dng, np.array(capture.samples[8:48, 10:70]), tags=tags)
-    with pytest.raises(ContractError, match="say where it lies"):
+    with pytest.raises(ContractError, match="add its position"):
         whole.process(dng)
     once = whole.process(dng, origin_px=(10, 8)).image
     always = load(path, method="wiener", origin_px=(10, 8)).process(dng).image

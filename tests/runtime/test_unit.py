@@ -39,7 +39,7 @@ def test_a_unit_without_a_name_has_that_of_its_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "one of bundle_sha256 and lens_sha256 must say what the unit belongs to; got none"),
+        ("", "one of bundle_sha256 and lens_sha256 must state what the unit belongs to; got none"),
         (f'bundle_sha256 = "{HASH}"\nlens_sha256 = "{HASH}"', "got bundle_sha256 and lens_sha256"),
         ("lens_sha256 = 3", "lens_sha256 must be the hash of a lens; got 3"),
         (f'lens_sha256 = "{HASH}"\nmeasured = 1', "measured must be a table"),
@@ -102,7 +102,7 @@ def test_a_unit_of_a_lens_holds_for_every_bundle_with_that_lens(tmp_path: Path) 
     other = write_focus_bundle(tmp_path, "other", lens=b"another lens")
     with pytest.raises(ContractError, match=r"bundle other that of .*another camera's"):
         own.check(other)
-    with pytest.raises(ContractError, match="does not say which lens it has"):
+    with pytest.raises(ContractError, match="does not state which lens it has"):
         own.check(write_focus_bundle(tmp_path, "unknown", lens=None))
 
 

@@ -21,34 +21,49 @@ MUCH_LOST = 0.02
 def design(
     recipe: Annotated[Path, typer.Argument(help="Design recipe (.toml).", metavar="RECIPE")],
     data: Annotated[
-        Path | None, typer.Option(help="Folder of sharp pictures; none: procedural scenes.")
+        Path | None, typer.Option(help="Folder of sharp pictures; default: procedural scenes.")
     ] = None,
     out_dir: Annotated[
-        Path | None, typer.Option(help="For lens, checkpoint, log and pictures; runs/NAME.")
+        Path | None,
+        typer.Option(help="Folder for lens, checkpoint, log and pictures; default: runs/NAME."),
     ] = None,
-    steps: Annotated[int | None, typer.Option(min=1, help="Steps instead of the recipe's.")] = None,
+    steps: Annotated[
+        int | None, typer.Option(min=1, help="Number of steps; default: the recipe's.")
+    ] = None,
     lens_rate: Annotated[
-        float | None, typer.Option(min=0, help="Learning rate of the lens; 0 trains the network.")
+        float | None,
+        typer.Option(
+            min=0,
+            help="Learning rate of the lens (0 trains the network alone); default: the recipe's.",
+        ),
     ] = None,
     prescription: Annotated[
-        str | None, typer.Option(help="Another start than the recipe's: a name or a lens file.")
+        str | None,
+        typer.Option(help="Lens to start from, a name or a lens file; default: the recipe's."),
     ] = None,
     search: Annotated[
-        bool, typer.Option(help="Try the recipe's \\[starts]; without, begin at the lens itself.")
+        bool,
+        typer.Option(help="Search the recipe's \\[starts] first, or start at the lens itself."),
     ] = True,
     seed: Annotated[
-        int | None, typer.Option(help="Of weights and draws, not of \\[starts].")
+        int | None,
+        typer.Option(
+            help="Random seed of weights and samples, not of \\[starts]; default: the recipe's."
+        ),
     ] = None,
     pictures: Annotated[
-        int, typer.Option(min=0, help="Draw lens, PSFs and a recovered patch every N steps.")
+        int,
+        typer.Option(
+            min=0, help="Draw lens, PSFs and a restored patch every N steps; 0 draws nothing."
+        ),
     ] = 0,
-    threads: Annotated[int, typer.Option(min=1, help="Threads of torch.")] = 1,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on where a run stopped.")] = False,
+    threads: Annotated[int, typer.Option(min=1, help="Number of torch threads.")] = 1,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue a run that stopped.")] = False,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Design a lens together with the network that undoes its blur (needs torch)."""
+    """Design a lens together with the network that removes its blur (needs torch)."""
     from camkit.cli.design.design_time import require_torch
 
     require_torch("camkit design")
@@ -56,7 +71,7 @@ def design(
     from camkit.models_def.design.run import DesignOptions, DesignRun
 
     if resume and overwrite:
-        raise ContractError("--resume goes on, --overwrite starts anew: give one of them")
+        raise ContractError("--resume continues, --overwrite starts again: use one of them")
     chosen = with_choices(
         read_design(recipe),
         steps=steps,

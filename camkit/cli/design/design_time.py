@@ -30,7 +30,7 @@ def refuse_existing(paths: Iterable[Path | None], *, overwrite: bool) -> None:
     """
     for path in paths:
         if path is not None and path.exists() and not overwrite:
-            raise ContractError(f"{path} exists; say --overwrite or another name")
+            raise ContractError(f"{path} exists; add --overwrite or choose another name")
 
 
 def print_report(report: Mapping[str, object], as_json: bool) -> None:

@@ -18,16 +18,19 @@ NO_PLATE = "none"
 
 def export(
     checkpoints: Annotated[
-        list[Path], typer.Argument(help="One checkpoint per size.", metavar="CHECKPOINT...")
+        list[Path],
+        typer.Argument(help="Checkpoints, one per network size.", metavar="CHECKPOINT..."),
     ],
-    out: Annotated[Path, typer.Option("-o", "--out", help="The bundle (.camkit).")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="Bundle to write (.camkit).")],
     psf: Annotated[
         Path | None,
-        typer.Option(help=f"The frozen PSF; default: {PSF_NAME} beside the first checkpoint."),
+        typer.Option(help=f"PSF of `camkit freeze`; default: {PSF_NAME} beside the checkpoint."),
     ] = None,
     haze: Annotated[
         Path | None,
-        typer.Option(help=f"The haze of its optics; default: {HAZE_NAME} beside it, if any."),
+        typer.Option(
+            help=f"Veiling glare of the optics; default: {HAZE_NAME} beside the PSF, if any."
+        ),
     ] = None,
     stress_psf: Annotated[
         Path | None,
@@ -35,7 +38,9 @@ def export(
     ] = None,
     stress_haze: Annotated[
         Path | None,
-        typer.Option(help=f"The haze beside them; default: {STRESS_HAZE_NAME} there, if any."),
+        typer.Option(
+            help=f"Veiling glare of those kernels; default: {STRESS_HAZE_NAME} there, if any."
+        ),
     ] = None,
     freeze: Annotated[
         Path | None,
@@ -43,24 +48,24 @@ def export(
     ] = None,
     plan: Annotated[
         Path | None,
-        typer.Option(help=f"Calibration of `adaptive`; default: {PLAN_NAME} there, if any."),
+        typer.Option(
+            help=f"Calibration of --quality adaptive; default: {PLAN_NAME} there, if any."
+        ),
     ] = None,
     prescription: Annotated[
         Path | None,
-        typer.Option(help="The lens (.toml or .zmx); default: the one of the checkpoint."),
+        typer.Option(help="Lens (.toml or .zmx); default: the checkpoint's."),
     ] = None,
     plate: Annotated[
         str | None,
-        typer.Option(
-            help="The plate (.toml, or a name), or 'none'; default: the one of the checkpoint."
-        ),
+        typer.Option(help="Plate (.toml or name), or 'none'; default: the checkpoint's."),
     ] = None,
     version: Annotated[str, typer.Option(help="Semantic version of the bundle.")] = "0.1.0",
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Pack checkpoints, PSF, lens or plate, and prove the result (needs torch)."""
+    """Pack checkpoints, PSF, lens or plate into a bundle and verify it (needs torch)."""
     from camkit.cli.design.design_time import print_report, refuse_existing, require_torch
     from camkit.errors import ContractError
 
@@ -70,7 +75,7 @@ def export(
     frozen = psf or _beside(folder, PSF_NAME)
     if frozen is None:
         raise ContractError(
-            f"there is no {folder / PSF_NAME}; make it with `camkit freeze`, or say --psf"
+            f"there is no {folder / PSF_NAME}; make it with `camkit freeze`, or add --psf"
         )
     stress = stress_psf or _beside(folder, STRESS_NAME)
     beside = None if stress is None else _beside(stress.parent, STRESS_HAZE_NAME)

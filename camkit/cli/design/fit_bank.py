@@ -10,22 +10,25 @@ from camkit.progress import note, working
 
 
 def fit_bank(
-    recipe: Annotated[Path, typer.Argument(help="The recipe (TOML).")],
+    recipe: Annotated[Path, typer.Argument(help="Training recipe (.toml) of the camera.")],
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="The recipe with its numbers (TOML).")
+        Path,
+        typer.Option("-o", "--output", help="Recipe with the fitted numbers to write (.toml)."),
     ],
     data: Annotated[
-        Path | None, typer.Option(help="Folder of pictures; without it procedural scenes only.")
+        Path | None, typer.Option(help="Folder of pictures; default: procedural scenes.")
     ] = None,
-    samples: Annotated[int, typer.Option(help="Samples that are photographed.")] = 240,
-    steps: Annotated[int, typer.Option(help="Steps of the descent.")] = 160,
-    seed: Annotated[int, typer.Option(min=0, help="Of samples and descent.")] = 0,
-    cache_dir: Annotated[Path, typer.Option(help="Folder for traced kernels.")] = Path("runs"),
+    samples: Annotated[int, typer.Option(help="Number of simulated samples.")] = 240,
+    steps: Annotated[int, typer.Option(help="Number of optimization steps.")] = 160,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed of samples and optimization.")] = 0,
+    cache_dir: Annotated[Path, typer.Option(help="Folder that keeps traced kernels.")] = Path(
+        "runs"
+    ),
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Fit the bank that restores all colours together to a recipe's camera (needs torch)."""
+    """Fit the filter bank that restores all colours jointly to a recipe's camera (needs torch)."""
     from camkit.cli.design.design_time import print_report, refuse_existing, require_torch
 
     require_torch("camkit fit-bank")

@@ -30,8 +30,7 @@ def freeze(
     optics: Annotated[
         Path,
         typer.Argument(
-            help="A lens (.toml or .zmx), a plate (.toml, a name, or a bundle with one), or a "
-            "measured PSF (.safetensors).",
+            help="Lens (.toml, .zmx), plate (.toml, name, bundle) or measured PSF (.safetensors).",
             metavar="OPTICS",
         ),
     ],
@@ -44,60 +43,75 @@ def freeze(
     *,
     out: Annotated[
         Path,
-        typer.Option("-o", "--out", help="The frozen PSF (.safetensors), or the unit (.toml)."),
+        typer.Option(
+            "-o",
+            "--out",
+            help="PSF to write (.safetensors), or with --unit the camera body (.toml).",
+        ),
     ],
     unit: Annotated[
-        bool, typer.Option("--unit", help="Measure the focus of the unit that took CAPTURES.")
+        bool,
+        typer.Option("--unit", help="Measure the focus of the camera body that took CAPTURES."),
     ] = False,
     recipe: Annotated[
         Path | None,
-        typer.Option(help="Recipe (TOML) with the sensor and its Wiener bank; default: duet's."),
+        typer.Option(help="Recipe (.toml) with the sensor and its Wiener bank; default: duet's."),
     ] = None,
     depths_mm: Annotated[
         str | None,
-        typer.Option(help="Object distances, near to far, such as 500,700,1500; default: lens's."),
+        typer.Option(
+            help="Object distances in mm, near to far, such as 500,700,1500; default: the lens's."
+        ),
     ] = None,
-    limit_db: Annotated[float, typer.Option(help="Mean loss allowed for the samples.")] = LIMIT_DB,
+    limit_db: Annotated[
+        float, typer.Option(help="Largest mean loss in dB from storing fewer PSF samples.")
+    ] = LIMIT_DB,
     energy: Annotated[
         float | None,
         typer.Option(
-            help="Least share of the light of a colour inside the kernels; default: 0.995, of a "
-            "plate 0.999 or what the largest side holds."
+            help="Least share of each colour's light inside the kernels; default: 0.995, plates "
+            "0.999."
         ),
     ] = None,
     max_side_px: Annotated[
         int | None,
-        typer.Option(help="Largest side of a kernel, odd; default: 151, of a plate 401."),
+        typer.Option(help="Largest kernel side in px, odd; default: 151, plates 401."),
     ] = None,
     focus_um: Annotated[
         str | None,
         typer.Option(
-            help="Also freeze kernels with the sensor moved so far to both sides, for units; "
-            "'auto': what nearly all fabricated copies need."
+            help="Also store kernels for a sensor shifted by up to this many um, or 'auto'; "
+            "default: none."
         ),
     ] = None,
     haze: Annotated[
         Path | None,
         typer.Option(
-            help="Freeze the peaks of a lens as core kernels, and write the light beside them "
-            "there (.safetensors)."
+            help="Store only sharp peaks as kernels; write the veiling glare to this file "
+            "(.safetensors)."
         ),
     ] = None,
     stress_out: Annotated[
-        Path | None, typer.Option(help="Also write kernels off the design point there.")
+        Path | None,
+        typer.Option(help="Also write kernels off the design point to this file (.safetensors)."),
     ] = None,
     stress_haze: Annotated[
         Path | None,
-        typer.Option(help="With --haze and --stress-out: the haze at those distances."),
+        typer.Option(
+            help="With --haze and --stress-out: also write the veiling glare of those kernels."
+        ),
     ] = None,
     report: Annotated[
-        Path | None, typer.Option(help="Also write the report there, as JSON for `export`.")
+        Path | None, typer.Option(help="Also write the report for `export` to this file (.json).")
     ] = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Keep as few PSF samples of a lens or a plate as the stated loss allows (needs torch)."""
+    """Compute the PSF of a lens or a plate with as few samples as the loss allows (needs torch).
+
+    With --unit nothing is frozen: the focus of the camera body that took CAPTURES is measured.
+    """
     from camkit.cli.design.design_time import print_report, refuse_existing, require_torch
 
     refuse_existing([out, haze, stress_out, stress_haze, report], overwrite=overwrite)
@@ -133,7 +147,9 @@ def freeze(
     sensor, bank = _camera_of(recipe)
     found = read_optics(optics)
     if (stress_haze is None) != (haze is None or stress_out is None):
-        raise ContractError("of a lens with a haze, --stress-out and --stress-haze go together")
+        raise ContractError(
+            "with --haze, --stress-out and --stress-haze go together; else omit --stress-haze"
+        )
     if haze is not None:
         chosen = {
             "--depths-mm": depths_mm is not None,
@@ -143,7 +159,7 @@ def freeze(
             "--focus-um": focus_um is not None,
         }
         if named := [name for name, said in chosen.items() if said]:
-            raise ContractError(f"with --haze nothing is chosen; leave {', '.join(named)} out")
+            raise ContractError(f"--haze conflicts with {', '.join(named)}")
         stress = None if stress_out is None or stress_haze is None else (stress_out, stress_haze)
         told = _freeze_hazy(found, (out, haze), stress, sensor)
         _report(told, report, json_)
@@ -193,7 +209,7 @@ def _freeze_hazy(
     from camkit.models_def.optics.thin.nearer import freeze_distances
 
     if not isinstance(optics, LensOptics):
-        raise UnsupportedError("only a lens is frozen as core and haze; leave --haze out")
+        raise UnsupportedError("--haze is for lenses only; leave it out")
     frozen, report = freeze_hazy(optics.lens, sensor, tell=note)
     told = report.to_json()
     if stress is not None:

@@ -9,24 +9,30 @@ from camkit.cli.choices import Debug, Json, Overwrite
 
 
 def freeze_norms(
-    recipe: Annotated[Path, typer.Argument(help="The recipe (TOML) of the checkpoint.")],
-    checkpoint: Annotated[Path, typer.Argument(help="A network with instance norms.")],
+    recipe: Annotated[Path, typer.Argument(help="Recipe (.toml) of the checkpoint.")],
+    checkpoint: Annotated[
+        Path, typer.Argument(help="Checkpoint of a network with instance norms (.pt).")
+    ],
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="The checkpoint with constants (.pt).")
+        Path, typer.Option("-o", "--output", help="Checkpoint with constant norms to write (.pt).")
     ],
     data: Annotated[
-        Path | None, typer.Option(help="Folder of pictures to calibrate on; default: procedural.")
+        Path | None,
+        typer.Option(help="Folder of calibration pictures; default: procedural scenes."),
     ] = None,
     valid: Annotated[
-        Path | None, typer.Option(help="Folder to state the cost on; default: procedural.")
+        Path | None,
+        typer.Option(help="Folder of pictures to measure the loss on; default: procedural scenes."),
     ] = None,
-    samples: Annotated[int, typer.Option(help="Samples to calibrate on.")] = 64,
-    cache_dir: Annotated[Path, typer.Option(help="Folder for traced kernels.")] = Path("runs"),
+    samples: Annotated[int, typer.Option(help="Number of calibration samples.")] = 64,
+    cache_dir: Annotated[Path, typer.Option(help="Folder that keeps traced kernels.")] = Path(
+        "runs"
+    ),
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Make the instance norms of a network constants, and say what that costs (needs torch)."""
+    """Replace the instance norms of a network with constants and report the loss (needs torch)."""
     from camkit.cli.design.design_time import print_report, refuse_existing, require_torch
 
     require_torch("camkit freeze-norms")

@@ -11,28 +11,32 @@ from camkit.progress import note, working
 
 
 def prepare(
-    recipe: Annotated[Path, typer.Argument(help="The recipe (TOML) of a camera with a haze.")],
+    recipe: Annotated[Path, typer.Argument(help="Recipe (.toml) of a camera with veiling glare.")],
     psf: Annotated[
-        Path | None, typer.Option(help=f"Core kernels; default: {PSF_NAME} in --out-dir.")
+        Path | None,
+        typer.Option(help=f"Kernels of the sharp peaks; default: {PSF_NAME} in --out-dir."),
     ] = None,
     haze: Annotated[
-        Path | None, typer.Option(help=f"The haze beside them; default: {HAZE_NAME} there.")
+        Path | None,
+        typer.Option(help=f"Veiling glare of the optics; default: {HAZE_NAME} in --out-dir."),
     ] = None,
     data: Annotated[
-        Path | None, typer.Option(help="Folder of pictures; without it procedural scenes only.")
+        Path | None, typer.Option(help="Folder of pictures; default: procedural scenes.")
     ] = None,
     valid: Annotated[
-        Path | None, typer.Option(help="Folder of pictures to validate on; default: procedural.")
+        Path | None, typer.Option(help="Folder of validation pictures; default: procedural scenes.")
     ] = None,
     out_dir: Annotated[
-        Path, typer.Option(help="Folder of the runs; frames lie in NAME_frames below it.")
+        Path, typer.Option(help="Folder of the runs; frames go into NAME_frames below it.")
     ] = Path("runs"),
-    seed: Annotated[int, typer.Option(min=0, help="Of scenes, places and noise.")] = 0,
+    seed: Annotated[
+        int, typer.Option(min=0, help="Random seed of scenes, positions and noise.")
+    ] = 0,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Photograph whole frames and take their haze away, for `train` (needs torch)."""
+    """Simulate whole frames and remove their veiling glare, for `train` (needs torch)."""
     from camkit.cli.design.design_time import print_report, refuse_existing, require_torch
 
     require_torch("camkit prepare")

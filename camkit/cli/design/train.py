@@ -22,60 +22,74 @@ if TYPE_CHECKING:
 
 def train(
     context: typer.Context,
-    recipe: Annotated[Path, typer.Argument(help="The recipe (TOML).")],
-    size: Annotated[str, typer.Option(help="Which of the recipe's networks: S, M, ...")] = "M",
+    recipe: Annotated[Path, typer.Argument(help="Training recipe (.toml).")],
+    size: Annotated[
+        str, typer.Option(help="Network of the recipe to train, such as S or M.")
+    ] = "M",
     role: Annotated[
-        str | None, typer.Option(help="Of which role; needed where a recipe has several.")
+        str | None, typer.Option(help="Role of the network, required if the recipe has several.")
     ] = None,
     data: Annotated[
-        Path | None, typer.Option(help="Folder of pictures; without it procedural scenes only.")
+        Path | None, typer.Option(help="Folder of pictures; default: procedural scenes.")
     ] = None,
     valid: Annotated[
-        Path | None, typer.Option(help="Folder of pictures to validate on; default: procedural.")
+        Path | None, typer.Option(help="Folder of validation pictures; default: procedural scenes.")
     ] = None,
     steps: Annotated[
-        int | None, typer.Option(help="Steps of the whole schedule; default: the recipe's.")
+        int | None,
+        typer.Option(help="Number of steps of the whole schedule; default: the recipe's."),
     ] = None,
     max_minutes: Annotated[
         float | None,
-        typer.Option(help="Wall time, decay included; default: until the steps are done."),
+        typer.Option(help="Limit of wall time in minutes, decay included; default: no limit."),
     ] = None,
     max_cpu_minutes: Annotated[
         float | None,
-        typer.Option(help="CPU time, processes that make samples included; likewise."),
+        typer.Option(
+            help="Limit of CPU time in minutes, all processes included; default: no limit."
+        ),
     ] = None,
     out_dir: Annotated[Path, typer.Option(help="Folder for checkpoint, log and samples.")] = Path(
         "runs"
     ),
     start: Annotated[
         Path | None,
-        typer.Option(help="First weights: a checkpoint or bundle of any camera, same network."),
+        typer.Option(
+            help="Checkpoint or bundle with initial weights of the same network; default: "
+            "random weights."
+        ),
     ] = None,
     fine_tune: Annotated[
         Path | None,
-        typer.Option(help="Fine-tune this checkpoint or bundle against discriminators."),
+        typer.Option(help="Checkpoint or bundle to fine-tune with discriminators."),
     ] = None,
     vgg: Annotated[
         Path | None,
-        typer.Option(help="VGG-19 weights (.pth or .safetensors), where a loss looks at them."),
+        typer.Option(
+            help="VGG-19 weights (.pth or .safetensors), for losses that compare features."
+        ),
     ] = None,
     sharp: Annotated[
         Path | None,
-        typer.Option(help="Folder of sharp pictures without captures, for a critic to know."),
+        typer.Option(
+            help="Folder of sharp pictures without captures, for the critic of an adversarial loss."
+        ),
     ] = None,
     pairs: Annotated[
         Path | None,
-        typer.Option(help="Folder of real pairs, where the loss or --fine-tune takes them."),
+        typer.Option(help="Folder of real pairs, for --fine-tune and losses that use pairs."),
     ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint.")] = False,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Continue from the checkpoint in --out-dir.")
+    ] = False,
     overwrite: Overwrite = False,
-    threads: Annotated[int, typer.Option(help="Threads of torch.")] = 1,
-    workers: Annotated[int, typer.Option(help="Processes that make samples.")] = 1,
-    device: Annotated[str, typer.Option(help="cpu or cuda.")] = "cpu",
+    threads: Annotated[int, typer.Option(help="Number of torch threads.")] = 1,
+    workers: Annotated[int, typer.Option(help="Number of processes that make samples.")] = 1,
+    device: Annotated[str, typer.Option(help="Device to train on: cpu or cuda.")] = "cpu",
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Train one network of a recipe as its camera will run it (needs torch)."""
+    """Train one restoration network of a recipe (needs torch)."""
     from camkit.cli.design.design_time import print_report, require_torch
 
     require_torch("camkit train")

@@ -21,61 +21,95 @@ def bench(
         list[str] | None, typer.Argument(help="Bundle NAMEs or PATHs.", metavar="[BUNDLE]...")
     ] = None,
     all_: Annotated[
-        bool, typer.Option("--all", help="All built-in cameras that photograph, of a stated size.")
+        bool,
+        typer.Option(
+            "--all", help="Use all built-in cameras that photograph and state a sensor size."
+        ),
     ] = False,
     data: Annotated[
         Path | None,
-        typer.Option(help="Folder of sharp pictures, EXR and HDR too; default: golden cases."),
+        typer.Option(help="Folder of sharp pictures, also EXR and HDR; default: the golden cases."),
     ] = None,
     saturate: Annotated[
-        float | None, typer.Option(help="Expose them so that this share saturates, such as 0.015.")
+        float | None,
+        typer.Option(
+            help="Share of pixels to saturate by exposure, such as 0.015; default: as they are."
+        ),
     ] = None,
     nits_per_unit: Annotated[
         float | None,
-        typer.Option(help="cd/m^2 of white, for what the eye sees; default 39.0625."),
+        typer.Option(help="Luminance of white in cd/m^2, for HDR metrics; default: 39.0625."),
     ] = None,
-    images: Annotated[int | None, typer.Option(help="Only the first N of them.")] = None,
-    out_dir: Annotated[Path, typer.Option(help="Folder of table, chart and page.")] = Path("bench"),
-    sizes: Annotated[str | None, typer.Option(help="Such as S,M,L; default: all.")] = None,
+    images: Annotated[
+        int | None, typer.Option(help="Number of pictures to use; default: all.")
+    ] = None,
+    out_dir: Annotated[Path, typer.Option(help="Folder for table, chart and page.")] = Path(
+        "bench"
+    ),
+    sizes: Annotated[
+        str | None, typer.Option(help="Network sizes, such as S,M,L; default: all.")
+    ] = None,
     methods: Annotated[
-        str | None, typer.Option(help="Such as net,wiener,develop; default: all.")
+        str | None, typer.Option(help="Methods, such as net,wiener,develop; default: all.")
     ] = None,
     modes: Annotated[
-        str | None, typer.Option(help="exact,fast,whole; default: all three for size M.")
+        str | None,
+        typer.Option(help="Tiling modes of exact,fast,whole; default: all for size M, else exact."),
     ] = None,
-    dtypes: Annotated[str | None, typer.Option(help="fp32,fp16; default: both for size M.")] = None,
+    dtypes: Annotated[
+        str | None,
+        typer.Option(help="Precisions of fp32,fp16; default: both for size M, else fp32."),
+    ] = None,
     providers: Annotated[
-        str | None, typer.Option(help="cpu,cuda,tensorrt,openvino; default: those there.")
+        str | None,
+        typer.Option(
+            help="Providers of cpu,cuda,tensorrt,openvino; default: all present for size M, "
+            "else cpu."
+        ),
     ] = None,
     threads: Annotated[
-        str | None, typer.Option(help="1,2,...; default: all, and 1 for size M.")
+        str | None,
+        typer.Option(help="Thread counts, such as 1,2; default: all threads, for size M also 1."),
     ] = None,
     tile: Annotated[
-        str | None, typer.Option(help="Sides of tiles in px; default: the planned one.")
+        str | None, typer.Option(help="Tile sides in px, such as 256,512; default: as planned.")
     ] = None,
     reference: Annotated[
         list[str] | None,
-        typer.Option(help="Another bundle of the same camera to stand beside; may be repeated."),
+        typer.Option(help="Another bundle of the same camera to compare with; may be repeated."),
     ] = None,
     capture: Annotated[
-        Path | None, typer.Option(help="A capture to time; default: a procedural one.")
+        Path | None, typer.Option(help="Capture to time; default: a procedural one.")
     ] = None,
     photo: Annotated[
-        Path | None, typer.Option(help="A sharp picture that every camera takes for it.")
+        Path | None,
+        typer.Option(help="Sharp picture that every camera photographs for the timing."),
     ] = None,
-    width: Annotated[int | None, typer.Option(help="Of the capture that is made, px.")] = None,
-    height: Annotated[int | None, typer.Option(help="Likewise; default: the sensor.")] = None,
-    repeat: Annotated[int | None, typer.Option(help="Processes per row; default 3.")] = None,
+    width: Annotated[
+        int | None,
+        typer.Option(help="Width of the procedural capture in px; default: the sensor's."),
+    ] = None,
+    height: Annotated[
+        int | None,
+        typer.Option(help="Height of the procedural capture in px; default: the sensor's."),
+    ] = None,
+    repeat: Annotated[
+        int | None, typer.Option(help="Processes per row; default: 3, or 2 with --quick.")
+    ] = None,
     quick: Annotated[
-        bool, typer.Option("--quick", help="A small capture, few rows, two processes each.")
+        bool,
+        typer.Option("--quick", help="Use a small capture, few rows and two processes per row."),
     ] = False,
     work_dir: Annotated[
-        Path | None, typer.Option(help="Keeps captures and traced PSFs between runs.")
+        Path | None,
+        typer.Option(
+            help="Folder that keeps captures and traced PSFs; default: a temporary folder."
+        ),
     ] = None,
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Chart the speed of a bundle against its accuracy, beside classical methods."""
+    """Measure speed and accuracy of bundles and of classical methods, as table, chart and page."""
     from camkit.report.bench.settings import (
         DEFAULT_REPEAT,
         QUICK_METHODS,

@@ -11,18 +11,17 @@ from camkit.cli.say import say
 
 
 def check(
-    bundle: Annotated[str, typer.Argument(help="Bundle NAME or PATH.", metavar="BUNDLE")],
+    bundle: Annotated[str, typer.Argument(help="Camera bundle, NAME or PATH.", metavar="BUNDLE")],
     level: Annotated[
         str,
         typer.Option(
-            help="all, or one of schema, hash, graph, golden, tiling, range, laws "
-            "(with the layers it stands on)."
+            help="Tests to run: all, or up to schema, hash, graph, golden, tiling, range or laws."
         ),
     ] = "all",
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Prove a bundle: members, graphs, golden cases, tiled = whole, range, laws of a picture."""
+    """Verify a bundle: members, graphs, golden cases, tiling, range and laws of a picture."""
     from camkit.bundle.reader import find_bundle
     from camkit.runtime.proof.check import check_bundle
     from camkit.runtime.proof.golden_run import case_work

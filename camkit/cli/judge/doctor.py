@@ -37,7 +37,7 @@ def doctor(
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Print versions, threads, providers and bundles, and try the RAW decoder."""
+    """Print versions, threads, providers and bundles, and test the RAW decoder."""
     report = examine()
     if json_:
         say(json.dumps(report, indent=2))

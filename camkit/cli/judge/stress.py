@@ -18,35 +18,41 @@ if TYPE_CHECKING:
 def stress(
     bundle: Annotated[
         str | None,
-        typer.Argument(help="Bundle NAME or PATH; --list needs none.", metavar="BUNDLE"),
+        typer.Argument(help="Camera bundle, NAME or PATH; optional with --list.", metavar="BUNDLE"),
     ] = None,
     scenarios: Annotated[
-        str | None, typer.Option(help="Some scenarios, NAME,NAME; default: all. See --list.")
+        str | None, typer.Option(help="Scenarios of --list to run, NAME,NAME; default: all.")
     ] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Few values and two scenes.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Use few values and two scenes.")] = False,
     data: Annotated[
-        Path | None, typer.Option(help="Folder of sharp pictures instead of procedural scenes.")
+        Path | None, typer.Option(help="Folder of sharp pictures; default: procedural scenes.")
     ] = None,
-    sizes: Annotated[str | None, typer.Option(help="Sizes of the network, such as S,M.")] = None,
-    scenes: Annotated[int | None, typer.Option(min=1, help="Number of scenes.")] = None,
+    sizes: Annotated[
+        str | None, typer.Option(help="Network sizes, such as S,M; default: all.")
+    ] = None,
+    scenes: Annotated[
+        int | None, typer.Option(min=1, help="Number of scenes; default: 8, or 2 with --quick.")
+    ] = None,
     compare: Annotated[
-        str | None, typer.Option(help="Another bundle of this camera: the curves before.")
+        str | None,
+        typer.Option(help='Another bundle of this camera, drawn for comparison as "before".'),
     ] = None,
     out_dir: Annotated[
-        Path | None, typer.Option(help="Folder for page, results and the journal (resumes).")
+        Path | None,
+        typer.Option(help="Folder for page, results and journal, to resume from; default: none."),
     ] = None,
     write: Annotated[
         bool, typer.Option("--write", help="Store the measured ranges in the bundle.")
     ] = False,
     list_: Annotated[
-        bool, typer.Option("--list", help="Name the scenarios, those of a BUNDLE if given.")
+        bool, typer.Option("--list", help="List the scenarios (of BUNDLE, if given) and stop.")
     ] = False,
     json_: Annotated[
         bool, typer.Option("--json", help="Print the results as one JSON list.")
     ] = False,
     _debug: Debug = False,
 ) -> None:
-    """Turn one knob after the other until the networks no longer help, and say where that is."""
+    """Sweep one degradation at a time and report where the network stops helping."""
     from camkit.bundle.reader import find_bundle, open_bundle
     from camkit.report.stress.run import StressOptions, run_stress, scenarios_for, write_envelope
     from camkit.report.stress.scenario import choose

@@ -8,6 +8,7 @@ import typer
 
 from camkit.cli.choices import Debug, Json
 from camkit.cli.say import say
+from camkit.cli.use.mosaic import BlackLevel, MosaicCfa, WhiteLevel, mosaic_options
 from camkit.errors import ContractError
 
 if TYPE_CHECKING:
@@ -20,20 +21,19 @@ LONGEST: Final = 300
 
 def info(
     file: Annotated[
-        str | None, typer.Argument(help="Bundle NAME or PATH, or a capture.", metavar="FILE")
+        str | None,
+        typer.Argument(help="Bundle (NAME or PATH) or capture to describe.", metavar="FILE"),
     ] = None,
     schema: Annotated[
-        bool, typer.Option("--schema", help="Print the JSON schema of the manifest.")
+        bool, typer.Option("--schema", help="Print the JSON schema of the bundle manifest.")
     ] = False,
-    mosaic: Annotated[
-        str | None, typer.Option(help="Headerless mosaic: RGGB, BGGR, GRBG or GBRG.")
-    ] = None,
-    black_level: Annotated[float | None, typer.Option(help="Black, DN, not the file's.")] = None,
-    white_level: Annotated[float | None, typer.Option(help="White, DN, not the file's.")] = None,
+    mosaic: MosaicCfa = None,
+    black_level: BlackLevel = None,
+    white_level: WhiteLevel = None,
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Say what a bundle or a capture is."""
+    """Print what a bundle or a capture contains."""
     if schema:
         from camkit.bundle.manifest import manifest_schema
 
@@ -41,7 +41,6 @@ def info(
         return
     if file is None:
         raise ContractError("give a bundle or a capture, or --schema")
-    from camkit.cli.use.mosaic import mosaic_options
 
     options = mosaic_options(mosaic, black_level, white_level)
     facts = _describe(file, options)

@@ -44,5 +44,5 @@ def _options() -> list[tuple[str, KindOption]]:
 
 
 def _help(kind: str, option: KindOption) -> str:
-    choices = f" {', '.join(option.choices)}." if option.choices else ""
-    return f"{kind}: {option.text}{choices}"
+    choices = f": {', '.join(option.choices)}" if option.choices else ""
+    return f"{option.text.rstrip('.')} ({kind}{choices})."

@@ -9,6 +9,7 @@ import typer
 from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.cli.exit_code import ExitCode
 from camkit.cli.say import say
+from camkit.cli.use.mosaic import BlackLevel, MosaicCfa, WhiteLevel, mosaic_options
 from camkit.errors import CamkitError, ContractError
 from camkit.progress import counted
 
@@ -19,44 +20,39 @@ if TYPE_CHECKING:
 Times = Annotated[
     str | None,
     typer.Option(
-        help="Exposure times: seconds separated by commas in the order of FILES, or a file with "
-        "lines NAME SECONDS, which may lie in each folder; default: what the files state."
+        help="Exposure times in s, such as 1,0.5, or a file of NAME SECONDS; default: from "
+        "the files."
     ),
-]
-MosaicCfa = Annotated[
-    str | None, typer.Option("--mosaic", help="FILES are headerless mosaics, such as RGGB.")
-]
-BlackLevel = Annotated[
-    float | None, typer.Option(help="Of a headerless mosaic, or in place of a RAW file's.")
-]
-WhiteLevel = Annotated[
-    float | None, typer.Option(help="Of a headerless mosaic, or in place of a RAW file's.")
 ]
 
 
 def merge(
     files: Annotated[
         list[Path],
-        typer.Argument(help="The frames: RAW, or pictures; or folders of them, a bracket each."),
+        typer.Argument(help="Frames of one bracket (RAW or pictures), or one folder per bracket."),
     ],
     out: Annotated[
-        Path, typer.Option("-o", "--out", help="The EXR to write; of several brackets a folder.")
+        Path, typer.Option("-o", "--out", help="EXR to write; for several brackets a folder.")
     ],
     times: Times = None,
     response: Annotated[
         str | None,
         typer.Option(
-            help="What codes stand for: linear, srgb or estimate; default: estimate for 8-bit "
-            "pictures, linear for all else."
+            help="Response curve: linear, srgb or estimate; default: estimate for 8 bits, else "
+            "linear."
         ),
     ] = None,
     reference: Annotated[
         str | None,
-        typer.Option(help="Name of the frame whose white is 1.0; default: the middle exposure."),
+        typer.Option(
+            help="Name of the frame whose white level is 1.0; default: the middle exposure."
+        ),
     ] = None,
     preview: Annotated[
         bool,
-        typer.Option("--preview", help="Also a small tone-mapped OUT.preview.jpg (Drago 2003)."),
+        typer.Option(
+            "--preview", help="Also write a small tone-mapped OUT.preview.jpg (Drago 2003)."
+        ),
     ] = False,
     mosaic: MosaicCfa = None,
     black_level: BlackLevel = None,
@@ -65,8 +61,11 @@ def merge(
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Merge frames of different exposure, each sample weighted by its noise, to a linear EXR."""
-    from camkit.cli.use.mosaic import mosaic_options
+    """Merge exposures into one linear EXR, each sample weighted by its noise.
+
+    --times takes seconds separated by commas in the order of FILES, or a file with lines
+    NAME SECONDS, which may lie in each folder.
+    """
     from camkit.runtime.merging.brackets import find_brackets, merged_paths
     from camkit.runtime.merging.result import merge_to_exr
     from camkit.runtime.merging.survey import survey
@@ -79,7 +78,7 @@ def merge(
     previews = [preview_path(path) if preview else None for path in outs]
     for path in (*outs, *filter(None, previews)):
         if path.exists() and not overwrite:
-            raise ContractError(f"{path} exists; say --overwrite or another name")
+            raise ContractError(f"{path} exists; add --overwrite or choose another name")
     failed = False
     jobs = list(zip(brackets, outs, previews, strict=True))
     for bracket, path, shown in counted(jobs, "merging", "brackets"):

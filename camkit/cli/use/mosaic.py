@@ -1,15 +1,24 @@
-"""What is said of a mosaic in place of its file, shared by the commands that read captures."""
+"""Options of a headerless mosaic and of its levels, shared by the commands that read captures."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 if TYPE_CHECKING:
     from camkit.runtime.capture import MosaicOptions
+
+MosaicCfa = Annotated[
+    str | None,
+    typer.Option("--mosaic", help="CFA of a headerless mosaic: RGGB, BGGR, GRBG or GBRG."),
+]
+BlackLevel = Annotated[float | None, typer.Option(help="Black level in DN; default: the file's.")]
+WhiteLevel = Annotated[float | None, typer.Option(help="White level in DN; default: the file's.")]
 
 
 def mosaic_options(
     cfa: str | None, black_level: float | None, white_level: float | None
 ) -> "MosaicOptions | None":
-    """Give the mosaic options, or None when none of the three is given.
+    """Return the mosaic options, or None when none of the three is given.
 
     Raises:
         ContractError: If they contradict each other, or a pattern comes without its levels.

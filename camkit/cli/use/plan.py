@@ -10,7 +10,7 @@ NOT_PLANNED = frozenset({"dry_run", "jobs", "resume", "overwrite"})
 
 
 def plan(**choices: Any) -> None:
-    """Print what `process` would do with the same options, why, and what it would take."""
+    """Print what `process` would do with the same options, why, and its time and memory."""
     process(**choices, dry_run=True, overwrite=True)
 
 

@@ -10,9 +10,12 @@ from camkit.cli.exit_code import ExitCode
 from camkit.cli.say import say
 from camkit.cli.use.decoding_ahead import decoding_ahead
 from camkit.cli.use.kind_options import with_kind_options
+from camkit.cli.use.mosaic import BlackLevel, MosaicCfa, WhiteLevel, mosaic_options
 from camkit.errors import ContractError
 
-Files = Annotated[list[str], typer.Argument(help="Captures, folders or globs.", metavar="FILES...")]
+Files = Annotated[
+    list[str], typer.Argument(help="Captures, folders or glob patterns.", metavar="FILES...")
+]
 
 
 @with_kind_options
@@ -21,104 +24,149 @@ def process(
     files: Files,
     bundle: Annotated[
         str | None,
-        typer.Option(help="Bundle NAME or PATH; 'none' only develops. Default: the file's own."),
+        typer.Option(
+            help="Camera bundle (NAME, PATH) or 'none' to only develop; default: the capture's."
+        ),
     ] = None,
     size: Annotated[
         str | None,
-        typer.Option(help="Size of network, such as S, M, L. Default: the quality's."),
+        typer.Option(help="Network size, such as S, M or L; default: the size of --quality."),
     ] = None,
     quality: Quality = "exact",
     max_seconds: MaxSeconds = None,
     max_error_db: MaxErrorDb = None,
-    out_dir: Annotated[Path, typer.Option(help="Folder for the pictures.")] = Path(),
+    out_dir: Annotated[Path, typer.Option(help="Folder for pictures and sidecars.")] = Path(),
     keep_folders: Annotated[
-        bool, typer.Option("--keep-folders", help="Pictures in folders as the captures are.")
+        bool,
+        typer.Option("--keep-folders", help="Repeat the folders of the captures below --out-dir."),
     ] = False,
     format_: Annotated[
         str | None,
-        typer.Option("--format", help="exr, tiff, png, jpeg (jpg) or dng. Default: exr."),
+        typer.Option(
+            "--format", help="File format: exr, tiff, png, jpeg (jpg) or dng; default: exr."
+        ),
     ] = None,
     preview: Annotated[
         bool,
-        typer.Option("--preview", help="Also a small tone-mapped NAME.preview.jpg (Drago 2003)."),
+        typer.Option(
+            "--preview", help="Also write a small tone-mapped NAME.preview.jpg (Drago 2003)."
+        ),
     ] = False,
     jpeg_quality: Annotated[
-        int | None, typer.Option(help="With --format jpeg: 1..100. Default: 92.")
+        int | None, typer.Option(help="JPEG quality, 1 to 100, with --format jpeg; default: 92.")
     ] = None,
     strip_metadata: Annotated[
         bool,
-        typer.Option("--strip-metadata", help="Leave out camera, lens, date, exposure and place."),
+        typer.Option(
+            "--strip-metadata", help="Omit the metadata: camera, lens, date, exposure and location."
+        ),
     ] = False,
     color: Annotated[
-        str, typer.Option(help="rec709, acescg or camera; a DNG is camera.")
+        str,
+        typer.Option(
+            help="Colour space: rec709, acescg or camera; a DNG always has camera colour."
+        ),
     ] = "rec709",
-    wb: Annotated[str, typer.Option(help="'camera' or gains R,G,B.")] = "camera",
-    exposure: Annotated[float, typer.Option(help="Exposure in EV.")] = 0.0,
+    wb: Annotated[
+        str, typer.Option(help="White balance: camera, or gains R,G,B relative to green.")
+    ] = "camera",
+    exposure: Annotated[float, typer.Option(help="Exposure compensation in EV.")] = 0.0,
     demosaic: Annotated[
-        str | None, typer.Option(help="fast or quality; default: the bundle's.")
+        str | None, typer.Option(help="Demosaicking: fast or quality; default: the bundle's.")
     ] = None,
-    linear: Annotated[bool, typer.Option("--linear", help="TIFF and PNG without curve.")] = False,
-    vignetting: Annotated[bool, typer.Option(help="Divide by relative illumination.")] = True,
-    undistort: Annotated[bool, typer.Option(help="Undo the lens's distortion.")] = True,
-    mosaic: Annotated[
-        str | None, typer.Option(help="Headerless mosaic: RGGB, BGGR, GRBG or GBRG.")
-    ] = None,
-    black_level: Annotated[float | None, typer.Option(help="Black, DN, not the file's.")] = None,
-    white_level: Annotated[float | None, typer.Option(help="White, DN, not the file's.")] = None,
+    linear: Annotated[
+        bool, typer.Option("--linear", help="Write TIFF and PNG linear, without the sRGB curve.")
+    ] = False,
+    vignetting: Annotated[
+        bool, typer.Option(help="Correct vignetting (divide by relative illumination).")
+    ] = True,
+    undistort: Annotated[bool, typer.Option(help="Correct the lens distortion.")] = True,
+    mosaic: MosaicCfa = None,
+    black_level: BlackLevel = None,
+    white_level: WhiteLevel = None,
     depth_m: DepthM = None,
     method: Annotated[
         str | None,
         typer.Option(
-            help="Way of a stage: net, wiener, rl, admm-tv, develop; of photons log, lsq, linear."
+            help="Restoration: net, wiener, rl, admm-tv, develop; SPAD: log, lsq, linear; "
+            "default: the best."
         ),
     ] = None,
-    mode: Annotated[str, typer.Option(help="exact, fast or whole.")] = "exact",
+    mode: Annotated[
+        str,
+        typer.Option(help="Tiling: exact, fast (smaller halo, small error) or whole (one window)."),
+    ] = "exact",
     unit: Annotated[
-        Path | None, typer.Option(help="The camera body: a TOML of camkit freeze --unit.")
+        Path | None, typer.Option(help="Measured camera body (.toml of `camkit freeze --unit`).")
     ] = None,
     origin_px: Annotated[
-        str | None, typer.Option(help="X,Y on the sensor of a crop that records no place.")
+        str | None,
+        typer.Option(
+            help="Position X,Y of a crop on the sensor in px; default: as recorded, else a full "
+            "frame."
+        ),
     ] = None,
     assume: Annotated[
-        str | None, typer.Option(help="centre or scale, for a picture that is no full frame.")
+        str | None,
+        typer.Option(
+            help="Placement of a picture that does not match the sensor size: centre or scale."
+        ),
     ] = None,
     force_bundle: Annotated[
-        bool, typer.Option("--force-bundle", help="Also where a capture names another bundle.")
+        bool,
+        typer.Option(
+            "--force-bundle", help="Use --bundle even if the capture names another bundle."
+        ),
     ] = False,
     on_unsafe: Annotated[
         str,
-        typer.Option(help="Outside the bundle's measured range: warn, fallback (Wiener) or fail."),
+        typer.Option(
+            help="Action outside the bundle's measured range: warn, fallback (Wiener filter) or "
+            "fail."
+        ),
     ] = "warn",
     laws: Annotated[
         str,
         typer.Option(
-            help="stated or enforce: keep the filter's brightness where no bundle bounds a network."
+            help="Brightness bound on the network: stated (if the bundle has one) or enforce "
+            "(always)."
         ),
     ] = "stated",
     strength: Annotated[
-        float, typer.Option(help="How much of what a network adds is kept, 0 to 1.")
+        float, typer.Option(help="Share of the network's correction that is kept, 0 to 1.")
     ] = 1.0,
-    max_mem: Annotated[str | None, typer.Option(help="Memory cap, such as 2G or 900M.")] = None,
-    threads: Annotated[int | None, typer.Option(help="Threads in all.")] = None,
-    jobs: Annotated[int, typer.Option(help="Captures at once.")] = 1,
+    max_mem: Annotated[
+        str | None, typer.Option(help="Memory limit, such as 2G or 900M; default: 930M.")
+    ] = None,
+    threads: Annotated[
+        int | None, typer.Option(help="Total number of threads; default: all available.")
+    ] = None,
+    jobs: Annotated[int, typer.Option(help="Number of captures processed at once.")] = 1,
     scheduler: Annotated[
         str | None, typer.Option(help="Address of a dask scheduler, such as tcp://HOST:8786.")
     ] = None,
     workers: Annotated[
-        int | None, typer.Option(help="Worker processes of dask on this machine.")
+        int | None, typer.Option(help="Number of dask worker processes to start on this machine.")
     ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Skip what is proved done.")] = False,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace pictures that exist.")
+    resume: Annotated[
+        bool,
+        typer.Option("--resume", help="Skip captures whose sidecar proves that they are done."),
     ] = False,
-    json_: Annotated[bool, typer.Option("--json", help="One JSON object per file.")] = False,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Print the plan, do nothing.")] = False,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace existing pictures.")
+    ] = False,
+    json_: Annotated[bool, typer.Option("--json", help="Print one JSON object per file.")] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Print the plan and write nothing.")
+    ] = False,
     _debug: Debug = False,
     **of_kind: str | None,
 ) -> None:
-    """Turn captures into pictures through the camera's bundle."""
+    """Restore captures with the bundle of their camera and write the pictures.
+
+    An option that names spad is for captures of single photons.
+    """
     from camkit.cli.use.cluster import cluster_client
-    from camkit.cli.use.mosaic import mosaic_options
     from camkit.cli.use.results import print_result
     from camkit.runtime.batch import process as run
     from camkit.runtime.development import WriteOptions

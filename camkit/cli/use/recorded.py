@@ -45,8 +45,8 @@ def simulate_recorded(
     recording = _recording(bundle)
     if said := [flag for flag, value in given.items() if value not in (None, False)]:
         raise ContractError(
-            f"{', '.join(said)} means nothing to bundle {bundle.manifest.name}, which counts "
-            "photons: --photons, --sbr and --seed say how"
+            f"{', '.join(said)} does not apply to bundle {bundle.manifest.name}, which counts "
+            "photons: use --photons, --sbr and --seed"
         )
     if out.suffix.lower() not in recording.suffixes:
         raise ContractError(
@@ -55,7 +55,7 @@ def simulate_recorded(
         )
     files = recording.files(out)
     if not overwrite and (there := [str(file) for file in files if file.exists()]):
-        raise ContractError(f"{', '.join(there)} exists; say --overwrite or another name")
+        raise ContractError(f"{', '.join(there)} exists; add --overwrite or choose another name")
     recorded = recording.record(_scene(scene), bundle, options)
     out.parent.mkdir(parents=True, exist_ok=True)
     recording.write(out, recorded)
@@ -100,8 +100,8 @@ def _check_light_alone(photons: float | None, sbr: float | None, bundle: "Bundle
     options = (("--photons", photons), ("--sbr", sbr))
     if said := [flag for flag, value in options if value is not None]:
         raise ContractError(
-            f"{', '.join(said)} means nothing to bundle {bundle.manifest.name}: its camera counts "
-            "no photons; --exposure and --iso say how much light there is"
+            f"{', '.join(said)} does not apply to bundle {bundle.manifest.name}: its camera counts "
+            "no photons; use --exposure and --iso"
         )
 
 

@@ -25,61 +25,75 @@ def simulate(
     scene: Annotated[
         str,
         typer.Argument(
-            help="A picture (8/16-bit sRGB, linear EXR or HDR), procedural:SEED, night:SEED or "
-            "squares:SEED; of single photons also an NPZ of depth_m and albedo, or of transient."
+            help="Picture (sRGB, EXR or HDR), procedural:SEED, night:SEED, squares:SEED; SPAD: "
+            "also NPZ."
         ),
     ],
-    bundle: Annotated[str, typer.Option(help="Bundle NAME or PATH of the camera.")],
-    out: Annotated[Path, typer.Option("-o", "--out", help="The capture to write, such as a DNG.")],
+    bundle: Annotated[str, typer.Option(help="Camera bundle, NAME or PATH.")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="Capture to write, such as a DNG.")],
     iso: Annotated[
         float | None, typer.Option(help="ISO speed of the capture; default: 100.")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed of the noise.")] = 0,
     origin_px: Annotated[
-        str | None, typer.Option(help="X,Y of a crop on the sensor; default: centred.")
+        str | None,
+        typer.Option(help="Position X,Y of a crop on the sensor in px; default: centred."),
     ] = None,
     exposure: Annotated[
         float | None, typer.Option(help="Factor on the scene's radiance; default: 1.")
     ] = None,
     saturate: Annotated[
         float | None,
-        typer.Option(help="Share of the scene that exceeds white in any colour, such as 0.015."),
+        typer.Option(help="Share of pixels to saturate, such as 0.015; replaces --exposure."),
     ] = None,
     photons: Annotated[
         float | None,
-        typer.Option(help="Counted by a pixel: of white, or on average by time; default: 10000."),
+        typer.Option(
+            help="SPAD: photons per pixel (counts: at white; histograms: mean); default: 10000."
+        ),
     ] = None,
     sbr: Annotated[
-        float | None, typer.Option(help="Photons of the signal over those of the background.")
+        float | None,
+        typer.Option(help="SPAD: ratio of signal to background photons; default: no background."),
     ] = None,
     surround_px: Annotated[
-        int, typer.Option(min=0, help="Ring of the scene outside the frame that lights it.")
+        int,
+        typer.Option(
+            min=0, help="Width in px of the scene outside the frame that still adds light."
+        ),
     ] = 0,
     bits: Annotated[
-        int | None, typer.Option(help="Of the converter, 8 to 16; default: the sensor's levels.")
+        int | None,
+        typer.Option(help="Bits of the AD converter, 8 to 16; default: the sensor's levels."),
     ] = None,
     no_plate: Annotated[
-        bool, typer.Option("--no-plate", help="Take the bare lens of a camera that has a plate.")
+        bool,
+        typer.Option("--no-plate", help="Simulate the bare lens of a camera that has a plate."),
     ] = False,
     depth_m: DepthM = None,
     unit: Annotated[
-        Path | None, typer.Option(help="The camera body (TOML), whose focus the light takes.")
+        Path | None, typer.Option(help="Measured camera body (.toml) whose focus is simulated.")
     ] = None,
     size_px: Annotated[
         str | None,
         typer.Option(
-            help="W,H of the scene: drawn so large, or cut from the middle of a picture; default: "
-            "the sensor, or the whole picture."
+            help="Scene size W,H in px, cropped from a picture; default: the sensor or the "
+            "whole picture."
         ),
     ] = None,
     truth: Annotated[
-        Path | None, typer.Option(help="EXR to write beside it: what nothing lost would give.")
+        Path | None,
+        typer.Option(help="Also write the ideal picture of a perfect lens and sensor (.exr)."),
     ] = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Photograph a scene with the bundle's camera: blur, vignetting, noise, saturation."""
+    """Simulate a capture of a scene: blur, vignetting, noise and saturation of the camera.
+
+    A picture of 8 or 16 bits is sRGB, EXR and Radiance HDR are linear. A camera that counts photons
+    also takes an NPZ with depth_m and albedo, or with transient.
+    """
     from camkit.bundle.reader import find_bundle, open_bundle
     from camkit.cli.use.recorded import light_of, simulate_recorded
     from camkit.runtime.kind import part_of
@@ -91,7 +105,7 @@ def simulate(
         raise ContractError("--saturate finds the exposure: leave --exposure out")
     for path in filter(None, (out, truth)):
         if path.exists() and not overwrite:
-            raise ContractError(f"{path} exists; say --overwrite or another name")
+            raise ContractError(f"{path} exists; add --overwrite or choose another name")
     opened = open_bundle(find_bundle(bundle))
     part, sensor = part_of(opened.manifest), opened.manifest.sensor
     counted = light_of(photons, sbr, seed, opened)

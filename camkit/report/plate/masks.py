@@ -26,7 +26,7 @@ def etching_of(plate: Plate) -> Etching:
     """
     if plate.etching is None:
         raise ContractError(
-            f"plate {plate.name} has no table [etching]: say its range_um and levels, without "
+            f"plate {plate.name} has no table [etching]: state its range_um and levels, without "
             "which there are no masks"
         )
     return plate.etching

@@ -144,13 +144,13 @@ def find_glare(
     overview = overview_of(opened(), height, width, settings.level)
     lit = float(overview.lights.mean(dtype=np.float64))
     if not lit:
-        return _unchanged(settings, lit, "no light reaches white, so none was sought streaks of")
+        return _unchanged(settings, lit, "no light reaches the white level")
     if lit > MOST_LIT:
         return _unchanged(
             settings,
             lit,
-            f"{lit:.0%} of the picture is light: streaks were not sought, since they cannot be "
-            f"told where more than {MOST_LIT:.0%} is",
+            f"{lit:.0%} of the picture is at the white level; streaks are found only up to "
+            f"{MOST_LIT:.0%}",
         )
     if pause is not None:
         pause()
@@ -190,7 +190,7 @@ def _unchanged(settings: GlareSettings, lit: float, why: str) -> Glare:
         streaks=nothing,
         floor=nothing,
         lit_fraction=lit,
-        notes=(f"the picture is unchanged: {why}",),
+        notes=(f"no streaks were removed: {why}",),
     )
 
 

@@ -140,8 +140,8 @@ class PlateRun:
         if table["digest"] != self.digest:
             raise ContractError(
                 f"{self.checkpoint} belongs to another recipe, or to other {option_text('steps')} "
-                f"or {option_text('seed')}; say the same again, or give {option_text('overwrite')} "
-                "or another -o"
+                f"or {option_text('seed')}; repeat the same options, or add "
+                f"{option_text('overwrite')} or another -o"
             )
         self._spent_s, self._spent_cpu_s = table["spent_s"], table["spent_cpu_s"]
         self.loop.load(table)

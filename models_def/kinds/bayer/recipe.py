@@ -354,8 +354,8 @@ class BayerRecipe(Recipe):
     def _check_hazy_depths(self) -> None:
         if not self.lens.bank_in_focus:
             raise ContractError(
-                "the bank of a lens with a haze knows the distance of the prescription alone; say "
-                "lens.bank_in_focus = true, or leave depths_mm out"
+                "the bank of a lens with veiling glare has the distance of the prescription alone; "
+                "state lens.bank_in_focus = true, or leave depths_mm out"
             )
         least = len(self.lens.depths_mm)
         if min(self.lens.copies, self.frames.count) < least:

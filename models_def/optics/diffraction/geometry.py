@@ -58,7 +58,7 @@ class Bench:
             raise ContractError(f"lengths must be > 0; got {lengths}")
         has_lens = math.isfinite(self.focal_length_mm)
         if has_lens == (self.sensor_mm is not None):
-            raise ContractError("say sensor_mm without a lens, and not with one: it follows")
+            raise ContractError("state sensor_mm without a lens, and not with one: it follows")
         if self.sensor_mm is not None and not 0 < self.sensor_mm < math.inf:
             raise ContractError(f"sensor_mm must be > 0; got {self.sensor_mm}")
         if has_lens and self.focus_mm <= self.focal_length_mm:

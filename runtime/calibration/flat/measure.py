@@ -131,7 +131,7 @@ def measure_flat(
     pitch_um = pixel_pitch_um or like.pixel_pitch_um
     if pitch_um is None:
         raise ContractError(
-            f"the pictures state no pixel pitch; say {option_text('pixel_pitch_um')}"
+            f"the pictures state no pixel pitch; add {option_text('pixel_pitch_um')}"
         )
     radius_px = math.hypot(like.width, like.height) / 2
     views = _views(pictures, poses, radius_px)
@@ -230,7 +230,7 @@ def _refuse_reversed(views: Views, parts: Parts) -> None:
     if least < MUCH_BETTER * parts.rms:
         raise ContractError(
             f"the pictures fit with {tried[least]} reversed ({least:.2%} are left, {parts.rms:.2%} "
-            "as they are); say how what is photographed moved in the picture: right, down and "
+            "as they are); check how what is photographed moved in the picture: right, down and "
             "clockwise are positive"
         )
 
@@ -244,7 +244,7 @@ def _notes(parts: Parts, count: int) -> list[str]:
             "shift the camera by a third of the picture, to the side and up, and turn it once"
         )
     elif not parts.centre_found:
-        found.append("the pictures do not tell the optical centre; the middle is taken")
+        found.append("the pictures do not determine the optical centre; the middle is used")
     if parts.rms > MOST_REST:
         found.append(
             f"lens and display leave {parts.rms:.2%} of the light: a pose may be wrong, or there "

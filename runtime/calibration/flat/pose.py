@@ -73,7 +73,7 @@ def poses_of(
     for option, said in (("shift_px", shifts), ("turn_deg", turns)):
         if said and len(said) != count:
             raise ContractError(
-                f"{option_text(option)} is said {len(said)} times for {count} pictures; say it "
+                f"{option_text(option)} is given {len(said)} times for {count} pictures; give it "
                 "once for each, in their order"
             )
     return [

@@ -93,12 +93,12 @@ def frame_of(
         if stated is not None and not crop / CROPS_AGREE < stated < crop * CROPS_AGREE:
             raise DecodeError(
                 f"the database has crop factor {crop:g} for the {known.model}, the capture states "
-                f"focal lengths of crop factor {stated:.2f}, as in a crop mode: say "
+                f"focal lengths of crop factor {stated:.2f}, as in a crop mode: add "
                 f"{option_text('crop_factor')}"
             )
     if crop is None:
         raise DecodeError(
-            "the capture states no pixel pitch and the database does not know its camera: say "
+            "the capture states no pixel pitch and the database does not know its camera: add "
             f"{option_text('crop_factor')}"
         )
     if pitch_um is None:
@@ -140,7 +140,7 @@ def _sensor(capture: Capture, frame: Frame) -> tuple[BayerSensor | PlanesSensor,
         read_noise_e = math.sqrt(float(np.mean(capture.noise.read_variance))) * full_well_e
     else:
         full_well_e, read_noise_e = white - black, 0.0
-        notes.append("the capture states no noise: 1 electron per DN stands for it")
+        notes.append("the capture states no noise: 1 electron per DN is assumed")
     fields: dict[str, Any] = {
         "extent": Extent(width_px=width, height_px=height, pixel_pitch_um=frame.pitch_um),
         "black_level": max(black, 0.0),
@@ -160,7 +160,7 @@ def _sensor(capture: Capture, frame: Frame) -> tuple[BayerSensor | PlanesSensor,
         return PlanesSensor(**fields, color_matrix=matrix), tuple(notes)
     if stated is None:
         stated = np.asarray(np.linalg.inv(rgb_to_xyz(REC709_PRIMARIES, D65)), dtype=np.float64)
-        notes.append("the capture states no colour matrix: camera RGB is taken as Rec.709")
+        notes.append("the capture states no colour matrix: camera RGB is used as Rec.709")
     return BayerSensor(**fields, cfa=capture.cfa, color_matrix=_rows(stated)), tuple(notes)
 
 

@@ -192,11 +192,13 @@ def lensfun_entry(path: Path, options: EntryOptions) -> Entry:
     crop = source.crop_factor if options.crop_factor is None else options.crop_factor
     if crop is None:
         raise ContractError(
-            f"{path} does not tell how large the sensor is: say {option_text('crop_factor')}"
+            f"{path} does not state the size of the sensor: add {option_text('crop_factor')}"
         )
     focal_mm = source.focal_mm(crop) if options.focal_mm is None else options.focal_mm
     if focal_mm is None:
-        raise ContractError(f"{path} does not tell the focal length: say {option_text('focal_mm')}")
+        raise ContractError(
+            f"{path} does not state the focal length: add {option_text('focal_mm')}"
+        )
     fit = fit_distortion(source, focal_mm)
     if fit.residual_px > options.most_residual_px:
         raise DecodeError(

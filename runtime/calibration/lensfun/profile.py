@@ -205,8 +205,8 @@ def _measured_on(lenses: Sequence[Lens], frame: Frame) -> Lens:
         crops = ", ".join(f"{lens.crop_factor:g}" for lens in known)
         raise DecodeError(
             f"{known[0].name} was measured with crop factor {crops}; the captures have "
-            f"{frame.crop_factor:.3g}, a larger sensor, whose corners nobody measured; "
-            f"say {option_text('crop_factor')} if they are a part of it"
+            f"{frame.crop_factor:.3g}, a larger sensor, whose corners were not "
+            f"measured; add {option_text('crop_factor')} if they are a part of it"
         )
     return max(large, key=lambda lens: lens.crop_factor)
 

@@ -174,7 +174,7 @@ class PairReader:
             self._hashes[capture.sha256] = path
         iso = capture.iso or capture.metadata.iso or self._iso
         if iso is None:
-            raise DecodeError(f"{path.name} states no ISO; say {option_text('iso')}")
+            raise DecodeError(f"{path.name} states no ISO; add {option_text('iso')}")
         used = np.flatnonzero(np.bincount(_plane_of(capture).ravel()))
         return Frame(
             path=path,

@@ -89,7 +89,7 @@ def unapplied(picture: DngPicture) -> list[str]:
     """Return notes on tags that are left out where LibRaw demosaics a picture."""
     names = {DELTA_V: "BlackLevelDeltaV", DELTA_H: "BlackLevelDeltaH"} | LISTS
     left = [name for tag, name in names.items() if tag in picture.directory]
-    return [f"not applied behind LibRaw's own demosaic: {', '.join(left)}"] if left else []
+    return [f"not applied, since LibRaw demosaicked the file: {', '.join(left)}"] if left else []
 
 
 def find_doubts(tags: TiffTags) -> list[str]:

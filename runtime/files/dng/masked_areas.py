@@ -19,7 +19,7 @@ LEAST_SAMPLES: Final = 64
 QUIET_SPREAD: Final = 0.02
 FAR: Final = 0.005
 """In shares of the range; nearer is the drift of black with temperature."""
-_DAMAGED: Final = ": the header is damaged, BlackLevel is taken"
+_DAMAGED: Final = ": the header is damaged, BlackLevel is used"
 
 
 def masked_black(
@@ -42,20 +42,20 @@ def masked_black(
     sound = [a for a in areas if a is not None and _inside(a, whole.shape) and not _meet(a, seen)]
     if len(sound) < len(areas):
         return stated, [
-            f"MaskedAreas {tuple(int(n) if np.isfinite(n) else n for n in values)} leave the "
-            f"picture or cover what it shows{_DAMAGED}"
+            f"MaskedAreas {tuple(int(n) if np.isfinite(n) else n for n in values)} lie outside "
+            f"the sensor or on the picture{_DAMAGED}"
         ]
     found = np.empty_like(stated)
     for place in np.ndindex(stated.shape):
         dark = np.concatenate([_samples(whole, area, place, first) for area in sound])
         if dark.size < LEAST_SAMPLES:
-            return stated, ["MaskedAreas are too small to measure black, BlackLevel is taken"]
+            return stated, ["MaskedAreas are too small to measure black, BlackLevel is used"]
         low, high = np.quantile(dark, (0.05, 0.95))
         if high - low > QUIET_SPREAD * (white - low):
-            return stated, [f"MaskedAreas see light{_DAMAGED}"]
+            return stated, [f"MaskedAreas are not dark{_DAMAGED}"]
         found[place] = dark.mean(dtype=np.float64)
     black, was = float(found.mean()), float(stated.mean())
-    note = f"black {black:.1f} is measured in the masked areas of the sensor, stated is {was:g}"
+    note = f"black level {black:.1f}, measured in the masked areas, replaces the stated {was:g}"
     far = abs(black - was) > FAR * (white - black)
     return found, [note + (": the header is damaged" if far else "")]
 

@@ -70,9 +70,11 @@ def field_gains(picture: DngPicture) -> tuple[FieldGains, list[str]]:
         if gains.get(list_name):
             most = max(gain.most for gain in gains[list_name])
             names = dict.fromkeys(gain.name for gain in gains[list_name])
-            notes.append(f"{' and '.join(names)} of {list_name} applied, gain up to {most:.2f}")
+            notes.append(f"{' and '.join(names)} of {list_name} applied: gain up to {most:.2f}")
         if missing:
-            notes.append(f"{list_name} is not applied: {', '.join(dict.fromkeys(missing))}")
+            notes.append(
+                f"corrections of {list_name} not applied: {', '.join(dict.fromkeys(missing))}"
+            )
     found = FieldGains(mosaic=tuple(gains["OpcodeList2"]), colours=tuple(gains["OpcodeList3"]))
     return found, notes
 

@@ -92,10 +92,9 @@ def color_matrix(tags: TiffTags) -> tuple[Matrix, str | None] | None:
     one = min(found, key=lambda each: abs(each.kelvin - _D65_KELVIN))
     if abs(np.linalg.det(one.matrix)) < 1e-9:
         return None
-    source = (
-        f"EXIF light source {one.light}" if one.light else "a light that the file does not state"
-    )
-    notes = [] if one.kelvin == _D65_KELVIN else [f"colour matrix is for {source}, not D65"]
+    source = f"EXIF light source {one.light}" if one.light else "an unknown light source"
+    is_d65 = one.kelvin == _D65_KELVIN
+    notes = [] if is_d65 else [f"the colour matrix is for {source}, not D65: colours may be off"]
     if any(tags.numbers(tag) is not None for tag in _THIRD_LIGHT):
         notes.append("ColorMatrix3, of a third light, is not applied")
     return one.matrix, "; ".join(notes) or None

@@ -29,10 +29,10 @@ from camkit.runtime.metadata import Metadata
 
 MAGIC: Final = b"\x76\x2f\x31\x01"
 MOST_PX_PER_BYTE: Final = 4096
-NOT_REC709: Final = "chromaticities of the file are not Rec.709; samples are taken as they are"
+NOT_REC709: Final = "chromaticities of the EXR are not Rec.709: colours are used unconverted"
 _DEEP: Final = ("deepscanline", "deeptile")
 _PREFERRED: Final = ("rgba", "rgb", "beauty", "combined", "color", "colour")
-_WHOLE: Final = "samples are whole numbers (UINT), taken as light with 1 as white"
+_WHOLE: Final = "samples are integers (UINT): they are read as linear light, 1 is white"
 _TOLERANCE: Final = 2e-3
 _DAMAGED: Final = (RuntimeError, ValueError, TypeError, KeyError, IndexError, AttributeError)
 """Errors that the package raises, depending on where the damage lies."""
@@ -226,9 +226,9 @@ def _notes(
     notes = ["alpha channel dropped"] if plain else []
     if rest:
         more = ", ..." if len(rest) > 5 else ""
-        notes.append(f"channels that are not read: {', '.join(rest[:5])}{more}")
+        notes.append(f"channels not read: {', '.join(rest[:5])}{more}")
     if len(part.channels) > 1 and part.channels[-1].endswith("BY"):
-        notes.append("luminance and chroma: chroma is filled in between its places")
+        notes.append("luminance and subsampled chroma: chroma is interpolated")
     layer = part.channels[0].rpartition(".")[0]
     notes += [f"layer {layer!r} is read"] if layer else []
     others = [
@@ -238,10 +238,10 @@ def _notes(
     ]
     if others:
         more = ", ..." if len(others) > 5 else ""
-        notes.append(f"parts that are not read: {', '.join(others[:5])}{more}")
+        notes.append(f"parts not read: {', '.join(others[:5])}{more}")
     stated = part.header.get("chromaticities")
     if stated is not None and not np.any(np.asarray(stated)):
-        notes.append("chromaticities of the file are all zero: taken as Rec.709")
+        notes.append("chromaticities of the EXR are all zero: Rec.709 is assumed")
     return (*notes, window.note) if window.note else tuple(notes)
 
 

@@ -38,7 +38,7 @@ def decode_picture(data: bytes, exif: TiffTags) -> Decoded:
         png_chunks.check_png_size(data)
         stated = stated_space.space_of_png(data, exif)
         if any(name == b"acTL" for name, _ in png_chunks.png_chunks(data)):
-            notes.append("an animated PNG: its first picture is read")
+            notes.append("animated PNG: only the first picture is read")
     samples, alpha = split_alpha(decode_array(data))
     notes += ["alpha channel dropped"] if alpha is not None else []
     return decoded_samples(samples, stated, tuple(notes))

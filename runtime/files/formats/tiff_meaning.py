@@ -48,9 +48,7 @@ def to_grey_or_rgb(samples: NDArray[Any], page: TiffPage) -> tuple[NDArray[Any],
     notes = []
     if samples.shape[0] > page.colours:
         premultiplied = page.extra[:1] == (ASSOCIATED_ALPHA,)
-        notes.append(
-            "alpha channel dropped" + (", by which colours are multiplied" * premultiplied)
-        )
+        notes.append("alpha channel dropped" + ("; colours stay multiplied by it" * premultiplied))
     colours = samples[: page.colours]
     match page.photometric:
         case _ if page.photometric == MIN_IS_WHITE:
@@ -59,7 +57,7 @@ def to_grey_or_rgb(samples: NDArray[Any], page: TiffPage) -> tuple[NDArray[Any],
         case _ if page.photometric == PALETTE:
             return _looked_up(colours[0], page), tuple(notes)
         case _ if page.photometric == MIN_IS_BLACK and page.colours == 3:
-            notes.append("three grey samples per pixel are taken as R, G, B")
+            notes.append("three grey samples per pixel are read as R, G, B")
     return colours[0] if page.colours == 1 else np.ascontiguousarray(colours), tuple(notes)
 
 

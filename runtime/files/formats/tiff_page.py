@@ -153,12 +153,12 @@ def picture_page(tags: TiffTags) -> tuple[TiffPage, tuple[str, ...]]:
     if chosen.number > 1:
         wide, high = pages[0].size_px
         notes.append(
-            f"page {chosen.number} is read, which is the picture; page 1 has {wide}x{high} px"
+            f"page {chosen.number} of the TIFF is read; page 1 is smaller ({wide}x{high} px)"
         )
     if chosen.empty_chunks:
         notes.append(f"{chosen.empty_chunks} strips or tiles hold no data: their samples are 0")
     if len(full) > 1:
-        notes.append(f"one page is read; {len(full) - 1} more of the TIFF are not")
+        notes.append(f"one page of the TIFF is read, {len(full) - 1} more are not")
     return chosen, tuple(notes)
 
 

@@ -39,7 +39,7 @@ def guess_pulse(counts: FloatArray, axis: TimeAxis) -> GaussianPulse:
     if shown.amplitude[best].sum() < LEAST_PHOTONS:
         raise ContractError(
             f"no pulse is stated, and {shown.amplitude[best].sum():.0f} photons are too few to "
-            "find its width; say [laser] fwhm_ps, [gate] or [irf] in a file for "
+            "find its width; state [laser] fwhm_ps, [gate] or [irf] in a file for "
             f"{option_text('timing')}"
         )
     low, high = NARROWEST * axis.step_ps, WIDEST * axis.step_ps * axis.bins

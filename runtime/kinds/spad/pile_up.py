@@ -62,7 +62,7 @@ def without_pile_up(counts: FloatArray, cycles: int, orientation: Orientation) -
     if most > cycles:
         raise ContractError(
             f"counts go up to {most:.0f}, above the {cycles} cycles in which they can have come; "
-            "correct cycles, or say 0 where they are not known"
+            "correct cycles, or state 0 where they are not known"
         )
     told = left - seen >= LEAST_LEFT * cycles
     most_told = np.maximum(1 - LEAST_LEFT * cycles / np.maximum(left, 1e-9), 0.0)

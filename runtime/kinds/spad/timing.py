@@ -132,7 +132,7 @@ class Timing(_Table):
         chosen = times.orientation or orientation
         if chosen is None:
             raise ContractError(
-                "nothing says whether times are those of a gate or of a histogram; say [timing] "
+                "nothing says whether times are those of a gate or of a histogram; state [timing] "
                 f'orientation = "gate" or "histogram" in a file for {option_text("timing")}'
             )
         edges = times.bin_edges_ps
@@ -147,7 +147,7 @@ class Timing(_Table):
             return TimeAxis(orientation=chosen, edges_ps=np.array(edges, dtype=np.float64))
         if times.time_bin_ps is None:
             raise ContractError(
-                "nothing says how wide a time bin is; say [timing] time_bin_ps (or bin_edges_ps) "
+                "nothing says how wide a time bin is; state [timing] time_bin_ps (or bin_edges_ps) "
                 f"in a file for {option_text('timing')}"
             )
         count = bins if bins is not None else stated
@@ -174,7 +174,7 @@ class Timing(_Table):
         if self.gate.width_ps is not None:
             return GatedPulse(width_ps=self.gate.width_ps, rc_ps=self.gate.rc_ps, sigma_ps=sigma)
         if self.gate.rc_ps > 0:
-            raise ContractError("[gate] rc_ps is of the edges of a gate; say its width_ps too")
+            raise ContractError("[gate] rc_ps is of the edges of a gate; state its width_ps too")
         return GaussianPulse(sigma_ps=sigma) if sigma > 0 else None
 
     def dark(self, shape: tuple[int, int]) -> NDArray[np.float64]:

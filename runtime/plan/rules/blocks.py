@@ -27,5 +27,5 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
     return work, Decision(
         what="blocks",
         choice=f"{kept} of {count}",
-        reason="blocks that only plain cells read stay as developed",
+        reason="blocks that only plain cells use are not restored",
     )

@@ -39,10 +39,10 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
         reason = "the bundle carries no calibrated plan (tools/plan_report.py calibrate writes it)"
         return work, Decision(what="cells", choice="all full", reason=reason)
     if subject.loss_db <= 0:
-        return work, Decision(what="cells", choice="all full", reason="no loss may be spent")
+        return work, Decision(what="cells", choice="all full", reason="no loss is allowed")
     manifest = subject.bundle.manifest
     if not all(known_stand_in(s, manifest.all_planes) for s in manifest.stages_of(Network)):
-        reason = "no plane stands in where the network does not run"
+        reason = "the bundle has no substitute for the network's result"
         return work, Decision(what="cells", choice="all full", reason=reason)
     losses = model.predict(subject.content)
     small = _smaller(subject, work, losses)

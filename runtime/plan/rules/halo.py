@@ -22,9 +22,9 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
     facts = subject.facts(work.size)
     shorter = [e for e in facts.halo_error if e.psnr_db is not None and e.psnr_db >= 80.0]
     if work.mode != "exact":
-        reason = f"{option_text('mode', work.mode)} says so"
+        reason = f"set by {option_text('mode', work.mode)}"
         return work, Decision(what="halo", choice=work.mode, reason=reason)
-    reason = "results must not depend on tile size and memory cap"
+    reason = "results must not depend on tile size and memory limit"
     if shorter:
         least = min(shorter, key=lambda entry: entry.halo_px)
         fast = option_text("mode", "fast")

@@ -25,7 +25,7 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
     down, across = (cell_count(side_px, stage.shrink) for side_px in sides_px)
     return work, Decision(
         what="haze",
-        choice="undone everywhere",
-        reason=f"light of one place falls on all others; solved in {down * across} cells of "
+        choice="removed everywhere",
+        reason=f"veiling glare reaches the whole picture; solved in {down * across} cells of "
         f"{stage.shrink} px",
     )

@@ -19,9 +19,9 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
         return work, None
     options = subject.options
     if options.size is not None:
-        reason = f"{option_text('size')} says so"
+        reason = f"set by {option_text('size')}"
     elif options.max_seconds is not None or options.max_error_db is not None:
-        reason = "the most that the budget allows"
+        reason = "the best within the stated limits"
     else:
         reason = f"quality {options.quality}"
     return work, Decision(

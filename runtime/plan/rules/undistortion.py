@@ -35,7 +35,7 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
         what="undistortion",
         choice="skipped",
         reason=f"no pixel would move by more than {shift_px:.2f} px (limit {LEAST_SHIFT_PX} px); "
-        "a shift is not counted in dB",
+        "the shift is not part of the dB",
     )
 
 

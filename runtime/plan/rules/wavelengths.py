@@ -17,5 +17,5 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
     return work, Decision(
         what="wavelengths",
         choice=f"all {count}",
-        reason="folded into one kernel per colour before the work; fewer would save nothing",
+        reason="combined into one kernel per colour; fewer would save no time",
     )

@@ -95,8 +95,8 @@ def test_it_is_described_and_planned(toy: Path, capture: Path, camkit_command) -
     [
         (("--method", "wiener"), "method must be one of net"),
         (("--method", "develop"), "method must be one of net"),
-        (("--depth-m", "2"), "--depth-m means nothing to bundle toy"),
-        (("--demosaic", "fast"), "--demosaic means nothing to bundle toy"),
+        (("--depth-m", "2"), "--depth-m does not apply to bundle toy"),
+        (("--demosaic", "fast"), "--demosaic does not apply to bundle toy"),
         (("--size", "M"), "holds size(s) S"),
     ],
 )

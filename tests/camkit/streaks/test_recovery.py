@@ -142,8 +142,8 @@ def test_too_much_clipped_is_left_as_the_sensor_saw_it_and_that_is_said() -> Non
     assert found.regions == ()
     assert found.to_json()["fallbacks"] == found.fallbacks == 1
     (note,) = found.notes
-    assert f"more than {MOST_CLIPPED:.0%} did" in note
-    assert "of the picture clipped: its lights were left as the sensor saw them" in note
+    assert f"only up to {MOST_CLIPPED:.0%}" in note
+    assert "of the picture is clipped: its lights are not restored" in note
 
 
 @pytest.mark.parametrize(("y", "x"), [(1, 100), (158, 100), (80, 1), (80, 206)])
@@ -152,7 +152,7 @@ def test_a_lamp_at_the_border_is_sought_and_what_lies_beyond_is_warned_of(y: int
     found = recover(captured_cells(light), star_kernels())
     assert len(found.regions) == 1
     assert found.notes == (
-        "lights reach the border of the picture: those outside it were not sought",
+        "a light reaches the border of the picture: lights beyond it are not restored",
     )
     assert 20 < found.to_json()["peak"] < 600
 

@@ -104,7 +104,7 @@ def test_in_a_minute_its_loss_falls_and_falls(role, recipe_path, tmp_path):
 def test_a_role_must_be_named_where_there_are_several(recipe_path, tmp_path):
     done = camkit("train", recipe_path, "--size", "S", "--out-dir", tmp_path)
     assert done.returncode == 2
-    assert "roles denoise, upscale; say which" in done.stderr
+    assert "roles denoise, upscale; choose one" in done.stderr
     done = camkit("train", recipe_path, "--role", "upscale", "--fine-tune", "x.pt")
     assert done.returncode != 0
     assert "'toy' are not fine-tuned" in done.stderr

@@ -47,7 +47,7 @@ def test_networks_are_found_by_role_and_size():
     assert isinstance(recipe.sensor, PlanesSensor)
     assert recipe.network("S", "second").network == "b"
     assert recipe.network("S", "first").schedule.steps == 9
-    with pytest.raises(ContractError, match="roles first, second; say which"):
+    with pytest.raises(ContractError, match="roles first, second; choose one"):
         recipe.network("S")
     with pytest.raises(ContractError, match="of the role first, second; not 'third'"):
         recipe.network("S", "third")

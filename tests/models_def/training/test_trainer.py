@@ -231,7 +231,7 @@ def test_a_finished_run_is_not_replaced_unasked(tmp_path, recipe_path, material,
     assert read_checkpoint(whole.checkpoint).step == 12
     for _ in range(2):
         train(recipe_path, options(tmp_path, stop_at_step=1, overwrite=True), material=material)
-    with pytest.raises(ContractError, match="say one"):
+    with pytest.raises(ContractError, match="choose one"):
         options(tmp_path, resume=True, overwrite=True)
 
 

@@ -94,9 +94,12 @@ def test_a_sidecar_keeps_the_distances_that_something_tells() -> None:
 @pytest.mark.parametrize(
     ("values", "text"),
     [
-        ((1 / 700,), "distance found in the capture: 0.7 m"),
-        ((1 / 500, 1 / 800, 1 / 2000), "distance found in the capture: 0.8 m (0.5 to 2 m"),
-        ((np.nan,), "nothing in the capture tells its distance"),
+        ((1 / 700,), "object distance estimated from the capture: 0.7 m"),
+        (
+            (1 / 500, 1 / 800, 1 / 2000),
+            "object distance estimated from the capture: 0.8 m (0.5 to 2 m",
+        ),
+        ((np.nan,), "the object distance cannot be estimated"),
     ],
 )
 def test_people_read_how_far_the_scene_was_found(values: tuple[float, ...], text: str) -> None:

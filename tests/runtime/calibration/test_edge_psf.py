@@ -105,7 +105,7 @@ def test_the_light_near_the_peak_is_right_to_a_hundredth(tmp_path: Path, core: f
 
 
 def test_haze_without_darks_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(DecodeError, match=r"haze fills the frame: \d+% .* by dark"):
+    with pytest.raises(DecodeError, match=r"veiling glare fills the frame: \d+% .* by dark"):
         measure_edge(_edge(tmp_path, Hazy()), FOUR_UM, None)
 
 

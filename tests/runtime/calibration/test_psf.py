@@ -213,5 +213,5 @@ def test_a_wrong_black_is_in_the_error(tmp_path: Path) -> None:
 def test_haze_without_darks_is_refused(tmp_path: Path) -> None:
     hazy = Hazy(side=360, x=181.3, y=178.6)
     bracket = survey(hazy.write(tmp_path, hazy.planes()), None)
-    with pytest.raises(DecodeError, match=r"haze fills the frame: \d+% .* by dark"):
+    with pytest.raises(DecodeError, match=r"veiling glare fills the frame: \d+% .* by dark"):
         measure_psf(bracket, PsfOptions(pixel_pitch_um=4.0), None)

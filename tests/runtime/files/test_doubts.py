@@ -210,7 +210,7 @@ def test_pictures_too_small_to_judge_raise_no_doubt():
 
 def test_one_black_of_a_cell_far_from_the_others_is_named():
     odd = Levels(black=np.array([[0, 256], [256, 256]], dtype=np.float32), white=WHITE)
-    assert any("lie 256 apart" in doubt for doubt in find_doubts(photograph(), odd, "RGGB"))
+    assert any("differ by 256" in doubt for doubt in find_doubts(photograph(), odd, "RGGB"))
     near = Levels(black=np.array([[250, 256], [262, 256]], dtype=np.float32), white=WHITE)
     assert find_doubts(photograph(), near, "RGGB") == []
 

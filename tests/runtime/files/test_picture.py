@@ -120,7 +120,7 @@ def test_float_tiff_is_linear(tmp_path):
 def test_a_grey_jpeg_is_a_picture_and_no_mosaic(tmp_path):
     path = tmp_path / "grey.png"  # the content counts, not the name
     path.write_bytes(cv2.imencode(".jpg", np.full((8, 8), 90, np.uint8))[1].tobytes())
-    with pytest.raises(DecodeError, match=r"grey\.png is a JPEG, which no mosaic is"):
+    with pytest.raises(DecodeError, match=r"grey\.png is a JPEG, which cannot be a mosaic"):
         read_mosaic(path, OPTIONS)
     capture = read_picture(path)
     assert np.abs(capture.linear_rows(0, 8) - decode_srgb(np.float32(90 / 255))).max() < 1e-5

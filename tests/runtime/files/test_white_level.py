@@ -22,7 +22,7 @@ def test_levels_that_fit_stay_as_they_are():
 def test_a_white_far_below_the_data_is_raised_to_what_their_bits_hold(bits, white):
     raised, note = believable_white(photograph(), levels(600.0), "RGGB", bits)
     assert raised.white == white
-    assert f"white 600 that the file states, which is damaged or of another scale: {white}" in note
+    assert f"stated white 600, which is damaged or of another scale: {white}" in note
     assert "MosaicOptions.white_level" in note
 
 

@@ -99,7 +99,7 @@ def test_each_option_that_means_nothing_is_refused_by_name(bare: Bundle, name: s
         check_choices(bare, Options(**{name: CHANGED[name]}))
         return
     said = _refused(bare, **{name: CHANGED[name]})
-    assert said.startswith(f"{option_text(name)} means nothing to bundle planes")
+    assert said.startswith(f"{option_text(name)} does not apply to bundle planes")
 
 
 @pytest.mark.parametrize("name", sorted(set(CHANGED) - {"unit"}))
@@ -108,7 +108,7 @@ def test_each_option_that_means_nothing_without_a_bundle_is_refused_by_name(name
         check_choices(None, Options(**{name: CHANGED[name]}))
         return
     said = _refused(None, **{name: CHANGED[name]})
-    assert said.startswith(f"{option_text(name)} means nothing without a bundle")
+    assert said.startswith(f"{option_text(name)} does not apply without a bundle")
 
 
 @pytest.mark.parametrize(
@@ -139,7 +139,7 @@ def test_a_camera_without_a_stage_refuses_its_options_and_no_other(
 
 def test_all_foreign_options_are_named_at_once(bare: Bundle) -> None:
     said = _refused(bare, size="M", demosaic="fast", depth_m=1.0)
-    assert said.startswith("size, depth_m, demosaic means nothing")
+    assert said.startswith("size, depth_m, demosaic does not apply")
 
 
 def test_a_method_that_no_stage_has_is_refused_with_those_there_are(
@@ -167,7 +167,7 @@ def test_methods_of_stages_that_the_bundle_leaves_out_are_refused(tmp_path: Path
 
 def test_a_place_may_be_assumed_only_on_a_sensor_of_known_size(tiny: Bundle, bare: Bundle) -> None:
     check_choices(tiny, Options(assume="scale"))
-    assert "assume means nothing" in _refused(bare, assume="scale")
+    assert "assume does not apply" in _refused(bare, assume="scale")
 
 
 def test_a_unit_of_another_bundle_or_of_none_is_refused(tiny: Bundle) -> None:
@@ -204,7 +204,7 @@ def test_no_color_means_no_option_of_color(tmp_path: Path) -> None:
     stages = (Linearise(gives=("light",)), Color(takes=("light",)))
     camera = write_planes_bundle(tmp_path, stages, sensor=planes_sensor())
     check_choices(camera, Options(exposure_ev=1.0, color="acescg"))
-    assert "white_balance means nothing" in _refused(camera, white_balance=(2.0, 1.0, 2.0))
+    assert "white_balance does not apply" in _refused(camera, white_balance=(2.0, 1.0, 2.0))
 
 
 def test_a_size_that_is_not_there_is_refused_even_where_no_network_runs(bundle: Bundle) -> None:
@@ -221,7 +221,7 @@ def test_an_option_of_a_stage_that_the_method_leaves_out_is_refused(
 ) -> None:
     options = Options(method=method, **{option: value})  # type: ignore[arg-type]
     check_choices(bundle, options)
-    with pytest.raises(ContractError, match=f"{option} means nothing with method="):
+    with pytest.raises(ContractError, match=f"{option} does not apply with method="):
         check_idle(bundle, options)
     check_idle(bundle, Options(**{option: value}))  # type: ignore[arg-type]
     check_idle(None, Options(method="develop"))

@@ -29,7 +29,7 @@ def test_notes_of_the_decode_come_first(bundle: Bundle) -> None:
 
 def test_planes_in_place_of_a_mosaic_are_noted(bundle: Bundle) -> None:
     notes = start(bundle, made_planes()).job.notes
-    assert notes == ["the capture holds full colours in place of a mosaic: it is not demosaicked"]
+    assert notes == ["the capture has full colour instead of a mosaic: demosaicking is skipped"]
 
 
 @pytest.mark.parametrize("count", [1, 2, 4])
@@ -119,7 +119,8 @@ def test_a_capture_of_another_camera_is_refused_unless_it_is_forced(bundle: Bund
         start(bundle, capture)
     forced = start(bundle, capture, force_bundle=True).job
     assert forced.notes == [
-        "the capture names bundle trio, not tiny: the blur of another lens is undone"
+        "the capture names bundle trio, not tiny: "
+        "the result is right only if both have the same lens"
     ]
     assert start(bundle, made_mosaic(bundle_name="tiny")).job.notes == []
 
@@ -128,6 +129,8 @@ def test_a_foreign_camera_whose_place_is_assumed_is_warned_of(bundle: Bundle) ->
     small = np.full((32, 48), 500, np.uint16)
     foreign = made_mosaic(samples=small, camera="Nikon D850")
     notes = start(bundle, foreign, assume="centre").job.notes
-    assert notes[0].startswith("the file names the camera Nikon D850: unless the lens of bundle")
+    assert notes[0].startswith(
+        "the capture is from the camera Nikon D850: the result is right only with the lens of"
+    )
     own = made_mosaic(samples=small, camera="camkit tiny", bundle_name="tiny")
     assert len(start(bundle, own, assume="centre").job.notes) == 1

@@ -52,6 +52,6 @@ def test_codes_that_never_occur_take_the_shape_of_srgb() -> None:
 
 def test_too_few_open_pixels_are_refused() -> None:
     codes = np.full((2, 3, 2000), 255, dtype=np.uint8)
-    with pytest.raises(DecodeError, match="there are 0: say response"):
+    with pytest.raises(DecodeError, match="there are 0: use response"):
         estimate_response(codes, np.array([1.0, 0.5]))
     assert disagreement(codes, np.array([1.0, 0.5]), srgb_response(256)) == np.inf

@@ -142,8 +142,8 @@ def test_where_nothing_speaks_srgb_is_taken_with_a_word(tmp_path: Path) -> None:
     response, note = choose_response(found, None)
     assert response is not None
     assert response.name == "srgb"
-    assert "too little is unclipped" in note
-    with pytest.raises(DecodeError, match="say response"):
+    assert "too few pixels are unclipped" in note
+    with pytest.raises(DecodeError, match="use response"):
         choose_response(found, "estimate")
 
 
@@ -157,7 +157,7 @@ def test_srgb_stays_where_an_estimate_explains_no_more(
     response, note = choose_response(found, None)
     assert response is not None
     assert response.name == "srgb"
-    assert "sRGB is taken" in note
+    assert "sRGB is used" in note
 
 
 @pytest.mark.parametrize("wanted", ["srgb", "estimate"])

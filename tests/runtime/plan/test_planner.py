@@ -225,5 +225,5 @@ def test_where_nothing_stands_in_for_a_network_it_gets_every_cell(tmp_path: Path
     work = start(camera, flat, quality="adaptive")
     assert work.labels is None
     reasons = {d["what"]: d["reason"] for d in work.record["decisions"]}
-    assert reasons["cells"] == "no plane stands in where the network does not run"
+    assert reasons["cells"] == "the bundle has no substitute for the network's result"
     assert work.fill().shape == (1, 1024, 1024)

@@ -123,7 +123,7 @@ def test_a_picture_without_light_is_unchanged_and_says_so(bundle: Bundle) -> Non
     pipeline = Pipeline(bundle, Options())
     work = pipeline.start(_capture(pipeline, dark))
     np.testing.assert_allclose(work.fill(), dark, atol=1e-6)
-    assert any("unchanged: no light reaches white" in text for text in work.warnings)
+    assert any("removed: no light reaches the white level" in text for text in work.warnings)
 
 
 def test_a_capture_that_names_a_camera_is_taken_all_the_same(

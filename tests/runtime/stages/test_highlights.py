@@ -183,7 +183,7 @@ def test_what_could_not_be_told_is_warned_of_once_the_rows_are_out(camera: Bundl
     scene = with_lamps(street(HEIGHT, WIDTH), [(2, 70, 4.0, (40.0, 40.0, 40.0))])
     work = start(camera, _mosaic(blurred(scene, star())))
     work.fill()
-    assert any("lights reach the border" in note for note in work.warnings)
+    assert any("a light reaches the border" in note for note in work.warnings)
 
 
 def test_what_burnt_out_is_neutral_where_lights_cannot_be_told(camera: Bundle) -> None:
@@ -192,7 +192,7 @@ def test_what_burnt_out_is_neutral_where_lights_cannot_be_told(camera: Bundle) -
     capture = _mosaic(blurred(scene, star()))
     work = start(camera, capture)
     work.fill()
-    assert any("of the picture clipped" in note for note in work.warnings)
+    assert any("of the picture is clipped" in note for note in work.warnings)
     burnt = _plane(capture, camera, "lit")[:, 8:-8, WIDTH // 2 + 8 : -8]
     assert burnt.min() > 1
     assert np.ptp(burnt, axis=0).max() < 0.1 * burnt.max()
@@ -289,7 +289,7 @@ def test_a_capture_smaller_than_a_cell_is_left_as_it_is(
     developed = start(camera, capture, assume="centre", method="develop").fill()
     np.testing.assert_array_equal(work.fill(), developed)
     (note,) = [note for note in work.warnings if "lights" in note]
-    assert f"this one has {size[1]} x {size[0]}: it was left as the sensor saw it" in note
+    assert f"the picture has {size[1]} x {size[0]}" in note
     assert "hdr" not in work.sections
 
 

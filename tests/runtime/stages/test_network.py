@@ -202,7 +202,7 @@ def test_a_tile_that_is_not_believed_takes_the_last_plane_and_says_so(tmp_path: 
     np.testing.assert_allclose(made.fill(), bank, atol=1e-4)
     *tiles, moved = made.warnings
     assert len(tiles) == made.windows["restore"].to_json()["windows"]
-    assert all(text.startswith("what came before the network was taken") for text in tiles)
+    assert all(text.startswith("the network's result was rejected") for text in tiles)
     assert moved.startswith("in 100.0% of the picture the network changed the brightness")
 
 
@@ -363,7 +363,7 @@ def test_a_capture_outside_the_envelope_is_told_once_however_many_networks(
     assert back.size is None
     assert len(back.job.notes) == 1
     np.testing.assert_array_equal(back.fill(), capture.samples)
-    with pytest.raises(ContractError, match="outside the range"):
+    with pytest.raises(ContractError, match="outside the measured range"):
         start(camera, capture, on_unsafe="fail")
 
 

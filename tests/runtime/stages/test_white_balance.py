@@ -37,14 +37,16 @@ def test_a_silent_capture_gets_the_white_balance_of_the_bundles_light(bundle: Bu
     np.testing.assert_allclose(made.white_balance, expected)
     assert made.white_balance != (1.0, 1.0, 1.0)
     assert made.job.notes == [
-        f"the capture states no white balance: that of {sensor.illuminant} is used"
+        f"the capture states no white balance: {sensor.illuminant} is assumed"
     ]
 
 
 def test_without_bundle_and_statement_gains_are_1_and_that_is_said() -> None:
     made = start(None, made_mosaic(white_balance=None))
     assert made.white_balance == (1.0, 1.0, 1.0)
-    assert made.job.notes == ["the file states no white balance: gains of 1 are used"]
+    assert made.job.notes == [
+        "the capture states no white balance: gains of 1 are used, colours may have a cast"
+    ]
 
 
 def test_planes_that_state_none_are_taken_as_they_are(bundle: Bundle) -> None:

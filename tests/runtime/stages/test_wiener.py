@@ -127,7 +127,7 @@ def test_a_bank_that_finds_the_distance_has_its_kernels(
     np.testing.assert_array_equal(made.fill(), told.fill())
     assert made.record["depth"] == "estimated"
     assert made.sections["distance"]["median_m"] == pytest.approx(0.5)
-    assert made.warnings[-1] == "distance found in the capture: 0.5 m"
+    assert made.warnings[-1] == "object distance estimated from the capture: 0.5 m"
     assert "distance" not in told.sections
 
 
@@ -145,7 +145,7 @@ def test_a_bank_that_finds_no_distance_has_mean_kernels(
     untold, mean = (start(bundle, capture, method="wiener") for bundle in (finding, usual))
     np.testing.assert_allclose(untold.fill(), mean.fill(), rtol=1e-3, atol=1e-4)
     assert untold.sections["distance"] == {}
-    assert "nothing in the capture tells its distance" in untold.warnings[-1]
+    assert "the object distance cannot be estimated" in untold.warnings[-1]
 
 
 def test_the_distance_of_a_capture_is_found_and_said(finding: Bundle) -> None:

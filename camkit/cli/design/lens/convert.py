@@ -14,20 +14,20 @@ if TYPE_CHECKING:
 
 
 def convert(
-    source: Annotated[Path, typer.Argument(help="The lens (.toml or .zmx).", metavar="IN")],
-    out: Annotated[Path, typer.Argument(help="The same lens (.toml or .zmx).", metavar="OUT")],
+    source: Annotated[Path, typer.Argument(help="Lens file (.toml or .zmx).", metavar="IN")],
+    out: Annotated[Path, typer.Argument(help="Lens file to write (.toml or .zmx).", metavar="OUT")],
     efl_mm: Annotated[
-        float | None, typer.Option(help="Scale the lens to this focal length.")
+        float | None, typer.Option(help="Focal length in mm to scale the lens to.")
     ] = None,
     f_number: Annotated[
-        float | None, typer.Option(help="Stop the lens to this F-number, after scaling.")
+        float | None, typer.Option(help="F-number to stop the lens down to, after scaling.")
     ] = None,
     glass: GlassFiles = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Write a lens in the other format; what is left out is said on stderr (needs torch).
+    """Write a lens in the other format and report on stderr what is lost (needs torch).
 
     A finite object distance is scaled with the lens.
     """

@@ -19,26 +19,37 @@ RINGS: Final = 12
 
 
 def optimize(
-    source: Annotated[Path, typer.Argument(help="The lens (.toml or .zmx).", metavar="FILE")],
-    out: Annotated[Path, typer.Option("-o", "--out", help="The better lens (.toml or .zmx).")],
+    source: Annotated[Path, typer.Argument(help="Lens file (.toml or .zmx).", metavar="FILE")],
+    out: Annotated[
+        Path, typer.Option("-o", "--out", help="Improved lens to write (.toml or .zmx).")
+    ],
     vary: Annotated[
         str | None,
         typer.Option(
-            help="What is free of every refracting surface: curvature,conic,thickness,"
-            "even_asphere; default: what `vary` of each surface names."
+            help="Variables: curvature,conic,thickness,even_asphere; default: `vary` of each "
+            "surface."
         ),
     ] = None,
-    merit: Annotated[str, typer.Option(help="rms, sum_abs or energy.")] = "sum_abs",
+    merit: Annotated[str, typer.Option(help="Merit function: rms, sum_abs or energy.")] = "sum_abs",
     core_um: Annotated[
-        float, typer.Option(min=0.01, help="Radius below which a spot counts as sharp.")
+        float, typer.Option(min=0.01, help="Radius in um below which a spot counts as sharp.")
     ] = 6.0,
-    starts: Annotated[int, typer.Option(min=1, help="Starts near the lens.")] = 8,
+    starts: Annotated[
+        int, typer.Option(min=1, help="Number of starting points near the lens.")
+    ] = 8,
     spread: Annotated[
-        float, typer.Option(min=0, max=1, help="How far, as a share of the ranges.")
+        float,
+        typer.Option(
+            min=0,
+            max=1,
+            help="Distance of the starting points, as a share of each variable's range.",
+        ),
     ] = 0.05,
-    steps: Annotated[int, typer.Option(min=1, help="Steps of the best starts.")] = 60,
-    rays: Annotated[int, typer.Option(min=4, help="Rays in half the pupil.")] = 24,
-    seed: Annotated[int, typer.Option(help="Of the starts.")] = 1,
+    steps: Annotated[
+        int, typer.Option(min=1, help="Number of optimization steps from the best starting points.")
+    ] = 60,
+    rays: Annotated[int, typer.Option(min=4, help="Number of rays in half the pupil.")] = 24,
+    seed: Annotated[int, typer.Option(help="Random seed of the starting points.")] = 1,
     glass: GlassFiles = None,
     overwrite: Overwrite = False,
     json_: Json = False,

@@ -14,21 +14,24 @@ from camkit.progress import working
 if TYPE_CHECKING:
     from camkit.models_def.optics.prescription import Lens
 
-PitchUm = Annotated[float, typer.Option(min=0.1, help="Of the pixels.")]
+PitchUm = Annotated[float, typer.Option(min=0.1, help="Pixel pitch in um.")]
 ToolRadiusUm = Annotated[
     float | None,
-    typer.Option(min=0, help="Nose of the tool that cuts grooves, instead of what the file says."),
+    typer.Option(
+        min=0, help="Nose radius in um of the tool that cuts the grooves; default: the file's."
+    ),
 ]
 WithWaves = Annotated[
     bool,
     typer.Option(
-        "--waves", help="Also sum the peaks of three fields from waves, in every colour (minutes)."
+        "--waves",
+        help="Also compute the peaks of three fields by wave optics, in every colour (minutes).",
     ),
 ]
 
 
 def peak(
-    file: Annotated[Path, typer.Argument(help="The lens (.toml or .zmx).", metavar="FILE")],
+    file: Annotated[Path, typer.Argument(help="Lens file (.toml or .zmx).", metavar="FILE")],
     pitch_um: PitchUm = 5.96,
     waves: WithWaves = False,
     tool_radius_um: ToolRadiusUm = None,
@@ -36,7 +39,7 @@ def peak(
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Say how much light of a point lies near its peak, and how far haze reaches (needs torch).
+    """Measure the light of a point near its peak and the reach of veiling glare (needs torch).
 
     The fields are those of the file and the middles between them.
     """

@@ -12,13 +12,15 @@ from camkit.cli.say import say
 
 
 def sag(
-    file: Annotated[Path, typer.Argument(help="The lens (.toml or .zmx).", metavar="FILE")],
-    out: Annotated[Path, typer.Option("-o", "--out", help="The table (.csv).")],
+    file: Annotated[Path, typer.Argument(help="Lens file (.toml or .zmx).", metavar="FILE")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="Table to write (.csv).")],
     surface: Annotated[
         int | None,
-        typer.Option(min=0, help="Which, from 0; default: the first with grooves, else 0."),
+        typer.Option(
+            min=0, help="Index of the surface, from 0; default: the first with grooves, else 0."
+        ),
     ] = None,
-    step_um: Annotated[float, typer.Option(min=0.1, help="Of the radius.")] = 10.0,
+    step_um: Annotated[float, typer.Option(min=0.1, help="Step of the radius in um.")] = 10.0,
     glass: GlassFiles = None,
     overwrite: Overwrite = False,
     json_: Json = False,

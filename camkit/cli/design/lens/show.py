@@ -12,15 +12,15 @@ from camkit.progress import working
 
 
 def show(
-    file: Annotated[Path, typer.Argument(help="The lens (.toml or .zmx).", metavar="FILE")],
+    file: Annotated[Path, typer.Argument(help="Lens file (.toml or .zmx).", metavar="FILE")],
     pupil: Annotated[
         str, typer.Option(help="Definition of the pupil: paraxial, chief or stop.")
     ] = "paraxial",
     sampling: Annotated[
         str,
         typer.Option(
-            help="Of the pupil: hexapolar:RINGS, gauss:RINGSxARMS, radau:RINGSxARMS, grid:SIDE "
-            "or fibonacci:RAYS."
+            help="Pupil sampling: hexapolar:RINGS, gauss:RxA, radau:RxA, grid:SIDE or "
+            "fibonacci:RAYS."
         ),
     ] = "hexapolar:6",
     out_dir: Annotated[
@@ -34,7 +34,7 @@ def show(
 ) -> None:
     """Draw and measure a lens: layout, spots, MTF, curves, Seidel sums (needs torch).
 
-    Without -o and --json the page is written beside where you are, as NAME.html.
+    Without -o and --json the page NAME.html is written to the current folder.
     """
     from camkit.cli.design.design_time import refuse_existing, require_torch
 

@@ -15,9 +15,12 @@ from camkit.progress import working
 
 def thin(
     recipe: Annotated[
-        Path, typer.Argument(help="Recipe (.toml), or the name of one.", metavar="RECIPE")
+        Path,
+        typer.Argument(help="Recipe (.toml), or the name of a built-in one.", metavar="RECIPE"),
     ],
-    out: Annotated[Path, typer.Option("-o", "--out", help="The plate as a lens (.toml).")],
+    out: Annotated[
+        Path, typer.Option("-o", "--out", help="Lens file of the plate to write (.toml).")
+    ],
     pitch_um: PitchUm = 5.96,
     waves: WithWaves = False,
     tool_radius_um: ToolRadiusUm = None,
@@ -25,7 +28,7 @@ def thin(
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Solve a thin plate, and say what its images of points are (needs torch)."""
+    """Solve a thin plate and measure its images of points (needs torch)."""
     from camkit.cli.design.design_time import refuse_existing, require_torch
 
     require_torch("camkit lens thin")

@@ -16,21 +16,25 @@ if TYPE_CHECKING:
 
 
 def tolerance(
-    file: Annotated[Path, typer.Argument(help="The lens (.toml or .zmx).", metavar="FILE")],
+    file: Annotated[Path, typer.Argument(help="Lens file (.toml or .zmx).", metavar="FILE")],
     errors: Annotated[
         Path | None,
-        typer.Option(help="File with a \\[tolerance] table; else that of the lens, else defaults."),
+        typer.Option(
+            help="File with a \\[tolerance] table; default: the lens file's, else built-in values."
+        ),
     ] = None,
-    samples: Annotated[int, typer.Option(min=1, help="Fabricated copies.")] = 50,
-    seed: Annotated[int, typer.Option(min=0, help="Of errors, patches and noise.")] = 1,
+    samples: Annotated[
+        int, typer.Option(min=1, help="Number of Monte-Carlo samples of the fabricated lens.")
+    ] = 50,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed of errors, patches and noise.")] = 1,
     data: Annotated[
-        Path | None, typer.Option(help="Folder of sharp pictures; none: procedural scenes.")
+        Path | None, typer.Option(help="Folder of sharp pictures; default: procedural scenes.")
     ] = None,
-    pitch_um: Annotated[float, typer.Option(min=0.1, help="Of the pixels.")] = 6.0,
+    pitch_um: Annotated[float, typer.Option(min=0.1, help="Pixel pitch in um.")] = 6.0,
     noise: Annotated[
-        float, typer.Option(min=0, help="Standard deviation, 1.0 = white level.")
+        float, typer.Option(min=0, help="Standard deviation of the noise (1.0 = white level).")
     ] = 0.01,
-    rays: Annotated[int, typer.Option(min=2, help="Of the pupil.")] = 512,
+    rays: Annotated[int, typer.Option(min=2, help="Number of rays through the pupil.")] = 512,
     out_dir: Annotated[
         Path | None,
         typer.Option("-o", "--out-dir", help="Folder for NAME-tolerance.png, .svg and .json."),
@@ -40,9 +44,9 @@ def tolerance(
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Draw fabricated copies of a lens: yield after recovery, sensitivities (needs torch).
+    """Simulate fabrication errors of a lens: yield after restoration, sensitivities (needs torch).
 
-    Without -o and --json the chart is written where you are.
+    Without -o and --json the chart is written to the current folder.
     """
     from camkit.cli.design.design_time import refuse_existing, require_torch
 

@@ -17,22 +17,31 @@ if TYPE_CHECKING:
 
 
 def design(
-    recipe: Annotated[Path, typer.Argument(help="Recipe of a plate (.toml).", metavar="RECIPE")],
+    recipe: Annotated[Path, typer.Argument(help="Plate recipe (.toml).", metavar="RECIPE")],
     out: Annotated[
-        Path, typer.Option("-o", "--out", help="The plate (.toml); checkpoint and log beside it.")
+        Path,
+        typer.Option(
+            "-o", "--out", help="Plate to write (.toml), with checkpoint and log beside it."
+        ),
     ],
-    steps: Annotated[int | None, typer.Option(min=1, help="Steps instead of the recipe's.")] = None,
-    minutes: Annotated[
-        float | None, typer.Option(help="Stop after so long; --resume goes on.")
+    steps: Annotated[
+        int | None, typer.Option(min=1, help="Number of steps; default: the recipe's.")
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="Of the start and of etch errors.")] = None,
-    threads: Annotated[int, typer.Option(min=1, help="Threads of torch.")] = 1,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on where a run stopped.")] = False,
+    minutes: Annotated[
+        float | None,
+        typer.Option(help="Time limit in minutes; --resume continues; default: no limit."),
+    ] = None,
+    seed: Annotated[
+        int | None,
+        typer.Option(help="Random seed of start and etch errors; default: the recipe's."),
+    ] = None,
+    threads: Annotated[int, typer.Option(min=1, help="Number of torch threads.")] = 1,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue a run that stopped.")] = False,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Design the relief of a plate by gradients, for masks on the sensor (needs torch).
+    """Optimize the relief of a plate for target masks on the sensor (needs torch).
 
     With a table reader in its recipe, a network that recovers its pictures is fitted along.
     """
@@ -43,7 +52,7 @@ def design(
     from camkit.models_def.design.plate.run import PlateRun, PlateRunOptions
 
     if resume and overwrite:
-        raise ContractError("--resume goes on, --overwrite starts anew: give one of them")
+        raise ContractError("--resume continues, --overwrite starts again: use one of them")
     if minutes is not None and not minutes > 0:
         raise ContractError(f"--minutes must be > 0; got {minutes:g}")
     run = PlateRun(

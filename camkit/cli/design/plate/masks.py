@@ -14,10 +14,14 @@ from camkit.errors import ContractError
 def masks(
     plate: Annotated[
         Path,
-        typer.Argument(help="The plate (.toml), a name, or a bundle with one.", metavar="PLATE"),
+        typer.Argument(
+            help="Plate (.toml or built-in name), or bundle with a plate.", metavar="PLATE"
+        ),
     ],
-    out_dir: Annotated[Path, typer.Option("-o", "--out-dir", help="Folder for the images.")],
-    format_: Annotated[str, typer.Option("--format", help="png (one bit) or tiff.")] = "png",
+    out_dir: Annotated[Path, typer.Option("-o", "--out-dir", help="Folder for the mask images.")],
+    format_: Annotated[
+        str, typer.Option("--format", help="Image format: png (one bit) or tiff (eight bits).")
+    ] = "png",
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,

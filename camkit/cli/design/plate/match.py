@@ -18,17 +18,23 @@ _POOR = 0.999
 def match(
     psf: Annotated[
         Path,
-        typer.Argument(help="NPZ with the key psf, 11x11, or a frozen PSF (.safetensors)."),
+        typer.Argument(
+            help="PSF to match: NPZ with an 11x11 array psf, or a frozen PSF (.safetensors)."
+        ),
     ],
     out_dir: Annotated[Path, typer.Option("-o", "--out-dir", help="Folder for plate and masks.")],
-    levels: Annotated[int, typer.Option(help="Levels to etch: 2, 4, 8, ...")] = 8,
-    cells: Annotated[int, typer.Option(help="Cells along a side of the 0.873-mm unit.")] = 88,
-    seed: Annotated[int, typer.Option(min=0, help="Of the first phases.")] = 0,
+    levels: Annotated[
+        int, typer.Option(help="Number of etched levels, a power of 2 up to 64.")
+    ] = 8,
+    cells: Annotated[
+        int, typer.Option(help="Number of cells along a side of the 0.873-mm unit.")
+    ] = 88,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed of the initial phases.")] = 0,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Find the plate whose dots are a PSF, and its masks (needs torch).
+    """Find the plate whose diffraction orders form a given PSF, and its masks (needs torch).
 
     One unit of it is written: side by side, 16x16 units make the plate of a SPAD camera.
     """

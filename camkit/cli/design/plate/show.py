@@ -18,16 +18,20 @@ from camkit.units import MM_PER_M
 def show(
     plate: Annotated[
         Path,
-        typer.Argument(help="The plate (.toml), a name, or a bundle with one.", metavar="PLATE"),
+        typer.Argument(
+            help="Plate (.toml or built-in name), or bundle with a plate.", metavar="PLATE"
+        ),
     ],
     recipe: Annotated[
-        Path | None, typer.Option(help="Recipe (TOML) with the sensor; default: duet's.")
+        Path | None, typer.Option(help="Recipe (.toml) with the sensor; default: duet's.")
     ] = None,
     depth_m: Annotated[
         float | None,
-        typer.Option(help="Distance of the point light; 'inf' is infinity; default: the focus."),
+        typer.Option(
+            help="Distance of the point light in m ('inf' for infinity); default: the focus."
+        ),
     ] = None,
-    side_px: Annotated[int, typer.Option(help="Side of the window, odd.")] = 401,
+    side_px: Annotated[int, typer.Option(help="Side of the window in px, odd.")] = 401,
     out_dir: Annotated[
         Path | None,
         typer.Option("-o", "--out-dir", help="Folder for NAME.html and its pictures (PNG, SVG)."),
@@ -38,7 +42,7 @@ def show(
 ) -> None:
     """Draw and measure a plate: PSF, cuts, relief, where the light goes (needs torch).
 
-    Without -o and --json the page is written beside where you are, as NAME.html.
+    Without -o and --json the page NAME.html is written to the current folder.
     """
     from camkit.cli.design.design_time import refuse_existing, require_torch
 

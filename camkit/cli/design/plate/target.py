@@ -75,6 +75,6 @@ def _member(archive: zipfile.ZipFile, path: Path) -> NDArray[Any]:
         )
     # a header may speak of more than there is, and numpy would make room for it
     if np.prod(shape, dtype=float) * dtype.itemsize > MOST_BYTES:
-        raise ContractError(f"{KEY} of {path} must be 11x11; it says it is {shape}")
+        raise ContractError(f"{KEY} of {path} must be 11x11; it states {shape}")
     data.seek(0)
     return np.asarray(npy.read_array(data, allow_pickle=False))

@@ -2,18 +2,15 @@
 
 import typer
 
+from camkit.cli.groups import JUDGE, add_command
 from camkit.cli.judge.analyse.field import field
 from camkit.cli.judge.analyse.hallucination import hallucination
 
-analyse_app = typer.Typer(
-    name="analyse",
-    help="What a camera can tell of a scene, and what it invents.",
-    no_args_is_help=True,
-)
-analyse_app.command()(field)
-analyse_app.command()(hallucination)
+analyse_app = typer.Typer(name="analyse", no_args_is_help=True)
+add_command(analyse_app, field, JUDGE, "Measure resolution over the field.")
+add_command(analyse_app, hallucination, JUDGE, "Find detail that networks invent.")
 
 
 @analyse_app.callback()
 def analyse() -> None:
-    """What a camera can tell of a scene, and what it invents."""
+    """Measure what a camera resolves over its field, and which detail it invents."""

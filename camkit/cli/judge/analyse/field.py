@@ -16,39 +16,48 @@ def field(
     name: Annotated[
         str,
         typer.Argument(
-            help="A bundle, a lens (.toml, .zmx or a name; lens:NAME where a bundle has it too), "
-            "frozen optics (PSF.safetensors+HAZE.safetensors) or a pinhole (pinhole-0.8).",
+            help="Bundle, lens (file or name), frozen optics (.safetensors) or pinhole "
+            "(pinhole-0.8).",
             metavar="NAME",
         ),
     ],
     lens: Annotated[
-        str | None, typer.Option(help="More of them, A,B; those without a sensor get NAME's.")
+        str | None,
+        typer.Option(help="Further optics to compare, A,B; those without a sensor use NAME's."),
     ] = None,
-    iso: Annotated[float, typer.Option(help="Sensitivity.")] = 100.0,
-    bars_px: Annotated[int, typer.Option(min=1, help="Width of the bars.")] = 12,
-    fields: Annotated[int, typer.Option(min=2, help="Points from the axis to the corner.")] = 9,
+    iso: Annotated[float, typer.Option(help="ISO speed of the captures.")] = 100.0,
+    bars_px: Annotated[int, typer.Option(min=1, help="Width of the test bars in px.")] = 12,
+    fields: Annotated[
+        int, typer.Option(min=2, help="Number of field points from the axis to the corner.")
+    ] = 9,
     wavelength_um: Annotated[
         float | None,
-        typer.Option(help="Of the points; default: the middle colour of each sensor."),
+        typer.Option(
+            help="Wavelength of the points in um; default: the middle colour of each sensor."
+        ),
     ] = None,
     data: Annotated[
         Path | None,
-        typer.Option(help="Folder of sharp pictures: photograph and restore whole frames."),
+        typer.Option(
+            help="Folder of sharp pictures to photograph and restore; default: no restoration."
+        ),
     ] = None,
     pictures: Annotated[
-        int | None, typer.Option(min=1, help="How many of them; default: 1.")
+        int | None, typer.Option(min=1, help="Number of these pictures; default: 1.")
     ] = None,
     frame: Annotated[
-        str | None, typer.Option(help="Only WIDTHxHEIGHT about the middle of such frames.")
+        str | None,
+        typer.Option(help="Central WIDTHxHEIGHT of these frames in px; default: the whole frame."),
     ] = None,
     page: Page = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Say what arrives of a point over the field, and what that lets be told apart and restored.
+    """Measure the image of a point over the field, and which detail is resolved and restored.
 
-    Lenses are traced, which needs torch; bundles and frozen optics do not.
+    Write lens:NAME for a lens whose name a bundle has too, PSF.safetensors+HAZE.safetensors for
+    frozen optics with veiling glare. Lenses are traced, which needs torch.
     """
     check_page(page, overwrite=overwrite)
     frame_px = None if frame is None else _frame_px(frame)

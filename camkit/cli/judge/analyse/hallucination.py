@@ -15,19 +15,26 @@ if TYPE_CHECKING:
 
 
 def hallucination(
-    name: Annotated[str, typer.Argument(help="Bundle NAME or PATH.", metavar="NAME")],
-    data: Annotated[Path, typer.Option(help="Folder of sharp pictures that no training saw.")],
-    pictures: Annotated[int, typer.Option(min=1, help="How many of them.")] = 10,
-    iso: Annotated[float, typer.Option(help="Sensitivity.")] = 100.0,
-    sizes: Annotated[str | None, typer.Option(help="Sizes of the network, such as S,M.")] = None,
-    patch_px: Annotated[int, typer.Option(help="Side of a patch.")] = 64,
+    name: Annotated[str, typer.Argument(help="Camera bundle, NAME or PATH.", metavar="NAME")],
+    data: Annotated[
+        Path, typer.Option(help="Folder of sharp pictures that were not used in training.")
+    ],
+    pictures: Annotated[int, typer.Option(min=1, help="Number of pictures.")] = 10,
+    iso: Annotated[float, typer.Option(help="ISO speed of the captures.")] = 100.0,
+    sizes: Annotated[
+        str | None, typer.Option(help="Network sizes, such as S,M; default: M.")
+    ] = None,
+    patch_px: Annotated[int, typer.Option(help="Side of a patch in px.")] = 64,
     vgg: Annotated[
         Path | None,
-        typer.Option(help="VGG-19 weights (.pth or .safetensors) for the perceptual measure."),
+        typer.Option(
+            help="VGG-19 weights (.pth or .safetensors) for the perceptual metric; default: "
+            "gradients."
+        ),
     ] = None,
     crops: Annotated[
         Path | None,
-        typer.Option(help="Folder for the worst patches: truth, capture, result."),
+        typer.Option(help="Folder for the worst patches (truth, capture, result)."),
     ] = None,
     page: Page = None,
     overwrite: Overwrite = False,
@@ -36,7 +43,7 @@ def hallucination(
 ) -> None:
     """Judge restored pictures patch by patch, against the truth and against their captures.
 
-    A control plants detail that no capture holds; the report says whether it was found.
+    A control adds detail that no capture contains; the report states whether it was detected.
     """
     check_page(page, overwrite=overwrite)
     if crops is not None:
@@ -86,7 +93,7 @@ def _check_crops(folder: Path, *, overwrite: bool) -> None:
     if folder.exists() and not folder.is_dir():
         raise ContractError(f"--crops is a folder; {folder} is a file")
     if folder.exists() and not overwrite:
-        raise ContractError(f"{folder} exists; say --overwrite or another name")
+        raise ContractError(f"{folder} exists; add --overwrite or choose another name")
 
 
 def _write_crops(report: "Report", folder: Path) -> list[str]:

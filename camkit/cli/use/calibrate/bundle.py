@@ -11,29 +11,32 @@ from camkit.errors import BundleError, ContractError, DecodeError
 
 
 def bundle(
-    source: Annotated[
-        str, typer.Argument(metavar="FROM", help="The bundle that is copied, by name or path.")
-    ],
-    out: Annotated[Path, typer.Option("-o", "--out", help="The new bundle (.camkit).")],
+    source: Annotated[str, typer.Argument(metavar="FROM", help="Bundle to copy, NAME or PATH.")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="New bundle to write (.camkit).")],
     geometry: Annotated[
-        Path | None, typer.Option(help="Of `calibrate geometry`: distortion, optical centre.")
+        Path | None,
+        typer.Option(help="Distortion and optical centre (.toml of `camkit calibrate geometry`)."),
     ] = None,
-    flat: Annotated[Path | None, typer.Option(help="Of `calibrate flat`: vignetting.")] = None,
+    flat: Annotated[
+        Path | None, typer.Option(help="Vignetting (.toml of `camkit calibrate flat`).")
+    ] = None,
     noise: Annotated[
-        Path | None, typer.Option(help="Of `calibrate noise`: gain, read noise, levels.")
+        Path | None,
+        typer.Option(help="Gain, read noise and levels (.toml of `camkit calibrate noise`)."),
     ] = None,
     psf: Annotated[
-        Path | None, typer.Option(help="Of `calibrate psf`: kernels; networks are left out.")
+        Path | None,
+        typer.Option(help="Kernels (.safetensors of `camkit calibrate psf`); drops the networks."),
     ] = None,
     keep_networks: Annotated[
-        bool, typer.Option("--keep-networks", help="Keep networks with other kernels.")
+        bool, typer.Option("--keep-networks", help="Keep the networks even if the kernels change.")
     ] = False,
     page: Page = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Put what was measured of a camera into a copy of a bundle, and prove it."""
+    """Store the measurements of a camera in a copy of a bundle and verify it."""
     check_out(out, ".camkit", "a bundle", overwrite=overwrite)
     check_page(page, overwrite=overwrite)
     if keep_networks and psf is None:

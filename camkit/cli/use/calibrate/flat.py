@@ -7,33 +7,35 @@ import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.cli.use.calibrate.outputs import Out, Outputs, Page
-from camkit.cli.use.merge import BlackLevel, MosaicCfa, WhiteLevel
+from camkit.cli.use.mosaic import BlackLevel, MosaicCfa, WhiteLevel, mosaic_options
 
 PixelPitchUm = Annotated[
-    float | None, typer.Option(help="Pixel pitch; default: what the pictures state.")
+    float | None, typer.Option(help="Pixel pitch in um; default: as the pictures state.")
 ]
 
 
 def flat(
     files: Annotated[
         list[Path],
-        typer.Argument(help="Linear pictures of one display or wall, the camera moved between."),
+        typer.Argument(
+            help="Linear pictures of one display or wall, with the camera moved in between."
+        ),
     ],
     out: Out,
     page: Page = None,
     shift_px: Annotated[
         list[str] | None,
         typer.Option(
-            help="X,Y by which what is photographed moved in a picture, right and down; given "
-            "again, once for each picture in their order; default: no shifts.",
+            help="Shift X,Y of the display in px, right and down, repeated per picture; "
+            "default: none.",
             show_default=False,
         ),
     ] = None,
     turn_deg: Annotated[
         list[float] | None,
         typer.Option(
-            help="Degrees by which it turned in a picture, clockwise; given again, once for each "
-            "picture; default: what the orientation of the files says.",
+            help="Clockwise turn of the display in degrees, repeated per picture; default: from "
+            "the files.",
             show_default=False,
         ),
     ] = None,
@@ -45,9 +47,11 @@ def flat(
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Measure relative illumination, told from the display's own unevenness by poses."""
+    """Measure the vignetting of a lens, separated from an uneven display by several poses.
+
+    --shift-px and --turn-deg are given once for each picture, in the order of FILES.
+    """
     outputs = Outputs.asked(out, page, overwrite=overwrite, as_json=json_)
-    from camkit.cli.use.mosaic import mosaic_options
     from camkit.runtime.calibration.flat.measure import measure_flat
 
     found = measure_flat(

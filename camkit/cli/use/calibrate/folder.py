@@ -43,7 +43,9 @@ class Folder:
             raise ContractError(f"{path} is a file; expected a folder")
         if path.is_dir() and any(path.iterdir()):
             if not overwrite:
-                raise ContractError(f"{path} is not empty; say --overwrite or another folder")
+                raise ContractError(
+                    f"{path} is not empty; add --overwrite or choose another folder"
+                )
             if not any((path / mark).exists() for mark in marks):
                 raise ContractError(
                     f"{path} holds files of another kind, without {marks[0]}; give another folder"

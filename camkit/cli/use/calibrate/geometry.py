@@ -18,27 +18,30 @@ def geometry(
     pictures: Annotated[
         list[Path],
         typer.Argument(
-            help="Photographs of the board, at one setting of lens and focus; or corners (.json)."
+            help="Photographs of the board at one lens and focus setting, or corners (.json)."
         ),
     ],
     out: Out,
     board: Annotated[
         str | None,
-        typer.Option(help="COLUMNSxROWS of its inner corners, like 9x6; a corner file states it."),
+        typer.Option(
+            help="Inner corners of the board, COLUMNSxROWS such as 9x6; default: a corner file's."
+        ),
     ] = None,
     square_mm: Annotated[
-        float | None, typer.Option(help="Side of a square; tells how far away the board was.")
+        float | None,
+        typer.Option(help="Side of a square in mm, to measure the distance of the board."),
     ] = None,
     focal_px: Annotated[
         float | None,
-        typer.Option(help="Nominal focal length, held if the pictures do not determine it."),
+        typer.Option(help="Nominal focal length in px, kept if the pictures do not determine it."),
     ] = None,
     page: Page = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Measure focal length, optical centre and distortion on photographs of a checkerboard."""
+    """Measure focal length, optical centre and distortion from photographs of a checkerboard."""
     outputs = Outputs.asked(out, page, overwrite=overwrite, as_json=json_)
     found = _found(pictures, board, square_mm, focal_px)
     outputs.write(found.to_record(), _lines(found), lambda: _page(found))

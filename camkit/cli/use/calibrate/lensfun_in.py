@@ -8,7 +8,7 @@ import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.cli.use.calibrate.outputs import Page, check_out, check_page, tell
-from camkit.cli.use.merge import BlackLevel, MosaicCfa, WhiteLevel
+from camkit.cli.use.mosaic import BlackLevel, MosaicCfa, WhiteLevel, mosaic_options
 
 if TYPE_CHECKING:
     from camkit.runtime.calibration.lensfun.profile import Found
@@ -18,28 +18,30 @@ def lensfun_in(
     database: Annotated[
         Path, typer.Argument(help="Folder of a lensfun database, or one of its XML files.")
     ],
-    lens: Annotated[str, typer.Option(help="Model of the lens, as the database writes it.")],
-    focal_mm: Annotated[float, typer.Option(help="Focal length of the captures.")],
+    lens: Annotated[str, typer.Option(help="Model of the lens, as written in the database.")],
+    focal_mm: Annotated[float, typer.Option(help="Focal length of the captures in mm.")],
     capture: Annotated[
-        Path, typer.Option(help="One of the captures; the bundle is for others like it.")
+        Path, typer.Option(help="Example capture; the bundle fits captures like it.")
     ],
-    out: Annotated[Path, typer.Option("-o", "--out", help="The bundle (.camkit).")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="Bundle to write (.camkit).")],
     aperture: Annotated[
         float | None,
-        typer.Option(help="F-number, for vignetting; default: what the capture states."),
+        typer.Option(help="F-number for the vignetting; default: as the capture states."),
     ] = None,
     distance_m: Annotated[
-        float | None, typer.Option(help="Distance of the object, for vignetting; default: far.")
+        float | None, typer.Option(help="Object distance in m for the vignetting; default: far.")
     ] = None,
     crop_factor: Annotated[
         float | None,
-        typer.Option(help="Of the captures' sensor; default: by pixel pitch, else the camera's."),
+        typer.Option(
+            help="Crop factor of the sensor; default: from the pixel pitch, else the camera's."
+        ),
     ] = None,
     scale: Annotated[
         float | None,
         typer.Option(
-            help="Of the straight picture's radii, 1 as lensfun has them; default: the most up to "
-            "1 at which no border is repeated."
+            help="Scale of the corrected picture; default: the largest up to 1 without repeated "
+            "borders."
         ),
     ] = None,
     mosaic: MosaicCfa = None,
@@ -50,11 +52,10 @@ def lensfun_in(
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Make a bundle that undistorts and evens the light of a lens that lensfun knows."""
+    """Make a bundle that corrects distortion and vignetting of a lens from a lensfun database."""
     check_out(out, ".camkit", "a bundle", overwrite=overwrite)
     check_page(page, overwrite=overwrite)
     from camkit.bundle.writer import write_bundle
-    from camkit.cli.use.mosaic import mosaic_options
     from camkit.runtime.calibration.lensfun.ordinary import CameraOptions, lensfun_bundle
     from camkit.runtime.output.part_file import atomic_output
 

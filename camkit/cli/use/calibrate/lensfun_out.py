@@ -13,32 +13,37 @@ def lensfun_out(
     source: Annotated[
         Path,
         typer.Argument(
-            help="A bundle, by its path or name, or what `calibrate geometry` wrote (.toml)."
+            help="Bundle (NAME or PATH), or geometry (.toml of `camkit calibrate geometry`)."
         ),
     ],
-    out: Annotated[Path, typer.Option("-o", "--out", help="The entry (.xml).")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="Entry for lensfun to write (.xml).")],
     focal_mm: Annotated[
         float | None,
-        typer.Option(help="Focal length; default: that of a geometry. A bundle needs it."),
+        typer.Option(
+            help="Focal length in mm, required for a bundle; default: that of the geometry."
+        ),
     ] = None,
     lens_name: Annotated[
         str | None, typer.Option(help="Model of the lens; default: the name of the source.")
     ] = None,
     maker: Annotated[str, typer.Option(help="Maker of the lens.")] = "Generic",
     mount: Annotated[
-        str, typer.Option(help="Mount of the camera, as the database names it.")
+        str, typer.Option(help="Mount of the camera, as named in the database.")
     ] = "Generic",
     crop_factor: Annotated[
         float | None,
         typer.Option(
-            help="Of the camera; default: by the sensor of a bundle. A geometry needs it."
+            help="Crop factor, required for a geometry; default: from the sensor of the bundle."
         ),
     ] = None,
     aperture: Annotated[
-        float | None, typer.Option(help="F-number; with it the vignetting of a bundle is written.")
+        float | None,
+        typer.Option(
+            help="F-number at which the vignetting of a bundle is written; default: no vignetting."
+        ),
     ] = None,
     most_residual_px: Annotated[
-        float, typer.Option(help="By which the model may miss the distortion.")
+        float, typer.Option(help="Largest misfit of the distortion model in px.")
     ] = 0.5,
     page: Page = None,
     overwrite: Overwrite = False,

@@ -7,7 +7,7 @@ import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.cli.use.calibrate.outputs import Out, Outputs, Page
-from camkit.cli.use.merge import BlackLevel, MosaicCfa, WhiteLevel
+from camkit.cli.use.mosaic import BlackLevel, MosaicCfa, WhiteLevel, mosaic_options
 from camkit.errors import ContractError
 
 if TYPE_CHECKING:
@@ -17,19 +17,19 @@ if TYPE_CHECKING:
 def noise(
     dark: Annotated[
         list[Path],
-        typer.Option(help="A frame without light; given again, two by two, pairs of every ISO."),
+        typer.Option(help="Dark frame, two per ISO; repeat the option for every frame."),
     ],
     flat: Annotated[
         list[Path],
         typer.Option(
-            help="A frame of even light; given again, two by two, pairs of one light and setting, "
-            "two levels or more for every ISO."
+            help="Evenly lit frame, two per level, two levels or more per ISO; repeat for every "
+            "frame."
         ),
     ],
     out: Out,
     page: Page = None,
     iso: Annotated[
-        float | None, typer.Option(help="Of files that state none.", show_default=False)
+        float | None, typer.Option(help="ISO speed of files that state none.", show_default=False)
     ] = None,
     mosaic: MosaicCfa = None,
     black_level: BlackLevel = None,
@@ -38,11 +38,10 @@ def noise(
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Measure gain, read noise and fixed patterns of a sensor on pairs of RAW frames."""
+    """Measure gain, read noise and fixed patterns of a sensor from pairs of RAW frames."""
     outputs = Outputs.asked(out, page, overwrite=overwrite, as_json=json_)
     if iso is not None and not 0 < iso < float("inf"):
         raise ContractError(f"--iso must be > 0; got {iso:g}")
-    from camkit.cli.use.mosaic import mosaic_options
     from camkit.runtime.calibration.noise.measure import measure_sensor
 
     found = measure_sensor(dark, flat, mosaic_options(mosaic, black_level, white_level), iso)

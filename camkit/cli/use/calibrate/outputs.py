@@ -11,10 +11,8 @@ import typer
 from camkit.cli.say import say
 from camkit.errors import ContractError
 
-Out = Annotated[Path, typer.Option("-o", "--out", help="What was found (.toml).")]
-Page = Annotated[
-    Path | None, typer.Option(help="Also show it on a page (.html), complete in itself.")
-]
+Out = Annotated[Path, typer.Option("-o", "--out", help="Result to write (.toml).")]
+Page = Annotated[Path | None, typer.Option(help="Also write a self-contained page (.html).")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,4 +126,4 @@ def named(out: Path | str, page: Path | str | None) -> str:
 
 def _check_free(path: Path, *, overwrite: bool) -> None:
     if path.exists() and not overwrite:
-        raise ContractError(f"{path} exists; say --overwrite or another name")
+        raise ContractError(f"{path} exists; add --overwrite or choose another name")

@@ -23,36 +23,38 @@ def pairs(
     captures: Annotated[
         list[Path],
         typer.Argument(
-            help="Captures of the screen, in any order, linear, or folders of them; the last may "
-            "be what was shown, see --targets.",
+            help="Linear captures of the screen, or folders; the --targets folder may come last.",
         ),
     ],
     geometry: Annotated[
-        Path, typer.Option(help="The camera: a TOML of camkit calibrate geometry.")
+        Path, typer.Option(help="Geometry of the camera (.toml of `camkit calibrate geometry`).")
     ],
-    out: Annotated[Path, typer.Option("-o", "--out", help="Folder for train --pairs.")],
+    out: Annotated[
+        Path, typer.Option("-o", "--out", help="Folder to write, for `camkit train --pairs`.")
+    ],
     targets: Annotated[
         Path | None,
-        typer.Option(
-            help="Folder that camkit calibrate targets wrote; default: the last one named."
-        ),
+        typer.Option(help="Folder of `camkit calibrate targets`; default: the last argument."),
     ] = None,
     tone: Annotated[
         Path | None,
-        typer.Option(help="The display: a TOML of camkit calibrate tone. Default: sRGB."),
+        typer.Option(
+            help="Tone curve of the display (.toml of `camkit calibrate tone`); default: sRGB."
+        ),
     ] = None,
     flat: Annotated[
-        Path | None, typer.Option(help="The vignetting: a TOML of camkit calibrate flat.")
+        Path | None,
+        typer.Option(help="Vignetting (.toml of `camkit calibrate flat`); default: none."),
     ] = None,
     most_residual_px: Annotated[
-        float, typer.Option(help="By which pictures may miss their captures, RMS.")
+        float, typer.Option(help="Largest RMS misalignment of picture and capture in px.")
     ] = 0.5,
     page: Page = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Lay shown pictures over their captures, as pairs that `camkit train --pairs` reads."""
+    """Align displayed pictures with their captures, as pairs for `camkit train --pairs`."""
     check_page(page, overwrite=overwrite)
     within = (".", "capture", "reference")
     folder = Folder.asked(out, (SETTINGS,), within, overwrite=overwrite)
@@ -98,7 +100,7 @@ def _apart(named: list[Path], targets: Path | None) -> tuple[list[Path], Path]:
     if targets is None:
         *named, targets = named
         if not targets.is_dir():
-            raise ContractError("say what was shown: --targets DIR, or its folder after the files")
+            raise ContractError("add --targets DIR, or its folder after the files")
     inside = [expand([path]) if path.is_dir() else [path] for path in named]
     shots = [path for paths in inside for path in paths]
     if not shots:

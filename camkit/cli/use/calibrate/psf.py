@@ -10,7 +10,8 @@ import typer
 from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.cli.say import say
 from camkit.cli.use.calibrate.outputs import Page, check_page
-from camkit.cli.use.merge import BlackLevel, MosaicCfa, Times, WhiteLevel
+from camkit.cli.use.merge import Times
+from camkit.cli.use.mosaic import BlackLevel, MosaicCfa, WhiteLevel, mosaic_options
 from camkit.errors import ContractError
 
 if TYPE_CHECKING:
@@ -22,40 +23,43 @@ if TYPE_CHECKING:
 def psf(
     files: Annotated[
         list[Path],
-        typer.Argument(help="Exposures of a point light, a disc or an edge in the dark, linear."),
+        typer.Argument(help="Linear exposures of a point light, a disc or an edge in the dark."),
     ],
-    out: Annotated[Path, typer.Option("-o", "--out", help="The PSF (safetensors) to write.")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="PSF to write (.safetensors).")],
     page: Page = None,
     times: Times = None,
     dark: Annotated[
         list[Path] | None,
-        typer.Option(help="A frame without light; may be given again, at every exposure time."),
+        typer.Option(help="Dark frame, at least one per exposure time; may be repeated."),
     ] = None,
     disc_px: Annotated[
         float | None,
         typer.Option(
-            help="The light is an even disc: its diameter in pixels, if the lens were perfect."
+            help="Diameter in px of a disc light, as a perfect lens would image it; default: a "
+            "point."
         ),
     ] = None,
     edge: Annotated[
         bool,
-        typer.Option("--edge", help="The light is a straight edge, slanted; its PSF is round."),
+        typer.Option(
+            "--edge",
+            help="Measure a slanted straight edge; the PSF is taken as rotationally symmetric.",
+        ),
     ] = False,
     side_px: Annotated[
         int | None,
-        typer.Option(help="Odd side of the kernels; default: as far as light is seen."),
+        typer.Option(help="Side of the kernels in px, odd; default: as far as light is seen."),
     ] = None,
     pixel_pitch_um: Annotated[
-        float | None, typer.Option(help="Pixel pitch; default: what the frames state.")
+        float | None, typer.Option(help="Pixel pitch in um; default: as the frames state.")
     ] = None,
     depth_m: Annotated[
-        float, typer.Option(help="Distance of the light in m; 'inf' is infinity.")
+        float, typer.Option(help="Distance of the light in m ('inf' for infinity).")
     ] = float("inf"),
     dots: Annotated[
         Path | None,
         typer.Option(
-            help="The light went through a plate of dots made for this PSF (safetensors): sum them "
-            "to what an array of small pixels sees."
+            help="PSF (.safetensors) that a plate of dots was designed for, to sum its dots."
         ),
     ] = None,
     mosaic: MosaicCfa = None,
@@ -65,15 +69,14 @@ def psf(
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Merge a bracket of a small light or an edge to a PSF, every colour of sum 1."""
+    """Merge a bracket of a point light, a disc or an edge into a PSF, every colour of sum 1."""
     if out.suffix.lower() != ".safetensors":
         raise ContractError(f"a PSF is safetensors; expected a name in .safetensors, got {out}")
     if out.exists() and not overwrite:
-        raise ContractError(f"{out} exists; say --overwrite or another name")
+        raise ContractError(f"{out} exists; add --overwrite or choose another name")
     check_page(page, overwrite=overwrite)
     _check_target(disc_px, dots, edge=edge)
     from camkit.bundle.psf_file import psf_to_bytes, read_psf
-    from camkit.cli.use.mosaic import mosaic_options
     from camkit.runtime.calibration.darks import Darks
     from camkit.runtime.calibration.dots import dots_psf
     from camkit.runtime.calibration.edge_psf import measure_edge
@@ -114,7 +117,7 @@ def _check_target(disc_px: float | None, dots: Path | None, *, edge: bool) -> No
     named = {"--disc-px": disc_px is not None, "--edge": edge, "--dots": dots is not None}
     said = [name for name, is_said in named.items() if is_said]
     if len(said) > 1:
-        raise ContractError(f"the light is one thing; say one of {' and '.join(said)}")
+        raise ContractError(f"the light is one thing; use one of {' and '.join(said)}")
 
 
 def _times(

@@ -15,21 +15,23 @@ LEVELS = "0,16,32,48,64,96,128,160,192,224,255"
 
 
 def targets(
-    screen: Annotated[str, typer.Option(help="WIDTHxHEIGHT of the display in px.")],
-    out: Annotated[Path, typer.Option("-o", "--out", help="Folder for PNGs and their list.")],
+    screen: Annotated[str, typer.Option(help="Size of the display in px, WIDTHxHEIGHT.")],
+    out: Annotated[
+        Path, typer.Option("-o", "--out", help="Folder for the PNG files and their list.")
+    ],
     pictures: Annotated[
-        list[Path] | None, typer.Argument(help="Sharp pictures to be shown, sRGB or Adobe RGB.")
+        list[Path] | None, typer.Argument(help="Sharp pictures to show, sRGB or Adobe RGB.")
     ] = None,
     board: Annotated[
-        str, typer.Option(help="COLUMNSxROWS of the checkerboard's inner corners.")
+        str, typer.Option(help="Inner corners of the checkerboard, COLUMNSxROWS.")
     ] = "9x6",
-    levels: Annotated[str, typer.Option(help="Of the grey steps, 0..255.")] = LEVELS,
+    levels: Annotated[str, typer.Option(help="Levels of the grey steps, 0 to 255.")] = LEVELS,
     page: Page = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Write what a display shows: checkerboard, grey steps, colours, pictures with marks."""
+    """Write pictures for a display: checkerboard, grey steps, colours, pictures with marks."""
     check_page(page, overwrite=overwrite)
     from camkit.report.calibration.targets_page import shrunk, targets_html
     from camkit.runtime.calibration.display.screen import Screen

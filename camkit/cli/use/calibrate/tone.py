@@ -7,16 +7,16 @@ import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.cli.use.calibrate.outputs import Out, Outputs, Page
-from camkit.cli.use.merge import BlackLevel, MosaicCfa, WhiteLevel
+from camkit.cli.use.mosaic import BlackLevel, MosaicCfa, WhiteLevel, mosaic_options
 
 
 def tone(
     files: Annotated[
-        list[Path], typer.Argument(help="Linear pictures, each of one grey that fills a display.")
+        list[Path], typer.Argument(help="Linear pictures, each of one grey that fills the display.")
     ],
     levels: Annotated[
         str,
-        typer.Option(help="What the display was told, such as 0,16,255, in the order of FILES."),
+        typer.Option(help="Levels sent to the display, such as 0,16,255, in the order of FILES."),
     ],
     out: Out,
     page: Page = None,
@@ -27,9 +27,8 @@ def tone(
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Measure luminance over level of a display that shows grey steps."""
+    """Measure the luminance of a display at each of its levels."""
     outputs = Outputs.asked(out, page, overwrite=overwrite, as_json=json_)
-    from camkit.cli.use.mosaic import mosaic_options
     from camkit.runtime.calibration.tone import levels_of, measure_tone
 
     said = mosaic_options(mosaic, black_level, white_level)

@@ -53,7 +53,7 @@ def measure_own(
     if unknown := _foreign(settings):
         names = ", ".join(bundle.manifest.name for bundle in bundles)
         raise ContractError(
-            f"{names} takes no photographs, so {', '.join(unknown)} means nothing to it; it knows "
+            f"{names} takes no photographs, so {', '.join(unknown)} does not apply to it; it knows "
             f"{OPTIONS}"
         )
     own = OwnSettings(

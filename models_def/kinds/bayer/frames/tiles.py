@@ -80,7 +80,7 @@ class Tiles:
             ]
         except (OSError, ValueError, EOFError) as error:
             raise ContractError(
-                f"the tiles ({part}) in {folder} are damaged; say `camkit prepare` again"
+                f"the tiles ({part}) in {folder} are damaged; run `camkit prepare` again"
             ) from error
         self._planes, self._clipped, self._sharp, self._facts = opened
 
@@ -223,12 +223,12 @@ def read_frames(folder: Path, recipe: BayerRecipe | None = None) -> Frames:
             f"{folder}: make them with `camkit prepare`"
         ) from None
     except ValueError as error:
-        raise ContractError(f"{folder / HEADER} is damaged; say `camkit prepare` again") from error
+        raise ContractError(f"{folder / HEADER} is damaged; run `camkit prepare` again") from error
     if not isinstance(header, dict) or not header.keys() >= _HEADER_KEYS:
-        raise ContractError(f"{folder / HEADER} is damaged; say `camkit prepare` again")
+        raise ContractError(f"{folder / HEADER} is damaged; run `camkit prepare` again")
     if recipe is not None and header["camera"] != camera_digest(recipe):
         raise ContractError(
-            f"the frames in {folder} were photographed for another recipe; say `camkit prepare` "
+            f"the frames in {folder} were photographed for another recipe; run `camkit prepare` "
             "again"
         )
     return Frames(

@@ -205,7 +205,7 @@ def _check(request: FitRequest) -> None:
     if request.role != "fusion" and request.vgg is None and not request.recipe.thesis.random_vgg:
         raise ContractError(
             f"the role {request.role} looks at pictures through VGG-19: give its weights by "
-            f"{option_text('vgg')} (a file of torchvision's vgg19), or say random_vgg = true in "
+            f"{option_text('vgg')} (a file of torchvision's vgg19), or state random_vgg = true in "
             "[thesis] to try the machinery with random ones"
         )
 

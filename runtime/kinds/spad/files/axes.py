@@ -104,8 +104,8 @@ def axes_of(path: Path, shape: Sequence[int], stated: str | None, usual: str | N
     text = usual if stated is None else stated
     if text is None:
         raise ContractError(
-            f"{path.name} holds an array of {shape}: nothing says which axis is time; say [array] "
-            f'axes = "yxt", "tyx" or what it is, in a file for {option_text("timing")}'
+            f"{path.name} holds an array of {shape}: nothing says which axis is time; state "
+            f'[array] axes = "yxt", "tyx" or what it is, in a file for {option_text("timing")}'
         )
     found = Axes.read(text)
     if found is None or not found.fits(shape):

@@ -40,7 +40,7 @@ def chosen_places(
         asked = "" if key is None else f", and no {key!r}"
         first = ", ".join(f"{name} {known[0]}" for name, known in several.items())
         raise ContractError(
-            f"{path.name} holds {listed}{asked}; choose in the file of {option_text('timing')}: "
+            f"{path.name} holds {listed}{asked}; choose one in the file of {option_text('timing')}: "
             f'under [array] the line key = "{first}"'
         )
     return {

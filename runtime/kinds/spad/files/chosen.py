@@ -38,7 +38,7 @@ def chosen_name(path: Path, names: Iterable[str], hints: Hints, what: str = "arr
     candidates = telling or known
     if len(candidates) > 1:
         raise ContractError(
-            f"{path.name} holds several {what}: {', '.join(candidates)}; say which by [array] key "
+            f"{path.name} holds several {what}: {', '.join(candidates)}; choose one by [array] key "
             f"in a file for {option_text('timing')}"
         )
     return candidates[0]

@@ -126,7 +126,7 @@ def checked_bins(path: Path, bins: int, pixels: int, kind: CountsKind) -> int:
     if kind != "counts" and bins > MOST_BINS:
         raise DecodeError(
             f"{path.name} has {bins} time bins; expected at most {MOST_BINS}: put bins together, "
-            f"or say [array] axes in a file for {option_text('timing')} if time is another axis"
+            f"or state [array] axes in a file for {option_text('timing')} if time is another axis"
         )
     if bins * pixels > MOST_COUNTS:
         raise DecodeError(

@@ -61,7 +61,7 @@ def stack_axes(path: Path, letters: str, shape: tuple[int, ...], key: str | None
     if not letters.endswith("YX") or (len(further) > 1 and set(further) - set(NAMES)):
         raise ContractError(
             f"{path.name} holds an array of {shape} with axes that it does not name; expected "
-            "time, rows and columns: say [array] axes, such as "
+            "time, rows and columns: state [array] axes, such as "
             f'"{_example(shape)}" (place 0 of each further axis), in a file for '
             f"{option_text('timing')}"
         )
@@ -71,7 +71,7 @@ def stack_axes(path: Path, letters: str, shape: tuple[int, ...], key: str | None
     if time is None and further and further != "C":
         listed = ", ".join(f"{NAMES[one]} ({n})" for one, n in zip(further, shape, strict=False))
         raise ContractError(
-            f"{path.name} holds {listed}, rows and columns: nothing says which axis is time; say "
+            f"{path.name} holds {listed}, rows and columns: nothing says which axis is time; state "
             f'[array] axes, such as "{_example(shape)}" (place 0 of each further axis), in a file '
             f"for {option_text('timing')}"
         )

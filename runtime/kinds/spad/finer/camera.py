@@ -181,7 +181,7 @@ class FineCamera:
         if shape != own:
             raise ContractError(
                 f"the capture has {shape[1]}x{shape[0]} pixels, the array of bundle "
-                f"{self.bundle.manifest.name} {own[1]}x{own[0]}; say "
+                f"{self.bundle.manifest.name} {own[1]}x{own[0]}; use "
                 f"{option_text('bundle', 'none')}"
             )
 

@@ -37,7 +37,7 @@ def guess_width(counts: FloatArray, axis: TimeAxis, period_ps: float | None) -> 
     if photons < LEAST_PHOTONS:
         raise ContractError(
             f"no pulse is stated, and {photons:.0f} photons are too few to find its width before "
-            f"a decay; say [laser] fwhm_ps or [irf] file in a file for {option_text('timing')}"
+            f"a decay; state [laser] fwhm_ps or [irf] file in a file for {option_text('timing')}"
         )
     whole = (whole * min(1.0, MOST_PHOTONS / photons)).astype(np.float32)
     low, high = NARROWEST * axis.step_ps, WIDEST * axis.step_ps * axis.bins

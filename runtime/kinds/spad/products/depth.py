@@ -230,17 +230,17 @@ def _warnings(
     if hot:
         places = ", ".join(f"({x}, {y})" for x, y in hot[:NAMED_HOT])
         more = f" and {len(hot) - NAMED_HOT} more" if len(hot) > NAMED_HOT else ""
-        told.append(f"hot pixels at {places}{more}: painted over and not valid")
+        told.append(f"hot pixels at {places}{more}: filled from their neighbours, marked not valid")
     if blind.any():
         told.append(
-            f"{int(blind.sum())} pixels lost bins to pile-up: more cycles were used up than can "
-            "be corrected for; they are not valid"
+            f"pile-up is too strong to correct in {int(blind.sum())} pixels: they are marked not "
+            "valid"
         )
     if not found.valid.any():
-        told.append("no pixel has enough photons to believe a return")
+        told.append("no pixel has enough photons for a reliable distance")
     if not is_lens_known:
         told.append(
-            "nothing says how the array looks out: the points assume a focal length of the "
-            "array's width; state [array] pitch_um and focal_length_mm"
+            "the lens is not stated: the point cloud assumes a focal length equal to the width of "
+            "the array; state [array] pitch_um and focal_length_mm"
         )
     return (*told, *survey.warnings())

@@ -50,7 +50,7 @@ def make_lifetime(making: Making, survey: Survey, began: float) -> Made:
     """
     if survey.camera is not None:
         raise UnsupportedError(
-            f"lifetimes are those of the array's own pixels; say {option_text('bundle', 'none')}"
+            f"lifetimes are those of the array's own pixels; use {option_text('bundle', 'none')}"
         )
     window = _window(survey)
     pulse, warnings = _pulse(survey, window)
@@ -61,7 +61,7 @@ def make_lifetime(making: Making, survey: Survey, began: float) -> Made:
     arrays = _arrays(making, survey, fitter, window)
     shown = np.where(arrays["valid"], arrays["lifetime_ps"], np.nan)
     if not arrays["valid"].any():
-        warnings += ("no pixel has enough photons to believe a lifetime",)
+        warnings += ("no pixel has enough photons for a reliable lifetime",)
     return Made(
         arrays=arrays,
         writers={
@@ -118,7 +118,7 @@ def _pulse(survey: Survey, window: _Window) -> tuple[Pulse, tuple[str, ...]]:
     guessed = guess_width(sample, window.axis, survey.timing.lifetime.period_ps)
     told = (
         f"no pulse is stated: a Gaussian of {FWHM_PER_SIGMA * guessed.sigma_ps:.3g} ps full width "
-        "before one decay was found in the capture; state [laser] fwhm_ps or [irf] if it is known"
+        "before one decay is estimated; state [laser] fwhm_ps or [irf] if you know it"
     )
     return guessed, (told,)
 

@@ -40,10 +40,7 @@ def full_pixels(survey: Survey) -> tuple[str, ...]:
     blind = survey.rows.blind_pixels
     if not blind:
         return ()
-    return (
-        f"{blind} pixels lost bins to pile-up: they have at least the photons that are given, "
-        "nobody can tell how many more",
-    )
+    return (f"pile-up is too strong to correct in {blind} pixels: their photons are a lower bound",)
 
 
 def sum_of(making: Making, survey: Survey) -> FloatArray:

@@ -79,12 +79,12 @@ class Settings:
         product = self.product or ("depth" if is_histogram else "intensity")
         if product != "intensity" and not is_histogram:
             raise ContractError(
-                f"{product} needs the times of photons, and this capture holds counts alone; say "
+                f"{product} needs the times of photons, and this capture holds counts alone; use "
                 + option_text("product", "intensity")
             )
         if product != "depth" and self.chosen:
             raise ContractError(
-                f"{', '.join('--' + name for name in self.chosen)} means nothing to the product "
+                f"{', '.join('--' + name for name in self.chosen)} does not apply to the product "
                 f"{product}: it is for depth; leave it out"
             )
         return product

@@ -97,7 +97,7 @@ class Survey:
         guessed = guess_pulse(self._sample(), self.an_axis)
         told = (
             f"no pulse is stated: a Gaussian of {FWHM_PER_SIGMA * guessed.sigma_ps:.3g} ps full "
-            "width was found in the capture; state [laser] fwhm_ps, [gate] or [irf] if it is known"
+            "width is estimated; state [laser] fwhm_ps, [gate] or [irf] if you know it"
         )
         return guessed, told
 
@@ -166,7 +166,7 @@ def _check_finer(settings: Settings, camera: FineCamera | None) -> None:
     if camera is None and settings.finer is not None:
         raise ContractError(
             f"{option_text('method', settings.finer)} makes pictures finer behind the plate of a "
-            f"bundle; say {option_text('bundle')} too"
+            f"bundle; add {option_text('bundle')} too"
         )
     if camera is not None and settings.way.pool not in ("auto", "1"):
         raise ContractError(

@@ -264,7 +264,7 @@ def test_export_finds_what_lies_beside_the_checkpoint(
 def test_files_of_fine_tuning_need_a_checkpoint_to_start_from(camkit_command) -> None:
     outcome = camkit_command("train", RECIPE, "--vgg", "vgg19.pth")
     assert outcome.code == ExitCode.USAGE
-    assert "say --fine-tune too" in outcome.err
+    assert "add --fine-tune too" in outcome.err
 
 
 def test_depths_that_are_no_numbers_are_a_usage_error(camkit_command, tmp_path) -> None:

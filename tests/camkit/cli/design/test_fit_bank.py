@@ -40,7 +40,7 @@ def test_the_recipe_is_written_with_its_bank(
     assert {"samples", "steps", "gain_db", "noise", "mistrust"} <= set(told)
     # and nothing is written over
     assert run(words) == ExitCode.USAGE
-    assert "exists; say --overwrite" in capsys.readouterr().err
+    assert "exists; add --overwrite" in capsys.readouterr().err
     assert run([*words, "--overwrite"]) == 0
 
 

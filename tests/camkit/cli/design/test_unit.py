@@ -52,7 +52,7 @@ def test_a_body_is_photographed_measured_and_used(bundle: Bundle, camkit_command
     assert (unit.name, unit.focus_um) == ("unit", told["focus_um"])
     measured = tomllib.loads(Path("found/unit.toml").read_text())["measured"]
     assert measured["standard_error_um"] == told["standard_error_um"]
-    assert "exists; say --overwrite" in camkit_command(*measure).err
+    assert "exists; add --overwrite" in camkit_command(*measure).err
     process = ("process", "1.dng", "--bundle", "focused.camkit", "--unit", "found/unit.toml")
     assert camkit_command(*process).code == 0
     sidecar = json.loads(Path("1.camkit.json").read_text())

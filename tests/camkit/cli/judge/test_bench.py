@@ -84,4 +84,4 @@ def test_an_array_of_single_photons_measures_itself(tmp_path: Path, camkit_comma
     assert {path.name for path in out.iterdir()} == {"bench.json", "bench.csv"}
     refused = camkit_command(*words, "--methods", "net")
     assert refused.code == ExitCode.USAGE
-    assert "--methods means nothing to it" in refused.err
+    assert "--methods does not apply to it" in refused.err

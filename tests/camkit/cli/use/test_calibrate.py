@@ -92,7 +92,7 @@ def test_a_list_of_times_may_name_the_darks_too(
     ("out", "options", "told"),
     [
         ("psf.npz", [], "expected a name in .safetensors"),
-        ("psf.safetensors", [], "say --pixel-pitch-um"),
+        ("psf.safetensors", [], "add --pixel-pitch-um"),
         ("psf.safetensors", ["--side-px", 40], "must be odd"),
         ("psf.safetensors", ["--pixel-pitch-um", 5, "--side-px", 201], "at most"),
     ],
@@ -206,7 +206,7 @@ def test_a_disc_becomes_a_psf_a_page_and_one_object(camkit_command, tmp_path: Pa
     assert "psf.html exists" in camkit_command("calibrate", "psf", *files, *dark, *asked).err
     missing = camkit_command("calibrate", "psf", *files, *asked, "--overwrite")
     assert missing.code == ExitCode.INPUT_FAILED
-    assert "haze fills the frame" in missing.err
+    assert "veiling glare fills the frame" in missing.err
     assert len(missing.err.strip().splitlines()) == 1
     assert not out.exists()
 
@@ -225,8 +225,8 @@ def test_one_frame_of_an_edge_becomes_a_psf(camkit_command, tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        (["--edge", "--disc-px", 4], "say one of --disc-px and --edge"),
-        (["--edge", "--dots", "d.safetensors"], "say one of --edge and --dots"),
+        (["--edge", "--disc-px", 4], "use one of --disc-px and --edge"),
+        (["--edge", "--dots", "d.safetensors"], "use one of --edge and --dots"),
         (["--disc-px", 0], "--disc-px must be > 0"),
         (["--page", "psf.txt"], "a page is HTML"),
     ],

@@ -69,9 +69,9 @@ def test_bad_input_is_one_line_and_no_file(camkit_command, tmp_path: Path) -> No
         ([*bright, *PITCH], ExitCode.INPUT_FAILED, "of green is clipped"),
         ([tmp_path / "text.dng", *PITCH], ExitCode.INPUT_FAILED, "text.dng"),
         ([tmp_path / "none.png", *PITCH], ExitCode.INPUT_FAILED, "none.png"),
-        ([*files], ExitCode.USAGE, "say --pixel-pitch-um"),
+        ([*files], ExitCode.USAGE, "add --pixel-pitch-um"),
         ([*files, *PITCH, "--shift-px", "1"], ExitCode.USAGE, "takes two numbers X,Y"),
-        ([*files, *PITCH, "--turn-deg", 1, "--turn-deg", 2], ExitCode.USAGE, "said 2 times for 1"),
+        ([*files, *PITCH, "--turn-deg", 1, "--turn-deg", 2], ExitCode.USAGE, "given 2 times for 1"),
     ):
         done = camkit_command("calibrate", "flat", *asked, "-o", out)
         assert done.code == code, done.err

@@ -57,7 +57,7 @@ def test_the_same_is_said_for_people(camkit_command, pictures, tmp_path: Path) -
     assert "note: corners were seen to" in done.err
     again = camkit_command("calibrate", "geometry", *pictures, *asked)
     assert again.code == ExitCode.USAGE
-    assert "say --overwrite" in again.err
+    assert "add --overwrite" in again.err
     assert camkit_command("calibrate", "geometry", *pictures, *asked, "--overwrite").code == 0
 
 

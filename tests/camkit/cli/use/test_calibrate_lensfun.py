@@ -160,7 +160,7 @@ def test_malformed_files_and_unknown_cameras_are_refused(
     words[4] = unknown
     done = camkit_command(*words)
     assert done.code == 1
-    assert "say --crop-factor" in done.err
+    assert "add --crop-factor" in done.err
     assert camkit_command(*words, "--crop-factor", 1.5).code == 0
     (asked[2] / "zz.xml").write_text("<lensdatabase>", encoding="utf-8")
     done = camkit_command(*words, "--overwrite")
@@ -281,7 +281,7 @@ def test_a_geometry_tells_its_focal_length_and_a_bundle_does_not(
     bundle = write_tiny_bundle(tmp_path)
     done = camkit_command("calibrate", "lensfun-out", bundle, "-o", tmp_path / "b.xml")
     assert done.code == ExitCode.USAGE
-    assert "say --focal-mm" in done.err
+    assert "add --focal-mm" in done.err
 
 
 def test_a_geometry_needs_its_crop_factor_and_obeys_the_limit(

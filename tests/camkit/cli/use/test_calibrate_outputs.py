@@ -44,7 +44,7 @@ def test_a_page_that_nobody_asked_for_is_not_drawn(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["found.toml", "page.html"])
 def test_what_exists_is_kept_unless_overwritten(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_text("old")
-    with pytest.raises(ContractError, match=f"{name} exists; say --overwrite"):
+    with pytest.raises(ContractError, match=f"{name} exists; add --overwrite"):
         _asked(tmp_path)
     _asked(tmp_path, overwrite=True).write(RECORD, [], lambda: "<html>")
     assert (tmp_path / name).read_text() != "old"

@@ -142,7 +142,7 @@ def test_captures_and_what_was_shown_may_be_two_folders(camkit_command, set_up, 
     done = camkit_command("calibrate", "pairs", shots, set_up / "targets", *end)
     assert done.code == 0, done.err
     assert "2 pairs" in done.out
-    for named, told in (([shots / "0.dng"], "say what was shown"), ([shots], "no capture is")):
+    for named, told in (([shots / "0.dng"], "add --targets DIR"), ([shots], "no capture is")):
         done = camkit_command("calibrate", "pairs", *named, *end[:3], tmp_path / "none")
         assert done.code == ExitCode.USAGE
         assert told in done.err

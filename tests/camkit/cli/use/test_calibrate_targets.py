@@ -113,7 +113,7 @@ def test_a_folder_of_other_things_is_left_alone(camkit_command, picture, tmp_pat
     out.mkdir()
     (out / "letter.txt").write_text("dear")
     asked = ("calibrate", "targets", picture, "-o", out, "--screen", "640x400")
-    assert "say --overwrite" in camkit_command(*asked).err
+    assert "add --overwrite" in camkit_command(*asked).err
     assert "holds files of another kind" in camkit_command(*asked, "--overwrite").err
     assert [path.name for path in out.iterdir()] == ["letter.txt"]
 

@@ -106,7 +106,7 @@ def test_notes_of_the_choice_are_said_on_stderr(camkit_command, tmp_path: Path) 
     out, files = tmp_path / "out.exr", (tmp_path / "a.png", tmp_path / "b.png")
     done = camkit_command("merge", *files, "-o", out, "--times", "1,2")
     assert done.code == 0
-    assert "note: too little is unclipped" in done.err
+    assert "note: too few pixels are unclipped" in done.err
     assert "100.0000% clipped in all" in done.out
 
 
@@ -277,7 +277,7 @@ def test_deep_codes_that_are_taken_as_light_are_said_to_be(
         (["night", "long.png"], "a.exr", "got the folder night and the file long.png"),
         (["empty"], "a.exr", "empty holds no frames; expected RAW files or pictures (.3fr, .arw"),
         (["one"], "a.exr", "2 to 256 frames; got 1"),
-        (["night"], "a.exr", "3 of 3 frames state no exposure time (0.png, 1.png, 2.png); say --t"),
+        (["night"], "a.exr", "3 of 3 frames state no exposure time (0.png, 1.png, 2.png); add --t"),
     ],
 )
 def test_what_folders_lack_is_said(

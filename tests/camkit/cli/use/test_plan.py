@@ -42,7 +42,7 @@ def test_plan_and_dry_run_say_the_same_to_people(
         lines = capsys.readouterr().out.splitlines()
         outs.append([line for line in lines if not line.startswith(("  about", "    saves"))])
     assert outs[0] == outs[1]
-    assert any("size: M (--size says so)" in line for line in outs[0])
+    assert any("size: M (set by --size)" in line for line in outs[0])
 
 
 def test_what_a_format_holds_counts_in_a_plan_too(

@@ -217,7 +217,7 @@ def test_assume_centre_takes_a_picture_of_another_size_with_a_note(
     assert "--assume centre" in camkit_command(*run).err
     outcome = camkit_command(*run, "--assume", "centre")
     assert outcome.code == 0, outcome.err
-    assert "note: assumed centred" in outcome.err
+    assert "note: assumed to be a centred crop" in outcome.err
 
 
 class _Terminal(io.StringIO):

@@ -94,7 +94,7 @@ def test_a_lamp_at_the_border_is_warned_of(street, camkit_command) -> None:
         camkit_command("process", "edge.dng", "--bundle", "streaks.camkit", "--json").out
     )
     assert told["status"] == "ok"
-    assert any("lights reach the border of the picture" in note for note in told["warnings"])
+    assert any("a light reaches the border of the picture" in note for note in told["warnings"])
 
 
 @pytest.mark.parametrize(

@@ -102,7 +102,7 @@ def test_its_report_is_written_as_json_and_csv(
 def test_what_means_nothing_to_it_is_refused_by_name(
     kind: _Kind, settings: Settings, changes: dict[str, Any], option: str
 ) -> None:
-    with pytest.raises(ContractError, match=f"no photographs, so {option} means nothing to it"):
+    with pytest.raises(ContractError, match=f"no photographs, so {option} does not apply to it"):
         run_bench(replace(settings, **changes))
     assert kind.asked == []
 

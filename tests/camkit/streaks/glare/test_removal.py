@@ -102,8 +102,8 @@ def test_the_sidecar_says_what_was_found(glare: Glare) -> None:
 @pytest.mark.parametrize(
     ("picture", "told"),
     [
-        (np.full((3, 40, 50), 0.2, np.float32), "no light reaches white"),
-        (np.ones((3, 40, 50), np.float32), "100% of the picture is light"),
+        (np.full((3, 40, 50), 0.2, np.float32), "no light reaches the white level"),
+        (np.ones((3, 40, 50), np.float32), "100% of the picture is at the white level"),
         (np.minimum(exposed_scene("night:6", 120, 160), 1), "no streaks at 2.5 to 8 degrees"),
     ],
 )
@@ -111,7 +111,7 @@ def test_an_unchanged_picture_says_why(picture: FloatArray, told: str) -> None:
     found = _found(picture)
     np.testing.assert_array_equal(_cleared(found, picture), picture)
     (note,) = found.notes
-    assert note.startswith("the picture is unchanged: ")
+    assert note.startswith("no streaks were removed: ")
     assert told in note
     assert found.to_json()["angle_deg"] is None
 

@@ -43,7 +43,7 @@ def test_paths_are_those_of_spheres() -> None:
         ({"diameter_mm": math.nan}, "must be > 0"),
         ({"focus_mm": 40.0}, "farther away than its focal length"),
         ({"sensor_mm": 50.0}, "not with one"),
-        ({"focal_length_mm": math.inf}, "say sensor_mm"),
+        ({"focal_length_mm": math.inf}, "state sensor_mm"),
         ({"focal_length_mm": math.inf, "sensor_mm": -1.0}, "sensor_mm must be > 0"),
     ],
 )

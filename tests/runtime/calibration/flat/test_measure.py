@@ -130,9 +130,9 @@ def test_wrong_wishes_are_refused(tmp_path: Path) -> None:
     (tmp_path / "small").mkdir()
     small = Flats(width=180, height=120).write_planes(tmp_path / "small", GOOD[:1])
     for call, told in (
-        (lambda: measure_flat(files, shifts, turns), "say pixel_pitch_um"),
+        (lambda: measure_flat(files, shifts, turns), "add pixel_pitch_um"),
         (lambda: measure_flat(files, shifts, turns, pixel_pitch_um=-1.0), "must be > 0"),
-        (lambda: measure_flat(files, shifts[:1], turns, pixel_pitch_um=1.0), "said 1 times for 2"),
+        (lambda: measure_flat(files, shifts[:1], turns, pixel_pitch_um=1.0), "given 1 times for 2"),
         (lambda: measure_flat(files[:1] * 2, shifts, turns, pixel_pitch_um=1.0), "given twice"),
     ):
         with pytest.raises(ContractError, match=told):

@@ -53,8 +53,8 @@ def test_a_picture_to_be_turned_clockwise_holds_things_turned_the_other_way() ->
 @pytest.mark.parametrize(
     ("shifts", "turns", "told"),
     [
-        (["1,2"], None, "shift_px is said 1 times for 2 pictures"),
-        (None, [1.0, 2.0, 3.0], "turn_deg is said 3 times"),
+        (["1,2"], None, "shift_px is given 1 times for 2 pictures"),
+        (None, [1.0, 2.0, 3.0], "turn_deg is given 3 times"),
         (["1,2", "3"], None, "takes two numbers X,Y; got '3'"),
         (["1,2", "a,b"], None, "takes two numbers"),
         (["1,2", "nan,0"], None, "a shift is two numbers"),

@@ -38,7 +38,7 @@ def test_a_crop_mode_is_not_taken_for_the_whole_sensor(tmp_path: Path) -> None:
     assert stated_crop(whole) == pytest.approx(1.5)
     assert lensfun_bundle(database, ZOOM, whole, options).notes
     part = _jpeg(tmp_path / "part.jpg", 24.0, 54)
-    told = r"crop factor 1\.5 for the Box 2, .* crop factor 2\.25, .* say crop_factor"
+    told = r"crop factor 1\.5 for the Box 2, .* crop factor 2\.25, .* add crop_factor"
     with pytest.raises(DecodeError, match=told):
         lensfun_bundle(database, ZOOM, part, options)
     said = CameraOptions(focal_mm=24.0, crop_factor=2.25)

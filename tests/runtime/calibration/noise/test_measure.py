@@ -136,7 +136,7 @@ def test_headerless_mosaics_take_their_iso_from_the_caller(tmp_path: Path, small
     assert list(facts.transfers) == ["G1", "R", "B", "G2"]
     assert facts.linearity is None
     assert facts.to_record()["linearity_percent"] is None
-    with pytest.raises(DecodeError, match=r"0\.png states no ISO; say iso"):
+    with pytest.raises(DecodeError, match=r"0\.png states no ISO; add iso"):
         measure_sensor(files[:2], files[2:], said)
 
 

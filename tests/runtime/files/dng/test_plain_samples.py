@@ -133,7 +133,7 @@ def test_samples_that_are_no_numbers_are_counted(tmp_path):
     samples = scene()
     samples[5, 5], samples[6, 6], samples[7, 7] = np.nan, np.inf, -np.inf
     capture = read(tmp_path, samples)
-    assert any("3 samples are no numbers" in note for note in capture.notes)
+    assert any("3 samples are NaN or infinite" in note for note in capture.notes)
     assert np.isnan(capture.linear_rows(0, HEIGHT)[[5, 6, 7], [5, 6, 7]]).all()
 
 

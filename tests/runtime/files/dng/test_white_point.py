@@ -38,7 +38,7 @@ def test_the_matrix_nearest_to_daylight_is_taken():
 def test_analog_balance_scales_the_rows_of_the_matrix():
     matrix, note = color_matrix(tags_of(t50721=IDENTITY, t50727=(2.0, 1.0, 3.0)))
     assert np.array_equal(np.diag(matrix), [2, 1, 3])
-    assert "does not state" in note
+    assert "an unknown light source" in note
 
 
 @pytest.mark.parametrize("values", [(1.0,) * 9, (math.nan,) * 9, (1.0,) * 8])

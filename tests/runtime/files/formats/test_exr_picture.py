@@ -71,7 +71,7 @@ def test_deep_files_are_refused_by_name_and_flat_parts_of_them_read(tmp_path, ki
     OpenEXR.File([part, flat]).write(str(path))
     found = read_picture(path)
     assert np.array_equal(found.samples, PLANES)
-    assert found.notes == ("parts that are not read: deep",)
+    assert found.notes == ("parts not read: deep",)
 
 
 def test_the_deep_file_of_reports_is_refused_in_one_line():
@@ -89,7 +89,7 @@ def test_parts_that_are_not_read_are_named(tmp_path, first):
     OpenEXR.File(parts).write(str(tmp_path / "a.exr"))
     found = read_picture(tmp_path / "a.exr")
     assert np.array_equal(found.samples, PLANES)
-    assert found.notes == ("parts that are not read: depth",)
+    assert found.notes == ("parts not read: depth",)
 
 
 @pytest.mark.parametrize(
@@ -188,5 +188,5 @@ def test_luminance_and_chroma_become_colour(tmp_path, origin, step):
     file.close()
     found = read_picture(tmp_path / "a.exr")
     assert np.abs(found.samples - planes).max() < 1e-5
-    assert "luminance and chroma" in found.notes[0]
+    assert "luminance and subsampled chroma" in found.notes[0]
     assert np.array_equal(read_scene(tmp_path / "a.exr"), found.samples)

@@ -334,7 +334,7 @@ def test_a_mosaic_is_not_colour_managed(tmp_path, suffix):
     options = MosaicOptions(cfa="RGGB", black_level=0, white_level=255)
     found = read_capture(path, mosaic=options)
     assert np.array_equal(found.samples, mosaic)
-    assert found.notes == ("headerless mosaic: pattern and levels as given",)
+    assert found.notes == ("headerless mosaic: CFA and levels are those of the options",)
 
 
 def test_codes_that_are_kept_name_the_space(tmp_path):

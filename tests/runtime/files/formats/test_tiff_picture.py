@@ -138,7 +138,7 @@ def test_the_picture_behind_a_thumbnail_is_read(tmp_path, marked, children, bits
     path = write_tiff(tmp_path / "a.tif", [(small[0] | tags, small[1]), packed_page(samples, bits)])
     found = read_picture(path, keep_codes=True)
     assert np.array_equal(found.samples, planes(samples))
-    assert any("page 2 is read" in note for note in found.notes)
+    assert any("page 2 of the TIFF is read" in note for note in found.notes)
 
 
 def test_a_picture_before_its_reduced_pages_is_read_and_a_stack_is_told(tmp_path):
@@ -150,7 +150,7 @@ def test_a_picture_before_its_reduced_pages_is_read_and_a_stack_is_told(tmp_path
     stack = write(tmp_path / "b.tif", np.stack([DEEP, DEEP // 2]), photometric="rgb")
     found = read_picture(stack)
     assert np.array_equal(found.samples, planes(DEEP))
-    assert any("1 more of the TIFF are not" in note for note in found.notes)
+    assert any("one page of the TIFF is read, 1 more are not" in note for note in found.notes)
 
 
 @pytest.mark.parametrize("kind", ["CIELab", "ICCLab"])

@@ -249,7 +249,7 @@ def test_saturated_pixels_are_bright_and_told(tmp_path: Path) -> None:
     timing.write_text(TIMING.replace("time_bin_ps", "cycles = 100\ntime_bin_ps"), encoding="utf-8")
     made = camkit.load(None, kind="spad", timing=timing).make(tmp_path / "a.npz")
     assert made.arrays["intensity"].argmax() == 3 * 8 + 4
-    assert any("1 pixels lost bins to pile-up" in told for told in made.warnings)
+    assert any("too strong to correct in 1 pixels" in told for told in made.warnings)
 
 
 def test_a_change_of_the_timing_file_is_a_new_product(
@@ -285,12 +285,12 @@ def test_a_change_of_the_timing_file_beside_is_a_new_product(scan: Path, tmp_pat
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        (["--product", "intensity", "--pool", "3"], "--pool means nothing to the product"),
-        (["--product", "transient", "--method", "lsq"], "--method means nothing to the product"),
+        (["--product", "intensity", "--pool", "3"], "--pool does not apply to the product"),
+        (["--product", "transient", "--method", "lsq"], "--method does not apply to the product"),
         (["--returns", "3"], "returns must be one of 1, 2; got '3'"),
         (["--method", "wiener"], "method must be one of log, lsq"),
         (["--format", "png"], "--format must be one of exr, tiff for such captures"),
-        (["--wb", "1,1,1"], "--wb means nothing to captures of the kind spad"),
+        (["--wb", "1,1,1"], "--wb does not apply to captures of the kind spad"),
     ],
 )
 def test_what_means_nothing_is_refused(
@@ -312,7 +312,7 @@ def test_what_means_nothing_is_refused(
 
 def test_counts_have_no_depth(tmp_path: Path) -> None:
     np.savez(tmp_path / "a.npz", counts=np.ones((4, 4)))
-    with pytest.raises(ContractError, match=r"this capture holds counts alone; say product=.int"):
+    with pytest.raises(ContractError, match=r"this capture holds counts alone; use product=.int"):
         camkit.load(None, kind="spad", product="depth").make(tmp_path / "a.npz")
 
 
@@ -339,7 +339,7 @@ def test_a_tiff_is_a_picture_unless_an_option_says_otherwise(tmp_path: Path, tim
     single = tmp_path / "in" / "single.tif"
     tifffile.imwrite(single, small_cube()[0])
     (grey,) = camkit.process(single, bundle="none", out_dir=tmp_path / "a")
-    assert 'if it counts single photons, say product="intensity"' in " ".join(grey.warnings)
+    assert 'if it counts single photons, add product="intensity"' in " ".join(grey.warnings)
 
 
 def test_the_plan_says_what_would_be_done(

@@ -100,7 +100,7 @@ def test_a_pulse_that_nobody_stated_is_found(axis: TimeAxis) -> None:
     mean = 60 * plain.shares(true, times, bins) + 0.2
     counts = np.random.default_rng(1).poisson(mean).astype(np.float32)
     assert guess_pulse(counts, plain).sigma_ps == pytest.approx(55, rel=0.04)
-    with pytest.raises(ContractError, match=r"photons are too few.*say \[laser\] fwhm_ps"):
+    with pytest.raises(ContractError, match=r"photons are too few.*state \[laser\] fwhm_ps"):
         guess_pulse(counts[:2], plain)
 
 

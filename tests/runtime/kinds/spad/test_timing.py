@@ -65,7 +65,7 @@ def test_a_full_width_is_twice_where_a_gaussian_is_half() -> None:
 
 def test_without_a_pulse_none_is_made_up() -> None:
     assert Timing().pulse() is None
-    with pytest.raises(ContractError, match="say its width_ps too"):
+    with pytest.raises(ContractError, match="state its width_ps too"):
         Timing().with_stated({"rc_ps": 60.0}).pulse()
 
 
@@ -121,9 +121,13 @@ def test_what_is_wrong_is_named(tmp_path: Path, text: str, message: str) -> None
 
 def test_what_an_axis_lacks_is_asked_for() -> None:
     bare = Timing()
-    with pytest.raises(ContractError, match=r'say \[timing\] orientation = "gate" or "histogram"'):
+    with pytest.raises(
+        ContractError, match=r'state \[timing\] orientation = "gate" or "histogram"'
+    ):
         bare.axis(bins=100)
-    with pytest.raises(ContractError, match=r"how wide a time bin is; say \[timing\] time_bin_ps"):
+    with pytest.raises(
+        ContractError, match=r"how wide a time bin is; state \[timing\] time_bin_ps"
+    ):
         bare.axis(bins=100, orientation="histogram")
     wide = bare.with_stated({"time_bin_ps": 8.0})
     with pytest.raises(ContractError, match=r"time stamps need \[timing\] bins"):

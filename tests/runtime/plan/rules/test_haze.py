@@ -30,7 +30,7 @@ def _decisions(bundle: Bundle, **choices: Any) -> dict[str, Decision]:
 
 def test_the_haze_is_undone_everywhere(bundle: Bundle) -> None:
     found = _decisions(bundle)
-    assert found["haze"].choice == "undone everywhere"
+    assert found["haze"].choice == "removed everywhere"
     assert "96 cells of 8 px" in found["haze"].reason
     assert {"blocks", "wavelengths"} <= set(found)
 
@@ -47,7 +47,7 @@ def test_what_is_left_over_is_counted_as_the_solver_counts_it(bundle: Bundle) ->
 
 def test_without_the_bank_nothing_is_said_of_it(bundle: Bundle) -> None:
     found = _decisions(bundle, method="haze")
-    assert found["haze"].choice == "undone everywhere"
+    assert found["haze"].choice == "removed everywhere"
     assert not {"blocks", "wavelengths"} & set(found)
 
 

@@ -139,7 +139,7 @@ def test_a_joint_design_tells_how_it_is_read_and_another_begins_at_its_end(
     ("words", "message"),
     [
         (["--minutes", "0"], "--minutes must be > 0"),
-        (["--resume", "--overwrite"], "give one of them"),
+        (["--resume", "--overwrite"], "use one of them"),
         (["-o", "plate.json"], "written as .toml"),
     ],
 )

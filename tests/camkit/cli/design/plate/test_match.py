@@ -94,7 +94,7 @@ def test_what_is_there_stays_unless_it_may_be_replaced(camkit_command, psf: Path
     asked = ("plate", "match", psf, "-o", folder, *SMALL)
     done = camkit_command(*asked)
     assert done.code == ExitCode.USAGE
-    assert "mask_4.png exists; say --overwrite or another name" in done.err
+    assert "mask_4.png exists; add --overwrite or choose another name" in done.err
     assert camkit_command(*asked, "--overwrite").code == 0
     # a mask of more levels would spoil this plate
     assert sorted(p.name for p in folder.glob("mask*")) == [
@@ -140,7 +140,7 @@ def _cut(path: Path) -> None:
         (lambda p: np.savez(p, psf=PSF * 0), "needs light"),
         (_objects, "holds pickled objects, which are never read"),
         (_bomb, "unpacks to 10000000 bytes"),
-        (_boast, "must be 11x11; it says it is (1000000, 1000000)"),
+        (_boast, "must be 11x11; it states (1000000, 1000000)"),
         (_cut, "is damaged, or no NPZ"),
         (lambda p: p.write_text("text"), "is damaged, or no NPZ"),
         (Path.exists, "cannot read"),

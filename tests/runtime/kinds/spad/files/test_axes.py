@@ -50,8 +50,8 @@ def test_a_fourth_axis_is_asked_about_and_taken_where_it_is_named(
 @pytest.mark.parametrize(
     ("axes", "shape", "key", "told"),
     [
-        ("TCYX", (12, 3, 5, 6), "channel 1", "channel 0, channel 1, channel 2; say which"),
-        ("TZYX", (12, 3, 5, 6), "slice 1", "slice 0, slice 1, slice 2; say which"),
+        ("TCYX", (12, 3, 5, 6), "channel 1", "channel 0, channel 1, channel 2; choose one"),
+        ("TZYX", (12, 3, 5, 6), "slice 1", "slice 0, slice 1, slice 2; choose one"),
         ("TZCYX", (12, 2, 3, 5, 6), "slice 1, channel 2", "slice 0, slice 1; channel 0"),
     ],
 )
@@ -75,7 +75,7 @@ def test_slices_and_channels_without_time_are_no_time(tmp_path: Path) -> None:
         open_counts(path, Hints())
     np.testing.assert_array_equal(_rows(path, axes="tc2yx"), CUBE[:, 2].transpose(1, 2, 0))
     tifffile.imwrite(path, CUBE[0], imagej=True, metadata={"axes": "CYX"})
-    with pytest.raises(ContractError, match="channel 0, channel 1, channel 2; say which"):
+    with pytest.raises(ContractError, match="channel 0, channel 1, channel 2; choose one"):
         open_counts(path, Hints())
 
 
@@ -85,7 +85,7 @@ def test_routers_of_a_stream_are_asked_about(tmp_path: Path) -> None:
     path = tmp_path / "a.spc"
     path.write_bytes(struct.pack(f"<{len(records)}I", *records))
     for key in (None, "channel 0"):
-        with pytest.raises(ContractError, match="holds channel 2, channel 5; say which"):
+        with pytest.raises(ContractError, match="holds channel 2, channel 5; choose one"):
             open_counts(path, Hints(key=key))
     for key, at, photons in (("channel 2", 10, 30), ("channel 5", 20, 40)):
         with open_counts(path, Hints(key=key)) as file:
@@ -97,7 +97,7 @@ def test_frames_of_ptu_are_asked_about_and_summed_where_that_is_said(tmp_path: P
     frames = RNG.poisson(1, (2, 4, 5, 1, 16)).astype(np.uint16)
     path = tmp_path / "a.ptu"
     ptufile.imwrite(path, frames, 16 * 20e-12, 20e-12)
-    with pytest.raises(ContractError, match="holds frame 0, frame 1, all frames; say which"):
+    with pytest.raises(ContractError, match="holds frame 0, frame 1, all frames; choose one"):
         open_counts(path, Hints())
     np.testing.assert_array_equal(_rows(path, key="frame 1"), frames[1, :, :, 0])
     np.testing.assert_array_equal(_rows(path, key="all frames"), frames.sum(axis=0)[:, :, 0])

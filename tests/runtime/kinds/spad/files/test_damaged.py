@@ -276,7 +276,7 @@ def test_cells_that_hold_no_stamps_are_refused(tmp_path: Path) -> None:
 def test_channels_are_chosen(tmp_path: Path) -> None:
     cube = np.random.default_rng(0).poisson(1, (6, 5, 2, 16)).astype(np.uint16)
     ptufile.imwrite(tmp_path / "a.ptu", cube, 25e-9, 20e-12)
-    with pytest.raises(ContractError, match=r"holds channel 0, channel 1; say which"):
+    with pytest.raises(ContractError, match=r"holds channel 0, channel 1; choose one"):
         open_counts(tmp_path / "a.ptu", Hints())
     with open_counts(tmp_path / "a.ptu", Hints(key="channel 1")) as file:
         np.testing.assert_array_equal(file.rows(0, 6)[..., :16], cube[:, :, 1])

@@ -117,7 +117,7 @@ def test_axes_that_are_unknown_are_asked_for(tmp_path: Path) -> None:
         made["anything"] = small_cube()
     scipy.io.savemat(tmp_path / "a.mat", {"anything": small_cube()})
     for name in ("a.h5", "a.mat"):
-        with pytest.raises(ContractError, match=r"which axis is time; say \[array\] axes"):
+        with pytest.raises(ContractError, match=r"which axis is time; state \[array\] axes"):
             open_counts(tmp_path / name, Hints())
         for axes in ("yx", "tyz", "ttyx", "txyt", ""):
             with pytest.raises(ContractError, match=r"does not fit a\.\w+, an array of"):
@@ -188,7 +188,7 @@ def test_among_several_variables_one_is_chosen(tmp_path: Path) -> None:
         for name, cube in cubes.items():
             made[name] = cube
     for name in ("a.npz", "a.mat", "a.h5"):
-        with pytest.raises(ContractError, match=r"first, second; say which by \[array\] key"):
+        with pytest.raises(ContractError, match=r"first, second; choose one by \[array\] key"):
             open_counts(tmp_path / name, Hints(axes="tyx"))
         with pytest.raises(ContractError, match=r"no 'third'.*it holds first, second"):
             open_counts(tmp_path / name, Hints(axes="tyx", key="third"))
@@ -199,7 +199,7 @@ def test_among_several_variables_one_is_chosen(tmp_path: Path) -> None:
         _whole(open_counts(tmp_path / "b.npz", Hints())), cubes["first"].transpose(1, 2, 0)
     )
     np.savez(tmp_path / "c.npz", histogram=cubes["first"], counts=cubes["second"][0])
-    with pytest.raises(ContractError, match="counts, histogram; say which"):
+    with pytest.raises(ContractError, match="counts, histogram; choose one"):
         open_counts(tmp_path / "c.npz", Hints())
 
 

@@ -11,7 +11,7 @@ from tests.data_folder import data_path
 
 def test_a_stream_of_two_detectors_is_asked_about() -> None:
     path = data_path("reports/spc_two_detectors.spc")
-    with pytest.raises(ContractError, match="holds channel 0, channel 1; say which"):
+    with pytest.raises(ContractError, match="holds channel 0, channel 1; choose one"):
         open_counts(path, Hints())
     for key, photons in (("channel 0", 3000), ("channel 1", 4000)):
         with open_counts(path, Hints(key=key)) as file:
@@ -20,7 +20,7 @@ def test_a_stream_of_two_detectors_is_asked_about() -> None:
 
 def test_a_stack_of_two_channels_is_asked_about() -> None:
     path = data_path("reports/tiff_stack_two_channels.tif")
-    with pytest.raises(ContractError, match="holds channel 0, channel 1; say which"):
+    with pytest.raises(ContractError, match="holds channel 0, channel 1; choose one"):
         open_counts(path, Hints())
     with open_counts(path, Hints(key="channel 0")) as file:
         assert file.bins == 64

@@ -118,5 +118,5 @@ def test_the_pulse_before_a_decay_is_found() -> None:
     mean = 3e5 * shifted.shapes(np.array([2500.0]), np.array([2500.0])).shares + 30
     whole = np.random.default_rng(0).poisson(mean).astype(np.float32)
     assert guess_width(whole, AXIS, None).sigma_ps == pytest.approx(100, rel=0.05)
-    with pytest.raises(ContractError, match=r"photons are too few.*say \[laser\] fwhm_ps"):
+    with pytest.raises(ContractError, match=r"photons are too few.*state \[laser\] fwhm_ps"):
         guess_width(counts[:2], AXIS, None)

@@ -95,7 +95,7 @@ def test_what_cannot_be_is_refused(scan: Path, tmp_path: Path) -> None:
         made(TIMING.replace("12800", "9000") + LASER)
     with pytest.raises(UnsupportedError, match="not to scans with a gate"):
         made(TIMING.replace('"histogram"', '"gate"') + LASER)
-    with pytest.raises(ContractError, match="pool means nothing to the product lifetime"):
+    with pytest.raises(ContractError, match="pool does not apply to the product lifetime"):
         made(TIMING + LASER, pool="3")
     with pytest.raises(ContractError, match=r"\[lifetime\] tau_ps: is unknown; known are period"):
         made(TIMING + "tau_ps = 3\n" + LASER)
@@ -107,4 +107,4 @@ def test_dark_captures_are_told(tmp_path: Path) -> None:
     timing = _timing(tmp_path, TIMING + LASER)
     made = camkit.load(None, kind="spad", timing=timing, product="lifetime").make(path)
     assert not made.arrays["valid"].any()
-    assert made.warnings == ("no pixel has enough photons to believe a lifetime",)
+    assert made.warnings == ("no pixel has enough photons for a reliable lifetime",)

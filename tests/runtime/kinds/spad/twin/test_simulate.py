@@ -136,7 +136,7 @@ def test_axes_in_another_order_are_named_where_they_would_fit(
     with pytest.raises(ContractError, match=rf"has {BINS}x{WIDTH} pixels.*axes = \"yxt\" in a"):
         camkit.load(str(bundle.path)).make(path)
     np.savez(tmp_path / "b.npz", histogram=np.ones((BINS, 9, 9), np.uint16))
-    with pytest.raises(ContractError, match=r"has 9x9 pixels.*say bundle=.none.$"):
+    with pytest.raises(ContractError, match=r"has 9x9 pixels.*use bundle=.none.$"):
         camkit.load(str(bundle.path)).make(tmp_path / "b.npz")
 
 
@@ -221,7 +221,7 @@ def test_light_in_flight_becomes_frames(bundle: Bundle, tmp_path: Path) -> None:
     ("words", "message"),
     [
         (("-o", "x.png"), "is a file in .npz, .h5, .tif, .mat, .ptu"),
-        (("-o", "x.npz", "--iso", "200"), "--iso means nothing to bundle tiny-spad"),
+        (("-o", "x.npz", "--iso", "200"), "--iso does not apply to bundle tiny-spad"),
         (("-o", "x.npz", "--photons", "0"), "photons must be a number > 0"),
         (("-o", "x.ptu"), "a PTU holds times of photons"),
         (("-o", "x.npz", "--photons", "1e10"), "captures hold at most 16777216; take fewer"),
@@ -257,7 +257,7 @@ def test_files_that_exist_are_kept(
     out = tmp_path / "c.tif"
     (tmp_path / "c.tif.toml").write_text("mine", encoding="utf-8")
     assert _simulate("procedural:1", "--bundle", bundle.path, "-o", out) == 2
-    assert "c.tif.toml exists; say --overwrite" in capsys.readouterr().err
+    assert "c.tif.toml exists; add --overwrite" in capsys.readouterr().err
     assert _simulate("procedural:1", "--bundle", bundle.path, "-o", out, "--overwrite") == 0
 
 
@@ -266,7 +266,7 @@ def test_photons_mean_nothing_to_a_camera_of_photographs(
 ) -> None:
     words = ("procedural:1", "--bundle", "duet", "-o", tmp_path / "a.dng", "--photons", "9")
     assert _simulate(*words) == 2
-    assert "--photons means nothing to bundle duet" in capsys.readouterr().err
+    assert "--photons does not apply to bundle duet" in capsys.readouterr().err
 
 
 def test_scenes_of_another_array_or_of_nothing_are_refused(bundle: Bundle, tmp_path: Path) -> None:
