@@ -69,8 +69,9 @@ def place(capture: Capture, extent: Extent | None, assume: Assumption | None) ->
     if size == sensor:
         return Placement(window=_window(size, (0.0, 0.0), extent))
     raise ContractError(
-        f"the capture has {size[0]}x{size[1]} pixels, the bundle's sensor {sensor[0]}x{sensor[1]}; "
-        f"for a crop add its position ({option_text('origin_px')}), else use another bundle, or "
+        f"the capture has {size[0]}x{size[1]} pixels, the bundle's sensor {sensor[0]}x{sensor[1]}: "
+        "it is not a whole frame of that camera; use the bundle of its lens. If this lens did take "
+        f"it: for a crop, add its position ({option_text('origin_px')}), else use "
         f"{option_text('assume', 'centre')} (same pitch) or {option_text('assume', 'scale')}"
     )
 

@@ -197,10 +197,12 @@ class Job:
                     f"{option_text('force_bundle')}"
                 )
             self.notes.append(f"{told}: the result is right only if both have the same lens")
-        elif capture.bundle_name is None and capture.camera and manifest.has_kernels:
+        is_file = capture.sha256 is not None
+        if capture.bundle_name is None and manifest.has_kernels and (capture.camera or is_file):
+            camera = capture.camera
+            source = f"is from the camera {camera}" if camera else "names no camera"
             self.notes.append(
-                f"the capture is from the camera {capture.camera}: the result is right only with "
-                f"the lens of bundle {name}"
+                f"the capture {source}: the result is right only with the lens of bundle {name}"
             )
 
     def _check_cfa(self, cfa: CfaPattern) -> None:

@@ -59,9 +59,10 @@ NOTED_FRACTION: Final = 0.01
 """Of the picture; a network that moves much light in more of it is worth a note."""
 
 
-_CAUSES: Final = (
-    "This is usual in dark or deeply coloured areas; elsewhere the capture may be of another "
-    "camera or distance, or its black level or white balance may be wrong"
+_USUAL: Final = "This is usual in dark or deeply coloured areas"
+_OTHER_CAUSES: Final = (
+    "; elsewhere the capture may be of another camera or distance, or its black level or white "
+    "balance may be wrong"
 )
 
 
@@ -223,14 +224,15 @@ class _NetworkStage:
         if keeper is None or not keeper.measured or keeper.large_fraction <= NOTED_FRACTION:
             return ()
         moved = (
-            f"in {keeper.large_fraction:.1%} of the picture the network changed the brightness "
-            f"of the filter's result by more than {FAR:.0%}, which noise and lens errors do not "
-            "explain"
+            f"in {keeper.large_fraction:.1%} of the picture the network and the filter differ in "
+            f"brightness by more than {FAR:.0%}"
         )
         if keeper.bound is not None:
-            return (f"{moved}; the brightness of the filter was kept there. {_CAUSES}",)
-        kept = f"{option_text('laws', 'enforce')} keeps the brightness of the filter there"
-        return (f"{moved}; {kept}. {_CAUSES}",)
+            moved += "; the brightness of the filter was kept there"
+        else:
+            moved += f" ({option_text('laws', 'enforce')} keeps that of the filter)"
+        is_own = self._job.capture.bundle_name == self._job.known_bundle.manifest.name
+        return (f"{moved}. {_USUAL}{'' if is_own else _OTHER_CAUSES}",)
 
     def run(self, taken: Sequence[Stream]) -> tuple[Stream, ...]:
         """Give the outputs of the network."""

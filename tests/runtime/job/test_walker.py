@@ -525,7 +525,7 @@ def test_a_probe_measures_and_tells_nothing_again(
     made = start(bundle, replace(_broken(), iso=None, white_balance=None))
     made.fill()
     assert len(measured) == 1
-    told = [text for text in made.warnings if "changed the brightness" not in text]
+    told = [text for text in made.warnings if "differ in brightness" not in text]
     assert len(told) == 2
 
 

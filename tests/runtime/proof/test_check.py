@@ -345,7 +345,7 @@ def test_a_proof_that_would_take_too_much_is_refused_before_it_begins(
 ) -> None:
     path = _write(tmp_path, _with_facts(receptive_field_radius_px=4096))
     message = _message(check_bundle(path, "tiling"), "tiling")
-    assert f"says {PROOF_MB.variable}=" in message
+    assert f"set {PROOF_MB.variable}=" in message
     sound = write_tiny_bundle(tmp_path)
     monkeypatch.setenv(limit.variable, "0.001")
     message = _message(check_bundle(sound, "tiling"), "tiling")

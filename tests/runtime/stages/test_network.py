@@ -203,7 +203,7 @@ def test_a_tile_that_is_not_believed_takes_the_last_plane_and_says_so(tmp_path: 
     *tiles, moved = made.warnings
     assert len(tiles) == made.windows["restore"].to_json()["windows"]
     assert all(text.startswith("the network's result was rejected") for text in tiles)
-    assert moved.startswith("in 100.0% of the picture the network changed the brightness")
+    assert moved.startswith("in 100.0% of the picture the network and the filter")
 
 
 def test_where_no_plane_stands_in_a_bad_tile_is_refused_without_a_hint(tmp_path: Path) -> None:

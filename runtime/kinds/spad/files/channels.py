@@ -40,8 +40,8 @@ def chosen_places(
         asked = "" if key is None else f", and no {key!r}"
         first = ", ".join(f"{name} {known[0]}" for name, known in several.items())
         raise ContractError(
-            f"{path.name} holds {listed}{asked}; choose one in the file of {option_text('timing')}: "
-            f'under [array] the line key = "{first}"'
+            f"{path.name} holds {listed}{asked}; choose one in the file of "
+            f'{option_text("timing")}: under [array] the line key = "{first}"'
         )
     return {
         name: ALL if found[name] == ALL else list(known).index(found[name])
