@@ -69,7 +69,7 @@ def main() -> None:
         write_capture(out_dir / f"{name}.dng", simulation, sensor, bundle.manifest.name)
         shape = "x".join(map(str, simulation.samples.shape[::-1]))
         print(f"{out_dir / name}.dng: {shape} at {simulation.window.origin_px}")
-    print(f"photographed in {time.perf_counter() - began:.1f} s\n", flush=True)
+    print(f"simulated in {time.perf_counter() - began:.1f} s\n", flush=True)
 
     plan = ("plan", str(out_dir / "confetti.dng"), "--bundle", arguments.bundle)
     subprocess.run([sys.executable, "-m", "camkit", *plan], check=True)

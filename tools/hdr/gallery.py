@@ -121,7 +121,8 @@ def _draw_plate(bundle: str, out_dir: Path) -> None:
     show = ("show", bundle, "-o", str(out_dir), "--overwrite")
     masks = ("masks", bundle, "-o", str(out_dir), "--overwrite")
     if find_spec("torch") is None:
-        print(f"with torch: camkit plate {' '.join(show)}; camkit plate {' '.join(masks)}")
+        print("To draw the plate too (needs torch):")
+        print(f"  camkit plate {' '.join(show)}; camkit plate {' '.join(masks)}")
         return
     for words in (show, masks):
         subprocess.run([sys.executable, "-m", "camkit", "plate", *words], check=True)

@@ -74,10 +74,11 @@ def _lines(found: "Geometry") -> list[str]:
     return [
         f"  {found.camera.model.name}: focal length {found.camera.focal_px:.2f} px, centre "
         f"({x:.2f}, {y:.2f}) of {found.size[0]}x{found.size[1]} px",
-        f"  {chosen.fit.rms_px:.3f} px rms in {seen} of {len(found.views)} pictures; left out "
-        f"{chosen.rms_px:.3f}, at worst {chosen.worst_px:.3f}",
-        f"  known to {found.coverage.radius_px:.0f} px from the centre, of "
-        f"{found.coverage.corner_px:.0f}; polynomial to {found.radial.residual_px:.3f} px",
+        f"  error {chosen.fit.rms_px:.3f} px rms in {seen} of {len(found.views)} pictures; in "
+        f"pictures left out of the fit {chosen.rms_px:.3f} px, at worst {chosen.worst_px:.3f} px",
+        f"  corners reach {found.coverage.radius_px:.0f} px from the centre, of "
+        f"{found.coverage.corner_px:.0f} px to the picture's corner; the distortion polynomial "
+        f"fits the model to {found.radial.residual_px:.3f} px",
     ]
 
 

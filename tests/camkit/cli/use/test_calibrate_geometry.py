@@ -53,7 +53,7 @@ def test_the_same_is_said_for_people(camkit_command, pictures, tmp_path: Path) -
     done = camkit_command("calibrate", "geometry", *pictures, *asked)
     assert done.code == 0, done.err
     assert "focal length 3" in done.out
-    assert "in 6 of 6 pictures; left out" in done.out
+    assert "in 6 of 6 pictures; in pictures left out of the fit" in done.out
     assert "note: corners were seen to" in done.err
     again = camkit_command("calibrate", "geometry", *pictures, *asked)
     assert again.code == ExitCode.USAGE
