@@ -3,6 +3,8 @@
 import json
 import subprocess
 import sys
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -35,13 +37,20 @@ def _child(*words: str) -> dict[str, float]:
     return dict(json.loads(told.stdout))
 
 
-@pytest.mark.parametrize("name", GRAPHS)
+def _some(names: Iterable[str], often: set[str]) -> list[Any]:
+    """Return parameters, all but a few of them slow."""
+    return [n if n in often else pytest.param(n, marks=pytest.mark.slow) for n in names]
+
+
+@pytest.mark.parametrize("name", _some(GRAPHS, {"unet", "nafnet"}))
 def test_a_run_takes_no_more_than_is_counted_whatever_sizes_its_windows_have(name: str) -> None:
     seen = _child("run", name, "512", "640", "448", "576")
     assert seen["rose_mb"] < seen["counted_mb"] + MORE_MB
 
 
-@pytest.mark.parametrize("name", ["unet", "nafnet without pooling", "densenet"])
+@pytest.mark.parametrize(
+    "name", _some(["unet", "nafnet without pooling", "densenet"], {"unet", "densenet"})
+)
 def test_a_picture_of_a_foreign_network_stays_within_the_cap(name: str) -> None:
     assert _child("picture", name, str(CAP_MB))["peak_mb"] < CAP_MB
 

@@ -77,7 +77,7 @@ def test_a_bench_measures_seconds_and_accuracy_of_every_row(tmp_path: Path) -> N
     }
     assert len(result.patches["tiny"]) == 4
     assert result.report["machine"]["gemm_gmac_per_s"]["1"] > 0
-    assert "tiny: timing M (1/2)" in told
+    assert "tiny: timing M" in told
 
 
 def test_seconds_stand_where_the_accuracy_cannot_be_measured(tmp_path: Path) -> None:

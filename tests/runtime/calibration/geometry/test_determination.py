@@ -127,7 +127,7 @@ def _parallel(scatter_px: float, tilt_deg: float = 0.0) -> FloatGrid:
     return _seen(_poses(tilts, places, rng.uniform(18, 24, 6)), scatter_px)
 
 
-@pytest.mark.parametrize("scatter_px", [0.0, 0.05, 0.3])
+@pytest.mark.parametrize("scatter_px", [0.0, 0.05, pytest.param(0.3, marks=pytest.mark.slow)])
 def test_exactly_parallel_views_need_the_nominal_focal_length(scatter_px: float) -> None:
     corners = _parallel(scatter_px)
     with pytest.raises(DecodeError, match=r"do not tell the focal length.* or give focal_px$"):
