@@ -94,8 +94,8 @@ def test_the_first_screen_is_short_and_in_the_order_that_a_reader_needs() -> Non
     text = README.read_text(encoding="utf-8")
     assert len(text.splitlines()) <= 120
     parts = ("**camkit ", "![", "- **", "**What it is not.**", "make demo", "## Use it",
-             "## Built-in cameras", "images/front.png", "## From Python", "## Where to go next", "## Known limits",
-             "## Citation and licence")  # fmt: skip
+             "## Built-in cameras", "images/front.png", "## From Python",
+             "## Where to go next", "## Known limits", "## Citation and licence")  # fmt: skip
     places = [text.index(part) for part in parts]
     assert places == sorted(places)
     first = text.split("\n\n")[1]

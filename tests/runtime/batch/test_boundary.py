@@ -7,8 +7,10 @@ import pytest
 
 import camkit
 from camkit.cli.app import run
+from camkit.errors import ContractError
 from camkit.runtime.batch import making
 from tests.data_folder import data_path
+from tests.dng_factory import write_scene
 
 TIMING = '[timing]\norientation = "gate"\ntime_bin_ps = 20\n[gate]\nwidth_ps = 200\n'
 
@@ -67,3 +69,19 @@ def test_a_damaged_header_fails_its_file_alone(tmp_path: Path) -> None:
     found = camkit.process([broken, sound], bundle="none", out_dir=out, timing=tmp_path / "t.toml")
     assert [one.status for one in found] == ["failed", "ok"]
     assert "its header is damaged" in str(found[0].error)
+
+
+@pytest.mark.parametrize("choice", [{"format": "png"}, {"preview": True}])
+def test_what_cannot_be_written_as_asked_fails_alone(
+    tmp_path: Path, choice: dict[str, object]
+) -> None:
+    counted, *_ = _captures(tmp_path)
+    photograph = tmp_path / "photograph.dng"
+    write_scene(photograph)
+    out = tmp_path / "out"
+    counted.with_name("a.npz.toml").write_text(TIMING, encoding="utf-8")
+    found = camkit.process([counted, photograph], bundle="none", out_dir=out, **choice)  # type: ignore[arg-type]
+    assert [one.status for one in found] == ["failed", "ok"]
+    assert next(iter(choice)) in str(found[0].error)
+    with pytest.raises(ContractError, match=next(iter(choice))):
+        camkit.process(counted, bundle="none", out_dir=out, **choice)  # type: ignore[arg-type]

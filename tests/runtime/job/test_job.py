@@ -132,5 +132,8 @@ def test_a_foreign_camera_whose_place_is_assumed_is_warned_of(bundle: Bundle) ->
     assert notes[0].startswith(
         "the capture is from the camera Nikon D850: the result is right only with the lens of"
     )
+    nameless = made_mosaic(samples=small, sha256="0" * 64)
+    notes = start(bundle, nameless, assume="centre").job.notes
+    assert notes[0].startswith("the capture names no camera: the result is right only with")
     own = made_mosaic(samples=small, camera="camkit tiny", bundle_name="tiny")
     assert len(start(bundle, own, assume="centre").job.notes) == 1
