@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from camkit.bundle.stages.undistort import Interpolation, Overshoot
 from camkit.contracts import FloatArray, RadialDistortion
 from camkit.errors import ContractError, UnsupportedError
+from camkit.runtime.cancel import check_wish
 from camkit.runtime.geometry.distortion import (
     check_distortion,
     distort_points,
@@ -208,6 +209,7 @@ def _warp_rows(
     """Fill rows begin..end of a band; source and target come with the row they start at."""
     (rows, first), (band, top) = source, target
     for channel in range(rows.shape[0]):
+        check_wish()
         if not warp.shares_map(channel):
             whole, fraction = warp.maps(channel, top + begin, top + end)
             whole[..., 1] -= first

@@ -16,7 +16,7 @@ from camkit.bundle.stages import Network
 from camkit.caller import option_text
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.runtime.cancel import Cancel
+from camkit.runtime.cancel import Cancel, cancellable
 from camkit.runtime.capture import Capture
 from camkit.runtime.clock import StageClock
 from camkit.runtime.color import ColorStage
@@ -209,7 +209,12 @@ class Reconstruction:
         return self._metered(self._walk.stream(self._plane_of(product)).bands())
 
     def _metered(self, bands: Iterator[Rows]) -> Iterator[Rows]:
-        yield from bands
+        while True:
+            with cancellable(self.job.cancel):
+                band = next(bands, None)
+            if band is None:
+                break
+            yield band
         self.job.meter.finish()
 
     def rows_of(self, plane: str) -> RowSource:

@@ -1,12 +1,15 @@
 """The haze found before the first row: the same bits by any bands; left out, or refused."""
 
+import time
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+import camkit
 from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.manifest import Manifest, planes_of
 from camkit.bundle.reader import Bundle, open_bundle
@@ -216,6 +219,23 @@ def test_it_may_be_cancelled(bundle: Bundle) -> None:
     work = pipeline.start(_capture(), cancel=lambda: True)
     with pytest.raises(Cancelled):
         work.fill()
+
+
+@pytest.mark.slow
+def test_a_wish_to_stop_is_asked_about_once_a_second_over_a_whole_frame() -> None:
+    pipeline = camkit.load("thin-plate", method="haze", threads=1)
+    samples = np.random.default_rng(0).integers(300, 3000, (4000, 6000), np.uint16)
+    asked: list[float] = []
+
+    def wish() -> bool:
+        asked.append(time.process_time())  # of this process: other programs do not count
+        return False
+
+    wish()
+    pipeline.process_array(samples, iso=100, cancel=wish)
+    gap_s = max(after - before for before, after in pairwise(asked))
+    print(f"{len(asked)} asks in {asked[-1] - asked[0]:.1f} s, at most {gap_s:.2f} s apart")
+    assert gap_s < 1.0
 
 
 def test_too_little_memory_is_said_before_any_row(
