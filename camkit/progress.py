@@ -113,10 +113,16 @@ def working(
         yield made
         return
     board.tasks.append(made)
+    is_left = False
     try:
         yield made
+    except GeneratorExit:
+        is_left = True  # a loop that ended early; tasks behind it may be of others by now
+        raise
     finally:
-        board.tasks.remove(made)
+        if made in board.tasks:
+            at = board.tasks.index(made)
+            del board.tasks[at : at + 1 if is_left else None]
 
 
 def counted(items: Sequence[Item], what: str, unit: str | None = None) -> Iterator[Item]:

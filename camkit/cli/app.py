@@ -132,13 +132,20 @@ class _PlainFormatter(logging.Formatter):
         return plain(super().format(record))
 
 
+class _SayHandler(logging.Handler):
+    """Says records on stderr, in place of a line of progress."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        say(self.format(record), err=True)
+
+
 @contextmanager
 def _messages(*, shown: bool) -> Iterator[None]:
     """Show what camkit's modules log, for `--debug`."""
     if not shown:
         yield
         return
-    logger, handler = logging.getLogger("camkit"), logging.StreamHandler()
+    logger, handler = logging.getLogger("camkit"), _SayHandler()
     handler.setFormatter(_PlainFormatter())
     before = logger.level
     logger.addHandler(handler)

@@ -6,14 +6,13 @@ Nothing is shown for what ends within `SILENT_S`. Times left come from work done
 """
 
 import shutil
-import sys
 import threading
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import Final
 
-from camkit.cli.say import erase, say, say_over
+from camkit.cli.say import erase, is_terminal, say, say_over
 from camkit.progress import Board, Task, duration, listening
 
 SILENT_S: Final = 2.0
@@ -32,7 +31,7 @@ class Display:
     def __init__(self, name: str) -> None:
         self.board = Board(note=self._note)
         self._name = name
-        self._is_terminal = sys.stderr.isatty()
+        self._is_terminal = is_terminal()
         self._start_s = time.monotonic()
         self._last_s: float | None = None
         self._last_state: object = None
@@ -48,9 +47,7 @@ class Display:
             spent_s = now_s - self._start_s
             if spent_s < SILENT_S or not (self._has_begun or spent_s > LINE_S):
                 return
-            for line in self._held:
-                say(line, err=True)
-            self._held.clear()
+            self.flush()
             left = time_left(tasks, now_s)
             text = tasks_text(tasks) or ("working" if self._has_begun else "starting")
             line = f"{self._name}: {text}; {duration(spent_s)} so far{left}"
@@ -60,6 +57,13 @@ class Display:
                 self._last_s = now_s
                 self._has_left = bool(left)
                 say(line, err=True)
+
+    def flush(self) -> None:
+        """Say the lines that were held back."""
+        with self._lock:
+            for line in self._held:
+                say(line, err=True)
+            self._held.clear()
 
     def _is_time(self, tasks: Sequence[Task], now_s: float, *, is_first_left: bool) -> bool:
         """Return whether a plain line is due."""
@@ -89,9 +93,14 @@ class Display:
 def outer(tasks: Sequence[Task]) -> list[Task]:
     """Return nested tasks down to the first that is counted evenly; what lies in it comes often."""
     for number, task in enumerate(tasks):
-        if task.is_even and (task.total or task.unit):
+        if task.is_even and (task.total or task.unit) and not _is_one(task):
             return list(tasks[: number + 1])
     return list(tasks)
+
+
+def _is_one(task: Task) -> bool:
+    """Return whether a task is a single unit of which no share is known: what lies in it tells."""
+    return task.total == 1 and task.unit is not None and task.done in (0, 1)
 
 
 def tasks_text(tasks: Sequence[Task]) -> str:
@@ -113,8 +122,9 @@ def _text(task: Task) -> str:
     if task.unit is None and not task.is_even:
         return f"step {min(task.done + 1, task.total):.0f} of {task.total:.0f}: {task.what}"
     counts = task.unit is not None and task.total > 1
+    shows_share = task.is_even and not _is_one(task)
     count = f", {int(task.done)} of {task.total:.0f} {task.unit}" if counts else ""
-    percent = f", {100 * min(1.0, task.done / task.total):.0f} %" if task.is_even else ""
+    percent = f", {100 * min(1.0, task.done / task.total):.0f} %" if shows_share else ""
     return task.what + count + percent
 
 
@@ -135,6 +145,9 @@ def shown(name: str) -> Iterator[None]:
     try:
         with listening(display.board):
             yield
+    except BaseException:
+        display.flush()
+        raise
     finally:
         over.set()
         clock.join()

@@ -3,6 +3,8 @@
 import re
 import sys
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Final
 
 import typer
@@ -15,6 +17,14 @@ _ERASED: Final = "\r\033[K"
 _rewritten = threading.Event()
 """Set while the last line of the terminal is one that `say_over` printed."""
 _lock = threading.RLock()
+
+
+def is_terminal() -> bool:
+    """Return whether stderr is a terminal; it may be closed, or absent in programs with windows."""
+    try:
+        return sys.stderr is not None and sys.stderr.isatty()
+    except ValueError:
+        return False
 
 
 def plain(text: str) -> str:
@@ -36,10 +46,17 @@ def say_over(text: str) -> None:
         typer.echo(_ERASED + plain(text), err=True, nl=False)
 
 
+@contextmanager
+def said_together() -> Iterator[None]:
+    """Keep the lines of this block together, whatever other threads say."""
+    with _lock:
+        yield
+
+
 def erase() -> None:
     """Take the line of `say_over` away, if one is there."""
     with _lock:
         if _rewritten.is_set():
             _rewritten.clear()
-            if sys.stderr.isatty():
+            if is_terminal():
                 typer.echo(_ERASED, err=True, nl=False)

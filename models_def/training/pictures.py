@@ -5,6 +5,7 @@ float16; a crop is decoded to linear Rec.709 when it is cut.
 """
 
 import io
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -65,10 +66,13 @@ def read_picture(path: Path) -> NDArray[np.uint8]:
 def _profile(path: Path) -> bytes | None:
     """Return the colour profile (ICC) of a picture; None without one."""
     try:
-        with Image.open(path) as opened:
-            profile = opened.info.get("icc_profile")
-    except (OSError, ValueError):  # what OpenCV alone reads has none that is known
-        return None
+        with warnings.catch_warnings():
+            # pixels are not decoded here, so their number does not matter
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            with Image.open(path) as opened:
+                profile = opened.info.get("icc_profile")
+    except (OSError, ValueError, Image.DecompressionBombError):
+        return None  # what OpenCV alone reads has none that is known
     return profile or None
 
 

@@ -9,15 +9,14 @@ from torch import Tensor
 from camkit.models_def.training.recipe import ScheduleRecipe
 
 
-def progress_of(step: int, steps: int, elapsed_s: float, budget_s: float | None) -> float:
-    """Give how much of the schedule lies behind, 0..1.
+def progress_of(step: int, steps: int, by_time: float = 0.0) -> float:
+    """Return how much of the schedule lies behind, 0..1.
 
-    By steps alone it is exact and repeatable. With a time budget it is whichever of the two is
-    further, so that the decay ends in time on a machine that is slower than hoped.
+    By steps alone it is exact and repeatable. With a time budget, of which a share is spent, it is
+    whichever of the two is further, so that the decay ends in time on a machine that is slower than
+    hoped.
     """
-    by_steps = step / steps
-    by_time = 0.0 if budget_s is None else elapsed_s / budget_s
-    return min(1.0, max(by_steps, by_time))
+    return min(1.0, max(step / steps, by_time))
 
 
 def learning_rate(recipe: ScheduleRecipe, step: int, progress: float) -> float:

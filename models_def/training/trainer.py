@@ -322,6 +322,7 @@ class _Run:
         until = self.step if options.resume else None
         self.log = RunLog(self.path.with_suffix(".jsonl"), keep_until_step=until)
         self.closing_s: dict[str, tuple[float, float]] = {}
+        self.setup_shares = (0.0, 0.0)
         self.baselines = dict(self._closing("judge", self.judge.baselines))
 
     def _restore(self, saved: Checkpoint) -> None:
@@ -356,9 +357,11 @@ class _Run:
         """Fit until the schedule, the time or the asked step ends; checkpoint and validate."""
         schedule, options = self.entry.schedule, self.options
         note(self._plan_line())
-        with working("making the first samples"):
-            pool.draw_batch(self.step, 1, schedule.patch_px)
+        task.tell(f"{task.what}: making the first samples")
+        pool.draw_batch(self.step, 1, schedule.patch_px)
+        task.tell(task.what.removesuffix(": making the first samples"))
         task.begin(self._progress(pool))
+        self.setup_shares, first_step = self._shares(pool), self.step
         self.log.write(
             {"step": self.step, "seconds": self.elapsed_s(), "cpu_s": self.cpu_s(pool)}
             | self._baseline_entries()
@@ -367,11 +370,12 @@ class _Run:
         losses: list[float] = []
         while not self._is_over(progress := self._progress(pool)):
             task.count(progress)
+            decay = self._decay(pool)
             batch = pool.draw_batch(self.step, schedule.batch, schedule.patch_px)
-            losses.append(self.fitter.fit(batch, self.step, progress))
+            losses.append(self.fitter.fit(batch, self.step, decay))
             self.step += 1
             if self.step % LOG_STEPS == 0:
-                self._log(pool, progress, sum(losses) / len(losses))
+                self._log(pool, decay, sum(losses) / len(losses))
                 losses.clear()
             if self.elapsed_s() - validated_s > options.validate_s:
                 self._validate(pool, task)
@@ -380,21 +384,32 @@ class _Run:
                 self._save(pool)
                 saved_s = self.elapsed_s()
         task.count(1.0)
+        if self.step == first_step and self.step not in (self.steps, options.stop_at_step):
+            note("no step was trained: the time ended before the first one; give more minutes")
         self._validate(pool, task)
         self._save(pool)
         self.spent_s = self.elapsed_s(), self.cpu_s(pool)
 
-    def _progress(self, pool: SamplePool) -> float:
+    def _shares(self, pool: SamplePool) -> tuple[float, float]:
+        """Return the shares of the wall and the CPU time that are spent, the end of the run too."""
         options = self.options
         walls_s, cpus_s = zip(*self.closing_s.values(), strict=True)
         spent = (
             (self.elapsed_s() + sum(walls_s), options.max_minutes),
             (self.cpu_s(pool) + sum(cpus_s), options.max_cpu_minutes),
         )
-        return max(
-            progress_of(self.step, self.steps, seconds, None if most is None else 60 * most)
-            for seconds, most in spent
-        )
+        wall, cpu = (0.0 if most is None else seconds / (60 * most) for seconds, most in spent)
+        return wall, cpu
+
+    def _progress(self, pool: SamplePool) -> float:
+        """Return how much of the run lies behind, 0..1."""
+        return progress_of(self.step, self.steps, max(self._shares(pool)))
+
+    def _decay(self, pool: SamplePool) -> float:
+        """Return how much of the schedule lies behind: what came before the first step is none."""
+        pairs = zip(self._shares(pool), self.setup_shares, strict=True)
+        of_steps = max((now - setup) / (1 - setup) for now, setup in pairs if setup < 1)
+        return progress_of(self.step, self.steps, of_steps)
 
     def _is_over(self, progress: float) -> bool:
         return progress >= 1 or self.step == self.options.stop_at_step

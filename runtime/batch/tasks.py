@@ -150,7 +150,7 @@ def _make_task(
 ) -> Task:
     refusal = refusal_of(source)
     if isinstance(names, ContractError):
-        names, refusal = (source.stem,), refusal or f"{source}: {names}"
+        names, refusal = (source.stem,), refusal or str(names)
     target, *beside = (folder / name for name in names)
     chosen = bundle
     if chosen is None and refusal is None:

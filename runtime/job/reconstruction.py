@@ -215,6 +215,7 @@ class Reconstruction:
             if band is None:
                 break
             yield band
+            del band  # not held while the next one is made
         self.job.meter.finish()
 
     def rows_of(self, plane: str) -> RowSource:

@@ -83,7 +83,7 @@ def choose_response(survey: Survey, wanted: ResponseName | None) -> tuple[Respon
     if wanted == "linear" or (wanted is None and codes is None):
         is_choice = wanted is None and coded and not survey.is_raw
         cure = option_text("response", "srgb")
-        note = f"frames of 16 bits are taken as linear light; if they are coded, say {cure}"
+        note = f"frames of 16 bits are taken as linear light; if they are coded, add {cure}"
         return None, note if is_choice else ""
     plain = srgb_response(int(survey.like.white_level) + 1)
     if wanted == "srgb" or codes is None:
@@ -128,10 +128,14 @@ def _exposure_note(survey: Survey, response: Response) -> str:
     if not off:
         return ""
     named = ", ".join(f"{name} {factor:.2f} times" for name, factor in off[:_NAMED_FRAMES])
-    more = f", {len(off) - _NAMED_FRAMES} more by less" if len(off) > _NAMED_FRAMES else ""
+    more = (
+        f", and {len(off) - _NAMED_FRAMES} more by smaller factors"
+        if len(off) > _NAMED_FRAMES
+        else ""
+    )
     return (
-        "exposures differ from the stated times (the brightness of all frames together tells it) "
-        f"and were corrected: {named}{more}"
+        "exposures were corrected, since frames are brighter or darker than their stated times: "
+        f"{named}{more}"
     )
 
 

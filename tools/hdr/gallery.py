@@ -63,7 +63,10 @@ def show_gallery(name: str, out_dir: Path) -> None:
     dng = out_dir / "night.dng"
     pictures = night_pictures(bundle, dng)
     camkit.process(dng, bundle=name, out_dir=out_dir, overwrite=True)
-    print(f"{dng}: {SCENE}, {SHARE:.1%} of the scene above white; linear PSNR at 2^8 times white")
+    print(
+        f"{dng}: {SCENE}, {SHARE:.1%} of the scene above white; "
+        f"linear PSNR at {CEILING:g} times white"
+    )
     columns = {}
     for title, (picture, decibels) in pictures.items():
         if title != "truth":

@@ -50,9 +50,16 @@ def restored_rows(record: Mapping[str, Any]) -> dict[str, dict[str, Mapping[str,
     found: dict[str, dict[str, Mapping[str, Any]]] = {}
     for row in record["rows"]:
         way = row["method"] if row["size"] is None else row["size"]
-        if way in MARKS and row["error"] is None:
+        if way in MARKS and row["error"] is None and _is_default(row, record):
             found.setdefault(row["bundle"], {})[way] = row
     return {camera: rows for camera, rows in found.items() if FILTER in rows and len(rows) > 1}
+
+
+def _is_default(row: Mapping[str, Any], record: Mapping[str, Any]) -> bool:
+    """Return whether a row is of exact tiles in fp32 on all threads of the CPU."""
+    wanted = {"mode": "exact", "dtype": "fp32", "provider": "cpu"}
+    is_plain = all(row.get(name) in (None, value) for name, value in wanted.items())
+    return is_plain and row["threads"] == record["machine"]["threads"] and not row["variant"]
 
 
 def gained_db(row: Mapping[str, Any]) -> float:

@@ -3,7 +3,7 @@
 import json
 from typing import TYPE_CHECKING
 
-from camkit.cli.say import say
+from camkit.cli.say import said_together, say
 
 if TYPE_CHECKING:
     from camkit.runtime.development import FileResult
@@ -11,12 +11,13 @@ if TYPE_CHECKING:
 
 def print_result(result: "FileResult", *, as_json: bool) -> None:
     """Print one file's result: JSON or a line on stdout, failures on stderr."""
-    if as_json:
-        say(json.dumps(result.to_json()))
-    elif result.status == "failed":
-        say(f"{result.input}: failed: {result.error}", err=True)
-    else:
-        _print_made(result)
+    with said_together():
+        if as_json:
+            say(json.dumps(result.to_json()))
+        elif result.status == "failed":
+            say(f"{result.input}: failed: {result.error}", err=True)
+        else:
+            _print_made(result)
 
 
 def _print_made(result: "FileResult") -> None:

@@ -59,7 +59,10 @@ def _check_compression(picture: DngPicture) -> None:
         return
     name = _COMPRESSIONS.get(picture.compression, f"method {picture.compression}")
     if picture.is_planar and picture.compression in _OF_LIBRAW:
-        name = f"JPEG ({name}) in planes that lie apart"
+        raise DecodeError(
+            f"the DNG has planes that lie apart, compressed ({name}), which is not read; save it "
+            "with interleaved planes or uncompressed"
+        )
     raise DecodeError(
         f"the DNG is compressed with {name}, which is not read; save it uncompressed or with "
         "lossless JPEG"

@@ -152,8 +152,9 @@ def picture_page(tags: TiffTags) -> tuple[TiffPage, tuple[str, ...]]:
     notes = []
     if chosen.number > 1:
         wide, high = pages[0].size_px
+        first = "a mask or preview" if _is_beside(pages[0]) else "smaller"
         notes.append(
-            f"page {chosen.number} of the TIFF is read; page 1 is smaller ({wide}x{high} px)"
+            f"page {chosen.number} of the TIFF is read; page 1 is {first} ({wide}x{high} px)"
         )
     if chosen.empty_chunks:
         notes.append(f"{chosen.empty_chunks} strips or tiles hold no data: their samples are 0")

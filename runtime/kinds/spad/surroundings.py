@@ -73,6 +73,7 @@ def are_believed(
     least, believed = least_gain(rate / 2), np.zeros(len(rows), dtype=bool)
     at_once = max(1, AT_ONCE_BYTES // (16 * side * side * bank.bins.shape[1]))
     everywhere = np.ones(cube.shape[:2], bool) if sound is None else sound
+    photons = cube.sum(axis=2)
     for start in range(0, len(rows), at_once):
         part = slice(start, start + at_once)
         pulses = _Pulses(
@@ -81,7 +82,7 @@ def are_believed(
             amplitude=fit.amplitude[part],
             background=fit.background[part],
         )
-        patches = _patches(pulses, cube, everywhere, rows[part], side)
+        patches = _patches(pulses, (cube, photons, everywhere), rows[part], side)
         places = np.divmod(rows[part], cube.shape[1])
         alone = pulses.gains(
             patches, slice(side // 2, side // 2 + 1), slice(side // 2, side // 2 + 1)
@@ -136,11 +137,12 @@ class _Pulses:
 
 def _patches(
     pulses: _Pulses,
-    cube: FloatArray,
-    sound: NDArray[np.bool_],
+    scene: tuple[FloatArray, FloatArray, NDArray[np.bool_]],
     rows: NDArray[np.int64],
     side: int,
 ) -> _Patches:
+    """Cut the squares of pixels out of counts (h, w, bins), photons and sound pixels (h, w)."""
+    cube, all_photons, sound = scene
     (height, width, _), reach = cube.shape, side // 2
     bins = pulses.bank.bins[pulses.template]
     y, x = np.divmod(rows, width)
@@ -155,7 +157,7 @@ def _patches(
             there[there] = sound[at_y[there], at_x[there]]
             at_y, at_x = at_y[there], at_x[there]
             near[there, dy, dx] = cube[at_y[:, None], at_x[:, None], bins[there]]
-            photons[there, dy, dx] = cube[at_y, at_x].sum(axis=1)
+            photons[there, dy, dx] = all_photons[at_y, at_x]
             members[there, dy, dx] = 1
     return _Patches(near=near, photons=photons, members=members)
 

@@ -21,10 +21,10 @@ def test_rate_warms_up_then_falls_to_its_end():
 
 
 def test_progress_ends_at_the_steps_or_the_time_whichever_comes_first():
-    assert progress_of(30, 60, 1.0, None) == 0.5
-    assert progress_of(30, 60, 9.0, 10.0) == 0.9
-    assert progress_of(30, 60, 99.0, 10.0) == 1.0
-    assert progress_of(59, 60, 0.0, None) < 1.0
+    assert progress_of(30, 60) == 0.5
+    assert progress_of(30, 60, 0.9) == 0.9
+    assert progress_of(30, 60, 9.9) == 1.0
+    assert progress_of(59, 60) < 1.0
 
 
 def test_average_of_constant_weights_is_that_constant():

@@ -214,8 +214,8 @@ def test_a_headerless_mosaic_is_taken_with_its_levels(tmp_path: Path) -> None:
 def test_an_unknown_option_is_refused(captures: Path) -> None:
     with pytest.raises(ContractError, match=r"unknown option.*sharpness"):
         camkit.process(captures / "a.dng", bundle="none", sharpness=3)
-    with pytest.raises(ContractError, match=r"fromat; did you mean format\? known are"):
-        camkit.process(captures / "a.dng", bundle="none", fromat="png")  # type: ignore[call-arg]
+    with pytest.raises(ContractError, match=r"formats; did you mean format\? known are"):
+        camkit.process(captures / "a.dng", bundle="none", formats="png")  # type: ignore[call-arg]
 
 
 def test_expand_lists_each_capture_once(captures: Path) -> None:

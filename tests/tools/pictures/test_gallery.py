@@ -21,6 +21,7 @@ def row(bundle: str, method: str, size: str | None, psnr_db: float, seconds: flo
     return {
         "bundle": bundle, "method": method, "size": size, "error": None,
         "psnr_db": psnr_db, "input_psnr_db": 20.0, "s_per_24mp": seconds,
+        "mode": None, "dtype": "fp32", "provider": "cpu", "threads": 2, "variant": False,
     }  # fmt: skip
 
 
@@ -30,9 +31,11 @@ def record() -> dict:
         row("lens", "wiener", None, 23, 4),
         row("lens", "net", "M", 25, 9),
         row("plate", "net", "M", 30, 2),
+        {**row("lens", "net", "M", 27, 20), "threads": 1},
+        {**row("lens", "net", "M", 28, 20), "mode": "whole"},
         {**row("broken", "wiener", None, 25, 9), "error": "too large"},
     ]
-    return {"machine": {"cores": 2}, "rows": rows}
+    return {"machine": {"cores": 2, "threads": 2}, "rows": rows}
 
 
 def write_scene(folder: Path) -> None:

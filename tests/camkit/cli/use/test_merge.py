@@ -264,7 +264,7 @@ def test_deep_codes_that_are_taken_as_light_are_said_to_be(
     chosen = () if response is None else ("--response", response)
     done = camkit_command("merge", *names, "-o", tmp_path / "a.exr", "--times", "1,1/4", *chosen)
     assert done.code == 0, done.err
-    said = "taken as linear light; if they are coded, say --response srgb" in done.out + done.err
+    said = "taken as linear light; if they are coded, add --response srgb" in done.out + done.err
     assert said == (response is None)
 
 

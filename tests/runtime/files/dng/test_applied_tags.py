@@ -345,7 +345,9 @@ def test_other_numbers_of_planes_are_named(tmp_path, planes):
 @pytest.mark.parametrize("compression", [7, 34892])
 def test_packed_planes_that_lie_apart_are_named(tmp_path, compression):
     samples = np.stack([stored(scene())] * 3, axis=-1)
-    with pytest.raises(DecodeError, match="in planes that lie apart, which is not read"):
+    with pytest.raises(
+        DecodeError, match=r"has planes that lie apart, compressed \(.*\), which is not read"
+    ):
         read(tmp_path, samples, {284: ("short", (2,))}, compression=compression)
 
 
@@ -362,7 +364,7 @@ def test_tags_behind_the_demosaic_of_x_trans_are_noted_and_small_ones_named(tmp_
         51009: opcode_list((9, gain_map(np.ones((2, 2)), (0, 0, 520, 530)))),
     }  # fmt: skip
     capture, _ = read(tmp_path, stored(scene(520, 530)), tags)
-    assert any("demosaic: BlackLevelDeltaV, OpcodeList2" in note for note in capture.notes)
+    assert any("demosaicked the file: BlackLevelDeltaV, OpcodeList2" in note for note in capture.notes)
     with pytest.raises(DecodeError, match="X-Trans from 512x512 px on; got 128x96"):
         read(tmp_path, stored(scene()), tags)
 

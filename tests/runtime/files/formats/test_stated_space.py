@@ -157,7 +157,10 @@ def test_a_grey_profile_of_colours_is_named_and_not_applied(tmp_path, suffix):
     plain = read_picture(write(tmp_path / f"a{suffix}", COLOURS))
     found = read_picture(write(tmp_path / f"b{suffix}", COLOURS, grey_profile(1.8)))
     assert np.array_equal(found.samples, plain.samples)
-    assert any("of grey for colours: codes are taken as sRGB" in note for note in found.notes)
+    assert any(
+        "of grey for colours, which is ignored: codes are read as sRGB" in note
+        for note in found.notes
+    )
 
 
 def test_a_grey_picture_of_an_rgb_profile_has_its_curve(tmp_path):
