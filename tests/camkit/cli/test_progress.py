@@ -14,7 +14,7 @@ from camkit.cli import progress as display_module
 from camkit.cli.app import run
 from camkit.cli.progress import Display, outer, shown, tasks_text, time_left
 from camkit.cli.say import say
-from camkit.progress import Task, counted, duration, note, working
+from camkit.progress import Task, counted, duration, listening, note, working
 from tests.capture_factory import write_tiny_captures
 
 
@@ -45,6 +45,39 @@ def _begun(clock: _Clock, what: str = "blurring", **facts: Any) -> Task:
     task = Task(what=what, since_s=clock.now_s, **facts)
     clock.display.board.tasks.append(task)
     return task
+
+
+@pytest.mark.parametrize("stream", [None, "closed"])
+def test_a_command_needs_no_stderr(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], stream: str | None
+) -> None:
+    closed = io.StringIO()
+    closed.close()
+    monkeypatch.setattr(sys, "stderr", stream and closed)
+    assert run(["info", "duet"]) == 0
+    assert "name: duet" in capsys.readouterr().out
+
+
+def test_a_single_unit_shows_what_lies_in_it_and_no_share(clock, capsys) -> None:
+    _begun(clock, "merging", total=1, unit="brackets")
+    _begun(clock, "reading", total=8, unit="frames").count(2)
+    clock.after(3)
+    said = capsys.readouterr().err
+    assert "merging; reading, 2 of 8 frames, 25 %" in said
+
+
+def test_a_loop_that_ended_early_leaves_no_task(clock) -> None:
+    board = clock.display.board
+    with listening(board), working("outside"):
+        loop = counted([1, 2], "inside")
+        next(loop)
+        assert [task.what for task in board.tasks] == ["outside", "inside"]
+        with working("later"):
+            loop.close()
+            assert [task.what for task in board.tasks] == ["outside", "later"]
+        left = counted([1, 2], "left")
+        next(left)
+    assert board.tasks == []
 
 
 def test_nothing_is_said_within_two_seconds(clock, capsys) -> None:

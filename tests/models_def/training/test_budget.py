@@ -170,3 +170,36 @@ def test_a_run_says_its_plan_and_a_line_at_every_validation(
     assert f"{result.valid_db:.2f} dB" in " ".join(lines)
     assert "left" not in lines[-1]
     assert " of 60 minutes" in lines[-1]
+
+
+def test_the_schedule_begins_at_the_first_step_whatever_came_before(
+    tmp_path, recipe_path, material, monkeypatch, clock
+) -> None:
+    decays: list[float] = []
+    fit = Fitter.fit
+
+    def noted(self: Fitter, batch: Any, step: int, progress: float) -> float:
+        clock.spend()
+        decays.append(progress)
+        return fit(self, batch, step, progress)
+
+    monkeypatch.setattr(Fitter, "fit", noted)
+    PARTS["opening the pool"](monkeypatch, lambda: [clock.spend() for _ in range(5)])
+    train(recipe_path, _options(tmp_path, max_cpu_minutes=2.0), material=material)
+    assert decays[0] == 0
+    assert decays == sorted(decays)
+    assert 0.8 < decays[-1] < 1
+
+
+def test_a_run_without_a_step_says_so(tmp_path, recipe_path, material, clock) -> None:
+    lines: list[str] = []
+    watch = Stopwatch()
+    clock.spend()
+    with listening(Board(note=lines.append)):
+        train(
+            recipe_path,
+            _options(tmp_path, max_cpu_minutes=PART_S / 60),
+            material=material,
+            stopwatch=watch,
+        )
+    assert any("no step was trained" in line for line in lines)

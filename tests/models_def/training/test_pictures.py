@@ -171,3 +171,14 @@ def test_lamps_are_put_into_as_many_crops_as_it_is_told(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     lit = [source.draw_crop(rng, 48).max() > 1 for _ in range(60)]
     assert 15 < sum(lit) < 45
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("most_px", [50, 10])
+def test_pictures_of_any_size_are_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, most_px: int
+) -> None:
+    grey = np.full((8, 10, 3), 90, np.uint8)
+    cv2.imwrite(str(tmp_path / "large.png"), grey)
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", most_px)
+    assert np.array_equal(read_picture(tmp_path / "large.png"), grey)

@@ -364,7 +364,9 @@ def test_tags_behind_the_demosaic_of_x_trans_are_noted_and_small_ones_named(tmp_
         51009: opcode_list((9, gain_map(np.ones((2, 2)), (0, 0, 520, 530)))),
     }  # fmt: skip
     capture, _ = read(tmp_path, stored(scene(520, 530)), tags)
-    assert any("demosaicked the file: BlackLevelDeltaV, OpcodeList2" in note for note in capture.notes)
+    assert any(
+        "demosaicked the file: BlackLevelDeltaV, OpcodeList2" in note for note in capture.notes
+    )
     with pytest.raises(DecodeError, match="X-Trans from 512x512 px on; got 128x96"):
         read(tmp_path, stored(scene()), tags)
 
