@@ -26,7 +26,7 @@ BRADFORD: Final[Matrix] = np.array(
 
 
 def white_xyz(white: Chromaticity) -> Matrix:
-    """Give XYZ of a white point, Y = 1."""
+    """Return XYZ of a white point, Y = 1."""
     x, y = white
     return np.array([x / y, 1.0, (1.0 - x - y) / y])
 
@@ -42,25 +42,25 @@ def rgb_to_xyz(primaries: tuple[Chromaticity, ...], white: Chromaticity) -> Matr
 
 
 def rec709_of_light(light: Chromaticity) -> Matrix:
-    """Give the (3,) linear Rec.709 values of a light of luminance 1; D65 has (1, 1, 1)."""
+    """Return the (3,) linear Rec.709 values of a light of luminance 1; D65 has (1, 1, 1)."""
     return np.asarray(np.linalg.solve(rgb_to_xyz(REC709_PRIMARIES, D65), white_xyz(light)))
 
 
 def adapt_white(source: Chromaticity, target: Chromaticity) -> Matrix:
-    """Give the Bradford (3, 3) XYZ matrix that maps the source white on the target white."""
+    """Return the Bradford (3, 3) XYZ matrix that maps the source white on the target white."""
     gains = (BRADFORD @ white_xyz(target)) / (BRADFORD @ white_xyz(source))
     return np.asarray(np.linalg.inv(BRADFORD) @ np.diag(gains) @ BRADFORD)
 
 
 def rec709_to_acescg() -> Matrix:
-    """Give the (3, 3) matrix from linear Rec.709 (D65) to ACEScg, adapted by Bradford."""
+    """Return the (3, 3) matrix from linear Rec.709 (D65) to ACEScg, adapted by Bradford."""
     to_xyz = rgb_to_xyz(REC709_PRIMARIES, D65)
     from_xyz = np.linalg.inv(rgb_to_xyz(ACESCG_PRIMARIES, ACES_WHITE))
     return np.asarray(from_xyz @ adapt_white(D65, ACES_WHITE) @ to_xyz)
 
 
 def camera_from_rec709(color_matrix: Matrix) -> tuple[Matrix, tuple[float, float, float]]:
-    """Give the camera space of a neutral-preserving camera and its white balance.
+    """Return the camera space of a neutral-preserving camera and its white balance.
 
     Args:
         color_matrix: (3, 3) XYZ (D65) to camera, as the DNG tag ColorMatrix for D65.
@@ -84,7 +84,7 @@ def camera_from_rec709(color_matrix: Matrix) -> tuple[Matrix, tuple[float, float
 
 
 def rec709_from_camera(color_matrix: Matrix) -> Matrix:
-    """Give the (3, 3) matrix from white-balanced camera RGB to linear Rec.709.
+    """Return the (3, 3) matrix from white-balanced camera RGB to linear Rec.709.
 
     Raises:
         ContractError: As `camera_from_rec709`, whose inverse this is.
@@ -105,7 +105,7 @@ def decode_srgb(encoded: FloatArray) -> FloatArray:
 
 
 def apply_matrix(matrix: Matrix, planes: FloatArray) -> FloatArray:
-    """Give matrix @ planes for (3, ...) float32 planes."""
+    """Return matrix @ planes for (3, ...) float32 planes."""
     flat = matrix.astype(np.float32) @ planes.reshape(3, -1)
     return np.asarray(flat.reshape(planes.shape), dtype=np.float32)
 

@@ -38,7 +38,7 @@ MOST_HEIGHT_MM: Final = 1e6
 
 
 def cfa_channels(cfa: CfaPattern) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Give the colour index (0 R, 1 G, 2 B) at each position of the 2x2 cell.
+    """Return the colour index (0 R, 1 G, 2 B) at each position of the 2x2 cell.
 
     Args:
         cfa: Letters in reading order of the cell whose corner is pixel (0, 0).
@@ -50,7 +50,7 @@ def cfa_channels(cfa: CfaPattern) -> tuple[tuple[int, int], tuple[int, int]]:
 
 
 def shifted_cfa(cfa: CfaPattern, origin_px: tuple[int, int]) -> CfaPattern:
-    """Give the pattern that a crop of a mosaic begins with.
+    """Return the pattern that a crop of a mosaic begins with.
 
     Args:
         cfa: Letters in reading order of the cell whose corner is pixel (0, 0) of the sensor.
@@ -84,21 +84,21 @@ class NoiseModel:
             )
 
     def with_gains(self, gains: tuple[float, ...]) -> "NoiseModel":
-        """Give the noise of the signal after multiplication by one gain per channel."""
+        """Return the noise of the signal after multiplication by one gain per channel."""
         return NoiseModel(
             shot=tuple(s * g for s, g in zip(self.shot, gains, strict=True)),
             read_variance=tuple(v * g * g for v, g in zip(self.read_variance, gains, strict=True)),
         )
 
     def raised(self, factors: tuple[float, ...]) -> "NoiseModel":
-        """Give the noise whose variance is multiplied by one factor per channel."""
+        """Return the noise whose variance is multiplied by one factor per channel."""
         return NoiseModel(
             shot=tuple(s * f for s, f in zip(self.shot, factors, strict=True)),
             read_variance=tuple(v * f for v, f in zip(self.read_variance, factors, strict=True)),
         )
 
     def at_least(self, other: "NoiseModel") -> "NoiseModel":
-        """Give the noise that is nowhere below another one of as many channels."""
+        """Return the noise that is nowhere below another one of as many channels."""
         return NoiseModel(
             shot=tuple(map(max, self.shot, other.shot)),
             read_variance=tuple(map(max, self.read_variance, other.read_variance)),
@@ -141,7 +141,7 @@ class RadialDistortion:
             raise ContractError(f"distortion radius_mm must be > 0; got {self.radius_mm}")
 
     def row(self, channel: int) -> NDArray[np.float64]:
-        """Give the coefficients of a channel: (4,), or (7,) with those of even powers behind."""
+        """Return the coefficients of a channel: (4,), or (7,) with those of even powers behind."""
         if self.even_coefficients is None:
             return np.asarray(self.coefficients[channel])
         return np.concatenate([self.coefficients[channel], self.even_coefficients[channel]])
@@ -225,7 +225,7 @@ class FrozenPsf:
 
     @property
     def radial_illumination(self) -> RadialIllumination | None:
-        """Give relative illumination over the field height; None where fields are a grid."""
+        """Return relative illumination over the field height; None where fields are a grid."""
         if self.symmetry == "grid":
             return None
         return RadialIllumination(
@@ -329,12 +329,12 @@ def _check_light(kernels: FloatArray) -> None:
 
 
 def grid_heights_mm(x_mm: NDArray[np.float64], y_mm: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Give the distances (field,) of the positions of a grid from the axis, row by row."""
+    """Return the distances (field,) of the positions of a grid from the axis, row by row."""
     return np.hypot(y_mm[:, None], x_mm).ravel()
 
 
 def depth_weights(depths_mm: NDArray[np.float64], depth_mm: float | None) -> NDArray[np.float64]:
-    """Give the share that every depth of a PSF has in the kernels of one object distance.
+    """Return the share that every depth of a PSF has in the kernels of one object distance.
 
     Between two depths kernels are linear in 1 / depth, as defocus is. Without a distance all
     depths have the same share: the mean kernel.
@@ -368,12 +368,12 @@ def depth_weights(depths_mm: NDArray[np.float64], depth_mm: float | None) -> NDA
 
 
 def depth_name(depth_mm: float) -> str:
-    """Give an object distance for people: "0.7 m" or "infinity"."""
+    """Return an object distance for people: "0.7 m" or "infinity"."""
     return "infinity" if np.isinf(depth_mm) else f"{depth_mm / MM_PER_M:g} m"
 
 
 def focus_weights(shifts_um: NDArray[np.float64] | None, focus_um: float) -> NDArray[np.float64]:
-    """Give the share that the nominal kernels, and those of every shift, have at a focus.
+    """Return the share that the nominal kernels, and those of every shift, have at a focus.
 
     Kernels are linear between neighbouring shifts, so they stay >= 0 and of unit sum.
 

@@ -98,7 +98,7 @@ class Kind:
         return importlib.import_module(name)
 
     def has_part(self, floor: Floor) -> bool:
-        """Tell whether a floor knows something of this kind."""
+        """Return whether a floor knows something of this kind."""
         return _is_there(self._module(floor))
 
     def _module(self, floor: Floor) -> str:
@@ -164,7 +164,7 @@ KINDS: Final = {kind.name: kind for kind in (BAYER, HDR, SPAD)}
 
 
 def all_kinds() -> list[Kind]:
-    """Give every kind that can be used here; a broken package brings none."""
+    """Return every kind that can be used here; a broken package brings none."""
     kinds = dict(KINDS)
     for name in sorted(_installed()):
         with contextlib.suppress(ContractError):
@@ -173,13 +173,13 @@ def all_kinds() -> list[Kind]:
 
 
 def kind_of_file(file: PurePath) -> Kind | None:
-    """Give the kind that alone has files of this type; None if photographs are such files too."""
+    """Return the kind that alone has files of this type; None if photographs are such files too."""
     suffix = file.suffix.lower()
     return next((kind for kind in all_kinds() if suffix in kind.file_types), None)
 
 
 def find_kind(name: str) -> Kind:
-    """Give the kind of a name: one of camkit's, or of an installed package.
+    """Return the kind of a name: one of camkit's, or of an installed package.
 
     Raises:
         UnsupportedError: If there is none; names those there are.
@@ -209,7 +209,7 @@ def find_kind(name: str) -> Kind:
 
 
 def _is_there(name: str) -> bool:
-    """Tell whether a module is there; one that fails for another reason still raises."""
+    """Return whether a module is there; one that fails for another reason still raises."""
     try:
         return util.find_spec(name) is not None
     except ModuleNotFoundError as error:

@@ -44,7 +44,7 @@ class Task:
     since_s: float = field(default_factory=time.monotonic)
 
     def tell(self, what: str) -> None:
-        """Say what is being done now."""
+        """Return what is being done now."""
         self.what = what
 
     def count(self, done: float, total: float | None = None) -> None:

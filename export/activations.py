@@ -8,7 +8,7 @@ from camkit.runtime.proof.golden_run import case_work
 
 
 def with_activations(bundle: Bundle, cases: Cases) -> dict[str, dict[str, NetworkFacts]]:
-    """Give the facts with activations that hold for the golden cases too."""
+    """Return the facts with activations that hold for the golden cases too."""
     found: dict[str, dict[str, NetworkFacts]] = {}
     for role, sizes in bundle.manifest.networks.items():
         found[role] = {}

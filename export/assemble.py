@@ -257,7 +257,7 @@ def _models(networks: Networks) -> dict[str, bytes]:
 
 
 def _windows(bundle: Bundle, cases: Cases) -> dict[tuple[str, str], list[FloatArray]]:
-    """Give what every network is given: for a larger probe first, then for the golden cases."""
+    """Return what every network is given: for a larger probe first, then for the golden cases."""
     captures, proving = list(cases.values()), part_of(bundle.manifest).proving
     windows: dict[tuple[str, str], list[FloatArray]] = {}
     if proving is None:
@@ -282,7 +282,7 @@ def _members(parts: Parts, camera: _Camera) -> dict[str, bytes]:
 
 
 def _stress_members(parts: Parts, optics: FrozenOptics) -> dict[str, bytes]:
-    """Give kernels off the design point, with their haze where there is one.
+    """Return kernels off the design point, with their haze where there is one.
 
     Raises:
         ContractError: If a haze is given without its kernels, of other samples, or for optics that
@@ -331,7 +331,7 @@ def _manifest(camera: _Camera, parts: Parts, networks: Networks) -> Manifest:
 
 
 def _on_frozen_grid(stage: Stage, freeze: Mapping[str, Any]) -> Stage:
-    """Give a stage; a Wiener bank on the block grid that freezing chose by measured loss."""
+    """Return a stage; a Wiener bank on the block grid that freezing chose by measured loss."""
     if not isinstance(stage, Wiener):
         return stage
     grid = {key: freeze[key] for key in ("block_px", "overlap_px") if key in freeze}

@@ -133,7 +133,7 @@ def _seen_by(sensor: Sensor) -> str:
 
 
 def _networks(bundle: Bundle) -> list[str]:
-    """Give a table of every network; with roles where there are several."""
+    """Return a table of every network; with roles where there are several."""
     networks = bundle.manifest.networks
     rows = ["| network | kMAC/px | parameters | reach (px) |", "|---|---|---|---|"]
     for role, sizes in networks.items():
@@ -184,7 +184,7 @@ def preview_png(bundle: Bundle, golden: Mapping[str, GoldenArrays]) -> bytes:
 
 
 def _pictures(golden: Mapping[str, GoldenArrays]) -> dict[str, GoldenArrays]:
-    """Give the cases of which the pipeline makes pictures."""
+    """Return the cases of which the pipeline makes pictures."""
     return {name: arrays for name, arrays in golden.items() if IMAGE in arrays.outputs}
 
 

@@ -42,7 +42,7 @@ more from each other, and by 0.008 at most from what was computed of them."""
 def designed_members(
     parts: Parts, checkpoints: Iterable[Checkpoint], psf: FrozenPsf
 ) -> dict[str, bytes]:
-    """Give the lens or the plate of a camera as members of its bundle: name -> content.
+    """Return the lens or the plate of a camera as members of its bundle: name -> content.
 
     None where the camera has neither, or a checkpoint does not carry it.
 
@@ -69,7 +69,7 @@ def designed_members(
 
 
 def _carried(checkpoints: Iterable[Checkpoint]) -> Mapping[str, bytes]:
-    """Give the optics that checkpoints carry; those of before carry none."""
+    """Return the optics that checkpoints carry; those of before carry none."""
     found: list[Mapping[str, bytes]] = []
     for checkpoint in checkpoints:
         if checkpoint.designed and checkpoint.designed not in found:

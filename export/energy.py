@@ -7,7 +7,7 @@ from camkit.errors import ContractError
 
 
 def energy_diameter_px(kernel: FloatArray, share: float) -> float:
-    """Give the diameter of the circle about the centroid that holds a share of the energy.
+    """Return the diameter of the circle about the centroid that holds a share of the energy.
 
     Args:
         kernel: (h, w), sums to 1.
@@ -28,7 +28,7 @@ def energy_diameter_px(kernel: FloatArray, share: float) -> float:
 
 
 def modulation(kernel: FloatArray, cycles_per_px: float) -> float:
-    """Give |OTF| of a (h, w) kernel at a frequency, averaged over both axes."""
+    """Return |OTF| of a (h, w) kernel at a frequency, averaged over both axes."""
     h, w = kernel.shape
     down = np.exp(-2j * np.pi * cycles_per_px * np.arange(h))
     across = np.exp(-2j * np.pi * cycles_per_px * np.arange(w))

@@ -76,7 +76,7 @@ def _has_bias(node: Any, weights: Weights) -> bool:
 
 
 def _channel_constant(node: Any, conv: Any, weights: Weights) -> NDArray[Any] | None:
-    """Give the (channel,) numbers that a node takes from, or multiplies with, its first input."""
+    """Return the (channel,) numbers that a node takes from, or multiplies with, its first input."""
     if node.op_type not in ("Sub", "Mul") or node.input[0] != conv.output[0]:
         return None
     values, channels = weights.get(node.input[1]), weights[conv.input[1]].shape[0]
@@ -133,7 +133,7 @@ def _coarse_convolutions(nodes: list[Any], weights: Weights, last: str) -> list[
 def _phases(
     source: str, conv: Any, slope: Any, weights: Weights
 ) -> Iterator[tuple[tuple[int, int], list[Any]]]:
-    """Give the nodes that make a pixel of every sample, for its four places (row, column)."""
+    """Return the nodes that make a pixel of every sample, for its four places (row, column)."""
     weight, name = weights[conv.input[1]].astype(np.float64), conv.output[0]
     for y, x in product(range(2), range(2)):
         part = f"{name}_{y}{x}"
@@ -148,7 +148,7 @@ def _phases(
 
 
 def _interleaved(phases: Iterable[tuple[Any, list[Any]]], output: str) -> list[Any]:
-    """Give the nodes that put the four pixels of every sample in their places."""
+    """Return the nodes that put the four pixels of every sample in their places."""
     parts = [nodes for _, nodes in phases]
     every = helper.make_node(
         "Concat", [nodes[-1].output[0] for nodes in parts], [f"{output}_all"], axis=1
@@ -159,7 +159,7 @@ def _interleaved(phases: Iterable[tuple[Any, list[Any]]], output: str) -> list[A
 def _narrowed(
     phases: Iterable[tuple[tuple[int, int], list[Any]]], tail: Any, weights: Weights
 ) -> list[Any]:
-    """Give the nodes that take each pixel of every sample to the few channels, and add up."""
+    """Return the nodes that take each pixel of every sample to the few channels, and add up."""
     weight, output, total = weights[tail.input[1]], tail.output[0], ""
     nodes: list[Any] = []
     for place, made in phases:
@@ -177,7 +177,7 @@ def _narrowed(
 
 
 def _seen_from(weight: NDArray[Any], place: tuple[int, int]) -> NDArray[Any]:
-    """Give what a 3x3 kernel on the fine grid takes from the pixels of one place.
+    """Return what a 3x3 kernel on the fine grid takes from the pixels of one place.
 
     Args:
         weight: (k, c, 3, 3).
@@ -195,7 +195,7 @@ def _seen_from(weight: NDArray[Any], place: tuple[int, int]) -> NDArray[Any]:
 
 
 def _conv_2x2(inputs: list[str], output: str, before: tuple[int, int]) -> Any:
-    """Give a convolution that keeps the size: so many rows and columns of zeros come before."""
+    """Return a convolution that keeps the size: so many rows and columns of zeros come before."""
     pads = [*before, *(1 - count for count in before)]
     return helper.make_node("Conv", inputs, [output], kernel_shape=[2, 2], pads=pads)
 
@@ -210,7 +210,7 @@ def _gives_few(node: Any, weights: Weights) -> bool:
 
 
 def _is_doubling(node: Any, weights: Weights) -> bool:
-    """Tell whether a node gives every sample four times, as a square."""
+    """Return whether a node gives every sample four times, as a square."""
     if node.op_type != "Resize" or len(node.input) != 3 or node.input[1]:
         return False
     scales, asked = weights.get(node.input[2]), _attributes(node)
@@ -237,7 +237,7 @@ def _attributes(node: Any) -> dict[str, Any]:
 
 
 def _only_reader(nodes: list[Any], node: Any, last: str) -> Any:
-    """Give the one node that reads what a node gives; None where others do, or the caller."""
+    """Return the one node that reads what a node gives; None where others do, or the caller."""
     readers = [other for other in nodes if node.output[0] in other.input]
     return readers[0] if len(readers) == 1 and node.output[0] != last else None
 

@@ -126,7 +126,7 @@ def freeze_copies(recipe: BayerRecipe, lens: Lens, tell: Tell) -> tuple[FrozenOp
 
 
 def designed_lens(lens: Lens) -> dict[str, bytes]:
-    """Give a lens as a bundle holds it."""
+    """Return a lens as a bundle holds it."""
     return {PRESCRIPTION: format_prescription(lens).encode()}
 
 
@@ -272,7 +272,7 @@ class _Studio:
     def _cleared(
         self, light: Light, samples: NDArray[np.uint16], iso: float
     ) -> tuple[FloatArray, tuple[float, float, float]]:
-        """Give what the stage haze makes of a shot, and what its noise was raised by."""
+        """Return what the stage haze makes of a shot, and what its noise was raised by."""
         haze = self._recipe.haze
         assert haze is not None
         capture = self._pipeline.capture_of(
@@ -289,7 +289,7 @@ class _Studio:
 
 
 def _seen(scene: FloatArray, matrix: NDArray[np.float64]) -> FloatArray:
-    """Give a scene (3, h, w) of colours outside Rec.709 without what no channel sees."""
+    """Return a scene (3, h, w) of colours outside Rec.709 without what no channel sees."""
     camera = np.maximum(apply_matrix(matrix, scene), 0)
     back = np.asarray(np.linalg.inv(matrix), np.float64)
     return np.asarray(apply_matrix(back, camera), np.float32)
@@ -346,7 +346,7 @@ def _with_surroundings(
 
 
 def _bank(recipe: BayerRecipe, sources: FrameSources) -> PsfBank:
-    """Give the core kernels as training asks for them; copies have the fields of the lens."""
+    """Return the core kernels as training asks for them; copies have the fields of the lens."""
 
     def core(optics: FrozenOptics) -> FloatArray:
         assert optics.haze is not None

@@ -68,7 +68,7 @@ class FrozenReport:
     frozen_db: float
 
     def to_json(self) -> dict[str, Any]:
-        """Give the report as a flat mapping."""
+        """Return the report as a flat mapping."""
         return {
             "norms": self.norms,
             "samples": self.samples,
@@ -151,7 +151,7 @@ def _restorer(network: nn.Module) -> Restorer:
 def _twin(
     saved: Checkpoint, config: dict[str, Any], frozen: nn.Module, report: FrozenReport
 ) -> Checkpoint:
-    """Give the checkpoint of the frozen network; it cannot be resumed, only begun from."""
+    """Return the checkpoint of the frozen network; it cannot be resumed, only begun from."""
     state = {name: tensor.clone() for name, tensor in frozen.state_dict().items()}
     cost_db = report.live_db - report.frozen_db
     return replace(

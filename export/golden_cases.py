@@ -109,7 +109,7 @@ def photograph_all(bundle: Bundle) -> Cases:
 
 @working("computing golden cases")
 def add_outputs(bundle: Bundle, cases: Cases) -> dict[str, GoldenArrays]:
-    """Give the cases with what the pipeline makes of them, for every product and size."""
+    """Return the cases with what the pipeline makes of them, for every product and size."""
     return {
         name: replace(
             arrays,
@@ -131,7 +131,7 @@ def _products(bundle: Bundle, arrays: GoldenArrays) -> tuple[str, ...]:
 
 
 def _side_px(extent: Extent, recipe: CaseRecipe) -> int:
-    """Give the side of a case: a small sensor makes it smaller."""
+    """Return the side of a case: a small sensor makes it smaller."""
     least = min(extent.width_px, extent.height_px)
     side_px = min(recipe.size_px, least // SIDE_STEP_PX * SIDE_STEP_PX)
     if side_px == 0:

@@ -131,13 +131,13 @@ def measure_network(
 
 
 def _arena_bytes(graph: GraphFacts) -> float:
-    """Give the memory of a window per pixel."""
+    """Return the memory of a window per pixel."""
     share = DEEP_ARENA if graph.stride_px >= DEEP_STRIDE_PX else 1.0
     return graph.bytes_per_pixel * share
 
 
 def _half(model: bytes, activations: dict[str, float]) -> bytes | None:
-    """Give a network in half precision where its range is proven and a bundle holds both."""
+    """Return a network in half precision where its range is proven and a bundle holds both."""
     if 3 * len(model) > 2 * MOST_HALF_BYTES:
         return None
     try:
@@ -147,7 +147,7 @@ def _half(model: bytes, activations: dict[str, float]) -> bytes | None:
 
 
 def _probe_size(radius_px: int, stride_px: int) -> int:
-    """Give a window that shows the whole reach with a stride to spare on each side."""
+    """Return a window that shows the whole reach with a stride to spare on each side."""
     side = max(2 * radius_px + 4 * stride_px, 8 * stride_px)
     return -(-side // (2 * stride_px)) * 2 * stride_px
 

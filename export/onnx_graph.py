@@ -184,7 +184,7 @@ def _traced(network: nn.Module, channels: int, stride: int) -> onnx.ModelProto:
 
 
 def _given(network: nn.Module, channels: int, scale: int) -> int:
-    """Give the output planes of a network.
+    """Return the output planes of a network.
 
     Raises:
         ContractError: If its output is not (1, k, scale h, scale w).

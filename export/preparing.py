@@ -42,7 +42,7 @@ class PreparingKind(Protocol):
     """A kind of camera whose samples are prepared."""
 
     def written_last(self, recipe: Any, runs: Path) -> Path:
-        """Give the file that is there when all is; raise ContractError if there is nothing to do.
+        """Return the file that is there when all is; raise ContractError if there is nothing to do.
 
         Args:
             recipe: Of the kind.
@@ -56,7 +56,7 @@ class PreparingKind(Protocol):
 
 
 def preparing_kind(name: str) -> PreparingKind:
-    """Give the part of a kind that prepares.
+    """Return the part of a kind that prepares.
 
     Raises:
         UnsupportedError: If its samples are made while it trains.

@@ -92,7 +92,7 @@ class _Draft:
 
     @property
     def sensor(self) -> BayerSensor | PlanesSensor:
-        """Give the sensor."""
+        """Return the sensor."""
         sensor = self.manifest.sensor
         if not isinstance(sensor, BayerSensor | PlanesSensor):
             raise DecodeError(f"{self.manifest.name} counts photons; nothing of it is measured so")
@@ -263,7 +263,7 @@ def _put_centre(draft: _Draft, measured: Measured) -> None:
 
 
 def _farthest_px(extent: Extent) -> float:
-    """Give the distance of the farthest corner from the optical centre."""
+    """Return the distance of the farthest corner from the optical centre."""
     x, y = extent.axis_px
     return float(np.hypot(max(x, extent.width_px - 1 - x), max(y, extent.height_px - 1 - y)))
 

@@ -66,7 +66,7 @@ def check_keys(where: str, table: Mapping[str, Any], known: set[str]) -> None:
 
 
 def typed(where: str, value: Any, kind: Any) -> Any:
-    """Give a value as the type of its field; whole numbers pass as float, lists as tuples."""
+    """Return a value as the type of its field; whole numbers pass as float, lists as tuples."""
     if get_origin(kind) is UnionType:  # TOML has no None: a key that is there has a value
         (kind,) = (one for one in get_args(kind) if one is not NoneType)
     if get_origin(kind) is tuple:
@@ -90,7 +90,7 @@ def typed(where: str, value: Any, kind: Any) -> Any:
 
 
 def key_line(key: str, value: str | float | bool | Sequence[str | float]) -> str:
-    """Give a line of TOML; numbers to their last bit."""
+    """Return a line of TOML; numbers to their last bit."""
     return f"{key} = {_value_text(value)}"
 
 

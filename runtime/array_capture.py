@@ -24,7 +24,7 @@ def capture_of_array(
     white_balance: tuple[float, float, float] | None = None,
     origin_px: tuple[int, int] | None = None,
 ) -> Capture:
-    """Give an array the meaning that a bundle's sensor gives it.
+    """Return an array the meaning that a bundle's sensor gives it.
 
     Args:
         image: (h, w) mosaic in DN, in the sensor's CFA and levels; or (c, h, w) planes: linear with

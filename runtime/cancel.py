@@ -15,7 +15,7 @@ class Flag(Protocol):
     """Something that can be raised from another thread, like `threading.Event`."""
 
     def is_set(self) -> bool:
-        """Tell whether it has been raised."""
+        """Return whether it has been raised."""
         ...
 
 
@@ -28,7 +28,7 @@ class Cancelled(CamkitError):  # noqa: N818 - a wish, not an error
 
 
 def is_cancelled(cancel: Cancel | None) -> bool:
-    """Tell whether the caller asked to stop."""
+    """Return whether the caller asked to stop."""
     if cancel is None:
         return False
     return cancel() if callable(cancel) else cancel.is_set()
@@ -105,5 +105,5 @@ def check_wish() -> None:
 
 
 def current_wish() -> Cancel | None:
-    """Give the wish that this thread works under."""
+    """Return the wish that this thread works under."""
     return _WISH.get()

@@ -190,31 +190,31 @@ class Capture:
 
     @property
     def channels(self) -> int:
-        """Give the number of colours: of the planes, or of those behind the mosaic."""
+        """Return the number of colours: of the planes, or of those behind the mosaic."""
         return int(self.samples.shape[0]) if self.cfa is None else COLOURS
 
     @property
     def plane_shape(self) -> tuple[int, int, int]:
-        """Give (channel, h, w) of the samples; a mosaic is one channel."""
+        """Return (channel, h, w) of the samples; a mosaic is one channel."""
         return 1 if self.cfa is not None else self.channels, self.height, self.width
 
     @property
     def height(self) -> int:
-        """Give the number of rows."""
+        """Return the number of rows."""
         return int(self.samples.shape[-2])
 
     @property
     def width(self) -> int:
-        """Give the number of columns."""
+        """Return the number of columns."""
         return int(self.samples.shape[-1])
 
     @property
     def resident_bytes(self) -> int:
-        """Give the memory that the samples take; none where they are read from the file."""
+        """Return the memory that the samples take; none where they are read from the file."""
         return 0 if mapping_of(self.samples) is not None else self.samples.nbytes
 
     def linear_rows(self, top: int, bottom: int) -> FloatArray:
-        """Give rows top..bottom as a linear signal: black is 0, white level 1, negatives kept.
+        """Return rows top..bottom as a linear signal: black is 0, white level 1, negatives kept.
 
         Float samples that are infinite or beyond `BRIGHTEST` are NaN, as invalid ones are.
 
@@ -241,7 +241,7 @@ class Capture:
         return rows
 
     def saturated_rows(self, top: int, bottom: int) -> NDArray[np.bool_]:
-        """Tell which samples of rows top..bottom are clipped (see `SATURATION_SHARE`).
+        """Return which samples of rows top..bottom are clipped (see `SATURATION_SHARE`).
 
         Float planes have no white level that clips, so none of their samples is; a float mosaic
         is in the numbers of its sensor, which does clip.
@@ -266,7 +266,7 @@ class Capture:
         return clipped
 
     def _black_rows(self, top: int) -> FloatArray:
-        """Give black as (c, 1, 1), or as the (2, 2) cell that starts at row `top`."""
+        """Return black as (c, 1, 1), or as the (2, 2) cell that starts at row `top`."""
         if self.cfa is None:
             return self.black_level[:, None, None]
         return np.roll(self.black_level, -(top % 2), axis=0)

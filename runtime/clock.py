@@ -71,10 +71,10 @@ class TimedRows:
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Give (channel, h, w) of the whole picture."""
+        """Return (channel, h, w) of the whole picture."""
         return self._source.shape
 
     def read(self, top: int, bottom: int) -> Rows:
-        """Give rows top..bottom of the source."""
+        """Return rows top..bottom of the source."""
         with self._clock.stage(self._name):
             return self._source.read(top, bottom)

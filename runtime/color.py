@@ -96,12 +96,12 @@ def rec709_of_planes(color_matrix: Matrix | None) -> Matrix:
 
 
 def to_output(band: FloatArray, stage: ColorStage) -> FloatArray:
-    """Give a (3, rows, w) band of camera RGB in the output space; negatives are kept."""
+    """Return a (3, rows, w) band of camera RGB in the output space; negatives are kept."""
     return apply_matrix(stage.matrix, band)
 
 
 def to_rec709(stage: ColorStage) -> Matrix:
-    """Give the (3, 3) matrix from the output space to Rec.709, white kept."""
+    """Return the (3, 3) matrix from the output space to Rec.709, white kept."""
     to_xyz = adapt_white(stage.white, D65) @ rgb_to_xyz(stage.primaries, stage.white)
     return np.asarray(np.linalg.inv(rgb_to_xyz(REC709_PRIMARIES, D65)) @ to_xyz)
 
@@ -154,7 +154,7 @@ def _srgb_table() -> NDArray[np.uint16]:
 
 
 def encode_uint16(band: FloatArray, *, tone: Literal["srgb", "linear"]) -> NDArray[np.uint16]:
-    """Give 16-bit codes of a linear band, 1.0 = 65535; values outside 0..1 are clipped.
+    """Return 16-bit codes of a linear band, 1.0 = 65535; values outside 0..1 are clipped.
 
     Args:
         band: (c, rows, w) float32, linear.
@@ -169,7 +169,7 @@ def encode_uint16(band: FloatArray, *, tone: Literal["srgb", "linear"]) -> NDArr
 
 
 def encode_uint8(band: FloatArray, *, tone: Literal["srgb", "linear"]) -> NDArray[np.uint8]:
-    """Give 8-bit codes of a linear band, 1.0 = 255; values outside 0..1 are clipped."""
+    """Return 8-bit codes of a linear band, 1.0 = 255; values outside 0..1 are clipped."""
     codes = encode_uint16(band, tone=tone).astype(np.uint32)
     return ((codes + 128) // 257).astype(np.uint8)
 

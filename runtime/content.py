@@ -85,17 +85,17 @@ class Content:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Give (rows, columns) of the lattice."""
+        """Return (rows, columns) of the lattice."""
         return lattice_shape(self.height_px, self.width_px)
 
     @property
     def cell_px(self) -> CellArray:
-        """Give the pixels of every cell."""
+        """Return the pixels of every cell."""
         return cell_area_px(self.height_px, self.width_px)
 
     @property
     def blurred_detail(self) -> CellArray:
-        """Give the detail (row, column) that blur leaves in a cell: its own and its neighbours'."""
+        """Return detail (row, column) that blur leaves in a cell: its own and its neighbours'."""
         import scipy.ndimage
 
         around = scipy.ndimage.maximum_filter(self.detail, size=3, mode="nearest")
@@ -103,11 +103,11 @@ class Content:
 
     @property
     def clipped_fraction(self) -> float:
-        """Give the share of 2x2 cells with a clipped sample in the whole capture."""
+        """Return the share of 2x2 cells with a clipped sample in the whole capture."""
         return float((self.clipped * self.cell_px).sum() / self.cell_px.sum())
 
     def to_json(self) -> dict[str, float | int | list[int]]:
-        """Give the capture in a few numbers, for the plan."""
+        """Return the capture in a few numbers, for the plan."""
         return {
             "size_px": [self.width_px, self.height_px],
             "cells": int(self.level.size),
@@ -120,12 +120,12 @@ class Content:
 
 
 def lattice_shape(height_px: int, width_px: int) -> tuple[int, int]:
-    """Give (rows, columns) of cells that cover a picture."""
+    """Return (rows, columns) of cells that cover a picture."""
     return -(-height_px // CELL_PX), -(-width_px // CELL_PX)
 
 
 def cell_area_px(height_px: int, width_px: int) -> CellArray:
-    """Give (rows, columns) pixels of every cell; less than CELL_PX^2 at the far borders."""
+    """Return (rows, columns) pixels of every cell; less than CELL_PX^2 at the far borders."""
     rows, columns = (
         np.diff([*range(0, size, CELL_PX), size]).astype(np.float64)
         for size in (height_px, width_px)
@@ -176,7 +176,7 @@ def measure_content(
 
 
 def _bins(capture: Capture, top: int, gains: tuple[float, ...]) -> FloatArray:
-    """Give (c, rows / 2, columns / 2): colours of the 2x2 cells of one group of rows."""
+    """Return (c, rows / 2, columns / 2): colours of the 2x2 cells of one group of rows."""
     rows = capture.linear_rows(top, min(top + GROUP_ROWS, capture.height))
     if np.issubdtype(capture.samples.dtype, np.floating):
         rows = np.nan_to_num(rows, posinf=1.0, neginf=0.0)
@@ -193,7 +193,7 @@ def _bins(capture: Capture, top: int, gains: tuple[float, ...]) -> FloatArray:
 
 
 def _clipped_bins(capture: Capture, top: int) -> NDArray[np.float32]:
-    """Give (rows / 2, columns / 2): 1 where a sample of the 2x2 cell is clipped."""
+    """Return (rows / 2, columns / 2): 1 where a sample of the 2x2 cell is clipped."""
     clipped = capture.saturated_rows(top, min(top + GROUP_ROWS, capture.height))
     if clipped.ndim == 3:
         clipped = np.asarray(clipped.any(axis=0))
@@ -206,7 +206,7 @@ def _clipped_bins(capture: Capture, top: int) -> NDArray[np.float32]:
 
 
 def light_squares(capture: Capture) -> NDArray[np.bool_]:
-    """Give (row, column) of the squares of LIGHT_PX, true where any sample is clipped."""
+    """Return (row, column) of the squares of LIGHT_PX, true where any sample is clipped."""
     height, width = capture.height, capture.width
     lefts = np.arange(0, width, LIGHT_PX)
     found = np.zeros((-(-height // LIGHT_PX), lefts.size), dtype=np.bool_)
@@ -256,13 +256,13 @@ class _Sums:
         self._counts[which, row] += widths * (values.shape[0] * values.shape[1])
 
     def means(self) -> tuple[CellArray, CellArray, CellArray, CellArray]:
-        """Give mean level, squared step, expected squared step, clipped share per cell."""
+        """Return mean level, squared step, expected squared step, clipped share per cell."""
         level, across, down, expected, clipped = self._totals / np.maximum(self._counts, 1)
         return level, (across + down) / 2, expected, clipped
 
 
 def _field(window: SensorWindow, height_px: int, width_px: int) -> CellArray:
-    """Give the distance of every cell's middle from the axis over the sensor's half diagonal."""
+    """Return the distance of every cell's middle from the axis over the sensor's half diagonal."""
     rows, columns = (
         np.array([(a + min(a + CELL_PX, size) - 1) / 2 for a in range(0, size, CELL_PX)])
         for size in (height_px, width_px)

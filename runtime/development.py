@@ -81,17 +81,17 @@ class WriteOptions:
 
     @property
     def picture(self) -> FileFormat:
-        """Give the format of pictures."""
+        """Return the format of pictures."""
         return "exr" if self.format is None else self.format
 
     @property
     def quality(self) -> int:
-        """Give the quality of a JPEG."""
+        """Return the quality of a JPEG."""
         return DEFAULT_JPEG_QUALITY if self.jpeg_quality is None else self.jpeg_quality
 
     @property
     def suffix(self) -> str:
-        """Give the suffix of the pictures, with its dot."""
+        """Return the suffix of the pictures, with its dot."""
         return "." + SUFFIXES[self.picture].lstrip(".")
 
 
@@ -125,7 +125,7 @@ class FileResult:
 
     @classmethod
     def failure(cls, source: Path, bundle: str | None, error: str) -> Self:
-        """Give the result of an input that failed."""
+        """Return the result of an input that failed."""
         return cls(
             input=source,
             output=None,
@@ -138,7 +138,7 @@ class FileResult:
 
     @classmethod
     def skip(cls, source: Path, target: Path, pipeline: Pipeline, *warnings: str) -> Self:
-        """Give the result of an input that was done before, or is done by another process."""
+        """Return the result of an input that was done before, or is done by another process."""
         return cls(
             input=source,
             output=target,
@@ -151,7 +151,7 @@ class FileResult:
         )
 
     def to_json(self) -> dict[str, Any]:
-        """Give the result as plain JSON values."""
+        """Return the result as plain JSON values."""
         return {
             **asdict(self),
             "input": str(self.input),
@@ -250,7 +250,7 @@ def proved_done(
     write: WriteOptions,
     mosaic: MosaicOptions | None,
 ) -> bool:
-    """Tell whether a sidecar proves that exactly this work was done and its picture is whole."""
+    """Return whether a sidecar proves that exactly this work was done and its picture is whole."""
     if not (source.is_file() and target.is_file() and sidecar_path(target).is_file()):
         return False
     record = read_sidecar(target)
@@ -263,7 +263,7 @@ def proved_done(
 
 
 def _are_whole(target: Path, hashes: Any) -> bool:
-    """Tell whether the files beside a main one are those of its sidecar."""
+    """Return whether the files beside a main one are those of its sidecar."""
     if not isinstance(hashes, dict):
         return False
     beside = {target.with_suffix(str(suffix)): sha256 for suffix, sha256 in hashes.items()}
@@ -277,7 +277,7 @@ def identity_of(
     write: WriteOptions,
     mosaic: MosaicOptions | None,
 ) -> dict[str, Any]:
-    """Give what decides the bytes of a picture or of products, as plain JSON values."""
+    """Return what decides the bytes of a picture or of products, as plain JSON values."""
     from camkit import __version__
 
     free = ("threads", "max_mem_bytes", "tile_px")

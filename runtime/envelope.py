@@ -35,7 +35,7 @@ QUANTITIES: Final = {
 
 
 def grey_noise(noise: NoiseModel) -> float:
-    """Give the standard deviation at mid grey, before white balance; green's of three colours."""
+    """Return the standard deviation at mid grey, before white balance; green's of three colours."""
     middle = len(noise.shot) // 2
     return float(np.sqrt(noise.shot[middle] * GREY + noise.read_variance[middle]))
 
@@ -59,7 +59,7 @@ def observe(capture: Capture, noise: NoiseModel) -> dict[str, float]:
 
 
 def _sampled(capture: Capture) -> dict[str, float]:
-    """Give the quantities that need samples, from bands over the whole height."""
+    """Return the quantities that need samples, from bands over the whole height."""
     total = clipped = broken = 0
     signal = 0.0
     for top, bottom in _bands(capture.height):
@@ -81,7 +81,7 @@ def _sampled(capture: Capture) -> dict[str, float]:
 
 
 def _bands(height: int) -> list[tuple[int, int]]:
-    """Give first and last rows of the bands; all rows of a small capture."""
+    """Return first and last rows of the bands; all rows of a small capture."""
     count = min(SAMPLE_BANDS, -(-height // SAMPLE_ROWS))
     starts = np.linspace(0, max(height - SAMPLE_ROWS, 0), count)
     # Even, so that every band holds as many rows of each colour.
@@ -93,7 +93,7 @@ def _repair(capture: Capture, rows: FloatArray) -> tuple[FloatArray, np.ndarray]
 
 
 def findings(envelope: Mapping[str, Range], seen: Mapping[str, float]) -> tuple[str, ...]:
-    """Say what of a capture lies outside.
+    """Return what of a capture lies outside.
 
     Args:
         envelope: The manifest's ranges; names that this version does not know are passed over.

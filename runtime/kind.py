@@ -38,7 +38,7 @@ class FromArray(Protocol):
         white_balance: tuple[float, float, float] | None = None,
         origin_px: tuple[int, int] | None = None,
     ) -> Capture:
-        """Give the capture."""
+        """Return the capture."""
         ...
 
 
@@ -77,7 +77,7 @@ class RuntimePart:
 
 
 def runtime_part(kind: str) -> RuntimePart:
-    """Give what the runtime knows of a kind.
+    """Return what the runtime knows of a kind.
 
     Raises:
         UnsupportedError: If there is no such kind, or the runtime knows nothing of it.
@@ -91,7 +91,7 @@ def runtime_part(kind: str) -> RuntimePart:
 
 
 def part_of(manifest: Manifest) -> RuntimePart:
-    """Give what the runtime knows of the kind of a bundle.
+    """Return what the runtime knows of the kind of a bundle.
 
     Raises:
         BundleError: If that kind cannot be used here; says why.
@@ -103,7 +103,7 @@ def part_of(manifest: Manifest) -> RuntimePart:
 
 
 def kind_without_bundle(file: Path | None, options: Options) -> Kind:
-    """Give the kind of a capture that comes without a bundle.
+    """Return the kind of a capture that comes without a bundle.
 
     It is the one whose options were chosen, else the one that alone has files of that type, else
     that of colour photographs.

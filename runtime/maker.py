@@ -70,7 +70,7 @@ class Made:
     sections: Mapping[str, Any] = field(default_factory=dict)
 
     def files(self, format_: str | None) -> dict[str, Write]:
-        """Give who writes each file, by suffix, the main one first.
+        """Return who writes each file, by suffix, the main one first.
 
         Raises:
             ContractError: If this product has no picture of that format.

@@ -81,7 +81,7 @@ class Metadata:
 
     @classmethod
     def believable(cls, **told: Any) -> Self:
-        """Give what can be believed of foreign values; an odd one counts as not stated.
+        """Return what can be believed of foreign values; an odd one counts as not stated.
 
         Args:
             **told: Fields by name, of any type and content.
@@ -92,13 +92,13 @@ class Metadata:
 
     @property
     def camera(self) -> str:
-        """Give make and model as people read them; empty if not stated."""
+        """Return make and model as people read them; empty if not stated."""
         if self.model.startswith(self.make):
             return self.model
         return f"{self.make} {self.model}".strip()
 
     def completed(self, **told: Any) -> "Metadata":
-        """Give the same with further values where none is stated, as far as they can be believed.
+        """Return the same with further values where none is stated, as far as they can be believed.
 
         Args:
             **told: Fields by name.
@@ -108,7 +108,7 @@ class Metadata:
         return replace(self, **{k: v for k, v in more.items() if k not in mine})
 
     def stated(self) -> dict[str, str | float]:
-        """Give what is stated, by name, as plain JSON values."""
+        """Return what is stated, by name, as plain JSON values."""
         return {name: value for name, value in asdict(self).items() if value not in ("", None)}
 
 
@@ -119,7 +119,7 @@ def _without_half_a_place(told: dict[str, Any]) -> dict[str, Any]:
 
 
 def _cleaned(name: str, value: Any) -> Any:
-    """Give a field's value as far as it can be believed, else that for "not stated"."""
+    """Return a field's value as far as it can be believed, else that for "not stated"."""
     if name in _RANGES:
         low, high = _RANGES[name]
         if isinstance(value, bool) or not isinstance(value, int | float):
@@ -134,7 +134,7 @@ def _cleaned(name: str, value: Any) -> Any:
 
 
 def clean_text(value: Any) -> str:
-    """Give foreign text without what does not print, and not too long; empty for other values."""
+    """Return foreign text without what does not print, and not too long; empty for other values."""
     if not isinstance(value, str):
         return ""
     shown = (c if c.isprintable() else " " for c in value[: 4 * MAX_TEXT])

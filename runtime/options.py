@@ -127,22 +127,22 @@ class Options:
             )
 
     def chosen(self, name: str) -> str | None:
-        """Give what was chosen for a kind's own option; None if nothing was."""
+        """Return what was chosen for a kind's own option; None if nothing was."""
         return dict(self.of_kind).get(name)
 
     @property
     def depth_mm(self) -> float | None:
-        """Give the object distance as a PSF states it."""
+        """Return the object distance as a PSF states it."""
         return None if self.depth_m is None else self.depth_m * MM_PER_M
 
     @property
     def focus_um(self) -> float:
-        """Give how far the sensor of the unit lies from its nominal place; 0 without one."""
+        """Return how far the sensor of the unit lies from its nominal place; 0 without one."""
         return 0.0 if self.unit is None else self.unit.focus_um
 
 
 def kind_option(name: str) -> KindOption:
-    """Give the option of a name that some kind of camera brings.
+    """Return the option of a name that some kind of camera brings.
 
     Raises:
         ContractError: If no kind does.
@@ -160,7 +160,7 @@ def kind_option_names() -> list[str]:
 
 
 def with_choices(options: Options, choices: Mapping[str, object]) -> Options:
-    """Give options with single ones chosen by name, those that a kind brings among them.
+    """Return options with single ones chosen by name, those that a kind brings among them.
 
     Raises:
         ContractError: If one is unknown, or cannot be what it was given.
@@ -208,7 +208,7 @@ def _check_of_kind(of_kind: tuple[tuple[str, str], ...]) -> None:
 
 
 def with_absolute_files(options: Options) -> Options:
-    """Give options whose files bear names that are true in every process."""
+    """Return options whose files bear names that are true in every process."""
     of_kind = tuple(
         (name, str(Path(value).absolute()) if kind_option(name).is_file else value)
         for name, value in options.of_kind
@@ -249,7 +249,7 @@ def _check_depth(depth_m: float | None) -> None:
 
 
 def checked_origin(origin_px: Any) -> tuple[int, int]:
-    """Give a place on a sensor as two whole numbers.
+    """Return a place on a sensor as two whole numbers.
 
     Raises:
         ContractError: If it is anything else.

@@ -148,7 +148,7 @@ class Pipeline:
         return _reopened, (known, self.options, self.kind)
 
     def network(self, role: str, size: str) -> NetworkEngine:
-        """Give the network of a role and size, made when first asked for.
+        """Return the network of a role and size, made when first asked for.
 
         Raises:
             ContractError: If there is no bundle, or it lacks the size.
@@ -162,7 +162,7 @@ class Pipeline:
             return self._engines[role, size]
 
     def speed(self, sizes: Sequence[str]) -> Speed:
-        """Give how fast this machine is; networks and bank are timed once per pipeline."""
+        """Return how fast this machine is; networks and bank are timed once per pipeline."""
         bundle = self.bundle
         roles = () if bundle is None else bundle.manifest.networks
         new = {
@@ -458,7 +458,7 @@ class Pipeline:
         white_balance: tuple[float, float, float] | None,
         origin_px: tuple[int, int] | None,
     ) -> Capture:
-        """Give an array the meaning that the bundle's sensor gives it; see `process_array`.
+        """Return an array the meaning that the bundle's sensor gives it; see `process_array`.
 
         Raises:
             ContractError: If shape, type or size do not fit the bundle.
@@ -505,7 +505,7 @@ def load(
 
 
 def _reopened(known: tuple[Path, str, str] | None, options: Options, kind: Kind) -> Pipeline:
-    """Give the pipeline that was pickled.
+    """Return the pipeline that was pickled.
 
     Raises:
         BundleError: If neither the path nor the name leads to the same bundle.

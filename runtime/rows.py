@@ -30,11 +30,11 @@ class RowSource(Protocol):
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Give (channel, h, w) of the whole picture."""
+        """Return (channel, h, w) of the whole picture."""
         ...
 
     def read(self, top: int, bottom: int) -> Rows:
-        """Give rows top..bottom as (channel, bottom - top, w).
+        """Return rows top..bottom as (channel, bottom - top, w).
 
         Successive calls must not go back above the `top` of an earlier call.
         """
@@ -45,7 +45,7 @@ class PiecedRows(RowSource, Protocol):
     """A row source that can give its rows as they lie, without joining them."""
 
     def pieces(self, top: int, bottom: int) -> Sequence[Rows]:
-        """Give rows top..bottom in consecutive pieces (channel, rows, w); otherwise as `read`."""
+        """Return rows top..bottom in consecutive pieces (channel, rows, w); otherwise as `read`."""
         ...
 
 
@@ -59,16 +59,16 @@ class ArrayRows:
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Give (channel, h, w) of the whole picture."""
+        """Return (channel, h, w) of the whole picture."""
         c, h, w = self._planes.shape
         return c, h, w
 
     def read(self, top: int, bottom: int) -> Rows:
-        """Give rows top..bottom as a view."""
+        """Return rows top..bottom as a view."""
         return self._planes[:, top:bottom]
 
     def pieces(self, top: int, bottom: int) -> Sequence[Rows]:
-        """Give the same view as the only piece."""
+        """Return the same view as the only piece."""
         return [self.read(top, bottom)]
 
 
@@ -117,13 +117,13 @@ class RollingRows:
         self._readers: list[weakref.ref[RowReader]] = []
 
     def reader(self) -> "RowReader":
-        """Give a new reader; make all readers before the first one reads."""
+        """Return a new reader; make all readers before the first one reads."""
         reader = RowReader(self)
         self._readers.append(weakref.ref(reader))
         return reader
 
     def pieces_for(self, reader: "RowReader", top: int, bottom: int) -> list[Rows]:
-        """Give rows to one of the readers; `RowReader.read` says what is refused."""
+        """Return rows to one of the readers; `RowReader.read` says what is refused."""
         if not 0 <= top < bottom <= self.shape[1]:
             raise ContractError(f"rows {top}..{bottom} lie outside 0..{self.shape[1]}")
         if top < reader.top:
@@ -166,11 +166,11 @@ class RowReader:
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Give (channel, h, w) of the whole picture."""
+        """Return (channel, h, w) of the whole picture."""
         return self._rows.shape
 
     def read(self, top: int, bottom: int) -> Rows:
-        """Give rows top..bottom as (channel, bottom - top, w).
+        """Return rows top..bottom as (channel, bottom - top, w).
 
         Raises:
             ContractError: If the rows lie outside the picture or above an earlier read.
@@ -179,5 +179,5 @@ class RowReader:
         return pieces[0] if len(pieces) == 1 else np.concatenate(pieces, axis=1)
 
     def pieces(self, top: int, bottom: int) -> list[Rows]:
-        """Give the same rows as they lie, in consecutive pieces."""
+        """Return the same rows as they lie, in consecutive pieces."""
         return self._rows.pieces_for(self, top, bottom)

@@ -30,7 +30,7 @@ STAGES: Final = "camkit.runtime.stages"
 
 @cache
 def stage_module(name: str) -> ModuleType:
-    """Give the module of a stage.
+    """Return the module of a stage.
 
     Raises:
         UnsupportedError: If this runtime has none.

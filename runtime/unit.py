@@ -57,7 +57,7 @@ class Unit:
 
     @property
     def focus_um(self) -> float:
-        """Give how far its sensor lies from the nominal place; 0 where that is not stated."""
+        """Return how far its sensor lies from the nominal place; 0 where that is not stated."""
         return self.facts.get(FOCUS, 0.0)
 
     def check(self, bundle: Bundle | None) -> None:
@@ -105,7 +105,7 @@ class Unit:
 
 
 def lens_hash(prescription: bytes) -> str:
-    """Give the hash by which a unit names its lens.
+    """Return the hash by which a unit names its lens.
 
     Args:
         prescription: The text that a bundle holds of its lens.
@@ -136,7 +136,7 @@ def read_unit(path: Path) -> Unit:
 
 
 def _is_finite(value: float) -> bool:
-    """Tell whether a number is one that fits a float."""
+    """Return whether a number is one that fits a float."""
     try:
         return isfinite(value)
     except OverflowError:
@@ -144,7 +144,7 @@ def _is_finite(value: float) -> bool:
 
 
 def _identity(table: Mapping[str, Any], path: Path) -> dict[str, str]:
-    """Give the one hash that says what a unit belongs to."""
+    """Return the one hash that says what a unit belongs to."""
     given = {key: table[key] for key in _HASHES if key in table}
     if len(given) != 1:
         raise ContractError(
@@ -159,7 +159,7 @@ def _identity(table: Mapping[str, Any], path: Path) -> dict[str, str]:
 
 
 def format_unit(name: str, identity: Mapping[str, str], measured: Mapping[str, float]) -> str:
-    """Give the TOML text of a unit.
+    """Return the TOML text of a unit.
 
     Args:
         name: For people.

@@ -79,13 +79,13 @@ SCHOTT_POWERS = [0.0, 2.0, -2.0, -4.0, -6.0, -8.0]
 
 
 def field(text: str, key: str) -> list[float]:
-    """Give the numbers that stand behind a key of a database file; none if it is not there."""
+    """Return the numbers that stand behind a key of a database file; none if it is not there."""
     found = re.search(rf"^\s*-?\s*{key}: *([-+0-9.eE ]+)$", text, re.MULTILINE)
     return [float(word) for word in found[1].split()] if found else []
 
 
 def dispersion(text: str) -> tuple[str, list[float]] | None:
-    """Give formula and coefficients in camkit's terms; None for tables and rare formulas."""
+    """Return formula and coefficients in camkit's terms; None for tables and rare formulas."""
     kind = re.search(r"type: formula (\d)", text)
     numbers = field(text, "coefficients")
     if kind is None or not numbers:
@@ -109,7 +109,7 @@ def dispersion(text: str) -> tuple[str, list[float]] | None:
 
 
 def entry(path: Path, name: str, source: str = "") -> str | None:
-    """Give a glass as a line of JSON; None where its formula is none of ours."""
+    """Return a glass as a line of JSON; None where its formula is none of ours."""
     text = path.read_text(encoding="utf-8")
     found = dispersion(text)
     if found is None or "n_is_absolute: true" in text:
@@ -119,7 +119,7 @@ def entry(path: Path, name: str, source: str = "") -> str | None:
 
 
 def stated(text: str) -> list[float | None]:
-    """Give the printed n_d and V_d, where they are stated."""
+    """Return the printed n_d and V_d, where they are stated."""
     return [next(iter(field(text, key)), None) for key in ("nd", "Vd")]
 
 
@@ -134,7 +134,7 @@ def write(name: str, rows: list[str], source: str, *, literature: bool = False) 
 
 
 def classic_rows(text: str) -> list[str]:
-    """Give glasses of 1983 that today's catalogue lacks, by the best numbers there are for each.
+    """Return glasses of 1983 that today's catalogue lacks, by the best numbers there are for each.
 
     Today's successor N-X has the very dispersion of X more often than not: then X has its
     coefficients. That is so if table V, or what another maker sells as X, says so.
@@ -174,13 +174,13 @@ def classic_rows(text: str) -> list[str]:
 
 
 def holds(glass: Glass) -> bool:
-    """Say whether a glass is known over all wavelengths that are compared."""
+    """Return whether a glass is known over all wavelengths that are compared."""
     low_um, high_um = glass.range_um
     return low_um <= float(WAVES_UM[0]) and high_um >= float(WAVES_UM[-1])
 
 
 def borne_out(apart: torch.Tensor) -> bool:
-    """Say whether any of the curves has this index and dispersion."""
+    """Return whether any of the curves has this index and dispersion."""
     shift = apart.mean(1, keepdim=True)
     bent = (apart - shift).abs().amax(1)
     return bool(((shift[:, 0].abs() <= BORNE_OUT_INDEX) & (bent <= BORNE_OUT_DISPERSION)).any())

@@ -104,7 +104,7 @@ def parse(given: list[str] | None = None) -> argparse.Namespace:
 
 
 def check(recipe: DesignRecipe, arguments: argparse.Namespace) -> Iterator[dict[str, float]]:
-    """Give a row of numbers for every field and depth.
+    """Return a row of numbers for every field and depth.
 
     Raises:
         ContractError: If the object is at infinity or the lens outside the bounds of the recipe.
@@ -116,7 +116,7 @@ def check(recipe: DesignRecipe, arguments: argparse.Namespace) -> Iterator[dict[
 
 
 def dense_parts(recipe: DesignRecipe, arguments: argparse.Namespace) -> DesignParts:
-    """Give the parts of a design with the lens in place, many rays and the trained network."""
+    """Return the parts of a design with the lens in place, many rays and the trained network."""
     if arguments.depth_mm:
         optics = replace(
             recipe.optics, object_distances_mm=(arguments.depth_mm,), focus_distance_mm=0.0
@@ -141,7 +141,7 @@ def dense_parts(recipe: DesignRecipe, arguments: argparse.Namespace) -> DesignPa
 
 
 def spots(parts: DesignParts, arguments: argparse.Namespace) -> list[Spot]:
-    """Give some fields of all depths, evenly over those about which the lens passes a patch."""
+    """Return some fields of all depths, evenly over those about which the lens passes a patch."""
     problem = parts.lens.problem
     with torch.no_grad():
         kernels = parts.lens()[0].float()
@@ -156,7 +156,7 @@ def spots(parts: DesignParts, arguments: argparse.Namespace) -> list[Spot]:
 
 
 def passes(parts: DesignParts, spot: Spot, arguments: argparse.Namespace) -> bool:
-    """Tell whether rays reach all that the kernels of a patch reach: one sample a pixel says."""
+    """Return whether rays reach all that the kernels of a patch reach: one sample a pixel says."""
     window = window_of(parts, spot, arguments)
     one = argparse.Namespace(**{**vars(arguments), "spp": 1, "passes": 1})
     try:
@@ -168,7 +168,7 @@ def passes(parts: DesignParts, spot: Spot, arguments: argparse.Namespace) -> boo
 
 
 def spots_at(parts: DesignParts, kernels: Tensor, fields: Iterable[int]) -> list[Spot]:
-    """Give fields of all depths, with kernels (depth, field, 3, k, k)."""
+    """Return fields of all depths, with kernels (depth, field, 3, k, k)."""
     problem = parts.lens.problem
     found = []
     for depth, depth_mm in enumerate(problem.depths_mm):
@@ -220,7 +220,7 @@ def judged(
 
 
 def window_of(parts: DesignParts, spot: Spot, arguments: argparse.Namespace) -> Window:
-    """Give a patch and what its front needs around it."""
+    """Return a patch and what its front needs around it."""
     side = arguments.patch_px + 2 * parts.front.margin_px
     window = centred_window(side, side, parts.lens.pixels.pitch_um)
     return replace(window, top_mm=window.top_mm + spot.chief_mm)
@@ -270,7 +270,7 @@ def by_rays(
 def by_kernels(
     parts: DesignParts, spot: Spot, texture: Texture, window: Window, alignment: Alignment
 ) -> tuple[Tensor, Tensor]:
-    """Give the capture (3, s, s) without noise, and what a lens without blur would record."""
+    """Return the capture (3, s, s) without noise, and what a lens without blur would record."""
     edge = parts.lens.pixels.kernel_px // 2
     # a pixel with the centroid of a spot sees what the chief ray of another one sees
     around = finer(window, 1, edge)
@@ -281,7 +281,7 @@ def by_kernels(
 
 
 def lines(parts: DesignParts) -> ChannelResponse:
-    """Give the colours of the design as narrow lines: rays draw wavelengths from a continuum."""
+    """Return the colours of the design as narrow lines: rays draw wavelengths from a continuum."""
     waves = parts.lens.problem.wavelengths_um.numpy()
     weights = parts.lens.pixels.color_weights.numpy()
     grid = (waves[:, None] + LINE_UM * np.array([-1.0, 0.0, 1.0])).flatten()
@@ -301,13 +301,13 @@ def recovered_db(parts: DesignParts, recorded: Tensor, known: Tensor, sharp: Ten
 
 
 def psnr_db(one: Tensor, other: Tensor) -> float:
-    """Give the PSNR of two linear pictures in sRGB tone."""
+    """Return the PSNR of two linear pictures in sRGB tone."""
     gap = encode_srgb(one.clamp(0, 1)) - encode_srgb(other.clamp(0, 1))
     return -10 * float(torch.log10(gap.square().mean().clamp_min(1e-12)))
 
 
 def mean(rows: list[dict[str, float]], key: str) -> float:
-    """Give the mean of a column."""
+    """Return the mean of a column."""
     return sum(row[key] for row in rows) / len(rows)
 
 

@@ -90,16 +90,16 @@ class Bench:
 
     @property
     def lens(self) -> Lens:
-        """Give the lens that is disturbed."""
+        """Return the lens that is disturbed."""
         return find_lens(self.recipe.prescription, self.folder)
 
     @property
     def efl_mm(self) -> float:
-        """Give the focal length that is wanted."""
+        """Return the focal length that is wanted."""
         return self.recipe.optics.efl_mm or paraxial_data(self.lens).efl_mm
 
     def of_arm(self, arm: str) -> DesignRecipe:
-        """Give the recipe of an arm."""
+        """Return the recipe of an arm."""
         solved = self.recipe.optics.solved_surface % len(self.lens.surfaces)
         if arm == "before":
             return plain(self.recipe, solved, self.plain_rate)
@@ -107,7 +107,7 @@ class Bench:
         return replace(own, starts=SPOTS_STARTS) if arm == "spots" else own
 
     def parts(self, arm: str, number: int, *, search: bool = True) -> DesignParts:
-        """Give the parts of an arm at a disturbed lens, the same one for every arm."""
+        """Return the parts of an arm at a disturbed lens, the same one for every arm."""
         path = (self.out_dir / "starts" / f"{number:02}.toml").resolve()
         if not path.exists():
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -196,7 +196,7 @@ def parse() -> argparse.Namespace:
 
 
 def bench_of(arguments: argparse.Namespace) -> Bench:
-    """Give what all trials share."""
+    """Return what all trials share."""
     recipe = replace(read_design(arguments.recipe), network=NetworkChoice(config={}))
     if recipe.loss.needs_network and recipe.front.kind != "wiener":
         recipe = replace(recipe, front=Front(kind="wiener"))
@@ -221,7 +221,7 @@ def bench_of(arguments: argparse.Namespace) -> Bench:
 
 
 def agreed_steps(bench: Bench, arguments: argparse.Namespace) -> int:
-    """Give the steps of every trial: those of an earlier run in this folder, or measured now."""
+    """Return the steps of every trial: those of an earlier run in this folder, or measured now."""
     path = arguments.out_dir / "settings.json"
     asked = {
         "digest": recipe_digest(bench.recipe),
@@ -244,7 +244,7 @@ def agreed_steps(bench: Bench, arguments: argparse.Namespace) -> int:
 
 
 def measured_steps(bench: Bench, minutes: float) -> int:
-    """Give the steps that fit into so many minutes of CPU, by a few of them."""
+    """Return the steps that fit into so many minutes of CPU, by a few of them."""
     plan = short(bench.recipe.schedule, WARM_STEPS + TIMED_STEPS)
     loop = DesignLoop(bench.parts("after", 0), replace(plan, valid_steps=TIMED_STEPS // 2))
     for _ in loop.run(WARM_STEPS):
@@ -257,7 +257,7 @@ def measured_steps(bench: Bench, minutes: float) -> int:
 
 
 def short(schedule: DesignSchedule, steps: int) -> DesignSchedule:
-    """Give a schedule of so many steps that decays and validates as often as the whole one."""
+    """Return a schedule of so many steps that decays and validates as often as the whole one."""
     share = steps / schedule.steps
     return replace(
         schedule,
@@ -270,7 +270,7 @@ def short(schedule: DesignSchedule, steps: int) -> DesignSchedule:
 
 
 def plain(recipe: DesignRecipe, solved: int, rate: float) -> DesignRecipe:
-    """Give a recipe with every number free in its own scale, no solve, no limits, no search."""
+    """Return a recipe with every number free in its own scale, no solve, no limits, no search."""
     optics, steepest = recipe.optics, recipe.limits.max_curvature_per_mm
     own = [v for v in recipe.variables if v.kind != "defocus"]
     if optics.efl_mm:
@@ -286,7 +286,7 @@ def plain(recipe: DesignRecipe, solved: int, rate: float) -> DesignRecipe:
 
 
 def steady(recipe: DesignRecipe, solved: int, efl_mm: float) -> DesignRecipe:
-    """Give a recipe with all that keeps a design from going astray, where it has not."""
+    """Return a recipe with all that keeps a design from going astray, where it has not."""
     optics, schedule = recipe.optics, recipe.schedule
     return replace(
         recipe,
@@ -300,7 +300,7 @@ def steady(recipe: DesignRecipe, solved: int, efl_mm: float) -> DesignRecipe:
 
 
 def level_of(number: int) -> float:
-    """Give the level of a start: they take turns."""
+    """Return the level of a start: they take turns."""
     return LEVELS[number % len(LEVELS)]
 
 
@@ -339,7 +339,7 @@ def to_the_end(bench: Bench, trial: Trial) -> Trial:
 def descended(
     parts: DesignParts, problem: Problem, begin: Tensor, schedule: DesignSchedule, *, whiten: bool
 ) -> Tensor:
-    """Give the best lens of a loop from `begin`, scaled."""
+    """Return the best lens of a loop from `begin`, scaled."""
     lens = LensModule(problem, parts.lens.pixels, begin, whiten=whiten)
     loop = DesignLoop(replace(parts, lens=lens), schedule)
     loop.judge()

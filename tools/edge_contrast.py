@@ -84,11 +84,11 @@ class Row:
 
     @property
     def worst(self) -> tuple[float, float, float]:
-        """Give the largest contrast, the largest rise, and the share of curves that only fall."""
+        """Return the largest contrast, the largest rise, and the share of curves that only fall."""
         return worst_of_curves(list(self.curves.values()))
 
     def mean_at(self, cycles_per_px: float) -> float:
-        """Give the mean contrast over places and directions, at the nearest frequency."""
+        """Return the mean contrast over places and directions, at the nearest frequency."""
         found = []
         for curve in self.curves.values():
             nearest = int((curve.cycles_per_px - cycles_per_px).abs().argmin())
@@ -96,7 +96,7 @@ class Row:
         return float(np.mean(found))
 
     def line(self) -> str:
-        """Give the row of the table."""
+        """Return the row of the table."""
         means = " | ".join(f"{self.mean_at(cycles):.2f}" for cycles in (0.1, 0.25, 0.5))
         largest, rise, falls = self.worst
         return (
@@ -149,7 +149,7 @@ def measure(bundle: Bundle, shots: Shots) -> list[Row]:
 def _edges(
     bundle: Bundle, pipelines: dict[str, Pipeline], across: Across, depth_mm: float, shots: Shots
 ) -> dict[str, EdgeContrast]:
-    """Give the contrast (place, frequency) that each method leaves."""
+    """Return the contrast (place, frequency) that each method leaves."""
     sensor = color_sensor(bundle)
     scene = slanted_edge(SIDE_PX, across, shots.levels).float().numpy()
     matrix = rec709_of(sensor)

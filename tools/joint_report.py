@@ -130,7 +130,7 @@ def main() -> None:
 
 
 def judges_of(recipe: DesignRecipe, name: str | None) -> NetworkChoice:
-    """Give the network that judges: the recipe's, another one, or none."""
+    """Return the network that judges: the recipe's, another one, or none."""
     if name is None:
         return recipe.network
     return NetworkChoice(name="" if name == "none" else name, config={})
@@ -157,17 +157,17 @@ def numbers(text: str) -> tuple[int, ...]:
 
 
 def slug(name: str) -> str:
-    """Give a name as it stands in a file name."""
+    """Return a name as it stands in a file name."""
     return name.replace(" ", "_")
 
 
 def front_db(report: Entry, name: str) -> float:
-    """Give what the front alone reaches with a lens."""
+    """Return what the front alone reaches with a lens."""
     return float(report["lenses"][name]["front_db"])
 
 
 def kept(path: Path, make: Callable[[], Entry]) -> Entry:
-    """Give what is in a file, or make it and keep it."""
+    """Return what is in a file, or make it and keep it."""
     if not path.exists():
         begin = time.process_time()
         made = make()
@@ -210,7 +210,7 @@ def refuse_other_settings(
 
 
 def given_lens(recipe: DesignRecipe, parts: DesignParts, name: str) -> Tensor:
-    """Give the numbers of a finished lens; raises ContractError if the recipe cannot make it."""
+    """Return the numbers of a finished lens; raises ContractError if the recipe cannot make it."""
     lens = find_lens(name, Path())
     problem = problem_of(recipe, lens)
     scaled = problem.free.scaled()
@@ -226,19 +226,19 @@ def given_lens(recipe: DesignRecipe, parts: DesignParts, name: str) -> Tensor:
 
 
 def shape(surface: Surface) -> list[float]:
-    """Give what light meets, in numbers of the order of 1."""
+    """Return what light meets, in numbers of the order of 1."""
     terms = [*surface.even_asphere, *[0.0] * ASPHERE_TERMS][:ASPHERE_TERMS]
     bends = [a * RIM_MM ** (2 * j) for j, a in enumerate(terms, start=1)]
     return [surface.curvature_per_mm * RIM_MM, surface.conic, surface.thickness_mm, *bends]
 
 
 def kept_lens(path: Path, make: Callable[[], Entry]) -> Tensor:
-    """Give the numbers of a lens from its file, or find it."""
+    """Return the numbers of a lens from its file, or find it."""
     return torch.tensor(kept(path, make)["scaled"], dtype=torch.float64)
 
 
 def spots(parts: DesignParts, merit: Merit, core_mm: float, least: int) -> Entry:
-    """Give the best lens on spots: from the start itself, from near it, and from anywhere.
+    """Return the best lens on spots: from the start itself, from near it, and from anywhere.
 
     Args:
         parts: What is free, and what is looked at.
@@ -272,13 +272,13 @@ def spots(parts: DesignParts, merit: Merit, core_mm: float, least: int) -> Entry
 
 
 def core_mm(starts: Starts, merit: Merit) -> float:
-    """Give the core of a merit: that of the recipe's search where it has the same merit."""
+    """Return the core of a merit: that of the recipe's search where it has the same merit."""
     own_mm = starts.core_um / 1000
     return own_mm if starts.merit == merit and own_mm else CORE_MM[merit]
 
 
 def distinct(lenses: Tensor) -> list[int]:
-    """Give the first few of (start, variable) that differ from each other in some number."""
+    """Return the first few of (start, variable) that differ from each other in some number."""
     chosen: list[int] = []
     for i, scaled in enumerate(lenses):
         if all(float((scaled - lenses[j]).abs().max()) > OTHER for j in chosen):
@@ -289,7 +289,7 @@ def distinct(lenses: Tensor) -> list[int]:
 
 
 def in_batches(problem: Problem, begin: Tensor, steps: int) -> tuple[Tensor, Tensor]:
-    """Give (start, variable) descended lenses and their merits, best first."""
+    """Return (start, variable) descended lenses and their merits, best first."""
     held = problem.free.high <= problem.free.low
     ends = [
         descend(lambda s: residuals(problem, s), part, steps, held)
@@ -301,7 +301,7 @@ def in_batches(problem: Problem, begin: Tensor, steps: int) -> tuple[Tensor, Ten
 
 
 def judged_ends(parts: DesignParts, recipe: DesignRecipe, ends: Entry, fresh: SceneSource) -> Entry:
-    """Give what the front makes of the lenses that the best descents ended at."""
+    """Return what the front makes of the lenses that the best descents ended at."""
     scores = [
         score_design(parts, recipe.schedule, torch.tensor(end, dtype=torch.float64), source=fresh)
         for end in ends["ends"]
@@ -310,7 +310,7 @@ def judged_ends(parts: DesignParts, recipe: DesignRecipe, ends: Entry, fresh: Sc
 
 
 def joint(recipe: DesignRecipe, folder: Path, pictures: Path | None) -> Entry:
-    """Give the lens of the recipe's own joint design."""
+    """Return the lens of the recipe's own joint design."""
     loop = DesignLoop(parts_of(recipe, folder=folder, pictures=pictures), recipe.schedule)
     curve = [loop.judge().valid_db] + [moment.valid_db for moment in loop.run()]
     loop.take_best()
@@ -339,7 +339,7 @@ def network_score(
 
 
 def line(name: str, entry: Entry) -> str:
-    """Give the line of a lens for people."""
+    """Return the line of a lens for people."""
     networks = [n["psnr_db"] for n in entry["networks"] if n]
     seen = f"{np.mean(networks):.2f} +- {np.std(networks):.2f}" if networks else "-"
     return f"{name:28} front {entry['front_db']:.2f} dB, network {seen} dB"

@@ -66,7 +66,7 @@ class Conditions:
     fresh: Path | None
 
     def digest(self, *more: Any) -> str:
-        """Give a hash of all that decides a measurement."""
+        """Return a hash of all that decides a measurement."""
         table = [asdict(self), *more]
         return hashlib.sha256(json.dumps(table, sort_keys=True, default=str).encode()).hexdigest()
 
@@ -153,7 +153,7 @@ def parse() -> argparse.Namespace:
 
 
 def named(lenses: list[str]) -> dict[str, str]:
-    """Give built-in names or paths by the name that the table shows."""
+    """Return built-in names or paths by the name that the table shows."""
     found: dict[str, str] = {}
     for text in lenses:
         name, _, place = text.rpartition("=")
@@ -165,7 +165,7 @@ def named(lenses: list[str]) -> dict[str, str]:
 
 
 def conditions_of(arguments: argparse.Namespace) -> Conditions:
-    """Give what is the same for all lenses."""
+    """Return what is the same for all lenses."""
     recipe = read_design(arguments.recipe)
     schedule = recipe.schedule
     steps = arguments.steps or schedule.steps
@@ -200,7 +200,7 @@ def conditions_of(arguments: argparse.Namespace) -> Conditions:
 
 
 def working_lens(name: str, conditions: Conditions) -> Lens:
-    """Give the lens as it works; foci on spots count the fields of the strip."""
+    """Return the lens as it works; foci on spots count the fields of the strip."""
     slopes = field_slopes(conditions.recipe.optics)
     lens = replace(
         find_lens(name),
@@ -217,7 +217,7 @@ def working_lens(name: str, conditions: Conditions) -> Lens:
 
 
 def kept(folder: Path, key: str, make: Any) -> Entry:
-    """Give the entry of the journal, or make it and write it down."""
+    """Return the entry of the journal, or make it and write it down."""
     path = folder / JOURNAL
     for entry in read_journal(path, lambda m: {**m, "key": m["key"]}, "measurement"):
         if entry["key"] == key:
@@ -237,7 +237,7 @@ def parts(
     *,
     widest: bool,
 ) -> tuple[DesignParts, Seen]:
-    """Give a loop's parts: to judge in the widest window, so that patches are the same for all."""
+    """Return loop's parts: to judge in the widest window, so that patches are the same for all."""
     recipe = conditions.recipe
     weights = torch.tensor(recipe.pixels.color_weights, dtype=torch.float64)
     pixels = Pixels(
@@ -322,13 +322,13 @@ def after(lens: Lens, conditions: Conditions, seed: int, folder: Path) -> Entry:
 
 
 def scores(judged: DesignParts, plan: Conditions) -> Entry:
-    """Give PSNR and SSIM of every depth and field."""
+    """Return PSNR and SSIM of every depth and field."""
     found = score_parts(judged, plan.recipe.schedule, plan.patches)
     return {"db": found.db, "ssim": found.ssim}
 
 
 def contrasts(judged: DesignParts) -> Entry:
-    """Give the contrast of edges in both directions."""
+    """Return the contrast of edges in both directions."""
     found = {across: edge_contrasts(judged, across) for across in ACROSS}
     return {
         "cycles_per_px": found["tangential"].cycles_per_px.tolist(),
@@ -354,7 +354,7 @@ def keep_pictures(judged: DesignParts, recipe: DesignRecipe, path: Path) -> None
 
 
 def row(name: str, entry: Entry) -> str:
-    """Give the line of a lens for people."""
+    """Return the line of a lens for people."""
     db, spread = mean_and_spread(entry["recovered"], "db")
     alike, _ = mean_and_spread(entry["recovered"], "ssim")
     largest, rise, _ = worst_contrast(entry["recovered"])

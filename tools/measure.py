@@ -173,7 +173,7 @@ def measure_tiling(arguments: argparse.Namespace) -> None:
 
 
 def _tiling_error(network: SizedNetwork, height: int, width: int) -> tuple[int, float]:
-    """Give the number of windows, and the largest difference from one window."""
+    """Return the number of windows, and the largest difference from one window."""
     facts = network.facts
     shape = (facts.input_channels, height, width)
     planes = ArrayRows(np.random.default_rng(0).uniform(0, 3, shape).astype(np.float32))

@@ -101,7 +101,7 @@ class Captures:
 
     @property
     def sizes(self) -> tuple[str, ...]:
-        """Give the sizes that the camera has."""
+        """Return the sizes that the camera has."""
         return open_bundle(find_bundle(str(self._bundle))).manifest.sizes
 
     def peak_mb(self, words: list[str], *, files: int) -> float:
@@ -154,7 +154,7 @@ class PssWatch:
 
 
 def _tree(pid: int) -> Iterator[int]:
-    """Give a process and its descendants."""
+    """Return a process and its descendants."""
     yield pid
     try:
         tasks = list(Path(f"/proc/{pid}/task").iterdir())

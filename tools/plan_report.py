@@ -116,7 +116,7 @@ def _calibrate(options: argparse.Namespace) -> int:
 
 
 def _scenes(options: argparse.Namespace) -> Iterator[tuple[str, FloatArray]]:
-    """Give names and (3, h, w) scenes with even sides, pictures spread over the folder."""
+    """Return names and (3, h, w) scenes with even sides, pictures spread over the folder."""
     if options.data is not None:
         paths = list_set(options.data)
         chosen = np.unique(np.linspace(0, len(paths) - 1, options.pictures).astype(int))
@@ -132,7 +132,7 @@ def _scenes(options: argparse.Namespace) -> Iterator[tuple[str, FloatArray]]:
 
 
 def _work(bundle: Bundle) -> tuple[TierWork, str | None]:
-    """Give what the tiers cost in this bundle, and its smallest size below the reference.
+    """Return what the tiers cost in this bundle, and its smallest size below the reference.
 
     Raises:
         ContractError: If it has not one network.

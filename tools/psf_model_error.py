@@ -37,7 +37,7 @@ def main() -> None:
 
 
 def rows(lens: Lens) -> list[tuple[float, float, float]]:
-    """Give (RMS over Airy radius, pitch, MTF difference) of every field and pitch."""
+    """Return (RMS over Airy radius, pitch, MTF difference) of every field and pitch."""
     slopes = torch.tan(torch.deg2rad(torch.tensor(FIELDS_DEG, dtype=torch.float64)))
     wave = torch.tensor([lens.reference_wavelength_um], dtype=torch.float64)
     heights = chief_landings(lens, slopes, wave, "stop")[:, 0]

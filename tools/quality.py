@@ -100,7 +100,7 @@ def parse_arguments() -> argparse.Namespace:
 
 
 def photographer(arguments: argparse.Namespace, bundle: Bundle) -> Callable[[Shot], Photograph]:
-    """Give the function that photographs a shot; PSFs stay in memory."""
+    """Return the function that photographs a shot; PSFs stay in memory."""
     lens = lenses(arguments, bundle)
 
     def take(shot: Shot) -> Photograph:
@@ -114,7 +114,7 @@ def photographer(arguments: argparse.Namespace, bundle: Bundle) -> Callable[[Sho
 
 
 def lenses(arguments: argparse.Namespace, bundle: Bundle) -> Callable[[int], FrozenOptics]:
-    """Give the function that traces the copy of a seed, once for all threads."""
+    """Return the function that traces the copy of a seed, once for all threads."""
     tracing = threading.Lock()
 
     @lru_cache(maxsize=len(FABRICATION_SEEDS))
@@ -237,7 +237,7 @@ def compare(arguments: argparse.Namespace, bundle: Bundle) -> None:
 def errors_of_copies(
     arguments: argparse.Namespace, bundle: Bundle, measurements: Sequence[Measurement]
 ) -> dict[str, float]:
-    """Give seed -> how far the transfer of the copy lies off the frozen one, of those measured."""
+    """Return seed -> how far the copy's transfer lies off the frozen one, of those measured."""
     sensor = color_sensor(bundle)
     seeds = sorted({m.seed for m in measurements if m.seed is not None})
     lens = lenses(arguments, bundle)
@@ -263,19 +263,19 @@ def measure_missing(
 
 
 def chosen_methods(arguments: argparse.Namespace, bundle: Bundle) -> list[str]:
-    """Give the methods asked for, or the usual ones and every size that the bundle holds."""
+    """Return the methods asked for, or the usual ones and every size that the bundle holds."""
     if arguments.methods:
         return str(arguments.methods).split(",")
     return [*DEFAULT_METHODS, *(size for size in SIZES if size in bundle.manifest.sizes)]
 
 
 def isos_of(arguments: argparse.Namespace) -> list[float]:
-    """Give the sensitivities that were asked for."""
+    """Return the sensitivities that were asked for."""
     return [float(iso) for iso in arguments.isos.split(",")]
 
 
 def list_shots(arguments: argparse.Namespace) -> list[Shot]:
-    """Give all captures, those of the first picture of every set first: a part is a fair part."""
+    """Return all captures, those of the first picture of every set first: a part is a fair part."""
     sources: Sequence[Any] = ("fresh", "bundle") if arguments.psf == "both" else (arguments.psf,)
     shots = [
         Shot(

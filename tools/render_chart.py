@@ -58,7 +58,7 @@ class Choice:
     oversample: int = 1
 
     def grid(self) -> MapGrid:
-        """Give the grid to trace."""
+        """Return the grid to trace."""
         return MapGrid(
             depths_mm=np.array(self.depths_mm),
             field_heights_mm=np.linspace(0, WIDEST_MM, self.fields),
@@ -77,7 +77,7 @@ MAPS: Final = (
 
 
 def windows(side_px: int) -> list[Window]:
-    """Give windows along a diagonal of the sensor."""
+    """Return windows along a diagonal of the sensor."""
     share = np.array([0.6, 0.8])
     square = centred_window(side_px, side_px, PITCH_UM)
     return [
@@ -86,7 +86,7 @@ def windows(side_px: int) -> list[Window]:
 
 
 def textures(some: list[Window], depth_mm: float) -> list[Texture]:
-    """Give a scene for each window, one sample to 1.5 pixels of the sensor."""
+    """Return a scene for each window, one sample to 1.5 pixels of the sensor."""
     scale = -1 / paraxial_image(FOCUSED).magnification * depth_mm / FOCUS_MM
     found = []
     for seed, window in enumerate(some):
@@ -171,7 +171,7 @@ def measured(work: Callable[[], tuple[Tensor, float]]) -> tuple[Tensor, dict[str
 
 
 def rms(difference: Tensor) -> float:
-    """Give the root of the mean square."""
+    """Return the root of the mean square."""
     return float(difference.square().mean().sqrt())
 
 
@@ -183,7 +183,7 @@ class Reference:
     noise: float
 
     def error(self, picture: Tensor) -> float:
-        """Give the RMS error; the noise of the reference, which is independent, is taken off."""
+        """Return the RMS error; the noise of the reference, which is independent, is taken off."""
         return math.sqrt(max(0.0, rms(picture - self.picture) ** 2 - self.noise**2))
 
 

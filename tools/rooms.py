@@ -59,7 +59,7 @@ def main() -> int:
 
 
 def modules(root: Path) -> Iterator[Path]:
-    """Give the production modules of a checkout, links not followed."""
+    """Return the production modules of a checkout, links not followed."""
     for home in HOMES:
         for path in sorted((root / home).rglob("*.py")):
             inside = path.relative_to(root).parents
@@ -68,7 +68,7 @@ def modules(root: Path) -> Iterator[Path]:
 
 
 def code_of(path: Path) -> str:
-    """Give the code of a module without comments, docstrings and blank lines."""
+    """Return the code of a module without comments, docstrings and blank lines."""
     text = path.read_text(encoding="utf-8")
     spoken = {line for start, end in _docstrings(text) for line in range(start, end + 1)}
     kept: dict[int, list[str]] = {}
@@ -81,7 +81,7 @@ def code_of(path: Path) -> str:
 
 
 def _docstrings(text: str) -> Iterator[tuple[int, int]]:
-    """Give first and last line of every string that stands alone."""
+    """Return first and last line of every string that stands alone."""
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
             yield node.lineno, node.end_lineno or node.lineno

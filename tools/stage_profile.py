@@ -224,7 +224,7 @@ def _written(work: Reconstruction, format_: str) -> dict[str, float]:
 
 
 def _cpu_s() -> float:
-    """Give the processor time of this process and of the children that have ended."""
+    """Return the processor time of this process and of the children that have ended."""
     spent = os.times()
     return spent.user + spent.system + spent.children_user + spent.children_system
 
@@ -264,7 +264,7 @@ def _profile_network(arguments: argparse.Namespace, bundle: Bundle, role: str) -
 def _node_seconds(
     data: bytes, facts: NetworkFacts, threads: int
 ) -> tuple[dict[str, float], dict[str, str]]:
-    """Give the seconds of every node on a square window, the median, and its operator."""
+    """Return the seconds of every node on a square window, the median, and its operator."""
     import onnxruntime as ort
 
     options = ort.SessionOptions()
@@ -291,7 +291,7 @@ def _node_seconds(
 
 
 def _keys(name: str) -> tuple[str, ...]:
-    """Give names under which an optimised node may stand in the graph as exported."""
+    """Return names under which an optimised node may stand in the graph as exported."""
     plain = name.removesuffix("_nchwc").removesuffix("_token")
     return name, plain
 

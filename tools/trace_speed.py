@@ -30,7 +30,7 @@ Run = Callable[[], object]
 
 
 def cooke(*, aspheric: bool) -> SurfaceTensors:
-    """Give the Cooke triplet of the published comparison, float32."""
+    """Return the Cooke triplet of the published comparison, float32."""
     terms = [[0.0, R4] if aspheric else []] * 6
     return SurfaceTensors(
         curvature_per_mm=torch.tensor([1 / r for r in RADII_MM]),
@@ -44,7 +44,7 @@ def cooke(*, aspheric: bool) -> SurfaceTensors:
 
 
 def pupil(rays: int) -> tuple[torch.Tensor, torch.Tensor, float]:
-    """Give points of the paraxial pupil in the first vertex plane, and the field's slope."""
+    """Return points of the paraxial pupil in the first vertex plane, and the field's slope."""
     number = torch.arange(rays, dtype=torch.float64)
     radius = PUPIL_RADIUS_MM * torch.sqrt((number + 0.5) / rays)
     angle = number * math.pi * (3 - math.sqrt(5))
@@ -54,7 +54,7 @@ def pupil(rays: int) -> tuple[torch.Tensor, torch.Tensor, float]:
 
 
 def camkit_runs(rays: int, *, aspheric: bool, compiled: bool) -> tuple[Run, Run]:
-    """Give our forward run and forward with backward."""
+    """Return our forward run and forward with backward."""
     lens = cooke(aspheric=aspheric)
     x, y, slope = pupil(rays)
     n = torch.full_like(x, 1 / math.sqrt(1 + slope**2))
@@ -77,7 +77,7 @@ def camkit_runs(rays: int, *, aspheric: bool, compiled: bool) -> tuple[Run, Run]
 
 
 def optiland_runs(rays: int, *, aspheric: bool, backend: str) -> tuple[Run, Run | None]:
-    """Give optiland's runs (its numpy backend has no gradient)."""
+    """Return optiland's runs (its numpy backend has no gradient)."""
     import numpy as np
     import optiland.backend as be
     from optiland.materials import IdealMaterial
@@ -136,7 +136,7 @@ def optiland_runs(rays: int, *, aspheric: bool, backend: str) -> tuple[Run, Run 
 
 
 def contenders(args: argparse.Namespace, *, aspheric: bool) -> dict[str, tuple[Run, Run | None]]:
-    """Give what is to be measured."""
+    """Return what is to be measured."""
     found: dict[str, tuple[Run, Run | None]] = {
         "camkit": camkit_runs(args.rays, aspheric=aspheric, compiled=False)
     }
@@ -150,7 +150,7 @@ def contenders(args: argparse.Namespace, *, aspheric: bool) -> dict[str, tuple[R
 
 
 def measure(runs: dict[str, Run], rounds: int, rays: int) -> dict[str, float]:
-    """Give the median speed of each in M ray-surfaces per CPU-second, rounds interleaved."""
+    """Return the median speed of each in M ray-surfaces per CPU-second, rounds interleaved."""
     seconds: dict[str, list[float]] = {name: [] for name in runs}
     for turn in range(rounds + 1):
         for name, run in runs.items():

@@ -21,7 +21,7 @@ CAPTURE: Final = "capture"
 
 
 def capture_plane(sensor: Sensor) -> Plane:
-    """Give the plane that a sensor gives: digital numbers, or photons."""
+    """Return the plane that a sensor gives: digital numbers, or photons."""
     if isinstance(sensor, SpadSensor):
         axes: Axes = "t y x" if sensor.time_bins else "y x"
         return Plane(axes=axes, type="uint32", channels=sensor.captured, domain="counts")

@@ -55,24 +55,24 @@ class FrozenOptics:
 
     @property
     def member_name(self) -> str:
-        """Give the name of their member."""
+        """Return the name of their member."""
         return PSF if self.streaks is None else STREAKS
 
     @property
     def member(self) -> tuple[str, bytes]:
-        """Give the name and the bytes of their member."""
+        """Return the name and the bytes of their member."""
         if self.streaks is not None:
             return self.member_name, streaks_to_bytes(self.streaks)
         return self.member_name, psf_to_bytes(self.psf)
 
     @property
     def members(self) -> dict[str, bytes]:
-        """Give the bytes of every member by name: that of the kernels, and the haze."""
+        """Return the bytes of every member by name: that of the kernels, and the haze."""
         added = {} if self.haze is None else {HAZE: haze_to_bytes(self.haze)}
         return dict([self.member]) | added
 
     def entry(self, object_distance_mm: float) -> FrozenPsfOptics | HazyPsfOptics | StreakEntry:
-        """Give what the manifest says of them; the distance may be inf."""
+        """Return what the manifest says of them; the distance may be inf."""
         pitch_um = self.psf.pixel_pitch_um
         focus_mm = None if np.isinf(object_distance_mm) else object_distance_mm
         if self.streaks is not None:
@@ -118,7 +118,7 @@ def read_optics_file(path: Path, *, channels: int) -> FrozenOptics:
 
 
 def psf_of_streaks(streaks: StreakOptics, channels: int, *, bare: bool = False) -> FrozenPsf:
-    """Give the dense kernels of streak optics, each of sum 1.
+    """Return the dense kernels of streak optics, each of sum 1.
 
     Args:
         streaks: Core, arms and haze.

@@ -75,7 +75,7 @@ class GoldenArrays:
                 )
 
     def output(self, product: str, size: str) -> FloatArray | None:
-        """Give what the pipeline makes of the capture, None if it is not stored."""
+        """Return what the pipeline makes of the capture, None if it is not stored."""
         return self.outputs.get(product, {}).get(size)
 
 
@@ -98,7 +98,7 @@ def golden_to_bytes(cases: Mapping[str, GoldenArrays]) -> bytes:
 
 
 def _halved(picture: FloatArray) -> NDArray[Any]:
-    """Give a picture in half precision, unless it leaves its range."""
+    """Return a picture in half precision, unless it leaves its range."""
     return picture if np.abs(picture).max() > _HALF_MAX else picture.astype(np.float16)
 
 

@@ -194,17 +194,17 @@ class Manifest(Entry):
 
     @property
     def parts(self) -> Parts:
-        """Give what stages look at to say what they give."""
+        """Return what stages look at to say what they give."""
         return Parts(sensor=self.sensor, optics=self.optics, networks=self.networks)
 
     @property
     def has_kernels(self) -> bool:
-        """Tell whether the optics blur by kernels that are known: only then is there a twin."""
+        """Return whether the optics blur by kernels that are known: only then is there a twin."""
         return self.optics is not None and self.optics.type != "lens_profile"
 
     @property
     def has_haze(self) -> bool:
-        """Tell whether a haze lies beside these kernels."""
+        """Return whether a haze lies beside these kernels."""
         return self.optics is not None and self.optics.type == "hazy_psf"
 
     @property
@@ -220,20 +220,20 @@ class Manifest(Entry):
 
     @property
     def is_trained(self) -> bool:
-        """Tell whether what its networks make is a picture to be judged."""
+        """Return whether what its networks make is a picture to be judged."""
         return self.training_data != NOT_TRAINED
 
     @property
     def all_planes(self) -> dict[str, Plane]:
-        """Give every plane by name, that of the sensor first."""
+        """Return every plane by name, that of the sensor first."""
         return {CAPTURE: capture_plane(self.sensor), **self.planes}
 
     def stage(self, kind: type[_S]) -> _S | None:
-        """Give the first stage of one type, or None if this camera does without it."""
+        """Return the first stage of one type, or None if this camera does without it."""
         return next(iter(self.stages_of(kind)), None)
 
     def stages_of(self, kind: type[_S]) -> tuple[_S, ...]:
-        """Give all stages of one type, in order."""
+        """Return all stages of one type, in order."""
         return tuple(stage for stage in self.stages if isinstance(stage, kind))
 
     @property
@@ -246,7 +246,7 @@ class Manifest(Entry):
         return tuple(sorted(common, key=self.mac_per_pixel))
 
     def mac_per_pixel(self, size: str) -> float:
-        """Give the multiplications per pixel of the networks of one size, all roles together."""
+        """Return the multiplications per pixel of the networks of one size, all roles together."""
         return sum(sizes[size].mac_per_pixel for sizes in self.networks.values() if size in sizes)
 
 
@@ -261,7 +261,7 @@ def bounds_light(stages: Iterable[Stage]) -> bool:
 
 
 def planes_of(stages: tuple[Stage, ...], parts: Parts) -> dict[str, Plane]:
-    """Give the planes to state in a manifest.
+    """Return the planes to state in a manifest.
 
     Raises:
         BundleError: If the stages do not join.
@@ -275,7 +275,7 @@ def planes_of(stages: tuple[Stage, ...], parts: Parts) -> dict[str, Plane]:
 def manifest_without_networks(
     stages: tuple[Stage, ...], sensor: Sensor, optics: Optics | None, **facts: Any
 ) -> Manifest:
-    """Give the manifest of a camera of physics alone; its only product is what comes last.
+    """Return the manifest of a camera of physics alone; its only product is what comes last.
 
     Args:
         stages: In order, none of them a network.
@@ -306,7 +306,7 @@ class _Head(Entry, extra="ignore"):
 
 
 def format_of(psf: FrozenPsf, *, hazy: bool = False, bounded: bool = False) -> str:
-    """Give the format of a bundle with such a PSF: what came later needs a newer one.
+    """Return the format of a bundle with such a PSF: what came later needs a newer one.
 
     Args:
         psf: Of its optics.
@@ -397,5 +397,5 @@ def manifest_to_bytes(manifest: Manifest) -> bytes:
 
 
 def manifest_schema() -> dict[str, Any]:
-    """Give the JSON schema of format 2.0, as `camkit info --schema` prints it."""
+    """Return the JSON schema of format 2.0, as `camkit info --schema` prints it."""
     return Manifest.model_json_schema()

@@ -107,7 +107,7 @@ class RadialEntry(Entry):
         return self
 
     def to_distortion(self) -> RadialDistortion:
-        """Give it as arrays."""
+        """Return it as arrays."""
         even = self.even_coefficients
         return RadialDistortion(
             coefficients=np.array(self.coefficients, dtype=np.float64),
@@ -136,7 +136,7 @@ class IlluminationEntry(Entry):
         return self
 
     def to_illumination(self) -> RadialIllumination:
-        """Give it as arrays."""
+        """Return it as arrays."""
         return RadialIllumination(
             heights_mm=np.array(self.heights_mm, dtype=np.float64),
             light=np.array(self.relative_illumination, dtype=np.float64),
@@ -159,7 +159,7 @@ class LensProfile(Entry):
 
 
 def _type_of(value: Any) -> Any:
-    """Give the type of optics; those that state none are kernels, as before there were others."""
+    """Return the type of optics; those that state none are kernels, as before there were others."""
     if isinstance(value, Mapping):
         return value.get("type", "frozen_psf")
     return getattr(value, "type", None)

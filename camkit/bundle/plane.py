@@ -31,7 +31,7 @@ class Grid(Entry):
     warped: bool = True
 
     def finer(self, scale: int) -> "Grid":
-        """Give the grid with `scale` samples where this one has one, about the same centres."""
+        """Return the grid with `scale` samples where this one has one, about the same centres."""
         fine = self.pitch_ratio / scale
         shift = (fine - self.pitch_ratio) / 2
         x, y = self.origin_px
@@ -67,7 +67,7 @@ class Plane(Entry):
         return f"({channels}) {self.domain} {self.type} over {self.axes}, {grid}"
 
     def stands_for(self, other: "Plane") -> bool:
-        """Tell whether this plane may be given where `other` was asked for: only samples differ."""
+        """Return whether this plane may stand in for `other`: only samples differ."""
         return (
             self.axes == other.axes
             and self.type == other.type

@@ -144,7 +144,7 @@ def psf_from_bytes(data: bytes, *, what: str = "psf.safetensors") -> FrozenPsf:
 
 
 def _read_symmetry(tensors: Mapping[str, NDArray[Any]], what: str) -> Symmetry:
-    """Give the symmetry that a file names; radial where it names none."""
+    """Return the symmetry that a file names; radial where it names none."""
     stated = tensors.get(_SYMMETRY)
     if stated is None:
         return "radial"

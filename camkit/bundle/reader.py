@@ -176,7 +176,7 @@ class Bundle:
         return tuple(self.manifest.members)
 
     def member(self, name: str) -> bytes:
-        """Give the bytes of one member, whose hash was checked at opening.
+        """Return the bytes of one member, whose hash was checked at opening.
 
         Raises:
             BundleError: If there is no such member.
@@ -184,7 +184,7 @@ class Bundle:
         return self._container.read(name)
 
     def network_facts(self, role: str, size: str) -> NetworkFacts:
-        """Give the facts about one size of the network of a role.
+        """Return the facts about one size of the network of a role.
 
         Raises:
             BundleError: If the bundle has no such network.
@@ -198,7 +198,7 @@ class Bundle:
         )
 
     def network_bytes(self, role: str, size: str, *, fp16: bool = False) -> bytes:
-        """Give the ONNX of one size of the network of a role.
+        """Return the ONNX of one size of the network of a role.
 
         Raises:
             BundleError: If the bundle has no such network, or none in fp16.
@@ -211,7 +211,7 @@ class Bundle:
         return self.member(facts.fp16_member)
 
     def stress_psf(self) -> FrozenPsf | None:
-        """Give the kernels off the design point, None if the bundle has none.
+        """Return the kernels off the design point, None if the bundle has none.
 
         Raises:
             BundleError: If they are damaged or no PSF.
@@ -221,7 +221,7 @@ class Bundle:
         return psf_from_bytes(self.member(STRESS_PSF), what=STRESS_PSF)
 
     def stress_haze(self) -> Haze | None:
-        """Give the haze beside the kernels off the design point, None if the bundle has none.
+        """Return the haze beside the kernels off the design point, None if the bundle has none.
 
         Raises:
             BundleError: If it is damaged, no haze, or not of the samples of those kernels.
@@ -425,19 +425,19 @@ def _check_psf(
 
 
 def built_in_bundles() -> dict[str, Path]:
-    """Give the bundles that come with camkit, name -> path."""
+    """Return the bundles that come with camkit, name -> path."""
     folder = Path(str(importlib.resources.files("camkit.bundles")))
     return {path.stem: path for path in sorted(folder.glob(f"*{SUFFIX}"))}
 
 
 def is_built_in(bundle: Bundle) -> bool:
-    """Tell whether a bundle lies where those that come with camkit do."""
+    """Return whether a bundle lies where those that come with camkit do."""
     known = built_in_bundles().get(bundle.path.stem)
     return known is not None and bundle.path.resolve() == known.resolve()
 
 
 def find_bundle(name_or_path: str | Path) -> Path:
-    """Give the path of a bundle: the name of a built-in one, or a file.
+    """Return the path of a bundle: the name of a built-in one, or a file.
 
     Raises:
         BundleError: If there is neither; near names are suggested.

@@ -61,7 +61,7 @@ class ChannelResponse(Entry):
         return self
 
     def to_arrays(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Give the wavelengths (n,) in micrometres and the response (channel, n)."""
+        """Return the wavelengths (n,) in micrometres and the response (channel, n)."""
         return np.array(self.wavelengths_um), np.array(self.response)
 
 
@@ -82,7 +82,7 @@ class Extent(Entry):
 
     @property
     def axis_px(self) -> tuple[float, float]:
-        """Give (x, y) of the optical axis, that of the middle where nothing else is stated."""
+        """Return (x, y) of the optical axis, that of the middle where nothing else is stated."""
         return self.optical_centre_px or ((self.width_px - 1) / 2, (self.height_px - 1) / 2)
 
 
@@ -97,7 +97,7 @@ class PixelSensor(Entry):
 
     @property
     def known_extent(self) -> Extent:
-        """Give the extent.
+        """Return the extent.
 
         Raises:
             UnsupportedError: If pictures of any size are taken.
@@ -111,17 +111,17 @@ class PixelSensor(Entry):
 
     @property
     def width_px(self) -> int:
-        """Give the columns of the whole sensor."""
+        """Return the columns of the whole sensor."""
         return self.known_extent.width_px
 
     @property
     def height_px(self) -> int:
-        """Give the rows of the whole sensor."""
+        """Return the rows of the whole sensor."""
         return self.known_extent.height_px
 
     @property
     def pixel_pitch_um(self) -> float:
-        """Give the distance of neighbouring pixels."""
+        """Return the distance of neighbouring pixels."""
         return self.known_extent.pixel_pitch_um
 
 
@@ -154,7 +154,7 @@ class LightSensor(PixelSensor):
         return self
 
     def response_arrays(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Give the wavelengths (n,) in micrometres and the response (channel, n).
+        """Return the wavelengths (n,) in micrometres and the response (channel, n).
 
         Raises:
             UnsupportedError: If the response is not known.
@@ -164,7 +164,7 @@ class LightSensor(PixelSensor):
         return self.channel_response.to_arrays()
 
     def one_noise_at(self, iso: float) -> tuple[float, float]:
-        """Give shot noise and read variance of the linear signal (1.0 = white level) at one ISO.
+        """Return shot noise and read variance of the linear signal (1.0 = white level) at one ISO.
 
         Between the stated ISOs, gain and read noise are interpolated over log ISO (the gain as
         its logarithm). Above them the gain goes on as 1/ISO and the read noise in electrons
@@ -242,7 +242,7 @@ class BayerSensor(LightSensor):
         return ("raw_bayer_v1", "linear_rgb_v1")
 
     def noise_at(self, iso: float) -> NoiseModel:
-        """Give the noise of the linear signal at one ISO, the same for the three colours.
+        """Return the noise of the linear signal at one ISO, the same for the three colours.
 
         Raises:
             ContractError: If the ISO is not a positive number.
@@ -282,7 +282,7 @@ class PlanesSensor(LightSensor):
 
     @property
     def cfa(self) -> None:
-        """Give the mosaic: none."""
+        """Return the mosaic: none."""
         return
 
     @property
@@ -296,7 +296,7 @@ class PlanesSensor(LightSensor):
         return ("linear_rgb_v1" if len(self.channels) == len(RGB) else "linear_planes_v1",)
 
     def noise_at(self, iso: float) -> NoiseModel:
-        """Give the noise of the linear signal at one ISO, the same for all channels.
+        """Return the noise of the linear signal at one ISO, the same for all channels.
 
         Raises:
             ContractError: If the ISO is not a positive number.
@@ -363,7 +363,7 @@ _EXTENT: Final = ("width_px", "height_px", "pixel_pitch_um", "optical_centre_px"
 
 
 def nested_sensor(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Give a sensor of a flat table, as recipes and manifests of format 1.0 hold it.
+    """Return a sensor of a flat table, as recipes and manifests of format 1.0 hold it.
 
     Its size stands beside the rest, and a `cfa` (or none) tells what it is unless it has a type.
 

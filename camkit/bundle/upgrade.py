@@ -72,7 +72,7 @@ class _Old(Entry):
 
 
 def upgrade(data: bytes) -> bytes:
-    """Give the manifest of format 2.0 that says the same as one of 1.0.
+    """Return the manifest of format 2.0 that says the same as one of 1.0.
 
     Args:
         data: JSON of format 1.0.
@@ -139,7 +139,7 @@ def _sensor(old: _Old) -> BayerSensor | PlanesSensor:
 
 
 def _stages(old: _Old, sensor: BayerSensor | PlanesSensor) -> tuple[Stage, ...]:
-    """Give the list of what format 1.0 did."""
+    """Return the list of what format 1.0 did."""
     types = [stage.get("type") for stage in old.stages]
     if unknown := [t for t in types if t not in STAGE_ORDER]:
         raise UpgradeError(f"stages: format 1.0 had no stage {unknown[0]!r}")
@@ -179,7 +179,7 @@ def _stages(old: _Old, sensor: BayerSensor | PlanesSensor) -> tuple[Stage, ...]:
 def _optics(
     old: _Old, members: Mapping[str, Any], stages: tuple[Stage, ...]
 ) -> FrozenPsfOptics | None:
-    """Give the optics: those of every bundle that held a PSF, or whose stages needed one."""
+    """Return the optics: those of every bundle that held a PSF, or whose stages needed one."""
     needs = _PSF_STAGES & {stage.type for stage in stages}
     if PSF not in members and not needs:
         return None

@@ -17,7 +17,7 @@ class ExitCode(IntEnum):
 
 
 def exit_code_of(error: Exception) -> ExitCode:
-    """Give the exit code of an error that ended the whole command."""
+    """Return the exit code of an error that ended the whole command."""
     if isinstance(error, BundleError):
         return ExitCode.BUNDLE_REFUSED
     if isinstance(error, ContractError):

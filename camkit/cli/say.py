@@ -28,7 +28,7 @@ def is_terminal() -> bool:
 
 
 def plain(text: str) -> str:
-    """Give a text with its control characters as visible escapes."""
+    """Return a text with its control characters as visible escapes."""
     return _STEERING.sub(lambda found: ascii(found[0])[1:-1], text)
 
 

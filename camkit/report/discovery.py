@@ -10,7 +10,7 @@ _T = TypeVar("_T")
 
 
 def discover(package: str, name: str, expected: type[_T]) -> tuple[_T, ...]:
-    """Give one object of every module of a package, by the modules' names.
+    """Return one object of every module of a package, by the modules' names.
 
     Args:
         package: The folder, by its import name: its modules import the type that it is searched

@@ -160,7 +160,7 @@ def _checked(
 
 
 def _direction(values: FloatGrid, there: Sites) -> tuple[FloatLine, FloatLine]:
-    """Give the unit normal (y, x) towards the bright side, and a point (y, x) of the edge.
+    """Return the unit normal (y, x) towards the bright side, and a point (y, x) of the edge.
 
     All gradients of a straight edge point along its normal, so their sum does too.
     """
@@ -239,7 +239,7 @@ def _fitted(values: FloatGrid, there: Sites, line: _Line) -> _Line:
 
 
 def _seen_reach(distance: FloatGrid, there: Sites, most_px: int) -> int:
-    """Give how far to both sides at least half as many samples are as beside the edge."""
+    """Return how far to both sides at least half as many samples are as beside the edge."""
     reach = most_px
     for side in (distance, -distance):
         counts = np.bincount(side[there & (side >= 0)].astype(np.intp), minlength=4)
@@ -254,7 +254,7 @@ def _seen_reach(distance: FloatGrid, there: Sites, most_px: int) -> int:
 
 
 def _spectrum(values: FloatGrid, bins: Bins, frequencies: FloatLine) -> tuple[FloatLine, FloatLine]:
-    """Give MTF and noise."""
+    """Return MTF and noise."""
     profile = bins.means(values)
     _check_flat(profile, bins)
     waves = edge_waves(bins, np.append(frequencies, 0.0))
@@ -279,7 +279,7 @@ def _check_flat(profile: FloatLine, bins: Bins) -> None:
 
 
 def _variance(values: FloatGrid, profile: FloatLine, bins: Bins) -> float:
-    """Give the variance of the samples away from the edge, around the profile."""
+    """Return the variance of the samples away from the edge, around the profile."""
     residual = values[bins.inside] - profile[bins.number]
     middle = (bins.counts.size - 1) / 2
     away = np.abs(bins.number - middle) > bins.counts.size / 4

@@ -46,7 +46,7 @@ class Bins:
     bins_per_px: int
 
     def means(self, picture: NDArray[Any]) -> FloatLine:
-        """Give the profile (bin,) of a picture (h, w)."""
+        """Return the profile (bin,) of a picture (h, w)."""
         values = np.asarray(picture, np.float64)[self.inside]
         return np.bincount(self.number, values, self.counts.size) / self.counts
 
@@ -95,7 +95,7 @@ def sort_samples(
 
 
 def edge_waves(bins: Bins, cycles_per_px: NDArray[Any]) -> NDArray[np.complex128]:
-    """Give the matrix (frequency, bin) that takes a profile to the spectrum of its slope.
+    """Return the matrix (frequency, bin) that takes a profile to the spectrum of its slope.
 
     It moves every mean from where its samples lie to the middle of its bin, takes differences of
     neighbours, lets them fade towards the end of the reach, and transforms them. What means and
@@ -111,7 +111,7 @@ def edge_waves(bins: Bins, cycles_per_px: NDArray[Any]) -> NDArray[np.complex128
 
 
 def _to_middles(bins: Bins) -> FloatLine:
-    """Give the matrix (bin, bin) that moves means along the line through their neighbours."""
+    """Return the matrix (bin, bin) that moves means along the line through their neighbours."""
     count = bins.counts.size
     middles = (np.arange(count) - (count - 1) / 2) / bins.bins_per_px
     before, after = np.arange(count)[:-2], np.arange(count)[2:]

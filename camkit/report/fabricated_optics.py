@@ -82,7 +82,7 @@ def _max_side_px(psf: FrozenPsf) -> int:
 
 
 def lens_text(bundle: Bundle, prescription: Path | None) -> str:
-    """Give the prescription as TOML: the file's, or else the bundle's own.
+    """Return the prescription as TOML: the file's, or else the bundle's own.
 
     Raises:
         ContractError: If there is neither.

@@ -24,7 +24,7 @@ _WAVE_COLORS: Final = (
 
 
 def wave_color(wavelength_um: float) -> str:
-    """Give a colour that tells wavelengths apart: about that of the light, but darker."""
+    """Return a colour that tells wavelengths apart: about that of the light, but darker."""
     at = [place for place, _ in _WAVE_COLORS]
     channels = zip(*(color for _, color in _WAVE_COLORS), strict=True)
     mixed = (round(float(np.interp(wavelength_um, at, channel))) for channel in channels)
@@ -32,17 +32,17 @@ def wave_color(wavelength_um: float) -> str:
 
 
 def field_color(number: int) -> str:
-    """Give the colour of a field."""
+    """Return the colour of a field."""
     return FIELD_COLORS[number % len(FIELD_COLORS)]
 
 
 def channel_color(name: str, number: int) -> str:
-    """Give the colour of a channel of the sensor; of another, that of a field of that number."""
+    """Return the colour of a channel of the sensor; of another, that of a field of that number."""
     return CHANNEL_COLORS.get(name, field_color(number))
 
 
 def new_figure(width_in: float, height_in: float) -> "Figure":
-    """Give an empty figure that belongs to no window."""
+    """Return an empty figure that belongs to no window."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -52,7 +52,7 @@ def new_figure(width_in: float, height_in: float) -> "Figure":
 
 
 def to_svg(figure: "Figure") -> str:
-    """Give the SVG text of a figure; its text stays text."""
+    """Return the SVG text of a figure; its text stays text."""
     from matplotlib import rc_context
 
     stream = io.StringIO()
@@ -62,7 +62,7 @@ def to_svg(figure: "Figure") -> str:
 
 
 def to_png(figure: "Figure") -> bytes:
-    """Give the PNG of a figure."""
+    """Return the PNG of a figure."""
     stream = io.BytesIO()
     figure.savefig(stream, format="png", metadata={"Software": None})
     return stream.getvalue()

@@ -68,7 +68,7 @@ class Reference:
             )
 
     def within(self, inside: tuple[slice, ...]) -> "Reference":
-        """Give a part of it."""
+        """Return a part of it."""
         return Reference(
             truth=self.truth[inside],
             clipped=None if self.clipped is None else self.clipped[inside],
@@ -78,7 +78,7 @@ class Reference:
 
 
 def hdr_scores(result: FloatArray, reference: Reference) -> dict[str, float]:
-    """Give every number of a result.
+    """Return every number of a result.
 
     Args:
         result: (3, h, w) float32 linear.
@@ -98,7 +98,7 @@ def hdr_scores(result: FloatArray, reference: Reference) -> dict[str, float]:
 
 
 def guess_scores(reference: Reference) -> dict[str, float]:
-    """Give `stops_rmse_guess`, also aligned: the stops of `blob_guess`, where it can be made."""
+    """Return `stops_rmse_guess`, also aligned: the stops of `blob_guess`, where it can be made."""
     if reference.clipped is None or reference.bare is None:
         return {}
     truth = reference.truth
@@ -125,13 +125,13 @@ def check_picture(name: str, picture: FloatArray, shape: tuple[int, ...]) -> Non
 
 
 def psnr_db(mean_square: float, peak: float = 1.0) -> float:
-    """Give a PSNR in dB, at most `BEST_DB`, of a mean squared error."""
+    """Return a PSNR in dB, at most `BEST_DB`, of a mean squared error."""
     least = peak**2 * 10 ** (-BEST_DB / 10)
     return float(10 * np.log10(peak**2 / max(mean_square, least)))
 
 
 def stops_rmse(result: FloatArray, truth: FloatArray) -> float | None:
-    """Give the RMS of log2(result / truth) over samples whose truth exceeds white; None for none.
+    """Return the RMS of log2(result / truth) over samples whose truth exceeds white; None for none.
 
     What is darker than `DARKEST` counts as that.
     """
@@ -153,12 +153,12 @@ def mu_law(linear: FloatArray) -> NDArray[np.float64]:
 
 
 def exposed(linear: FloatArray, down_ev: float) -> FloatArray:
-    """Give sRGB values of a picture exposed by so many stops less, clipped at white."""
+    """Return sRGB values of a picture exposed by so many stops less, clipped at white."""
     return encode_srgb(linear * np.float32(2.0**-down_ev))
 
 
 def aligned(result: FloatArray, truth: FloatArray) -> FloatArray:
-    """Give the result times the scale that fits it best to the truth in log space.
+    """Return the result times the scale that fits it best to the truth in log space.
 
     Least absolute deviations of log(scale x result / truth) over the samples in which both exceed
     `ALIGN_FLOOR`: the scale is the median of truth / result; 1 where there are none. Least squares

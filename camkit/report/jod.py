@@ -30,7 +30,7 @@ DISPLAY: Final = (
 
 
 def jod(result: FloatArray, truth: FloatArray, nits_per_unit: float) -> float:
-    """Give the quality of a picture in just-objectionable differences; 10 is perfect.
+    """Return the quality of a picture in just-objectionable differences; 10 is perfect.
 
     Args:
         result: (3, h, w) linear Rec.709.
@@ -51,7 +51,7 @@ def jod(result: FloatArray, truth: FloatArray, nits_per_unit: float) -> float:
 
 @cache
 def obstacle() -> str | None:
-    """Say why there is no JOD here; None if there is."""
+    """Return why there is no JOD here; None if there is."""
     try:
         _package()
     except UnsupportedError as error:

@@ -10,7 +10,7 @@ _T = TypeVar("_T")
 
 
 def find_part(kind: str, tool: str, expected: type[_T]) -> _T:
-    """Give what one tool asks of a kind: a field of the `ReportPart` called PART of its module.
+    """Return what one tool asks of a kind: a field of the `ReportPart` called PART of its module.
 
     Args:
         kind: Name of the kind.
@@ -48,5 +48,5 @@ def check_photographs(manifest: Manifest, instead: str) -> None:
 
 
 def camera_of(manifest: Manifest) -> tuple[object, ...]:
-    """Give what two bundles of one camera have in common."""
+    """Return what two bundles of one camera have in common."""
     return manifest.kind, manifest.sensor

@@ -107,7 +107,7 @@ def find_limb(truth: FloatArray) -> Limb:
 
 
 def crossings(profiles: Grid, away: Grid, half: float) -> Grid:
-    """Give where profiles (n, r) fall through a level, nearest to 0; NaN where they do not."""
+    """Return where profiles (n, r) fall through a level, nearest to 0; NaN where they do not."""
     above = profiles >= half
     falls = above[:, :-1] & ~above[:, 1:]
     at = np.argmin(np.where(falls, np.abs(away[:-1]), np.inf), axis=1)
@@ -118,7 +118,7 @@ def crossings(profiles: Grid, away: Grid, half: float) -> Grid:
 
 
 def wobble(moved: Grid, radius_px: float) -> float:
-    """Give the standard deviation of displacements in waves of at most `LONGEST_PX`.
+    """Return the standard deviation of displacements in waves of at most `LONGEST_PX`.
 
     Args:
         moved: (n,) at equal steps around a circle; where one is NaN, its neighbours count.
@@ -134,12 +134,12 @@ def wobble(moved: Grid, radius_px: float) -> float:
 
 
 def largest_rise(profiles: Grid) -> Grid:
-    """Give how far profiles (..., r) rise at most, from any place to any later one; >= 0."""
+    """Return how far profiles (..., r) rise at most, from any place to any later one; >= 0."""
     return np.asarray((profiles - np.minimum.accumulate(profiles, axis=-1)).max(axis=-1))
 
 
 def _profiles(picture: FloatArray | Grid, limb: Limb, away: Grid) -> Grid:
-    """Give (colours, angles, radii) at distances from the limb, > 0 outside."""
+    """Return (colours, angles, radii) at distances from the limb, > 0 outside."""
     count = limb.radius_px.size
     angle = 2 * np.pi * np.arange(count)[:, None] / count
     radius = limb.radius_px[:, None] + away

@@ -49,7 +49,7 @@ def pu21(nits: ArrayLike) -> FloatGrid:
 
 
 def pu21_mean_square(result: FloatArray, truth: FloatArray, nits_per_unit: float) -> float:
-    """Give the mean squared difference of encoded luminance, where encoded white is 1.
+    """Return the mean squared difference of encoded luminance, where encoded white is 1.
 
     Args:
         result: (3, h, w) linear Rec.709.
@@ -61,7 +61,7 @@ def pu21_mean_square(result: FloatArray, truth: FloatArray, nits_per_unit: float
 
 
 def pu21_ssim(result: FloatArray, truth: FloatArray, nits_per_unit: float) -> float:
-    """Give SSIM of the luma of encoded colours; arguments as of `pu21_mean_square`.
+    """Return SSIM of the luma of encoded colours; arguments as of `pu21_mean_square`.
 
     References: Wang et al. 2004 (SSIM with Gaussian weights of sigma 1.5).
     """
@@ -83,7 +83,7 @@ def _shown(linear: FloatArray, nits_per_unit: float) -> FloatGrid:
 
 
 def _luminance(colors: FloatGrid) -> FloatGrid:
-    """Give the weighted sum (h, w) of Rec.709 colours (3, h, w)."""
+    """Return the weighted sum (h, w) of Rec.709 colours (3, h, w)."""
     return np.asarray(np.tensordot(_WEIGHTS, colors, axes=1))
 
 

@@ -64,12 +64,12 @@ class Shot:
 
     @property
     def fabrication_seed(self) -> int:
-        """Give the seed of the lens copy."""
+        """Return the seed of the lens copy."""
         return FABRICATION_SEEDS[self.number % len(FABRICATION_SEEDS)]
 
     @property
     def noise_seed(self) -> int:
-        """Give the seed of the noise, the same for both PSFs and whatever else is run."""
+        """Return the seed of the noise, the same for both PSFs and whatever else is run."""
         text = f"{self.set_name}/{self.picture.name}/{self.position}/{self.iso:g}"
         return zlib.crc32(text.encode())
 
@@ -95,7 +95,7 @@ class Exposed:
 
     @property
     def sharp(self) -> FloatArray:
-        """Give the truth of the picture."""
+        """Return the truth of the picture."""
         return self.truths[IMAGE]
 
 
@@ -108,7 +108,7 @@ class Score:
 
 
 def list_set(folder: Path, count: int | None = None) -> tuple[Path, ...]:
-    """Give the first pictures of a folder by name.
+    """Return the first pictures of a folder by name.
 
     Raises:
         ContractError: If there is none.
@@ -127,7 +127,7 @@ def crop_origin(
     share: float,
     quadrant: tuple[int, int],
 ) -> tuple[int, int]:
-    """Give the even (x, y) of a crop on the way from the middle of the sensor to a corner.
+    """Return the even (x, y) of a crop on the way from the middle of the sensor to a corner.
 
     Args:
         size_px: (width, height) of the crop.
@@ -221,14 +221,14 @@ def judge(restored: FloatArray, sharp: FloatArray) -> Score:
 
 
 def inner_srgb(restored: FloatArray, sharp: FloatArray) -> tuple[FloatGrid, FloatGrid]:
-    """Give truth and restoration as (h, w, 3) sRGB values without the border."""
+    """Return truth and restoration as (h, w, 3) sRGB values without the border."""
     inside = np.s_[:, BORDER_PX:-BORDER_PX, BORDER_PX:-BORDER_PX]
     truth = sharp[inside].transpose(1, 2, 0).astype(np.float64)
     return truth, encode_srgb(restored[inside]).transpose(1, 2, 0).astype(np.float64)
 
 
 def psnr(truth: FloatGrid, got: FloatGrid) -> float:
-    """Give the PSNR in dB of values up to 1."""
+    """Return the PSNR in dB of values up to 1."""
     # equal pictures would be infinitely good, which no mean survives
     if (truth == got).all():
         return 120.0

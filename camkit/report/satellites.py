@@ -70,7 +70,7 @@ def satellites(picture: FloatArray, truth: FloatArray) -> Satellites:
 
 
 def find_stars(truth: FloatArray) -> Grid:
-    """Give (n, 2) (y, x), the middles of stars with sky all around them."""
+    """Return (n, 2) (y, x), the middles of stars with sky all around them."""
     plane = truth.sum(axis=0, dtype=np.float64)
     plane -= np.median(plane)
     reach = int(CORE_PX) + 1
@@ -87,7 +87,7 @@ def find_stars(truth: FloatArray) -> Grid:
 
 
 def _around(place: Grid) -> tuple[tuple[slice, ...], Grid]:
-    """Give the window of a star, and how far its pixels are from it."""
+    """Return the window of a star, and how far its pixels are from it."""
     reach = int(RING_PX) + 1
     top, left = (round(float(v)) - reach for v in place)
     side = 2 * reach + 1
@@ -102,7 +102,7 @@ def _above_sky(window: FloatArray, ring: NDArray[np.bool_]) -> Grid:
 
 
 def _noise(picture: FloatArray, stars: Grid) -> float:
-    """Give what noise alone adds above the sky in a pixel, all colours added up."""
+    """Return what noise alone adds above the sky in a pixel, all colours added up."""
     height, width = picture.shape[1:]
     far = np.ones((height, width), dtype=bool)
     edge = int(RING_PX)

@@ -7,5 +7,5 @@ from camkit.runtime.job.choices import known_options
 
 
 def in_sensor_geometry(manifest: Manifest) -> dict[str, Any]:
-    """Give the options by which a bundle's pictures stay in the geometry of its sensor."""
+    """Return the options by which a bundle's pictures stay in the geometry of its sensor."""
     return {"undistort": False} if "undistort" in known_options(manifest.stages) else {}

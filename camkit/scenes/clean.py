@@ -174,5 +174,5 @@ def _log_uniform(rng: Generator, limits: tuple[float, float]) -> float:
 
 
 def _colour(rng: Generator, level: float) -> Plane:
-    """Give a colour (3, 1, 1) near grey."""
+    """Return a colour (3, 1, 1) near grey."""
     return np.asarray(level * np.exp(rng.normal(0, TINT, (3, 1, 1))))

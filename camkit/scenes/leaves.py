@@ -69,7 +69,7 @@ def _leaf_radii(rng: Generator, height: int, width: int, least_px: float) -> NDA
 def box_around(
     scene: FloatArray, cy: float, cx: float, radius: float
 ) -> tuple[FloatArray, FloatArray, FloatArray] | None:
-    """Give the view of a scene around a centre and the offsets (dy, dx) of its pixels.
+    """Return the view of a scene around a centre and the offsets (dy, dx) of its pixels.
 
     Args:
         scene: (3, h, w).
@@ -93,7 +93,7 @@ def box_around(
 def _leaf_mask(
     kind: int, radius: float, angle: float, dy: FloatArray, dx: FloatArray
 ) -> FloatArray:
-    """Give the coverage (0..1, anti-aliased over one pixel) of a disc, ellipse or rectangle."""
+    """Return the coverage (0..1, anti-aliased over one pixel) of a disc, ellipse or rectangle."""
     if kind == 0:
         return np.asarray(np.clip(np.float32(radius) - np.hypot(dy, dx) + 0.5, 0, 1))
     c, s = np.float32(np.cos(angle)), np.float32(np.sin(angle))

@@ -20,14 +20,14 @@ MOST_DIGITS: Final = 18
 
 
 def is_scene_name(text: str) -> bool:
-    """Tell whether a text names a scene, rightly or not, and not a file."""
+    """Return whether a text names a scene, rightly or not, and not a file."""
     source, colon, seed = text.partition(":")
     meant = len(source) > 1 and source.isalpha() and seed.isdigit() and not Path(text).exists()
     return bool(colon) and (source in SOURCES or meant)
 
 
 def named_scene(name: str, height: int, width: int) -> FloatArray:
-    """Give the scene of a name.
+    """Return the scene of a name.
 
     Args:
         name: `SOURCE:SEED`, such as procedural:7.

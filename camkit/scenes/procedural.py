@@ -21,7 +21,7 @@ AREA_PER_LIGHT_PX: Final = 40_000
 
 
 def procedural_scene(seed: int, height: int, width: int) -> FloatArray:
-    """Give a sharp scene; the same seed and size give the same scene.
+    """Return a sharp scene; the same seed and size give the same scene.
 
     Args:
         seed: Any non-negative integer.

@@ -38,7 +38,7 @@ class Saturation:
 
 
 def fill_of(scene: FloatArray, matrix: NDArray[np.float64], gains: tuple[float, ...]) -> FloatArray:
-    """Give how full the fullest colour of every pixel is, 1.0 = it clips.
+    """Return how full the fullest colour of every pixel is, 1.0 = it clips.
 
     Args:
         scene: (3, h, w) float32 linear Rec.709.
@@ -69,7 +69,7 @@ def saturation_at(
     *,
     ceiling: float | None = None,
 ) -> Saturation:
-    """Give what of a scene an exposure saturates.
+    """Return what of a scene an exposure saturates.
 
     Args:
         exposure: Factor on the scene.
@@ -89,7 +89,7 @@ def saturating_exposure(
     *,
     ceiling: float = CEILING,
 ) -> Saturation:
-    """Give the least exposure at which a share of the pixels of a scene saturates.
+    """Return the least exposure at which a share of the pixels of a scene saturates.
 
     It is found among the values of the scene, not by trying: of n pixels, the round(n share)
     fullest exceed 1, by `HEADROOM` or half the way to the next one, and no other does.
@@ -119,7 +119,7 @@ def saturating_exposure(
 
 
 def with_exposure(scene: FloatArray, exposure: float, *, ceiling: float = CEILING) -> FloatArray:
-    """Give a scene at an exposure, which ends at a ceiling in times white."""
+    """Return a scene at an exposure, which ends at a ceiling in times white."""
     return np.asarray(np.minimum(scene * np.float32(exposure), np.float32(ceiling)))
 
 
@@ -136,7 +136,7 @@ def _saturation(
 
 
 def _threshold(fill: FloatArray, share: float) -> float:
-    """Give a value that a share of the values exceeds."""
+    """Return a value that a share of the values exceeds."""
     wanted = round(share * fill.size)
     if wanted < 1:
         raise ContractError(

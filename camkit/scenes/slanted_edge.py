@@ -61,7 +61,7 @@ def slanted_edge(
 
 
 def bright_share(distance: FloatGrid, wide: float, narrow: float) -> FloatGrid:
-    """Give the share of pixels' area beyond a line.
+    """Return the share of pixels' area beyond a line.
 
     Seen along the line a square is a trapezoid: a box as wide as one side looks, smeared by a box
     as wide as the other does.

@@ -62,7 +62,7 @@ def cut_texture(rng: Generator, texture: FloatArray, height: int, width: int) ->
 def sample_texture(
     texture: FloatArray, y: NDArray[np.float64], x: NDArray[np.float64]
 ) -> FloatArray:
-    """Give a periodic texture between its samples, without a kink at them.
+    """Return a periodic texture between its samples, without a kink at them.
 
     Args:
         texture: (side, side) float32.

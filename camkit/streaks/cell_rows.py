@@ -61,7 +61,7 @@ def rows_of_cells(
     rows: int,
     width: int,
 ) -> FloatArray:
-    """Give rows of pixels (rows, width), linear between the middles of cells, even beyond them."""
+    """Return rows of pixels (rows, width), linear between cell middles, even beyond them."""
     place = (np.arange(top, top + rows) - offset_px[0]) / pitch_px
     low = np.clip(np.floor(place).astype(int), 0, field.shape[0] - 1)
     high = np.minimum(low + 1, field.shape[0] - 1)
@@ -71,7 +71,7 @@ def rows_of_cells(
 
 
 def _columns_of_cells(lines: FloatArray, pitch_px: int, offset_px: float, width: int) -> FloatArray:
-    """Give columns of pixels: those of one phase lie between their cells alike."""
+    """Return columns of pixels: those of one phase lie between their cells alike."""
     out = np.empty((lines.shape[0], width), np.float32)
     before = max(-int(np.floor(-offset_px / pitch_px)), 0)
     last = int(np.floor((width - 1 - offset_px) / pitch_px)) + 1

@@ -47,12 +47,12 @@ class Cells:
 
     @property
     def known(self) -> FloatArray:
-        """Give the light of what did not clip, spread over its cell."""
+        """Return the light of what did not clip, spread over its cell."""
         return self.light * (1 - self.clipped)
 
 
 def sample_sites(cfa: CfaPattern | None) -> tuple[Sites, ...]:
-    """Give where each colour has its samples in a cell; everywhere in full planes."""
+    """Return where each colour has its samples in a cell; everywhere in full planes."""
     every = tuple((y, x) for y in (0, 1) for x in (0, 1))
     if cfa is None:
         return (every,) * COLOURS
@@ -61,7 +61,7 @@ def sample_sites(cfa: CfaPattern | None) -> tuple[Sites, ...]:
 
 
 def cells_of(samples: FloatArray, clipped: NDArray[np.bool_], sites: Sequence[Sites]) -> Cells:
-    """Give the cells of 2 x 2 pixels of a capture; a last odd row or column is left out.
+    """Return the cells of 2 x 2 pixels of a capture; a last odd row or column is left out.
 
     Args:
         samples: (1, h, w) mosaic or (3, h, w) planes, linear, float32, every colour clips at 1.
@@ -102,7 +102,7 @@ def cells_of(samples: FloatArray, clipped: NDArray[np.bool_], sites: Sequence[Si
 
 
 def coarser(cells: Cells) -> Cells:
-    """Give cells of twice the pitch; a last odd row or column is left out.
+    """Return cells of twice the pitch; a last odd row or column is left out.
 
     Raises:
         ContractError: If a side is shorter than such a cell.
@@ -126,7 +126,7 @@ def coarser(cells: Cells) -> Cells:
 
 
 def cell_kernel(kernel: FloatArray, sites: Sites) -> FloatArray:
-    """Give what the samples of a colour see, per cell of 2 px, of a cell of even light.
+    """Return what the samples of a colour see, per cell of 2 px, of a cell of even light.
 
     Args:
         kernel: (n, n) in pixels, n odd.
@@ -147,13 +147,13 @@ def cell_kernel(kernel: FloatArray, sites: Sites) -> FloatArray:
 
 
 def coarser_kernel(kernel: FloatArray) -> FloatArray:
-    """Give the kernel of cells of twice the pitch."""
+    """Return the kernel of cells of twice the pitch."""
     hat = np.array([0.5, 1, 0.5])
     return _every_second(_spread(kernel, np.outer(hat, hat)))
 
 
 def _pixels(clipped: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """Give the samples of every cell of 2 x 2 as bits."""
+    """Return the samples of every cell of 2 x 2 as bits."""
     code = np.zeros((clipped.shape[0], clipped.shape[1] // 2, clipped.shape[2] // 2), np.uint8)
     for bit in range(PITCH_PX**2):
         y, x = divmod(bit, PITCH_PX)
@@ -167,7 +167,7 @@ def _middle(sites: Sites) -> tuple[float, float]:
 
 
 def _overlap(distance_px: float) -> float:
-    """Give the share of a pixel that lies in a square of 2 px, `distance_px` from its middle."""
+    """Return the share of a pixel that lies in a square of 2 px, `distance_px` from its middle."""
     return float(np.clip(1.5 - abs(distance_px), 0, 1))
 
 
@@ -190,6 +190,6 @@ def _every_second(kernel: FloatArray) -> FloatArray:
 
 
 def _among_known(light: FloatArray, clipped: FloatArray) -> FloatArray:
-    """Give the mean of what did not clip from its mean over all; 0 where all did."""
+    """Return the mean of what did not clip from its mean over all; 0 where all did."""
     known = 1 - clipped
     return np.divide(light, known, out=np.zeros_like(light), where=known > 0)

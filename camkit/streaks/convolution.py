@@ -25,16 +25,16 @@ class Spread(Protocol):
     """What becomes of the light of a window."""
 
     def spread(self, light: FloatArray) -> FloatArray:
-        """Give what light (h, w) becomes."""
+        """Return what light (h, w) becomes."""
         ...
 
     def gathered(self, image: FloatArray) -> FloatArray:
-        """Give the transpose: for every place, what its light would meet in an image (h, w)."""
+        """Return the transpose: for every place, what its light would meet in an image (h, w)."""
         ...
 
 
 def spreading(kernel: FloatArray, lit: Mask) -> Spread:
-    """Give the cheaper way to spread light that lies on some cells of a window alone.
+    """Return the cheaper way to spread light that lies on some cells of a window alone.
 
     Args:
         kernel: (n, n) float32, n odd.
@@ -80,12 +80,12 @@ class FewLights:
         return laid
 
     def _about(self, y: int, x: int) -> FloatArray:
-        """Give the kernel about a place (h, w)."""
+        """Return the kernel about a place (h, w)."""
         half, (height, width) = self._wide.shape[0] // 2, self._shape
         return self._wide[half - y : half - y + height, half - x : half - x + width]
 
     def spread(self, light: FloatArray) -> FloatArray:
-        """Give what light (h, w) becomes; counts where it may be alone."""
+        """Return what light (h, w) becomes; counts where it may be alone."""
         if "_laid" in self.__dict__:
             # a sum over rows of fixed order: products of matrices hang on threads and processors
             whole = np.einsum("ji,j->i", self._laid, light[self._at])
@@ -96,7 +96,7 @@ class FewLights:
         return once
 
     def gathered(self, image: FloatArray) -> FloatArray:
-        """Give the transpose at the places of lights; 0 elsewhere."""
+        """Return the transpose at the places of lights; 0 elsewhere."""
         out = np.zeros(self._shape, np.float32)
         out[self._at] = np.einsum("ji,i->j", self._laid, image.ravel())
         return out
@@ -133,11 +133,11 @@ class Convolution:
         self._transform = scipy.fft.rfft2(wrapped)
 
     def spread(self, light: FloatArray) -> FloatArray:
-        """Give what light (h, w) becomes."""
+        """Return what light (h, w) becomes."""
         return self._filtered(light, self._transform)
 
     def gathered(self, image: FloatArray) -> FloatArray:
-        """Give the transpose: for every place, what its light would meet in an image (h, w)."""
+        """Return the transpose: for every place, what its light would meet in an image (h, w)."""
         return self._filtered(image, self._turned)
 
     @cached_property

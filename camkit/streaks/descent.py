@@ -77,7 +77,7 @@ def seek_lights(
     steps: Steps,
     hidden: Mask | None = None,
 ) -> FloatArray:
-    """Give the light of clipped cells.
+    """Return the light of clipped cells.
 
     Args:
         seen: (h, w) float32: light of the cells, less what known light has thrown there; of no
@@ -115,7 +115,7 @@ def seek_lights(
 def not_outshining(
     guess: FloatArray, seen: FloatArray, clipped: Mask, spread: Spread
 ) -> FloatArray:
-    """Give a guess, less bright where its streaks would be brighter than what is seen.
+    """Return a guess, less bright where its streaks would be brighter than what is seen.
 
     A start far too bright is not always left again: where streaks lie on clipped cells mostly,
     little speaks against it.
@@ -140,7 +140,7 @@ def not_outshining(
 
 
 def _beyond(thrown: FloatArray, seen: FloatArray) -> float:
-    """Give the share of streaks that is brighter than what is seen."""
+    """Return the share of streaks that is brighter than what is seen."""
     whole = float(thrown.sum(dtype=np.float64))
     return float(np.maximum(thrown - seen, 0).sum(dtype=np.float64)) / max(whole, _TINY)
 
@@ -164,13 +164,13 @@ class _System:
     price: FloatArray
 
     def gathered(self, slope_y: FloatArray, slope_x: FloatArray, level: FloatArray) -> FloatArray:
-        """Give what a picture of these gradients and level says to every light."""
+        """Return what a picture of these gradients and level says to every light."""
         weighed = _divergence(self.weights.y * slope_y, self.weights.x * slope_x)
         weighed += self.weights.excess * level
         return self.spread.gathered(weighed)
 
     def applied(self, light: FloatArray) -> FloatArray:
-        """Give the matrix times lights in their units."""
+        """Return the matrix times lights in their units."""
         thrown = self.spread.spread(self.unit * light)
         return self.unit * self.gathered(*gradient(thrown), thrown) + self.price * light
 
@@ -195,22 +195,22 @@ def _conjugate_gradients(
 
 
 def _price(light: FloatArray, steps: Steps) -> FloatArray:
-    """Give what more light costs, falling as the logarithm of a light rises."""
+    """Return what more light costs, falling as the logarithm of a light rises."""
     return np.asarray(steps.price + steps.dim_price * DIM / (DIM + light), np.float32)
 
 
 def _weight(rest: FloatArray, scale: float) -> FloatArray:
-    """Give the weights of Geman and McClure."""
+    """Return the weights of Geman and McClure."""
     return np.asarray(scale**-2 / (1 + (rest / scale) ** 2) ** 2, np.float32)
 
 
 def gradient(image: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Give the differences of cells (h, w) down, (h - 1, w), and across, (h, w - 1)."""
+    """Return the differences of cells (h, w) down, (h - 1, w), and across, (h, w - 1)."""
     return image[1:] - image[:-1], image[:, 1:] - image[:, :-1]
 
 
 def _divergence(y: FloatArray, x: FloatArray) -> FloatArray:
-    """Give the transpose of the gradient."""
+    """Return the transpose of the gradient."""
     out = np.empty((x.shape[0], y.shape[1]), np.float32)
     out[0], out[1:] = 0, y
     out[:-1] -= y
@@ -220,7 +220,7 @@ def _divergence(y: FloatArray, x: FloatArray) -> FloatArray:
 
 
 def usable_cells(clipped: Mask) -> Mask:
-    """Tell which cells (h, w) are neither clipped nor beside one that is, corners included."""
+    """Return which cells (h, w) are neither clipped nor beside one that is, corners included."""
     rows = clipped.copy()
     rows[1:] |= clipped[:-1]
     rows[:-1] |= clipped[1:]

@@ -50,7 +50,7 @@ class Judge:
         self._kernel = kernel
 
     def evidence(self, excess: FloatArray, box: Box) -> float:
-        """Give the cost of the picture without an excess that lies in a box, less that with it."""
+        """Return cost of the picture without an excess that lies in a box, less that with it."""
         around, inner = self._around(box)
         rest, usable = self._rest[around], self._usable[around]
         light = np.zeros(rest.shape, np.float32)
@@ -59,7 +59,7 @@ class Judge:
         return _cost(rest + streaks, usable) - _cost(rest, usable)
 
     def _around(self, box: Box) -> tuple[Box, Box]:
-        """Give the place that the streaks of a box reach, and the box within it."""
+        """Return the place that the streaks of a box reach, and the box within it."""
         reach = self._kernel.shape[0] // 2
         (top, bottom), (left, right) = (
             (max(side.start - reach, 0), min(side.stop + reach, end))
@@ -85,17 +85,17 @@ class Proven:
     given_up: int
 
     def left(self, light: FloatArray) -> FloatArray:
-        """Give what is left of light (..., h, w)."""
+        """Return what is left of light (..., h, w)."""
         over = np.maximum(light - np.float32(WHITE), 0)
         return np.asarray(light - (1 - self.share) * over, np.float32)
 
     def finer(self, shape: tuple[int, int]) -> "Proven":
-        """Give the same in cells of half the pitch; a last odd one goes with its neighbour."""
+        """Return the same in cells of half the pitch; a last odd one goes with its neighbour."""
         return replace(self, share=repeated(self.share, shape))
 
 
 def proven(light: FloatArray, judges: Sequence[Judge | None]) -> Proven:
-    """Tell what the picture proves of lights.
+    """Return what the picture proves of lights.
 
     A light mostly has all colours: what is proven in one speaks for the others.
 
@@ -121,12 +121,12 @@ def proven(light: FloatArray, judges: Sequence[Judge | None]) -> Proven:
 
 
 def share_of(evidence: float) -> float:
-    """Give the share of its excess that a light keeps."""
+    """Return the share of its excess that a light keeps."""
     return min(max((evidence - NOTHING) / (ENOUGH - NOTHING), 0.0), 1.0)
 
 
 def _cost(rest: FloatArray, usable: Mask) -> float:
-    """Give the cost of the gradients between cells that tell."""
+    """Return the cost of the gradients between cells that tell."""
     down, across = usable[1:] & usable[:-1], usable[:, 1:] & usable[:, :-1]
     whole = 0.0
     for slope, there in zip(gradient(rest), (down, across), strict=True):

@@ -50,7 +50,7 @@ class StreakKernels:
 
 
 def streak_kernels(kernels: FloatArray, sites: tuple[Sites, ...], reach_px: int) -> StreakKernels:
-    """Give the kernels for the cells of a capture.
+    """Return the kernels for the cells of a capture.
 
     Args:
         kernels: (3, n, n) dense kernels of the colours in pixels, n odd; shares of the light.

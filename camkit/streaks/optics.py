@@ -127,17 +127,17 @@ class StreakOptics:
 
     @property
     def reach_px(self) -> int:
-        """Give the distance at which the longest arm ends."""
+        """Return the distance at which the longest arm ends."""
         return int(self.profiles.shape[-1]) - 1
 
     @property
     def side_px(self) -> int:
-        """Give the side of the dense kernel that holds everything."""
+        """Return the side of the dense kernel that holds everything."""
         squares = int(self.haze.shape[-1])
         return 2 * max(self.reach_px, (squares * HAZE_STEP_PX - 1) // 2) + 1
 
     def dense(self, *, bare: bool = False) -> FloatArray:
-        """Give the kernels (depth, wavelength, side, side), shares of the light.
+        """Return the kernels (depth, wavelength, side, side), shares of the light.
 
         Args:
             bare: Of the lens without its plate, of which the core alone is known.
@@ -154,7 +154,7 @@ class StreakOptics:
         return kernels
 
     def _wide(self) -> FloatArray:
-        """Give haze and arms, the core's place included."""
+        """Return haze and arms, the core's place included."""
         side = self.side_px
         place = np.arange(side) - side // 2
         taps = haze_taps(side, self.haze.shape[-1])
@@ -170,7 +170,7 @@ class StreakOptics:
 
 
 def arm_axes(place: NDArray[np.integer], angle_rad: float) -> tuple[FloatGrid, FloatGrid]:
-    """Give how far (y, x) pixels lie along an arm, and across it, both in pixels."""
+    """Return how far (y, x) pixels lie along an arm, and across it, both in pixels."""
     x, y = place[None, :], place[:, None]
     along = math.cos(angle_rad) * x + math.sin(angle_rad) * y
     across = math.cos(angle_rad) * y - math.sin(angle_rad) * x
@@ -180,7 +180,7 @@ def arm_axes(place: NDArray[np.integer], angle_rad: float) -> tuple[FloatGrid, F
 def arm_light(
     profile: NDArray[Any], section: NDArray[Any], along: FloatGrid, across: FloatGrid
 ) -> FloatArray:
-    """Give the light of an arm at places along and across it; linear between its samples."""
+    """Return the light of an arm at places along and across it; linear between its samples."""
     distance = np.arange(profile.size)
     offset = SECTION_STEP_PX * (np.arange(section.size) - section.size // 2)
     light = np.zeros(along.shape, np.float32)
@@ -192,7 +192,7 @@ def arm_light(
 
 
 def haze_taps(side_px: int, squares: int) -> FloatArray:
-    """Give (side, squares): how much every square counts at a pixel; linear between middles."""
+    """Return (side, squares): how much every square counts at a pixel; linear between middles."""
     place = (np.arange(side_px) - side_px // 2) / HAZE_STEP_PX + squares // 2
     return np.stack(
         [np.interp(place, np.arange(squares), unit) for unit in np.eye(squares)], axis=1

@@ -83,7 +83,7 @@ class Recovery:
     blind: bool = False
 
     def to_json(self) -> dict[str, int | float]:
-        """Give what a sidecar says of it.
+        """Return what a sidecar says of it.
 
         `clipped_streak_fraction` is the share of the streaks that fell on clipped samples, where
         nobody sees them; `unexplained` the share that outshines what is seen, which no true light
@@ -158,7 +158,7 @@ def _at_border(mask: Mask) -> bool:
 
 
 def veil_of(known: FloatArray, kernels: tuple[FloatArray, ...]) -> FloatArray:
-    """Give what light throws beside itself; beyond the frame it goes on as at its border.
+    """Return what light throws beside itself; beyond the frame it goes on as at its border.
 
     Args:
         known: (3, h, w) light.

@@ -83,7 +83,7 @@ def groups_of(clipped: Mask) -> tuple[Group, ...]:
 def refined(
     colour: int, found: Found, groups: Sequence[Group], fine: Cells, kernels: StreakKernels
 ) -> FloatArray:
-    """Give the lights of one colour in a window, in cells of 2 px.
+    """Return the lights of one colour in a window, in cells of 2 px.
 
     Args:
         colour: Which.

@@ -26,16 +26,16 @@ class Window:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Give (rows, columns)."""
+        """Return (rows, columns)."""
         return self.bottom - self.top, self.right - self.left
 
     @property
     def at(self) -> tuple[slice, slice]:
-        """Give the place in an array."""
+        """Return the place in an array."""
         return slice(self.top, self.bottom), slice(self.left, self.right)
 
     def moved(self, rows: int, columns: int) -> "Window":
-        """Give the same, so many cells farther down and to the right."""
+        """Return the same, so many cells farther down and to the right."""
         return Window(
             top=self.top + rows,
             bottom=self.bottom + rows,
@@ -44,7 +44,7 @@ class Window:
         )
 
     def finer(self, shape: tuple[int, int]) -> "Window":
-        """Give the same place in cells of half the pitch, of an array of that shape.
+        """Return the same place in cells of half the pitch, of an array of that shape.
 
         A last odd row or column there, which no cell covers, goes with its neighbour.
         """

@@ -21,7 +21,7 @@ _TINY: Final = 1e-6
 
 
 def rim_distance_px(mask: NDArray[np.bool_], pitch_px: float) -> FloatArray:
-    """Give the distance of every cell of a mask (h, w) from its rim, 0 outside.
+    """Return the distance of every cell of a mask (h, w) from its rim, 0 outside.
 
     Farther than `FARTHEST_CELLS` from a rim nothing grows, so that strips of rows can be measured
     one by one, in the memory of a few.
@@ -37,12 +37,12 @@ def rim_distance_px(mask: NDArray[np.bool_], pitch_px: float) -> FloatArray:
 
 
 def dome(distance_px: FloatArray) -> FloatArray:
-    """Give what most lights look like, from the distance to their rim."""
+    """Return what most lights look like, from the distance to their rim."""
     return np.asarray(np.minimum(distance_px, DOME_PX) ** 2, np.float32)
 
 
 def pooled(fine: FloatArray) -> FloatArray:
-    """Give the means of 2 x 2 cells of (..., h, w); a last odd row or column is left out."""
+    """Return the means of 2 x 2 cells of (..., h, w); a last odd row or column is left out."""
     height, width = fine.shape[-2] // 2, fine.shape[-1] // 2
     means = np.empty((*fine.shape[:-2], height, width), np.float32)
     for top in range(0, height, STRIP_ROWS):
@@ -55,19 +55,19 @@ def pooled(fine: FloatArray) -> FloatArray:
 
 
 def upsampled(coarse: FloatArray, shape: tuple[int, int]) -> FloatArray:
-    """Give fine cells (h, w) of `shape`, linear between the middles of coarse ones."""
+    """Return fine cells (h, w) of `shape`, linear between the middles of coarse ones."""
     return _doubled(_doubled(coarse, shape[0]).T, shape[1]).T
 
 
 def repeated(coarse: NDArray[Any], shape: tuple[int, int]) -> NDArray[Any]:
-    """Give fine cells (h, w) of `shape`, each as the coarse one that covers it."""
+    """Return fine cells (h, w) of `shape`, each as the coarse one that covers it."""
     fine = np.repeat(np.repeat(coarse, 2, axis=0), 2, axis=1)
     more = [(0, max(side - have, 0)) for side, have in zip(shape, fine.shape, strict=True)]
     return np.pad(fine, more, mode="edge")
 
 
 def with_means(base: FloatArray, means: FloatArray) -> FloatArray:
-    """Give lights shaped like a base whose coarse cells have these means.
+    """Return lights shaped like a base whose coarse cells have these means.
 
     Args:
         base: (h, w) >= 0, fine; 0 where there is no light.
@@ -84,7 +84,7 @@ def with_means(base: FloatArray, means: FloatArray) -> FloatArray:
 
 
 def _doubled(coarse: FloatArray, rows: int) -> FloatArray:
-    """Give twice the rows, or a few more, linear between the middles of the given ones."""
+    """Return twice the rows, or a few more, linear between the middles of the given ones."""
     above = np.concatenate([coarse[:1], coarse[:-1]])
     below = np.concatenate([coarse[1:], coarse[-1:]])
     out = np.empty((2 * coarse.shape[0], coarse.shape[1]), np.float32)

@@ -58,7 +58,7 @@ class LitPixels:
 
 
 def lit_pixels(recovery: Recovery) -> LitPixels:
-    """Give the pixels of all lights."""
+    """Return the pixels of all lights."""
     none, dark = np.zeros(0, np.int32), np.zeros((COLOURS, 0), np.float32)
     parts = [LitPixels(rows=none, columns=none, light=dark, excess=dark)]
     parts += [_region_pixels(region, recovery.fine) for region in recovery.regions]
@@ -137,7 +137,7 @@ def _places(clipped: FloatArray, light: FloatArray) -> _Places:
 
 
 def _lit(numbers: Index, cells: Cells, region: Region) -> Mask:
-    """Tell which pixels of a window are lit in each colour: (3, h + 2, w + 2), a rim of False."""
+    """Return which pixels of a window are lit in each colour: (3, h + 2, w + 2), a rim of False."""
     height, width = (PITCH_PX * side for side in numbers.shape)
     lit = np.zeros((COLOURS, height + 2, width + 2), np.bool_)
     at = (slice(None), *region.window.at)
@@ -154,7 +154,7 @@ def _lit(numbers: Index, cells: Cells, region: Region) -> Mask:
 
 
 def _shaped(numbers: Index, lit: Mask, cells: Cells, region: Region) -> _Shaped:
-    """Give the lit pixels of a window."""
+    """Return the lit pixels of a window."""
     at = (slice(None), *region.window.at)
     clipped = cells.clipped[at]
     level = _level(cells, region)
@@ -178,14 +178,14 @@ def _shaped(numbers: Index, lit: Mask, cells: Cells, region: Region) -> _Shaped:
 
 
 def _level(cells: Cells, region: Region) -> FloatArray:
-    """Give what all samples of the cells of a window say: (3, h, w), 1 where they clipped."""
+    """Return what all samples of the cells of a window say: (3, h, w), 1 where they clipped."""
     at = (slice(None), *region.window.at)
     clipped = cells.clipped[at]
     return np.asarray(cells.light[at] * (1 - clipped) + clipped, np.float32)
 
 
 def _shared_out(shaped: _Shaped, light: FloatArray) -> FloatArray:
-    """Give lights (3, n) of these shapes whose sums in each place are as stated.
+    """Return lights (3, n) of these shapes whose sums in each place are as stated.
 
     Args:
         shaped: The pixels.
@@ -201,7 +201,7 @@ def _shared_out(shaped: _Shaped, light: FloatArray) -> FloatArray:
 
 
 def _most(shaped: _Shaped, light: FloatArray) -> FloatArray:
-    """Give how bright colours may be (3, n) beside one that was seen, as the place is coloured.
+    """Return how bright colours may be (3, n) beside one that was seen, as the place is coloured.
 
     Where green clipped and red was seen to be dim, the light ends: its green is not bright either.
     """
@@ -244,7 +244,7 @@ def _own(pixels: NDArray[np.uint8], rows: Index, columns: Index) -> Mask:
 
 
 def _smoothed(light: FloatArray, clipped: FloatArray) -> FloatArray:
-    """Give a light a little wider, as high as it was."""
+    """Return a light a little wider, as high as it was."""
     there = (clipped > 0).astype(np.float32)
     near = scipy.ndimage.gaussian_filter(there, SMOOTHING_CELLS, mode="constant")
     wide = scipy.ndimage.gaussian_filter(light * there, SMOOTHING_CELLS, mode="constant")
@@ -252,7 +252,7 @@ def _smoothed(light: FloatArray, clipped: FloatArray) -> FloatArray:
 
 
 def _depth(lit: Mask, rows: Index, columns: Index) -> FloatArray:
-    """Give the distance of pixels from what is not lit, at most `DEEPEST`; 0 outside."""
+    """Return the distance of pixels from what is not lit, at most `DEEPEST`; 0 outside."""
     beside, across = np.ones(rows.size, np.bool_), np.ones(rows.size, np.bool_)
     for dy, dx in ((0, 1), (1, 0), (1, 2), (2, 1)):
         beside &= lit[rows + dy, columns + dx]
@@ -266,7 +266,7 @@ def _depth(lit: Mask, rows: Index, columns: Index) -> FloatArray:
 def _between(
     field: FloatArray, rows: Index, columns: Index, offset_px: tuple[float, float]
 ) -> FloatArray:
-    """Give a field of cells at pixels, linear between the middles of cells."""
+    """Return a field of cells at pixels, linear between the middles of cells."""
     upper, lower, share_y = _corners(rows, offset_px[0], field.shape[0])
     left, right, share_x = _corners(columns, offset_px[1], field.shape[1])
     above = field[upper, left] * (1 - share_x) + field[upper, right] * share_x
@@ -275,7 +275,7 @@ def _between(
 
 
 def _corners(places: Index, offset_px: float, cells: int) -> tuple[Index, Index, FloatArray]:
-    """Give the cells on both sides of pixels along one axis, and the share of the second."""
+    """Return the cells on both sides of pixels along one axis, and the share of the second."""
     at = (places - np.float32(offset_px)) / np.float32(PITCH_PX)
     low = np.floor(at)
     share = np.asarray(at - low, np.float32)

@@ -38,7 +38,7 @@ class Streaks(Protocol):
 
 
 def streaks_of(recovery: Recovery, lit: LitPixels) -> list[Streaks]:
-    """Give the streaks of all windows.
+    """Return the streaks of all windows.
 
     Args:
         recovery: Of the capture.
@@ -132,7 +132,7 @@ class CellStreaks:
 
 
 def _shows(region: Region) -> bool:
-    """Tell whether streaks are bright enough, beside what clipped, for their pixels to matter."""
+    """Return whether streaks are bright enough, beside what clipped, for their pixels to matter."""
     return bool((region.streaks[region.light == 0] > FAINT).any())
 
 

@@ -27,7 +27,7 @@ from camkit.units import to_radians
 
 
 def problem_of(recipe: DesignRecipe, lens: Lens) -> Problem:
-    """Give the fields, wavelengths and depths of a recipe, and what is free of a lens."""
+    """Return the fields, wavelengths and depths of a recipe, and what is free of a lens."""
     optics = recipe.optics
     if optics.object_distances_mm:
         lens = refocused(lens, optics.focus_distance_mm or optics.object_distances_mm[0])
@@ -58,7 +58,7 @@ def problem_of(recipe: DesignRecipe, lens: Lens) -> Problem:
 
 
 def refocused(lens: Lens, distance_mm: float) -> Lens:
-    """Give the lens with its sensor moved as the paraxial image of an object at a distance is."""
+    """Return the lens with its sensor moved as the paraxial image of an object at a distance is."""
     placed = replace(lens, object_distance_mm=distance_mm)
     return with_focus_shift(
         placed, paraxial_image(placed).distance_mm - paraxial_image(lens).distance_mm
@@ -66,7 +66,7 @@ def refocused(lens: Lens, distance_mm: float) -> Lens:
 
 
 def field_slopes(optics: OpticsRecipe) -> Tensor:
-    """Give the fields (field,) as slopes, spaced as the recipe says."""
+    """Return the fields (field,) as slopes, spaced as the recipe says."""
     far = math.tan(to_radians(optics.half_field_deg))
     steps = torch.linspace(0, 1, optics.fields, dtype=torch.float64)
     slopes: Tensor = far * (steps.sqrt() if optics.spacing == "area" else steps)
@@ -74,7 +74,7 @@ def field_slopes(optics: OpticsRecipe) -> Tensor:
 
 
 def pixels_of(recipe: DesignRecipe, problem: Problem, begin: Tensor) -> Pixels:
-    """Give the pixels and colours of a recipe, with a window that fits the lens at `begin`."""
+    """Return the pixels and colours of a recipe, with a window that fits the lens at `begin`."""
     weights = torch.tensor(recipe.pixels.color_weights, dtype=torch.float64)
     pixels = Pixels(
         pitch_um=recipe.pixels.pitch_um,
@@ -87,7 +87,7 @@ def pixels_of(recipe: DesignRecipe, problem: Problem, begin: Tensor) -> Pixels:
 
 
 def recorder_of(recipe: DesignRecipe) -> Recorder:
-    """Give what the pixels of a recipe do; raises ContractError for unknown colour filters."""
+    """Return what the pixels of a recipe do; raises ContractError for unknown colour filters."""
     wanted, known = recipe.pixels.cfa, {str(cfa): cfa for cfa in CFA_PATTERNS}
     if wanted and wanted not in known:
         raise ContractError(
@@ -120,7 +120,7 @@ def parts_of(
     pictures: Path | None = None,
     source: SceneSource | None = None,
 ) -> DesignParts:
-    """Give what a loop joins; a lens that is to stay (`lens_rate` 0) is not searched for.
+    """Return what a loop joins; a lens that is to stay (`lens_rate` 0) is not searched for.
 
     Args:
         recipe: The design.

@@ -52,7 +52,7 @@ def draw_copy(lens: Lens, errors: FabricationErrors, number: int) -> Copy:
 def made_with(
     tensors: SurfaceTensors, copy: Copy, *, reference: SurfaceTensors, object_distance_mm: float
 ) -> SurfaceTensors:
-    """Give a batch of lenses with the errors of a copy; the sensor follows its paraxial focus.
+    """Return a batch of lenses with the errors of a copy; the sensor follows its paraxial focus.
 
     Args:
         tensors: Of `FreeLens.tensors`, at any wavelengths.

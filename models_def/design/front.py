@@ -43,16 +43,16 @@ class Front:
 
     @property
     def channels(self) -> int:
-        """Give how many planes there are."""
+        """Return how many planes there are."""
         return 3 if self.kind == "none" else 6
 
     @property
     def margin_px(self) -> int:
-        """Give what is recorded around a patch and cut off again."""
+        """Return what is recorded around a patch and cut off again."""
         return 0 if self.kind == "none" else self.filter_margin_px
 
     def planes(self, recorded: Tensor, kernels: Tensor) -> Tensor:
-        """Give (b, channels, p, p) from (b, 3, p + 2 margin, ...) and kernels (b, 3, k, k)."""
+        """Return (b, channels, p, p) from (b, 3, p + 2 margin, ...) and kernels (b, 3, k, k)."""
         if self.kind == "none":
             return encode_srgb(recorded)
         inner = slice(self.filter_margin_px, -self.filter_margin_px)

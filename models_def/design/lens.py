@@ -27,16 +27,16 @@ class DesignLens(nn.Module, ABC):
 
     @abstractmethod
     def scaled(self) -> Tensor:
-        """Give the present lens (variable,)."""
+        """Return the present lens (variable,)."""
 
     @abstractmethod
     def forward(self) -> tuple[Tensor, Tensor]:
-        """Give kernels (depth, field, 3, k, k) and the penalty of the limits (a scalar)."""
+        """Return kernels (depth, field, 3, k, k) and the penalty of the limits (a scalar)."""
 
     @abstractmethod
     def made_kernels(self, copy: Copy) -> Tensor:
-        """Give the kernels (depth, field, 3, k, k) of a copy of the present lens."""
+        """Return the kernels (depth, field, 3, k, k) of a copy of the present lens."""
 
     @abstractmethod
     def lens(self) -> Lens:
-        """Give the present lens as a prescription."""
+        """Return the present lens as a prescription."""

@@ -197,7 +197,7 @@ class DesignLoop:
         return kernels.float(), penalty
 
     def _made(self, kernels: Tensor, number: int, *, moving: bool) -> Tensor:
-        """Give the kernels that captures are made with: those of copy `number`, if there are any.
+        """Return the kernels that captures are made with: those of copy `number`, if there are any.
 
         Args:
             kernels: Of the nominal lens.
@@ -213,7 +213,7 @@ class DesignLoop:
     def _pictures(
         self, batch: Batch, kernels: Tensor, made: Tensor | None = None
     ) -> tuple[Tensor, Tensor]:
-        """Give recovered pictures (depth, b, 3, p, p) and the sharp ones in sRGB tone.
+        """Return recovered pictures (depth, b, 3, p, p) and the sharp ones in sRGB tone.
 
         Args:
             batch: Patches.
@@ -277,18 +277,18 @@ class DesignLoop:
         )
 
     def _valid_copies(self, kernels: Tensor) -> list[Tensor]:
-        """Give the kernels of the copies that lenses are judged by, drawn apart from all others."""
+        """Return kernels of the copies that lenses are judged by, drawn apart from all others."""
         count = 1 if self.parts.fabrication is None else VALID_COPIES
         return [self._made(kernels, VALID_SEED + i, moving=False) for i in range(count)]
 
     def _judged(self, batch: Batch, kernels: Tensor, made: Tensor) -> tuple[float, float]:
-        """Give mean PSNR and loss of a batch."""
+        """Return mean PSNR and loss of a batch."""
         pictures, sharp = self._pictures(batch, kernels, made)
         loss = float(design_loss(self.parts.loss, pictures, sharp))
         return _psnr_db(pictures, sharp), loss
 
     def field_pictures(self, patches: int) -> Iterator[tuple[int, Tensor, Tensor]]:
-        """Give so many fixed patches at every field, drawn apart from all others.
+        """Return so many fixed patches at every field, drawn apart from all others.
 
         Yields:
             Field, recovered (depth, 1, 3, p, p) and sharp (1, 3, p, p), in sRGB tone.
@@ -304,7 +304,7 @@ class DesignLoop:
                     yield field, *self._pictures(batch, kernels, made)
 
     def look(self, count: int = 4) -> tuple[Tensor, tuple[Tensor, Tensor, Tensor]]:
-        """Give kernels and, for some fixed patches, (count, 3, h, w) captures, recovered, sharp."""
+        """Return kernels and, of fixed patches, (count, 3, h, w) captures, recovered, sharp."""
         with torch.no_grad():
             kernels, _ = self._kernels(moving=False)
             rows = []
@@ -340,7 +340,7 @@ class DesignLoop:
         }
 
     def state(self) -> State:
-        """Give all that a resumed run needs: tensors and plain numbers."""
+        """Return all that a resumed run needs: tensors and plain numbers."""
         return {
             "step": self.step,
             "best_db": self.best_db,

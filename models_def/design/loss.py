@@ -55,7 +55,7 @@ class DesignLoss:
 
 
 def design_loss(loss: DesignLoss, pictures: Tensor, sharp: Tensor) -> Tensor:
-    """Give the scalar to minimise.
+    """Return the scalar to minimise.
 
     Args:
         loss: Which.

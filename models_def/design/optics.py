@@ -31,7 +31,7 @@ class _Bounded(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx: Any, free: Tensor) -> Tensor:
-        """Give the numbers within their bounds."""
+        """Return the numbers within their bounds."""
         ctx.save_for_backward(free)
         return free.clamp(0, 1)
 
@@ -86,12 +86,12 @@ class LensModule(DesignLens):
         self.moves = nn.Parameter(torch.zeros_like(begin))
 
     def scaled(self) -> Tensor:
-        """Give the present lens (variable,), within its bounds."""
+        """Return the present lens (variable,), within its bounds."""
         moved: Tensor = _Bounded.apply(self.begin + self.basis @ self.moves)  # type: ignore[no-untyped-call]
         return moved
 
     def forward(self) -> tuple[Tensor, Tensor]:
-        """Give kernels (depth, field, 3, k, k) and the penalty of the limits (a scalar)."""
+        """Return kernels (depth, field, 3, k, k) and the penalty of the limits (a scalar)."""
         scaled = self.scaled()[None]
         problem = self.problem
         kernels, penalty = [], torch.zeros((), dtype=scaled.dtype)
@@ -103,7 +103,7 @@ class LensModule(DesignLens):
         return torch.stack(kernels), penalty
 
     def made_kernels(self, copy: Copy) -> Tensor:
-        """Give the kernels (depth, field, 3, k, k) of a copy of the present lens."""
+        """Return the kernels (depth, field, 3, k, k) of a copy of the present lens."""
         scaled, problem = self.scaled()[None], self.problem
         focused_mm = problem.free.lens.object_distance_mm
 
@@ -114,12 +114,12 @@ class LensModule(DesignLens):
         return torch.stack([splat_batch(found.landed, self.pixels)[0] for found in traced])
 
     def lens(self) -> Lens:
-        """Give the present lens as a prescription."""
+        """Return the present lens as a prescription."""
         return self.problem.free.made(self.scaled().detach())
 
 
 def fitting_window_px(problem: Problem, scaled: Tensor, pixels: Pixels) -> int:
-    """Give the odd window that holds 99 % of the light of every field, depth and colour.
+    """Return the odd window that holds 99 % of the light of every field, depth and colour.
 
     A quarter is added, so that a design may spread light further than it found it.
 
@@ -150,7 +150,7 @@ def fitting_window_px(problem: Problem, scaled: Tensor, pixels: Pixels) -> int:
 
 
 def whitening(problem: Problem, scaled: Tensor) -> Tensor:
-    """Give the basis (variable, variable) in which all moves change the spots alike.
+    """Return the basis (variable, variable) in which all moves change the spots alike.
 
     It is the inverse square root of J^T J of the RMS residuals, so that a unit move along any axis
     changes the RMS spot by the size of the pixel core. A number at one of its bounds has an axis

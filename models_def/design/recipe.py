@@ -226,7 +226,7 @@ def with_choices(
     seed: int | None = None,
     search: bool = True,
 ) -> DesignRecipe:
-    """Give the recipe with what a caller chose instead; None keeps what it says.
+    """Return the recipe with what a caller chose instead; None keeps what it says.
 
     Without `search` the design begins at the prescription itself.
     """
@@ -242,6 +242,6 @@ def with_choices(
 
 
 def recipe_digest(recipe: DesignRecipe) -> str:
-    """Give a hash of all that decides a run."""
+    """Return a hash of all that decides a run."""
     table = {name: value for name, value in asdict(recipe).items() if value is not None}
     return hashlib.sha256(json.dumps(table, sort_keys=True).encode()).hexdigest()

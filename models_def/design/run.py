@@ -102,7 +102,7 @@ class DesignRun:
 
     @property
     def leads(self) -> bool:
-        """Tell whether this process writes the files."""
+        """Return whether this process writes the files."""
         return not torch.distributed.is_initialized() or torch.distributed.get_rank() == 0
 
     def go(self, until: int | None = None) -> Iterator[Progress]:
@@ -184,7 +184,7 @@ class DesignRun:
         }
 
     def view(self) -> DesignView:
-        """Give the present lens, its kernels and what becomes of a few fixed patches."""
+        """Return the present lens, its kernels and what becomes of a few fixed patches."""
         kernels, patches = self.loop.look()
         return DesignView(lens=self.loop.parts.lens.lens(), kernels=kernels, patches=patches)
 

@@ -68,12 +68,12 @@ class Starts:
 
     @property
     def ends(self) -> int:
-        """Give how many descents go to the end."""
+        """Return how many descents go to the end."""
         return max(1, self.count // 4) + 1 if self.count else 0
 
 
 def best_starts(problem: Problem, starts: Starts) -> Tensor:
-    """Give the lenses (start, variable), scaled, that a design may begin at, best spots first.
+    """Return the lenses (start, variable), scaled, that a design may begin at, best spots first.
 
     Args:
         problem: Its lens is the given one.
@@ -111,7 +111,7 @@ def best_starts(problem: Problem, starts: Starts) -> Tensor:
 
 
 def traced_lenses(starts: Starts, variables: int) -> int:
-    """Give how many lenses a search traces, those that the recovery judges among them."""
+    """Return how many lenses a search traces, those that the recovery judges among them."""
     if starts.count == 0:
         return 0
     scouted = evaluations(starts.count, starts.scout_steps, variables)
@@ -120,7 +120,7 @@ def traced_lenses(starts: Starts, variables: int) -> int:
 
 
 def best_judged(lenses: Tensor, judge: Callable[[Tensor], float]) -> Tensor:
-    """Give the lens (variable,) of (start, variable) that a judge gives most."""
+    """Return the lens (variable,) of (start, variable) that a judge gives most."""
     if len(lenses) == 1:
         return lenses[0]
     marks = [judge(scaled) for scaled in lenses]
@@ -130,7 +130,7 @@ def best_judged(lenses: Tensor, judge: Callable[[Tensor], float]) -> Tensor:
 def disturbed(
     lens: Lens, rng: np.random.Generator, *, curvature_share: float, focus_mm: float
 ) -> Lens:
-    """Give a lens with every curvature and the place of its sensor off by chance.
+    """Return a lens with every curvature and the place of its sensor off by chance.
 
     Args:
         lens: As it should be.

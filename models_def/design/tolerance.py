@@ -165,11 +165,11 @@ class ToleranceResult:
     offenders: tuple[Offender, ...]
 
     def percentile_db(self, percent: float) -> float:
-        """Give the PSNR that `percent` of the copies fall short of."""
+        """Return the PSNR that `percent` of the copies fall short of."""
         return float(np.percentile(self.copies.mean_db, percent))
 
     def share_at_least(self, psnr_db: float) -> float:
-        """Give the yield: the share of copies with at least this PSNR."""
+        """Return the yield: the share of copies with at least this PSNR."""
         return float((self.copies.mean_db >= psnr_db).mean())
 
 
@@ -344,7 +344,7 @@ def _class_loss(
 
 
 def _overall(spot_rms_mm: Array) -> Array:
-    """Give the RMS radius (copy,) over all fields."""
+    """Return the RMS radius (copy,) over all fields."""
     return np.asarray(np.sqrt((spot_rms_mm**2).mean(-1)))
 
 

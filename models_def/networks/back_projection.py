@@ -69,7 +69,7 @@ class Projection(nn.Module):
         self.there, self.back, self.error = there(width), back(width), there(width)
 
     def forward(self, earlier: Tensor) -> Tensor:
-        """Give the maps of the other resolution from all earlier ones of this."""
+        """Return the maps of the other resolution from all earlier ones of this."""
         x = self.merge(earlier)
         first = self.there(x)
         return torch.as_tensor(first + self.error(self.back(first) - x))
@@ -96,7 +96,7 @@ class BackProjection(nn.Module):
                 nn.init.zeros_(torch.as_tensor(layer.bias))
 
     def forward(self, planes: Tensor) -> Tensor:
-        """Give the picture (b, 1, 4 h, 4 w) from (b, in_channels, h, w)."""
+        """Return the picture (b, 1, 4 h, 4 w) from (b, in_channels, h, w)."""
         coarse = self.features(planes)
         fine = [self.ups[0](coarse)]
         coarse_maps: list[Tensor] = []

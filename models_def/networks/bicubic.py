@@ -21,7 +21,7 @@ REACH: Final = 2
 
 
 def cubic(distance: Tensor, sharpness: float = SHARPNESS) -> Tensor:
-    """Give the weight of a sample at a distance in samples.
+    """Return the weight of a sample at a distance in samples.
 
     References: Keys 1981, eq. (4) with a = `sharpness`.
     """
@@ -32,7 +32,7 @@ def cubic(distance: Tensor, sharpness: float = SHARPNESS) -> Tensor:
 
 
 def bicubic_filters(scale: int = SCALE, phase: int = PHASE) -> Tensor:
-    """Give the weights (scale^2, 1, 5, 5) of the samples around a block, by sub-pixel.
+    """Return the weights (scale^2, 1, 5, 5) of the samples around a block, by sub-pixel.
 
     Sub-pixels go row by row, as a pixel-shuffle places its channels.
 
@@ -59,7 +59,7 @@ class Bicubic(nn.Module):
         self.register_buffer("filters", bicubic_filters(scale, phase), persistent=False)
 
     def forward(self, samples: Tensor) -> Tensor:
-        """Give (b, c, scale h, scale w) from (b, c, h, w)."""
+        """Return (b, c, scale h, scale w) from (b, c, h, w)."""
         channels = samples.shape[1]
         wide = functional.pad(samples, (REACH,) * 4, mode="replicate")
         # groups rather than a reshape, whose graph would ask for shapes

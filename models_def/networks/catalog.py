@@ -67,7 +67,7 @@ NETWORK_NAMES: Final = tuple(_BUILDERS)
 
 
 def lights_px(name: str) -> int | None:
-    """Give how far from lights a network acts; None for one that acts everywhere."""
+    """Return how far from lights a network acts; None for one that acts everywhere."""
     return REACH_PX if name in _NEAR_LIGHTS else None
 
 

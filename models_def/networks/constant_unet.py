@@ -58,7 +58,7 @@ class ConstantUnet(nn.Module):
         self.out = nn.Conv2d(width, 3, 1)
 
     def forward(self, planes: Tensor) -> Tensor:
-        """Give (b, 3, h, w) from (b, in_channels, h, w); h, w multiples of `stride_px`."""
+        """Return (b, 3, h, w) from (b, in_channels, h, w); h, w multiples of `stride_px`."""
         skips: list[Tensor] = []
         x = planes
         for i, encoder in enumerate(self.encoders):

@@ -57,7 +57,7 @@ class Discriminator(nn.Module):
         self.layers = nn.Sequential(*parts, _conv(widths[-1], 1, stride=1))
 
     def forward(self, picture: Tensor) -> Tensor:
-        """Give (b, 1, m, n) scores of (b, 3, h, w) pictures in 0..1."""
+        """Return (b, 1, m, n) scores of (b, 3, h, w) pictures in 0..1."""
         scores: Tensor = self.layers(2 * picture - 1)
         return scores
 

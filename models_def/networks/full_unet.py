@@ -52,7 +52,7 @@ class FullConfig:
             raise ContractError(f"widths must be {SCALES} positive integers; got {self.widths}")
 
     def outer(self) -> TrimmedConfig:
-        """Give the shape of the outer three scales."""
+        """Return the shape of the outer three scales."""
         a, b, c = self.widths[:OUTER_SCALES]
         return TrimmedConfig(widths=(a, b, c), in_channels=self.in_channels, residual=self.residual)
 
@@ -71,7 +71,7 @@ class DeepScales(nn.Module):
         nn.init.zeros_(torch.as_tensor(self.join.bias))
 
     def forward(self, x: Tensor) -> Tensor:
-        """Give (b, widths[0], h, w) from the same; h, w multiples of 2^(len(widths) - 1)."""
+        """Return (b, widths[0], h, w) from the same; h, w multiples of 2^(len(widths) - 1)."""
         skips = []
         for encoder in self.encoders:
             skips.append(x)

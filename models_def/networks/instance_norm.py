@@ -21,7 +21,7 @@ VARIANCE_FLOOR: Final = 1e-5
 
 
 def instance_norm(x: Tensor) -> Tensor:
-    """Give (b, c, h, w) of mean 0 and variance 1 per picture and channel.
+    """Return (b, c, h, w) of mean 0 and variance 1 per picture and channel.
 
     A channel of one pixel becomes 0.
     """
@@ -39,7 +39,7 @@ class LiveNorm(nn.Module):
         self.channels = channels
 
     def forward(self, x: Tensor) -> Tensor:
-        """Give (b, c, h, w) from the same."""
+        """Return (b, c, h, w) from the same."""
         return instance_norm(x)
 
 
@@ -55,7 +55,7 @@ class FrozenNorm(nn.Module):
         self.register_buffer("scale", torch.ones(channels, 1, 1))
 
     def forward(self, x: Tensor) -> Tensor:
-        """Give (b, c, h, w) from the same."""
+        """Return (b, c, h, w) from the same."""
         return (x - self.mean) * self.scale
 
     def take(self, mean: Tensor, variance: Tensor) -> None:
@@ -65,7 +65,7 @@ class FrozenNorm(nn.Module):
 
 
 def picture_norm(channels: int, *, frozen: bool) -> nn.Module:
-    """Give a norm of one kind or the other."""
+    """Return a norm of one kind or the other."""
     return FrozenNorm(channels) if frozen else LiveNorm(channels)
 
 
@@ -80,7 +80,7 @@ def live_norms(network: nn.Module) -> tuple[str, ...]:
 
 @torch.no_grad()
 def freeze_norms(live: nn.Module, frozen: nn.Module, pictures: Sequence[Tensor]) -> int:
-    """Give a network of frozen norms the weights of its live twin, and constants, in place.
+    """Return a network of frozen norms the weights of its live twin, and constants, in place.
 
     A constant is the mean, over the calibration pictures, of what the live norm computed: its
     means, and its variances.

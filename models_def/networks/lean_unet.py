@@ -95,7 +95,7 @@ class ResidualBlock(nn.Module):
             self.second.weight.mul_(BRANCH_GAIN)
 
     def forward(self, x: Tensor) -> Tensor:
-        """Give (b, c, h, w) from (b, c, h, w)."""
+        """Return (b, c, h, w) from (b, c, h, w)."""
         branch = nn.functional.leaky_relu(self.first(x), NEGATIVE_SLOPE)
         return x + torch.as_tensor(self.second(branch))
 
@@ -108,7 +108,7 @@ class Upsampling(nn.Module):
         self.conv = _conv(inputs, 4 * outputs, 1, 1, bias=bias)
 
     def forward(self, x: Tensor) -> Tensor:
-        """Give (b, outputs, 2h, 2w) from (b, inputs, h, w)."""
+        """Return (b, outputs, 2h, 2w) from (b, inputs, h, w)."""
         return nn.functional.pixel_shuffle(self.conv(x), 2)
 
 

@@ -68,18 +68,18 @@ class NearLights(nn.Module):
 
 
 def nearness(planes: Tensor) -> Tensor:
-    """Give (b, 1, h, w), 1 on lights and beside them, 0 elsewhere; planes as `NearLights` has."""
+    """Return (b, 1, h, w), 1 on lights and beside them, 0 elsewhere; planes as `NearLights` has."""
     there = raised(planes).amax(dim=1, keepdim=True)
     return nn.functional.max_pool2d(there, 2 * BESIDE_PX + 1, 1, BESIDE_PX)
 
 
 def least(planes: Tensor) -> Tensor:
-    """Give (b, 3, h, w): what the output is at least; never more than `lit`."""
+    """Return (b, 3, h, w): what the output is at least; never more than `lit`."""
     darker = torch.minimum(planes[:, :COLOURS], planes[:, COLOURS:])
     return darker * (LEAST + (1 - LEAST) * raised(planes))
 
 
 def raised(planes: Tensor) -> Tensor:
-    """Give (b, 3, h, w): 1 where a light was put into a colour, 0 elsewhere."""
+    """Return (b, 3, h, w): 1 where a light was put into a colour, 0 elsewhere."""
     more = planes[:, COLOURS:] - RATIO * planes[:, :COLOURS] - FLOOR
     return (more / FLOOR).clamp(0, 1)

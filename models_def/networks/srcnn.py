@@ -57,7 +57,7 @@ class Srcnn(nn.Module):
         nn.init.normal_(torch.as_tensor(self.layers[-1].weight), std=FIRST_STD)
 
     def forward(self, planes: Tensor) -> Tensor:
-        """Give the picture (b, 1, 4 h, 4 w) from (b, in_channels, h, w)."""
+        """Return the picture (b, 1, 4 h, 4 w) from (b, in_channels, h, w)."""
         x = self.finer(planes)
         for layer in list(self.layers)[:-1]:
             x = functional.relu(layer(x))

@@ -36,7 +36,7 @@ class TrimmedConfig:
 
 
 def double_conv(inputs: int, outputs: int) -> nn.Sequential:
-    """Give two 3x3 convolutions, a PReLU behind each."""
+    """Return two 3x3 convolutions, a PReLU behind each."""
     return nn.Sequential(
         nn.Conv2d(inputs, outputs, 3, padding=1),
         nn.PReLU(),
@@ -76,14 +76,14 @@ class TrimmedUnet(nn.Module):
         return self.decode(planes, fine, half, quarter)
 
     def encode(self, planes: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Give the features (b, widths[i], h / 2^i, w / 2^i) of the three scales."""
+        """Return the features (b, widths[i], h / 2^i, w / 2^i) of the three scales."""
         fine: Tensor = self.encode_fine(planes)
         half: Tensor = self.encode_half(nn.functional.max_pool2d(fine, 2))
         quarter: Tensor = self.bottleneck(nn.functional.max_pool2d(half, 2))
         return fine, half, quarter
 
     def decode(self, planes: Tensor, fine: Tensor, half: Tensor, quarter: Tensor) -> Tensor:
-        """Give (b, 3, h, w) from the input and the features of `encode`."""
+        """Return (b, 3, h, w) from the input and the features of `encode`."""
         x = self.merge_half(torch.cat((self.up_half(quarter), half), dim=1))
         x = self.merge_fine(torch.cat((self.up_fine(x), fine), dim=1))
         restored: Tensor = self.out(x)

@@ -56,7 +56,7 @@ class Vdsr(nn.Module):
         nn.init.zeros_(torch.as_tensor(self.layers[-1].weight))
 
     def forward(self, planes: Tensor) -> Tensor:
-        """Give the picture (b, 1, 4 h, 4 w) from (b, in_channels, h, w)."""
+        """Return the picture (b, 1, 4 h, 4 w) from (b, in_channels, h, w)."""
         fine = self.finer(planes)
         x = fine
         for layer in list(self.layers)[:-1]:

@@ -81,7 +81,7 @@ class VggLevels(nn.Module):
         self.requires_grad_(requires_grad=False)
 
     def forward(self, picture: Tensor) -> tuple[Tensor, ...]:
-        """Give the features, (b, widths[i], h / 2^i, w / 2^i)."""
+        """Return the features, (b, widths[i], h / 2^i, w / 2^i)."""
         x = (picture - self.mean) / self.deviation
         levels: list[Tensor] = []
         for names in self.blocks:
@@ -104,7 +104,7 @@ def _draw_weights(layers: nn.Module) -> None:
 
 
 def take_vgg(network: nn.Module, path: Path) -> None:
-    """Give a network with the names of torchvision the weights of a file, in place.
+    """Return a network with the names of torchvision the weights of a file, in place.
 
     Raises:
         ContractError: If the file is missing, cannot be read as tensors alone, or lacks a tensor of
@@ -126,7 +126,7 @@ def take_vgg(network: nn.Module, path: Path) -> None:
 
 
 def file_digest(path: Path) -> str:
-    """Give the sha256 of a file, to name weights by."""
+    """Return the sha256 of a file, to name weights by."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

@@ -42,7 +42,7 @@ def fit_distortion(
 
 
 def ideal_heights(lens: Lens, heights_mm: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Give EFL tan(field angle) in mm of the fields that land at sensor heights."""
+    """Return EFL tan(field angle) in mm of the fields that land at sensor heights."""
     slopes = slopes_for_heights(lens, torch.from_numpy(heights_mm))
     return paraxial_data(lens).efl_mm * slopes.numpy()
 

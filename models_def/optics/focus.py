@@ -37,7 +37,7 @@ def focus_shift_mm(
     samples: PupilSamples | None = None,
     definition: PupilDefinition = "stop",
 ) -> float:
-    """Give how far the sensor should move away from the lens.
+    """Return how far the sensor should move away from the lens.
 
     Args:
         lens: The prescription; its fields, wavelengths and object distance count.
@@ -75,12 +75,12 @@ def focus_shift_mm(
 
 
 def with_focus(lens: Lens, merit: FocusMerit) -> Lens:
-    """Give the lens with its sensor at the best place; see `focus_shift_mm`."""
+    """Return the lens with its sensor at the best place; see `focus_shift_mm`."""
     return with_focus_shift(lens, focus_shift_mm(lens, merit))
 
 
 def launch_path_mm(rays: Rays, object_distance_mm: float) -> Tensor:
-    """Give the path in air from the object point to launched rays, any constant left out.
+    """Return the path in air from the object point to launched rays, any constant left out.
 
     Args:
         rays: From `pupil.launch`.

@@ -126,7 +126,7 @@ class FreezeReport:
     focus_energy_kept: float = 0.0
 
     def to_json(self) -> dict[str, int | float | str]:
-        """Give the report as a flat mapping, which speaks of depths and focus where it may."""
+        """Return the report as a flat mapping, which speaks of depths and focus where it may."""
         facts: dict[str, Any] = {}
         for name, value in asdict(self).items():
             facts |= value if name == "of_optics" else {name: value}
@@ -191,7 +191,7 @@ def choose_grid(
 
 
 def _field_counts(optics: Optics, sensor: ColorSensor) -> tuple[int, ...]:
-    """Give the numbers of fields to try: one where they make no difference."""
+    """Return the numbers of fields to try: one where they make no difference."""
     corner_mm = corner_height_mm(sensor)
     few, many = (optics.layout(corner_mm, FIELD_COUNTS[i]).count for i in (0, -1))
     return FIELD_COUNTS if few != many or len(FIELD_COUNTS) == 1 else FIELD_COUNTS[-1:]
@@ -203,7 +203,7 @@ def _samples(frozen: Frozen) -> str:
 
 
 def choose_depths(psf: FrozenPsf, bench: Bench, *, limit_db: float) -> tuple[float, ...]:
-    """Give the nearest and the farthest depth, and as few between them as the loss allows.
+    """Return the nearest and the farthest depth, and as few between them as the loss allows.
 
     Args:
         psf: With all depths of the bench.
@@ -224,12 +224,12 @@ def choose_depths(psf: FrozenPsf, bench: Bench, *, limit_db: float) -> tuple[flo
 
 
 def between_mm(depths_mm: tuple[float, ...]) -> tuple[float, ...]:
-    """Give the distances half-way in 1 / distance between neighbours."""
+    """Return the distances half-way in 1 / distance between neighbours."""
     return tuple(2 / (1 / near + 1 / far) for near, far in pairwise(depths_mm))
 
 
 def choose_blocks(psf: FrozenPsf, bench: Bench, *, tell: Tell = _silent) -> tuple[Wiener, Loss]:
-    """Give the cheapest block grid that loses `BLOCK_TOLERANCE_DB` more than the best at most.
+    """Return the cheapest block grid that loses `BLOCK_TOLERANCE_DB` more than the best at most.
 
     Tried are those of `BLOCKS` whose overlap suits the kernels (`BLOCK_REACH`; the widest where
     none does) and the grid of the bench's own settings. The cost of a grid is the area filtered

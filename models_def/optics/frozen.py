@@ -91,7 +91,7 @@ class Frozen:
 
 
 def corner_height_mm(sensor: ColorSensor) -> float:
-    """Give half the diagonal of the sensor, by its outermost pixel edges."""
+    """Return half the diagonal of the sensor, by its outermost pixel edges."""
     diagonal_px = math.hypot(sensor.width_px, sensor.height_px)
     return diagonal_px / 2 * sensor.pixel_pitch_um / UM_PER_MM
 
@@ -191,7 +191,7 @@ def with_focus(
 def _wavelengths(
     optics: Optics, grid: FreezeGrid, response_um: FloatGrid
 ) -> tuple[FloatGrid, FloatGrid, Tensor]:
-    """Give the wavelengths to keep, those to ask for, and (kept, asked) weights between them."""
+    """Return the wavelengths to keep, those to ask for, and (kept, asked) weights between them."""
     own_um = optics.wavelengths_um
     if own_um is not None:
         return own_um, own_um, torch.eye(own_um.size, dtype=torch.float64)
@@ -213,12 +213,12 @@ def rounded(kernels: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def dense_grid(grid: FreezeGrid) -> FreezeGrid:
-    """Give the grid with twice the field and three times the wavelength density."""
+    """Return the grid with twice the field and three times the wavelength density."""
     return replace(grid, fields=2 * grid.fields - 1, wavelengths=3 * grid.wavelengths - 2)
 
 
 def stress_depths_mm(depths_mm: tuple[float, ...]) -> tuple[float, ...]:
-    """Give the distances to stress a lens at: its own, and some nearer and farther than all.
+    """Return the distances to stress a lens at: its own, and some nearer and farther than all.
 
     Args:
         depths_mm: Distances it was made for, increasing; infinity is allowed.
@@ -258,7 +258,7 @@ def freeze_stress(optics: Optics, sensor: ColorSensor, grid: FreezeGrid | None =
 
 
 def wavelength_bands(waves_um: FloatGrid) -> tuple[FloatGrid, Tensor]:
-    """Give fine wavelengths and (sample, fine) weights: triangles around the samples."""
+    """Return fine wavelengths and (sample, fine) weights: triangles around the samples."""
     steps = max(waves_um.size - 1, 1)
     # a whole number of fine steps per sample
     count = steps * -(-(FINE_WAVELENGTHS - 1) // steps) + 1
@@ -268,7 +268,7 @@ def wavelength_bands(waves_um: FloatGrid) -> tuple[FloatGrid, Tensor]:
 
 
 def _smallest_side(traced: list[TracedPsf], weights: Tensor, grid: FreezeGrid) -> tuple[int, float]:
-    """Give the smallest odd side that holds the wanted light of every colour, and what it holds."""
+    """Return smallest odd side that holds the wanted light of every colour, and what it holds."""
     full = torch.stack([t.kernels * t.energy_kept[..., None, None] for t in traced])
     colours = torch.einsum("cw,dfwij->dfcij", weights, full)
     kept = 0.0

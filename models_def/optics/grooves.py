@@ -63,20 +63,20 @@ class Profile:
     rim_mm: float
 
     def height_mm(self, radius_mm: Tensor) -> Tensor:
-        """Give h at radii of any shape, float64; see `trace.sag`."""
+        """Return h at radii of any shape, float64; see `trace.sag`."""
         numbers = (self.curvature_per_mm, self.conic, self.even_asphere)
         c, k, terms = (torch.tensor(n, dtype=torch.float64) for n in numbers)
         return sag(c, k, terms, radius_mm.to(torch.float64) ** 2)
 
 
 def grooved_mm(height_mm: Tensor, grooves: Grooves) -> Tensor:
-    """Give the heights that are cut, of those of the continuous profile; any shape."""
+    """Return the heights that are cut, of those of the continuous profile; any shape."""
     depth = to_mm(grooves.depth_um)
     return height_mm - depth * torch.trunc(height_mm / depth)
 
 
 def wall_radii_mm(profile: Profile, grooves: Grooves) -> Tensor:
-    """Give the radii (wall,) float64 at which walls stand, from the axis outwards.
+    """Return the radii (wall,) float64 at which walls stand, from the axis outwards.
 
     Raises:
         ContractError: If the profile has no rim within a metre, or a groove is narrower than 1 um.
@@ -108,7 +108,7 @@ def wall_radii_mm(profile: Profile, grooves: Grooves) -> Tensor:
 
 
 def narrowest_mm(profile: Profile, grooves: Grooves) -> float:
-    """Give the width of the narrowest groove between two walls; inf where there are no two.
+    """Return the width of the narrowest groove between two walls; inf where there are no two.
 
     Raises:
         ContractError: See `wall_radii_mm`.
@@ -118,7 +118,7 @@ def narrowest_mm(profile: Profile, grooves: Grooves) -> float:
 
 
 def groove_facts(profile: Profile, grooves: Grooves) -> dict[str, float | bool | None]:
-    """Give what is known of the grooves of a surface, as plain values; None for no number."""
+    """Return what is known of the grooves of a surface, as plain values; None for no number."""
     narrowest = narrowest_mm(profile, grooves)
     return {
         "groove_depth_um": grooves.depth_um,

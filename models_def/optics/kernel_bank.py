@@ -52,7 +52,7 @@ def gaussian_response(
     centres_um: tuple[float, float, float] = (0.600, 0.540, 0.460),
     fwhm_um: float = 0.090,
 ) -> ChannelResponse:
-    """Give Gaussian colour channels on a wavelength grid: camkit's own model camera."""
+    """Return Gaussian colour channels on a wavelength grid: camkit's own model camera."""
     sigma = fwhm_um / GAUSS_FWHM
     away = wavelengths_um[None] - np.array(centres_um)[:, None]
     response = np.exp(-0.5 * (away / sigma) ** 2)
@@ -64,14 +64,14 @@ def gaussian_response(
 
 
 def wavelength_grid(count: int, low_um: float = 0.42, high_um: float = 0.68) -> NDArray[np.float64]:
-    """Give evenly spaced wavelengths."""
+    """Return evenly spaced wavelengths."""
     return np.linspace(low_um, high_um, count)
 
 
 def fabricated_copies(
     lens: Lens, count: int, seed: int, errors: FabricationErrors | None = None
 ) -> tuple[Lens, ...]:
-    """Give the nominal lens and `count` - 1 fabricated copies, not focused afresh.
+    """Return the nominal lens and `count` - 1 fabricated copies, not focused afresh.
 
     Args:
         lens: Nominal.
@@ -88,7 +88,7 @@ def fabricated_copies(
 def focused_copies(
     lens: Lens, count: int, seed: int, errors: FabricationErrors | None = None
 ) -> tuple[Lens, ...]:
-    """Give what `fabricated_copies` gives, each copy focused when it was assembled.
+    """Return what `fabricated_copies` gives, each copy focused when it was assembled.
 
     Errors of radius and index move the focus by some 0.1 mm. A camera is focused when it is
     built: the sensor keeps its nominal distance from the copy's own paraxial focus, but for the
@@ -110,7 +110,7 @@ def colour_kernels(
     pitch_um: float,
     rays: int,
 ) -> tuple[FloatArray, float]:
-    """Give kernels (field, c, size, size) float32 and the least energy kept of a colour."""
+    """Return kernels (field, c, size, size) float32 and the least energy kept of a colour."""
     with torch.no_grad():
         traced = trace_psf(
             lens,

@@ -72,7 +72,7 @@ class LensOptics:
         return
 
     def layout(self, corner_mm: float, fields: int) -> FieldLayout:
-        """Give heights from the axis to the corner, evenly spaced."""
+        """Return heights from the axis to the corner, evenly spaced."""
         return radial_layout(np.linspace(0.0, corner_mm, fields))
 
     def kernels(
@@ -111,16 +111,16 @@ class LensOptics:
         return np.asarray(light.numpy() / float(light[0]), dtype=np.float64)
 
     def copies(self, count: int, seed: int) -> "tuple[LensOptics, ...]":
-        """Give the nominal lens and fabricated copies, each focused when it was assembled."""
+        """Return the nominal lens and fabricated copies, each focused when it was assembled."""
         lenses = focused_copies(self.lens, count, seed)
         return tuple(replace(self, lens=lens) for lens in lenses)
 
     def refocused(self, focus_um: float) -> "LensOptics":
-        """Give the lens before a sensor that was moved away from it."""
+        """Return the lens before a sensor that was moved away from it."""
         return replace(self, lens=with_focus_shift(self.lens, focus_um / UM_PER_MM))
 
     def focus_range_um(self) -> float:
-        """Give how far the focus of nearly all fabricated copies lies from the nominal one.
+        """Return how far the focus of nearly all fabricated copies lies from the nominal one.
 
         Twice the standard deviation of where spots are smallest, seen from the sensor as it stands
         after assembly, in whole steps of 5 um.

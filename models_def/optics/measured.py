@@ -66,7 +66,7 @@ class MeasuredOptics:
         return self.psf.wavelengths_um
 
     def layout(self, corner_mm: float, fields: int) -> FieldLayout:
-        """Give the places at which it was measured."""
+        """Return the places at which it was measured."""
         del corner_mm, fields
         psf = self.psf
         if psf.grid_x_mm is not None and psf.grid_y_mm is not None:
@@ -105,7 +105,7 @@ class MeasuredOptics:
         )
 
     def distortion(self, radius_mm: float, channels: int) -> RadialDistortion:
-        """Give the distortion as measured, for every channel; one row stands for all.
+        """Return the distortion as measured, for every channel; one row stands for all.
 
         Raises:
             ContractError: If it was measured for another number of channels.
@@ -123,7 +123,7 @@ class MeasuredOptics:
         return replace(self.psf.distortion, coefficients=coefficients, even_coefficients=even)
 
     def illumination(self, fields: FieldLayout) -> FloatGrid:
-        """Give the relative illumination, blended as kernels are."""
+        """Return the relative illumination, blended as kernels are."""
         psf, light = self.psf, self.psf.relative_illumination
         if psf.grid_x_mm is not None and psf.grid_y_mm is not None:
             grid, at = (
@@ -135,7 +135,7 @@ class MeasuredOptics:
         return np.interp(np.hypot(fields.x_mm, fields.y_mm), psf.field_heights_mm, light)
 
     def copies(self, count: int, seed: int) -> "tuple[MeasuredOptics, ...]":
-        """Give itself: how others of it would differ was not measured."""
+        """Return itself: how others of it would differ was not measured."""
         del count, seed
         return (self,)
 
@@ -195,7 +195,7 @@ def measured_psf(
 
 
 def resampled(kernels: Tensor, ratio: float) -> Tensor:
-    """Give (..., h, w) kernels at another pitch: light spread by the area that samples share.
+    """Return (..., h, w) kernels at another pitch: light spread by the area that samples share.
 
     Args:
         kernels: Odd sides; the middle sample stays in the middle.
@@ -208,7 +208,7 @@ def resampled(kernels: Tensor, ratio: float) -> Tensor:
 
 
 def _shares(side: int, ratio: float) -> Tensor:
-    """Give (made, side): the share of each sample that falls into each one made."""
+    """Return (made, side): the share of each sample that falls into each one made."""
     half = int(np.ceil(side * ratio / 2 - 0.5))
     made = torch.arange(-half, half + 1, dtype=torch.float64)[:, None]
     given = (torch.arange(side, dtype=torch.float64)[None] - side // 2) * ratio

@@ -52,17 +52,17 @@ class FieldLayout:
 
 
 def radial_layout(heights_mm: FloatGrid) -> FieldLayout:
-    """Give places along +y, increasing from 0, for optics of revolution."""
+    """Return places along +y, increasing from 0, for optics of revolution."""
     return FieldLayout(symmetry="radial", x_mm=np.zeros_like(heights_mm), y_mm=heights_mm)
 
 
 def uniform_layout() -> FieldLayout:
-    """Give the one place of optics that are the same everywhere."""
+    """Return the one place of optics that are the same everywhere."""
     return FieldLayout(symmetry="uniform", x_mm=np.zeros(1), y_mm=np.zeros(1))
 
 
 def grid_layout(x_mm: FloatGrid, y_mm: FloatGrid) -> FieldLayout:
-    """Give the places of a grid of (column,) and (row,) positions, row by row."""
+    """Return the places of a grid of (column,) and (row,) positions, row by row."""
     y, x = (axis.ravel() for axis in np.meshgrid(y_mm, x_mm, indexing="ij"))
     return FieldLayout(symmetry="grid", x_mm=x, y_mm=y, grid_x_mm=x_mm, grid_y_mm=y_mm)
 
@@ -101,7 +101,7 @@ class Optics(Protocol):
         ...
 
     def layout(self, corner_mm: float, fields: int) -> FieldLayout:
-        """Give the places to freeze at.
+        """Return the places to freeze at.
 
         Args:
             corner_mm: Distance of the sensor's corner from the axis.
@@ -119,7 +119,7 @@ class Optics(Protocol):
         side_px: int,
         pitch_um: float,
     ) -> TracedPsf:
-        """Give the kernels of places, as they fall on the sensor, in a window of odd side.
+        """Return the kernels of places, as they fall on the sensor, in a window of odd side.
 
         Raises:
             ContractError: If it is not known there.
@@ -127,15 +127,15 @@ class Optics(Protocol):
         ...
 
     def distortion(self, radius_mm: float, channels: int) -> RadialDistortion:
-        """Give the radial distortion of every channel, up to a distance from the axis."""
+        """Return the radial distortion of every channel, up to a distance from the axis."""
         ...
 
     def illumination(self, fields: FieldLayout) -> FloatGrid:
-        """Give the relative illumination (field,), 1 on the axis."""
+        """Return the relative illumination (field,), 1 on the axis."""
         ...
 
     def copies(self, count: int, seed: int) -> "tuple[Optics, ...]":
-        """Give itself and `count` - 1 copies of it as they would be fabricated.
+        """Return itself and `count` - 1 copies of it as they would be fabricated.
 
         Itself alone where nothing is known of its fabrication.
         """

@@ -43,7 +43,7 @@ class Paraxial:
 
 
 def vertex_curvature(tensors: SurfaceTensors) -> Tensor:
-    """Give (surface, ...) vertex curvatures: c + 2 a_2."""
+    """Return (surface, ...) vertex curvatures: c + 2 a_2."""
     if tensors.even_asphere.shape[1] == 0:
         return tensors.curvature_per_mm
     return tensors.curvature_per_mm + 2 * tensors.even_asphere[:, 0]
@@ -66,7 +66,7 @@ def trace_paraxial(
 
 
 def focal_lengths(tensors: SurfaceTensors) -> tuple[Tensor, Tensor]:
-    """Give EFL and BFL in mm, differentiable, with the batch shape of the tensors."""
+    """Return EFL and BFL in mm, differentiable, with the batch shape of the tensors."""
     one = torch.ones_like(tensors.index[0] * tensors.curvature_per_mm[0])
     surfaces = range(len(tensors.aspheric))
     height, slope = trace_paraxial(tensors, one, torch.zeros_like(one), surfaces)
@@ -74,7 +74,7 @@ def focal_lengths(tensors: SurfaceTensors) -> tuple[Tensor, Tensor]:
 
 
 def image_distance(tensors: SurfaceTensors, object_distance_mm: float) -> Tensor:
-    """Give the paraxial image distance in mm from the last vertex, in the batch shape."""
+    """Return the paraxial image distance in mm from the last vertex, in the batch shape."""
     one = torch.ones_like(tensors.index[0] * tensors.curvature_per_mm[0])
     count = len(tensors.aspheric)
     height, slope = trace_paraxial(tensors, one, one / object_distance_mm, range(count))
@@ -82,7 +82,7 @@ def image_distance(tensors: SurfaceTensors, object_distance_mm: float) -> Tensor
 
 
 def image_of_stop(tensors: SurfaceTensors, stop: int) -> tuple[Tensor, Tensor]:
-    """Give place (mm behind the last vertex) and magnification of the stop seen from behind."""
+    """Return place (mm behind the last vertex) and magnification of the stop seen from behind."""
     zero = torch.zeros_like(tensors.index[0] * tensors.curvature_per_mm[0])
     rest = range(stop + 1, len(tensors.aspheric))
     if not rest:
@@ -95,7 +95,7 @@ def image_of_stop(tensors: SurfaceTensors, stop: int) -> tuple[Tensor, Tensor]:
 
 
 def entrance_pupil(tensors: SurfaceTensors, stop: int) -> tuple[Tensor, Tensor]:
-    """Give place (mm behind the first vertex) and magnification of the entrance pupil."""
+    """Return place (mm behind the first vertex) and magnification of the entrance pupil."""
     # a stop at a surface: rays in front of it see it through the surfaces before it only
     place, scale = image_of_stop(reverse(tensors), len(tensors.aspheric) - 1 - stop)
     return -place, scale
@@ -153,7 +153,7 @@ class Image:
 
 
 def paraxial_image(lens: Lens, wavelength_um: float | None = None) -> Image:
-    """Give where the object plane of a lens is imaged, how large, and how fast.
+    """Return where the object plane of a lens is imaged, how large, and how fast.
 
     Args:
         lens: The prescription.
@@ -185,6 +185,6 @@ def paraxial_image(lens: Lens, wavelength_um: float | None = None) -> Image:
 
 
 def with_paraxial_focus(lens: Lens) -> Lens:
-    """Give the lens with its sensor at the paraxial image of its object, reference wavelength."""
+    """Return the lens with its sensor at the paraxial image of its object, reference wavelength."""
     last = replace(lens.surfaces[-1], thickness_mm=paraxial_image(lens).distance_mm)
     return replace(lens, surfaces=(*lens.surfaces[:-1], last))

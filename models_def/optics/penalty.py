@@ -27,7 +27,7 @@ _WITHIN: Final = 1 - 1e-3
 def ray_penalty(
     tensors: SurfaceTensors, launched: Rays, seen: Sequence[Rays], barrier: float = BARRIER
 ) -> Tensor:
-    """Give what each ray pays (shape of the rays); differentiable, also for lost rays.
+    """Return what each ray pays (shape of the rays); differentiable, also for lost rays.
 
     Args:
         tensors: The lens.
@@ -84,7 +84,7 @@ def _margins(
 
 
 def reach_rho(rays: Rays, like: Tensor) -> Tensor:
-    """Give the largest r^2 in mm^2 of living rays, in the shape of a number of the lens."""
+    """Return the largest r^2 in mm^2 of living rays, in the shape of a number of the lens."""
     rho = torch.where(rays.valid, rays.x**2 + rays.y**2, 0.0)
     extra = rho.ndim - like.ndim
     dims = [d for d in range(rho.ndim) if d < extra or like.shape[d - extra] == 1]
@@ -92,7 +92,7 @@ def reach_rho(rays: Rays, like: Tensor) -> Tensor:
 
 
 def edge_gaps(tensors: SurfaceTensors, reaches: Sequence[Tensor]) -> Tensor:
-    """Give the thickness of elements and gaps at their edges in mm, differentiable.
+    """Return the thickness of elements and gaps at their edges in mm, differentiable.
 
     The edge lies at the larger of the heights that living rays reach on the two surfaces; a
     conic that ends further in counts with the height of its rim.

@@ -172,7 +172,7 @@ class Lens:
 
 
 def grooves_of(lens: Lens) -> list[dict[str, Any]]:
-    """Give what is known of the grooves of a lens, one entry for each grooved surface."""
+    """Return what is known of the grooves of a lens, one entry for each grooved surface."""
     return [
         {"surface": number, **groove_facts(surface.profile, surface.grooves)}
         for number, surface in enumerate(lens.surfaces)
@@ -198,14 +198,14 @@ class FabricationErrors:
 
 
 def with_focus_shift(lens: Lens, shift_mm: float) -> Lens:
-    """Give the lens with its sensor moved away from it by `shift_mm`."""
+    """Return the lens with its sensor moved away from it by `shift_mm`."""
     last = lens.surfaces[-1]
     moved = replace(last, thickness_mm=last.thickness_mm + shift_mm)
     return replace(lens, surfaces=(*lens.surfaces[:-1], moved))
 
 
 def perturb(lens: Lens, errors: FabricationErrors, rng: np.random.Generator) -> Lens:
-    """Give a fabricated copy of a lens: every number off by a uniform error.
+    """Return a fabricated copy of a lens: every number off by a uniform error.
 
     An element keeps one index throughout. Lenses given by f-number should first be fixed by
     `pupil.with_fixed_stop`, or the stop follows the focal length.
@@ -285,7 +285,7 @@ def parse_prescription(
 
 
 def _own_catalogues(table: Mapping[str, Any], folder: Path | None) -> list[GlassCatalogue]:
-    """Give the glasses that a prescription brings along: its own tables, then its .agf files."""
+    """Return the glasses that a prescription brings along: its own tables, then its .agf files."""
     tables = _tables(table.get("glass", []), "[[glass]]")
     own = GlassCatalogue(name=table["name"], glasses=tuple(map(parse_glass_table, tables)))
     names = table.get("glass_catalogues", [])
@@ -310,7 +310,7 @@ def write_prescription(lens: Lens, path: Path) -> None:
 
 
 def format_prescription(lens: Lens) -> str:
-    """Give the TOML text of a lens; see `write_prescription`."""
+    """Return the TOML text of a lens; see `write_prescription`."""
     if any(surface.index_offset for surface in lens.surfaces):
         raise ContractError("a prescription holds no index offsets; write the nominal lens")
     angles = ", ".join(degrees_text(angle) for angle in lens.field_angles_rad)
@@ -359,7 +359,7 @@ def _groove_table(grooves: Grooves) -> dict[str, float | bool]:
 
 
 def degrees_text(angle_rad: float) -> str:
-    """Give the shortest number of degrees that becomes this angle again, to the last bit."""
+    """Return the shortest number of degrees that becomes this angle again, to the last bit."""
     angle_deg = to_degrees(angle_rad)
     neighbours = (angle_deg, math.nextafter(angle_deg, 0), math.nextafter(angle_deg, 90))
     for digits in range(1, 18):
@@ -371,7 +371,7 @@ def degrees_text(angle_rad: float) -> str:
 
 
 def _radius_text(curvature_per_mm: float) -> str:
-    """Give the shortest radius whose inverse is this curvature."""
+    """Return the shortest radius whose inverse is this curvature."""
     if not curvature_per_mm:
         return "inf"
     radius_mm = 1 / curvature_per_mm

@@ -69,7 +69,7 @@ def splat(spots: Spots, size_px: int, pitch_um: float) -> TracedPsf:
 def tent(
     row: Tensor, column: Tensor, offset: tuple[int, int], size_px: int
 ) -> tuple[Tensor, Tensor]:
-    """Give flat places and weights of one of the four pixels around each ray."""
+    """Return flat places and weights of one of the four pixels around each ray."""
     top, left = torch.floor(row.detach()), torch.floor(column.detach())
     below, beside = row - top, column - left
     weight = (below if offset[0] else 1 - below) * (beside if offset[1] else 1 - beside)
@@ -117,12 +117,12 @@ def trace_psf(
 
 
 def with_object_distance(lens: Lens, distance_mm: float) -> Lens:
-    """Give the lens looking at another object distance, the sensor unmoved."""
+    """Return the lens looking at another object distance, the sensor unmoved."""
     return replace(lens, object_distance_mm=distance_mm)
 
 
 def energy_diameter(spots: Spots, share: float = 0.95) -> Tensor:
-    """Give the diameter (field,) in mm about the centroid that holds a share of the light.
+    """Return the diameter (field,) in mm about the centroid that holds a share of the light.
 
     All wavelengths together, with equal weight.
     """

@@ -58,7 +58,7 @@ class PupilSamples:
 
 
 def half_disc(rays: int) -> PupilSamples:
-    """Give stratified points of the half disc x > 0, each with the same area.
+    """Return stratified points of the half disc x > 0, each with the same area.
 
     Points lie on the Fibonacci spiral, folded at x = 0: no random draw, no rows.
     """
@@ -71,7 +71,7 @@ def half_disc(rays: int) -> PupilSamples:
 
 
 def hexapolar(rings: int) -> PupilSamples:
-    """Give a centre point and rings of 6, 12, ... points (the sampling of other programs)."""
+    """Return a centre point and rings of 6, 12, ... points (the sampling of other programs)."""
     xs, ys = [0.0], [0.0]
     for ring in range(1, rings + 1):
         for i in range(6 * ring):
@@ -84,7 +84,7 @@ def hexapolar(rings: int) -> PupilSamples:
 
 
 def with_fixed_stop(lens: Lens) -> Lens:
-    """Give the lens with its aperture stated as the stop's size, as metal keeps it."""
+    """Return the lens with its aperture stated as the stop's size, as metal keeps it."""
     stop_mm = paraxial_data(lens).stop_semi_diameter_mm
     return replace(lens, aperture_kind="stop_semi_diameter_mm", aperture_value=stop_mm)
 
@@ -199,7 +199,7 @@ def newton_aim(
 
 
 def real_stop_radius_mm(lens: Lens) -> float:
-    """Give the height at the stop of the real marginal ray of the reference wavelength.
+    """Return the height at the stop of the real marginal ray of the reference wavelength.
 
     The ray starts on the axis and meets the edge of the paraxial entrance pupil; a lens that
     states its stop keeps that.
@@ -223,19 +223,19 @@ def real_stop_radius_mm(lens: Lens) -> float:
 
 
 def with_open_apertures(tensors: SurfaceTensors) -> SurfaceTensors:
-    """Give the lens without the limits of its surfaces: no rim and no wall of a groove."""
+    """Return the lens without the limits of its surfaces: no rim and no wall of a groove."""
     tensors = without_walls(tensors)
     return replace(tensors, semi_diameter_mm=torch.full_like(tensors.semi_diameter_mm, math.inf))
 
 
 def beam_radius_mm(lens: Lens) -> float:
-    """Give the radius in the first vertex plane of the axial beam into the entrance pupil."""
+    """Return the radius in the first vertex plane of the axial beam into the entrance pupil."""
     data = paraxial_data(lens)
     return data.entrance_pupil_diameter_mm / 2 * _vertex_scale(lens, data)
 
 
 def _vertex_scale(lens: Lens, data: Paraxial) -> float:
-    """Give the height in the first vertex plane of an axial ray of height 1 in the pupil."""
+    """Return the height in the first vertex plane of an axial ray of height 1 in the pupil."""
     if math.isinf(lens.object_distance_mm):
         return 1.0
     return lens.object_distance_mm / (lens.object_distance_mm + data.entrance_pupil_mm)
@@ -250,7 +250,7 @@ def pupil_rays(
     definition: PupilDefinition = "stop",
     stop_radius_mm: float | None = None,
 ) -> tuple[Rays, Tensor]:
-    """Give launched rays and their weights.
+    """Return launched rays and their weights.
 
     Args:
         lens: The prescription (stop, aperture, object distance).

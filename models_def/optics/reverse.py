@@ -15,7 +15,7 @@ from camkit.models_def.optics.trace import Rays, SurfaceTensors, trace
 
 
 def reverse(tensors: SurfaceTensors) -> SurfaceTensors:
-    """Give the lens as light from the sensor meets it.
+    """Return the lens as light from the sensor meets it.
 
     The gap to the sensor stays last, where it means nothing: replace it by what follows.
     """

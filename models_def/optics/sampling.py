@@ -84,14 +84,14 @@ class Bench:
 
 
 def ring_heights(corner_mm: float, places: int) -> FloatGrid:
-    """Give heights (place,) in the middle of rings of equal area."""
+    """Return heights (place,) in the middle of rings of equal area."""
     return np.asarray(corner_mm * np.sqrt((np.arange(places) + 0.5) / places))
 
 
 def judged_places(
     optics: Optics, sensor: ColorSensor, fields: int
 ) -> tuple[FieldLayout, tuple[FloatGrid, FloatGrid]]:
-    """Give where to freeze optics densely, and the x (place,) and y (place,) to judge them at.
+    """Return where to freeze optics densely, and the x (place,) and y (place,) to judge them at.
 
     Radial optics are judged along +y, and traced there; others all around the axis, from the
     samples that they have.
@@ -181,12 +181,12 @@ def mean_kernel_loss(frozen: FrozenPsf, whole: FrozenPsf, bench: Bench) -> Loss:
 
 
 def _at_places(psf: FrozenPsf, bench: Bench, depth_mm: float | None) -> Tensor:
-    """Give the kernels of the places."""
+    """Return the kernels of the places."""
     return _kernels(psf, bench.sensor, bench.places_mm, depth_mm)
 
 
 def _compare(pairs: list[tuple[Tensor, Tensor]], bench: Bench) -> Loss:
-    """Give the loss of the first kernels against the second, a pair for each depth."""
+    """Return the loss of the first kernels against the second, a pair for each depth."""
     channels = len(bench.sensor.channels)
     scenes = _scenes(bench.places_mm[0].size, PATCH_PX, bench.seed, channels)
     by_depth = []
@@ -296,7 +296,7 @@ def _block_error(
     block_px: int,
     settings: Wiener,
 ) -> float:
-    """Give the mean squared error of a probe in a block that it lies off the middle of.
+    """Return the mean squared error of a probe in a block that it lies off the middle of.
 
     Args:
         probe: With its scene.
@@ -322,7 +322,7 @@ def _block_error(
 
 
 def _reach_px(grid: Wiener) -> int:
-    """Give the side of a scene that holds all blocks of a grid that see its middle."""
+    """Return the side of a scene that holds all blocks of a grid that see its middle."""
     off = max(OFFSETS) * (grid.block_px - grid.overlap_px)
     return 2 * int(np.ceil((grid.block_px + off) / 2)) + 2
 
@@ -342,7 +342,7 @@ def _loss(ratios: Tensor) -> Loss:
 
 
 def _error(restored: Tensor, scenes: Tensor) -> Tensor:
-    """Give the mean squared error (place,) inside the margin."""
+    """Return the mean squared error (place,) inside the margin."""
     inside = slice(MARGIN_PX, -MARGIN_PX)
     return (restored - scenes)[..., inside, inside].square().mean(dim=(1, 2, 3))
 
@@ -359,7 +359,7 @@ def _kernels(
 
 
 def _scenes(count: int, size_px: int, seed: int, channels: int) -> Tensor:
-    """Give (count, c, size, size) scenes below clipping; grey ones unless there are three."""
+    """Return (count, c, size, size) scenes below clipping; grey ones unless there are three."""
     scenes = [procedural_scene(seed + i, size_px, size_px) for i in range(count)]
     pictures = torch.from_numpy(np.stack(scenes)).clamp(0, 1)
     if channels == len(RGB):

@@ -9,7 +9,7 @@ from camkit.models_def.optics.prescription import Lens, Surface
 
 
 def scale_lens(lens: Lens, factor: float) -> Lens:
-    """Give the lens with every length times a factor; angles, conics and F-number stay.
+    """Return the lens with every length times a factor; angles, conics and F-number stay.
 
     Args:
         lens: The prescription.
@@ -45,7 +45,7 @@ def _scaled(surface: Surface, factor: float) -> Surface:
 
 
 def scale_to_efl(lens: Lens, efl_mm: float) -> Lens:
-    """Give the lens scaled to a focal length at its reference wavelength.
+    """Return the lens scaled to a focal length at its reference wavelength.
 
     Raises:
         ContractError: If the focal length is not finite or has the other sign.
@@ -60,7 +60,7 @@ def scale_to_efl(lens: Lens, efl_mm: float) -> Lens:
 
 
 def with_f_number(lens: Lens, f_number: float, *, working: bool = False) -> Lens:
-    """Give the lens stopped to an F-number, stated as its entrance pupil diameter.
+    """Return the lens stopped to an F-number, stated as its entrance pupil diameter.
 
     The rim of the stop opens as far as the beam needs; the others stay as they are, so a lens that
     is opened may be vignetted by its own glass.

@@ -40,7 +40,7 @@ class Spots:
 
 
 def chief_heights(lens: Lens, slopes: Tensor, wavelength_um: float | None = None) -> Tensor:
-    """Give the heights (field,) in mm at which chief rays of field slopes meet the sensor.
+    """Return the heights (field,) in mm at which chief rays of field slopes meet the sensor.
 
     The chief ray passes the centre of the stop; no wall of a groove takes it.
 
@@ -118,7 +118,7 @@ def trace_spots(
 
 
 def rms_radius(spots: Spots) -> Tensor:
-    """Give the RMS spot radius (field, wavelength) in mm about the centroid."""
+    """Return the RMS spot radius (field, wavelength) in mm about the centroid."""
     total = spots.weight.sum(-1, keepdim=True).clamp_min(1e-12)
     share = spots.weight / total
     dx = spots.x_mm - (share * spots.x_mm).sum(-1, keepdim=True)
@@ -127,7 +127,7 @@ def rms_radius(spots: Spots) -> Tensor:
 
 
 def all_waves(spots: Spots) -> Spots:
-    """Give the spots of all wavelengths as one, (field, 1, wavelength * rays), waves alike."""
+    """Return the spots of all wavelengths as one, (field, 1, wavelength * rays), waves alike."""
     total = spots.weight.sum(-1, keepdim=True).clamp_min(1e-12)
     return replace(
         spots,

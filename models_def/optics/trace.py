@@ -62,7 +62,7 @@ class SurfaceTensors:
     grooves: tuple[Groove | None, ...] = ()
 
     def to(self, target: torch.dtype | torch.device) -> Self:
-        """Give the same lens in another type or on another device."""
+        """Return the same lens in another type or on another device."""
         return replace(
             self,
             curvature_per_mm=self.curvature_per_mm.to(target),
@@ -102,7 +102,7 @@ class Rays:
 
 
 def surface_tensors(lens: Lens, wavelengths_um: Tensor) -> SurfaceTensors:
-    """Give the tensors of a lens, float64.
+    """Return the tensors of a lens, float64.
 
     Args:
         lens: The prescription.
@@ -142,7 +142,7 @@ def _groove(surface: Surface) -> Groove | None:
 
 
 def without_walls(tensors: SurfaceTensors) -> SurfaceTensors:
-    """Give the lens with ideal grooves, for rays that are a reference and must not be lost."""
+    """Return the lens with ideal grooves, for rays that are a reference and must not be lost."""
     ideal = (None if g is None else replace(g, walls=False) for g in tensors.grooves)
     return replace(tensors, grooves=tuple(ideal))
 

@@ -59,7 +59,7 @@ def demosaic(mosaic: Tensor, cfa: CfaPattern) -> Tensor:
 
 
 def _cell_masks(size: torch.Size, cfa: CfaPattern, like: Tensor) -> Tensor:
-    """Give (3, h, w): 1 where a colour is sampled."""
+    """Return (3, h, w): 1 where a colour is sampled."""
     masks = torch.zeros((3, *size), dtype=like.dtype, device=like.device)
     for row, colours in enumerate(cfa_channels(cfa)):
         for col, colour in enumerate(colours):
@@ -68,5 +68,5 @@ def _cell_masks(size: torch.Size, cfa: CfaPattern, like: Tensor) -> Tensor:
 
 
 def _row_mask(mask: Tensor) -> Tensor:
-    """Give (h, 1): 1 in the rows that hold the colour at all."""
+    """Return (h, 1): 1 in the rows that hold the colour at all."""
     return mask.amax(dim=1, keepdim=True)

@@ -126,7 +126,7 @@ def scatter(planes: Tensor, kernels: Tensor, *, step_px: int = BLOCK_STEP_PX) ->
 
 
 def block_centres_px(length: int, margin_px: int, *, step_px: int = BLOCK_STEP_PX) -> Tensor:
-    """Give the block centres along one side, in pixels of the picture inside the margin.
+    """Return the block centres along one side, in pixels of the picture inside the margin.
 
     Args:
         length: Side with margins.

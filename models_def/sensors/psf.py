@@ -81,7 +81,7 @@ class FieldKernels:
     grid_y_mm: Tensor | None = None
 
     def at(self, x_mm: Tensor, y_mm: Tensor) -> Tensor:
-        """Give the kernels of image points.
+        """Return the kernels of image points.
 
         Args:
             x_mm: (b,) positions from the axis, to the right.
@@ -137,7 +137,7 @@ def color_kernels(
 
 
 def field_kernels(kernels: Tensor, psf: FrozenPsf) -> FieldKernels:
-    """Give (field, c, h, w) kernels at the fields of a PSF."""
+    """Return (field, c, h, w) kernels at the fields of a PSF."""
     grid = (psf.grid_x_mm, psf.grid_y_mm)
     x_mm, y_mm = (None if axis is None else torch.from_numpy(axis.copy()) for axis in grid)
     return FieldKernels(
@@ -152,7 +152,7 @@ def field_kernels(kernels: Tensor, psf: FrozenPsf) -> FieldKernels:
 def grid_neighbours(
     grid_mm: tuple[Tensor, Tensor], x_mm: Tensor, y_mm: Tensor
 ) -> tuple[Tensor, Tensor]:
-    """Give the four fields (b, 4) of a grid around image points, and their shares (b, 4).
+    """Return the four fields (b, 4) of a grid around image points, and their shares (b, 4).
 
     Bilinear; a point beyond the rim is taken on it.
 
@@ -171,7 +171,7 @@ def grid_neighbours(
 
 
 def _axis_neighbours(axis: Tensor, at: Tensor) -> tuple[Tensor, Tensor]:
-    """Give the (b, 2) neighbours on one axis and their shares."""
+    """Return the (b, 2) neighbours on one axis and their shares."""
     low = (torch.searchsorted(axis, at, right=True) - 1).clamp(0, max(axis.numel() - 2, 0))
     high = (low + 1).clamp(max=axis.numel() - 1)
     step = torch.where(high > low, axis[high] - axis[low], 1.0)
@@ -181,7 +181,7 @@ def _axis_neighbours(axis: Tensor, at: Tensor) -> tuple[Tensor, Tensor]:
 
 
 def _turned_at(kernels: Tensor, field_heights_mm: Tensor, x_mm: Tensor, y_mm: Tensor) -> Tensor:
-    """Give the kernels of image points, turned so that their radial direction points outward.
+    """Return the kernels of image points, turned so that their radial direction points outward.
 
     Linear in the field height (the last one holds beyond it), a Catmull-Rom gather for the turn,
     zero outside, negatives cut, normalised. On the axis nothing is turned, and neither is the PSF
@@ -249,7 +249,7 @@ def _turn(kernels: Tensor, out_x: Tensor, out_y: Tensor) -> Tensor:
 
 
 def _catmull_rom(t: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-    """Give the weights of the samples -1, 0, 1, 2 for a position t in 0..1."""
+    """Return the weights of the samples -1, 0, 1, 2 for a position t in 0..1."""
     t2, t3 = t * t, t * t * t
     return (
         0.5 * (2 * t2 - t3 - t),

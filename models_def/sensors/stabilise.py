@@ -12,7 +12,7 @@ DEFAULT_SCALE = 64.0
 def stabilise(
     image: Tensor, shot: Tensor, read_variance: Tensor, *, scale: float = DEFAULT_SCALE
 ) -> Tensor:
-    """Give s = sqrt(max(x / shot + read_variance / shot^2, 0)) / scale.
+    """Return s = sqrt(max(x / shot + read_variance / shot^2, 0)) / scale.
 
     The noise of s has the standard deviation 0.5 / scale at any gain.
 

@@ -54,7 +54,7 @@ class Numbers:
 
     @classmethod
     def of(cls, together: Together, like: Tensor) -> "Numbers":
-        """Give those of a bundle or recipe."""
+        """Return those of a bundle or recipe."""
         return cls(
             noise=like.new_tensor(together.noise),
             noise_rise=like.new_tensor(together.noise_rise),
@@ -67,7 +67,7 @@ class Numbers:
 
 
 def frequencies_squared(size: tuple[int, int], like: Tensor) -> Tensor:
-    """Give f^2 of a half spectrum, (h, w // 2 + 1)."""
+    """Return f^2 of a half spectrum, (h, w // 2 + 1)."""
     fy = torch.fft.fftfreq(size[0], dtype=torch.float64, device=like.device)[:, None]
     fx = torch.fft.rfftfreq(size[1], dtype=torch.float64, device=like.device)[None, :]
     squared: Tensor = (fy * fy + fx * fx).to(like.dtype)
@@ -75,7 +75,7 @@ def frequencies_squared(size: tuple[int, int], like: Tensor) -> Tensor:
 
 
 def spread_at(spread: Spread, height_mm: float, f2: Tensor) -> Tensor:
-    """Give V of a field height, (c, h, w // 2 + 1); linear between the table's places."""
+    """Return V of a field height, (c, h, w // 2 + 1); linear between the table's places."""
     table = np.array(spread.variance, dtype=np.float64)
     heights, places = np.array(spread.heights_mm), np.array(spread.frequencies)
     lines = [

@@ -12,7 +12,7 @@ _LINEAR_BELOW: Final = 0.0031308
 
 
 def encode_srgb(linear: Tensor) -> Tensor:
-    """Give the sRGB tone of linear values; negative ones become black, as on a display."""
+    """Return the sRGB tone of linear values; negative ones become black, as on a display."""
     light = linear.clamp(min=0)
     # the power has an infinite slope at 0, which would turn the other branch's gradient into NaN
     high = 1.055 * light.clamp(min=_LINEAR_BELOW) ** (1 / 2.4) - 0.055

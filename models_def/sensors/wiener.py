@@ -66,7 +66,7 @@ class BlockFacts:
 def block_facts(
     patches: Tensor, kernels: Tensor, shot: Tensor, read_variance: Tensor, settings: Wiener
 ) -> BlockFacts:
-    """Give what the bank knows of patches; arguments as of `wiener_restore`."""
+    """Return what the bank knows of patches; arguments as of `wiener_restore`."""
     otf = to_otf(kernels, (patches.shape[-2], patches.shape[-1]))
     planes = taper_edges(patches, otf, settings.overlap_px // 4)
     mean = planes.mean(dim=(-2, -1)).clamp(min=0)
@@ -137,7 +137,7 @@ def wiener_restore(
 
 
 def _nearness(clipped: Tensor, reach_px: int | None, *, like: Tensor) -> Tensor:
-    """Give (b, c, h, w): 1 near clipped samples, falling smoothly to 0; 1 without a reach."""
+    """Return (b, c, h, w): 1 near clipped samples, falling smoothly to 0; 1 without a reach."""
     if reach_px is None:
         return torch.ones((), dtype=like.dtype, device=like.device)
     near = np.zeros(tuple(clipped.shape), dtype=np.float32)
@@ -223,7 +223,7 @@ def _filter(patches: Tensor, transfer: Tensor) -> Tensor:
 
 
 def _gain(otf: Tensor, ratio: Tensor, exponent: float, size: tuple[int, int]) -> Tensor:
-    """Give conj(H) / (|H|^2 + NSR); `ratio` (b, c) is NSR where the rise is one."""
+    """Return conj(H) / (|H|^2 + NSR); `ratio` (b, c) is NSR where the rise is one."""
     h, w = size
     fy = torch.fft.fftfreq(h, dtype=torch.float64, device=otf.device)[:, None]
     fx = torch.fft.rfftfreq(w, dtype=torch.float64, device=otf.device)[None, :]

@@ -89,7 +89,7 @@ class BankFittingKind(Protocol):
 
 
 def bank_fitting_kind(name: str) -> BankFittingKind:
-    """Give the part of a kind that fits banks.
+    """Return the part of a kind that fits banks.
 
     Raises:
         UnsupportedError: If its cameras have none.
@@ -110,7 +110,7 @@ def check_text(recipe: str) -> None:
 
 
 def with_bank(recipe: str, together: Together) -> str:
-    """Give the text of a recipe with these numbers in its table [wiener], and nothing else changed.
+    """Return text of a recipe with these numbers in its table [wiener], and nothing else changed.
 
     Raises:
         ContractError: If it has no such table, or says them in another way than this writes them.
@@ -135,7 +135,7 @@ def with_bank(recipe: str, together: Together) -> str:
 
 
 def bank_table(together: Together) -> str:
-    """Give the numbers as tables of a recipe."""
+    """Return the numbers as tables of a recipe."""
     lines = ["[wiener.together]"]
     for name, value in together.model_dump(exclude={"spread"}).items():
         lines.append(f"{name} = {list(value) if isinstance(value, tuple) else value!r}")

@@ -71,7 +71,7 @@ class Checkpoint:
 
     @property
     def chosen(self) -> State:
-        """Give the weights that are exported and that others begin with."""
+        """Return the weights that are exported and that others begin with."""
         return self.best or self.average
 
 
@@ -129,7 +129,7 @@ def to_checkpoint(path: Path, table: dict[str, Any]) -> Checkpoint:
 
 
 def _designed(path: Path, found: Any) -> dict[str, bytes]:
-    """Give the bytes of what was written as tensors.
+    """Return the bytes of what was written as tensors.
 
     Raises:
         ContractError: If it was not.
@@ -143,7 +143,7 @@ def _designed(path: Path, found: Any) -> dict[str, bytes]:
 
 
 def recipe_of(checkpoint: Checkpoint) -> Recipe:
-    """Give the recipe that a checkpoint carries; raises as `read_recipe` does."""
+    """Return the recipe that a checkpoint carries; raises as `read_recipe` does."""
     return to_recipe(tomllib.loads(checkpoint.recipe_toml))
 
 

@@ -81,7 +81,7 @@ def read_first_weights(source: Path, size: str, role: str = DEFAULT_ROLE) -> Fir
 
 
 def take_first_weights(network: nn.Module, first: FirstWeights) -> tuple[str, ...]:
-    """Give a network the first weights, in place.
+    """Return a network the first weights, in place.
 
     Args:
         network: The same network, or the full U-Net that extends a trimmed one.
@@ -138,7 +138,7 @@ def _of_bundle(bundle: Bundle, role: str, size: str) -> FirstWeights:
 
 
 def state_of_onnx(model: bytes) -> State:
-    """Give the weights of a network that `camkit export` wrote, under their names in torch.
+    """Return the weights of a network that `camkit export` wrote, under their names in torch.
 
     Raises:
         ContractError: If the network has PReLUs (the U-Nets of the thesis), or weights lie

@@ -38,15 +38,15 @@ class Fits(Protocol):
         ...
 
     def weights(self) -> State:
-        """Give the weights being trained."""
+        """Return the weights being trained."""
         ...
 
     def average(self) -> State:
-        """Give the averaged weights."""
+        """Return the averaged weights."""
         ...
 
     def optimizer_state(self) -> dict[str, Any]:
-        """Give everything else that a step changes: tensors and plain numbers."""
+        """Return everything else that a step changes: tensors and plain numbers."""
         ...
 
     def load(self, weights: State, average: State, optimizer: dict[str, Any]) -> None:
@@ -54,7 +54,7 @@ class Fits(Protocol):
         ...
 
     def notes(self) -> dict[str, float]:
-        """Give what else the log should hold since the last call."""
+        """Return what else the log should hold since the last call."""
         ...
 
 
@@ -137,7 +137,7 @@ class Fitter:
         update_average(self._average, self.network.parameters(), ema_decay(schedule, step))
 
     def notes(self) -> dict[str, float]:
-        """Give what else the log should hold; nothing."""
+        """Return what else the log should hold; nothing."""
         return {}
 
     def restore(self, planes: Tensor) -> Tensor:
@@ -146,15 +146,15 @@ class Fitter:
             return torch.as_tensor(self.averaged(planes.to(self.device))).cpu()
 
     def weights(self) -> State:
-        """Give the weights being trained."""
+        """Return the weights being trained."""
         return _to_cpu(self.network.state_dict())
 
     def average(self) -> State:
-        """Give the averaged weights."""
+        """Return the averaged weights."""
         return _to_cpu(self.averaged.state_dict())
 
     def optimizer_state(self) -> dict[str, Any]:
-        """Give the optimiser's state: tensors and plain numbers."""
+        """Return the optimiser's state: tensors and plain numbers."""
         return self._optimizer.state_dict()
 
     def load(self, weights: State, average: State, optimizer: dict[str, Any]) -> None:

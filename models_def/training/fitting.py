@@ -68,12 +68,12 @@ class FittingKind(Protocol):
     """A kind of camera with fitters of its own."""
 
     def fitting(self, request: FitRequest) -> OwnFitting | None:
-        """Give the fitter of a role, None for the house's; raise ContractError if it lacks."""
+        """Return the fitter of a role, None for the house's; raise ContractError if it lacks."""
         ...
 
 
 def own_fitting(kind: str, request: FitRequest) -> OwnFitting | None:
-    """Give the fitter that a kind brings for a role, None for the house's.
+    """Return the fitter that a kind brings for a role, None for the house's.
 
     Raises:
         ContractError: If something is missing, or files were given in vain.

@@ -37,14 +37,14 @@ class Material(Protocol):
 
     @property
     def designed(self) -> Mapping[str, bytes]:
-        """Give its optics as designed, as a bundle holds them: name of a member -> content.
+        """Return its optics as designed, as a bundle holds them: name of a member -> content.
 
         A lens is `prescription.toml`, a plate `plate.toml`; empty where there is neither.
         """
         ...
 
     def digest(self) -> str:
-        """Give the sha256 of all that decides samples."""
+        """Return the sha256 of all that decides samples."""
         ...
 
     def write(self, folder: Path) -> None:
@@ -77,7 +77,7 @@ class Judge(Protocol):
     """Fixed captures that are never trained on."""
 
     def baselines(self) -> Mapping[str, float]:
-        """Give what a network must beat: name -> mean dB."""
+        """Return what a network must beat: name -> mean dB."""
         ...
 
     def score(self, restore: Restorer) -> Score:
@@ -120,7 +120,7 @@ class TrainingKind(Protocol[R, M]):
         ...
 
     def design(self, recipe: R) -> Design:
-        """Give the camera as its bundle will state it."""
+        """Return the camera as its bundle will state it."""
         ...
 
     def build_network(self, name: str, **config: Any) -> nn.Module:
@@ -128,7 +128,7 @@ class TrainingKind(Protocol[R, M]):
         ...
 
     def layout(self, recipe: R, role: str) -> SampleLayout:
-        """Say what the samples of a role hold, and so what its networks take and give."""
+        """Return what the samples of a role hold, and so what its networks take and give."""
         ...
 
     def finish(self, recipe: R, role: str) -> Finish | None:
@@ -144,7 +144,7 @@ class TrainingKind(Protocol[R, M]):
         ...
 
     def samples_digest(self, recipe: R, role: str, seed: int) -> str:
-        """Give a hash of all in the recipe that decides the samples, to name their pool by."""
+        """Return a hash of all in the recipe that decides the samples, to name their pool by."""
         ...
 
     def maker(
@@ -159,7 +159,7 @@ class TrainingKind(Protocol[R, M]):
 
 
 def training_kind(name: str) -> TrainingKind[Any, Any]:
-    """Give the part of a kind that training asks.
+    """Return the part of a kind that training asks.
 
     Raises:
         UnsupportedError: If there is no such kind, or it cannot be trained.

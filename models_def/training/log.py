@@ -104,5 +104,5 @@ def plot_logs(logs: Mapping[str, Path | Sequence[Path]], chart: Path) -> None:
 
 
 def _baselines(entry: Mapping[str, Any]) -> list[float]:
-    """Give what stands in an entry beside the network's own dB."""
+    """Return what stands in an entry beside the network's own dB."""
     return [v for k, v in entry.items() if k.endswith("_db") and k != "valid_db"]

@@ -20,7 +20,7 @@ RANGE_PX: Final = 5
 
 
 def patch_errors(output: Tensor, target: Tensor, weight: Tensor) -> Tensor:
-    """Give the mean squared error per patch in the square-root domain.
+    """Return the mean squared error per patch in the square-root domain.
 
     Args:
         output: (b, c, h, w) stabilised.
@@ -35,19 +35,19 @@ def patch_errors(output: Tensor, target: Tensor, weight: Tensor) -> Tensor:
 
 
 def patch_distances(output: Tensor, target: Tensor, weight: Tensor) -> Tensor:
-    """Give the mean |difference| per patch, (b,), as `patch_errors` has the mean square."""
+    """Return the mean |difference| per patch, (b,), as `patch_errors` has the mean square."""
     judged, gap = _gap(output, target, weight)
     return gap.abs().sum((1, 2, 3)) / judged.sum((1, 2, 3)).clamp(min=1)
 
 
 def _gap(output: Tensor, target: Tensor, weight: Tensor) -> tuple[Tensor, Tensor]:
-    """Say what is judged, and give its difference in the square-root domain, 0 elsewhere."""
+    """Return what is judged, and give its difference in the square-root domain, 0 elsewhere."""
     judged = target >= 0
     return judged, torch.where(judged, output - target, 0.0) * weight[:, :, None, None]
 
 
 def overshoots(output: Tensor, target: Tensor, weight: Tensor) -> Tensor:
-    """Give the mean square of what leaves the range of the target around each pixel, per patch.
+    """Return the mean square of what leaves the range of the target around each pixel, per patch.
 
     A square's range is that of 5x5 pixels of the target. A halo is such an overshoot, a missing
     edge is none: this is no measure of sharpness, and belongs beside `patch_errors`.
@@ -71,7 +71,7 @@ def overshoots(output: Tensor, target: Tensor, weight: Tensor) -> Tensor:
 
 
 def training_loss(loss: str, errors: Tensor) -> Tensor:
-    """Give the scalar to minimise from the (b,) errors of the patches, of l1 their distances.
+    """Return the scalar to minimise from the (b,) errors of the patches, of l1 their distances.
 
     `log_mse` weighs patches by their relative error, as the mean of PSNR does, down to a floor
     below which a patch counts as good.

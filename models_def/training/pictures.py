@@ -31,7 +31,7 @@ Generator = np.random.Generator
 
 
 def list_pictures(folder: Path | None) -> tuple[Path, ...]:
-    """Give the pictures of a folder by name; none without a folder.
+    """Return the pictures of a folder by name; none without a folder.
 
     Raises:
         ContractError: If a folder is named that is not there or holds no picture.
@@ -95,7 +95,7 @@ def _to_srgb(picture: NDArray[np.uint8], profile: bytes, name: str) -> NDArray[n
 
 
 def to_linear(picture: NDArray[np.uint8]) -> FloatArray:
-    """Give (3, h, w) float32 linear Rec.709 from (h, w, 3) 8-bit sRGB."""
+    """Return (3, h, w) float32 linear Rec.709 from (h, w, 3) 8-bit sRGB."""
     return np.ascontiguousarray(SRGB_TABLE[picture].transpose(2, 0, 1))
 
 
@@ -164,7 +164,7 @@ class SceneSource:
         return np.ascontiguousarray(best.transpose(2, 0, 1), dtype=np.float32)
 
     def _draw_picture(self, rng: Generator) -> NDArray[Any]:
-        """Give (h, w, 3) uint8 sRGB of a picture or float16 linear of a scene."""
+        """Return (h, w, 3) uint8 sRGB of a picture or float16 linear of a scene."""
         from_file = bool(self.pictures) and rng.random() < self.picture_share
         if from_file:
             key = int(rng.integers(len(self.pictures)))

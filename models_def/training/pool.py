@@ -81,7 +81,7 @@ class PoolFiles:
         self.cpu_s: NDArray[np.float64] = _map(folder / "cpu.f64", np.float64, (MAX_WORKERS,))
 
     def next_missing(self, share: tuple[int, int] = (0, 1)) -> int | None:
-        """Give the first sample below the goal that is not there; share is (worker, workers)."""
+        """Return the first sample below the goal that is not there; share is (worker, workers)."""
         goal = int(self.goal[0])
         indices = np.arange(max(0, goal - self.size), max(0, goal))
         missing = indices[self.slots[indices % self.size] != indices + 1]
@@ -89,7 +89,7 @@ class PoolFiles:
         return int(missing[0]) if missing.size else None
 
     def are_ready(self, low: int, end: int) -> bool:
-        """Tell whether the samples low .. end - 1 are all there."""
+        """Return whether the samples low .. end - 1 are all there."""
         indices = np.arange(low, end)
         return bool((self.slots[indices % self.size] == indices + 1).all())
 
@@ -187,7 +187,7 @@ class SamplePool:
         return float(self._files.cpu_s.sum())
 
     def span(self, step: int) -> tuple[int, int]:
-        """Give the samples (low, end) that a step may draw from."""
+        """Return the samples (low, end) that a step may draw from."""
         data = self._recipe.data
         end = data.first_samples + step // data.steps_per_sample
         return max(0, end + AHEAD - data.pool_samples), end
@@ -289,7 +289,7 @@ def pool_folder(
     *,
     seed: int,
 ) -> Path:
-    """Give where the pool of these samples lies."""
+    """Return where the pool of these samples lies."""
     names = "" if pictures is None else ",".join(sorted(p.name for p in pictures.iterdir()))
     digest = training_kind(recipe.kind).samples_digest(recipe, role, seed)
     return folder / f"pool-{_short_hash(''.join((digest, material.digest(), names)))}"

@@ -36,7 +36,7 @@ def _report(files: PoolFiles, number: int) -> None:
 
 
 def _parent_is_gone() -> bool:
-    """Tell whether the other end of stdin is closed; the trainer never writes to it."""
+    """Return whether the other end of stdin is closed; the trainer never writes to it."""
     readable, _, _ = select.select([sys.stdin], [], [], 0)
     return bool(readable)
 

@@ -6,7 +6,7 @@ from camkit.models_def.training.recipe import ScheduleRecipe
 
 
 def half_precision(schedule: ScheduleRecipe, device: torch.device, progress: float) -> bool:
-    """Say whether a step multiplies in bfloat16.
+    """Return whether a step multiplies in bfloat16.
 
     A processor without instructions for it emulates them, several times slower than float32, and
     so computes in float32.
@@ -22,7 +22,7 @@ def half_precision(schedule: ScheduleRecipe, device: torch.device, progress: flo
 
 
 def multiplies_bfloat16(device: torch.device) -> bool:
-    """Say whether a device multiplies bfloat16 itself; of devices but CPUs it is assumed."""
+    """Return whether a device multiplies bfloat16 itself; of devices but CPUs it is assumed."""
     if device.type != "cpu":
         return True
     known = torch.cpu.get_capabilities()

@@ -241,7 +241,7 @@ class Recipe:
     networks: Mapping[str, Mapping[str, NetworkRecipe]]
 
     def role(self, name: str | None) -> str:
-        """Give a role by its name, or the only one.
+        """Return a role by its name, or the only one.
 
         Raises:
             ContractError: If there is no such role, or several to choose from.
@@ -256,7 +256,7 @@ class Recipe:
         return name
 
     def network(self, size: str, role: str | None = None) -> NetworkRecipe:
-        """Give the network of a size, or raise ContractError naming the sizes there are."""
+        """Return the network of a size, or raise ContractError naming the sizes there are."""
         sizes = self.networks[self.role(role)]
         if size not in sizes:
             raise ContractError(
@@ -304,7 +304,7 @@ def common_tables(
 
 
 def mosaic_sensor(sensor: Sensor) -> BayerSensor:
-    """Give a sensor with a mosaic of which training knows all that it simulates.
+    """Return a sensor with a mosaic of which training knows all that it simulates.
 
     Raises:
         ContractError: If it is another, or its size or response is not stated.
@@ -317,7 +317,7 @@ def mosaic_sensor(sensor: Sensor) -> BayerSensor:
 
 
 def with_new_names(table: Mapping[str, Any], older: Mapping[str, str]) -> Mapping[str, Any]:
-    """Give the table of today's names, from one that may hold older ones.
+    """Return the table of today's names, from one that may hold older ones.
 
     Checkpoints carry their recipe as text, so older names are read for ever.
 
@@ -343,7 +343,7 @@ def differing_part(one: Recipe, other: Recipe, parts: Iterable[str]) -> str | No
 
 
 def own_schedule(where: str, table: Any, base: ScheduleRecipe) -> ScheduleRecipe:
-    """Give a schedule with what a table changes of it.
+    """Return a schedule with what a table changes of it.
 
     Raises:
         ContractError: If a key is unknown or wrong.

@@ -64,7 +64,7 @@ class RefiningKind(Protocol):
 
 
 def refining_kind(name: str) -> RefiningKind:
-    """Give the part of a kind that fine-tunes.
+    """Return the part of a kind that fine-tunes.
 
     Raises:
         UnsupportedError: If its networks are not fine-tuned.

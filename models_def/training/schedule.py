@@ -20,7 +20,7 @@ def progress_of(step: int, steps: int, by_time: float = 0.0) -> float:
 
 
 def learning_rate(recipe: ScheduleRecipe, step: int, progress: float) -> float:
-    """Give the rate: linear warm-up, then a half cosine over the progress."""
+    """Return the rate: linear warm-up, then a half cosine over the progress."""
     warmup = min(1.0, (step + 1) / max(1, recipe.warmup_steps))
     cosine = 0.5 * (1 + math.cos(math.pi * progress))
     floor = recipe.final_rate
@@ -28,7 +28,7 @@ def learning_rate(recipe: ScheduleRecipe, step: int, progress: float) -> float:
 
 
 def ema_decay(recipe: ScheduleRecipe, step: int) -> float:
-    """Give the decay of the weight average; shorter at the start, so that it soon follows."""
+    """Return the decay of the weight average; shorter at the start, so that it soon follows."""
     return min(recipe.ema_decay, (step + 1) / (step + 10))
 
 

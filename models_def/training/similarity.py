@@ -15,7 +15,7 @@ _STABLE: Final = (0.01**2, 0.03**2)
 
 
 def ssim(one: Tensor, other: Tensor) -> Tensor:
-    """Give the mean SSIM (b,) of pictures (b, c, h, w) with values in 0..1, 11 px Gaussian."""
+    """Return the mean SSIM (b,) of pictures (b, c, h, w) with values in 0..1, 11 px Gaussian."""
     channels = one.shape[1]
     line = torch.arange(-_RADIUS_PX, _RADIUS_PX + 1, dtype=one.dtype, device=one.device)
     weight = torch.exp(-0.5 * (line / _SIGMA_PX) ** 2)

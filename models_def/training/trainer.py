@@ -146,7 +146,7 @@ class TrainResult:
     valid_db: float
 
     def to_json(self) -> dict[str, Any]:
-        """Give the result as a flat mapping of plain values."""
+        """Return the result as a flat mapping of plain values."""
         flat = {f"{name}_db": db for name, db in self.baselines.items()}
         return {
             "checkpoint": str(self.checkpoint),
@@ -261,7 +261,7 @@ def check_layout(name: str, network: nn.Module, layout: SampleLayout) -> None:
 
 
 def checkpoint_path(recipe: Recipe, options: TrainOptions, refinement: Refinement | None) -> Path:
-    """Give the file that a run writes its checkpoints to."""
+    """Return the file that a run writes its checkpoints to."""
     label = _label(recipe.role(options.role), options.size)
     name = f"{recipe.name}_{label}" + ("" if refinement is None else f"_{refinement.name}")
     return options.out_dir / f"{name}.pt"

@@ -69,7 +69,7 @@ def restoration_bank(
 def block_filter(
     method: str, settings: Wiener, noise: NoiseModel, kernel_px: int | None = None
 ) -> BlockFilter:
-    """Give the block filter of a method; see `wiener_filter`.
+    """Return the block filter of a method; see `wiener_filter`.
 
     Raises:
         UnsupportedError: If the method is unknown.
@@ -86,7 +86,7 @@ def block_filter(
 
 
 def method_numbers(method: str) -> Mapping[str, float]:
-    """Give the numbers by which a method other than the filter works, by name.
+    """Return the numbers by which a method other than the filter works, by name.
 
     Raises:
         UnsupportedError: If the method is unknown.
@@ -115,7 +115,7 @@ def richardson_lucy_filter(
     rounds: int | None = None,
     rounds_per_snr: float = RL_ROUNDS_PER_SNR,
 ) -> BlockFilter:
-    """Give Richardson-Lucy as a block filter.
+    """Return Richardson-Lucy as a block filter.
 
     Args:
         noise: Noise after white balance.

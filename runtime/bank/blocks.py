@@ -92,11 +92,11 @@ class LocalPsf:
 
     @property
     def channels(self) -> int:
-        """Give the number of channels."""
+        """Return the number of channels."""
         return int(self.kernels.kernels.shape[1])
 
     def position_mm(self, x_px: float, y_px: float) -> tuple[float, float]:
-        """Give the sensor position of a pixel position of the capture."""
+        """Return the sensor position of a pixel position of the capture."""
         x_mm, y_mm = self.window.to_mm(x_px, y_px)
         return float(x_mm), float(y_mm)
 
@@ -164,7 +164,7 @@ def lay_spans(size_px: int, block_px: int, overlap_px: int) -> tuple[Span, ...]:
 
 
 def cut_block_px(block_px: int, overlap_px: int, size_px: tuple[int, int]) -> int:
-    """Give the side of the blocks of a picture: none much larger than the picture is.
+    """Return the side of the blocks of a picture: none much larger than the picture is.
 
     Args:
         block_px: As the bundle states it.
@@ -219,13 +219,13 @@ def to_otf(kernel: FloatArray, block_px: int) -> ComplexArray:
 
 
 def _halves(length: int, middle: int) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
-    """Give (in the block, in the kernel) of what lies from the centre on, and before it."""
+    """Return (in the block, in the kernel) of what lies from the centre on, and before it."""
     before = slice(-middle, None) if middle else slice(0, 0)
     return (slice(0, length - middle), slice(middle, None)), (before, slice(0, middle))
 
 
 def mirror_otf(otf: ComplexArray, *, flip_x: bool, flip_y: bool) -> ComplexArray:
-    """Give the OTF of the kernel mirrored left-right and/or up-down."""
+    """Return the OTF of the kernel mirrored left-right and/or up-down."""
     if flip_x != flip_y:
         turned = np.empty_like(otf)
         turned[:, 0] = otf[:, 0]
@@ -293,7 +293,7 @@ def _shrink(planes: FloatArray, factor: int, *, axis: int) -> FloatArray:
 
 @lru_cache(maxsize=4)
 def taper_weights(size_px: int, ring_px: int) -> FloatArray:
-    """Give (b, b): 1 inside, falling as sin^2 to 0 over the ring."""
+    """Return (b, b): 1 inside, falling as sin^2 to 0 over the ring."""
     line = np.ones(size_px, dtype=np.float32)
     line[:ring_px] = np.sin(np.pi / 2 * (np.arange(ring_px) + 0.5) / ring_px) ** 2
     line = np.minimum(line, line[::-1])
@@ -405,7 +405,7 @@ class BlockBank:
     def _restore(
         self, strip: "_Strip", pool: ThreadPoolExecutor, cancel: Cancel | None
     ) -> Iterator[FloatArray]:
-        """Give the windowed blocks of one block row, from left to right."""
+        """Return the windowed blocks of one block row, from left to right."""
         psf, y_px = self._psf, strip.span.centre
         places = [
             (psf.number_at(c.centre, y_px), psf.position_mm(c.centre, y_px)) for c in self._columns
@@ -435,7 +435,7 @@ class BlockBank:
         return pool.map(restore, self._columns, places)
 
     def _place(self, place: "_Numbered") -> "_Place":
-        """Give the OTF of a place, and what the filter knows of it."""
+        """Return the OTF of a place, and what the filter knows of it."""
         number, place_mm = place
         otf = to_otf(self._psf.kernels_of(number).at(*place_mm), self._block_px)
         # Kernels of one field are those of many heights.
@@ -462,7 +462,7 @@ class BlockBank:
 
 
 def _lengthened(planes: FloatArray, rows: int) -> FloatArray:
-    """Give the planes with zero rows added below, `rows` in all."""
+    """Return the planes with zero rows added below, `rows` in all."""
     longer = np.zeros((planes.shape[0], rows, planes.shape[2]), dtype=np.float32)
     longer[:, : planes.shape[1]] = planes
     return longer
@@ -491,11 +491,11 @@ class _Strip:
     plain: PlainBlock | None = None
 
     def is_plain(self, column: Span) -> bool:
-        """Tell whether a block stays as it is."""
+        """Return whether a block stays as it is."""
         return self.plain is not None and self.plain(self.span, column)
 
     def cut(self, column: Span) -> _Cut:
-        """Give samples and clipped samples of one block."""
+        """Return samples and clipped samples of one block."""
         samples = _taken(self.rows, column.index, axis=2)
         if self.saturated is None:
             return samples, None

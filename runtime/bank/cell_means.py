@@ -16,7 +16,7 @@ COLOURS = 3
 
 
 def cell_count(side_px: int, cell_px: int) -> int:
-    """Give the cells along a side."""
+    """Return the cells along a side."""
     return max(1, (side_px + cell_px // 2) // cell_px)
 
 
@@ -60,7 +60,7 @@ def cell_means(
 
 
 def _sites(cfa: CfaPattern | None, channels: int) -> Iterator[list[tuple[int, slice, slice]]]:
-    """Give the (plane, rows, columns) that hold the samples of every channel."""
+    """Return the (plane, rows, columns) that hold the samples of every channel."""
     if cfa is None:
         yield from ([(plane, slice(None), slice(None))] for plane in range(channels))
         return
@@ -77,7 +77,7 @@ def _sites(cfa: CfaPattern | None, channels: int) -> Iterator[list[tuple[int, sl
 def _gathered(
     line: NDArray[np.float64] | NDArray[np.bool_], columns: int, cell_px: int, across: slice
 ) -> NDArray[np.float64]:
-    """Give the sums over cells of samples along a row; the last cell takes the rest."""
+    """Return the sums over cells of samples along a row; the last cell takes the rest."""
     if not line.size:  # a colour without a column in a capture one pixel wide
         return np.zeros(columns)
     first = np.arange(columns) * cell_px // (across.step or 1)

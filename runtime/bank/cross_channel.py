@@ -66,17 +66,17 @@ class Other:
     steps: FloatArray
 
     def compared(self, plane: FloatArray) -> FloatArray:
-        """Give W x, (2, b, b)."""
+        """Return W x, (2, b, b)."""
         return np.asarray(np.stack(differences(plane)) * self.light - plane * self.steps)
 
     def back(self, lines: FloatArray) -> FloatArray:
-        """Give the adjoint of `compared`, (b, b)."""
+        """Return the adjoint of `compared`, (b, b)."""
         along = np.einsum("dij,dij->ij", lines, self.steps)
         return np.asarray(backward(*(lines * self.light)) - along)
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Give what the square of W x weighs of |D x|^2 and |x|^2 at most."""
+        """Return what the square of W x weighs of |D x|^2 and |x|^2 at most."""
         steps = float(np.square(self.steps).sum(axis=0).max())
         return 2 * float(np.square(self.light).max()), 2 * steps
 
@@ -103,7 +103,7 @@ class Colour:
 
     @property
     def metric(self) -> NDArray[np.float32]:
-        """Give M over frequencies, (b, b // 2 + 1)."""
+        """Return M over frequencies, (b, b // 2 + 1)."""
         of_steps, of_light = 1.0, 0.0
         for other in self.others:
             steps, light = other.bounds
@@ -113,24 +113,24 @@ class Colour:
 
     @property
     def weights(self) -> FloatArray:
-        """Give the largest length of each dual, (1 + others, 1, 1)."""
+        """Return the largest length of each dual, (1 + others, 1, 1)."""
         found = [self.tv, *(self.cross for _ in self.others)]
         return np.array(found, dtype=np.float32)[:, None, None]
 
     def applied(self, plane: FloatArray) -> FloatArray:
-        """Give K x, (1 + others, 2, b, b)."""
+        """Return K x, (1 + others, 2, b, b)."""
         steps = np.stack(differences(plane))
         return np.stack([steps, *(other.compared(plane) for other in self.others)])
 
     def back(self, duals: FloatArray) -> FloatArray:
-        """Give K^T p, (b, b)."""
+        """Return K^T p, (b, b)."""
         found = backward(*duals[0])
         for other, lines in zip(self.others, duals[1:], strict=True):
             found = found + other.back(lines)
         return found
 
     def cost(self, plane: FloatArray) -> float:
-        """Give F of x (b, b), times V."""
+        """Return F of x (b, b), times V."""
         misfit = apply_transfer(plane[None], self.otf[None])[0] - self.samples
         lengths = _lengths(self.applied(plane)).sum(axis=(-2, -1), dtype=np.float64)
         fit = 0.5 * float(np.square(misfit, dtype=np.float64).sum())
@@ -138,7 +138,7 @@ class Colour:
 
 
 def compared_with(light: FloatArray) -> Other:
-    """Give a colour as others are compared with it; m is its brightest sample here or next to here.
+    """Return colour as others are compared with it; m is its brightest sample here or next to here.
 
     Args:
         light: (b, b) u, 1 at its level.
@@ -152,7 +152,7 @@ def compared_with(light: FloatArray) -> Other:
 
 
 def solved(colour: Colour, rounds: int) -> FloatArray:
-    """Give x of one colour, (b, b), after some rounds from black."""
+    """Return x of one colour, (b, b), after some rounds from black."""
     side = len(colour.samples)
     metric, weights = colour.metric, colour.weights
     data = np.conj(colour.otf) * transform(colour.samples[None])[0]
@@ -176,7 +176,7 @@ def cross_channel_filter(
     cross_weight: float = CROSS_WEIGHT,
     rounds: int = CROSS_ROUNDS,
 ) -> BlockFilter:
-    """Give deconvolution with the cross-channel prior as a block filter.
+    """Return deconvolution with the cross-channel prior as a block filter.
 
     Args:
         noise: Noise after white balance.
@@ -211,11 +211,11 @@ def cross_channel_filter(
 
 
 def sharpest_first(otf: ComplexArray) -> list[int]:
-    """Give the colours of (c, b, b // 2 + 1) transfers by their mean squares, falling."""
+    """Return the colours of (c, b, b // 2 + 1) transfers by their mean squares, falling."""
     power = np.square(np.abs(otf)).mean(axis=(-2, -1))
     return [int(c) for c in np.argsort(-power, kind="stable")]
 
 
 def _lengths(lines: FloatArray) -> FloatArray:
-    """Give the lengths (n, b, b) of (n, 2, b, b) lines."""
+    """Return the lengths (n, b, b) of (n, 2, b, b) lines."""
     return np.asarray(np.sqrt(np.square(lines).sum(axis=1)))

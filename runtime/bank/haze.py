@@ -74,7 +74,7 @@ class HazyKernels:
     differ: bool = False
 
     def scaled(self, ratio: float) -> "HazyKernels":
-        """Give the kernels scaled about their centres; see `FieldKernels.scaled`."""
+        """Return the kernels scaled about their centres; see `FieldKernels.scaled`."""
         return HazyKernels(
             core=self.core.scaled(ratio),
             coarse_core=self.coarse_core.scaled(ratio),
@@ -98,19 +98,19 @@ class Lit:
     light: FloatGrid
 
     def at(self, x_mm: float, y_mm: float) -> FloatArray:
-        """Give the kernels (c, n, n) of an image point, with their light."""
+        """Return the kernels (c, n, n) of an image point, with their light."""
         return self.kernels.at(x_mm, y_mm) * self.light_at(x_mm, y_mm)[:, None, None]
 
     def outward(self, x_mm: float, y_mm: float) -> FloatArray:
-        """Give them with +y pointing outward; see `FieldKernels.outward`."""
+        """Return them with +y pointing outward; see `FieldKernels.outward`."""
         return self.kernels.outward(x_mm, y_mm) * self.light_at(x_mm, y_mm)[:, None, None]
 
     def light_at(self, x_mm: float, y_mm: float) -> FloatArray:
-        """Give the light (c,) of an image point, interpolated as the kernels are."""
+        """Return the light (c,) of an image point, interpolated as the kernels are."""
         return self.kernels.between(self.light, x_mm, y_mm)
 
     def scaled(self, ratio: float) -> "Lit":
-        """Give the kernels scaled about their centres; see `FieldKernels.scaled`."""
+        """Return the kernels scaled about their centres; see `FieldKernels.scaled`."""
         return Lit(kernels=self.kernels.scaled(ratio), light=self.light)
 
 
@@ -132,7 +132,7 @@ class CoarseBand:
 
     @property
     def noise_rise(self) -> tuple[float, ...]:
-        """Give what the variance of the noise of every colour is multiplied by, on average."""
+        """Return what the variance of the noise of every colour is multiplied by, on average."""
         square = np.square(self.gain, dtype=np.float64).mean(axis=(-2, -1))
         return tuple(float(v) for v in square)
 
@@ -153,7 +153,7 @@ class CoarseBand:
 def enlarged(
     cells: FloatArray, cell_px: int, down: NDArray[np.intp], across: NDArray[np.intp]
 ) -> FloatArray:
-    """Give a picture in cells (h, w) at pixels, linear between the middles of the cells.
+    """Return a picture in cells (h, w) at pixels, linear between the middles of the cells.
 
     Args:
         cells: Its border holds beyond them.
@@ -226,7 +226,7 @@ def hazy_kernels(
 
 
 def in_cells(kernels: FloatArray, cell_px: int) -> FloatGrid:
-    """Give kernels in cells: the mean over points spread evenly over the middle cell.
+    """Return kernels in cells: the mean over points spread evenly over the middle cell.
 
     Args:
         kernels: (..., h, w) in pixels, odd sides.
@@ -275,7 +275,7 @@ def _lit(kernels: FloatGrid, like: FieldKernels) -> Lit:
 
 
 def cell_window(window: SensorWindow, cell_px: int, margin: int) -> SensorWindow:
-    """Give where the cells of a capture lie on the sensor, and some around them."""
+    """Return where the cells of a capture lie on the sensor, and some around them."""
     width, height = (cell_count(side, cell_px) for side in window.size_px)
     return window.resampled(cell_px, (width, height)).widened(margin)
 
@@ -336,33 +336,33 @@ def solve_coarse(
 
 @lru_cache(maxsize=KEPT_TERMS)
 def few_of(lit: Lit, terms: int) -> tuple[FewKernels, ...]:
-    """Give the few kernels of every channel; kept, since all captures of a camera need them."""
+    """Return the few kernels of every channel; kept, since all captures of a camera need them."""
     nodes = NodeKernels(lit.kernels, lit.light)
     return tuple(few_kernels(nodes.of(c), terms) for c in range(lit.light.shape[1]))
 
 
 def few_are_kept() -> bool:
-    """Tell whether this process has found few kernels of any camera already."""
+    """Return whether this process has found few kernels of any camera already."""
     return few_of.cache_info().currsize > 0
 
 
 @lru_cache(maxsize=KEPT_CAMERAS)
 def filters_of(lit: Lit, terms: int) -> tuple[FewKernels, ...]:
-    """Give few kernels of the filters of every channel, see `place_undo`; kept as `few_of`."""
+    """Return few kernels of the filters of every channel, see `place_undo`; kept as `few_of`."""
     nodes = NodeKernels(lit.kernels, lit.light)
     channels = range(lit.light.shape[1])
     return tuple(few_kernels(undoing_kernels(nodes.of(c)), terms) for c in channels)
 
 
 def _mirrored(cells: FloatArray) -> FloatArray:
-    """Give the cells with a mirrored margin; a single row or column goes on as it is."""
+    """Return the cells with a mirrored margin; a single row or column goes on as it is."""
     if min(cells.shape) < 2:
         return np.pad(cells, MARGIN_CELLS, mode="edge")
     return np.pad(cells, MARGIN_CELLS, mode="reflect")
 
 
 def coarse_work(entry: Dehaze, channels: int) -> float:
-    """Give how often a pixel is transformed, the margins of the cells left aside.
+    """Return how often a pixel is transformed, the margins of the cells left aside.
 
     Filters for every place add less than as much again.
     """
@@ -370,7 +370,7 @@ def coarse_work(entry: Dehaze, channels: int) -> float:
 
 
 def kept_bytes(entry: Dehaze, haze: Haze, channels: int, kernel_scale: float = 1.0) -> int:
-    """Give the memory of what is kept of optics, see `few_of`; arguments as of `solving_bytes`."""
+    """Return memory of what is kept of optics, see `few_of`; arguments as of `solving_bytes`."""
     side = int(haze.kernels.shape[-1] * kernel_scale) + 3
     fields = 2 * haze.kernels.shape[0]
     kept = side**2 * (entry.terms + fields)
@@ -382,7 +382,7 @@ def kept_bytes(entry: Dehaze, haze: Haze, channels: int, kernel_scale: float = 1
 def solving_bytes(
     entry: Dehaze, haze: Haze, channels: int, size_px: tuple[int, int], kernel_scale: float = 1.0
 ) -> int:
-    """Give the memory in which the scene of a capture is found.
+    """Return the memory in which the scene of a capture is found.
 
     Args:
         entry: The manifest's stage.

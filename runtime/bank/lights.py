@@ -187,7 +187,7 @@ def _cover(clipped: Mask, core: int, *, most: int) -> Cells | None:
 def light_share(
     clipped: Mask, side_px: int, kernel_px: int | None, settings: Wiener, *, step_px: int
 ) -> float:
-    """Give the work of explaining as a share of that in the whole block; see `choose_windows`."""
+    """Return the work of explaining as a share of that in the whole block; see `choose_windows`."""
     rule = RULES[settings.clip_windows]
     chosen = choose_windows(clipped, side_px, kernel_px, rule, step_px=step_px)
     if chosen is None:
@@ -197,14 +197,14 @@ def light_share(
 
 
 def fitted_px(settings: Wiener, kernel_px: int | None) -> int | None:
-    """Give the side of the kernel to choose windows by; None where whole blocks are explained."""
+    """Return the side of the kernel to choose windows by; None where whole blocks are explained."""
     reach_px = settings.clip_reach_px
     most_px = RULES[settings.clip_windows].most_reach_px
     return None if reach_px is None or reach_px > most_px else kernel_px
 
 
 def nearness(clipped: Mask, reach_px: int | None) -> FloatArray:
-    """Give (c, h, w): 1 up to half the reach from clipped samples, falling smoothly to 0.
+    """Return (c, h, w): 1 up to half the reach from clipped samples, falling smoothly to 0.
 
     Args:
         clipped: (c, h, w).
@@ -225,7 +225,7 @@ def nearness(clipped: Mask, reach_px: int | None) -> FloatArray:
 
 @lru_cache(maxsize=4)
 def _fade(reach_px: int) -> FloatArray:
-    """Give the nearness by squared distance from the nearest clipped sample."""
+    """Return the nearness by squared distance from the nearest clipped sample."""
     t = np.clip(2 - np.sqrt(np.arange(reach_px**2 + 1)) * 2 / reach_px, 0, 1)
     return np.asarray(t * t * (3 - 2 * t), dtype=np.float32)
 
@@ -233,7 +233,7 @@ def _fade(reach_px: int) -> FloatArray:
 def _unexplained(
     block: Block, found: FloatArray, unknown: Mask, near: FloatArray
 ) -> NDArray[np.float64]:
-    """Give (c,): the sum of squares near the lights that are left unexplained."""
+    """Return (c,): the sum of squares near the lights that are left unexplained."""
     residual = block.samples - apply_transfer(found, block.otf)
     np.copyto(residual, 0, where=unknown)
     np.square(residual, out=residual)

@@ -52,7 +52,7 @@ class Nodes:
 
 
 def node_places(kernels: FieldKernels) -> FloatGrid:
-    """Give where the kernels of optics are stored, on every azimuth where they turn: (node, 2)."""
+    """Return where kernels of optics are stored, on every azimuth where they turn: (node, 2)."""
     if kernels.grid_x_mm is not None and kernels.grid_y_mm is not None:
         return np.stack(np.meshgrid(kernels.grid_x_mm, kernels.grid_y_mm), axis=-1).reshape(-1, 2)
     if not kernels.turns:
@@ -98,7 +98,7 @@ def lay_nodes(kernels: FieldKernels, window: SensorWindow) -> Nodes:
 
 
 def _between(knots_mm: FloatGrid, at_mm: FloatGrid) -> tuple[NDArray[np.intp], FloatGrid]:
-    """Give the knot below places, and the share of the one above; the ends hold beyond them."""
+    """Return the knot below places, and the share of the one above; the ends hold beyond them."""
     if knots_mm.size == 1:
         return np.zeros(at_mm.shape, np.intp), np.zeros(at_mm.shape)
     low = np.clip(np.searchsorted(knots_mm, at_mm, "right") - 1, 0, knots_mm.size - 2)
@@ -115,7 +115,7 @@ def _crossed(
     across: _Axis,
     number: Callable[[NDArray[np.intp], NDArray[np.intp]], NDArray[np.intp]],
 ) -> Nodes:
-    """Give the four nodes about every cell, of which `number` tells which they are."""
+    """Return the four nodes about every cell, of which `number` tells which they are."""
     (row, lower), (column, right) = down, across
     near, share = [], []
     for step, of_row in ((0, 1 - lower), (1, lower)):
@@ -155,7 +155,7 @@ class NodeKernels:
                 self._made[key] = kernels.at(*key)
 
     def of(self, channel: int) -> FloatArray:
-        """Give the kernels (node, n, n) of a channel."""
+        """Return the kernels (node, n, n) of a channel."""
         found = []
         for place, light in zip(self._places_mm, self._light, strict=True):
             kernel = self._made[self._key(place)][channel]
@@ -165,7 +165,7 @@ class NodeKernels:
         return np.stack(found)
 
     def _key(self, place_mm: FloatGrid) -> tuple[float, float]:
-        """Give the place, or of turned kernels that which mirrors it."""
+        """Return the place, or of turned kernels that which mirrors it."""
         x, y = (round(float(along), 9) for along in place_mm)
         return (abs(x), abs(y)) if self._turns else (x, y)
 
@@ -220,7 +220,7 @@ class PlaceBlur:
         self._spectra = np.stack(run_parts(self._spectrum, list(kernels), threads=threads))
 
     def __call__(self, light: FloatArray) -> FloatArray:
-        """Give the blur (h, w) float32 of a picture (h, w); beyond it there is no light."""
+        """Return the blur (h, w) float32 of a picture (h, w); beyond it there is no light."""
         check_wish()
 
         def some(first: int) -> NDArray[np.complex64]:
@@ -239,7 +239,7 @@ class PlaceBlur:
         return self._inverse(total)
 
     def solver(self, damping: float) -> Callable[[FloatArray], FloatArray]:
-        """Give what nearly undoes the blur: the Wiener filter of its mean kernel.
+        """Return what nearly undoes the blur: the Wiener filter of its mean kernel.
 
         Args:
             damping: Added to the kernel's power.
@@ -270,7 +270,7 @@ class PlaceBlur:
 
 
 def few_kernels(kernels: FloatArray, terms: int) -> FewKernels:
-    """Give few kernels that stand for many.
+    """Return few kernels that stand for many.
 
     Args:
         kernels: (node, n, n), n odd.
@@ -298,7 +298,7 @@ def few_kernels(kernels: FloatArray, terms: int) -> FewKernels:
 
 
 def _whole_pairs(lengths: FloatGrid, most: int) -> int:
-    """Give how many directions to keep, of the longest: equal ones are kept or left together.
+    """Return how many directions to keep, of the longest: equal ones are kept or left together.
 
     Two equally long directions, as sine and cosine of the azimuth are, may be any two of their
     plane: which of them the last bits of the kernels would decide.

@@ -23,7 +23,7 @@ DAMPING: Final = 1e-2
 
 
 def cores_differ(haze: Haze) -> bool:
-    """Tell whether every place needs a filter of its own.
+    """Return whether every place needs a filter of its own.
 
     Fields on a line stand for the rings between them, others for equal areas.
 
@@ -41,12 +41,12 @@ def cores_differ(haze: Haze) -> bool:
 
 
 def filter_side(side: int) -> int:
-    """Give the side in cells of the filter of a kernel."""
+    """Return the side in cells of the filter of a kernel."""
     return 2 * side - 1
 
 
 def undoing_kernels(kernels: FloatArray) -> FloatArray:
-    """Give the Wiener filter of every kernel, made to hold all light.
+    """Return the Wiener filter of every kernel, made to hold all light.
 
     Args:
         kernels: (node, n, n), n odd.

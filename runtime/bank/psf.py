@@ -66,7 +66,7 @@ def wavelength_weights(
 
 
 def _hats(knots_um: FloatGrid, at_um: FloatGrid) -> FloatGrid:
-    """Give (knot, n): the linear interpolation weights of every knot at n points."""
+    """Return (knot, n): the linear interpolation weights of every knot at n points."""
     return np.stack([np.interp(at_um, knots_um, unit) for unit in np.eye(knots_um.size)])
 
 
@@ -105,11 +105,11 @@ class FieldKernels:
 
     @property
     def turns(self) -> bool:
-        """Tell whether kernels are turned with the azimuth, and mirrored from one quadrant."""
+        """Return whether kernels are turned with the azimuth, and mirrored from one quadrant."""
         return self.symmetry == "radial" and self.field_heights_mm.size > 1
 
     def at(self, x_mm: float, y_mm: float) -> FloatArray:
-        """Give the kernels of an image point.
+        """Return the kernels of an image point.
 
         Args:
             x_mm: Position from the axis, to the right.
@@ -123,7 +123,7 @@ class FieldKernels:
         return _kernel_at(self.kernels, self.field_heights_mm, x_mm, y_mm, turns=self.turns)
 
     def outward(self, x_mm: float, y_mm: float) -> FloatArray:
-        """Give the kernels of an image point as rows and columns of its own: +y points outward.
+        """Return the kernels of an image point as rows and columns of its own: +y points outward.
 
         Args:
             x_mm: See `at`.
@@ -141,7 +141,7 @@ class FieldKernels:
         return _normalised(_turn(kernels, -x_mm / height_mm, y_mm / height_mm))
 
     def between(self, values: FloatArray | FloatGrid, x_mm: float, y_mm: float) -> FloatArray:
-        """Give what else is known at the fields at an image point: linear, as the kernels are.
+        """Return what else is known at the fields at an image point: linear, as the kernels are.
 
         Args:
             values: (field, ...); nothing of them is turned.
@@ -157,7 +157,7 @@ class FieldKernels:
         return np.asarray(_blend(values, self.field_heights_mm, height_mm), np.float32)
 
     def scaled(self, ratio: float) -> "FieldKernels":
-        """Give the kernels scaled about their centres, odd sides and sums of 1 kept.
+        """Return the kernels scaled about their centres, odd sides and sums of 1 kept.
 
         Args:
             ratio: New pixels per old pixel; > 0.
@@ -241,7 +241,7 @@ def _kernel_at(
     *,
     turns: bool,
 ) -> FloatArray:
-    """Give the kernel of an image point, turned so that its radial direction points outward.
+    """Return the kernel of an image point, turned so that its radial direction points outward.
 
     Linear in the field height (the last one holds beyond it), a Catmull-Rom gather for the turn,
     zero outside, negatives cut, normalised. On the axis nothing is turned.
@@ -287,7 +287,7 @@ def _blend_grid(
 
 
 def _neighbours(positions_mm: FloatGrid, at_mm: float) -> tuple[int, float]:
-    """Give the sample below a position, and the share of the one above it."""
+    """Return the sample below a position, and the share of the one above it."""
     if positions_mm.size == 1:
         return 0, 0.0
     inside = min(max(at_mm, positions_mm[0]), positions_mm[-1])
@@ -351,7 +351,7 @@ def _reached(places: FloatGrid, kernel: FloatArray, *, axis: int) -> NDArray[np.
 
 
 def _catmull_rom(t: FloatGrid) -> list[FloatArray]:
-    """Give the weights of the samples -1, 0, 1, 2 for positions t in 0..1.
+    """Return the weights of the samples -1, 0, 1, 2 for positions t in 0..1.
 
     They are 1/2 of 2 t^2 - t^3 - t, 3 t^3 - 5 t^2 + 2, 4 t^2 - 3 t^3 + t and t^3 - t^2.
     """

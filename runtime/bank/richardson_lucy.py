@@ -57,7 +57,7 @@ def richardson_lucy(
 
 
 def background_of(noise: NoiseModel) -> FloatArray:
-    """Give read_variance / shot as (c, 1, 1): the light that would make the read noise."""
+    """Return read_variance / shot as (c, 1, 1): the light that would make the read noise."""
     shot = np.maximum(np.array(noise.shot), 1e-12)
     return np.asarray(np.array(noise.read_variance) / shot, dtype=np.float32)[:, None, None]
 

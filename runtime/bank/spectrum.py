@@ -28,7 +28,7 @@ _INVERSE: Final = cv2.DFT_INVERSE | cv2.DFT_REAL_OUTPUT
 
 
 def transform(planes: FloatArray) -> ComplexArray:
-    """Give the spectrum of real planes, as `numpy.fft.rfft2` does.
+    """Return the spectrum of real planes, as `numpy.fft.rfft2` does.
 
     Args:
         planes: (c, h, w) float32; not changed.
@@ -46,7 +46,7 @@ def transform(planes: FloatArray) -> ComplexArray:
 
 
 def inverse(half: ComplexArray, width: int) -> FloatArray:
-    """Give the real planes of a spectrum, as `numpy.fft.irfft2` does.
+    """Return the real planes of a spectrum, as `numpy.fft.irfft2` does.
 
     Args:
         half: (c, h, w // 2 + 1) complex64 of `transform`; not changed.
@@ -79,7 +79,7 @@ def apply_transfer(samples: FloatArray, transfer: ComplexArray) -> FloatArray:
 
 
 def to_packed(planes: FloatArray) -> FloatArray:
-    """Give the spectra of real planes (c, h, w) float32 in packed planes of the same shape."""
+    """Return the spectra of real planes (c, h, w) float32 in packed planes of the same shape."""
     packed = np.empty(planes.shape, dtype=np.float32)
     for plane, out in zip(planes, packed, strict=True):
         cv2.dft(np.ascontiguousarray(plane), dst=out)
@@ -96,7 +96,7 @@ def from_packed(packed: FloatArray) -> FloatArray:
 
 
 def packed_spectrum(half: ComplexArray, width: int) -> FloatArray:
-    """Give the half spectrum (c, h, w // 2 + 1) of real planes in packed planes (c, h, w)."""
+    """Return the half spectrum (c, h, w // 2 + 1) of real planes in packed planes (c, h, w)."""
     packed = np.empty((*half.shape[:2], width), dtype=np.float32)
     _pairs(packed)[:] = half[:, :, 1 : 1 + (width - 1) // 2]
     for column, frequency in _packed_columns(width):
@@ -105,7 +105,7 @@ def packed_spectrum(half: ComplexArray, width: int) -> FloatArray:
 
 
 def packed_power(packed: FloatArray) -> FloatArray:
-    """Give the power of spectra in packed planes (c, h, w), at both parts of every frequency."""
+    """Return the power of spectra in packed planes (c, h, w), at both parts of every frequency."""
     power = np.square(packed)
     for column, _ in _packed_columns(packed.shape[2]):
         _sum_pairs(power[:, :, column])
@@ -123,7 +123,7 @@ def _sum_pairs(lines: FloatArray) -> None:
 
 
 def spread_weights(half: FloatArray, width: int) -> FloatArray:
-    """Give real weights (c, h, w // 2 + 1), alike at f and -f, for packed planes (c, h, w)."""
+    """Return real weights (c, h, w // 2 + 1), alike at f and -f, for packed planes (c, h, w)."""
     inner, height = (width - 1) // 2, half.shape[1]
     spread = np.empty((*half.shape[:2], width), dtype=np.float32)
     for weights, plane in zip(half[:, :, 1 : 1 + inner], spread, strict=True):
@@ -138,7 +138,7 @@ def spread_weights(half: FloatArray, width: int) -> FloatArray:
 def packed_places(
     rows: NDArray[np.intp], columns: NDArray[np.intp], size: tuple[int, int]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Give where real and imaginary parts of frequencies lie in a packed plane, flattened.
+    """Return where real and imaginary parts of frequencies lie in a packed plane, flattened.
 
     Args:
         rows: Of the half spectrum.
@@ -169,12 +169,12 @@ def _pairs(packed: FloatArray) -> ComplexArray:
 
 
 def _packed_columns(width: int) -> list[tuple[int, int]]:
-    """Give (packed column, frequency) of the columns that hold the spectrum of a real line."""
+    """Return (packed column, frequency) of the columns that hold the spectrum of a real line."""
     return [(0, 0)] if width % 2 else [(0, 0), (width - 1, width // 2)]
 
 
 def _unpack_column(lines: FloatArray) -> ComplexArray:
-    """Give the whole spectrum (c, h) of packed lines: re 0, re 1, im 1, ..., [re h / 2]."""
+    """Return the whole spectrum (c, h) of packed lines: re 0, re 1, im 1, ..., [re h / 2]."""
     count, height = lines.shape
     spectrum = np.zeros((count, height), dtype=np.complex64)
     spectrum.real[:, 0] = lines[:, 0]

@@ -100,7 +100,7 @@ class Transfer:
 
 @lru_cache(maxsize=4)
 def shapes_of(together: Together, block_px: int) -> Shapes:
-    """Give the shapes of a block."""
+    """Return the shapes of a block."""
     fy, fx = np.fft.fftfreq(block_px)[:, None], np.fft.rfftfreq(block_px)[None, :]
     f2 = fy * fy + fx * fx
     samples = float(block_px) ** 2
@@ -132,7 +132,7 @@ def shapes_of(together: Together, block_px: int) -> Shapes:
 
 
 def transfer_of(otf: ComplexArray, height_mm: float, together: Together) -> Transfer:
-    """Give what the filter needs to know of a place.
+    """Return what the filter needs to know of a place.
 
     Args:
         otf: (c, b, b // 2 + 1) complex64.
@@ -159,7 +159,7 @@ def transfer_of(otf: ComplexArray, height_mm: float, together: Together) -> Tran
 def _spread_at(
     spread: Spread, height_mm: float, shapes: Shapes, mistrust: np.float32
 ) -> FloatArray:
-    """Give mistrust V of a field height, (c, b, b) packed; linear between the table's places."""
+    """Return mistrust V of a field height, (c, b, b) packed; linear between the table's places."""
     table, heights = _table(spread)
     place = float(np.interp(height_mm, heights, np.arange(len(heights))))
     below = min(int(place), max(len(heights) - 2, 0))
@@ -175,7 +175,7 @@ def _spread_at(
 
 @lru_cache(maxsize=4)
 def _table(spread: Spread) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Give the variances (height, colour, frequency), and the heights in mm."""
+    """Return the variances (height, colour, frequency), and the heights in mm."""
     return np.array(spread.variance, np.float64), np.array(spread.heights_mm, np.float64)
 
 
@@ -235,7 +235,7 @@ def _measured(
     shapes: Shapes,
     block: tuple[NDArray[np.float64], NDArray[np.float64], float],
 ) -> float:
-    """Give the measured over the expected power of the light, in the band.
+    """Return the measured over the expected power of the light, in the band.
 
     Args:
         crossed: (c, b, b) conj(H) Y.
@@ -256,5 +256,5 @@ def _measured(
 
 
 def _at(planes: FloatArray, places: Places) -> FloatArray:
-    """Give the samples (c, n) of planes at some places."""
+    """Return the samples (c, n) of planes at some places."""
     return planes.reshape(len(planes), -1).take(places, axis=1)

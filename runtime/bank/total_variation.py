@@ -22,7 +22,7 @@ LEAST_RHO: Final = np.float32(1e-7)
 def admm_tv_filter(
     noise: NoiseModel, *, weight: float = TV_WEIGHT, iterations: int = ADMM_ITERATIONS
 ) -> BlockFilter:
-    """Give least squares with isotropic total variation, solved by ADMM.
+    """Return least squares with isotropic total variation, solved by ADMM.
 
     min over x of 1/2 |h * x - y|^2 + beta |grad x|_1, beta = weight * variance / level.
 
@@ -58,7 +58,7 @@ class BlockLight:
     variance: NDArray[np.float64]
 
     def splitting(self, weight: float) -> tuple[FloatArray, FloatArray]:
-        """Give threshold and rho of a total variation, (c, 1, 1); their product is beta.
+        """Return threshold and rho of a total variation, (c, 1, 1); their product is beta.
 
         Gradients below the threshold, a share of the level, are taken for noise in the first round.
         """
@@ -68,7 +68,7 @@ class BlockLight:
 
 
 def light_of_block(noise: NoiseModel) -> Callable[[Block], BlockLight]:
-    """Give what finds the light of blocks in a noise."""
+    """Return what finds the light of blocks in a noise."""
     shot, read_variance = np.array(noise.shot), np.array(noise.read_variance)
     background = background_of(noise)
 
@@ -124,23 +124,23 @@ def _admm_tv(
 
 
 def _shrinkage(down: FloatArray, across: FloatArray, threshold: FloatArray) -> FloatArray:
-    """Give the factor that shortens every gradient by the threshold."""
+    """Return the factor that shortens every gradient by the threshold."""
     length = np.sqrt(np.square(down) + np.square(across))
     return np.asarray(np.maximum(1 - threshold / np.maximum(length, np.float32(1e-20)), 0))
 
 
 def differences(planes: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Give the periodic forward differences (down, across) of (..., b, b) planes."""
+    """Return the periodic forward differences (down, across) of (..., b, b) planes."""
     return np.roll(planes, -1, axis=-2) - planes, np.roll(planes, -1, axis=-1) - planes
 
 
 def backward(down: FloatArray, across: FloatArray) -> FloatArray:
-    """Give the adjoint of `differences`."""
+    """Return the adjoint of `differences`."""
     return np.asarray(np.roll(down, 1, axis=-2) - down + np.roll(across, 1, axis=-1) - across)
 
 
 def gradient_power(size: int) -> NDArray[np.float32]:
-    """Give |D|^2 of the periodic forward differences, (b, b // 2 + 1)."""
+    """Return |D|^2 of the periodic forward differences, (b, b // 2 + 1)."""
     fy, fx = np.fft.fftfreq(size)[:, None], np.fft.rfftfreq(size)[None, :]
     power = 4 * (np.sin(np.pi * fy) ** 2 + np.sin(np.pi * fx) ** 2)
     return np.asarray(power, dtype=np.float32)

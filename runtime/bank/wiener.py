@@ -35,7 +35,7 @@ frozen OTF calls almost nothing must not be raised without end."""
 
 
 def wiener_filter(settings: Wiener, noise: NoiseModel, kernel_px: int | None = None) -> BlockFilter:
-    """Give the Wiener filter of one block as a block filter.
+    """Return the Wiener filter of one block as a block filter.
 
     Args:
         settings: Prior, and rounds of Richardson-Lucy for clipped blocks.
@@ -79,7 +79,7 @@ def wiener_filter(settings: Wiener, noise: NoiseModel, kernel_px: int | None = N
 
 
 def place_knowledge(settings: Wiener) -> PlaceKnowledge | None:
-    """Give what the filter knows of a place once for all blocks there; None if that is nothing."""
+    """Return what the filter knows of a place for all blocks there; None if that is nothing."""
     if (together := settings.together) is None:
         return None
     return lambda otf, height_mm: transfer_of(otf, height_mm, together)
@@ -93,7 +93,7 @@ def _known(block: Block, together: Together) -> Transfer:
 
 @lru_cache(maxsize=4)
 def _prior_rise(block_px: int, exponent: float) -> FloatArray:
-    """Give 1 / S(f) for a prior scale and level of one, (b, b // 2 + 1)."""
+    """Return 1 / S(f) for a prior scale and level of one, (b, b // 2 + 1)."""
     fy, fx = np.fft.fftfreq(block_px)[:, None], np.fft.rfftfreq(block_px)[None, :]
     rise = ((fy * fy + fx * fx + CORNER_FREQUENCY**2) ** (exponent / 2)).astype(np.float32)
     rise.flags.writeable = False
@@ -101,7 +101,7 @@ def _prior_rise(block_px: int, exponent: float) -> FloatArray:
 
 
 def _gain(otf: ComplexArray, rise: FloatArray, ratio: NDArray[np.float64]) -> ComplexArray:
-    """Give conj(H) / (|H|^2 + NSR); `ratio` is NSR per colour where the rise is one."""
+    """Return conj(H) / (|H|^2 + NSR); `ratio` is NSR per colour where the rise is one."""
     power = np.square(otf.real)
     power += np.square(otf.imag)
     nsr = ratio.astype(np.float32)[:, None, None] * rise

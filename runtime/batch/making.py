@@ -45,7 +45,7 @@ class Pipelines:
         self._lock = threading.Lock()
 
     def get(self, bundle: str, source: Path | None = None) -> Pipeline:
-        """Give the pipeline of a bundle, "none" for one that only develops.
+        """Return the pipeline of a bundle, "none" for one that only develops.
 
         Args:
             bundle: Name or path.

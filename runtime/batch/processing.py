@@ -161,7 +161,7 @@ def _with_choices(
 
 
 def kind_of_run(bundle: str | None, options: Options, pipelines: Pipelines) -> Kind | None:
-    """Give the kind of all captures of a run; None where each file says its own.
+    """Return the kind of all captures of a run; None where each file says its own.
 
     Raises:
         BundleError: If the named bundle is refused.

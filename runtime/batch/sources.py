@@ -19,7 +19,7 @@ CAPTURE_SUFFIXES: Final = RAW_SUFFIXES | {".exr", ".tif", ".tiff", ".png"}
 
 
 def expand(files: Sequence[FilePath], kind: Kind | None = None) -> list[Path]:
-    """Give the captures named by files, folders and globs, each once, in the order given.
+    """Return the captures named by files, folders and globs, each once, in the order given.
 
     A folder stands for the captures directly in it, by name, without the pictures that a sidecar
     beside them calls its output; a glob that matches nothing and a
@@ -76,7 +76,7 @@ def is_result(path: Path) -> bool:
 
 
 def refusal_of(source: Path) -> str | None:
-    """Say why an input cannot be read, as far as that is known without opening it."""
+    """Return why an input cannot be read, as far as that is known without opening it."""
     try:
         check_regular(source)
     except OSError as error:

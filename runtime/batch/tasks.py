@@ -46,12 +46,12 @@ class Task:
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """Give every file that may appear, the main one first."""
+        """Return every file that may appear, the main one first."""
         return (self.target, *self.beside)
 
     @property
     def own(self) -> tuple[Path, ...]:
-        """Give the files among these that are the capture itself."""
+        """Return the files among these that are the capture itself."""
         source = self.source.resolve()
         return tuple(path for path in self.files if path.resolve() == source)
 
@@ -115,7 +115,7 @@ def _bundle_options() -> str:
 
 
 def _folders(sources: Sequence[Path], write: WriteOptions) -> list[Path]:
-    """Give the folder of every picture."""
+    """Return the folder of every picture."""
     if not write.keep_folders or not sources:
         return [write.out_dir] * len(sources)
     parents = [source.absolute().parent for source in sources]
@@ -173,7 +173,7 @@ def _make_task(
 
 
 def state_of(path: Path) -> tuple[int, int] | None:
-    """Give what changes when a file is written anew; None without a file.
+    """Return what changes when a file is written anew; None without a file.
 
     Its inode does too, but every machine may see another one.
     """

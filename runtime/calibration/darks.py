@@ -94,7 +94,7 @@ class Darks:
         return cls(means, counts, _drift(list(levels.values()), DRIFT_DN * step))
 
     def level_error(self, bracket: Survey) -> float:
-        """Give the standard error of black in the merged light of a bracket.
+        """Return the standard error of black in the merged light of a bracket.
 
         Every frame and every dark has a black of its own. Where shot noise rules, frames are
         weighted by their times s, so that the error of each comes through by 1 / sum(s). That of a
@@ -115,21 +115,21 @@ class Darks:
         return self._drift * float(np.sqrt(shares.size + of_darks) / shares.sum())
 
     def rows(self, frame: Frame, top: int, bottom: int) -> tuple[FloatArray, NDArray[np.bool_]]:
-        """Give the dark light of rows of a frame, and where it leaves nothing to measure."""
+        """Return the dark light of rows of a frame, and where it leaves nothing to measure."""
         time_s, factor = self._taken(frame)
         dark = self._means[time_s][:, top:bottom] * np.float32(factor)
         broken = ~(dark <= BROKEN_LIGHT)
         return np.where(broken, np.float32(0), dark), broken
 
     def _taken(self, frame: Frame) -> tuple[float, float]:
-        """Give the time of the darks that a frame takes, and by which factor it takes them."""
+        """Return the time of the darks that a frame takes, and by which factor it takes them."""
         nearest = min(self._means, key=lambda time_s: abs(np.log(time_s / frame.time_s)))
         is_same = abs(nearest / frame.time_s - 1) <= SAME_TIME
         return nearest, 1.0 if is_same else frame.time_s / nearest
 
 
 def _why_not(times_s: Sequence[float] | None, bracket: Survey) -> str:
-    """Say why the file of a dark frame does not tell its time among those of a bracket."""
+    """Return why the file of a dark frame does not tell its time among those of a bracket."""
     if times_s is not None or not bracket.is_timed:
         return ""
     for frame in bracket.frames:
@@ -139,7 +139,7 @@ def _why_not(times_s: Sequence[float] | None, bracket: Survey) -> str:
 
 
 def _level(light: FloatArray) -> float:
-    """Give the mean of a dark frame without its hot pixels."""
+    """Return the mean of a dark frame without its hot pixels."""
     seen = light[np.isfinite(light)]
     if not seen.size:
         return 0.0
@@ -148,7 +148,7 @@ def _level(light: FloatArray) -> float:
 
 
 def _drift(levels: Sequence[Sequence[float]], least: float) -> float:
-    """Give the spread of levels of frames of one time each, pooled; where few, `least` or more."""
+    """Return spread of levels of frames of one time each, pooled; where few, `least` or more."""
     free = sum(len(of_time) - 1 for of_time in levels)
     if free == 0:
         return least

@@ -54,21 +54,21 @@ class DiscCore:
 
     @property
     def radius_px(self) -> float:
-        """Give how far from the centre what it leaves tells whether it fits."""
+        """Return how far from the centre what it leaves tells whether it fits."""
         return self.diameter_px / 2 + REST_PX
 
     @property
     def height(self) -> float:
-        """Give its value in the middle."""
+        """Return its value in the middle."""
         return self.level * float(1 - np.exp(-((self.diameter_px / self.spread_px) ** 2) / 8))
 
     @property
     def light(self) -> float:
-        """Give its sum over all pixels."""
+        """Return its sum over all pixels."""
         return self.level * np.pi * self.diameter_px**2 / 4
 
     def at(self, y: FloatGrid, x: FloatGrid) -> FloatGrid:
-        """Give its values at pixels."""
+        """Return its values at pixels."""
         radius = np.hypot(y - self.y, x - self.x)
         most = self.diameter_px / 2 + _FAR_SPREADS * self.spread_px
         places = np.arange(0.0, most + _RADIUS_STEP_PX, _RADIUS_STEP_PX)
@@ -79,7 +79,7 @@ class DiscCore:
 
 
 def blurred_disc(radius_px: FloatLine, diameter_px: float, spread_px: float) -> FloatLine:
-    """Give a disc of height 1 blurred by a Gaussian of unit sum, at distances from its middle.
+    """Return a disc of height 1 blurred by a Gaussian of unit sum, at distances from its middle.
 
     The Gaussian is integrated over circles in closed form, a modified Bessel function, and over
     their radii by quadrature.
@@ -95,7 +95,7 @@ def blurred_disc(radius_px: FloatLine, diameter_px: float, spread_px: float) -> 
 def middle_of(
     cells: NDArray[np.floating], place: tuple[int, int], radius: float
 ) -> tuple[int, int]:
-    """Give (row, column) of the middle of a disc, from any place on it.
+    """Return (row, column) of the middle of a disc, from any place on it.
 
     Args:
         cells: (h, w) light, dark around.
@@ -157,7 +157,7 @@ def fit_disc(lattice: Lattice, y: float, x: float, diameter_px: float) -> DiscCo
 
 
 def disc_spectrum(cycles_per_px: FloatGrid, diameter_px: float) -> FloatGrid:
-    """Give the spectrum of a disc of unit sum: 2 J1(pi D f) / (pi D f)."""
+    """Return the spectrum of a disc of unit sum: 2 J1(pi D f) / (pi D f)."""
     at = np.pi * diameter_px * np.maximum(cycles_per_px, 1e-12)
     return np.asarray(2 * special.j1(at) / at)
 
@@ -214,7 +214,7 @@ def _fade(radius: FloatGrid, start: float) -> FloatGrid:
 def _gain(
     disc: FloatGrid, frequency: FloatGrid, core: DiscCore, seen: FloatGrid, noise_power: float
 ) -> FloatGrid:
-    """Give what the spectrum of the rest is multiplied by, so that the error is least.
+    """Return what the spectrum of the rest is multiplied by, so that the error is least.
 
     Args:
         disc: Spectrum of the disc.

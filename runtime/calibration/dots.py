@@ -55,7 +55,7 @@ class SeenDots:
     likeness: float
 
     def to_json(self) -> dict[str, Any]:
-        """Give plain JSON values."""
+        """Return plain JSON values."""
         return {
             "place_um": [round(part, 3) for part in reversed(self.place_um)],
             "share": round(self.share, 5),
@@ -122,7 +122,7 @@ def see_dots(
 def dots_psf(
     measured: MeasuredPsf, designed: FrozenPsf, active_um: float = ACTIVE_UM
 ) -> tuple[FrozenPsf, SeenDots]:
-    """Give the PSF of an array out of a point measured on fine pixels, see `measure_psf`.
+    """Return the PSF of an array out of a point measured on fine pixels, see `measure_psf`.
 
     Args:
         measured: The point through the plate. Its red is taken as it lies on the sensor: dots
@@ -163,7 +163,7 @@ def dots_psf(
 def _line(
     profile: FloatGrid, pitch_um: float, spacing_um: float, side: int
 ) -> tuple[FloatGrid, float]:
-    """Give the places of the lattice along one axis, in um from the middle, and the modulation.
+    """Return the places of the lattice along one axis, in um from the middle, and the modulation.
 
     The lattice goes on beyond the photograph, so that few dots find their place in a wide PSF.
     """
@@ -176,7 +176,7 @@ def _line(
 
 
 def _circles(image: FloatGrid, rows: FloatGrid, columns: FloatGrid, radius: float) -> FloatGrid:
-    """Give the light (row, column) of a circle about every place; all in pixels."""
+    """Return the light (row, column) of a circle about every place; all in pixels."""
     down, right = (
         places + (n - 1) / 2 for places, n in zip((rows, columns), image.shape, strict=True)
     )
@@ -184,7 +184,7 @@ def _circles(image: FloatGrid, rows: FloatGrid, columns: FloatGrid, radius: floa
 
 
 def _circle(image: FloatGrid, y: float, x: float, radius: float) -> float:
-    """Give the light of one circle; pixels at its rim count by the share of them inside."""
+    """Return the light of one circle; pixels at its rim count by the share of them inside."""
     top, left = (max(0, int(np.floor(at - radius))) for at in (y, x))
     part = image[top : max(0, int(y + radius) + 2), left : max(0, int(x + radius) + 2)]
     if part.size == 0:
@@ -199,7 +199,7 @@ def _circle(image: FloatGrid, y: float, x: float, radius: float) -> float:
 
 
 def _most_like(circles: FloatGrid, designed: NDArray[np.floating]) -> tuple[tuple[int, int], float]:
-    """Give the first (row, column) of the window that is most like a PSF, and how like it is."""
+    """Return the first (row, column) of the window that is most like a PSF, and how like it is."""
     wanted = designed / np.sqrt(np.square(designed, dtype=np.float64).sum())
     windows = np.lib.stride_tricks.sliding_window_view(circles, wanted.shape)
     sizes = np.sqrt((windows**2).sum((-2, -1)))

@@ -82,11 +82,11 @@ class RoundPsf:
     shares: FloatLine
 
     def share_within(self, radius_px: float) -> float:
-        """Give the share of the light within a radius, in closed form."""
+        """Return the share of the light within a radius, in closed form."""
         return float(self.shares @ -np.expm1(-((radius_px / self.spreads_px) ** 2) / 2))
 
     def kernel(self, half: int) -> FloatGrid:
-        """Give (2 half + 1, 2 half + 1) samples of unit sum."""
+        """Return (2 half + 1, 2 half + 1) samples of unit sum."""
         offset = np.arange(-MOST_HALF_PX, MOST_HALF_PX + 1, dtype=np.float64)
         lines = np.exp(-(offset**2) / (2 * self.spreads_px[:, None] ** 2))
         # samples of a narrow Gaussian do not add up to its integral, those of a wide one end
@@ -97,7 +97,7 @@ class RoundPsf:
         return np.asarray(kernel / kernel.sum())
 
     def half_of(self, lost: float) -> int:
-        """Give the radius in pixels beyond which so large a share of the light lies, at most."""
+        """Return the radius in pixels beyond which so large a share of the light lies, at most."""
         radii = np.arange(LEAST_HALF_PX, MOST_HALF_PX + 1)
         inside = np.array([self.share_within(float(radius)) for radius in radii])
         return int(radii[min(int(np.searchsorted(inside, 1 - lost)), radii.size - 1)])
@@ -121,7 +121,7 @@ class EdgeProfile:
 
     @property
     def reach_px(self) -> float:
-        """Give how far both sides are seen."""
+        """Return how far both sides are seen."""
         return float(min(-self.distance_px[0], self.distance_px[-1]))
 
 
@@ -307,7 +307,7 @@ class Bins:
         return cls(ends=ends, sums=np.stack(sums).astype(np.float64))
 
     def profile(self, without: int | None = None) -> EdgeProfile:
-        """Give the profile, of all strips or without one.
+        """Return the profile, of all strips or without one.
 
         Raises:
             DecodeError: If a side of the edge is not seen.
@@ -331,7 +331,7 @@ class Bins:
 
 
 def _plain(planes: NDArray[np.float32], survey: Survey) -> FloatGrid:
-    """Give (h, w) of a mosaic, else (c, h, w)."""
+    """Return (h, w) of a mosaic, else (c, h, w)."""
     return np.asarray(planes[0] if survey.like.cfa else planes, dtype=np.float64)
 
 

@@ -102,16 +102,16 @@ class Line:
 
     @property
     def normal(self) -> tuple[float, float]:
-        """Give (y, x) of unit length."""
+        """Return (y, x) of unit length."""
         return float(np.sin(self.angle)), float(np.cos(self.angle))
 
     def distances(self, y: FloatGrid, x: FloatGrid) -> FloatGrid:
-        """Give how far pixels lie on its bright side."""
+        """Return how far pixels lie on its bright side."""
         down, right = self.normal
         return np.asarray((y - self.y) * down + (x - self.x) * right)
 
     def along(self, y: FloatGrid, x: FloatGrid) -> FloatGrid:
-        """Give how far along it pixels lie."""
+        """Return how far along it pixels lie."""
         down, right = self.normal
         return np.asarray((y - self.y) * right - (x - self.x) * down)
 
@@ -148,19 +148,19 @@ def find_edges(capture: Capture) -> FoundEdges:
 
 
 def _square(top: int, left: int) -> tuple[slice, slice]:
-    """Give where a square lies among cells."""
+    """Return where a square lies among cells."""
     size = SQUARE_PX // _CELL_PX
     return slice(top, top + size), slice(left, left + size)
 
 
 def _as_cells(pixels: NDArray[Any]) -> NDArray[Any]:
-    """Give (4, h, w): the pixels of each cell of 2x2, row by row."""
+    """Return (4, h, w): the pixels of each cell of 2x2, row by row."""
     height, width = (side // _CELL_PX * _CELL_PX for side in pixels.shape)
     return np.stack([pixels[y:height:2, x:width:2] for y in (0, 1) for x in (0, 1)])
 
 
 def _searched_cells(linear: NDArray[np.float32], capture: Capture) -> FloatGrid:
-    """Give one value for each cell: the mean of its green samples, or of the middle plane."""
+    """Return one value for each cell: the mean of its green samples, or of the middle plane."""
     if capture.cfa is None:
         searched = _as_cells(linear[len(linear) // 2])
     else:
@@ -169,7 +169,7 @@ def _searched_cells(linear: NDArray[np.float32], capture: Capture) -> FloatGrid:
 
 
 def _steps(cells: FloatGrid) -> Iterator[tuple[float, float, float]]:
-    """Give (y, x) in pixels and angle of the steps of all squares.
+    """Return (y, x) in pixels and angle of the steps of all squares.
 
     A square is looked at twice: where it lies, and with the step in its middle.
     """
@@ -188,7 +188,7 @@ def _steps(cells: FloatGrid) -> Iterator[tuple[float, float, float]]:
 
 
 def _step_in(cells: FloatGrid, top: int, left: int) -> tuple[float, float, float] | None:
-    """Give the (y, x) in pixels and the angle of the step of a square, None where there is none."""
+    """Return (y, x) in pixels and the angle of the step of a square, None where there is none."""
     found = step_of(cells[_square(top, left)])
     if found is None:
         return None
@@ -196,7 +196,7 @@ def _step_in(cells: FloatGrid, top: int, left: int) -> tuple[float, float, float
 
 
 def step_of(cells: FloatGrid) -> tuple[float, float, float] | None:
-    """Give (y, x) in pixels of a point of the one step of a picture, and the angle of its normal.
+    """Return (y, x) in pixels of a point of the one step of a picture, and the angle of its normal.
 
     All gradients of a straight edge point along its normal, so their sum does too.
 
@@ -246,7 +246,7 @@ def _edge(
 def edge_samples(
     square: NDArray[np.floating], cfa: CfaPattern | None, origin: tuple[int, int] = (0, 0)
 ) -> list[Samples]:
-    """Give (y, x, value) of the samples of each colour.
+    """Return (y, x, value) of the samples of each colour.
 
     Args:
         square: (h, w) of a mosaic, or (c, h, w).
@@ -312,7 +312,7 @@ def fit_line(
 
 
 def _is_even(profile: Profile) -> bool:
-    """Tell whether both sides of a step are flat."""
+    """Return whether both sides of a step are flat."""
     distance, value = profile.distance_px, profile.value
     ends = []
     for side in (-1, 1):
@@ -324,7 +324,7 @@ def _is_even(profile: Profile) -> bool:
 
 
 def _profile(distance: FloatLine, values: FloatLine) -> Profile | None:
-    """Give the means of bins within the reach; None where a side of the edge is not seen."""
+    """Return the means of bins within the reach; None where a side of the edge is not seen."""
     count = 2 * REACH_PX * BINS_PER_PX
     number = np.floor((distance + REACH_PX) * BINS_PER_PX).astype(np.intp)
     near = (number >= 0) & (number < count)

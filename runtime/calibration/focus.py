@@ -79,7 +79,7 @@ class MeasuredFocus:
     misfit: float
 
     def to_json(self) -> dict[str, float | int]:
-        """Give plain JSON values."""
+        """Return plain JSON values."""
         return {
             "focus_um": round(self.focus_um, 2),
             "standard_error_um": round(self.standard_error_um, 2),
@@ -142,7 +142,7 @@ def _squares_of(
     kernels: Sequence[FieldKernels],
     shares: FloatGrid,
 ) -> tuple[list[FloatLine], int]:
-    """Give the mean squares (focus,) of every edge of a capture, and how many are clipped."""
+    """Return the mean squares (focus,) of every edge of a capture, and how many are clipped."""
     channels = len(camera.sensor.channels)
     if capture.channels != channels:
         raise ContractError(f"{name} has {capture.channels} colours, the sensor {channels}")
@@ -160,7 +160,7 @@ def _squares_of(
 
 
 def edge_rises(kernels: FloatArray, normal: tuple[float, float]) -> FloatGrid:
-    """Give how the light of each colour rises across a sharp edge.
+    """Return how the light of each colour rises across a sharp edge.
 
     A sample of a kernel is taken as light spread evenly over its pixel, which is how sharp an edge
     looks to pixels.
@@ -192,13 +192,13 @@ def edge_rises(kernels: FloatArray, normal: tuple[float, float]) -> FloatGrid:
 
 
 def rise_places(height: int, width: int) -> FloatLine:
-    """Give the distances (place,) from the edge, px, of `edge_rises` of kernels of some sides."""
+    """Return the distances (place,) from the edge, px, of `edge_rises` of kernels of some sides."""
     half = (math.ceil(math.hypot(height, width) / 2) + 2) * FINE
     return np.asarray(np.arange(-half, half + 1) / FINE)
 
 
 def _box(width: float) -> FloatLine:
-    """Give a box of unit sum, whose outermost places hold what is left of a whole one."""
+    """Return a box of unit sum, whose outermost places hold what is left of a whole one."""
     half = math.ceil(max(width - 1, 0) / 2)
     box = np.ones(2 * half + 1)
     if half:
@@ -207,7 +207,7 @@ def _box(width: float) -> FloatLine:
 
 
 def _edge_squares(edge: Edge, rises: FloatGrid) -> FloatLine:
-    """Give the mean square (focus,) of an edge's profiles around the best of each focus.
+    """Return the mean square (focus,) of an edge's profiles around the best of each focus.
 
     Dark, bright and tilt of each colour are fitted, and one place for all colours.
 
@@ -232,7 +232,7 @@ def _edge_squares(edge: Edge, rises: FloatGrid) -> FloatLine:
 def _fit_colours(
     edge: Edge, rises: FloatGrid, places: FloatLine, moved: float
 ) -> tuple[float, float]:
-    """Give the mean square, and how much farther the edge lies."""
+    """Return the mean square, and how much farther the edge lies."""
     rest_by_move = move_by_move = total = weight = 0.0
     for profile, rise in zip(edge.profiles, rises, strict=True):
         at = profile.distance_px - moved
@@ -295,7 +295,7 @@ def _best(squares: FloatGrid, tried_um: FloatLine, captures: int) -> MeasuredFoc
 
 
 def _minimum(at: FloatLine, values: FloatLine) -> tuple[float, float]:
-    """Give place and height of the least value, by the parabola through it and its neighbours."""
+    """Return place and height of the least value, by the parabola through it and its neighbours."""
     i = int(values.argmin())
     if i in (0, at.size - 1):
         return float(at[i]), float(values[i])

@@ -39,12 +39,12 @@ class Lattice:
 
     @classmethod
     def of_plane(cls, plane: FloatGrid) -> Self:
-        """Give the lattice of a whole plane."""
+        """Return the lattice of a whole plane."""
         return cls(values=plane, matrix=np.eye(2), shift=np.zeros(2))
 
     @classmethod
     def of_mosaic(cls, mosaic: FloatGrid, cfa: CfaPattern, colour: int) -> Self:
-        """Give the lattice of a colour of a (h, w) mosaic: 0 red, 1 green, 2 blue."""
+        """Return the lattice of a colour of a (h, w) mosaic: 0 red, 1 green, 2 blue."""
         cell = np.array(cfa_channels(cfa))
         if colour != GREEN:
             top, left = (int(n) for n in np.argwhere(cell == colour)[0])
@@ -61,22 +61,22 @@ class Lattice:
 
     @property
     def pitch_px(self) -> float:
-        """Give the root of the area of a sample, in pixels."""
+        """Return the root of the area of a sample, in pixels."""
         return float(np.abs(np.linalg.det(self.matrix)) ** -0.5)
 
     def places(self) -> tuple[FloatGrid, FloatGrid]:
-        """Give (y, x) in pixels of every sample, each of the shape of `values`."""
+        """Return (y, x) in pixels of every sample, each of the shape of `values`."""
         inverse = np.linalg.inv(self.matrix)
         row, column = np.indices(self.values.shape) - self.shift[:, None, None]
         y, x = (inverse[n, 0] * row + inverse[n, 1] * column for n in (0, 1))
         return y, x
 
     def with_values(self, values: FloatGrid) -> "Lattice":
-        """Give other values on the same lattice."""
+        """Return other values on the same lattice."""
         return Lattice(values=values, matrix=self.matrix, shift=self.shift)
 
     def at(self, y: FloatGrid, x: FloatGrid, *, order: int = SPLINE_ORDER) -> FloatGrid:
-        """Give values at any pixels; what is missing is taken from its neighbours."""
+        """Return values at any pixels; what is missing is taken from its neighbours."""
         row, column = _placed(self.matrix, self.shift, y, x)
         whole = filled(self.values)
         places = np.stack([row, column])
@@ -85,7 +85,7 @@ class Lattice:
 
 
 def filled(values: FloatGrid) -> FloatGrid:
-    """Give values without NaN: each the median of its neighbours, 0 where all are missing."""
+    """Return values without NaN: each the median of its neighbours, 0 where all are missing."""
     missing = np.isnan(values)
     if not missing.any():
         return values

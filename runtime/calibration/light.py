@@ -33,26 +33,26 @@ class LightCore(Protocol):
 
     @property
     def y(self) -> float:
-        """Give the row of its centre, in pixels."""
+        """Return the row of its centre, in pixels."""
 
     @property
     def x(self) -> float:
-        """Give the column of its centre."""
+        """Return the column of its centre."""
 
     @property
     def height(self) -> float:
-        """Give how bright it is in the middle."""
+        """Return how bright it is in the middle."""
 
     @property
     def radius_px(self) -> float:
-        """Give how far from the centre what it leaves tells whether it fits."""
+        """Return how far from the centre what it leaves tells whether it fits."""
 
     @property
     def spread_px(self) -> float:
-        """Give the standard deviation of its blur where it is narrowest."""
+        """Return the standard deviation of its blur where it is narrowest."""
 
     def at(self, y: FloatGrid, x: FloatGrid) -> FloatGrid:
-        """Give its values at pixels."""
+        """Return its values at pixels."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,23 +66,23 @@ class Core:
 
     @property
     def radius_px(self) -> float:
-        """Give how far from the centre it is looked at."""
+        """Return how far from the centre it is looked at."""
         return REST_PX
 
     @property
     def spread_px(self) -> float:
-        """Give its standard deviation where it is narrowest."""
+        """Return its standard deviation where it is narrowest."""
         return float(1 / np.sqrt(np.linalg.eigvalsh(self.form).max()))
 
     def at(self, y: FloatGrid, x: FloatGrid) -> FloatGrid:
-        """Give its values at pixels."""
+        """Return its values at pixels."""
         dy, dx, form = y - self.y, x - self.x, self.form
         inside = form[0, 0] * dy**2 + 2 * form[0, 1] * dy * dx + form[1, 1] * dx**2
         return np.asarray(self.height * np.exp(-0.5 * inside))
 
 
 def find_light(cells: NDArray[np.floating]) -> tuple[int, int]:
-    """Give (row, column) of the brightest cell that is no lone defect.
+    """Return (row, column) of the brightest cell that is no lone defect.
 
     Args:
         cells: (h, w) light of whole cells, the sum of their colours.
@@ -104,7 +104,7 @@ def find_light(cells: NDArray[np.floating]) -> tuple[int, int]:
 
 
 def background(planes: Sequence[NDArray[np.floating]]) -> tuple[float, float]:
-    """Give level and spread of what lies along the border of planes, robustly; NaN is left out.
+    """Return level and spread of what lies along the border of planes, robustly; NaN is left out.
 
     Both hold also where a converter cut at black what noise had brought below it: the level is a
     mean, and the spread that of the upper half.
@@ -116,7 +116,7 @@ def background(planes: Sequence[NDArray[np.floating]]) -> tuple[float, float]:
 
 
 def border(plane: NDArray[np.floating]) -> NDArray[np.bool_]:
-    """Tell which samples of a (h, w) plane lie along its border."""
+    """Return which samples of a (h, w) plane lie along its border."""
     sides = [max(_LEAST_BORDER_PX, round(BORDER_SHARE * n)) for n in plane.shape]
     found = np.ones(plane.shape, dtype=bool)
     found[sides[0] : -sides[0], sides[1] : -sides[1]] = False
@@ -124,7 +124,7 @@ def border(plane: NDArray[np.floating]) -> NDArray[np.bool_]:
 
 
 def level_of(values: NDArray[np.floating]) -> tuple[float, float]:
-    """Give level and spread of (n,) values of the dark, robustly; NaN is left out.
+    """Return level and spread of (n,) values of the dark, robustly; NaN is left out.
 
     Raises:
         DecodeError: If there is nothing but NaN.
@@ -168,7 +168,7 @@ def fit_core(lattice: Lattice, y: float, x: float) -> Core:
 
 
 def _core(p: FloatGrid, top: float) -> Core:
-    """Give the Gaussian of six numbers: place, height, log spreads, angle."""
+    """Return the Gaussian of six numbers: place, height, log spreads, angle."""
     c, s = np.cos(p[5]), np.sin(p[5])
     turn = np.array([[c, -s], [s, c]])
     form = turn @ np.diag(np.exp(-2 * p[3:5])) @ turn.T

@@ -63,7 +63,7 @@ class Reblurred:
 
     @property
     def rest(self) -> float:
-        """Give the root mean square of what is left."""
+        """Return the root mean square of what is left."""
         return float(np.sqrt(np.square(self.seen - self.told).mean()))
 
 
@@ -93,7 +93,7 @@ class ColourFacts:
     reblurred: Reblurred | None = None
 
     def to_json(self) -> dict[str, Any]:
-        """Give plain JSON values."""
+        """Return plain JSON values."""
         told: dict[str, Any] = {
             "colour": self.colour,
             "wavelength_um": self.wavelength_um,
@@ -148,18 +148,18 @@ class MeasuredPsf:
 
     @property
     def side_px(self) -> int:
-        """Give the side of the kernels."""
+        """Return the side of the kernels."""
         return int(self.psf.kernels.shape[-1])
 
 
 def core_share(kernel: FloatGrid) -> float:
-    """Give the share of a (side, side) kernel of unit sum within 3 px of its middle."""
+    """Return the share of a (side, side) kernel of unit sum within 3 px of its middle."""
     offset = np.arange(kernel.shape[-1]) - kernel.shape[-1] // 2
     return float(kernel[np.hypot(offset[:, None], offset[None]) <= CORE_SHARE_PX].sum())
 
 
 def frozen(kernels: FloatGrid, pitch_um: float, depth_m: float) -> FrozenPsf:
-    """Give (colour, side, side) kernels of unit sum, blue, green, red, as a PSF of one place."""
+    """Return (colour, side, side) kernels of unit sum, blue, green, red, as a PSF of one place."""
     return FrozenPsf(
         kernels=np.ascontiguousarray(kernels[None, None], dtype=np.float32),
         field_heights_mm=np.zeros(1),

@@ -64,7 +64,7 @@ class FlatFile(Entry, extra="ignore"):
         return self
 
     def to_entry(self) -> IlluminationEntry:
-        """Give it as a lens profile holds it."""
+        """Return it as a lens profile holds it."""
         return IlluminationEntry(
             heights_mm=self.heights_mm, relative_illumination=self.relative_illumination
         )
@@ -118,7 +118,7 @@ class NoiseFile(Entry, extra="ignore"):
         return self
 
     def noise(self) -> tuple[IsoNoise, ...]:
-        """Give gain and read noise by increasing ISO."""
+        """Return gain and read noise by increasing ISO."""
         return tuple(
             IsoNoise(iso=one.iso, gain_e_per_dn=one.gain_e_per_dn, read_noise_e=one.read_noise_e)
             for one in sorted(self.iso, key=lambda one: one.iso)

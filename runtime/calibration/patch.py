@@ -91,7 +91,7 @@ class Patch:
         self.place = place[0] - self.top, place[1] - self.left
 
     def red(self, half: int, core: LightCore) -> FloatGrid:
-        """Give the light of red as its samples lie, up to so many pixels from a core."""
+        """Return the light of red as its samples lie, up to so many pixels from a core."""
         lattice = self.light[RED]
         y, x = lattice.places()
         inside = np.maximum(np.abs(y - core.y), np.abs(x - core.x)) <= half
@@ -106,7 +106,7 @@ class Patch:
 
 
 def cells(merged: Merged, survey: Survey) -> FloatArray:
-    """Give the light of whole cells: the sum of the planes, or of the 2x2 of a mosaic."""
+    """Return the light of whole cells: the sum of the planes, or of the 2x2 of a mosaic."""
     light = merged.light
     if survey.like.cfa is None:
         return np.asarray(light.sum(axis=0))
@@ -116,7 +116,7 @@ def cells(merged: Merged, survey: Survey) -> FloatArray:
 
 
 def _lattice(planes: FloatGrid, survey: Survey, channel: int) -> Lattice:
-    """Give the lattice of a channel of (1 or 3, h, w)."""
+    """Return the lattice of a channel of (1 or 3, h, w)."""
     cfa = survey.like.cfa
     if cfa is None:
         return Lattice.of_plane(planes[channel])
@@ -127,7 +127,7 @@ _Plane = tuple[FloatArray, int, tuple[int, int]]
 
 
 def _planes(merged: Merged, survey: Survey, channel: int) -> list[_Plane]:
-    """Give the light of a channel by its places in the cell, NaN where none is known.
+    """Return the light of a channel by its places in the cell, NaN where none is known.
 
     With each come its pitch in pixels and its first (row, column).
     """

@@ -32,7 +32,7 @@ class Field:
     peak_share_error: float
 
     def to_json(self) -> dict[str, Any]:
-        """Give plain JSON values."""
+        """Return plain JSON values."""
         return {
             "height_mm": round(self.height_mm, 4),
             "peak_share": round(self.peak_share, 5),
@@ -41,7 +41,7 @@ class Field:
 
 
 def height_mm(like: Capture, centre_px: tuple[float, float], pitch_um: float) -> float:
-    """Give the distance of a place from the middle of the sensor.
+    """Return the distance of a place from the middle of the sensor.
 
     Args:
         like: A frame, which may state that it is a part of a sensor.
@@ -58,7 +58,7 @@ def height_mm(like: Capture, centre_px: tuple[float, float], pitch_um: float) ->
 def peak_share(
     light: FloatGrid, variance: FloatGrid, level_error: float, pitch_px: float = 1.0
 ) -> tuple[float, float]:
-    """Give the share of light within 10 px of the middle, and its standard error.
+    """Return the share of light within 10 px of the middle, and its standard error.
 
     Args:
         light: (side, side), background taken off and nothing cut: what is cut at zero is a bias.
@@ -78,7 +78,7 @@ def peak_share(
 
 
 def light_within(kernel: FloatArray) -> FloatGrid:
-    """Give the light of a kernel (n, n) within 0.5, 1.5, ... px of its middle."""
+    """Return the light of a kernel (n, n) within 0.5, 1.5, ... px of its middle."""
     offset = np.arange(kernel.shape[-1]) - kernel.shape[-1] // 2
     ring = np.rint(np.hypot(offset[:, None], offset)).astype(np.intp)
     return np.asarray(np.cumsum(np.bincount(ring.ravel(), kernel.astype(np.float64).ravel())))

@@ -129,7 +129,7 @@ def measure_psf(survey: Survey, options: PsfOptions, darks: Darks | None) -> Mea
 
 
 def checked_pitch_um(survey: Survey, options: PsfOptions) -> float:
-    """Give the pixel pitch of frames that a PSF can be measured on.
+    """Return the pixel pitch of frames that a PSF can be measured on.
 
     Raises:
         ContractError: If frames are coded, or no pitch is known.
@@ -143,7 +143,7 @@ def checked_pitch_um(survey: Survey, options: PsfOptions) -> float:
 
 
 def _place(merged: Merged, survey: Survey, disc_px: float | None) -> tuple[int, int]:
-    """Give (row, column) of the light, in pixels."""
+    """Return (row, column) of the light, in pixels."""
     pitch, light = (2 if survey.like.cfa else 1), cells(merged, survey)
     place = find_light(light)
     if disc_px is not None:
@@ -174,7 +174,7 @@ def _refuse_clipped(merged: Merged, survey: Survey, place: tuple[int, int], reac
 
 
 def _most_half(survey: Survey, row: int, column: int, side_px: int | None) -> int:
-    """Give half the side that may be cropped around a place.
+    """Return half the side that may be cropped around a place.
 
     Raises:
         ContractError: If the side that is asked for does not fit into the frame.
@@ -198,7 +198,7 @@ def _most_half(survey: Survey, row: int, column: int, side_px: int | None) -> in
 
 
 def _centred(patch: Patch, half: int, disc_px: float | None) -> _Centred:
-    """Give every colour on the pixels about the centre of green."""
+    """Return every colour on the pixels about the centre of green."""
     cores = [_core(lattice, patch.place, disc_px) for lattice in patch.light]
     middle = cores[GREEN]
     offset = np.arange(-half, half + 1, dtype=np.float64)
@@ -218,7 +218,7 @@ def _core(lattice: Lattice, place: tuple[int, int], disc_px: float | None) -> Li
 
 
 def _as_point(seen: _Centred, pitches_px: Sequence[float]) -> FloatGrid:
-    """Give (colour, side, side) light as of a point: discs are taken out."""
+    """Return (colour, side, side) light as of a point: discs are taken out."""
     light, middle = seen.light.copy(), seen.cores[GREEN]
     for n, (core, pitch_px) in enumerate(zip(seen.cores, pitches_px, strict=True)):
         if isinstance(core, DiscCore):
@@ -228,7 +228,7 @@ def _as_point(seen: _Centred, pitches_px: Sequence[float]) -> FloatGrid:
 
 
 def _doubts(patch: Patch, cores: Sequence[LightCore]) -> list[str]:
-    """Say whether the core is too fine for the lattice of a colour, as any of them shows."""
+    """Return whether the core is too fine for the lattice of a colour, as any of them shows."""
     for lattice, core in zip(patch.light, cores, strict=True):
         y, x = lattice.places()
         near = np.hypot(y - core.y, x - core.x) <= core.radius_px
@@ -268,7 +268,7 @@ def _facts(
 
 
 def _reblurred(kernel: FloatGrid, seen: FloatGrid, core: LightCore) -> Reblurred | None:
-    """Give the means of rings of a disc, as it was seen and as a kernel makes it."""
+    """Return the means of rings of a disc, as it was seen and as a kernel makes it."""
     if not isinstance(core, DiscCore):
         return None
     level = core.level

@@ -13,7 +13,7 @@ _ESCAPES: Final = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t"}
 
 
 def to_toml(record: Mapping[str, Any]) -> str:
-    """Give the TOML text of a record: `tomllib.loads` gives it back but for what is not known.
+    """Return the TOML text of a record: `tomllib.loads` gives it back but for what is not known.
 
     Args:
         record: Texts as keys; values are bool, int, float, str, lists (or tuples) of those and of
@@ -83,7 +83,7 @@ def _value(value: Any, name: str) -> str:
 
 
 def _list(values: Sequence[Any], name: str) -> str:
-    """Give a list on one line, or one member a line where it is long or holds lists."""
+    """Return a list on one line, or one member a line where it is long or holds lists."""
     members = [_value(value, name) for value in values]
     line = f"[{', '.join(members)}]"
     rows = any(_is_list(value) for value in values)

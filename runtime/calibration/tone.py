@@ -67,7 +67,7 @@ class PowerCurve:
     top: float
 
     def at(self, levels: FloatGrid) -> FloatGrid:
-        """Give luminance at levels."""
+        """Return luminance at levels."""
         share = np.maximum(levels / self.top + self.offset, _LEAST)
         return np.asarray(self.black + self.gain * share**self.gamma)
 
@@ -93,13 +93,13 @@ class ToneFacts:
 
     @property
     def residuals(self) -> FloatGrid | None:
-        """Give how far fitted steps lie off the curve, as a share of it; NaN of others."""
+        """Return how far fitted steps lie off the curve, as a share of it; NaN of others."""
         if self.curve is None:
             return None
         return np.where(self.seen, self.luminance / self.curve.at(self.levels) - 1, np.nan)
 
     def to_record(self) -> dict[str, Any]:
-        """Give plain values; None where no curve was fitted."""
+        """Return plain values; None where no curve was fitted."""
         rest, curve = self.residuals, self.curve
         left = None if rest is None else 100 * np.sqrt(np.mean(rest[self.seen] ** 2))
         return {
@@ -192,7 +192,7 @@ def measure_tone(
 
 
 def _middle(path: Path, capture: Capture) -> tuple[float, float]:
-    """Give mean and its standard deviation of green in the middle.
+    """Return mean and its standard deviation of green in the middle.
 
     Raises:
         DecodeError: If the picture is coded or clipped there.
@@ -218,7 +218,7 @@ def _middle(path: Path, capture: Capture) -> tuple[float, float]:
 def exposures_of(
     files: Sequence[Path], captures: Sequence[Capture]
 ) -> tuple[list[float], list[str]]:
-    """Give relative exposures, and what is to be said of them.
+    """Return relative exposures, and what is to be said of them.
 
     Raises:
         DecodeError: If some files state time and ISO and others do not.
@@ -279,7 +279,7 @@ def _check_rising(steps: Sequence[Step]) -> None:
 
 
 def _monotone(light: Sequence[float]) -> FloatGrid:
-    """Give values that never fall: neighbours that do share their mean."""
+    """Return values that never fall: neighbours that do share their mean."""
     pools: list[tuple[float, int]] = []
     for value in light:
         mean, count = value, 1

@@ -27,7 +27,7 @@ _LOW_PAIR_SPREADS: Final = 0.9704  # of a normal distribution, between these qua
 
 
 def reach_px(light: FloatGrid, noise: FloatGrid) -> int:
-    """Give the distance from the middle, along rows or columns, up to which there is light.
+    """Return the distance from the middle, along rows or columns, up to which there is light.
 
     Args:
         light: (colour, side, side), background taken off.
@@ -53,7 +53,7 @@ def reach_px(light: FloatGrid, noise: FloatGrid) -> int:
 
 
 def smooth_noise(light: FloatGrid, noise: FloatGrid) -> FloatGrid:
-    """Give (side, side) light whose noise is averaged where nothing but noise is seen.
+    """Return (side, side) light whose noise is averaged where nothing but noise is seen.
 
     Args:
         light: Background taken off, noise around zero.

@@ -26,14 +26,14 @@ RANGE_MARGIN: Final = 1.02
 
 
 def reference_channel(distortion: RadialDistortion) -> int:
-    """Give the channel that pictures are centred by: the middle one, green of three."""
+    """Return the channel that pictures are centred by: the middle one, green of three."""
     return int(distortion.coefficients.shape[0]) // 2
 
 
 def distort_points(
     points_mm: FloatGrid, distortion: RadialDistortion, *, channel: int = 1
 ) -> FloatGrid:
-    """Give where ideal image points fall on the sensor.
+    """Return where ideal image points fall on the sensor.
 
     Args:
         points_mm: (..., 2) x, y from the axis.
@@ -49,7 +49,7 @@ def distort_points(
 def undistort_points(
     points_mm: FloatGrid, distortion: RadialDistortion, *, channel: int = 1
 ) -> FloatGrid:
-    """Give the ideal image points of points on the sensor: inverse of `distort_points`.
+    """Return the ideal image points of points on the sensor: inverse of `distort_points`.
 
     Newton's method from a table of the forward model; exact to about 1e-9 mm.
 
@@ -93,7 +93,7 @@ def check_distortion(distortion: RadialDistortion, corner_radius_mm: float) -> N
 
 
 def ideal_limit(coefficients: FloatGrid, radius: float) -> float:
-    """Give an ideal radius whose image is at or beyond `radius` on the sensor, before any fold.
+    """Return an ideal radius whose image is at or beyond `radius` on the sensor, before any fold.
 
     Args:
         coefficients: (4,) of one colour, or (7,) with even powers.
@@ -118,7 +118,7 @@ def ideal_limit(coefficients: FloatGrid, radius: float) -> float:
 
 
 def _growth(c: FloatGrid, u: FloatGrid) -> FloatGrid:
-    """Give r_d / r at squared radii."""
+    """Return r_d / r at squared radii."""
     odd = c[0] + u * (c[1] + u * (c[2] + u * c[3]))
     if len(c) == ODD_TERMS:
         return np.asarray(odd)
@@ -152,7 +152,7 @@ def _fold_radius(c: FloatGrid) -> float:
 
 
 def _last_root(polynomial: FloatGrid) -> float:
-    """Give the largest real root > 0 of a polynomial, highest power first; 0 for none."""
+    """Return the largest real root > 0 of a polynomial, highest power first; 0 for none."""
     roots = np.roots(polynomial)
     real = roots[np.abs(roots.imag) <= 1e-9 * (1 + np.abs(roots.real))].real
     return float(real.max(initial=0.0))

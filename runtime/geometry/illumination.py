@@ -14,7 +14,7 @@ GAIN_SAMPLES: Final = 1 << 21
 
 
 def illumination_band(psf: FrozenPsf, window: SensorWindow, top: int, bottom: int) -> FloatArray:
-    """Give the relative illumination of rows top..bottom of a window.
+    """Return the relative illumination of rows top..bottom of a window.
 
     Linear in the squared field height between the samples of the PSF, since the illumination is
     an even function of the height; constant beyond the last one.
@@ -46,7 +46,7 @@ def illumination_band(psf: FrozenPsf, window: SensorWindow, top: int, bottom: in
 
 
 def _on_grid(psf: FrozenPsf, x_mm: FloatGrid, y_mm: FloatGrid) -> FloatArray:
-    """Give the illumination (row, column) between the positions of a grid; its rim holds beyond."""
+    """Return illumination (row, column) between the positions of a grid; its rim holds beyond."""
     assert psf.grid_x_mm is not None
     assert psf.grid_y_mm is not None
     known = psf.relative_illumination.reshape(psf.grid_y_mm.size, psf.grid_x_mm.size)
@@ -123,6 +123,6 @@ class IlluminationGain:
         return np.asarray(np.multiply(band, gain, out=out))
 
     def _gains(self, index: NDArray[np.intp]) -> FloatArray:
-        """Give the samples of these numbers."""
+        """Return the samples of these numbers."""
         gains = 1 / np.interp(index * self._step, self._squares, self._coarse)
         return np.asarray(gains, dtype=np.float32)

@@ -109,7 +109,7 @@ def scatter_light(
 
 
 def _reaching(side: int, first: int, last: int, inside: int) -> tuple[slice, int]:
-    """Give the part of a kernel along an axis that throws light of a block inside.
+    """Return the part of a kernel along an axis that throws light of a block inside.
 
     Args:
         side: Of the kernel.

@@ -43,30 +43,30 @@ class SensorWindow:
 
     @property
     def known_axis_px(self) -> tuple[float, float]:
-        """Give (x, y) on the sensor where the optical axis meets it."""
+        """Return (x, y) on the sensor where the optical axis meets it."""
         width, height = self.sensor_size_px
         return self.axis_px or ((width - 1) / 2, (height - 1) / 2)
 
     @property
     def centre_mm(self) -> FloatGrid:
-        """Give (x, y) of the middle of the window from the axis."""
+        """Return (x, y) of the middle of the window from the axis."""
         width, height = self.size_px
         return np.array(self.to_mm((width - 1) / 2, (height - 1) / 2), dtype=np.float64)
 
     @property
     def corner_radius_mm(self) -> float:
-        """Give the largest distance of a pixel of the window from the axis."""
+        """Return the largest distance of a pixel of the window from the axis."""
         width, height = self.size_px
         x_mm, y_mm = self.to_mm(np.array([0, width - 1.0]), np.array([0, height - 1.0]))
         return float(np.hypot(np.abs(x_mm).max(), np.abs(y_mm).max()))
 
     def widened(self, px: int) -> "SensorWindow":
-        """Give a window with more pixels on every side, even beyond the sensor."""
+        """Return a window with more pixels on every side, even beyond the sensor."""
         (x, y), (width, height) = self.origin_px, self.size_px
         return replace(self, size_px=(width + 2 * px, height + 2 * px), origin_px=(x - px, y - px))
 
     def resampled(self, ratio: float, size_px: tuple[int, int]) -> "SensorWindow":
-        """Give the same window in samples of another distance.
+        """Return the same window in samples of another distance.
 
         Args:
             ratio: Distance of the new samples over that of the old ones.
@@ -84,7 +84,7 @@ class SensorWindow:
         )
 
     def to_mm(self, x_px: PixelGrid, y_px: PixelGrid) -> tuple[FloatGrid, FloatGrid]:
-        """Give the sensor position of pixel positions of the capture (0, 0 = top left pixel)."""
+        """Return the sensor position of pixel positions of the capture (0, 0 = top left pixel)."""
         (x0, y0), (axis_x, axis_y) = self.origin_px, self.known_axis_px
         pitch_mm = to_mm(self.pitch_um)
         x_mm = (np.asarray(x_px, dtype=np.float64) + (x0 - axis_x)) * pitch_mm
@@ -92,7 +92,7 @@ class SensorWindow:
         return x_mm, y_mm
 
     def to_px(self, x_mm: FloatGrid, y_mm: FloatGrid) -> tuple[FloatGrid, FloatGrid]:
-        """Give the pixel position in the capture of sensor positions; inverse of `to_mm`."""
+        """Return the pixel position in the capture of sensor positions; inverse of `to_mm`."""
         (x0, y0), (axis_x, axis_y) = self.origin_px, self.known_axis_px
         pitch_mm = to_mm(self.pitch_um)
         return x_mm / pitch_mm + (axis_x - x0), y_mm / pitch_mm + (axis_y - y0)
@@ -101,7 +101,7 @@ class SensorWindow:
 def centred_origin(
     size_px: tuple[int, int], sensor_size_px: tuple[int, int], *, multiple: int = 2
 ) -> tuple[int, int]:
-    """Give the origin that centres a window on the sensor, rounded down to the CFA cell."""
+    """Return the origin that centres a window on the sensor, rounded down to the CFA cell."""
     x, y = (
         max((whole - side) // 2, 0) // multiple * multiple
         for side, whole in zip(size_px, sensor_size_px, strict=True)

@@ -6,7 +6,7 @@ from camkit.contracts import FloatArray
 
 
 def shrunk(planes: FloatArray, times: int) -> FloatArray:
-    """Give the means over squares of `times` pixels a side.
+    """Return the means over squares of `times` pixels a side.
 
     Args:
         planes: (c, h, w).

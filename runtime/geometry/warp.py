@@ -135,16 +135,16 @@ class Warp:
 
     @property
     def channels(self) -> int:
-        """Give the number of channels that the distortion knows."""
+        """Return the number of channels that the distortion knows."""
         return int(self.distortion.coefficients.shape[0])
 
     def shares_map(self, channel: int) -> bool:
-        """Tell whether a channel has the same map as the one before it."""
+        """Return whether a channel has the same map as the one before it."""
         row = self.distortion.row
         return channel > 0 and bool(np.array_equal(row(channel), row(channel - 1)))
 
     def positions(self, channel: int, x_px: FloatGrid, y_px: FloatGrid) -> FloatGrid:
-        """Give (..., 2) source pixel positions of output pixel positions.
+        """Return (..., 2) source pixel positions of output pixel positions.
 
         Args:
             channel: Number of the channel.
@@ -159,7 +159,7 @@ class Warp:
         return np.stack(self.window.to_px(found[..., 0], found[..., 1]), axis=-1)
 
     def lattice(self, channel: int, top: int, bottom: int) -> FloatGrid:
-        """Give the positions on the lattice nodes around rows top..bottom (top on the lattice)."""
+        """Return positions on the lattice nodes around rows top..bottom (top on the lattice)."""
         width = self.window.size_px[0] + 2 * self._margin_px
         middle = (LATTICE_PX - 1) / 2
         columns = np.arange(-1, -(-width // LATTICE_PX) + 1) * LATTICE_PX + middle
@@ -168,7 +168,7 @@ class Warp:
         return self.positions(channel, x, y)
 
     def maps(self, channel: int, top: int, bottom: int) -> Maps:
-        """Give cv2's fixed-point maps of output rows top..bottom (top on the lattice)."""
+        """Return cv2's fixed-point maps of output rows top..bottom (top on the lattice)."""
         nodes = self.lattice(channel, top, bottom).astype(np.float32)
         width = self.window.size_px[0] + 2 * self._margin_px
         # cv2.resize places node i in the middle of its cell, as the lattice does.

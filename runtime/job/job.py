@@ -100,17 +100,17 @@ class Job:
 
     @property
     def bundle(self) -> Bundle | None:
-        """Give the camera."""
+        """Return the camera."""
         return self.setup.bundle
 
     @property
     def known_bundle(self) -> Bundle:
-        """Give the camera, which a stage that needs one always has."""
+        """Return the camera, which a stage that needs one always has."""
         return self.setup.known_bundle
 
     @property
     def color_matrix(self) -> Matrix | None:
-        """Give XYZ (D65) to camera, of the file before that of the bundle; None if not known."""
+        """Return XYZ (D65) to camera, of the file before that of the bundle; None if not known."""
         sensor = None if self.bundle is None else self.bundle.manifest.sensor
         if self.capture.color_matrix is not None or self.capture.cfa is None:
             return self.capture.color_matrix
@@ -120,16 +120,16 @@ class Job:
 
     @property
     def options(self) -> Options:
-        """Give what the caller chose."""
+        """Return what the caller chose."""
         return self.setup.options
 
     @property
     def threads(self) -> int:
-        """Give the threads to compute with."""
+        """Return the threads to compute with."""
         return self.setup.threads
 
     def probe(self, *planes: str) -> tuple[RowSource, ...]:
-        """Give rows of planes that are made for the asking stage alone, before its first row.
+        """Return rows of planes that are made for the asking stage alone, before its first row.
 
         They equal those that it will be given. To be called when the first row is asked for.
         Several planes are made by one walk: read the same rows of each before the next ones, from
@@ -147,7 +147,7 @@ class Job:
         return self.prober(self, planes)
 
     def unheard(self) -> "Job":
-        """Give the same job for a walk whose counts and notes nobody hears."""
+        """Return the same job for a walk whose counts and notes nobody hears."""
         other = Job(self.setup, self.capture, cancel=self.cancel, known=self.known)
         other.record, other.kept = dict(self.record), self.kept
         other.work, other.subject, other.falls_back = self.work, self.subject, self.falls_back
@@ -220,7 +220,7 @@ class Job:
 
     @cached_property
     def placement(self) -> Placement:
-        """Give where the capture lies on the bundle's sensor.
+        """Return where the capture lies on the bundle's sensor.
 
         Raises:
             ContractError: If it does not fit and nothing was assumed.
@@ -232,7 +232,7 @@ class Job:
         return placement
 
     def window_of(self, plane: Plane) -> SensorWindow:
-        """Give where the samples of a plane lie on the sensor, in pixels of its own grid."""
+        """Return where the samples of a plane lie on the sensor, in pixels of its own grid."""
         window, ratio = self.placement.window, plane.grid.pitch_ratio
         if ratio == 1:
             return window
@@ -240,13 +240,13 @@ class Job:
         return window.resampled(ratio, (width, height))
 
     def grid_px(self, plane: Plane) -> tuple[int, int]:
-        """Give (height, width) of a plane of this capture."""
+        """Return (height, width) of a plane of this capture."""
         ratio = plane.grid.pitch_ratio
         return round(self.capture.height / ratio), round(self.capture.width / ratio)
 
     @cached_property
     def noise(self) -> NoiseModel:
-        """Give the noise of the raw signal: the file's, the bundle's at its ISO, or measured."""
+        """Return the noise of the raw signal: the file's, the bundle's at its ISO, or measured."""
         sensor = self.known_bundle.manifest.sensor
         if self.capture.noise is not None:
             source, noise = "file", self.capture.noise

@@ -68,11 +68,11 @@ class MeteredRows:
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Give (channel, h, w) of the whole picture."""
+        """Return (channel, h, w) of the whole picture."""
         return self._source.shape
 
     def read(self, top: int, bottom: int) -> Rows:
-        """Give rows top..bottom of the source."""
+        """Return rows top..bottom of the source."""
         rows = self._source.read(top, bottom)
         self._meter.reach(self._key, bottom / self.shape[1])
         return rows

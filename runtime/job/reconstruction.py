@@ -80,7 +80,7 @@ class Reconstruction:
 
     @property
     def products(self) -> dict[str, str]:
-        """Give the products that can be had: name -> plane."""
+        """Return the products that can be had: name -> plane."""
         bundle = self._setup.bundle
         if bundle is None:
             return {IMAGE: DEVELOPMENT[-1].gives[0]}
@@ -88,11 +88,11 @@ class Reconstruction:
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Give (c, h, w) of the image."""
+        """Return (c, h, w) of the image."""
         return self.shape_of(IMAGE)
 
     def shape_of(self, product: str) -> tuple[int, int, int]:
-        """Give (c, h, w) of a product.
+        """Return (c, h, w) of a product.
 
         Raises:
             ContractError: If there is none of the name.
@@ -113,12 +113,12 @@ class Reconstruction:
 
     @property
     def record(self) -> dict[str, Any]:
-        """Give what was decided, for the sidecar."""
+        """Return what was decided, for the sidecar."""
         return self.job.record
 
     @property
     def sections(self) -> dict[str, Any]:
-        """Give what stages found, for the sidecar: name of a section -> what it holds.
+        """Return what stages found, for the sidecar: name of a section -> what it holds.
 
         Complete once all rows are out.
         """
@@ -126,12 +126,12 @@ class Reconstruction:
 
     @property
     def white_balance(self) -> tuple[float, ...]:
-        """Give the gains in use."""
+        """Return the gains in use."""
         return self.job.white_balance
 
     @property
     def color(self) -> ColorStage:
-        """Give the way from camera colour to the colour asked for.
+        """Return the way from camera colour to the colour asked for.
 
         Raises:
             ContractError: If no stage gives a picture in colour.
@@ -142,7 +142,7 @@ class Reconstruction:
 
     @property
     def origin(self) -> Origin:
-        """Give what every writer should know of where the products come from."""
+        """Return what every writer should know of where the products come from."""
         capture, bundle = self.capture, self._setup.bundle
         return Origin(
             camera=capture.camera,
@@ -160,44 +160,44 @@ class Reconstruction:
 
     @property
     def size(self) -> str | None:
-        """Give the size of network in use; None if none runs."""
+        """Return the size of network in use; None if none runs."""
         sizes = self.job.work.sizes() if self.job.windows else ()
         return sizes[0] if sizes else None
 
     @property
     def labels(self) -> Labels | None:
-        """Give the tier of every lattice cell; None where all get the network."""
+        """Return the tier of every lattice cell; None where all get the network."""
         return self.job.work.labels
 
     @property
     def windows(self) -> dict[str, NetworkWindows]:
-        """Give role -> the planned windows of its network; empty if none runs."""
+        """Return role -> the planned windows of its network; empty if none runs."""
         return self.job.windows
 
     def measured_speed(self, sizes: Sequence[str]) -> Speed:
-        """Give how fast this machine is with the networks of some sizes."""
+        """Return how fast this machine is with the networks of some sizes."""
         return self._setup.speed(sizes)
 
     @property
     def seconds(self) -> dict[str, float]:
-        """Give the seconds per stage so far, in the order of the data."""
+        """Return the seconds per stage so far, in the order of the data."""
         spent = self.clock.seconds
         order = (*BEFORE_STAGES, *self._walk.keys)
         return {name: spent[name] for name in sorted(spent, key=order.index)}
 
     @property
     def clock(self) -> StageClock:
-        """Give the clock of the stages, for profiles."""
+        """Return the clock of the stages, for profiles."""
         return self.job.clock
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Give what the user should know; complete once the last band is out."""
+        """Return what the user should know; complete once the last band is out."""
         return (*self.job.notes, *self._walk.warnings())
 
     @property
     def clipped_fraction(self) -> float:
-        """Give the share of clipped samples seen so far."""
+        """Return the share of clipped samples seen so far."""
         return self.job.clipped_fraction
 
     def bands(self, product: str = IMAGE) -> Iterator[Rows]:
@@ -219,7 +219,7 @@ class Reconstruction:
         self.job.meter.finish()
 
     def rows_of(self, plane: str) -> RowSource:
-        """Give the rows of any plane of the manifest, for export, reports and tests."""
+        """Return the rows of any plane of the manifest, for export, reports and tests."""
         return self._walk.stream(plane).rows()
 
     def keep(self, plane: str) -> Stream:
@@ -231,7 +231,7 @@ class Reconstruction:
         return self._walk.keep(plane)
 
     def network_input(self, role: str) -> FloatArray:
-        """Give what the network of a role is given for the whole capture, (c, h, w).
+        """Return what the network of a role is given for the whole capture, (c, h, w).
 
         Raises:
             ContractError: If no stage has the role.

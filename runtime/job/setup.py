@@ -42,14 +42,14 @@ class Setup:
 
     @property
     def stages(self) -> tuple[Stage, ...]:
-        """Give the stages that are walked."""
+        """Return the stages that are walked."""
         if self.bundle is None:
             return DEVELOPMENT
         return bounded_stages(self.bundle.manifest, self.options.laws)
 
     @property
     def known_bundle(self) -> Bundle:
-        """Give the bundle.
+        """Return the bundle.
 
         Raises:
             ContractError: If there is none.

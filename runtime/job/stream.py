@@ -44,17 +44,17 @@ class Stream:
 
     @property
     def gives_own_rows(self) -> bool:
-        """Tell whether what `rows` reads is the reader's own to change."""
+        """Return whether what `rows` reads is the reader's own to change."""
         return self.source is not None and self.owned
 
     def rows(self) -> RowSource:
-        """Give the rows, to be read from top to bottom with any overlap."""
+        """Return the rows, to be read from top to bottom with any overlap."""
         if self.source is not None:
             return self.source
         return self.pieced()
 
     def pieced(self) -> PiecedRows:
-        """Give the rows as they lie, each kept until it is read."""
+        """Return the rows as they lie, each kept until it is read."""
         if isinstance(self.source, RowReader):
             return self.source
         return RollingRows(self.shape, self.bands()).reader()
@@ -68,21 +68,21 @@ class Stream:
         return bands if self.owned else (band.copy() for band in bands)
 
     def timed(self, clock: StageClock, name: str) -> "Stream":
-        """Give the stream whose making is charged to a stage."""
+        """Return the stream whose making is charged to a stage."""
         if self.made is not None:
             return replace(self, made=clock.bands(name, self.made))
         assert self.source is not None
         return replace(self, source=TimedRows(self.source, clock, name))
 
     def metered(self, meter: Meter, key: str) -> "Stream":
-        """Give the stream whose rows are counted."""
+        """Return the stream whose rows are counted."""
         if self.made is not None:
             return replace(self, made=meter.bands(key, self.made, self.shape[1]))
         assert self.source is not None
         return replace(self, source=MeteredRows(self.source, meter, key))
 
     def shared(self, takers: int) -> list["Stream"]:
-        """Give a stream for each of several takers; rows are kept until all have read them."""
+        """Return a stream for each of several takers; rows are kept until all have read them."""
         if takers < 2:
             return [self][:takers]
         rolling = RollingRows(self.shape, self.bands())
@@ -91,9 +91,9 @@ class Stream:
         ]
 
     def with_bands(self, made: Iterator[Rows]) -> "Stream":
-        """Give what a stage made of this stream, of the same shape and meaning."""
+        """Return what a stage made of this stream, of the same shape and meaning."""
         return replace(self, made=made, source=None, owned=True)
 
     def with_source(self, source: RowSource) -> "Stream":
-        """Give what a stage makes of this stream, readable from any row on."""
+        """Return what a stage makes of this stream, readable from any row on."""
         return replace(self, source=source, made=None, shape=source.shape, owned=True)

@@ -90,13 +90,13 @@ class Walk:
             spent += work.planned_bytes()
 
     def needed_bytes(self) -> int:
-        """Give the memory of the whole walk."""
+        """Return the memory of the whole walk."""
         running = [work for work, way in zip(self._works, self.ways, strict=True) if way]
         planned = self._fixed_bytes(running) + sum(work.planned_bytes() for work in running)
         return max(planned, self._first_bytes(running))
 
     def _first_bytes(self, running: list[StageWork]) -> int:
-        """Give the memory at the time when stages look at the capture before any row.
+        """Return the memory at the time when stages look at the capture before any row.
 
         Whatever becomes of rows, a JPEG say, takes nothing yet.
         """
@@ -110,11 +110,11 @@ class Walk:
         return FIXED_BYTES + stored + job.capture.resident_bytes + job.reserved_bytes + held
 
     def warnings(self) -> tuple[str, ...]:
-        """Give what the stages have to say once the last row is out."""
+        """Return what the stages have to say once the last row is out."""
         return tuple(text for work in self._works for text in work.warnings())
 
     def stream(self, wanted: str) -> Stream:
-        """Give the rows of a plane; every call walks anew.
+        """Return the rows of a plane; every call walks anew.
 
         Args:
             wanted: Name of the plane.
@@ -126,7 +126,7 @@ class Walk:
         return made
 
     def streams(self, *wanted: str) -> tuple[Stream, ...]:
-        """Give the rows of several planes by one walk, to be read band by band in turns.
+        """Return the rows of several planes by one walk, to be read band by band in turns.
 
         Args:
             wanted: Names of planes, no two alike.
@@ -161,11 +161,11 @@ class Walk:
         return kept
 
     def taken_by(self, number: int) -> list[Stream]:
-        """Give the streams that a stage takes; every call walks anew."""
+        """Return the streams that a stage takes; every call walks anew."""
         return [self.stream(name) for name in self.stages[number].takes]
 
     def _needed(self, wanted: Sequence[str]) -> list[int]:
-        """Give the stages, in order, whose planes the wanted are made of and are not known."""
+        """Return the stages, in order, whose planes the wanted are made of and are not known."""
         planes, needed, known = set(wanted), [], self._job.known.keys()
         for number in range(len(self.stages) - 1, -1, -1):
             made = planes.intersection(self.stages[number].gives) - known
@@ -180,7 +180,7 @@ class Walk:
 
 
 def _giver_of(plane: str, stages: Sequence[Stage]) -> int:
-    """Give the number of the stage that gives a plane; -1 for the sensor.
+    """Return the number of the stage that gives a plane; -1 for the sensor.
 
     Raises:
         ContractError: If none does.
@@ -195,7 +195,7 @@ def _giver_of(plane: str, stages: Sequence[Stage]) -> int:
 
 
 def _probed(job: Job, planes: Sequence[str], *, before: int) -> tuple[RowSource, ...]:
-    """Give what `Job.probe` gives.
+    """Return what `Job.probe` gives.
 
     Raises:
         ContractError: If a plane is made by a stage that asks, or behind it.
@@ -210,7 +210,7 @@ def _probed(job: Job, planes: Sequence[str], *, before: int) -> tuple[RowSource,
 
 
 def _planes_of(job: Job) -> dict[str, Plane]:
-    """Give the planes that are stated; without a bundle that of the capture alone."""
+    """Return the planes that are stated; without a bundle that of the capture alone."""
     if job.bundle is not None:
         return job.bundle.manifest.all_planes
     channels = MOSAIC if job.capture.cfa is not None else RGB
@@ -218,7 +218,7 @@ def _planes_of(job: Job) -> dict[str, Plane]:
 
 
 def _capture_stream(job: Job, plane: Plane) -> Stream:
-    """Give the capture as it is; planes that come in place of a mosaic have their own channels."""
+    """Return capture as it is; planes that come in place of a mosaic have their own channels."""
     capture = job.capture
     if capture.cfa is None and plane.channels == MOSAIC:
         plane = plane.model_copy(update={"channels": RGB})
@@ -239,10 +239,10 @@ class _Samples:
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Give (channel, h, w); a mosaic is one channel."""
+        """Return (channel, h, w); a mosaic is one channel."""
         return self._capture.plane_shape
 
     def read(self, top: int, bottom: int) -> Rows:
-        """Give rows top..bottom."""
+        """Return rows top..bottom."""
         rows: Rows = self._capture.samples[..., top:bottom, :]
         return rows if rows.ndim == 3 else rows[None]

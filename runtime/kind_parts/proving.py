@@ -20,15 +20,15 @@ class CaseWork(Protocol):
     """A golden capture on its way to its products."""
 
     def shape_of(self, product: str) -> tuple[int, int, int]:
-        """Give (c, h, w) of a product before any of it is computed."""
+        """Return (c, h, w) of a product before any of it is computed."""
         ...
 
     def fill(self, out: FloatArray | None = None, product: str = "image") -> FloatArray:
-        """Give a product, (c, h, w)."""
+        """Return a product, (c, h, w)."""
         ...
 
     def network_input(self, role: str) -> FloatArray:
-        """Give what the network of a role is given, (c, h, w)."""
+        """Return what the network of a role is given, (c, h, w)."""
         ...
 
 

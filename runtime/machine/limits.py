@@ -28,7 +28,7 @@ class Limit:
     unit: str
 
     def value(self, environment: Mapping[str, str] | None = None) -> float:
-        """Give the limit in force.
+        """Return the limit in force.
 
         Args:
             environment: That of the process unless given.
@@ -69,7 +69,7 @@ class Limit:
 
 
 def _rounded_up(wanted: float) -> str:
-    """Give a number of two digits that is not below."""
+    """Return a number of two digits that is not below."""
     if not math.isfinite(wanted) or wanted <= 0:
         return "inf"
     step = 10.0 ** (math.floor(math.log10(wanted)) - 1)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 
 def peak_rss_mb() -> float:
-    """Give the peak memory of this process so far, in MB; 0 where the system does not tell.
+    """Return the peak memory of this process so far, in MB; 0 where the system does not tell.
 
     On Linux getrusage would also count what the parent held before exec, so the kernel's own
     high-water mark is read there.
@@ -35,7 +35,7 @@ def _max_rss_mb() -> float:
 
 
 def trim_heap(limit_bytes: int) -> None:
-    """Give freed memory back to the system where the process takes more than a limit.
+    """Return freed memory back to the system where the process takes more than a limit.
 
     The C library keeps what was freed between two blocks in use: up to a quarter of the memory of
     a large picture. Giving it back costs milliseconds, so it is done near the limit only. Nothing
@@ -116,7 +116,7 @@ holes. It costs fresh pages for every array. Nothing happens where the C library
 
 
 def mapping_of(samples: NDArray[Any]) -> mmap.mmap | None:
-    """Give the file mapping that an array is a view of; None for an array in memory."""
+    """Return the file mapping that an array is a view of; None for an array in memory."""
     owner: Any = samples
     while isinstance(owner, np.ndarray):
         owner = owner.base
@@ -124,7 +124,7 @@ def mapping_of(samples: NDArray[Any]) -> mmap.mmap | None:
 
 
 def release_pages(samples: NDArray[Any]) -> None:
-    """Give back what was read of a mapped array; it is read again when it is asked for."""
+    """Return back what was read of a mapped array; it is read again when it is asked for."""
     mapping = mapping_of(samples)
     if mapping is not None and hasattr(mmap, "MADV_DONTNEED"):
         mapping.madvise(mmap.MADV_DONTNEED)

@@ -71,7 +71,7 @@ def run_slices(
 
 
 def run_parts(work: Callable[[T], R], parts: Sequence[T], *, threads: int) -> list[R]:
-    """Give what `work` makes of every part, in their order; the threads end with the call.
+    """Return what `work` makes of every part, in their order; the threads end with the call.
 
     Args:
         work: Called at the same time from several threads.

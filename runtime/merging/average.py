@@ -47,7 +47,7 @@ class Average:
 
     @classmethod
     def empty(cls, shape: tuple[int, int, int]) -> Self:
-        """Give an average of nothing."""
+        """Return an average of nothing."""
         return cls(
             value=np.full(shape, np.nan, dtype=np.float32),
             precision=np.zeros(shape, dtype=np.float32),

@@ -61,7 +61,7 @@ def estimate_response(codes: Codes, times_s: NDArray[np.float64]) -> Response:
 
 
 def disagreement(codes: Codes, times_s: NDArray[np.float64], response: Response) -> float:
-    """Give by how many codes a frame misses what the frames together say of its pixels.
+    """Return by how many codes a frame misses what the frames together say of its pixels.
 
     Args:
         codes: (frame, channel, pixel) uint8.
@@ -97,13 +97,13 @@ def residuals_codes(
 
 
 def _trusted(codes: NDArray[np.intp], clipped_from: int) -> NDArray[np.bool_]:
-    """Tell which samples of (pixel, frame) codes speak: unclipped, in two frames at least."""
+    """Return which samples of (pixel, frame) codes speak: unclipped, in two frames at least."""
     open_ = (codes > 0) & (codes < clipped_from)
     return np.asarray(open_ & (open_.sum(axis=1) >= 2)[:, None])
 
 
 def _curve(codes: NDArray[np.intp], log_times: FloatTable, start: Response) -> FloatTable:
-    """Give the (256,) log light of one colour's (pixel, frame) codes."""
+    """Return the (256,) log light of one colour's (pixel, frame) codes."""
     trust = _trusted(codes, start.clipped_from)
     pixels = int(trust.any(axis=1).sum())
     if pixels < LEAST_PIXELS or np.ptp(log_times) == 0:
@@ -130,7 +130,7 @@ def _curve(codes: NDArray[np.intp], log_times: FloatTable, start: Response) -> F
 def _solve(
     codes: NDArray[np.intp], log_times: FloatTable, weights: FloatTable, prior: FloatTable
 ) -> FloatTable:
-    """Give the curve that fits best with these weights of the samples."""
+    """Return the curve that fits best with these weights of the samples."""
     pixels, frames = codes.shape
     total = np.maximum(weights.sum(axis=1), 1e-300)
     rows = np.repeat(np.arange(pixels), frames)
@@ -151,7 +151,7 @@ def _solve(
 def _residual(
     curve: FloatTable, codes: NDArray[np.intp], log_times: FloatTable, weights: FloatTable
 ) -> FloatTable:
-    """Give the (pixel, frame) residuals of the log light against its mean over frames."""
+    """Return the (pixel, frame) residuals of the log light against its mean over frames."""
     seen = np.where(weights > 0, np.where(np.isfinite(curve), curve, 0)[codes] - log_times, 0)
     total = np.maximum(weights.sum(axis=1, keepdims=True), 1e-300)
     return np.asarray(seen - (weights * seen).sum(axis=1, keepdims=True) / total)

@@ -60,7 +60,7 @@ class Merged:
 
 
 def choose_response(survey: Survey, wanted: ResponseName | None) -> tuple[Response | None, str]:
-    """Give what codes stand for, None for linear samples, and a note where it was a choice.
+    """Return what codes stand for, None for linear samples, and a note where it was a choice.
 
     Without a wish, pictures of 8 bits are estimated and all others are linear, as captures are
     elsewhere. The estimate gives way to a known curve that explains the frames to within the
@@ -200,7 +200,7 @@ class _Coded:
         share: float,
         _before: tuple[FloatArray, FloatArray],
     ) -> Exposed:
-        """Give what rows say, exposed by a share of the longest time."""
+        """Return what rows say, exposed by a share of the longest time."""
         codes, tables = capture.samples[:, top:bottom], self._response
         clipped = codes >= tables.clipped_from
         inside = _certainty(codes, tables.log_light.shape[1])
@@ -245,7 +245,7 @@ class _Linear:
         share: float,
         before: tuple[FloatArray, FloatArray],
     ) -> Exposed:
-        """Give what rows say, exposed by a share of the longest time."""
+        """Return what rows say, exposed by a share of the longest time."""
         shape = (-1, bottom - top, capture.width)
         light = capture.linear_rows(top, bottom).reshape(shape)
         clipped = clipped_rows(capture, top, bottom).reshape(shape)
@@ -269,7 +269,7 @@ class _Linear:
 
 
 def clipped_rows(capture: Capture, top: int, bottom: int) -> BoolArray:
-    """Tell which samples of rows are clipped; those of floats clip at 1, as exposures do."""
+    """Return which samples of rows are clipped; those of floats clip at 1, as exposures do."""
     if np.issubdtype(capture.samples.dtype, np.floating):
         limit = SATURATION_SHARE * capture.white_level
         return np.asarray(capture.samples[..., top:bottom, :] >= limit)
@@ -285,7 +285,7 @@ def _read_variance(like: Capture, noise: NoiseModel) -> tuple[float, ...]:
 
 
 def _spread_over(like: Capture, per_channel: tuple[float, ...]) -> FloatArray:
-    """Give numbers per colour as (1, 2, w) of a mosaic, or (channel, 1, 1)."""
+    """Return numbers per colour as (1, 2, w) of a mosaic, or (channel, 1, 1)."""
     values = np.array(per_channel, dtype=np.float32)
     if like.cfa is None:
         return values[:, None, None]

@@ -50,7 +50,7 @@ class Response:
 
 
 def response_of(name: ResponseName, log_light: FloatTable) -> Response:
-    """Give a response with the precision of its codes.
+    """Return a response with the precision of its codes.
 
     Args:
         name: How it was come by.
@@ -69,7 +69,7 @@ def response_of(name: ResponseName, log_light: FloatTable) -> Response:
 
 
 def srgb_response(codes: int) -> Response:
-    """Give the response of pictures in sRGB, 256 or 65536 codes."""
+    """Return the response of pictures in sRGB, 256 or 65536 codes."""
     light = decode_srgb(np.linspace(0, 1, codes, dtype=np.float32)).astype(np.float64)
     with np.errstate(divide="ignore"):
         table = np.log(light)

@@ -59,7 +59,7 @@ class Report:
     notes: tuple[str, ...]
 
     def to_json(self) -> dict[str, Any]:
-        """Give the report as plain JSON values."""
+        """Return the report as plain JSON values."""
         return {
             "frames": list(self.frames),
             "times_s": list(self.times_s),
@@ -118,7 +118,7 @@ def merge_to_exr(
 
 
 def reference_frame(survey: Survey, name: str | None) -> Frame:
-    """Give the frame of a name, or the middle one by time.
+    """Return the frame of a name, or the middle one by time.
 
     Raises:
         ContractError: If no frame, or more than one, has the name.
@@ -199,7 +199,7 @@ def _write(writer: PictureWriter, bands: Iterator[FloatArray], seen: "_Seen") ->
 
 
 def _stated(time_s: float) -> float | None:
-    """Give a time as metadata can hold it; relative exposures may be beyond."""
+    """Return a time as metadata can hold it; relative exposures may be beyond."""
     return time_s if 1e-7 <= time_s <= 1e6 else None
 
 
@@ -223,7 +223,7 @@ class _Seen:
 
     @property
     def stops(self) -> float:
-        """Give the stops between the tails."""
+        """Return the stops between the tails."""
         shares = np.cumsum(self._counts) / max(int(self._counts.sum()), 1)
         low, high = np.searchsorted(shares, (_TAIL, 1 - _TAIL))
         return max(0.0, float(high - low) / _STEPS_PER_STOP)

@@ -72,7 +72,7 @@ class Survey:
 
     @property
     def times_s(self) -> NDArray[np.float64]:
-        """Give the exposure times, longest first."""
+        """Return the exposure times, longest first."""
         return np.array([frame.time_s for frame in self.frames])
 
 
@@ -290,7 +290,7 @@ def without_pixels(capture: Capture) -> Capture:
 
 
 def _lattice(capture: Capture) -> NDArray[np.uint8] | None:
-    """Give (3, pixel) codes of a regular lattice; None for other samples than 8-bit pictures."""
+    """Return (3, pixel) codes of a regular lattice; None for other samples than 8-bit pictures."""
     samples = capture.samples
     if samples.dtype != np.uint8 or capture.cfa is not None:
         return None

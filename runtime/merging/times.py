@@ -14,7 +14,7 @@ MOST_LIST_BYTES: Final = 1 << 20
 
 
 def stated_times(text: str, files: Sequence[Path], darks: Sequence[Path] = ()) -> tuple[float, ...]:
-    """Give the exposure time of every file, then of every dark frame.
+    """Return the exposure time of every file, then of every dark frame.
 
     Args:
         text: Seconds separated by commas, in the order of the files; or the path of a list with

@@ -64,7 +64,7 @@ class CellNetwork:
 
     @property
     def window_bytes(self) -> float:
-        """Give the memory of a window per pixel: activations, input and output."""
+        """Return the memory of a window per pixel: activations, input and output."""
         return self.cost.arena_bytes + _FLOAT_BYTES * (self.cost.channels + self.cost.outputs)
 
 
@@ -99,7 +99,7 @@ class CellWindow:
 
     @property
     def area_px(self) -> int:
-        """Give the pixels computed."""
+        """Return the pixels computed."""
         top, left, bottom, right = self.pixels
         return (bottom - top) * (right - left)
 
@@ -154,7 +154,7 @@ class CellLayout:
         )
 
     def area_px(self, network: int) -> int:
-        """Give the pixels that one network computes."""
+        """Return the pixels that one network computes."""
         return sum(w.area_px for ws in self.strips for w in ws if w.network == network)
 
 
@@ -269,7 +269,7 @@ def infer_cells(
 def _checked(
     made: FloatArray, given: FloatArray, window: CellWindow, guard: TileGuard | None
 ) -> FloatArray:
-    """Give (3, h, w) of a window's output if it is sound."""
+    """Return (3, h, w) of a window's output if it is sound."""
     describe = partial(_describe, window)
     if guard is not None:
         return guard.check(made[0], given[0], describe)
@@ -321,7 +321,7 @@ def _place(
 
 @lru_cache(maxsize=256)
 def _ramp(around: tuple[bool, ...], cell_px: int) -> FloatArray:
-    """Give (cell, cell) weights: distance to the nearest cell without network over RAMP_PX.
+    """Return (cell, cell) weights: distance to the nearest cell without network over RAMP_PX.
 
     Args:
         around: Which of the 3x3 cells have a network, in reading order.
@@ -349,7 +349,7 @@ class _Frame:
     padded: tuple[int, int]
 
     def window(self, network: int, cells: tuple[int, int, int, int], halo: int) -> CellWindow:
-        """Give the window that serves a rectangle of cells."""
+        """Return the window that serves a rectangle of cells."""
         top, left, bottom, right = (edge * self.cell for edge in cells)
         height, width = self.padded
         return CellWindow(
@@ -367,7 +367,7 @@ class _Frame:
 def _strip_cells(
     frame: _Frame, networks: Sequence[CellNetwork], halo: int, limits: CellLimits
 ) -> tuple[int, int]:
-    """Give cell rows per strip and the most pixels of a window, by the memory cap."""
+    """Return cell rows per strip and the most pixels of a window, by the memory cap."""
     cell, (height, width) = frame.cell, frame.padded
     rows = -(-height // cell)
     per_px = sum(network.window_bytes for network in networks)
@@ -414,7 +414,7 @@ def _cover(
 def _best_cut(
     mask: NDArray[np.bool_], box: tuple[int, int, int, int], cell: int, halo: int, most_px: int
 ) -> list[tuple[int, int, int, int]]:
-    """Give the parts of the cheapest cut of a rectangle, nothing if it is best left whole."""
+    """Return the parts of the cheapest cut of a rectangle, nothing if it is best left whole."""
     top, left, bottom, right = box
     whole = _work_px(box, cell, halo)
     must = whole - _CALL_PX > most_px
@@ -438,7 +438,7 @@ def _best_cut(
 def _box(
     mask: NDArray[np.bool_], box: tuple[int, int, int, int]
 ) -> tuple[int, int, int, int] | None:
-    """Give the smallest rectangle around the chosen cells of a rectangle."""
+    """Return the smallest rectangle around the chosen cells of a rectangle."""
     top, left, bottom, right = box
     rows, columns = np.nonzero(mask[top:bottom, left:right])
     if rows.size == 0:

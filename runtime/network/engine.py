@@ -55,7 +55,7 @@ _ORT_ERRORS: Final = (
 
 
 def available_threads(requested: int | None = None) -> int:
-    """Give the number of threads to compute with.
+    """Return the number of threads to compute with.
 
     Args:
         requested: The user's choice, or None for all that the machine grants.
@@ -276,7 +276,7 @@ def _create_session(
 
 
 def _chosen_providers(provider: str) -> list[str | tuple[str, dict[str, str]]]:
-    """Give the provider with those that take the nodes it does not know.
+    """Return the provider with those that take the nodes it does not know.
 
     Raises:
         UnsupportedError: If the installed onnxruntime lacks the provider.
@@ -297,7 +297,7 @@ def _chosen_providers(provider: str) -> list[str | tuple[str, dict[str, str]]]:
 
 
 def _check_contract(session: Any) -> tuple[int, int]:
-    """Give the channels of input and output."""
+    """Return the channels of input and output."""
     inputs, outputs = session.get_inputs(), session.get_outputs()
     names = [v.name for v in inputs], [v.name for v in outputs]
     types = {v.type for v in (*inputs, *outputs)}

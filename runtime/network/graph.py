@@ -151,7 +151,7 @@ def _check_tensors(tensors: Sequence[Any]) -> None:
 
 
 def _held_values(tensor: Any) -> int:
-    """Give the most values a tensor can hold, were they of 4 bits."""
+    """Return the most values a tensor can hold, were they of 4 bits."""
     fields = ("float_data", "int32_data", "int64_data", "double_data", "uint64_data")
     return 2 * len(tensor.raw_data) + 8 * sum(len(getattr(tensor, name)) for name in fields)
 
@@ -272,7 +272,7 @@ def inspect_graph(data: bytes) -> GraphFacts:
 
 
 def check_graph(data: bytes, facts: NetworkFacts) -> GraphFacts:
-    """Hold a network against what the manifest says about it.
+    """Check a network against what the manifest says about it.
 
     Args:
         data: The ONNX model.
@@ -319,7 +319,7 @@ def check_graph(data: bytes, facts: NetworkFacts) -> GraphFacts:
 
 
 def with_node_outputs(data: bytes) -> tuple[bytes, tuple[str, ...]]:
-    """Give a model whose every tensor is an output, to measure activations.
+    """Return a model whose every tensor is an output, to measure activations.
 
     Returns:
         The model, and the names of its outputs in the order of the graph.

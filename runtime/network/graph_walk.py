@@ -121,7 +121,7 @@ class _Walk:
         return [int(value) for value in values.ravel()]
 
     def pass_through(self, node: Node, channels: int, windows: Windows) -> Extent:
-        """Give the extent behind a node with windows, and remember them for the way back."""
+        """Return the extent behind a node with windows, and remember them for the way back."""
         self.windows[node.outputs[0]] = windows
         return self.extent(node).through(channels, windows)
 
@@ -204,7 +204,7 @@ def _check_extents(node: Node, extents: Sequence[Extent]) -> None:
 
 
 def _final(extents: Mapping[str, Extent], target: tuple[str, int | None]) -> tuple[Extent, int]:
-    """Give the extent of the output, and its samples along a side for one pixel."""
+    """Return the extent of the output, and its samples along a side for one pixel."""
     name, channels = target
     if name not in extents:
         raise BundleError(f"output {name!r} is never computed")
@@ -394,7 +394,7 @@ def _elementwise(walk: _Walk, node: Node) -> Extent:
 
 
 def _together(node: Node, extents: Sequence[Extent], channels: int) -> Extent:
-    """Give the extent of a tensor computed sample by sample from several."""
+    """Return the extent of a tensor computed sample by sample from several."""
     axes = {extent.axes for extent in extents if extent.axes is not None}
     if len(axes) > 1:
         grids = sorted(f"every {rows.step} px (+{rows.extra})" for rows, _ in axes)

@@ -55,7 +55,7 @@ class TileGuard:
     def check(
         self, output: FloatArray, given: FloatArray, describe: Callable[[], str]
     ) -> FloatArray:
-        """Give the output of a tile if it is sound, else the planes that stand in for it.
+        """Return the output of a tile if it is sound, else the planes that stand in for it.
 
         Args:
             output: (k, s h, s w) float32 that the network made of the tile.
@@ -91,7 +91,7 @@ def _hint() -> str:
 
 
 def is_finite(planes: FloatArray) -> bool:
-    """Tell whether no sample is NaN or inf; both survive a minimum and a maximum."""
+    """Return whether no sample is NaN or inf; both survive a minimum and a maximum."""
     return math.isfinite(planes.min()) and math.isfinite(planes.max())
 
 
@@ -133,7 +133,7 @@ def light_bound(most_light: float, noise: NoiseModel, *, scale: float) -> Bound:
 
 
 def _trouble(output: FloatArray, given: FloatArray, bound: Bound) -> str | None:
-    """Say what is wrong with a tile; None if nothing is."""
+    """Return what is wrong with a tile; None if nothing is."""
     low, high = float(output.min()), float(output.max())
     if not (math.isfinite(low) and math.isfinite(high)):
         return "NaN or inf"

@@ -52,21 +52,21 @@ class Node:
     attributes: Mapping[str, Any]
 
     def integers(self, name: str, default: list[int]) -> list[int]:
-        """Give an attribute that is a list of integers."""
+        """Return an attribute that is a list of integers."""
         values = self.attributes.get(name, default)
         if not isinstance(values, list) or not all(isinstance(v, int) for v in values):
             raise BundleError(f"{self.label}: {name} must be a list of integers; got {values!r}")
         return values
 
     def integer(self, name: str, default: int) -> int:
-        """Give an attribute that is an integer."""
+        """Return an attribute that is an integer."""
         value = self.attributes.get(name, default)
         if not isinstance(value, int):
             raise BundleError(f"{self.label}: {name} must be an integer; got {value!r}")
         return value
 
     def text(self, name: str, default: str) -> str:
-        """Give an attribute that is a word."""
+        """Return an attribute that is a word."""
         value = self.attributes.get(name, default)
         return value.decode(errors="replace") if isinstance(value, bytes) else str(value)
 
@@ -98,7 +98,7 @@ class Axis:
     extra: int = 0
 
     def through(self, window: Window) -> "Axis":
-        """Give this axis behind an operator.
+        """Return this axis behind an operator.
 
         Raises:
             BundleError: If the grid becomes absurdly coarse or fine.
@@ -124,7 +124,7 @@ class Extent:
         return self.channels / float(self.axes[0].step * self.axes[1].step)
 
     def through(self, channels: int, windows: Windows | None = None) -> "Extent":
-        """Give the extent behind an operator with the given windows."""
+        """Return the extent behind an operator with the given windows."""
         axes = self.axes
         if axes is not None and windows is not None:
             axes = axes[0].through(windows[0]), axes[1].through(windows[1])
@@ -132,7 +132,7 @@ class Extent:
 
 
 def convolution_windows(node: Node, kernel: tuple[int, ...]) -> Windows:
-    """Give the windows of a convolution or pooling, transposed or not.
+    """Return the windows of a convolution or pooling, transposed or not.
 
     Raises:
         BundleError: If a parameter is out of range, or size or padding depend on the picture
@@ -179,7 +179,7 @@ def _transposed(stride: int, span: int, pads: tuple[int, int], growth: int) -> W
 
 
 def shuffle_window(block: int) -> Window:
-    """Give the window of DepthToSpace."""
+    """Return the window of DepthToSpace."""
     return Window(
         stride=Fraction(1, block),
         size=lambda n: n * block,
@@ -188,7 +188,7 @@ def shuffle_window(block: int) -> Window:
 
 
 def place_run(run: tuple[int, int], block: int, place: int) -> tuple[int, int]:
-    """Give the samples that DepthToSpace puts on one place of every block of a run of its output.
+    """Return the samples that DepthToSpace puts on one place of every block of a run of its output.
 
     Args:
         run: First and last sample of the output along an axis.
@@ -199,7 +199,7 @@ def place_run(run: tuple[int, int], block: int, place: int) -> tuple[int, int]:
 
 
 def unshuffle_window(block: int) -> Window:
-    """Give the window of SpaceToDepth."""
+    """Return the window of SpaceToDepth."""
     return Window(
         stride=Fraction(block),
         size=lambda n: n // block,
@@ -208,7 +208,7 @@ def unshuffle_window(block: int) -> Window:
 
 
 def resize_windows(node: Node, constants: Constants) -> Windows:
-    """Give the windows of a Resize by constant factors, nearest or linear.
+    """Return the windows of a Resize by constant factors, nearest or linear.
 
     Raises:
         BundleError: If its factors are not constant (it then depends on the picture's size), or
@@ -246,7 +246,7 @@ def _resize_window(node: Node, mode: str, scale: float) -> Window:
 
 
 def is_corner_aligned(node: Node) -> bool:
-    """Tell whether a Resize depends on the size of the whole picture."""
+    """Return whether a Resize depends on the size of the whole picture."""
     return node.text("coordinate_transformation_mode", "half_pixel") == "align_corners"
 
 

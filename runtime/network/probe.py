@@ -111,18 +111,18 @@ def _phases(stride_px: int) -> list[int]:
 
 
 def probe_runs(stride_px: int) -> int:
-    """Give how often a network runs to be probed."""
+    """Return how often a network runs to be probed."""
     return 1 + 2 * len(_phases(stride_px))
 
 
 def _by_pixel(changed: np.ndarray, scale: int) -> np.ndarray:
-    """Give (h, w): whether any sample of the output on a pixel changed."""
+    """Return (h, w): whether any sample of the output on a pixel changed."""
     height, width = (side // scale for side in changed.shape)
     return np.asarray(changed.reshape(height, scale, width, scale).any(axis=(1, 3)))
 
 
 def _distance(first: np.ndarray, last: np.ndarray, pixel: int) -> int:
-    """Give the largest distance from a pixel to the nearest end of any interval first..last."""
+    """Return the largest distance from a pixel to the nearest end of any interval first..last."""
     outside = np.maximum(first - pixel, pixel - last)
     return max(0, int(outside.max(initial=0)))
 

@@ -29,7 +29,7 @@ def node_activations(model: bytes, windows: Iterable[FloatArray]) -> dict[str, f
 
 
 def fits_fp16(activations: Mapping[str, float], *, headroom: float) -> bool:
-    """Tell whether all activations, times a headroom, lie well within the range of fp16.
+    """Return whether all activations, times a headroom, lie well within the range of fp16.
 
     CPU runs of an fp16 graph stay finite beyond 65504 and prove nothing; fp32 activations do.
     """

@@ -34,7 +34,7 @@ class RowBuffer:
         self._end = 0
 
     def move_to(self, top: int) -> FloatArray:
-        """Give the rows from `top` on, (c, rows, padded w); never above an earlier `top`."""
+        """Return the rows from `top` on, (c, rows, padded w); never above an earlier `top`."""
         kept = self._end - top
         if 0 < kept < self._rows.shape[1]:
             self._rows[:, :kept] = self._rows[:, top - self._top : self._end - self._top]

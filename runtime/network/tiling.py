@@ -134,7 +134,7 @@ class PixelCost:
 
     @property
     def out_values(self) -> int:
-        """Give the samples of the output for one pixel."""
+        """Return the samples of the output for one pixel."""
         return self.outputs * self.scale * self.scale
 
 
@@ -177,7 +177,7 @@ def _axis(size: int, window: int, halo: int) -> tuple[Span, ...]:
 
 
 def _equal_window(size: int, count: int, halo: int, stride: int) -> int:
-    """Give the smallest window of which `count` cover a padded axis."""
+    """Return the smallest window of which `count` cover a padded axis."""
     return min(size, _ceil_to(-(-(size + (count - 1) * 2 * halo) // count), stride))
 
 
@@ -247,7 +247,7 @@ def lay_windows(height_px: int, width_px: int, limits: TileLimits) -> TileLayout
 
 
 def _least_work(size: tuple[int, int], halo: int, limits: TileLimits) -> tuple[int, int]:
-    """Give the window of least computation within the cap; of equals, that of the fewest runs."""
+    """Return the window of least computation within the cap; of equals, that of the fewest runs."""
     if limits.whole:
         heights, widths = {size[0]}, {size[1]}
     else:
@@ -275,7 +275,7 @@ def _least_work(size: tuple[int, int], halo: int, limits: TileLimits) -> tuple[i
 
 
 def _equal_windows(size: int, halo: int, stride: int) -> set[int]:
-    """Give the window sizes of which 1, 2, 3, ... cover a padded axis."""
+    """Return the window sizes of which 1, 2, 3, ... cover a padded axis."""
     most = max(1, (size - 2 * halo) // stride)
     counts = {*range(1, min(most, _MOST_COUNTS) + 1), most}
     windows = {_equal_window(size, k, halo, stride) for k in counts}
@@ -348,7 +348,7 @@ def infer_bands(
 
 
 def _pieces(outputs: int, rows: int, width: int) -> list[FloatArray]:
-    """Give empty pieces of a band, (outputs, rows of the piece, width), from top to bottom."""
+    """Return empty pieces of a band, (outputs, rows of the piece, width), from top to bottom."""
     cuts = [*range(0, rows, PIECE_ROWS), rows]
     return [np.empty((outputs, b - a, width), np.float32) for a, b in pairwise(cuts)]
 

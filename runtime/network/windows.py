@@ -73,7 +73,7 @@ class SizedNetwork:
 
     @property
     def cost(self) -> PixelCost:
-        """Give what the network holds per pixel."""
+        """Return what the network holds per pixel."""
         behind = STEP_BYTES if self.extra_reach_px else 0.0
         return PixelCost(
             arena_bytes=max(self.facts.bytes_per_pixel, self.block_bytes) + behind,
@@ -88,7 +88,7 @@ class SizedNetwork:
         return bool(self.facts.global_operators)
 
     def halo_px(self, mode: Mode) -> int:
-        """Give the halo of a mode.
+        """Return the halo of a mode.
 
         Raises:
             ContractError: If mode fast is asked of a network without an error curve.
@@ -117,7 +117,7 @@ class WindowLimits:
 
     @property
     def max_bytes(self) -> int:
-        """Give what is left for the windows."""
+        """Return what is left for the windows."""
         return max(self.cap_bytes - self.spent_bytes, 1)
 
 
@@ -189,11 +189,11 @@ class NetworkWindows:
 
     @property
     def halo_px(self) -> int:
-        """Give the largest halo of its networks."""
+        """Return the largest halo of its networks."""
         return max(network.halo_px(self.mode) for network in self.networks)
 
     def window_mp(self) -> dict[str, float]:
-        """Give size -> megapixels computed, halos included."""
+        """Return size -> megapixels computed, halos included."""
         if self.tiles is not None:
             layout = self.tiles
             area = layout.window_count * layout.window_height_px * layout.window_width_px
@@ -211,7 +211,7 @@ class NetworkWindows:
         return self.cells.needed_bytes([network.cost for network in self.networks])
 
     def to_json(self) -> dict[str, Any]:
-        """Give the windows in a few numbers, for the sidecar."""
+        """Return the windows in a few numbers, for the sidecar."""
         if self.tiles is not None:
             seen = list(self.networks[0].facts.global_operators)
             return {
@@ -325,7 +325,7 @@ def _has_fast(facts: NetworkFacts) -> bool:
 
 
 def fast_halo_px(curve: tuple[HaloError, ...], least_db: float = FAST_LEAST_DB) -> int:
-    """Give the smallest halo of a measured error curve that keeps `least_db`.
+    """Return the smallest halo of a measured error curve that keeps `least_db`.
 
     Raises:
         ContractError: If the bundle carries no curve.

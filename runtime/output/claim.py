@@ -47,7 +47,7 @@ def claimed(output: Path) -> Iterator[bool]:
 
 
 def was_claimed(output: Path) -> bool:
-    """Tell whether an output is claimed now, or whoever claimed it last has died of it."""
+    """Return whether an output is claimed now, or whoever claimed it last has died of it."""
     return output.with_name(output.name + CLAIM_SUFFIX).exists()
 
 
@@ -69,7 +69,7 @@ def _lock(path: Path) -> int | None:
 
 
 def _is_still(path: Path, descriptor: int) -> bool:
-    """Tell whether the name still stands for the open file: its last holder removes it."""
+    """Return whether the name still stands for the open file: its last holder removes it."""
     try:
         return os.path.samestat(path.stat(), os.fstat(descriptor))
     except FileNotFoundError:

@@ -30,14 +30,14 @@ Tags = Mapping[int, tuple[Kind, Any]]
 
 
 def header_bytes(first: int, *, big: bool = False) -> bytes:
-    """Give the start of a little-endian file whose first directory lies at `first`."""
+    """Return the start of a little-endian file whose first directory lies at `first`."""
     if big:
         return b"II+\0\x08\0\0\0" + first.to_bytes(8, "little")
     return b"II*\0" + first.to_bytes(4, "little")
 
 
 def directory_bytes(tags: Tags, offset: int, *, big: bool = False) -> bytes:
-    """Give a directory with the values that it points at.
+    """Return a directory with the values that it points at.
 
     Args:
         tags: What it holds. The offset of its strip counts from the start of the file, and the
@@ -54,12 +54,12 @@ def directory_bytes(tags: Tags, offset: int, *, big: bool = False) -> bytes:
 
 
 def directory_length(tags: Tags, *, big: bool = False) -> int:
-    """Give the length of a directory, which does not depend on what its numbers are."""
+    """Return the length of a directory, which does not depend on what its numbers are."""
     return len(_directory(tags, big=big).tobytes(0))
 
 
 def _directory(tags: Tags, *, big: bool) -> Any:
-    """Give Pillow's directory, its strip at the start of the file."""
+    """Return Pillow's directory, its strip at the start of the file."""
     from PIL.TiffImagePlugin import ImageFileDirectory_v2
 
     directory = ImageFileDirectory_v2(header_bytes(0, big=big))

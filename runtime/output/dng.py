@@ -105,7 +105,7 @@ def camkit_description(
     pixel_pitch_um: float,
     object_distance_mm: float | None = None,
 ) -> str:
-    """Give the JSON that tells a later reader where on which sensor the capture lies.
+    """Return the JSON that tells a later reader where on which sensor the capture lies.
 
     The object distance (inf as "inf") is left out if None.
     """
@@ -169,11 +169,11 @@ class DngFile:
         self._file.close()
 
     def release(self) -> None:
-        """Let go of the file as it is."""
+        """Release the file as it is."""
         self._file.close()
 
     def _front(self, size: tuple[int, int], preview_bytes: int) -> bytes:
-        """Give all that stands before the first row; its length is always the same."""
+        """Return all that stands before the first row; its length is always the same."""
         metadata, samples_bytes = self._tags.metadata, math.prod(self._shape) * _BITS // 8
         pointers, _ = sub_directories(metadata, 0)
         main = {**_main(self._tags), **_preview(size, preview_bytes), **pointers}
@@ -262,7 +262,7 @@ def open_linear_dng(path: str | os.PathLike[str], shape: tuple[int, int], tags: 
 
 
 def _preview_of_mosaic(mosaic: NDArray[np.uint16], cfa: CfaPattern, tags: DngTags) -> FloatArray:
-    """Give (3, h, w) float32 DN above black: averages over the positions of the cell."""
+    """Return (3, h, w) float32 DN above black: averages over the positions of the cell."""
     height, width = (max(side // 2, 1) for side in mosaic.shape)
     black = np.broadcast_to(np.asarray(tags.black, dtype=np.float32), (2, 2))
     found: list[list[FloatArray]] = [[], [], []]
@@ -275,7 +275,7 @@ def _preview_of_mosaic(mosaic: NDArray[np.uint16], cfa: CfaPattern, tags: DngTag
 
 
 def _main(tags: DngTags) -> dict[int, tuple[Kind, Any]]:
-    """Give what is said of the photograph as a whole."""
+    """Return what is said of the photograph as a whole."""
     make, _, model = tags.camera_model.partition(" ")
     found: dict[int, tuple[Kind, Any]] = {
         271: (Kind.ASCII, make.encode()),  # Make
@@ -337,7 +337,7 @@ def _samples(shape: tuple[int, ...], samples_bytes: int) -> dict[int, tuple[Kind
 
 
 def _noise(noise: NoiseModel | None) -> Tags:
-    """Give NoiseProfile in CFAPlaneColor order."""
+    """Return NoiseProfile in CFAPlaneColor order."""
     if noise is None:
         return {}
     pairs = zip(noise.shot, noise.read_variance, strict=True)

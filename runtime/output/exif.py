@@ -31,7 +31,7 @@ _SECONDS_PARTS: Final = 10_000
 
 
 def exif_block(metadata: Metadata, *, main: Tags, exif: Tags) -> bytes:
-    """Give EXIF as a TIFF structure of its own.
+    """Return EXIF as a TIFF structure of its own.
 
     Args:
         metadata: What is carried.
@@ -52,7 +52,7 @@ def exif_block(metadata: Metadata, *, main: Tags, exif: Tags) -> bytes:
 
 
 def color_tags(picture: PictureFormat) -> Tags:
-    """Say whether a picture is sRGB, for those who do not read its profile."""
+    """Return whether a picture is sRGB, for those who do not read its profile."""
     is_srgb = picture.color.space == "rec709" and picture.tone == "srgb"
     return {
         40960: (Kind.UNDEFINED, b"0100"),  # FlashpixVersion
@@ -61,14 +61,14 @@ def color_tags(picture: PictureFormat) -> Tags:
 
 
 def main_tags(metadata: Metadata) -> Tags:
-    """Give what stands in the first directory of a file."""
+    """Return what stands in the first directory of a file."""
     return _texts(metadata, _IN_MAIN)
 
 
 def sub_directories(
     metadata: Metadata, offset: int, *, exif: Tags = NOTHING, big: bool = False
 ) -> tuple[Tags, bytes]:
-    """Give the directories for exposure and place.
+    """Return the directories for exposure and place.
 
     Args:
         metadata: What is carried.
@@ -107,7 +107,7 @@ def _exif(metadata: Metadata, more: Tags) -> Tags:
 
 
 def _sensitivity(iso: int) -> dict[int, tuple[Kind, int]]:
-    """Give the ISO speed, in the tag for large numbers too where it needs that."""
+    """Return the ISO speed, in the tag for large numbers too where it needs that."""
     found = {exif_tags.NUMBER_TAGS["iso"]: (Kind.SHORT, min(iso, MAX_SHORT))}
     if iso >= MAX_SHORT:
         found[_SENSITIVITY_TYPE] = Kind.SHORT, 2  # recommended exposure index
@@ -134,14 +134,14 @@ def _gps(metadata: Metadata) -> Tags:
 
 
 def _sexagesimal(degrees: float) -> tuple[Fraction, ...]:
-    """Give degrees, minutes and seconds (to 3 mm on the ground) without sign."""
+    """Return degrees, minutes and seconds (to 3 mm on the ground) without sign."""
     parts = round(abs(degrees) * 3600 * _SECONDS_PARTS)
     minutes, seconds = divmod(parts, 60 * _SECONDS_PARTS)
     return Fraction(minutes // 60), Fraction(minutes % 60), Fraction(seconds, _SECONDS_PARTS)
 
 
 def nearest_ratio(value: float) -> Fraction:
-    """Give a number >= 0 as people would write it: 1/640, 63/10; six digits are kept.
+    """Return a number >= 0 as people would write it: 1/640, 63/10; six digits are kept.
 
     Exposure times come from files as decimals, as 32-bit numbers or as ratios.
     """

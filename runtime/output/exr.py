@@ -33,7 +33,7 @@ class ExrWriter(PictureWriter):
         self._file = self._open()
 
     def encode(self, band: FloatArray) -> Codes:
-        """Give the band as float16, or as float32 where float16 would overflow."""
+        """Return the band as float16, or as float32 where float16 would overflow."""
         peak = max(-float(band.min()), float(band.max()))
         fits = self.is_half and peak <= HALF_MAX
         return band.astype(np.float16 if fits else np.float32)
@@ -53,7 +53,7 @@ class ExrWriter(PictureWriter):
         _patch_chromaticities(self.path, self._chromaticities())
 
     def release(self) -> None:
-        """Let go of the file as it is."""
+        """Release the file as it is."""
         self._file.close()
 
     def _chromaticities(self) -> tuple[float, ...]:

@@ -26,7 +26,7 @@ SPACE_TITLES: Final = {"rec709": "Rec.709", "acescg": "ACEScg", "camera": "camer
 
 
 def icc_profile(stage: ColorStage, *, tone: str) -> bytes:
-    """Give the profile of pictures in an output space.
+    """Return the profile of pictures in an output space.
 
     Args:
         stage: Colour stage; its primaries and white define the colorants.

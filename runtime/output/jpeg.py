@@ -67,7 +67,7 @@ class JpegWriter(PictureWriter):
         self._stored = 0
 
     def encode(self, band: FloatArray) -> Codes:
-        """Give the band as (3, rows, w) uint8 codes."""
+        """Return the band as (3, rows, w) uint8 codes."""
         return encode_uint8(band, tone=self.picture.tone)
 
     def store(self, rows: Codes) -> None:

@@ -62,7 +62,7 @@ class LinearDngWriter(PictureWriter):
         self._file = open_linear_dng(path, (picture.height, picture.width), tags)
 
     def encode(self, band: FloatArray) -> Codes:
-        """Give the band as (3, rows, w) uint16 DN of the raw signal."""
+        """Return the band as (3, rows, w) uint16 DN of the raw signal."""
         scale = WHITE / np.array(self._gains)
         codes = band * scale.astype(np.float32)[:, None, None]
         return np.asarray(np.clip(np.rint(codes), 0, WHITE), dtype=np.uint16)
@@ -77,5 +77,5 @@ class LinearDngWriter(PictureWriter):
         self._file.finish(self._preview.planes())
 
     def release(self) -> None:
-        """Let go of the file as it is."""
+        """Release the file as it is."""
         self._file.release()

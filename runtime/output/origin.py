@@ -38,7 +38,7 @@ class Origin:
     window: PictureWindow | None = None
 
     def stripped(self) -> Self:
-        """Give the same without what tells of photographer, camera, date and place.
+        """Return the same without what tells of photographer, camera, date and place.
 
         What a picture needs to be shown (orientation, gains, colour matrix) stays.
         """

@@ -19,7 +19,7 @@ HASH_LETTERS: Final = 16
 
 
 def part_path(path: Path) -> Path:
-    """Give a new name under which a file is written before it is complete.
+    """Return a new name under which a file is written before it is complete.
 
     It is UTF-8 whatever the name itself is: not every library opens other names.
     """
@@ -27,7 +27,7 @@ def part_path(path: Path) -> Path:
 
 
 def stale_parts(path: Path) -> list[Path]:
-    """Give the parts of a file that lie beside it, whoever wrote them."""
+    """Return the parts of a file that lie beside it, whoever wrote them."""
     prefix = _part_prefix(path)
     return [
         near
@@ -47,14 +47,14 @@ def _part_prefix(path: Path) -> str:
 
 @contextmanager
 def atomic_output(path: Path) -> Iterator[Path]:
-    """Give the path to write one file to; see `atomic_outputs`."""
+    """Return the path to write one file to; see `atomic_outputs`."""
     with atomic_outputs(path) as (part,):
         yield part
 
 
 @contextmanager
 def atomic_outputs(*paths: Path) -> Iterator[tuple[Path, ...]]:
-    """Give the paths to write to; the files take their real names when the block ends well.
+    """Return the paths to write to; the files take their real names when the block ends well.
 
     The content is on the disk before the names are, so that even after a power cut no name stands
     for half a file. When the block raises, or one of the files cannot take its name, nothing new
@@ -79,7 +79,7 @@ def atomic_outputs(*paths: Path) -> Iterator[tuple[Path, ...]]:
 
 
 def _rename(parts: Sequence[Path], paths: Sequence[Path]) -> None:
-    """Give every part its name, or none."""
+    """Return every part its name, or none."""
     older: list[tuple[Path, Path | None]] = []
     try:
         for part, path in zip(parts, paths, strict=True):

@@ -61,7 +61,7 @@ class PictureFormat:
 
     @property
     def file_size(self) -> tuple[int, int]:
-        """Give (width, height) of the file, after turning."""
+        """Return (width, height) of the file, after turning."""
         turned = self.orientation >= 5
         return (self.height, self.width) if turned else (self.width, self.height)
 
@@ -81,7 +81,7 @@ class PictureWriter(ABC):
 
     @abstractmethod
     def encode(self, band: FloatArray) -> Codes:
-        """Give the band as the file holds it: (3, rows, w)."""
+        """Return the band as the file holds it: (3, rows, w)."""
 
     @abstractmethod
     def store(self, rows: Codes) -> None:
@@ -93,7 +93,7 @@ class PictureWriter(ABC):
 
     @abstractmethod
     def release(self) -> None:
-        """Let go of the file as it is, after an error."""
+        """Release the file as it is, after an error."""
 
     @final
     def __enter__(self) -> Self:

@@ -10,12 +10,12 @@ from camkit.errors import ContractError
 
 
 def png_bytes(codes: NDArray[np.uint8]) -> bytes:
-    """Give the PNG of (h, w, 3) R, G, B of 8 bits."""
+    """Return the PNG of (h, w, 3) R, G, B of 8 bits."""
     return _encoded(".png", codes, np.uint8)
 
 
 def tiff_bytes(codes: NDArray[np.uint16]) -> bytes:
-    """Give the TIFF of (h, w, 3) R, G, B of 16 bits."""
+    """Return the TIFF of (h, w, 3) R, G, B of 16 bits."""
     return _encoded(".tiff", codes, np.uint16)
 
 

@@ -44,7 +44,7 @@ class PngWriter(PictureWriter):
             self._chunk(b"eXIf", exif)
 
     def encode(self, band: FloatArray) -> Codes:
-        """Give the band as (3, rows, w) codes."""
+        """Return the band as (3, rows, w) codes."""
         encode = encode_uint16 if self._bits == 16 else encode_uint8
         return encode(band, tone=self.picture.tone)
 
@@ -66,7 +66,7 @@ class PngWriter(PictureWriter):
         self._file.close()
 
     def release(self) -> None:
-        """Let go of the file as it is."""
+        """Release the file as it is."""
         self._file.close()
 
     def _data(self, packed: bytes) -> None:

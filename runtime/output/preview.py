@@ -63,7 +63,7 @@ class Averages:
 def preview_jpeg(
     planes: FloatArray, scale: tuple[float, float, float], matrix: NDArray[np.float64] | None
 ) -> bytes:
-    """Give a preview as sRGB.
+    """Return a preview as sRGB.
 
     Args:
         planes: (3, h, w) float32 DN above black, camera RGB.

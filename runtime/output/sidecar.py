@@ -29,12 +29,12 @@ MAX_BYTES: Final = 4_000_000
 
 
 def sidecar_path(output: Path) -> Path:
-    """Give the sidecar of a picture: NAME.exr -> NAME.camkit.json."""
+    """Return the sidecar of a picture: NAME.exr -> NAME.camkit.json."""
     return output.with_name(output.stem + SIDECAR_SUFFIX)
 
 
 def sidecar_text(record: Mapping[str, Any], sections: Mapping[str, Any] | None = None) -> str:
-    """Give what the sidecar of a picture holds.
+    """Return what the sidecar of a picture holds.
 
     Args:
         record: Plain JSON values, with at least the keys of `REQUIRED`.
@@ -61,7 +61,7 @@ def sidecar_text(record: Mapping[str, Any], sections: Mapping[str, Any] | None =
 
 
 def read_sidecar(output: Path) -> dict[str, Any] | None:
-    """Give the record of a picture's sidecar; None if there is none that can be believed."""
+    """Return the record of a picture's sidecar; None if there is none that can be believed."""
     path = sidecar_path(output)
     if not path.is_file() or path.stat().st_size > MAX_BYTES:
         return None

@@ -35,7 +35,7 @@ class TiffWriter(PictureWriter):
         self._file.write(_front(picture))
 
     def encode(self, band: FloatArray) -> Codes:
-        """Give the band as (3, rows, w) uint16 codes."""
+        """Return the band as (3, rows, w) uint16 codes."""
         return encode_uint16(band, tone=self.picture.tone)
 
     def store(self, rows: Codes) -> None:
@@ -48,12 +48,12 @@ class TiffWriter(PictureWriter):
         self._file.close()
 
     def release(self) -> None:
-        """Let go of the file as it is."""
+        """Release the file as it is."""
         self._file.close()
 
 
 def _front(picture: PictureFormat) -> bytes:
-    """Give all that stands before the first row."""
+    """Return all that stands before the first row."""
     width, height = picture.file_size
     strip_bytes = width * height * 3 * BITS // 8
     big = strip_bytes > BIGTIFF_BYTES

@@ -62,7 +62,7 @@ HELD_TURNED: Final = {"exr": 6.0, "tiff": 6.0, "png": 6.0, "jpeg": 3.0, "dng": 0
 
 
 def held_bytes(format_: str, *, pixels: int, orientation: int) -> int:
-    """Give the memory of a writer that cannot hand on every row at once.
+    """Return the memory of a writer that cannot hand on every row at once.
 
     Args:
         format_: As `open_writer` takes it.

@@ -8,7 +8,7 @@ from camkit.runtime.plan.decision import PLAIN, Labels
 
 
 def plain_blocks(labels: Labels, reach_px: int) -> PlainBlock | None:
-    """Give the test for blocks that stay as they are; None if no cell is plain.
+    """Return the test for blocks that stay as they are; None if no cell is plain.
 
     Args:
         labels: (row, column) tiers of the cells.
@@ -28,7 +28,7 @@ def plain_blocks(labels: Labels, reach_px: int) -> PlainBlock | None:
 def plain_share(
     labels: Labels, reach_px: int, rows: tuple[Span, ...], columns: tuple[Span, ...]
 ) -> float:
-    """Give the share of blocks that stay as they are."""
+    """Return the share of blocks that stay as they are."""
     test = plain_blocks(labels, reach_px)
     if test is None:
         return 0.0
@@ -36,7 +36,7 @@ def plain_share(
 
 
 def _cells(span: Span, reach_px: int) -> slice:
-    """Give the cells that the live part of a block and its surroundings touch."""
+    """Return the cells that the live part of a block and its surroundings touch."""
     first = span.start + span.inner.start - reach_px
     last = span.start + span.inner.stop - 1 + reach_px
     return slice(max(first, 0) // CELL_PX, last // CELL_PX + 1)

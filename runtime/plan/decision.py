@@ -61,7 +61,7 @@ class Subject:
         return next(iter(roles)) if len(roles) == 1 else None
 
     def facts(self, size: str) -> NetworkFacts:
-        """Give the facts of one size of the first network of the camera."""
+        """Return the facts of one size of the first network of the camera."""
         return self.bundle.network_facts(next(iter(self.bundle.manifest.networks)), size)
 
     def reach_px(self, size: str) -> int:
@@ -78,7 +78,7 @@ class Subject:
 
     @property
     def megapixels(self) -> float:
-        """Give the size of the capture."""
+        """Return the size of the capture."""
         return self.height_px * self.width_px / 1e6
 
 
@@ -123,7 +123,7 @@ class Work:
         return tuple(s for tier, s in both if s is not None and (self.labels == tier).any())
 
     def network_labels(self) -> Labels | None:
-        """Give (row, column): 0 no network, n the n-th of `sizes`; None for one everywhere."""
+        """Return (row, column): 0 no network, n the n-th of `sizes`; None for one everywhere."""
         if self.labels is None:
             return None
         numbers = np.zeros(self.labels.shape, np.int8)
@@ -152,7 +152,7 @@ class Decision:
     saving_s: float | None = None
 
     def to_json(self) -> dict[str, Any]:
-        """Give the decision as plain JSON values."""
+        """Return the decision as plain JSON values."""
         return {
             "what": self.what,
             "choice": self.choice,

@@ -30,11 +30,11 @@ class Estimate:
     peak_mb: float
 
     def to_json(self) -> dict[str, Any]:
-        """Give plain JSON values."""
+        """Return plain JSON values."""
         return {"seconds": round(self.seconds, 4), "peak_mb": round(self.peak_mb, 1)}
 
     def compare(self, seconds: float, peak_mb: float) -> dict[str, Any]:
-        """Give the estimate with what really was and the ratio real / estimated."""
+        """Return the estimate with what really was and the ratio real / estimated."""
         return {
             **self.to_json(),
             "real_seconds": round(seconds, 4),
@@ -50,7 +50,7 @@ def estimate_seconds(
     speed: Speed,
     window_mp: Mapping[str, Mapping[str, float]] | None = None,
 ) -> float:
-    """Give the seconds of a piece of work; see `stage_seconds`."""
+    """Return the seconds of a piece of work; see `stage_seconds`."""
     files = FILE_SHARE * speed.rest_s_per_mp * subject.megapixels
     return files + sum(stage_seconds(subject, work, speed, window_mp))
 
@@ -61,7 +61,7 @@ def stage_seconds(
     speed: Speed,
     window_mp: Mapping[str, Mapping[str, float]] | None = None,
 ) -> tuple[float, ...]:
-    """Give the seconds of every stage of a piece of work, 0 for what is left out.
+    """Return the seconds of every stage of a piece of work, 0 for what is left out.
 
     Args:
         subject: The capture.
@@ -85,12 +85,12 @@ def stage_seconds(
 
 
 def network_seconds(role: str, window_mp: Mapping[str, float], speed: Speed) -> float:
-    """Give the seconds of the windows of a role."""
+    """Return the seconds of the windows of a role."""
     return sum(speed.network_s_per_mp[role, size] * mp for size, mp in window_mp.items())
 
 
 def nominal_window_mp(subject: Subject, work: Work) -> dict[str, float]:
-    """Give size -> megapixels computed by the one network of a camera, from the lattice alone."""
+    """Return size -> megapixels computed by the one network of a camera, from the lattice alone."""
     computed = subject.megapixels * WINDOW_OVERLAP
     if not work.networks:
         return {}
@@ -112,7 +112,7 @@ def nominal_window_mp(subject: Subject, work: Work) -> dict[str, float]:
 
 
 def role_window_mp(role: str, subject: Subject, work: Work) -> dict[str, float]:
-    """Give size -> megapixels computed by the network of a role, on the grid of what it takes."""
+    """Return size -> megapixels computed by the network of a role, on the grid of what it takes."""
     if subject.role is not None:
         return nominal_window_mp(subject, work)
     manifest = subject.bundle.manifest
@@ -123,7 +123,7 @@ def role_window_mp(role: str, subject: Subject, work: Work) -> dict[str, float]:
 
 
 def tier_work_of(subject: Subject, work: Work) -> TierWork:
-    """Give what the tiers of a piece of work cost, from the bundle's facts."""
+    """Return what the tiers of a piece of work cost, from the bundle's facts."""
     full = subject.facts(work.size)
     small = None if work.small is None else subject.facts(work.small)
     return TierWork(

@@ -40,11 +40,11 @@ class CellLosses:
     extra: dict[str, CellArray]
 
     def allowed(self, loss_db: float) -> float:
-        """Give the error that may be added to the whole picture for a loss of `loss_db`."""
+        """Return the error that may be added to the whole picture for a loss of `loss_db`."""
         return float(self.exact.sum() * (10 ** (loss_db / 10) - 1))
 
     def loss_db(self, added: float) -> float:
-        """Give the loss of the whole picture when `added` error is added."""
+        """Return the loss of the whole picture when `added` error is added."""
         return float(10 * np.log10(1 + added / self.exact.sum()))
 
 
@@ -70,14 +70,14 @@ class LossModel:
             raise ContractError("a loss model must be finite")
 
     def predict(self, content: Content) -> CellLosses:
-        """Give the predicted errors of every cell."""
+        """Return the predicted errors of every cell."""
         area = content.cell_px
         made = {name: area * _line(line, content) for name, line in self.lines.items()}
         exact = made.pop(EXACT)
         return CellLosses(exact=exact, extra=made)
 
     def budget_db(self, max_error_db: float) -> float:
-        """Give the predicted loss to spend so that the true one stays below a limit at worst."""
+        """Return the predicted loss to spend so that the true one stays below a limit at worst."""
         return self.adaptive_db * max_error_db / (WORST_OVER_MEAN * 0.1)
 
 
@@ -88,7 +88,7 @@ def _line(line: tuple[float, float, float, float], content: Content) -> CellArra
 
 
 def read_loss_model(plan: Mapping[str, Threshold] | None) -> LossModel | None:
-    """Give the calibration in a manifest's `plan`; None if it has none.
+    """Return the calibration in a manifest's `plan`; None if it has none.
 
     Raises:
         ContractError: If a target lacks one of its terms.
@@ -114,7 +114,7 @@ def read_loss_model(plan: Mapping[str, Threshold] | None) -> LossModel | None:
 def plan_entries(
     model: LossModel, *, adaptive_cost_db: float, draft_cost_db: float
 ) -> dict[str, Threshold]:
-    """Give a calibration as the entries of a manifest's `plan`; inverse of `read_loss_model`.
+    """Return a calibration as the entries of a manifest's `plan`; inverse of `read_loss_model`.
 
     Args:
         model: The calibration.

@@ -50,7 +50,7 @@ class Plan:
 
     @property
     def cost_db(self) -> float:
-        """Give the predicted loss against `exact`."""
+        """Return the predicted loss against `exact`."""
         return sum(decision.cost_db for _, decision, _ in self.steps)
 
     def sizes(self) -> list[str]:
@@ -60,7 +60,7 @@ class Plan:
         return [s for s in self.subject.bundle.manifest.sizes if s in named | {REFERENCE}]
 
     def decisions(self, speed: Speed | None = None) -> list[Decision]:
-        """Give the decisions; with a speed, with the seconds they save.
+        """Return the decisions; with a speed, with the seconds they save.
 
         What a size costs is that of the subject as it is known now: it may have been looked at
         since the plan was made.
@@ -79,7 +79,7 @@ class Plan:
         ]
 
     def _saving_s(self, step: int, speed: Speed) -> float:
-        """Give the seconds that a step saves; the size, the first, against the reference."""
+        """Return the seconds that a step saves; the size, the first, against the reference."""
         before, _, after = self.steps[step]
         chosen = step == 0 and before is after and after.size != REFERENCE
         if chosen and any(size == REFERENCE for _, size in speed.network_s_per_mp):
@@ -92,7 +92,7 @@ class Plan:
 
 
 def default_size(bundle: Bundle, options: Options) -> str:
-    """Give the size that a pipeline gets ready: --size, or that of the quality."""
+    """Return the size that a pipeline gets ready: --size, or that of the quality."""
     if options.size is not None:
         return options.size
     sizes = bundle.manifest.sizes
@@ -106,7 +106,7 @@ def default_size(bundle: Bundle, options: Options) -> str:
 
 
 def needs_content(options: Options) -> bool:
-    """Tell whether the choice depends on the capture."""
+    """Return whether the choice depends on the capture."""
     budgets = options.max_seconds is not None or options.max_error_db is not None
     return budgets or options.quality in {"adaptive", "draft"}
 
@@ -136,7 +136,7 @@ def make_plan(subject: Subject, speed: Callable[[], Speed]) -> Plan:
 
 
 def asked_work(bundle: Bundle, options: Options) -> Work:
-    """Give what a caller asked for, before any capture is known.
+    """Return what a caller asked for, before any capture is known.
 
     Raises:
         ContractError: If no stage has the method, or what it leaves out cannot be.
@@ -164,7 +164,7 @@ def _ruled(subject: Subject, work: Work, note: str = "") -> Plan:
 
 
 def _sizes(subject: Subject) -> list[str]:
-    """Give the sizes to choose from, from the best on; never above the reference."""
+    """Return the sizes to choose from, from the best on; never above the reference."""
     if subject.options.size is not None:
         return [subject.options.size]
     sizes = list(subject.bundle.manifest.sizes[::-1])
@@ -172,7 +172,7 @@ def _sizes(subject: Subject) -> list[str]:
 
 
 def _within_error(subject: Subject, work: Work, model: LossModel | None) -> Plan:
-    """Give the cheapest plan whose predicted loss stays below the limit."""
+    """Return the cheapest plan whose predicted loss stays below the limit."""
     limit = subject.options.max_error_db
     if limit is None or model is None:
         return _ruled(subject, work, "the bundle carries no calibrated plan: nothing is skipped")
@@ -186,7 +186,7 @@ def _within_error(subject: Subject, work: Work, model: LossModel | None) -> Plan
 
 
 def _nominal_work(plan: Plan) -> float:
-    """Give the work of the networks and the bank of a plan, in multiplications per pixel."""
+    """Return the work of the networks and the bank of a plan, in multiplications per pixel."""
     tiers = tier_work_of(plan.subject, plan.work)
     per_px = tiers.per_px()
     if plan.work.labels is None or plan.subject.content is None:
@@ -196,7 +196,7 @@ def _nominal_work(plan: Plan) -> float:
 
 
 def _within_seconds(subject: Subject, work: Work, model: LossModel | None, speed: Speed) -> Plan:
-    """Give the first plan of the ladder that fits the time."""
+    """Return the first plan of the ladder that fits the time."""
     limit = subject.options.max_seconds
     if limit is None:
         raise ContractError("a plan within a time needs max_seconds")

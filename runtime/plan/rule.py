@@ -31,7 +31,7 @@ class Rule:
 
 @cache
 def find_rules() -> tuple[Rule, ...]:
-    """Give the rules in their order.
+    """Return the rules in their order.
 
     Raises:
         ContractError: If a module of `rules/` has no ORDER or no `decide`.

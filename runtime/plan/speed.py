@@ -88,7 +88,7 @@ def measure_speed(
 
 
 def _seconds_per_mp(engine: NetworkEngine, facts: NetworkFacts) -> float:
-    """Give the seconds per megapixel of a window, a square of whole strides."""
+    """Return the seconds per megapixel of a window, a square of whole strides."""
     fitting = min(WINDOW_PX, int((WINDOW_BYTES / max(facts.bytes_per_pixel, 1)) ** 0.5))
     side = max(fitting // facts.stride_px, 1) * facts.stride_px
     window = np.full((1, engine.channels, side, side), 0.1, np.float32)

@@ -52,12 +52,12 @@ class TierWork:
     small_halo_px: int = 0
 
     def per_px(self) -> FloatGrid:
-        """Give the work per pixel of every tier, the bank included."""
+        """Return the work per pixel of every tier, the bank included."""
         small = np.inf if self.small_mac is None else BANK_MAC + self._network(self.small_mac)
         return np.array([0.0, BANK_MAC, small, BANK_MAC + self._network(self.full_mac)])
 
     def borders(self) -> FloatGrid:
-        """Give (tier, tier): work per border of one cell's side between two tiers."""
+        """Return (tier, tier): work per border of one cell's side between two tiers."""
         ring = np.zeros(4)
         ring[FULL] = self._network(self.full_mac) * self.full_halo_px * CELL_PX
         if self.small_mac is not None:
@@ -77,7 +77,7 @@ class TierWork:
 def choose_tiers(
     area_px: CellArray, losses: FloatGrid, allowed: float, work: TierWork
 ) -> Labels | None:
-    """Give the tier of every cell, the least work within a loss.
+    """Return the tier of every cell, the least work within a loss.
 
     Args:
         area_px: (row, column) pixels of every cell.
@@ -113,7 +113,7 @@ def choose_tiers(
 
 
 def total_work(labels: NDArray[np.integer], costs: FloatGrid, borders: FloatGrid) -> float:
-    """Give the work of a labelling: cells and borders."""
+    """Return the work of a labelling: cells and borders."""
     cells = np.take_along_axis(costs, labels[None].astype(np.intp), axis=0).sum()
     across = borders[labels[:, :-1], labels[:, 1:]].sum()
     down = borders[labels[:-1], labels[1:]].sum()
@@ -121,7 +121,7 @@ def total_work(labels: NDArray[np.integer], costs: FloatGrid, borders: FloatGrid
 
 
 def work_shares(labels: Labels, area_px: CellArray, work: TierWork) -> tuple[float, float]:
-    """Give the work of (bank, networks) as shares of doing everything; borders included."""
+    """Return the work of (bank, networks) as shares of doing everything; borders included."""
     per_px = work.per_px()
     per_px[~np.isfinite(per_px)] = 0
     network = per_px - np.where(np.arange(4) >= WIENER, BANK_MAC, 0)
@@ -137,7 +137,7 @@ def work_shares(labels: Labels, area_px: CellArray, work: TierWork) -> tuple[flo
 
 
 def _settle(unary: FloatGrid, borders: FloatGrid) -> NDArray[np.intp]:
-    """Give labels that no single cell can better; from the best single cells onwards."""
+    """Return labels that no single cell can better; from the best single cells onwards."""
     labels = unary.argmin(axis=0)
     rows, columns = np.indices(labels.shape)
     parity = (rows + columns) % 2
@@ -152,7 +152,7 @@ def _settle(unary: FloatGrid, borders: FloatGrid) -> NDArray[np.intp]:
 
 
 def _pull(labels: NDArray[np.intp], borders: FloatGrid) -> FloatGrid:
-    """Give (tier, row, column): work of the borders that a tier would have to its neighbours."""
+    """Return (tier, row, column): work of the borders that a tier would have to its neighbours."""
     to = borders[:, labels]
     pull = np.zeros_like(to)
     pull[:, 1:] += to[:, :-1]

@@ -29,7 +29,7 @@ class Tuning:
 
 
 def stage_tuning(stages: Sequence[Stage], method: str) -> Tuning | None:
-    """Give how a method was tuned by the last stage that has it; None where no stage has it.
+    """Return how a method was tuned by the last stage that has it; None where no stage has it.
 
     A stage whose module defines `tuning(entry, method)` says it itself; of any other the numbers
     that the bundle states for it are told.
@@ -49,6 +49,6 @@ def stage_tuning(stages: Sequence[Stage], method: str) -> Tuning | None:
 
 
 def stated_numbers(entry: Entry) -> dict[str, Value]:
-    """Give the single numbers that an entry of a manifest states, by name."""
+    """Return the single numbers that an entry of a manifest states, by name."""
     fields = entry.model_dump(mode="json")
     return {name: value for name, value in fields.items() if isinstance(value, int | float)}

@@ -24,7 +24,7 @@ WHOLE: Final = "whole"
 
 
 def ways_of(stages: Sequence[Stage], work: Work) -> tuple[str, ...]:
-    """Give the way of every stage.
+    """Return the way of every stage.
 
     Raises:
         ContractError: If no stage has the method.
@@ -45,7 +45,7 @@ def ways_of(stages: Sequence[Stage], work: Work) -> tuple[str, ...]:
 
 
 def planned(stages: Sequence[Stage], work: Work) -> Work:
-    """Give the work with what follows from its ways.
+    """Return the work with what follows from its ways.
 
     Raises:
         ContractError: If no stage has its method.
@@ -54,7 +54,7 @@ def planned(stages: Sequence[Stage], work: Work) -> Work:
 
 
 def runs(stages: Sequence[Stage], kind: type[Stage], work: Work) -> bool:
-    """Tell whether any stage of a kind is run.
+    """Return whether any stage of a kind is run.
 
     Raises:
         ContractError: If no stage has the method.
@@ -64,7 +64,7 @@ def runs(stages: Sequence[Stage], kind: type[Stage], work: Work) -> bool:
 
 
 def without_networks(manifest: Manifest, work: Work) -> Work | None:
-    """Give the work by the best method that runs no network; None if they cannot be left out."""
+    """Return the work by the best method that runs no network; None if they cannot be left out."""
     stages = manifest.stages
     methods = offered_methods(stages, manifest.all_planes)
     tried = (planned(stages, replace(work, method=method)) for method in methods)
@@ -89,7 +89,7 @@ def offered_methods(stages: Sequence[Stage], planes: Mapping[str, Plane]) -> tup
 
 
 def _last_with(stages: Sequence[Stage], method: str) -> int:
-    """Give the number of the last stage that has a method; -1 where nothing is restored."""
+    """Return the number of the last stage that has a method; -1 where nothing is restored."""
     if method == DEVELOP:
         return -1
     found = [n for n, stage in enumerate(stages) if method in stage_module(stage.type).METHODS]
@@ -105,7 +105,7 @@ def _last_with(stages: Sequence[Stage], method: str) -> int:
 def stand_ins(
     stages: Sequence[Stage], ways: Sequence[str], planes: Mapping[str, Plane]
 ) -> dict[str, str]:
-    """Give what the stages that are left out would give -> the plane that stands for it.
+    """Return what the stages that are left out would give -> the plane that stands for it.
 
     Args:
         stages: In order.

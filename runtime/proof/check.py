@@ -63,11 +63,11 @@ class CheckReport:
         return all(layer.status != "fail" for layer in self.layers)
 
     def lines(self) -> list[str]:
-        """Give one line per layer, for people."""
+        """Return one line per layer, for people."""
         return [f"{layer.status:4}  {layer.name:7} {layer.message}" for layer in self.layers]
 
     def to_json(self) -> dict[str, Any]:
-        """Give plain data, for programs."""
+        """Return plain data, for programs."""
         return {
             "bundle": str(self.path),
             "passed": self.passed,

@@ -100,7 +100,7 @@ def _compared(
 
 
 def _compare(got: FloatArray, stored: FloatArray, case: GoldenCase, where: str) -> float:
-    """Give the largest difference as a share of what is allowed."""
+    """Return the largest difference as a share of what is allowed."""
     allowed = case.atol + case.rtol * max(1.0, float(np.abs(stored).max()))
     difference = float(np.abs(got - stored).max())
     if not difference <= allowed:
@@ -166,7 +166,7 @@ def _engine(bundle: Bundle, role: str, size: str, threads: int) -> NetworkEngine
 
 
 def _tiles_px(stride: int) -> tuple[int, ...]:
-    """Give three sides of tiles on the lattice of a stride.
+    """Return three sides of tiles on the lattice of a stride.
 
     Origins of tiles of an odd number of cells, one cell among them, come to lie on every phase of
     a lattice that is twice or four times as coarse: what is exact on multiples of 64 px alone is
@@ -181,7 +181,7 @@ def _tiles_px(stride: int) -> tuple[int, ...]:
 
 
 def _picture_px(facts: NetworkFacts, tile: int) -> tuple[int, int]:
-    """Give odd sides (h, w) that need at least 2 x 2 windows."""
+    """Return odd sides (h, w) that need at least 2 x 2 windows."""
     stride, wide = facts.stride_px, max(_tiles_px(facts.stride_px))
     halo = math.ceil(facts.reach_px / stride) * stride
     return 2 * (halo + tile) + stride + 1, 2 * halo + wide + 2 * stride + 3
@@ -239,7 +239,7 @@ def _infer(engine: NetworkEngine, picture: FloatArray, layout: TileLayout) -> Fl
 
 
 def _probe_px(facts: NetworkFacts) -> int:
-    """Give a window with room for the reach on both sides of the probed cell."""
+    """Return a window with room for the reach on both sides of the probed cell."""
     stride = facts.stride_px
     return max(4, 2 * (math.ceil(facts.reach_px / stride) + 2)) * stride
 
@@ -281,7 +281,7 @@ def prove_range(bundle: Bundle, *, run: GoldenRun | None) -> Result:
 
 
 def _golden(bundle: Bundle) -> dict[str, GoldenArrays]:
-    """Give the arrays of the cases that the manifest lists.
+    """Return the arrays of the cases that the manifest lists.
 
     Raises:
         BundleError: If manifest and golden.safetensors hold other cases.
@@ -297,7 +297,7 @@ def _golden(bundle: Bundle) -> dict[str, GoldenArrays]:
 
 
 def _windows(bundle: Bundle, role: str, size: str, run: GoldenRun | None) -> list[FloatArray]:
-    """Give inputs of a network: those of the golden captures, else noise."""
+    """Return inputs of a network: those of the golden captures, else noise."""
     facts = bundle.network_facts(role, size)
     if run is not None and bundle.manifest.golden:
         arrays = _golden(bundle)
@@ -310,7 +310,7 @@ def _windows(bundle: Bundle, role: str, size: str, run: GoldenRun | None) -> lis
 
 
 def _noise(facts: NetworkFacts) -> FloatArray:
-    """Give noise as the input of a network."""
+    """Return noise as the input of a network."""
     side = math.ceil(_SYNTHETIC_PX / facts.stride_px) * facts.stride_px
     rng = np.random.default_rng(_SEED)
     planes = rng.random((facts.input_channels, side, side), dtype=np.float32)

@@ -127,7 +127,7 @@ def apply_gains(mosaic: FloatArray, cfa: CfaPattern, gains: tuple[float, float, 
 
 
 def shift_rows(cfa: CfaPattern, rows: int) -> CfaPattern:
-    """Give the CFA letters of the cell that starts `rows` below the first."""
+    """Return the CFA letters of the cell that starts `rows` below the first."""
     if rows % 2 == 0:
         return cfa
     swapped = cfa[2:] + cfa[:2]

@@ -27,7 +27,7 @@ Places = NDArray[np.intp]
 
 
 def neighbours(padded: NDArray[Any], rows: Places, cols: Places, step: int) -> FloatArray:
-    """Give the eight samples at a distance of `step`.
+    """Return the eight samples at a distance of `step`.
 
     Args:
         padded: (h + 4, w + 4): a mosaic or a plane with `MARGIN_PX` of context on every side.

@@ -96,7 +96,7 @@ def repair_planes(planes: FloatArray) -> tuple[FloatArray, BoolArray]:
 
 
 def places_of(mask: BoolArray) -> tuple[NDArray[np.intp], ...]:
-    """Give what `np.nonzero` gives, in a fraction of its time where few of a mask are true."""
+    """Return what `np.nonzero` gives, in a fraction of its time where few of a mask are true."""
     return np.unravel_index(np.flatnonzero(mask), mask.shape)
 
 
@@ -148,7 +148,7 @@ def _apart(plane: FloatArray, padded: FloatArray, step: int) -> BoolArray:
 
 
 def _extreme(padded: FloatArray, step: int, choose: np.ufunc) -> FloatArray:
-    """Give the largest or smallest of the 8 neighbours at a distance of `step`."""
+    """Return the largest or smallest of the 8 neighbours at a distance of `step`."""
     inner = padded[2 - step : padded.shape[0] - 2 + step, :]
     centre = inner[:, 2:-2]
     right = inner.shape[1] - 2 + step
@@ -159,7 +159,7 @@ def _extreme(padded: FloatArray, step: int, choose: np.ufunc) -> FloatArray:
 
 
 def _median(around: FloatArray) -> FloatArray:
-    """Give the median of the valid ones of (8, n); 0 where none is."""
+    """Return the median of the valid ones of (8, n); 0 where none is."""
     valid = np.isfinite(around)
     count = valid.sum(axis=0)
     ordered = np.sort(np.where(valid, around, np.inf), axis=0)
@@ -172,7 +172,7 @@ def _median(around: FloatArray) -> FloatArray:
 
 
 def fallback_noise(channels: int = 3) -> NoiseModel:
-    """Give the noise that is taken when a picture is too small to measure."""
+    """Return the noise that is taken when a picture is too small to measure."""
     return NoiseModel(
         shot=(FALLBACK_SHOT,) * channels, read_variance=(FALLBACK_READ_VARIANCE,) * channels
     )
@@ -205,7 +205,7 @@ def measure_noise(capture: Capture) -> NoiseModel:
 
 
 def _sample_planes(capture: Capture) -> Iterator[FloatArray]:
-    """Give same-colour planes of bands spread over the picture; clipped samples are NaN."""
+    """Return same-colour planes of bands spread over the picture; clipped samples are NaN."""
     step = max(_BAND_ROWS, capture.height // _MAX_BANDS // 2 * 2)
     for top in range(0, capture.height, step):
         bottom = min(top + _BAND_ROWS, capture.height)
@@ -218,7 +218,7 @@ def _sample_planes(capture: Capture) -> Iterator[FloatArray]:
 
 
 def _block_statistics(plane: FloatArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Give level and noise variance of every whole block of a plane."""
+    """Return level and noise variance of every whole block of a plane."""
     high, wide = ((n - 2) // _BLOCK * _BLOCK for n in plane.shape)
     if high <= 0 or wide <= 0:
         return np.zeros(0), np.zeros(0)
@@ -257,7 +257,7 @@ def _fit_line(levels: NDArray[np.float64], variances: NDArray[np.float64]) -> tu
 def _best_shot(
     x: NDArray[np.float64], y: NDArray[np.float64], spread: NDArray[np.float64], read_e: float
 ) -> tuple[float, float, float]:
-    """Give (cost, shot, read noise): the shot noise that fits best with a read noise.
+    """Return (cost, shot, read noise): the shot noise that fits best with a read noise.
 
     The sum over levels of (((shot x + (read_e shot)^2) / y - 1) / spread)^2 has its least value
     where its derivative, a cubic in shot, is zero, or at the ends of what is possible. Known is the

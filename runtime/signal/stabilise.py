@@ -28,7 +28,7 @@ def stabilise(
     scale: float = DEFAULT_SCALE,
     out: FloatArray | None = None,
 ) -> FloatArray:
-    """Give s = sqrt(max(x / shot + read_variance / shot^2, 0)) / scale.
+    """Return s = sqrt(max(x / shot + read_variance / shot^2, 0)) / scale.
 
     The noise of s has the standard deviation 0.5 / scale at any gain.
 
@@ -88,7 +88,7 @@ def unstabilise(
 
 
 def familiar_noise(noise: NoiseModel, trained_reads_e: Sequence[float]) -> NoiseModel:
-    """Give the noise closest to a capture's whose read noise a network has been trained with.
+    """Return the noise closest to a capture's whose read noise a network has been trained with.
 
     Planes are stabilised by it and taken back by it: what the network makes of them changes, the
     light they stand for does not. Where a capture has less read noise, black is lifted to where the
@@ -146,13 +146,13 @@ class StackedRows:
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Give (c, h, w) of all sources together."""
+        """Return (c, h, w) of all sources together."""
         _, height, width = self._sources[0].shape
         stacked: tuple[PiecedRows | RowSource, ...] = (*self._sources, *self._masks)
         return sum(source.shape[0] for source in stacked), height, width
 
     def read(self, top: int, bottom: int) -> FloatArray:
-        """Give the rows top..bottom, (c, rows, w)."""
+        """Return the rows top..bottom, (c, rows, w)."""
         parts = [source.pieces(top, bottom) for source in self._sources]
         stacked = np.empty((self.shape[0], bottom - top, self.shape[2]), dtype=np.float32)
         start = 0
@@ -184,7 +184,7 @@ class StackedRows:
 
 
 def _line(planes: FloatArray, noise: NoiseModel, scale: float) -> tuple[FloatArray, FloatArray]:
-    """Give slope and offset, (c, 1, 1) each, of s^2 as a line in x."""
+    """Return slope and offset, (c, 1, 1) each, of s^2 as a line in x."""
     shot = np.array(noise.shot, dtype=np.float64)[:, None, None]
     read_variance = np.array(noise.read_variance, dtype=np.float64)[:, None, None]
     if planes.ndim != 3 or planes.shape[0] != len(noise.shot):

@@ -50,5 +50,5 @@ def _converted(bands: Iterator[Rows], color: ColorStage) -> Iterator[FloatArray]
 
 
 def seconds(_entry: Color, subject: Subject, _work: Work, speed: Speed) -> float:
-    """Give the seconds that it will take."""
+    """Return the seconds that it will take."""
     return REST_SHARE * speed.rest_s_per_mp * subject.megapixels

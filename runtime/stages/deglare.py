@@ -31,7 +31,7 @@ SEARCH_SHARE: Final = 10.0
 
 
 def prepare(entry: Deglare, job: Job) -> StageWork:
-    """Say what is looked for."""
+    """Return what is looked for."""
     settings = GlareSettings(
         least_rad=math.radians(entry.least_angle_deg),
         most_rad=math.radians(entry.most_angle_deg),
@@ -63,7 +63,7 @@ def check(_entry: Deglare, manifest: Manifest, _max_bytes: int) -> None:
 
 
 def seconds(_entry: Deglare, subject: Subject, _work: Work, speed: Speed) -> float:
-    """Give the seconds that it will take."""
+    """Return the seconds that it will take."""
     searched = SEARCH_SHARE * min(subject.megapixels, OVERVIEW_MP)
     return (REST_SHARE * subject.megapixels + searched) * speed.rest_s_per_mp
 

@@ -46,7 +46,7 @@ def prepare(entry: Demosaic, job: Job) -> StageWork:
 
 
 def seconds(_entry: Demosaic, subject: Subject, _work: Work, speed: Speed) -> float:
-    """Give the seconds that it will take."""
+    """Return the seconds that it will take."""
     return REST_SHARE * speed.rest_s_per_mp * subject.megapixels
 
 
@@ -63,12 +63,12 @@ class ColorRows:
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Give (3, h, w)."""
+        """Return (3, h, w)."""
         _, height, width = self._source.shape
         return 3, height, width
 
     def read(self, top: int, bottom: int) -> Rows:
-        """Give rows top..bottom as (3, rows, w) float32, a new array."""
+        """Return rows top..bottom as (3, rows, w) float32, a new array."""
         margin, (_, height, width) = DEMOSAIC_MARGIN_PX[self._method], self.shape
         above, below = max(top - margin, 0), min(bottom + margin, height)
         mosaic = self._source.read(above, below)[0]

@@ -67,7 +67,7 @@ def check(entry: Dehaze, manifest: Manifest, _max_bytes: int) -> None:
 
 
 def prepare(entry: Dehaze, job: Job) -> StageWork:
-    """Say what the coarse picture takes."""
+    """Return what the coarse picture takes."""
 
     def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
         picture = taken[0]
@@ -93,7 +93,7 @@ def prepare(entry: Dehaze, job: Job) -> StageWork:
 
 
 def seconds(_entry: Dehaze, subject: Subject, _work: Work, speed: Speed) -> float:
-    """Give the seconds that it will take."""
+    """Return the seconds that it will take."""
     first_mp = 0.0 if few_are_kept() else FIRST_MP
     return (REST_SHARE * subject.megapixels + SOLVED_MP + first_mp) * speed.rest_s_per_mp
 
@@ -122,7 +122,7 @@ def coarse_band(entry: Dehaze, picture: Stream, job: Job) -> CoarseBand:
 
 @lru_cache(maxsize=KEPT_CAMERAS)
 def _kernels(bundle: Bundle, depth_mm: float | None, scale: float) -> HazyKernels:
-    """Give the kernels of a camera; the same ones to all its captures."""
+    """Return the kernels of a camera; the same ones to all its captures."""
     sensor = bundle.manifest.sensor
     assert sensor.type != "spad"  # its counts never join
     response = sensor.response_arrays()

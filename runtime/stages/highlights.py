@@ -55,7 +55,7 @@ LEAST_PX: Final = 4
 
 
 def prepare(entry: Highlights, job: Job) -> StageWork:
-    """Say which planes are looked at; a capture smaller than a cell is left as it is.
+    """Return which planes are looked at; a capture smaller than a cell is left as it is.
 
     Raises:
         ContractError: If no stage gives them.
@@ -90,12 +90,12 @@ def prepare(entry: Highlights, job: Job) -> StageWork:
 
 
 def seconds(_entry: Highlights, subject: Subject, _work: Work, speed: Speed) -> float:
-    """Give the seconds that it will take."""
+    """Return the seconds that it will take."""
     return REST_SHARE * speed.rest_s_per_mp * subject.megapixels
 
 
 def first_bytes(pixels: int) -> int:
-    """Give the memory that a picture takes at most while its lights are sought."""
+    """Return the memory that a picture takes at most while its lights are sought."""
     fine_px = min(pixels, FINE_CELLS * PITCH_PX**2)
     return max(BYTES_PER_PX * pixels, FINE_BYTES_PER_PX * fine_px)
 

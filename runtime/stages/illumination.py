@@ -20,7 +20,7 @@ REST_SHARE: Final = 0.03
 
 
 def is_left_out(options: Options) -> bool:
-    """Tell whether the caller wants the vignetting kept."""
+    """Return whether the caller wants the vignetting kept."""
     return not options.vignetting
 
 
@@ -40,5 +40,5 @@ def prepare(_entry: Illumination, job: Job) -> StageWork:
 
 
 def seconds(_entry: Illumination, subject: Subject, _work: Work, speed: Speed) -> float:
-    """Give the seconds that it will take."""
+    """Return the seconds that it will take."""
     return REST_SHARE * speed.rest_s_per_mp * subject.megapixels

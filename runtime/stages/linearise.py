@@ -45,7 +45,7 @@ def _renamed(stream: Stream, source: "LinearRows | MaskRows", domain: str, type_
 
 
 def seconds(_entry: Linearise, subject: Subject, _work: Work, speed: Speed) -> float:
-    """Give the seconds that it will take."""
+    """Return the seconds that it will take."""
     return REST_SHARE * speed.rest_s_per_mp * subject.megapixels
 
 
@@ -63,11 +63,11 @@ class LinearRows:
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Give (channel, h, w)."""
+        """Return (channel, h, w)."""
         return self._job.capture.plane_shape
 
     def read(self, top: int, bottom: int) -> Rows:
-        """Give rows top..bottom as (channel, rows, w) float32, a new array."""
+        """Return rows top..bottom as (channel, rows, w) float32, a new array."""
         capture = self._job.capture
         channels, _, width = self.shape
         light = np.empty((channels, bottom - top, width), dtype=np.float32)
@@ -98,11 +98,11 @@ class MaskRows:
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Give (channel, h, w)."""
+        """Return (channel, h, w)."""
         return self._capture.plane_shape
 
     def read(self, top: int, bottom: int) -> Rows:
-        """Give rows top..bottom as (channel, rows, w) bool, a new array."""
+        """Return rows top..bottom as (channel, rows, w) bool, a new array."""
         mask = self._capture.saturated_rows(top, bottom)
         release_pages(self._capture.samples)
         return mask if mask.ndim == 3 else mask[None]

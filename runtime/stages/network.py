@@ -67,7 +67,7 @@ _OTHER_CAUSES: Final = (
 
 
 def prepare(entry: Network, job: Job) -> StageWork:
-    """Hold the capture against the envelope; the windows are planned when the memory is known."""
+    """Check the capture against the envelope; the windows are planned when the memory is known."""
     if entry.transform == "stabilise":
         _ = job.noise  # known to the plan before any row
     if "envelope" not in job.record:  # one network has looked already
@@ -99,7 +99,7 @@ def _falls_back(job: Job) -> bool:
 
 
 def seconds(entry: Network, subject: Subject, work: Work, speed: Speed) -> float:
-    """Give the seconds that it will take."""
+    """Return the seconds that it will take."""
     return network_seconds(entry.role, role_window_mp(entry.role, subject, work), speed)
 
 
@@ -128,7 +128,7 @@ def _parted(taken: Sequence[Stream]) -> tuple[list[Stream], list[Stream]]:
 
 
 def _familiar_noise(job: Job, stream: Stream) -> NoiseModel:
-    """Give the noise by which a stream is stabilised."""
+    """Return the noise by which a stream is stabilised."""
     noise, sensor = job.noise.with_gains(stream.gains), job.known_bundle.manifest.sensor
     if sensor.type == "spad":
         return noise
@@ -184,7 +184,7 @@ class _NetworkStage:
         job.record["tiles"] = tiles[entry.role] if one else tiles
 
     def _trimmed(self, engine: NetworkEngine, cap_bytes: int) -> Run:
-        """Give the run of a network that has the memory to itself, as far as that is near the cap.
+        """Return run of a network that has the memory to itself, as far as that is near the cap.
 
         Its activations are the peak: what other stages have freed must not lie beside them.
         """
@@ -198,7 +198,7 @@ class _NetworkStage:
         return run
 
     def planned_bytes(self) -> int:
-        """Give the memory of weights and windows."""
+        """Return the memory of weights and windows."""
         return 0 if self._windows is None else self._weight_bytes + self._windows.needed_bytes()
 
     def warnings(self) -> tuple[str, ...]:
@@ -235,7 +235,7 @@ class _NetworkStage:
         return (f"{moved}. {_USUAL}{'' if is_own else _OTHER_CAUSES}",)
 
     def run(self, taken: Sequence[Stream]) -> tuple[Stream, ...]:
-        """Give the outputs of the network."""
+        """Return the outputs of the network."""
         if self._windows is None:
             raise ContractError("the windows of a network are planned before it runs")
         job, entry = self._job, self._entry
@@ -313,7 +313,7 @@ class _NetworkStage:
             del band
 
     def _noise(self, last: Stream, ports: int) -> NoiseModel | None:
-        """Give the noise by which outputs are taken back: every port by that of the last input."""
+        """Return noise by which outputs are taken back: every port by that of the last input."""
         if self._entry.transform != "stabilise":
             return None
         one = _familiar_noise(self._job, last)
@@ -329,7 +329,7 @@ class _NetworkStage:
         return changed_bands(bands, undo, threads=self._job.threads)
 
     def _stand_in(self, taken: Sequence[Stream]) -> slice | None:
-        """Give the channels of the input that stand for the output where it is not had."""
+        """Return the channels of the input that stand for the output where it is not had."""
         planes = self._job.known_bundle.manifest.planes
         if len(self._entry.gives) != 1:
             return None
@@ -368,7 +368,7 @@ class _NetworkStage:
         return self._facts().output_scale
 
     def _facts(self) -> NetworkFacts:
-        """Give what is known of the network; also where all cells of a picture go without it."""
+        """Return what is known of the network; also where all cells of a picture go without it."""
         return self._job.known_bundle.network_facts(self._entry.role, self._job.work.size)
 
 
@@ -381,10 +381,10 @@ class _Channels:
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Give (channel, h, w)."""
+        """Return (channel, h, w)."""
         _, height, width = self._source.shape
         return self._channels.stop - self._channels.start, height, width
 
     def read(self, top: int, bottom: int) -> FloatArray:
-        """Give rows top..bottom."""
+        """Return rows top..bottom."""
         return self._source.read(top, bottom)[self._channels]

@@ -36,5 +36,5 @@ def prepare(_entry: RaiseClipped, job: Job) -> StageWork:
 
 
 def seconds(_entry: RaiseClipped, subject: Subject, _work: Work, speed: Speed) -> float:
-    """Give the seconds that it will take."""
+    """Return the seconds that it will take."""
     return REST_SHARE * speed.rest_s_per_mp * subject.megapixels

@@ -59,7 +59,7 @@ def prepare(entry: Repair, job: Job) -> StageWork:
 
 
 def seconds(_entry: Repair, subject: Subject, _work: Work, speed: Speed) -> float:
-    """Give the seconds that it will take."""
+    """Return the seconds that it will take."""
     return REST_SHARE * speed.rest_s_per_mp * subject.megapixels
 
 
@@ -73,7 +73,7 @@ class Mended:
         self._count = 0
 
     def hold(self, top: int, bottom: int) -> bool:
-        """Tell whether rows top..bottom were looked at."""
+        """Return whether rows top..bottom were looked at."""
         return self._span[0] <= top <= bottom <= self._span[1] and bottom > self._span[0]
 
     def add(self, top: int, bottom: int, places: Places, values: FloatArray) -> None:
@@ -92,7 +92,7 @@ class Mended:
             self._span, self._places, self._values = (0, 0), [], []
 
     def within(self, top: int, bottom: int) -> tuple[Places, FloatArray]:
-        """Give places and values in rows top..bottom, which it must hold."""
+        """Return places and values in rows top..bottom, which it must hold."""
         if len(self._places) > 1:
             self._places = [_joined(self._places)]
             self._values = [np.concatenate(self._values)]
@@ -122,18 +122,18 @@ class SoundRows:
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Give (channel, h, w)."""
+        """Return (channel, h, w)."""
         return self._source.shape
 
     def read(self, top: int, bottom: int) -> Rows:
-        """Give rows top..bottom as (channel, rows, w) float32, a new array."""
+        """Return rows top..bottom as (channel, rows, w) float32, a new array."""
         sound, places = self._mend(top, bottom)
         self.repaired += int(np.count_nonzero(places[1] >= self._end))
         self._end = max(self._end, bottom)
         return sound
 
     def places(self, top: int, bottom: int) -> Places:
-        """Give which samples of rows top..bottom were replaced."""
+        """Return which samples of rows top..bottom were replaced."""
         if self._mended.hold(top, bottom):
             return self._mended.within(top, bottom)[0]
         return self._mend(top, bottom)[1]
@@ -189,11 +189,11 @@ class UnknownRows:
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Give (channel, h, w)."""
+        """Return (channel, h, w)."""
         return self._mask.shape
 
     def read(self, top: int, bottom: int) -> Rows:
-        """Give rows top..bottom as (channel, rows, w) bool, a new array."""
+        """Return rows top..bottom as (channel, rows, w) bool, a new array."""
         unknown = self._mask.read(top, bottom).copy()
         channel, row, column = self._sound.places(top, bottom)
         unknown[channel, row - top, column] = False

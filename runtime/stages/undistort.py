@@ -25,7 +25,7 @@ CUBIC_SHARE: Final = 0.32
 
 
 def is_left_out(options: Options) -> bool:
-    """Tell whether the caller wants the geometry of the sensor kept."""
+    """Return whether the caller wants the geometry of the sensor kept."""
     return not options.undistort
 
 
@@ -52,6 +52,6 @@ def prepare(entry: Undistort, job: Job) -> StageWork:
 
 
 def seconds(entry: Undistort, subject: Subject, _work: Work, speed: Speed) -> float:
-    """Give the seconds that it will take."""
+    """Return the seconds that it will take."""
     share = CUBIC_SHARE if entry.interpolation == "cubic" else 1.0
     return share * REST_SHARE * speed.rest_s_per_mp * subject.megapixels

@@ -39,7 +39,7 @@ def prepare(_entry: WhiteBalance, job: Job) -> StageWork:
 
 
 def seconds(_entry: WhiteBalance, subject: Subject, _work: Work, speed: Speed) -> float:
-    """Give the seconds that it will take."""
+    """Return the seconds that it will take."""
     return REST_SHARE * speed.rest_s_per_mp * subject.megapixels
 
 
@@ -72,11 +72,11 @@ class BalancedRows:
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Give (channel, h, w)."""
+        """Return (channel, h, w)."""
         return self._source.shape
 
     def read(self, top: int, bottom: int) -> Rows:
-        """Give rows top..bottom as (channel, rows, w) float32, a new array."""
+        """Return rows top..bottom as (channel, rows, w) float32, a new array."""
         rows = self._source.read(top, bottom)
         if not self._owned:
             rows = rows.copy()

@@ -93,7 +93,7 @@ def check(entry: Wiener, manifest: Manifest, max_bytes: int) -> None:
 
 
 def bank_work(entry: Wiener, channels: int) -> float:
-    """Give how often a pixel is transformed at most: overlaps, channels, rounds at clipped lights.
+    """Return how often a pixel is transformed at most: overlaps, channels, rounds of clipping.
 
     A block takes a transform for its kernel and two for its filter; where samples are clipped,
     four for every round of Richardson-Lucy and two each for what it explains and leaves.
@@ -104,12 +104,12 @@ def bank_work(entry: Wiener, channels: int) -> float:
 
 
 def block_bytes(block_px: int, channels: int, *, threads: int) -> int:
-    """Give the memory in which some threads restore a block each (measured)."""
+    """Return the memory in which some threads restore a block each (measured)."""
     return 4 * channels * block_px * block_px * (PLANES_HELD + PLANES_PER_BLOCK * threads)
 
 
 def prepare(entry: Wiener, job: Job) -> StageWork:
-    """Say which kernels are taken, where there is a choice, and what the noise is."""
+    """Return which kernels are taken, where there is a choice, and what the noise is."""
     bundle, depth_mm, _ = job.known_bundle, job.options.depth_mm, job.noise
     depths_mm = bundle.psf.depths_mm
     if depths_mm.size > 1:
@@ -151,7 +151,7 @@ def _restored(entry: Wiener, job: Job, taken: Sequence[Stream]) -> Iterator[Rows
 
 
 def tuning(entry: Wiener, method: str) -> Tuning:
-    """Say how a method was tuned: the bank by what its bundle states, the others by camkit."""
+    """Return how a method was tuned: the bank by what its bundle states, the others by camkit."""
     if method == METHODS[0]:
         values = stated_numbers(entry)
         if entry.together is not None:
@@ -253,7 +253,7 @@ def _nearness_key(entry: Wiener) -> tuple[str, tuple[str, ...]]:
 
 
 def _plain(job: Job) -> PlainBlock | None:
-    """Give the test for blocks that nothing but plain cells read; None without any."""
+    """Return the test for blocks that nothing but plain cells read; None without any."""
     work, subject = job.work, job.subject
     if work.labels is None or subject is None:
         return None
@@ -262,7 +262,7 @@ def _plain(job: Job) -> PlainBlock | None:
 
 
 def seconds(entry: Wiener, subject: Subject, work: Work, speed: Speed) -> float:
-    """Give the seconds that it will take."""
+    """Return the seconds that it will take."""
     size_px = subject.height_px, subject.width_px
     block_px = cut_block_px(entry.block_px, entry.overlap_px, size_px)
     rows, columns = (lay_spans(side, block_px, entry.overlap_px) for side in size_px)
@@ -292,7 +292,7 @@ def _search_seconds(subject: Subject, speed: Speed) -> float:
 
 
 def _kernel_share(subject: Subject, columns: Sequence[Span]) -> float:
-    """Give the share of blocks with a kernel of their own; mirrored places share one."""
+    """Return the share of blocks with a kernel of their own; mirrored places share one."""
     kernels = subject.bundle.psf.field_heights_mm.size
     window = subject.placement.window
     places = {round(abs(float(window.to_mm(c.centre, 0)[0])), 6) for c in columns}
@@ -305,7 +305,7 @@ def _light_work(
     spans: tuple[Sequence[Span], Sequence[Span]],
     kernel_px: int | None,
 ) -> NDArray[np.float64]:
-    """Give (row, column): what clipped samples cost a block, 1 where it is explained as a whole."""
+    """Return (row, column): what clipped samples cost a block, 1 where all is explained."""
     rows, columns = spans
     block_px = rows[0].index.size
     found = np.zeros((len(rows), len(columns)))

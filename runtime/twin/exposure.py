@@ -51,7 +51,7 @@ class Setting:
 
 
 def expose(light: Light, sensor: ColorSensor, setting: Setting) -> NDArray[np.uint16]:
-    """Give the DN that a sensor records of light.
+    """Return the DN that a sensor records of light.
 
     Args:
         light: What falls on it.
@@ -80,7 +80,7 @@ def expose(light: Light, sensor: ColorSensor, setting: Setting) -> NDArray[np.ui
 
 
 def noise_of(sensor: ColorSensor, setting: Setting) -> NoiseModel:
-    """Give the noise that a setting really makes."""
+    """Return the noise that a setting really makes."""
     stated = sensor.noise_at(setting.iso)
     power = setting.noise_factor**2
     return NoiseModel(
@@ -90,7 +90,7 @@ def noise_of(sensor: ColorSensor, setting: Setting) -> NoiseModel:
 
 
 def levels_of(sensor: ColorSensor, setting: Setting) -> tuple[float, float]:
-    """Give black and white level of the converter; with other bits the black keeps its share."""
+    """Return black and white level of the converter; with other bits the black keeps its share."""
     if setting.bits is None:
         return sensor.black_level, sensor.white_level
     white = 2.0**setting.bits - 1
@@ -98,7 +98,7 @@ def levels_of(sensor: ColorSensor, setting: Setting) -> tuple[float, float]:
 
 
 def variance_of(signal: NDArray[np.float64], noise: NoiseModel, step: float) -> NDArray[np.float64]:
-    """Give the variance of samples: photons, amplifier, converter.
+    """Return the variance of samples: photons, amplifier, converter.
 
     Args:
         signal: Without noise, 1.0 = white level; what lies below 0 counts as dark.
@@ -117,7 +117,7 @@ def record(
     full_well_e: float,
     rng: np.random.Generator | None,
 ) -> NDArray[np.float64]:
-    """Give the signal after the pixel: Poisson electrons, full well, Gaussian read noise.
+    """Return the signal after the pixel: Poisson electrons, full well, Gaussian read noise.
 
     Args:
         signal: Linear, 1.0 = white level.
@@ -136,7 +136,7 @@ def record(
 
 
 def sample_mosaic(planes: FloatArray, cfa: CfaPattern, gains: Gains) -> FloatArray:
-    """Give the (h, w) raw mosaic of (3, h, w) white-balanced planes."""
+    """Return the (h, w) raw mosaic of (3, h, w) white-balanced planes."""
     mosaic = np.empty(planes.shape[1:], dtype=np.float32)
     for row, channels in enumerate(cfa_channels(cfa)):
         for column, channel in enumerate(channels):
@@ -146,14 +146,14 @@ def sample_mosaic(planes: FloatArray, cfa: CfaPattern, gains: Gains) -> FloatArr
 
 
 def sample_planes(planes: FloatArray, sensor: ColorSensor, gains: Gains) -> FloatArray:
-    """Give what the pixels see of (c, h, w) white-balanced planes: (h, w) behind a mosaic."""
+    """Return what the pixels see of (c, h, w) white-balanced planes: (h, w) behind a mosaic."""
     if isinstance(sensor, BayerSensor):
         return sample_mosaic(planes, sensor.cfa, gains)
     return planes / np.array(gains, dtype=np.float32)[:, None, None]
 
 
 def signal_of(light: Light, sensor: ColorSensor) -> FloatArray:
-    """Give the signal of the pixels, 1.0 = white level, dimmed by the optics."""
+    """Return the signal of the pixels, 1.0 = white level, dimmed by the optics."""
     signal = sample_planes(light.planes, sensor, light.gains)
     if light.vignetting is not None:
         height = light.window.size_px[1]

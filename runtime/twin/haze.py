@@ -39,7 +39,7 @@ class HazeLens:
 
 
 def margin_px(lens: HazeLens, least_px: int) -> int:
-    """Give the least margin of whole cells, one at least."""
+    """Return the least margin of whole cells, one at least."""
     return max(-(-least_px // lens.cell_px), 1) * lens.cell_px
 
 
@@ -52,7 +52,7 @@ def hazed(
     ring_px: int = 0,
     workers: int = 1,
 ) -> tuple[FloatArray, FloatArray]:
-    """Give the haze of a scene, and that of a scene of ones.
+    """Return the haze of a scene, and that of a scene of ones.
 
     Args:
         planes: (c, h + 2 around, w + 2 around) float32, the scene, mirrored beyond its ring.

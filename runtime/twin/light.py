@@ -113,7 +113,7 @@ def lens_of(
     haze: Haze | None = None,
     response: Response | None = None,
 ) -> Lens:
-    """Give what the light goes through for one object distance.
+    """Return what the light goes through for one object distance.
 
     Args:
         psf: Of the optics.
@@ -159,7 +159,7 @@ def _hazy_lens(psf: FrozenPsf, haze: Haze, response: Response, depth_mm: float |
 
 
 def with_kernels(lens: Lens, change: KernelChange) -> Lens:
-    """Give a lens whose kernels are changed and normalised again; sizes stay."""
+    """Return a lens whose kernels are changed and normalised again; sizes stay."""
 
     def kernels_at(x_mm: float, y_mm: float) -> FloatArray:
         changed = np.maximum(change(lens.kernels_at(x_mm, y_mm)), 0)
@@ -170,12 +170,12 @@ def with_kernels(lens: Lens, change: KernelChange) -> Lens:
 
 
 def with_axis_moved(lens: Lens, x_mm: float, y_mm: float) -> Lens:
-    """Give a lens whose axis meets the sensor beside its middle."""
+    """Return a lens whose axis meets the sensor beside its middle."""
     return with_places(lens, lambda x, y: (x - x_mm, y - y_mm))
 
 
 def with_places(lens: Lens, place: PlaceChange) -> Lens:
-    """Give a lens whose kernels at (x, y) mm are those that another has at `place(x, y)`."""
+    """Return a lens whose kernels at (x, y) mm are those that another has at `place(x, y)`."""
 
     def moved(lookup: KernelLookup) -> KernelLookup:
         return lambda x, y: lookup(*place(x, y))
@@ -187,7 +187,7 @@ def with_places(lens: Lens, place: PlaceChange) -> Lens:
 
 
 def camera_space(sensor: ColorSensor) -> tuple[NDArray[np.float64], Gains]:
-    """Give the matrix (c, 3) from linear Rec.709 to white-balanced channels, and the gains.
+    """Return the matrix (c, 3) from linear Rec.709 to white-balanced channels, and the gains.
 
     Channels without a colour matrix see Rec.709 as it is where they are three, else its luminance.
     """
@@ -205,7 +205,7 @@ def light_of(
     window: SensorWindow,
     options: LightOptions | None = None,
 ) -> Light:
-    """Let a scene fall on the sensor.
+    """Project a scene on the sensor.
 
     Args:
         scene: (3, s h, s w) float32 linear Rec.709 in ideal geometry, >= 0; h and w those of the
@@ -254,7 +254,7 @@ def _spread(planes: FloatArray, lens: Lens, window: SensorWindow, workers: int) 
 
 
 def lit_core(lens: Lens) -> KernelLookup:
-    """Give the kernels of a lens with the light that they hold: all of it without a haze."""
+    """Return the kernels of a lens with the light that they hold: all of it without a haze."""
     haze = lens.haze
     if haze is None:
         return lens.kernels_at
@@ -278,7 +278,7 @@ def _spread_hazy(
 
 
 def crop_light(light: Light, size_px: tuple[int, int]) -> Light:
-    """Give the top left part of a light, as a smaller capture at the same place."""
+    """Return the top left part of a light, as a smaller capture at the same place."""
     width, height = size_px
     scale = light.clean.shape[2] // light.planes.shape[2]
     return replace(
@@ -290,7 +290,7 @@ def crop_light(light: Light, size_px: tuple[int, int]) -> Light:
 
 
 def stated_balance(gains: Gains) -> tuple[float, float, float] | None:
-    """Give the gains as a capture states them: those of three colours, else None."""
+    """Return the gains as a capture states them: those of three colours, else None."""
     if len(gains) != 3:
         return None
     red, green, blue = gains
@@ -305,7 +305,7 @@ def scene_window(
     scale: int = 1,
     surround_px: int = 0,
 ) -> SensorWindow:
-    """Give where the picture of a scene lies on the sensor; centred without an origin.
+    """Return where the picture of a scene lies on the sensor; centred without an origin.
 
     Args:
         scene: (3, h, w) linear Rec.709.
@@ -362,7 +362,7 @@ def _on_sensor(
     options: LightOptions,
     margin_px: int,
 ) -> FloatArray:
-    """Give the sharp scene in the sensor's channels and geometry, with a margin around the window.
+    """Return sharp scene in the sensor's channels and geometry, with a margin around the window.
 
     The margin is the surround of the scene as far as that reaches, and mirrored beyond it.
     """

@@ -9,7 +9,7 @@ from camkit.scenes.saturation import CEILING, Saturation, saturating_exposure, s
 def exposure_for_share(
     scene: FloatArray, sensor: ColorSensor, share: float, *, ceiling: float = CEILING
 ) -> Saturation:
-    """Give the least exposure at which a share of a scene exceeds what a sensor holds.
+    """Return the least exposure at which a share of a scene exceeds what a sensor holds.
 
     Args:
         scene: (3, h, w) float32 linear Rec.709, 1.0 = white.
@@ -26,7 +26,7 @@ def exposure_for_share(
 def saturation_of(
     scene: FloatArray, sensor: ColorSensor, exposure: float, *, ceiling: float | None = None
 ) -> Saturation:
-    """Give what of a scene an exposure saturates.
+    """Return what of a scene an exposure saturates.
 
     Args:
         scene: (3, h, w) float32 linear Rec.709, 1.0 = white.

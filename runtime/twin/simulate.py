@@ -164,7 +164,7 @@ def photograph(scene: FloatArray, bundle: Bundle, options: SimulationOptions) ->
 
 
 def bare_psf(bundle: Bundle) -> FrozenPsf:
-    """Give the kernels of the lens alone, where a plate before it writes streaks.
+    """Return the kernels of the lens alone, where a plate before it writes streaks.
 
     Raises:
         ContractError: If the optics of the bundle write none.

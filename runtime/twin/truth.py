@@ -24,7 +24,7 @@ from camkit.runtime.twin.simulate import Simulation
 
 
 def light_sensor(manifest: Manifest) -> ColorSensor:
-    """Give the sensor of a camera that the twin can photograph with.
+    """Return the sensor of a camera that the twin can photograph with.
 
     Raises:
         UnsupportedError: If it counts photons.
@@ -35,7 +35,7 @@ def light_sensor(manifest: Manifest) -> ColorSensor:
 
 
 def picture_scale(manifest: Manifest) -> int:
-    """Give the samples of a bundle's picture along a side of a pixel of its sensor.
+    """Return the samples of a bundle's picture along a side of a pixel of its sensor.
 
     Raises:
         UnsupportedError: If it makes no picture, or one whose samples are not whole shares of a
@@ -55,7 +55,7 @@ def picture_scale(manifest: Manifest) -> int:
 
 
 def true_picture(clean: FloatArray, sensor: ColorSensor) -> FloatArray:
-    """Give linear Rec.709 (3, h, w) of clean planes of the twin.
+    """Return linear Rec.709 (3, h, w) of clean planes of the twin.
 
     Args:
         clean: (c, h, w) float32, white-balanced channels of the sensor.
@@ -73,7 +73,7 @@ def true_picture(clean: FloatArray, sensor: ColorSensor) -> FloatArray:
 
 
 def ideal_picture(simulation: Simulation, bundle: Bundle) -> FloatArray:
-    """Give what the product `image` would show of a scene if nothing were lost.
+    """Return what the product `image` would show of a scene if nothing were lost.
 
     Args:
         simulation: Photographed with `picture_scale` samples of the scene along a side of a pixel.

@@ -130,13 +130,13 @@ class Simulation:
         return self._queue_free
 
     def _moved(self, now: float, size: float) -> float:
-        """Give when bytes have gone through the storage."""
+        """Return when bytes have gone through the storage."""
         alone = size / self._load.storage
         self._storage_free = max(now, self._storage_free) + alone
         return max(self._storage_free, now + size / self._load.stream)
 
     def _computed(self, now: float) -> float:
-        """Give when a file has been computed, again and again if its worker dies."""
+        """Return when a file has been computed, again and again if its worker dies."""
         load = self._load
         seconds = load.seconds * math.exp(self._rng.gauss(0, load.spread))
         if self._rng.random() < load.stragglers:
@@ -196,7 +196,7 @@ def main() -> None:
 
 
 def table(load: Load, cores: list[int], wanted: argparse.Namespace) -> Iterator[str]:
-    """Give the lines of the table."""
+    """Return the lines of the table."""
     yield (
         "| cores | files/s | hours | core hours | cores busy | storage busy | queue busy | "
         "tail s | made again | limit |"

@@ -58,7 +58,7 @@ def main() -> None:
 
 
 def measure(wanted: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Give what was measured, printed as it is found."""
+    """Return what was measured, printed as it is found."""
     bundle = open_bundle(find_bundle(wanted.bundle))
     captures = folder / "captures"
     captures.mkdir()
@@ -136,7 +136,7 @@ class Processes:
     """A scheduler and workers that are started again when they end."""
 
     def __init__(self, folder: Path, workers: int) -> None:
-        """Say where their logs go and how many there are."""
+        """Return where their logs go and how many there are."""
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             port = probe.getsockname()[1]
@@ -171,7 +171,7 @@ class Processes:
             os.killpg(self._running[name].pid, signal.SIGKILL)
 
     def pid_of(self, name: str) -> int:
-        """Give the process that has a name now."""
+        """Return the process that has a name now."""
         return self._running[name].pid
 
     def _supervise(self) -> None:
@@ -242,7 +242,7 @@ class _Watch:
         self._seen.append((time.process_time(), times.user + times.system))
 
     def each_ms(self) -> tuple[float, float]:
-        """Give what a file took of each."""
+        """Return what a file took of each."""
         (caller, scheduler), (caller_end, scheduler_end) = self._seen[0], self._seen[-1]
         count = max(1, len(self._seen) - 1)
         return 1e3 * (caller_end - caller) / count, 1e3 * (scheduler_end - scheduler) / count

@@ -12,7 +12,7 @@ from camkit.runtime.twin.simulate import Simulation
 
 
 def color_sensor(bundle: Bundle) -> ColorSensor:
-    """Give the sensor of a camera that takes pictures in colour.
+    """Return the sensor of a camera that takes pictures in colour.
 
     Raises:
         UnsupportedError: If it has not three channels.
@@ -27,14 +27,14 @@ def color_sensor(bundle: Bundle) -> ColorSensor:
 
 
 def rec709_of(sensor: ColorSensor) -> Matrix:
-    """Give the (3, 3) matrix from white-balanced channels to linear Rec.709."""
+    """Return the (3, 3) matrix from white-balanced channels to linear Rec.709."""
     if sensor.color_matrix is None:
         return np.eye(3)
     return rec709_from_camera(np.array(sensor.color_matrix, dtype=np.float64))
 
 
 def captured(pipeline: Pipeline, simulation: Simulation) -> Capture:
-    """Give the simulation as a capture that the pipeline of its camera takes."""
+    """Return the simulation as a capture that the pipeline of its camera takes."""
     red, green, blue = simulation.white_balance
     x, y = (int(v) for v in simulation.window.origin_px)
     return pipeline.capture_of(

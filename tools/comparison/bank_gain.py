@@ -120,7 +120,7 @@ def main(words: Sequence[str] | None = None) -> None:
 
 
 def together_of(recipe: Path) -> Together:
-    """Give the model that a recipe states.
+    """Return the model that a recipe states.
 
     Raises:
         ContractError: If it states none.
@@ -132,7 +132,7 @@ def together_of(recipe: Path) -> Together:
 
 
 def restoring_together(bundle: Bundle, together: Together) -> Bundle:
-    """Give a bundle whose bank restores colours together; its hash stays."""
+    """Return a bundle whose bank restores colours together; its hash stays."""
     stages = tuple(
         stage.model_copy(update={"together": together}) if isinstance(stage, Wiener) else stage
         for stage in bundle.manifest.stages
@@ -141,7 +141,7 @@ def restoring_together(bundle: Bundle, together: Together) -> Bundle:
 
 
 def restorers(bundle: Bundle, together: Together) -> dict[str, Restorer]:
-    """Give every way."""
+    """Return every way."""
     other = restoring_together(bundle, together)
     tuned = tuned_from_json(json.loads(TUNED.read_text(encoding="utf-8"))["tuned"]["values"])
 
@@ -161,7 +161,7 @@ def _psnr_db(restore: Restorer, taken: Photograph) -> float:
 
 
 def gains(found: Sequence[Judged]) -> dict[str, dict[str, float | None]]:
-    """Give what `together` gains over the others, with its standard error over copies."""
+    """Return what `together` gains over the others, with its standard error over copies."""
     told = {}
     for other in (ALONE, PEER):
         each = [one.psnr_db[TOGETHER] - one.psnr_db[other] for one in found]

@@ -101,7 +101,7 @@ def make(arguments: argparse.Namespace) -> None:
 
 
 def counted(folder: Path) -> dict[str, int]:
-    """Give how often each was found better.
+    """Return how often each was found better.
 
     Raises:
         ContractError: If a vote is none, or a picture has two or none.

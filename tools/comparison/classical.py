@@ -129,7 +129,7 @@ def _stepped(values: Values, place: int, step: float) -> Values:
 
 
 def by_block(method: str, numbers: Numbers | None = None) -> Method:
-    """Give a method of the runtime (see `block_filter`) on a sample as one block.
+    """Return a method of the runtime (see `block_filter`) on a sample as one block.
 
     Args:
         method: Its name.
@@ -157,7 +157,7 @@ def by_block(method: str, numbers: Numbers | None = None) -> Method:
 
 
 def wiener_alone(developed: Developed, recipe: BayerRecipe) -> Tensor:
-    """Give what the bank makes of every colour for itself."""
+    """Return what the bank makes of every colour for itself."""
     return filtered(developed, recipe.with_together(None))
 
 
@@ -187,7 +187,7 @@ class ClassicalMaker:
 def with_method(
     name: str, maker: SampleMaker, recipe: Recipe, numbers: Numbers | None = None
 ) -> SampleMaker:
-    """Give a maker of the same samples by a method; exits where the camera has no bank.
+    """Return a maker of the same samples by a method; exits where the camera has no bank.
 
     Args:
         name: One of `METHODS`.

@@ -5,7 +5,7 @@ from typing import Any
 
 
 def to_compact_json(value: Any, digits: int) -> str:
-    """Give one line of JSON; every float keeps so many significant digits.
+    """Return one line of JSON; every float keeps so many significant digits.
 
     Args:
         value: Plain values, lists and objects.

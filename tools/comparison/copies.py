@@ -22,7 +22,7 @@ Transfer = NDArray[np.complex128]
 def transfer_error(
     frozen: FrozenPsf, copy: FrozenPsf, sensor: ColorSensor, *, focus_um: float = 0.0
 ) -> float:
-    """Give the relative RMS error of the frozen transfer against that of a copy.
+    """Return the relative RMS error of the frozen transfer against that of a copy.
 
     Args:
         frozen: What methods know; of several depths the mean kernel is taken.
@@ -36,19 +36,19 @@ def transfer_error(
 
 
 def relative_error(ours: Transfer, theirs: Transfer) -> float:
-    """Give the root of the mean square of the difference over that of `theirs`."""
+    """Return the root of the mean square of the difference over that of `theirs`."""
     wrong, power = (float(np.square(np.abs(part)).sum()) for part in (ours - theirs, theirs))
     return math.sqrt(wrong / power)
 
 
 def transfers(kernels: FieldKernels) -> Transfer:
-    """Give the transfers (height, c, n) at some shares of the largest height."""
+    """Return the transfers (height, c, n) at some shares of the largest height."""
     heights_mm = np.array(HEIGHTS) * kernels.field_heights_mm[-1]
     return np.stack([_transfer(kernels.at(0.0, float(at_mm))) for at_mm in heights_mm])
 
 
 def _transfer(kernels: FloatArray) -> Transfer:
-    """Give the transfer (c, n) below the highest frequency that counts, about the middle pixel."""
+    """Return transfer (c, n) below the highest frequency that counts, about the middle pixel."""
     h, w = kernels.shape[-2:]
     wide = np.zeros((len(kernels), GRID_PX, GRID_PX))
     wide[:, :h, :w] = kernels

@@ -86,12 +86,12 @@ def _psnr_db(views: Views) -> float:
 
 
 def as_filtered(planes: Tensor) -> Tensor:
-    """Give what the bank, or the method in its place, makes of samples, (n, 3, S, S)."""
+    """Return what the bank, or the method in its place, makes of samples, (n, 3, S, S)."""
     return planes[:, -3:]
 
 
 def known(target: Tensor, planes: Tensor) -> Tensor:
-    """Give a target less what it has from the bank, which is asked for where light was clipped."""
+    """Return target less what it has from the bank, which is asked for where light was clipped."""
     return torch.where(target == as_filtered(planes), torch.tensor(NOT_JUDGED), target)
 
 

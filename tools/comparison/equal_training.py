@@ -91,7 +91,7 @@ def trained(one: Trainee, settings: EqualTime, tell: Tell) -> dict[str, Any]:
 
 
 def finished(folder: Path) -> dict[str, Any] | None:
-    """Give how a training ended; None where it did not."""
+    """Return how a training ended; None where it did not."""
     path = folder / DONE
     if not path.is_file():
         return None
@@ -100,7 +100,7 @@ def finished(folder: Path) -> dict[str, Any] | None:
 
 
 def checkpoint_in(folder: Path, size: str, role: str | None) -> Path:
-    """Give the file that a training wrote, or will write."""
+    """Return the file that a training wrote, or will write."""
     options = TrainOptions(out_dir=folder, size=size, role=role)
     return checkpoint_path(read_recipe(folder / RECIPE), options, None)
 

@@ -91,7 +91,7 @@ class Conditions:
     out_dir: Path
 
     def digest(self, row: "Row") -> str:
-        """Give a hash of all that decides a row."""
+        """Return a hash of all that decides a row."""
         recipes = [path for recipe in (row.lab, row.wild) for path in (recipe, judged_by(recipe))]
         texts = [text for recipe in recipes for text in self._told(recipe)]
         tuning = (self.tune,) if row.size in TUNABLE else ()
@@ -100,11 +100,11 @@ class Conditions:
         )
 
     def training_digest(self, row: "Row") -> str:
-        """Give a hash of all that decides the weights of a row."""
+        """Return a hash of all that decides the weights of a row."""
         return _hash(row.size, *self._told(row.lab), *self._trained_by())
 
     def _told(self, recipe: Path) -> list[str]:
-        """Give the texts of a recipe and of what says how its frames were made, where they are."""
+        """Return texts of a recipe and of what says how its frames were made, where they are."""
         frames = sorted((self.out_dir / recipe.stem).glob(f"*/{FRAMES}"))
         return [path.read_text(encoding="utf-8") for path in (recipe, *frames) if path.exists()]
 
@@ -264,7 +264,7 @@ def frame_counts(text: str) -> dict[str, int]:
 
 
 def row_of(name: str, lab: Path, wild: Path) -> Row:
-    """Give the row of a word of the command line."""
+    """Return the row of a word of the command line."""
     size, _, recipes = name.partition("=")
     own = recipes.split(",") if recipes else [str(lab), str(wild)]
     if len(own) != 2:
@@ -368,13 +368,13 @@ CLASSICAL: Final[tuple[str, ...]] = ("wiener", *METHODS)
 
 
 def line(name: str, entry: Entry) -> str:
-    """Give a row for people while it runs."""
+    """Return a row for people while it runs."""
     told = (f"{where} {entry[where]['psnr_db']:.2f} dB" for where in DOMAINS)
     return f"{name:24} {', '.join(told)}"
 
 
 def table(rows: dict[str, Entry]) -> str:
-    """Give the table as Markdown; the last column is what a row loses abroad."""
+    """Return the table as Markdown; the last column is what a row loses abroad."""
     heads = [f"{where} {metric}" for where in DOMAINS for metric in METRICS]
     lines = [f"| row | {' | '.join(heads)} | steps | lab - wild, dB |"]
     lines.append("|---" * (len(heads) + 3) + "|")
@@ -387,7 +387,7 @@ def table(rows: dict[str, Entry]) -> str:
 
 
 def table_of_distances(rows: dict[str, Entry]) -> str:
-    """Give PSNR abroad by distance of the scenes; empty where all are at one."""
+    """Return PSNR abroad by distance of the scenes; empty where all are at one."""
     names = next(iter(rows.values()))["wild"].get("at", {})
     if not names:
         return ""

@@ -78,7 +78,7 @@ class Measurement:
 
     @property
     def capture(self) -> tuple[str, str, str, int, float]:
-        """Give what names the capture."""
+        """Return what names the capture."""
         return self.psf, self.set_name, self.picture, self.position, self.iso
 
 
@@ -98,12 +98,12 @@ class Row:
 
 
 def identity_of(*parts: object) -> str:
-    """Give a short hash of plain values."""
+    """Return a short hash of plain values."""
     return hashlib.sha256(json.dumps(parts, default=str).encode()).hexdigest()[:12]
 
 
 def shot_key(shot: Shot) -> tuple[str, str, str, int, float]:
-    """Give what names the capture, as `Measurement.capture`."""
+    """Return what names the capture, as `Measurement.capture`."""
     return shot.psf, shot.set_name, shot.picture.name, shot.position, shot.iso
 
 
@@ -124,7 +124,7 @@ def append_measurements(path: Path, measurements: Iterable[Measurement]) -> None
 def open_rows(
     shot: Shot, rows: Sequence[Row], done: Mapping[tuple[object, ...], set[tuple[str, str]]]
 ) -> tuple[Row, ...]:
-    """Give the rows that still have to be measured on a capture."""
+    """Return the rows that still have to be measured on a capture."""
     finished = done.get(shot_key(shot), set())
     return tuple(row for row in rows if (row.name, row.identity) not in finished)
 
@@ -132,7 +132,7 @@ def open_rows(
 def finished_rows(
     measurements: Iterable[Measurement],
 ) -> dict[tuple[object, ...], set[tuple[str, str]]]:
-    """Give capture -> (name, identity) of the rows measured on it."""
+    """Return capture -> (name, identity) of the rows measured on it."""
     done: dict[tuple[object, ...], set[tuple[str, str]]] = {}
     for m in measurements:
         done.setdefault(m.capture, set()).add((m.method, m.identity))
@@ -145,7 +145,7 @@ def latest(measurements: Iterable[Measurement]) -> list[Measurement]:
 
 
 def by_capture(measurements: Iterable[Measurement], methods: Sequence[str]) -> list[list[Any]]:
-    """Give a row a capture: CAPTURE_COLUMNS, then VALUE_COLUMNS of every method, None without."""
+    """Return a row a capture: CAPTURE_COLUMNS, then VALUE_COLUMNS of every method, None without."""
     rows: dict[tuple[object, ...], dict[str, Measurement]] = {}
     for m in measurements:
         rows.setdefault(m.capture, {})[m.method] = m

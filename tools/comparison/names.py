@@ -21,6 +21,6 @@ BEFORE: Final = " before"
 
 
 def title_of(name: str) -> str:
-    """Give what a row is called in tables."""
+    """Return what a row is called in tables."""
     plain = name.removesuffix(BEFORE)
     return TITLES.get(plain, plain) + name[len(plain) :]

@@ -42,16 +42,16 @@ class Lead:
 
     @property
     def sure(self) -> int:
-        """Give 1 where it is ahead, -1 where it is behind, 0 where nobody can tell."""
+        """Return 1 where it is ahead, -1 where it is behind, 0 where nobody can tell."""
         return int(np.sign(self.mean)) if abs(self.mean) > SURE * self.error else 0
 
     def less(self, other: "Lead") -> "Lead":
-        """Give what is left when another lead is taken away."""
+        """Return what is left when another lead is taken away."""
         return Lead(mean=self.mean - other.mean, error=float(np.hypot(self.error, other.error)))
 
 
 def lead_of(one: Sequence[float], other: Sequence[float], frames: Sequence[int]) -> Lead:
-    """Give the lead of one over the other.
+    """Return the lead of one over the other.
 
     Args:
         one: Value of every sample.
@@ -68,7 +68,7 @@ def lead_of(one: Sequence[float], other: Sequence[float], frames: Sequence[int])
 
 
 def verdict_of(home: Lead, abroad: Lead) -> str:
-    """Give holds, partly, fails, behind or untold."""
+    """Return holds, partly, fails, behind or untold."""
     lost = home.less(abroad).sure
     if home.sure < 0 and abroad.sure <= 0:
         return "behind"

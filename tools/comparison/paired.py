@@ -24,7 +24,7 @@ AIMS_DB: Final = {
 
 
 def pairs_of(methods: Sequence[str], best_classical: str | None) -> list[tuple[str, str]]:
-    """Give what is compared with what.
+    """Return what is compared with what.
 
     Bank and networks with the same before, S with M before, bank and networks with the best
     classical method, M with rivals.
@@ -40,7 +40,7 @@ def pairs_of(methods: Sequence[str], best_classical: str | None) -> list[tuple[s
 
 
 def best_classical(measurements: Iterable[Measurement]) -> str | None:
-    """Give the classical method with the highest mean, if there is any."""
+    """Return the classical method with the highest mean, if there is any."""
     levels: dict[str, list[float]] = {}
     for m in measurements:
         if m.method in CLASSICAL:
@@ -51,7 +51,7 @@ def best_classical(measurements: Iterable[Measurement]) -> str | None:
 def paired_gains(
     measurements: Sequence[Measurement], pairs: Sequence[tuple[str, str]]
 ) -> list[dict[str, Any]]:
-    """Give every pair's gain over all captures, by ISO and by place, as plain JSON values."""
+    """Return every pair's gain over all captures, by ISO and by place, as plain JSON values."""
     found = []
     for method, over in pairs:
         gains = _differences(measurements, method, over)
@@ -70,7 +70,7 @@ def paired_gains(
 
 
 def to_lines(gains: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Give a table in Markdown, a line for each pair."""
+    """Return a table in Markdown, a line for each pair."""
     if not gains:
         return []
     isos, places = list(gains[0]["by_iso"]), list(gains[0]["by_position"])
@@ -130,7 +130,7 @@ def _gain(gains: Sequence[tuple[Measurement, float]]) -> dict[str, Any]:
 def mean_and_error(
     gains: Sequence[float], groups: Sequence[Hashable]
 ) -> tuple[float, float | None]:
-    """Give a mean, and its standard error from the means of groups that are independent.
+    """Return a mean, and its standard error from the means of groups that are independent.
 
     Args:
         gains: Of captures.

@@ -84,7 +84,7 @@ class Peer:
 
     @property
     def settings(self) -> tuple[Setting, ...]:
-        """Give all settings that the tuning tries."""
+        """Return all settings that the tuning tries."""
         return tuple(product(*self.candidates))
 
     def restore(self, capture: LocalCapture, setting: Setting) -> FloatArray:
@@ -113,19 +113,19 @@ class Peer:
         return bank.restore_array(capture.planes, capture.saturated)
 
     def describe(self, setting: Setting) -> str:
-        """Give the setting as text."""
+        """Return the setting as text."""
         pairs = zip(self.parameters, setting, strict=True)
         return ", ".join(f"{name} {value:g}" for name, value in pairs)
 
 
 def part_sides(kernel_px: int) -> tuple[int, int]:
-    """Give side and overlap of the parts, for kernels of a side."""
+    """Return side and overlap of the parts, for kernels of a side."""
     overlap_px = PART_STEP_PX * max(1, -(-(kernel_px - 1) // PART_STEP_PX))
     return PARTS_PER_OVERLAP * overlap_px, overlap_px
 
 
 def wiener_part(noise: NoiseModel, setting: Setting) -> BlockFilter:
-    """Give `skimage.restoration.wiener` with its own Laplacian as regulariser.
+    """Return `skimage.restoration.wiener` with its own Laplacian as regulariser.
 
     Args:
         noise: Not used; the balance is tuned for each ISO.
@@ -151,7 +151,7 @@ def wiener_part(noise: NoiseModel, setting: Setting) -> BlockFilter:
 
 
 def richardson_lucy_part(noise: NoiseModel, setting: Setting) -> BlockFilter:
-    """Give the rounds of `skimage.restoration.richardson_lucy`, on the transfer function.
+    """Return the rounds of `skimage.restoration.richardson_lucy`, on the transfer function.
 
     The same rounds, but each convolution reuses the transform of the kernel: four transforms a
     round in place of six longer ones. Negative samples count as no light.
@@ -180,7 +180,7 @@ def richardson_lucy_part(noise: NoiseModel, setting: Setting) -> BlockFilter:
 
 
 def admm_tv_part(noise: NoiseModel, setting: Setting) -> BlockFilter:
-    """Give camkit's ADMM with total variation.
+    """Return camkit's ADMM with total variation.
 
     Args:
         noise: Sets the unit of the weight and the steps.
@@ -191,7 +191,7 @@ def admm_tv_part(noise: NoiseModel, setting: Setting) -> BlockFilter:
 
 
 def cross_channel_part(noise: NoiseModel, setting: Setting) -> BlockFilter:
-    """Give camkit's cross-channel deconvolution.
+    """Return camkit's cross-channel deconvolution.
 
     Args:
         noise: Sets the unit of the weights and the steps.
@@ -227,6 +227,6 @@ PEERS: Final[dict[str, Peer]] = {
 
 @lru_cache(maxsize=4)
 def _laplacian(side_px: int) -> ComplexArray:
-    """Give the regulariser that scikit-image would make for every call, (b, b // 2 + 1)."""
+    """Return the regulariser that scikit-image would make for every call, (b, b // 2 + 1)."""
     transfer, _ = uft.laplacian(2, (side_px, side_px))
     return np.asarray(transfer, dtype=np.complex64)

@@ -50,7 +50,7 @@ class Photograph:
 
     @property
     def height_mm(self) -> float:
-        """Give the distance of the crop's middle from the axis."""
+        """Return the distance of the crop's middle from the axis."""
         return float(np.hypot(*self.simulation.window.centre_mm))
 
 
@@ -68,7 +68,7 @@ def photograph(shot: Shot, scene: FloatArray, bundle: Bundle, lens: FrozenOptics
 
 
 def finish_planes(planes: FloatArray, taken: Photograph, bundle: Bundle) -> FloatArray:
-    """Give linear Rec.709 of white-balanced camera planes, vignetting divided out.
+    """Return linear Rec.709 of white-balanced camera planes, vignetting divided out.
 
     These are the last stages of the pipeline, for planes that a foreign method restored.
     """
@@ -79,7 +79,7 @@ def finish_planes(planes: FloatArray, taken: Photograph, bundle: Bundle) -> Floa
 
 
 def bundle_restorer(bundle: Bundle, *, method: str = "net", size: str = "M") -> Restorer:
-    """Give a restoration of the bundle's pipeline, in sensor geometry, on one thread.
+    """Return a restoration of the bundle's pipeline, in sensor geometry, on one thread.
 
     Args:
         bundle: The camera.
@@ -100,7 +100,7 @@ def bundle_restorer(bundle: Bundle, *, method: str = "net", size: str = "M") -> 
 
 
 def _develop(simulation: Simulation, bundle: Bundle) -> LocalCapture:
-    """Give what the bundle's own bank is given.
+    """Return what the bundle's own bank is given.
 
     Raises:
         ContractError: If the bundle has no bank.

@@ -25,7 +25,7 @@ class Mean:
     count: int
 
     def to_json(self) -> dict[str, float | int]:
-        """Give plain JSON values."""
+        """Return plain JSON values."""
         return {
             "psnr_db": round(self.psnr_db, 3),
             "ssim": round(self.ssim, 4),
@@ -45,7 +45,7 @@ def comparable(measurements: Sequence[Measurement], methods: Sequence[str]) -> l
 def means(
     measurements: Iterable[Measurement], *fields: str
 ) -> dict[tuple[Any, ...], dict[str, Mean]]:
-    """Give (values of the fields) -> method -> means over all captures of the group."""
+    """Return (values of the fields) -> method -> means over all captures of the group."""
     groups: dict[tuple[Any, ...], dict[str, list[Measurement]]] = {}
     for m in measurements:
         key = tuple(getattr(m, field) for field in fields)
@@ -64,7 +64,7 @@ def means(
 
 
 def gains(by_method: Mapping[str, Mean], network: str = "M") -> dict[str, Any]:
-    """Give how far the network lies above the best classical method and every other row, in dB."""
+    """Return how far the network lies above the best classical method and other rows, in dB."""
     if network not in by_method:
         return {}
     level = by_method[network].psnr_db
@@ -84,7 +84,7 @@ def gains(by_method: Mapping[str, Mean], network: str = "M") -> dict[str, Any]:
 
 
 def summarise(measurements: Sequence[Measurement], methods: Sequence[str]) -> dict[str, Any]:
-    """Give all means and gains as plain JSON values, for each kind of PSF."""
+    """Return all means and gains as plain JSON values, for each kind of PSF."""
     kept = comparable(measurements, methods)
     summary: dict[str, Any] = {}
     for psf in sorted({m.psf for m in kept}, reverse=True):
@@ -107,7 +107,7 @@ def summarise(measurements: Sequence[Measurement], methods: Sequence[str]) -> di
 
 
 def seconds_per_megapixel(measurements: Iterable[Measurement]) -> dict[str, float]:
-    """Give seconds per megapixel of every method."""
+    """Return seconds per megapixel of every method."""
     totals: dict[str, list[float]] = {}
     for m in measurements:
         total = totals.setdefault(m.method, [0.0, 0.0])
@@ -182,7 +182,7 @@ def _table(
     overall: Mapping[str, Any],
     methods: Sequence[str],
 ) -> list[str]:
-    """Give a table with a line per method and PSNR / SSIM per ISO and over all."""
+    """Return a table with a line per method and PSNR / SSIM per ISO and over all."""
     (by_iso,) = groups.values()
     isos = list(by_iso)
     count = overall[methods[0]]["n"]
@@ -198,7 +198,7 @@ def _table(
 def _copy_lines(
     by_copy: Mapping[str, Mapping[str, Any]], errors: Mapping[str, float], methods: Sequence[str]
 ) -> list[str]:
-    """Give a table with a column for each copy of the lens."""
+    """Return a table with a column for each copy of the lens."""
     if not by_copy:
         return []
     heads = [f"{seed}, off by {errors.get(seed, float('nan')):.2f}" for seed in by_copy]
@@ -212,7 +212,7 @@ def _copy_lines(
 
 
 def _groups(groups: Mapping[str, Any], methods: Sequence[str], what: str) -> list[str]:
-    """Give a table per ISO with a column per group."""
+    """Return a table per ISO with a column per group."""
     isos = list(next(iter(groups.values())))
     lines = []
     for iso in isos:

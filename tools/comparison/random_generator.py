@@ -33,7 +33,7 @@ CALIBRATION_STRIDES: Final = 4
 
 
 def random_generator(config: NormedConfig) -> ExportedNetwork:
-    """Give a generator with random weights and frozen norms, exported.
+    """Return a generator with random weights and frozen norms, exported.
 
     Args:
         config: Its shape; whether norms are frozen does not matter.

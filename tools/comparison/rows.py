@@ -41,7 +41,7 @@ class Rival:
 
     @property
     def size(self) -> str:
-        """Give the size that is compared: M, or the only one there is."""
+        """Return the size that is compared: M, or the only one there is."""
         sizes = self.bundle.manifest.sizes
         if "M" in sizes or len(sizes) == 1:
             return "M" if "M" in sizes else sizes[0]

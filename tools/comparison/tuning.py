@@ -42,7 +42,7 @@ def try_peers(taken: Photograph, bundle: Bundle, peers: Sequence[str]) -> list[T
 
 
 def choose(trials: Iterable[Trial]) -> tuple[Tuned, dict[str, dict[str, dict[str, float]]]]:
-    """Give the best settings, and the mean PSNR of all: peer -> ISO -> setting as text -> dB."""
+    """Return the best settings, and the mean PSNR of all: peer -> ISO -> setting as text -> dB."""
     groups: dict[tuple[str, float], dict[Setting, list[float]]] = {}
     for t in trials:
         groups.setdefault((t.peer, t.iso), {}).setdefault(t.setting, []).append(t.psnr_db)
@@ -58,13 +58,13 @@ def choose(trials: Iterable[Trial]) -> tuple[Tuned, dict[str, dict[str, dict[str
 
 
 def at_edge(peer: str, setting: Setting) -> list[str]:
-    """Give the parameters whose chosen value is the first or last candidate."""
+    """Return the parameters whose chosen value is the first or last candidate."""
     chosen = zip(PEERS[peer].parameters, PEERS[peer].candidates, setting, strict=True)
     return [name for name, tried, value in chosen if value in (tried[0], tried[-1])]
 
 
 def tuned_to_json(tuned: Tuned) -> dict[str, dict[str, dict[str, float]]]:
-    """Give plain JSON values: peer -> ISO -> parameter -> value."""
+    """Return plain JSON values: peer -> ISO -> parameter -> value."""
     return {
         peer: {
             f"{iso:g}": dict(zip(PEERS[peer].parameters, setting, strict=True))

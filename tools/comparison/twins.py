@@ -116,12 +116,12 @@ def write_twins(
 
 
 def judged_by(recipe: Path) -> Path:
-    """Give where the recipe of samples to judge on lies, beside that of a network."""
+    """Return where the recipe of samples to judge on lies, beside that of a network."""
     return recipe.with_name(f"{recipe.stem}{JUDGED}{recipe.suffix}")
 
 
 def with_losses(camera: str, losses: str) -> str:
-    """Give the text of a camera's recipe with schedule, sizes and losses of another recipe.
+    """Return the text of a camera's recipe with schedule, sizes and losses of another recipe.
 
     Raises:
         ContractError: If one of them has no table `[schedule]`.
@@ -131,7 +131,7 @@ def with_losses(camera: str, losses: str) -> str:
 
 
 def _parted(text: str) -> tuple[str, str]:
-    """Give what lies before the schedule of a recipe, and the rest with the comment above it."""
+    """Return what lies before the schedule of a recipe, and the rest with the comment above it."""
     lines = text.splitlines()
     if LOSSES not in lines:
         raise ContractError(f"the recipe has no table {LOSSES}")
@@ -149,7 +149,7 @@ def _read(recipe: Path) -> str:
 
 
 def with_keys(text: str, table: str, keys: Mapping[str, Value]) -> str:
-    """Give the text of a recipe with other values of keys of a table, each on a line of its own.
+    """Return the text of a recipe with other values of keys of a table, each on a line of its own.
 
     Raises:
         ContractError: If there is no such table, or the values do not come out.

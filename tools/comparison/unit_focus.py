@@ -88,7 +88,7 @@ class Judged:
     gains_db: Mapping[str, tuple[float, ...]]
 
     def to_json(self) -> dict[str, Any]:
-        """Give plain JSON values."""
+        """Return plain JSON values."""
         said = {"why": self.why} if self.found is None else self.found.to_json()
         error = {"nominal": self.error[0], "unit": self.error[1]}
         pictures = {
@@ -145,7 +145,7 @@ def main(words: Sequence[str] | None = None) -> None:
 
 
 def refocusable(bundle: Bundle, range_um: float | None) -> tuple[Bundle, float]:
-    """Give a bundle with kernels of its lens before a moved sensor, and how far that is moved."""
+    """Return a bundle with kernels of its lens before a moved sensor, and how far that is moved."""
     lens = _lens_of(bundle)
     reach_um = lens.focus_range_um() if range_um is None else range_um
     psf, _ = with_focus(bundle.psf, (-reach_um, reach_um), lens.refocused, color_sensor(bundle))
@@ -206,7 +206,7 @@ def target_captures(lens: FrozenPsf, bundle: Bundle) -> list[tuple[str, Capture]
 def gains_db(
     lens: FrozenOptics, banks: Mapping[str, Bundle], pictures: Sequence[Path], focus_um: float
 ) -> dict[str, tuple[float, ...]]:
-    """Give what the focus gains each bank, capture by capture."""
+    """Return what the focus gains each bank, capture by capture."""
     bundle = banks[ALONE]
     unit = Unit(name="copy", bundle_sha256=bundle.sha256, facts={FOCUS: focus_um})
     pipelines = {bank: [_bank(of, known) for known in (None, unit)] for bank, of in banks.items()}
@@ -240,7 +240,7 @@ def _psnr_db(pipeline: Pipeline, simulation: Simulation, sharp: FloatArray) -> f
 
 
 def blend_errors(bundle: Bundle, range_um: float) -> dict[str, dict[str, float]]:
-    """Give the relative RMS error of blended transfers half-way to either end of the reach."""
+    """Return the relative RMS error of blended transfers half-way to either end of the reach."""
     lens, sensor = _lens_of(bundle), color_sensor(bundle)
     response = sensor.response_arrays()
     low, nominal, high = (
@@ -263,7 +263,7 @@ def blend_errors(bundle: Bundle, range_um: float) -> dict[str, dict[str, float]]
 
 
 def gain(each_db: Sequence[float], groups: Sequence[int]) -> dict[str, float | None] | None:
-    """Give the mean gain with its standard error over groups; None of nothing."""
+    """Return the mean gain with its standard error over groups; None of nothing."""
     if not each_db:
         return None
     mean_db, error_db = mean_and_error(each_db, groups)

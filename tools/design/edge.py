@@ -59,7 +59,7 @@ class EdgeContrast:
 
 
 def slanted_edge(side_px: int, across: Across, levels: tuple[float, float] = LEVELS) -> Tensor:
-    """Give a linear picture (3, side, side) of an edge through its middle, dark to bright.
+    """Return a linear picture (3, side, side) of an edge through its middle, dark to bright.
 
     Args:
         side_px: Of the picture.
@@ -82,7 +82,7 @@ def _distance(y: Tensor, x: Tensor, across: Across) -> Tensor:
 def edge_contrast(
     pictures: Tensor, sharp: Tensor, across: Across, *, reach_px: int = 40, count: int = 25
 ) -> EdgeContrast:
-    """Give the contrast of recovered edges.
+    """Return the contrast of recovered edges.
 
     Args:
         pictures: (..., h, w) linear, h = w.

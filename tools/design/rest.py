@@ -50,11 +50,11 @@ class LensAtRest(DesignLens):
         self.moves = nn.Parameter(torch.zeros_like(self.begin))
 
     def scaled(self) -> Tensor:
-        """Give no free number."""
+        """Return no free number."""
         return self.moves
 
     def forward(self) -> tuple[Tensor, Tensor]:
-        """Give kernels (depth, field, 3, k, k) and no penalty."""
+        """Return kernels (depth, field, 3, k, k) and no penalty."""
         return self.kernels, torch.zeros((), dtype=self.kernels.dtype)
 
     def made_kernels(self, copy: Copy) -> Tensor:
@@ -62,7 +62,7 @@ class LensAtRest(DesignLens):
         raise ContractError(f"a lens at rest has no copies; got {copy}")
 
     def lens(self) -> Lens:
-        """Give the lens as a prescription."""
+        """Return the lens as a prescription."""
         return self.problem.free.lens
 
 
@@ -86,7 +86,7 @@ class Seen:
 def at_work(
     lens: Lens, *, f_number: float, object_distance_mm: float, focus: FocusMerit | None = None
 ) -> Lens:
-    """Give a lens set to an F-number and focused at a distance.
+    """Return a lens set to an F-number and focused at a distance.
 
     Args:
         lens: The prescription.
@@ -101,7 +101,7 @@ def at_work(
 
 
 def window_of(problem: Problem, pixels: Pixels, largest_px: int) -> int:
-    """Give the odd window that holds 99.5 % of the light of every field and depth, or the cap."""
+    """Return the odd window that holds 99.5 % of the light of every field and depth, or the cap."""
     problem = replace(problem, samples=half_disc(_WINDOW_RAYS))
     diameters = [
         energy_diameter(spots, _HELD).max()
@@ -138,7 +138,7 @@ def trace_at_rest(problem: Problem, pixels: Pixels) -> Seen:
 
 
 def _field_spots(problem: Problem, depth_mm: float) -> list[Spots | None]:
-    """Give spots (1, wave, ray) about the centroid of all rays; None for a field without light."""
+    """Return spots (1, wave, ray) about the centroid of all rays; None without light."""
     lens = with_object_distance(problem.free.lens, depth_mm)
     found: list[Spots | None] = []
     for slope in problem.slopes:
@@ -155,7 +155,7 @@ def _field_spots(problem: Problem, depth_mm: float) -> list[Spots | None]:
 
 
 def _field(spots: Spots | None, pixels: Pixels) -> tuple[Tensor, ...]:
-    """Give kernel (3, k, k), share held, share arriving and RMS radius of one field."""
+    """Return kernel (3, k, k), share held, share arriving and RMS radius of one field."""
     size = pixels.kernel_px
     even = torch.full((3, size, size), 1 / size**2, dtype=torch.float64)
     none = torch.zeros((), dtype=torch.float64)
@@ -175,7 +175,7 @@ def _field(spots: Spots | None, pixels: Pixels) -> tuple[Tensor, ...]:
 def at_rest(
     lens: Lens, problem: Problem, pixels: Pixels, rays: int = REST_RAYS
 ) -> tuple[LensAtRest, Seen]:
-    """Give a lens at rest that looks at the fields, wavelengths and depths of a problem.
+    """Return a lens at rest that looks at the fields, wavelengths and depths of a problem.
 
     Args:
         lens: As it works.

@@ -47,12 +47,12 @@ class Captures(nn.Module):
     """In the place of a network: shows what the sensor recorded."""
 
     def forward(self, planes: Tensor) -> Tensor:
-        """Give the capture (b, 3, p, p) among the planes of a front."""
+        """Return the capture (b, 3, p, p) among the planes of a front."""
         return planes[:, :3]
 
 
 def at_lens(parts: DesignParts, scaled: Tensor, *, rays: int | None = None) -> DesignParts:
-    """Give the parts with the lens at (variable,) scaled numbers, not whitened."""
+    """Return the parts with the lens at (variable,) scaled numbers, not whitened."""
     problem = parts.lens.problem
     if rays is not None:
         problem = replace(problem, samples=half_disc(rays))
@@ -105,7 +105,7 @@ def score_parts(
 
 
 def edge_contrasts(parts: DesignParts, across: Across, pairs: int = 2) -> EdgeContrast:
-    """Give the contrast (depth, field, frequency) of green edges after recovery.
+    """Return the contrast (depth, field, frequency) of green edges after recovery.
 
     Args:
         parts: The design as it is.

@@ -63,7 +63,7 @@ class Rules:
     within_mm: float = 0.5
 
     def sound(self, trial: Trial) -> bool:
-        """Tell whether a lens loses no ray and has the wanted focal length."""
+        """Return whether a lens loses no ray and has the wanted focal length."""
         off_mm = abs(trial.efl_mm - self.efl_mm)
         return math.isfinite(trial.front_db) and trial.valid_rays == 1 and off_mm <= self.within_mm
 
@@ -94,7 +94,7 @@ class Cell:
 
 
 def wilson_interval(hits: int, trials: int) -> tuple[float, float]:
-    """Give the 95 % interval of a share seen in so many trials.
+    """Return the 95 % interval of a share seen in so many trials.
 
     References: Wilson 1927, the score interval.
     """
@@ -109,7 +109,7 @@ def wilson_interval(hits: int, trials: int) -> tuple[float, float]:
 
 
 def best_trials(trials: Sequence[Trial], rules: Rules, arm: str, count: int) -> list[Trial]:
-    """Give the best short runs of an arm; those that are no sound lens come last."""
+    """Return the best short runs of an arm; those that are no sound lens come last."""
     own = [t for t in trials if t.arm == arm and t.run == "box" and math.isfinite(t.front_db)]
     return sorted(own, key=lambda t: (not rules.sound(t), -t.front_db))[:count]
 
@@ -186,7 +186,7 @@ def _end(trial: Trial) -> dict[str, Any]:
 
 
 def to_text(trials: Sequence[Trial], rules: Rules) -> str:
-    """Give the table as Markdown."""
+    """Return the table as Markdown."""
     lines = [
         "| arm | curvatures | sharp | success (95 %) | inside limits | valid rays | median dB |",
         "|---|---|---|---|---|---|---|",

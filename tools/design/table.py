@@ -26,7 +26,7 @@ _VIEWS: Final = ("PSF", "captured", "recovered")
 
 
 def worst_contrast(entries: Sequence[Entry]) -> tuple[float, float, float]:
-    """Give the largest contrast, the largest rise, and the share of curves that only fall."""
+    """Return the largest contrast, the largest rise, and the share of curves that only fall."""
     curves = [
         EdgeContrast(
             cycles_per_px=torch.tensor(entry["contrast"]["cycles_per_px"]),
@@ -39,7 +39,7 @@ def worst_contrast(entries: Sequence[Entry]) -> tuple[float, float, float]:
 
 
 def worst_of_curves(curves: Sequence[EdgeContrast]) -> tuple[float, float, float]:
-    """Give the same of curves that are at hand."""
+    """Return the same of curves that are at hand."""
     return (
         max(float(c.largest.max()) for c in curves),
         max(float(c.rise.max()) for c in curves),
@@ -48,13 +48,13 @@ def worst_of_curves(curves: Sequence[EdgeContrast]) -> tuple[float, float, float
 
 
 def mean_and_spread(entries: Sequence[Entry], what: str) -> tuple[float, float]:
-    """Give mean and standard deviation over seeds of `db` or `ssim`."""
+    """Return mean and standard deviation over seeds of `db` or `ssim`."""
     means = [float(np.mean(entry[what])) for entry in entries]
     return float(np.mean(means)), float(np.std(means))
 
 
 def lens_table(report: Entry) -> str:
-    """Give the page as Markdown: quality, where it is reached, what lenses do, contrast."""
+    """Return the page as Markdown: quality, where it is reached, what lenses do, contrast."""
     lenses: dict[str, Entry] = report["lenses"]
     parts = [
         f"Recipe {report['recipe']}, front {report['front']}, network {report['network']}, "

@@ -78,7 +78,7 @@ def measure_folder(folder: Path, out_dir: Path | None) -> dict[str, Any]:
 
 
 def measure(scene: CodedScene, stated: FloatArray) -> tuple[dict[str, Any], dict[str, FloatArray]]:
-    """Give the numbers of a scene, and pictures of its largest light by name."""
+    """Return the numbers of a scene, and pictures of its largest light by name."""
     where = around_light(scene.clipped)
     clean, _ = cleaned_psf(stated)
     turn, misfits = best_turn(scene, clean, where)
@@ -118,7 +118,7 @@ def measure(scene: CodedScene, stated: FloatArray) -> tuple[dict[str, Any], dict
 
 
 def best_turn(scene: CodedScene, psf: FloatArray, where: Mask) -> tuple[str, dict[str, float]]:
-    """Give the way to hold a PSF with which the reference explains a capture best.
+    """Return the way to hold a PSF with which the reference explains a capture best.
 
     Returns:
         Its name, and the misfit of every way, the factors of the PSF's parts being free.
@@ -133,7 +133,7 @@ def best_turn(scene: CodedScene, psf: FloatArray, where: Mask) -> tuple[str, dic
 
 
 def areas_of(clipped: Mask) -> dict[str, Box]:
-    """Give the frame without its border, and the box of its largest light within."""
+    """Return the frame without its border, and the box of its largest light within."""
     light, sides = largest_light(clipped), []
     for axis in (1, 0):
         line = np.asarray(light.any(axis=axis))
@@ -155,7 +155,7 @@ def against_model(scene: CodedScene, expected: FloatArray, where: Mask) -> dict[
 
 
 def table(name: str, found: dict[str, Any]) -> str:
-    """Give the scores of a scene as a table."""
+    """Return the scores of a scene as a table."""
     lines = [f"\n{name}: reference up to {found['reference_peak']} of white (red, green, blue)"]
     for area, rows in found["scores"].items():
         names = list(next(iter(rows.values())))

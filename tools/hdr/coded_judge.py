@@ -92,7 +92,7 @@ class Judge:
 
 
 def solved(seen: Seen, psf: FloatArray, arms_px: int | None = None) -> tuple[FloatArray, Recovery]:
-    """Give a capture with its lights, >= 0, and what was found.
+    """Return a capture with its lights, >= 0, and what was found.
 
     Args:
         seen: The capture, in full planes.
@@ -108,7 +108,7 @@ def solved(seen: Seen, psf: FloatArray, arms_px: int | None = None) -> tuple[Flo
 
 
 def light_by_start(seen: Seen, psf: FloatArray) -> list[float | None]:
-    """Say how much of the lights that a solve finds is measured, and not what it started from.
+    """Return how much of the lights that a solve finds is measured, and not what it started from.
 
     Lights are sought twice in cells of 4 px, from the guess and from a tenth of it.
 
@@ -142,7 +142,7 @@ def light_by_start(seen: Seen, psf: FloatArray) -> list[float | None]:
 
 
 def reach_px(psf: FloatArray) -> int:
-    """Give the radius in which `REACH_SHARE` of every colour of a PSF lies."""
+    """Return the radius in which `REACH_SHARE` of every colour of a PSF lies."""
     inside = [light_within(plane) for plane in psf]
     return max(int(np.searchsorted(light / light[-1], REACH_SHARE)) for light in inside)
 
@@ -150,7 +150,7 @@ def reach_px(psf: FloatArray) -> int:
 def simulated(
     reference: FloatArray, psf: FloatArray, levels: NDArray[np.intp], offset: float
 ) -> Seen:
-    """Give the capture that a PSF makes of a reference: clipped and rounded to 8 bits.
+    """Return the capture that a PSF makes of a reference: clipped and rounded to 8 bits.
 
     Args:
         reference: (3, h, w) light, 1.0 = white.
@@ -170,7 +170,7 @@ def simulated(
 
 
 def star_psf(psf: FloatArray) -> FloatArray:
-    """Give the core of a PSF with a share of its light in eight even arms, the same in all colours.
+    """Return core of a PSF with a share of its light in eight even arms, the same in all colours.
 
     Returns:
         (3, m, m), each of sum 1.
@@ -191,7 +191,7 @@ def star_psf(psf: FloatArray) -> FloatArray:
 
 
 def _resized(plane: NDArray[np.float64], half: int, wanted: int) -> NDArray[np.float64]:
-    """Give a plane about its middle with another number of pixels to each side."""
+    """Return a plane about its middle with another number of pixels to each side."""
     wide = np.pad(plane, max(wanted - half, 0))
     cut = max(half - wanted, 0)
     return wide[cut : wide.shape[0] - cut, cut : wide.shape[1] - cut]

@@ -98,7 +98,7 @@ def parts_of(psf: FloatArray) -> dict[str, Mask]:
 
 
 def seen_through(light: FloatArray, psf: FloatArray) -> FloatArray:
-    """Give light (3, h, w) spread by a PSF; what lies outside the frame is dark."""
+    """Return light (3, h, w) spread by a PSF; what lies outside the frame is dark."""
     shape = light.shape[1], light.shape[2]
     thrown = [Convolution(k, shape).spread(p) for k, p in zip(psf, light, strict=True)]
     return np.asarray(np.maximum(np.stack(thrown), 0), np.float32)
@@ -107,7 +107,7 @@ def seen_through(light: FloatArray, psf: FloatArray) -> FloatArray:
 def explained(
     capture: FloatArray, reference: FloatArray, psf: FloatArray, where: Mask
 ) -> dict[str, Any]:
-    """Say how far the reference through each part of the PSF explains a capture.
+    """Return how far the reference through each part of the PSF explains a capture.
 
     Args:
         capture: (3, h, w).

@@ -43,13 +43,13 @@ class Laid:
     misfit: float
 
     def on(self, picture: FloatArray) -> FloatArray:
-        """Give a picture (3, h, w) laid on the capture; light stays positive between pixels."""
+        """Return a picture (3, h, w) laid on the capture; light stays positive between pixels."""
         logs = np.log(np.maximum(picture, FAINT))
         moved = [scipy.ndimage.shift(p, self.shift_px, order=3, mode="nearest") for p in logs]
         return np.asarray(np.exp(np.stack(moved)) * self.gain[:, None, None], np.float32)
 
     def to_json(self) -> dict[str, Any]:
-        """Give it as plain values."""
+        """Return it as plain values."""
         return {
             "shift_px": [round(side, 2) for side in self.shift_px],
             "gain": [round(float(g), 3) for g in self.gain],
@@ -101,7 +101,7 @@ def lay(capture: FloatArray, expected: FloatArray, where: Mask) -> Laid:
 
 
 def local_shifts(capture: FloatArray, expected: FloatArray, clipped: Mask) -> list[list[int]]:
-    """Give (row, column, down, right) in pixels of blocks that lie elsewhere, where they tell."""
+    """Return (row, column, down, right) in pixels of blocks that lie elsewhere, where they tell."""
     seen, told = (_details(np.sqrt(np.clip(p, 0, 1))) for p in (capture, expected))
     open_ = ~clipped.any(axis=0)
     found = []
@@ -117,7 +117,7 @@ def local_shifts(capture: FloatArray, expected: FloatArray, clipped: Mask) -> li
 
 
 def _rests(seen: FloatArray, told: FloatArray, where: Mask) -> tuple[NDArray[np.float64], float]:
-    """Give what is left of squares for every shift of what is told, at its best gain; and in all.
+    """Return what is left of squares for every shift of what is told, at its best gain; and in all.
 
     Shifts go from -FARTHEST_PX to FARTHEST_PX along both sides.
     """
@@ -142,7 +142,7 @@ def _rests(seen: FloatArray, told: FloatArray, where: Mask) -> tuple[NDArray[np.
 
 
 def _between(line: NDArray[np.float64], place: int) -> float:
-    """Give how far the least of a line lies beside a sample, by the parabola through three."""
+    """Return how far the least of a line lies beside a sample, by the parabola through three."""
     if not 0 < place < line.size - 1:
         return 0.0
     before, here, after = line[place - 1 : place + 2]

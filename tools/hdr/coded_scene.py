@@ -118,7 +118,7 @@ def read_scene(folder: Path) -> CodedScene:
 
 
 def stated_stops(file: Path) -> float:
-    """Give the stops in the name of a file.
+    """Return the stops in the name of a file.
 
     Raises:
         DecodeError: If there is no number.
@@ -130,7 +130,7 @@ def stated_stops(file: Path) -> float:
 
 
 def clipping_codes(codes: Codes) -> NDArray[np.intp]:
-    """Give for every colour the code at which it ends, `FULL` unless it ends below.
+    """Return for every colour the code at which it ends, `FULL` unless it ends below.
 
     It ends below where most pixels whose other two colours are full have one code.
 
@@ -148,19 +148,19 @@ def clipping_codes(codes: Codes) -> NDArray[np.intp]:
 
 
 def clipped_samples(codes: Codes, levels: NDArray[np.intp]) -> Mask:
-    """Tell which samples of (3, h, w) are at the (3,) levels of their colours or above."""
+    """Return which samples of (3, h, w) are at the (3,) levels of their colours or above."""
     return np.asarray(codes >= levels[:, None, None])
 
 
 def offset_response(offset: float) -> Response:
-    """Give the response of codes that are light less an offset; 1.0 = code 255."""
+    """Return the response of codes that are light less an offset; 1.0 = code 255."""
     light = (np.arange(CODES) + offset) / (CODES - 1 + offset)
     with np.errstate(divide="ignore"):
         return response_of("linear", np.tile(np.log(light), (3, 1)))
 
 
 def black_offset(frames: Sequence[Codes], stops: NDArray[np.float64]) -> float:
-    """Give what was cut at black, in codes.
+    """Return what was cut at black, in codes.
 
     A frame of an r-th of the exposure of another has (code + offset) / r - offset: a line, whose
     slope tells r and whose foot the offset. The median over colours and neighbours in time, each
@@ -193,7 +193,7 @@ def black_offset(frames: Sequence[Codes], stops: NDArray[np.float64]) -> float:
 def measured_stops(
     frames: Sequence[Codes], stops: NDArray[np.float64], offset: float
 ) -> NDArray[np.float64]:
-    """Give the exposure of every frame in stops beside the longest.
+    """Return the exposure of every frame in stops beside the longest.
 
     Args:
         frames: (3, h, w) each, longest first, clipped pixels full in all colours.
@@ -212,7 +212,7 @@ def measured_stops(
 
 
 def _shared(longer: Codes, shorter: Codes, stops: float) -> Mask:
-    """Tell which samples of two frames, so many stops apart, tell their ratio.
+    """Return which samples of two frames, so many stops apart, tell their ratio.
 
     They are chosen by the longer frame, whose noise is less, lest those that noise raised be taken.
     """
@@ -221,7 +221,7 @@ def _shared(longer: Codes, shorter: Codes, stops: float) -> Mask:
 
 
 def _lattice(frames: Sequence[Codes]) -> Codes:
-    """Give (frame, 3, pixel) codes of the same pixels of every frame."""
+    """Return (frame, 3, pixel) codes of the same pixels of every frame."""
     step = max(1, math.isqrt(frames[0][0].size // SAMPLED_PIXELS))
     return np.stack([frame[:, ::step, ::step].reshape(3, -1) for frame in frames])
 
@@ -229,7 +229,7 @@ def _lattice(frames: Sequence[Codes]) -> Codes:
 def _merged(
     frames: Sequence[Codes], exposed: NDArray[np.float64], offset: float
 ) -> tuple[FloatArray, dict[str, float]]:
-    """Give the light, 1.0 = white of the longest frame, and by how much responses disagree."""
+    """Return the light, 1.0 = white of the longest frame, and by how much responses disagree."""
     times_s, lattice = 2.0**exposed, _lattice(frames)
     with tempfile.TemporaryDirectory() as folder:
         bracket = survey(_written(frames, Path(folder)), times_s.tolist())
@@ -244,7 +244,7 @@ def _merged(
 
 
 def _files(folder: Path) -> tuple[Path, list[Path]]:
-    """Give the capture and the frames of a folder, longest first."""
+    """Return the capture and the frames of a folder, longest first."""
     coded, frames = sorted(folder.glob(CODED)), sorted(folder.glob(BARE))
     if len(coded) != 1 or len(frames) < 2:
         raise DecodeError(

@@ -81,7 +81,7 @@ def main() -> None:
 
 
 def night_scenes(seeds: Sequence[int]) -> list[Scene]:
-    """Give night scenes, not yet exposed."""
+    """Return night scenes, not yet exposed."""
     return [
         Scene(name=f"night:{seed}", number=n, linear=night_scene(seed, NIGHT_PX, NIGHT_PX))
         for n, seed in enumerate(seeds)
@@ -89,7 +89,7 @@ def night_scenes(seeds: Sequence[int]) -> list[Scene]:
 
 
 def picture_scenes(paths: Sequence[Path]) -> list[Scene]:
-    """Give the middles of scenes of high dynamic range."""
+    """Return the middles of scenes of high dynamic range."""
     found = []
     for number, path in enumerate(paths):
         linear = read_picture(path, PICTURE_PX)
@@ -132,7 +132,7 @@ def refocused(plate: Plate, bundle: Bundle, depth_mm: float) -> Refocused:
 def measure(
     bundle: Bundle, sizes: Sequence[str], scenes: Sequence[Scene], depths_m: Sequence[float]
 ) -> list[dict[str, Any]]:
-    """Give what every depth gives, beside the depth that the bundle was frozen for."""
+    """Return what every depth gives, beside the depth that the bundle was frozen for."""
     plate, judge = read_plate(bundle.path), hdr_judge_of(bundle, tuple(sizes), None)
     nominal_m = bundle.reference_depth_mm / MM_PER_M
     scored: dict[float, dict[str, Scores]] = {}
@@ -212,7 +212,7 @@ def _db(scores: Scores, way: str, method: str) -> float:
 
 
 def _summary(pairs: Sequence[tuple[float, float]]) -> dict[str, float]:
-    """Give the mean and what is lost from the second of each pair to the first."""
+    """Return the mean and what is lost from the second of each pair to the first."""
     lost = [nominal - found for found, nominal in pairs]
     return {
         "hdr_psnr_db": round(float(np.mean([found for found, _ in pairs])), 2),
@@ -222,7 +222,7 @@ def _summary(pairs: Sequence[tuple[float, float]]) -> dict[str, float]:
 
 
 def to_text(record: Mapping[str, Any]) -> str:
-    """Give a table of every set of scenes."""
+    """Return a table of every set of scenes."""
     parts = []
     first = record["depths"][0]["sets"]
     for name, ways in first.items():

@@ -145,7 +145,7 @@ def _case(name: str) -> tuple[GoldenCase, GoldenArrays]:
 
 
 def mosaic_of(planes: FloatArray) -> NDArray[np.uint16]:
-    """Give the mosaic (h, w) that the sensor of the bundle sees of planes (3, h, w)."""
+    """Return the mosaic (h, w) that the sensor of the bundle sees of planes (3, h, w)."""
     light = np.empty(planes.shape[1:], np.float32)
     for row, colours in enumerate(cfa_channels("RGGB")):
         for column, colour in enumerate(colours):

@@ -54,7 +54,7 @@ def main() -> None:
 
 
 def measured(seed: int) -> dict[str, Any]:
-    """Give the angle of a scene's star, the one that is found, and the scores of each way."""
+    """Return the angle of a scene's star, the one that is found, and the scores of each way."""
     angle_deg = ANGLES_DEG[seed % len(ANGLES_DEG)]
     scene = np.minimum(exposed_scene(f"night:{seed}", *SIDES_PX), np.float32(CEILING))
     capture = photographed(scene, two_point_star(math.radians(angle_deg)), seed).seen
@@ -78,14 +78,14 @@ def measured(seed: int) -> dict[str, Any]:
 
 
 def lit(seen: Seen, angle_deg: float, share: float) -> FloatArray:
-    """Give a capture with its lamps, read from a star of that angle and share of light."""
+    """Return a capture with its lamps, read from a star of that angle and share of light."""
     kernel = two_point_star(math.radians(angle_deg), share=share).dense()[0, 0]
     picture, _ = solved(seen, np.stack([kernel] * 3).astype(np.float32), REACH_PX)
     return picture
 
 
 def mean_scores(found: dict[str, dict[str, Any]]) -> dict[str, dict[str, float]]:
-    """Give the means of every way over the scenes in which an angle was found."""
+    """Return the means of every way over the scenes in which an angle was found."""
     told = [scene["scores"] for scene in found.values() if scene["found_deg"] is not None]
     ways = list(told[0]) if told else []
     return {

@@ -68,12 +68,12 @@ def main() -> None:
 
 
 def night(seed: int) -> FloatArray:
-    """Give a night scene, exposed."""
+    """Return a night scene, exposed."""
     return exposed_scene(f"night:{seed}", *SIDES_PX)
 
 
 def picture(path: Path) -> FloatArray:
-    """Give a picture (3, h, w), linear; one of high dynamic range exposed as the night scenes."""
+    """Return a picture (3, h, w), linear; one of high dynamic range exposed as the night scenes."""
     light = read_light(path)
     side = -(-max(light.shape) // MOST_PX)
     height, width = light.shape[1] // side, light.shape[2] // side

@@ -50,7 +50,7 @@ class Shot:
 def two_point_star(
     angle_rad: float, fading: Fading = "exponential", share: float = SHARE
 ) -> StreakOptics:
-    """Give the optics: two arms, `angle_rad` from the vertical, of a share of the light in all."""
+    """Return optics: two arms, `angle_rad` from the vertical, of a share of the light in all."""
     distance = np.arange(REACH_PX + 1, dtype=np.float64)
     profile = np.exp(-FADING_PER_PX * distance) if fading == "exponential" else distance * 0 + 1
     profile *= share / (2 * profile.sum())
@@ -72,7 +72,7 @@ def two_point_star(
 
 
 def exposed_scene(name: str, height: int, width: int) -> FloatArray:
-    """Give a scene (3, h, w) exposed so that some of it saturates."""
+    """Return a scene (3, h, w) exposed so that some of it saturates."""
     scene = named_scene(name, height, width)
     found = saturating_exposure(scene, np.eye(3), (1.0, 1.0, 1.0), SATURATED)
     return with_exposure(scene, found.exposure)
@@ -100,7 +100,7 @@ def photographed(scene: FloatArray, star: StreakOptics | None, seed: int = 0) ->
 
 
 def psnr_db(picture: FloatArray, shot: Shot, level: float) -> float:
-    """Give the PSNR of what is no light, linear, peak 1."""
+    """Return the PSNR of what is no light, linear, peak 1."""
     dim = shot.seen.max(axis=0) < level
     return float(-10 * np.log10(np.mean((picture - shot.wanted)[:, dim] ** 2, dtype=np.float64)))
 

@@ -54,7 +54,7 @@ def main() -> None:
 
 
 def compare(folder: Path) -> dict[str, Any]:
-    """Give for each way the residual of each inner frame, and their times."""
+    """Return for each way the residual of each inner frame, and their times."""
     pictures, times_s = read_bracket(folder)
     record: dict[str, Any] = {"left_out_s": times_s[1:-1].tolist()}
     for way, predict in WAYS.items():
@@ -67,7 +67,7 @@ def compare(folder: Path) -> dict[str, Any]:
 
 
 def read_bracket(folder: Path) -> tuple[Pictures, Times]:
-    """Give pictures (h, w, 3) as OpenCV orders them and their times, longest first."""
+    """Return pictures (h, w, 3) as OpenCV orders them and their times, longest first."""
     names = [line.split()[0] for line in (folder / LIST).read_text().splitlines() if line.strip()]
     files = [folder / name for name in names if not name.startswith("#")]
     times_s = np.array(stated_times(str(folder / LIST), files))
@@ -93,7 +93,7 @@ def without_borders(pictures: Pictures) -> Pictures:
 
 
 def residual(codes: NDArray[np.float64], picture: NDArray[np.uint8]) -> float:
-    """Give the root mean square over samples that are neither black nor white."""
+    """Return the root mean square over samples that are neither black nor white."""
     open_ = (picture > 0) & (picture < 255)
     return float(np.sqrt(np.mean((codes - picture)[open_] ** 2)))
 
@@ -108,7 +108,7 @@ def by_opencv(pictures: Pictures, times_s: Times, time_s: float) -> NDArray[np.f
 
 
 def by_camkit(response: ResponseName) -> Predict:
-    """Give what predicts a frame by camkit with a response."""
+    """Return what predicts a frame by camkit with a response."""
 
     def predict(pictures: Pictures, times_s: Times, time_s: float) -> NDArray[np.float64]:
         with tempfile.TemporaryDirectory() as folder:
@@ -134,7 +134,7 @@ WAYS: Final[dict[str, Predict]] = {
 
 
 def _through(light: NDArray[np.float64], curves: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
-    """Give the codes of (h, w, 3) light by (3, 256) rising light of codes."""
+    """Return the codes of (h, w, 3) light by (3, 256) rising light of codes."""
     codes = np.arange(curves.shape[1])
     return np.stack([np.interp(light[..., c], curves[c], codes) for c in range(3)], axis=-1)
 

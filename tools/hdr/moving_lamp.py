@@ -142,7 +142,7 @@ def measure(
 
 
 def frames(case: Case, seed: int, sensor: BayerSensor) -> list[FloatArray]:
-    """Give the scene (3, h, w) at the moment of every frame; the same lamps for every case."""
+    """Return the scene (3, h, w) at the moment of every frame; the same lamps for every case."""
     night = night_scene(seed, SIDE_PX, SIDE_PX)
     dark = dimmed(with_exposure(night, exposure_for_share(night, sensor, SHARE).exposure))
     lamps = draw_lamps(np.random.default_rng(seed))
@@ -203,7 +203,7 @@ def merged(shots: Sequence[Simulation], bundle: Bundle) -> FloatArray:
 
 
 def _restoring(bundle: Bundle, sizes: Sequence[str]) -> dict[str, Pipeline]:
-    """Give the ways in which a bundle restores."""
+    """Return the ways in which a bundle restores."""
     options = Options(threads=1, **in_sensor_geometry(bundle.manifest))
     ways = {"physics": replace(options, method="physics")}
     ways |= {size: replace(options, size=size) for size in sizes}
@@ -211,7 +211,7 @@ def _restoring(bundle: Bundle, sizes: Sequence[str]) -> dict[str, Pipeline]:
 
 
 def mean_of(scenes: Sequence[Mapping[str, Mapping[str, float]]]) -> dict[str, dict[str, float]]:
-    """Give the means over scenes, and in how many a way ends above the bracket (`wins`)."""
+    """Return the means over scenes, and in how many a way ends above the bracket (`wins`)."""
     found: dict[str, dict[str, float]] = {}
     for way in scenes[0]:
         own = [scene[way] for scene in scenes]
@@ -226,7 +226,7 @@ def mean_of(scenes: Sequence[Mapping[str, Mapping[str, float]]]) -> dict[str, di
 
 
 def to_text(means: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> str:
-    """Give the table of the means."""
+    """Return the table of the means."""
     ways = list(next(iter(means.values())))
     head = ["lamps", *(f"{way}: dB, stops" for way in ways), "above the bracket"]
     rows = [

@@ -49,7 +49,7 @@ def main() -> None:
 
 
 def all_costs() -> dict[str, dict[str, float]]:
-    """Give the cost of every network by its name."""
+    """Return the cost of every network by its name."""
     with torch.device("meta"):
         picture = torch.zeros(1, 3, SIDE_PX, SIDE_PX)
         return {
@@ -67,7 +67,7 @@ def all_costs() -> dict[str, dict[str, float]]:
 
 
 def compare_orders(side_px: int) -> tuple[float, float, float]:
-    """Give the CPU-seconds of the early and the late 1x1 and their largest difference."""
+    """Return the CPU-seconds of the early and the late 1x1 and their largest difference."""
     torch.set_num_threads(1)
     torch.manual_seed(1)
     early = SplittingNetwork().eval()
@@ -85,7 +85,7 @@ def compare_orders(side_px: int) -> tuple[float, float, float]:
 
 
 def cost(network: nn.Module, *pictures: Tensor) -> dict[str, float]:
-    """Give parameters, those that are trained, and thousands of multiplications per pixel."""
+    """Return parameters, those that are trained, and thousands of multiplications per pixel."""
     with torch.no_grad(), FlopCounterMode(display=False) as counter:
         network(*pictures)
     pixels = pictures[0].shape[-2] * pictures[0].shape[-1]

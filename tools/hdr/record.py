@@ -14,7 +14,7 @@ from camkit.errors import CamkitError, ContractError
 
 
 def new_parser(description: str) -> argparse.ArgumentParser:
-    """Give a parser that asks for a bundle, its sizes and where the numbers go."""
+    """Return a parser that asks for a bundle, its sizes and where the numbers go."""
     parser = argparse.ArgumentParser(
         description=description, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -57,7 +57,7 @@ def open_camera(name: str, sizes: Sequence[str]) -> Bundle:
 
 
 def origin_of(bundle: Bundle, sizes: Sequence[str]) -> dict[str, Any]:
-    """Say what numbers were measured with; those of physics follow from the optics alone."""
+    """Return what numbers were measured with; those of physics follow from the optics alone."""
     return {
         "bundle": bundle.manifest.name,
         "bundle_sha256": bundle.sha256,
@@ -73,7 +73,7 @@ def write_record(path: Path | None, record: dict[str, Any]) -> None:
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """Give a table in Markdown; numbers get one digit behind the point."""
+    """Return a table in Markdown; numbers get one digit behind the point."""
     lines = [_line(head), _line(["---"] * len(head))]
     return "\n".join([*lines, *(_line([_cell(value) for value in row]) for row in rows)])
 

@@ -130,7 +130,7 @@ def _beside_nothing(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def to_text(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Give the table with the goals."""
+    """Return the table with the goals."""
     head = ["clipped", "method", "CPU s", "over development", "goal", "highlights", "network"]
     lines = []
     for row in rows:

@@ -91,7 +91,7 @@ def _options(bundle: Bundle, seed: int) -> SimulationOptions:
 
 
 def _lit(subject: Subject, seed: int, size: tuple[int, int], sensor: BayerSensor) -> FloatArray:
-    """Give one scene (3, h, w) of a subject."""
+    """Return one scene (3, h, w) of a subject."""
     night = night_scene(seed, *size)
     share = subject.share or DARK_SHARE
     night = with_exposure(night, exposure_for_share(night, sensor, share).exposure)

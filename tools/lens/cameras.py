@@ -53,12 +53,12 @@ def open_camera(name: str, folder: Path) -> Bundle:
 
 
 def optics_of(bundle: Bundle) -> FrozenOptics:
-    """Give the frozen optics of a bundle."""
+    """Return the frozen optics of a bundle."""
     return FrozenOptics(psf=bundle.psf, haze=bundle.haze if bundle.manifest.has_haze else None)
 
 
 def ways_of(bundle: Bundle) -> tuple[Way, ...]:
-    """Give what restores: the filter alone, and the network where there is one."""
+    """Return what restores: the filter alone, and the network where there is one."""
     networks = any(isinstance(stage, Network) for stage in bundle.manifest.stages)
     return ("filter", "network") if networks else ("filter",)
 
@@ -66,7 +66,7 @@ def ways_of(bundle: Bundle) -> tuple[Way, ...]:
 def light_through(
     bundle: Bundle, scene: FloatArray, share: float = 0.0, optics: FrozenOptics | None = None
 ) -> Light:
-    """Let a scene fall on the sensor of a camera, vignetting on, without distortion.
+    """Project a scene on the sensor of a camera, vignetting on, without distortion.
 
     Args:
         bundle: The camera.
@@ -84,18 +84,18 @@ def light_through(
 
 
 def truth_of(bundle: Bundle, light: Light) -> FloatArray:
-    """Give what a perfect camera would have shown, (3, h, w) float32 linear Rec.709."""
+    """Return what a perfect camera would have shown, (3, h, w) float32 linear Rec.709."""
     return true_picture(light.clean, light_sensor(bundle.manifest))
 
 
 def passed_light(lens: Lens) -> float:
-    """Give the light on the axis that passes a lens, as the area of its stop in mm^2 over pi."""
+    """Return the light on the axis that passes a lens, as the area of its stop in mm^2 over pi."""
     peak = measure_peak(lens, 0.0, lens.reference_wavelength_um, _PITCH_UM, _RAYS)
     return lens.aperture_value**2 * (1 - sum(peak.lost.values()))
 
 
 def setting_of(exposure: float) -> Setting:
-    """Give how the sensor records a scene.
+    """Return how the sensor records a scene.
 
     The ISO is what brings white to the white level, up to `MOST_ISO`; beyond, the picture stays
     dark, since no pedestal would hold the noise. With more light than pixels hold the shutter
@@ -136,7 +136,7 @@ def restored(
 
 
 def square_error(picture: FloatArray, truth: FloatArray) -> FloatArray:
-    """Give the squared error of sRGB values (h, w), the mean over colours, without the border.
+    """Return the squared error of sRGB values (h, w), the mean over colours, without the border.
 
     Args:
         picture: (3, h, w) linear Rec.709.
@@ -147,5 +147,5 @@ def square_error(picture: FloatArray, truth: FloatArray) -> FloatArray:
 
 
 def decibels(square: FloatArray) -> float:
-    """Give -10 log10 of the mean."""
+    """Return -10 log10 of the mean."""
     return float(-10 * np.log10(max(square.mean(dtype=np.float64), 1e-12)))

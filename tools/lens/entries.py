@@ -51,7 +51,7 @@ class Summary:
 
 
 def entries_of(database: Database) -> Iterator[tuple[Lens, Distortion]]:
-    """Give every entry of distortion with its lens."""
+    """Return every entry of distortion with its lens."""
     for file, element in database.lenses():
         lens = lens_of(element, file)
         for entry in lens.distortion:
@@ -59,7 +59,7 @@ def entries_of(database: Database) -> Iterator[tuple[Lens, Distortion]]:
 
 
 def frame_for(lens: Lens) -> Frame:
-    """Give pictures of the sensor with which a lens was measured."""
+    """Return pictures of the sensor with which a lens was measured."""
     pitch_um = 1000 * FULL_FRAME_MM / lens.crop_factor / math.hypot(*SIZE_PX)
     return Frame(size_px=SIZE_PX, pitch_um=pitch_um, crop_factor=lens.crop_factor, channels=1)
 
@@ -90,7 +90,7 @@ def summarise(database: Database, *, warped: bool = False) -> Summary:
 
 
 def warped_px(entry: Distortion, radial: RadialEntry, frame: Frame) -> float:
-    """Give by how many pixels the map of a picture misses the formula at most, in its top rows."""
+    """Return by how many pixels a picture's map misses the formula at most, in its top rows."""
     width, height = frame.size_px
     window = SensorWindow(
         size_px=frame.size_px,

@@ -152,7 +152,7 @@ def draw_tiles(rows: "Sequence[tuple[str, Sequence[FloatArray]]]") -> "Figure | 
 
 
 def _around(light: FloatArray, reach: int) -> FloatArray:
-    """Give the light within a reach of the middle, zero where nothing is known."""
+    """Return the light within a reach of the middle, zero where nothing is known."""
     half = light.shape[0] // 2
     if half < reach:
         return np.pad(light, reach - half)

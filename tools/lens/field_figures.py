@@ -72,7 +72,7 @@ class Shown:
 
     @property
     def degrees(self) -> list[float]:
-        """Give the field angles."""
+        """Return the field angles."""
         angles = [point.image.field_angle_rad for point in self.found.points]
         return [float("nan") if angle is None else to_degrees(angle) for angle in angles]
 
@@ -135,7 +135,7 @@ def show(word: str, options: FieldOptions, crop_px: int, board_px: int) -> Shown
 
 
 def with_angles(images: Sequence[PointImage], name: str, bundle: Bundle) -> list[PointImage]:
-    """Give the images with field angles, by the lens of that name where nobody knows them."""
+    """Return the images with field angles, by the lens of that name where nobody knows them."""
     if name not in built_in_lenses() or any(i.field_angle_rad is not None for i in images):
         return list(images)
     efl_mm = paraxial_data(read_lens(Path(name))).efl_mm
@@ -148,7 +148,7 @@ def with_angles(images: Sequence[PointImage], name: str, bundle: Bundle) -> list
 
 
 def wide_images(bundle: Bundle, subject: Subject, fields: int) -> tuple[list[Array], int]:
-    """Give the light of points in cells, core and haze, and the side of a cell in pixels."""
+    """Return the light of points in cells, core and haze, and the side of a cell in pixels."""
     if not bundle.manifest.has_haze:
         return [], 1
     band: Band = band_of(subject.sensor)
@@ -161,7 +161,7 @@ def wide_images(bundle: Bundle, subject: Subject, fields: int) -> tuple[list[Arr
 
 
 def cut(frame: FloatArray, side_px: int) -> list[FloatArray]:
-    """Give copies of crops from the middle of a frame (3, h, w) along its diagonal."""
+    """Return copies of crops from the middle of a frame (3, h, w) along its diagonal."""
     _, height, width = frame.shape
     side = min(side_px, height, width)
     found = []
@@ -175,7 +175,7 @@ def cut(frame: FloatArray, side_px: int) -> list[FloatArray]:
 
 
 def photographed_board(bundle: Bundle, options: FieldOptions, side_px: int) -> FloatArray:
-    """Give the picture (3, h, w) of a capture of a chequered board that fills the frame, sRGB."""
+    """Return the picture (3, h, w) of a capture of a chequered board that fills the frame, sRGB."""
     sensor, scale = light_sensor(bundle.manifest), picture_scale(bundle.manifest)
     extent = sensor.known_extent
     width, height = options.frame_px or (extent.width_px, extent.height_px)
@@ -210,7 +210,7 @@ def write(shown: Sequence[Shown], options: FieldOptions, folder: Path) -> None:
 
 
 def better(found: LensField, options: FieldOptions) -> float | None:
-    """Give dB over the frame where every ring shows the better one of capture and result."""
+    """Return dB over the frame where every ring shows the better one of capture and result."""
     zones = [point.psnr_db for point in found.points]
     if all(zone is None for zone in zones):
         return None
@@ -234,7 +234,7 @@ def better(found: LensField, options: FieldOptions) -> float | None:
 
 
 def table_of(lenses: dict[str, Any]) -> list[str]:
-    """Give the table: dB by ring, the better one of capture and result last."""
+    """Return the table: dB by ring, the better one of capture and result last."""
     names = list(lenses)
     lines = [
         "| mm | "

@@ -169,12 +169,12 @@ def main() -> None:
 
 
 def length_mm(lens: Lens) -> float:
-    """Give the length from the first surface, which may be a stop, to the sensor."""
+    """Return the length from the first surface, which may be a stop, to the sensor."""
     return sum(surface.thickness_mm for surface in lens.surfaces)
 
 
 def with_stop_at(lens: Lens, distance_mm: float) -> Lens:
-    """Give a lens whose first surface is a stop, with the stop at another distance."""
+    """Return a lens whose first surface is a stop, with the stop at another distance."""
     stop, *rest = lens.surfaces
     return replace(lens, surfaces=(replace(stop, thickness_mm=distance_mm), *rest))
 
@@ -182,7 +182,7 @@ def with_stop_at(lens: Lens, distance_mm: float) -> Lens:
 def shorter(
     open_: Subject, stopped: Lens, light: float, distances_mm: Sequence[float], folder: Path
 ) -> list[Subject]:
-    """Give the open plate and cameras whose stop stands at other distances, all of one filter."""
+    """Return the open plate and cameras whose stop stands at other distances, all of one filter."""
     sensor = light_sensor(open_.bundle.manifest)
     if not isinstance(sensor, BayerSensor):
         raise UnsupportedError("the stop is moved before a Bayer sensor only")
@@ -238,7 +238,7 @@ def measure(
 
 
 def rings(bundle: Bundle, light: Light) -> Any:
-    """Give the number of the ring (h, w) of every pixel but those of the border."""
+    """Return the number of the ring (h, w) of every pixel but those of the border."""
     middles = (np.arange(RINGS) + 0.5) / RINGS * corner_height_mm(light_sensor(bundle.manifest))
     return zones_of(light.window, 1, middles)[BORDER_PX:-BORDER_PX, BORDER_PX:-BORDER_PX]
 
@@ -261,7 +261,7 @@ def waits(points: Sequence[Point]) -> dict[str, float | None]:
 
 
 def _means(points: Sequence[Point], camera: str, way: Way) -> dict[float, float]:
-    """Give the mean over pictures by time."""
+    """Return the mean over pictures by time."""
     groups: dict[float, list[float]] = {}
     for p in points:
         if (p.camera, p.way) == (camera, way):
@@ -328,7 +328,7 @@ def _draw_lengths(panel: "Axes", points: Sequence[Point]) -> None:
 
 
 def to_text(points: Sequence[Point], by_length: Sequence[Point]) -> str:
-    """Give the means by time, and what shorter cameras reach, as tables in Markdown."""
+    """Return the means by time, and what shorter cameras reach, as tables in Markdown."""
     lines = ["| time | open, filter | stop, filter | difference |", "|---|---|---|---|"]
     of = {name: _means(points, name, "filter") for name in (OPEN, STOP)}
     for time in sorted(of[OPEN]):

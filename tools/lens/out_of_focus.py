@@ -140,7 +140,7 @@ def main() -> None:
 
 
 def edge_scene(disc_px: float) -> FloatArray:
-    """Give an edge (3, h, w) that rises between the middle columns, blurred by an even disc."""
+    """Return an edge (3, h, w) that rises between the middle columns, blurred by an even disc."""
     width, height = EDGE_PX
     low, high = LEVELS
     rise = disc_rise(np.arange(width, dtype=np.float64) - (width - 1) / 2, disc_px)
@@ -149,7 +149,7 @@ def edge_scene(disc_px: float) -> FloatArray:
 
 
 def disc_rise(at_px: Line, disc_px: float) -> Line:
-    """Give how much of an even disc lies on the bright side of a straight edge, 0..1.
+    """Return how much of an even disc lies on the bright side of a straight edge, 0..1.
 
     Args:
         at_px: Of the middle of the disc from the edge.
@@ -162,7 +162,7 @@ def disc_rise(at_px: Line, disc_px: float) -> Line:
 
 
 def looks(bundle: Bundle, light: Light, disc_px: float) -> dict[str, Line]:
-    """Give the profile of green of an edge: of the scene, developed, and as restored."""
+    """Return the profile of green of an edge: of the scene, developed, and as restored."""
     middle = slice(ROWS_PX, EDGE_PX[1] - ROWS_PX)
     found = {"scene": edge_scene(disc_px)[1, middle].mean(axis=0, dtype=np.float64)}
     for way in ("develop", *ways_of(bundle)):
@@ -178,7 +178,7 @@ def measured(kind: str, size: float, profiles: dict[str, Line]) -> Edge:
 
 
 def edge_width_px(line: Line) -> float:
-    """Give the way from 10 to 90 % of the rise of a profile about its middle.
+    """Return the way from 10 to 90 % of the rise of a profile about its middle.
 
     Args:
         line: (n,), n even, the edge between the middle samples. The levels are the means of the
@@ -197,7 +197,7 @@ def edge_width_px(line: Line) -> float:
 
 
 def _crossing(rise: Line, level: float) -> float:
-    """Give where a rise first passes a level for good, on its way to one half."""
+    """Return where a rise first passes a level for good, on its way to one half."""
     half = int(np.argmax(rise >= 0.5))
     under = np.flatnonzero(rise[:half] < level)
     last = int(under[-1]) if under.size else 0
@@ -206,7 +206,7 @@ def _crossing(rise: Line, level: float) -> float:
 
 
 def before_background(sharp: FloatArray, far: FloatArray, disc_px: float) -> FloatArray:
-    """Give a picture within an ellipse, before another one that is blurred by an even disc."""
+    """Return a picture within an ellipse, before another one that is blurred by an even disc."""
     side = 2 * int(np.ceil(disc_px / 2)) + 1
     place = np.arange(side) - side // 2
     kernel = (np.hypot(place[:, None], place) <= disc_px / 2).astype(np.float32)
@@ -218,7 +218,7 @@ def before_background(sharp: FloatArray, far: FloatArray, disc_px: float) -> Flo
 
 
 def shown(bundle: Bundle, scene: FloatArray) -> tuple[dict[str, FloatArray], dict[str, float]]:
-    """Give a scene, what is developed and what is restored of it, and their dB."""
+    """Return a scene, what is developed and what is restored of it, and their dB."""
     light = light_through(bundle, scene)
     truth = truth_of(bundle, light)
     row, db = {"scene": truth}, dict[str, float]()
@@ -274,7 +274,7 @@ def _draw_profiles(panel: "Axes", lines: dict[str, Line], title: str) -> None:
 
 
 def to_text(edges: Sequence[Edge]) -> str:
-    """Give the widths as a table in Markdown."""
+    """Return the widths as a table in Markdown."""
     ways = list(edges[0].widths_px)
     lines = [f"| edge | scene, px | {', px | '.join(ways)}, px |", "|---|---|" + "---|" * len(ways)]
     for edge in edges:

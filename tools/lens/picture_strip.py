@@ -52,7 +52,7 @@ def draw_strip(rows: Mapping[str, Mapping[str, FloatArray]], *, shrink: int = 1)
 
 
 def _shown(picture: FloatArray, shrink: int) -> FloatArray:
-    """Give (h, w, 3) sRGB values."""
+    """Return (h, w, 3) sRGB values."""
     _, height, width = picture.shape
     size = (max(width // shrink, 1), max(height // shrink, 1))
     small = cv2.resize(

@@ -90,7 +90,7 @@ def main() -> None:
 
 
 def phase_map(recipe: ThinRecipe, solved: SolvedPlate, radii_mm: Array, angles_rad: Array) -> Array:
-    """Give the phase (radius, angle) in radians that every direction would want, not wrapped.
+    """Return the phase (radius, angle) in radians that every direction would want, not wrapped.
 
     Args:
         recipe: Focal length and wavelength.
@@ -111,18 +111,18 @@ def phase_map(recipe: ThinRecipe, solved: SolvedPlate, radii_mm: Array, angles_r
 
 
 def wrapped(phase: Array) -> Array:
-    """Give phases within 0..`WRAP_PI` pi, in units of pi."""
+    """Return phases within 0..`WRAP_PI` pi, in units of pi."""
     return np.asarray(np.mod(phase / math.pi, WRAP_PI))
 
 
 def shown_angles(solved: SolvedPlate) -> list[float]:
-    """Give the first, the middle and the last direction."""
+    """Return the first, the middle and the last direction."""
     angles = solved.apertures.field_angles_rad
     return [angles[0], angles[len(angles) // 2], angles[-1]]
 
 
 def spot_of(lens: Lens, angle_rad: float) -> tuple[LandedLight, float]:
-    """Give the light of a direction on the sensor, and the height of its peak in pixels."""
+    """Return the light of a direction on the sensor, and the height of its peak in pixels."""
     light = land_light(lens, angle_rad, lens.reference_wavelength_um, PITCH_UM, SPOT_RAYS)
     return light, peak_height_px(light)
 
@@ -225,7 +225,7 @@ def _draw_section(panel: "Axes", lens: Lens, solved: SolvedPlate) -> None:
 
 
 def _fan(lens: Lens, angle_rad: float, places: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Give z and y (point, ray) of a direction in the meridian, and which rays arrive."""
+    """Return z and y (point, ray) of a direction in the meridian, and which rays arrive."""
     tensors = surface_tensors(lens, torch.tensor(lens.reference_wavelength_um, dtype=torch.float64))
     across = torch.linspace(-1, 1, FAN, dtype=torch.float64)
     slope = torch.tensor([math.tan(angle_rad)], dtype=torch.float64)
@@ -280,7 +280,7 @@ def _draw_spot(panel: "Axes", light: LandedLight, peak_px: float) -> None:
 
 
 def spot_image(light: LandedLight, peak_px: float, reach_px: int, *, step_px: int) -> Array:
-    """Give the light by cell (n, n) about a peak, rows outward, both halves of the pupil.
+    """Return the light by cell (n, n) about a peak, rows outward, both halves of the pupil.
 
     Args:
         light: Of rays with x >= 0 in the pupil.
@@ -297,7 +297,7 @@ def spot_image(light: LandedLight, peak_px: float, reach_px: int, *, step_px: in
 def to_json(
     recipe: ThinRecipe, solved: SolvedPlate, spots: list[tuple[LandedLight, float]]
 ) -> dict[str, Any]:
-    """Give the numbers of both figures as plain JSON values."""
+    """Return the numbers of both figures as plain JSON values."""
     discs, plate = solved.apertures, recipe.plate
     rim = np.array([-plate.aperture_mm / 2, plate.aperture_mm / 2])
     rims = phase_map(recipe, solved, rim, np.array(discs.field_angles_rad)) / math.pi
@@ -339,7 +339,7 @@ def to_json(
 
 
 def to_text(told: dict[str, Any]) -> str:
-    """Give the virtual apertures, as `to_json` has them, as a table in Markdown."""
+    """Return the virtual apertures, as `to_json` has them, as a table in Markdown."""
     lines = [
         "| degrees | centre, mm | image, mm | spot, µm rms | phase at the rims, π |",
         "|---|---|---|---|---|",

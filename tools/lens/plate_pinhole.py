@@ -126,7 +126,7 @@ def main() -> None:
 def pictures(
     bundle: Bundle, scene: FloatArray, exposure: float, strengths: dict[str, float] | None = None
 ) -> tuple[dict[str, FloatArray], FloatArray]:
-    """Give what a camera makes of a scene, way by way, and the truth; linear Rec.709.
+    """Return what a camera makes of a scene, way by way, and the truth; linear Rec.709.
 
     Args:
         bundle: The camera.
@@ -143,13 +143,13 @@ def pictures(
 
 
 def recorded(exposure: float) -> dict[str, float]:
-    """Give ISO and share of the white level of an exposure as plain JSON values."""
+    """Return ISO and share of the white level of an exposure as plain JSON values."""
     setting = setting_of(exposure)
     return {"iso": round(setting.iso, 1), "white": round(setting.exposure, 5)}
 
 
 def tune(bundle: Bundle, scene: FloatArray, exposure: float) -> dict[str, float]:
-    """Give the strength of every denoiser that has the largest PSNR on a scene."""
+    """Return the strength of every denoiser that has the largest PSNR on a scene."""
     light = light_through(bundle, scene)
     truth, developed = truth_of(bundle, light), restored(bundle, light, exposure, "develop", seed=1)
     found = {}
@@ -160,7 +160,7 @@ def tune(bundle: Bundle, scene: FloatArray, exposure: float) -> dict[str, float]
 
 
 def denoised(picture: FloatArray, name: str, strength: float) -> FloatArray:
-    """Give a picture (3, h, w), linear, behind a denoiser.
+    """Return a picture (3, h, w), linear, behind a denoiser.
 
     Args:
         picture: Noise and all; negative values are kept.
@@ -172,7 +172,7 @@ def denoised(picture: FloatArray, name: str, strength: float) -> FloatArray:
 
 
 def _non_local_means(picture: FloatArray, sigma: float) -> FloatArray:
-    """Give Buades's mean of like patches, by OpenCV on 16 bits."""
+    """Return Buades's mean of like patches, by OpenCV on 16 bits."""
     scale = _TOP / (2 * _REACH)
     levels = np.clip((picture + _REACH) * scale, 0, _TOP).astype(np.uint16)
     smooth = cv2.fastNlMeansDenoising(
@@ -186,7 +186,7 @@ def _non_local_means(picture: FloatArray, sigma: float) -> FloatArray:
 
 
 def _total_variation(picture: FloatArray, sigma: float) -> FloatArray:
-    """Give Chambolle's least total variation, by scikit-image."""
+    """Return Chambolle's least total variation, by scikit-image."""
     smooth = restoration.denoise_tv_chambolle(
         picture, weight=sigma, max_num_iter=_TV_ROUNDS, channel_axis=0
     )
@@ -200,7 +200,7 @@ DENOISERS: Final[dict[str, Denoiser]] = {
 
 
 def noise_of(picture: FloatArray) -> float:
-    """Give the deviation of the noise of a picture (3, h, w), by its finest differences."""
+    """Return the deviation of the noise of a picture (3, h, w), by its finest differences."""
     rows = picture[:, 1:] - picture[:, :-1]
     both = rows[:, :, 1:] - rows[:, :, :-1]
     return float(np.median(np.abs(both)) / _MEDIAN / 2)
@@ -209,7 +209,7 @@ def noise_of(picture: FloatArray) -> float:
 def chosen_for_strip(
     row: dict[str, FloatArray], truth: FloatArray, entry: dict[str, Any]
 ) -> dict[str, FloatArray]:
-    """Give the scene, the plate's capture and recovery, the pinhole's capture, its best two."""
+    """Return the scene, the plate's capture and recovery, the pinhole's capture, its best two."""
     db: dict[str, float] = entry["psnr_db"]
     best = max((f"pinhole {name}" for name in DENOISERS), key=lambda way: db[way])
     recovered = "plate network" if "plate network" in row else "plate filter"

@@ -152,7 +152,7 @@ def ways_of(named: Mapping[str, Bundle]) -> Iterator[Way]:
 
 
 def options(**chosen: str) -> Options:
-    """Give options of the geometry of the sensor, on one thread."""
+    """Return options of the geometry of the sensor, on one thread."""
     return Options(**chosen, undistort=False, vignetting=False, threads=1)  # type: ignore[arg-type]
 
 
@@ -213,7 +213,7 @@ def judge(way: Way, made: Simulation, chosen: argparse.Namespace) -> Entry:
 
 
 def measures(apart: FloatArray, rim_px: int) -> Entry:
-    """Give `MEASURES` and the zones of a difference of sRGB values (3, h, w)."""
+    """Return `MEASURES` and the zones of a difference of sRGB values (3, h, w)."""
     square = np.square(apart).mean(axis=0, dtype=np.float32)
     height, width = square.shape
     level = level_square(apart)
@@ -233,7 +233,7 @@ def measures(apart: FloatArray, rim_px: int) -> Entry:
 
 
 def level_square(apart: FloatArray) -> float:
-    """Give the mean square of the means of blocks, those at the far borders smaller."""
+    """Return the mean square of the means of blocks, those at the far borders smaller."""
     _, height, width = apart.shape
     total = 0.0
     for top in range(0, height, BLOCK_PX):
@@ -246,13 +246,13 @@ def level_square(apart: FloatArray) -> float:
 
 
 def part(square: FloatArray, where: Any) -> float | None:
-    """Give the dB of a part of a frame; None where there is none."""
+    """Return the dB of a part of a frame; None where there is none."""
     held = square[where]
     return decibels(held) if held.size else None
 
 
 def table(rows: Mapping[str, Sequence[Entry]], isos: Sequence[float]) -> str:
-    """Give the table as Markdown, a part for every ISO."""
+    """Return the table as Markdown, a part for every ISO."""
     heads = [*MEASURES, *(f"zone {number + 1}" for number in range(ZONES))]
     lines = []
     for iso in isos:
@@ -266,13 +266,13 @@ def table(rows: Mapping[str, Sequence[Entry]], isos: Sequence[float]) -> str:
 
 
 def mean_of(values: Sequence[float | None]) -> str:
-    """Give the mean of what is known, as the table has it."""
+    """Return the mean of what is known, as the table has it."""
     known = [value for value in values if value is not None]
     return f"{np.mean(known):.2f}" if known else ""
 
 
 def digest(way: Way, path: Path, iso: float, sources: Mapping[str, Any]) -> str:
-    """Give a hash of all that decides an entry."""
+    """Return a hash of all that decides an entry."""
     held = hashlib.sha256(way.bundle.path.read_bytes()).hexdigest()
     seen = hashlib.sha256(path.read_bytes()).hexdigest()
     told = [held, way.name, way.options.method, seen, iso, dict(sources)]

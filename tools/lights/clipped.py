@@ -83,7 +83,7 @@ def _restored(taken: Simulation, bundle: Bundle, size: str, way: str) -> FloatAr
 
 
 def _explaining(bundle: Bundle, way: str) -> Bundle:
-    """Give the bundle with another way to explain lights."""
+    """Return the bundle with another way to explain lights."""
     ways: dict[str, dict[str, Any]] = {
         "none": {"clip_iterations": 0},
         "near": {"clip_reach_px": NEAR_PX},

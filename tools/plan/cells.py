@@ -79,7 +79,7 @@ def photograph(
 
 
 def sharp_of(simulation: Simulation, bundle: Bundle) -> FloatArray:
-    """Give (3, h, w) sRGB values of the sharp picture in sensor geometry."""
+    """Return (3, h, w) sRGB values of the sharp picture in sensor geometry."""
     return encode_srgb(apply_matrix(rec709_of(color_sensor(bundle)), simulation.clean))
 
 
@@ -99,12 +99,12 @@ def cell_sums(squares: FloatArray) -> CellArray:
 
 
 def cell_errors(restored: FloatArray, sharp: FloatArray) -> CellArray:
-    """Give the squared sRGB error per cell of linear Rec.709 against sRGB values."""
+    """Return the squared sRGB error per cell of linear Rec.709 against sRGB values."""
     return cell_sums(np.square(encode_srgb(restored) - sharp).mean(axis=0))
 
 
 def pipelines(bundle: Bundle) -> Mapping[str, Pipeline]:
-    """Give a pipeline per target, in sensor geometry, on one thread."""
+    """Return a pipeline per target, in sensor geometry, on one thread."""
     made = {
         EXACT: Pipeline(bundle, Options(size=REFERENCE, undistort=False, threads=1)),
         WIENER_TARGET: Pipeline(bundle, Options(method="wiener", undistort=False, threads=1)),

@@ -101,7 +101,7 @@ def _design(capture: CaptureCells, mask: np.ndarray) -> np.ndarray:
 
 
 def _per_px(capture: CaptureCells, target: str) -> np.ndarray:
-    """Give the error per pixel of the exact result, or what a target adds to it."""
+    """Return the error per pixel of the exact result, or what a target adds to it."""
     pixels = np.maximum(capture.pixels, 1)
     exact = capture.errors[EXACT] / pixels
     if target == EXACT:
@@ -128,7 +128,7 @@ def _largest(
     mean_db: float,
     worst_db: float,
 ) -> tuple[float, tuple[float, float]]:
-    """Give the largest predicted loss that keeps both limits, and the losses it leads to."""
+    """Return the largest predicted loss that keeps both limits, and the losses it leads to."""
     for loss_db in _LOSSES_DB:
         lost = [true_loss_db(c, model, work, small, loss_db) for c in captures]
         if np.mean(lost) <= mean_db and max(lost) <= worst_db:
@@ -139,7 +139,7 @@ def _largest(
 def true_loss_db(
     capture: CaptureCells, model: LossModel, work: TierWork, small: str | None, loss_db: float
 ) -> float:
-    """Give what a capture really loses when the model may spend `loss_db`."""
+    """Return what a capture really loses when the model may spend `loss_db`."""
     losses = model.predict(capture.content)
     grid = _grid(losses, small)
     labels = choose_tiers(capture.content.cell_px, grid, losses.allowed(loss_db), work)
@@ -160,7 +160,7 @@ def true_loss_db(
 def saving_of_the_all_knowing(
     capture: CaptureCells, work: TierWork, small: str | None, loss_db: float
 ) -> float:
-    """Give the share of work that could be saved if every cell's loss were known beforehand.
+    """Return the share of work that could be saved if every cell's loss were known beforehand.
 
     Args:
         capture: Measured.

@@ -56,7 +56,7 @@ class ProofRow:
     choice: str
 
     def line(self) -> str:
-        """Give the row for people."""
+        """Return the row for people."""
         return (
             f"{self.kind:8s} {self.name[:34]:34s} ISO {self.iso:4g}: loses {self.loss_db:6.3f} dB "
             f"of {self.exact_db:5.2f}, saves {self.saved_work:5.1%} of network and FFT "
@@ -127,7 +127,7 @@ def _row(
 
 
 def _counted_seconds(bundle: Bundle, work: Reconstruction, speed: Speed) -> float:
-    """Give the seconds of blocks and windows as planned, at the speed of this machine."""
+    """Return the seconds of blocks and windows as planned, at the speed of this machine."""
     stage = bundle.manifest.stage(Wiener)
     seconds = sum(
         network_seconds(role, windows.window_mp(), speed) for role, windows in work.windows.items()
@@ -146,7 +146,7 @@ def _counted_seconds(bundle: Bundle, work: Reconstruction, speed: Speed) -> floa
 
 
 def summarise(rows: Sequence[ProofRow]) -> dict[str, dict[str, float]]:
-    """Give per subject and for all: captures, mean and worst loss, mean savings."""
+    """Return per subject and for all: captures, mean and worst loss, mean savings."""
     subjects = list(dict.fromkeys(row.kind for row in rows))
     groups = {name: [row for row in rows if row.kind == name] for name in subjects}
     groups["all"] = list(rows)

@@ -65,7 +65,7 @@ class ProofScene:
 def proof_scenes(
     height: int, width: int, data: Path | None = None, subjects: tuple[str, ...] = ()
 ) -> Iterator[ProofScene]:
-    """Give the scenes, subject by subject.
+    """Return the scenes, subject by subject.
 
     Args:
         height: Rows of the procedural ones.
@@ -114,7 +114,7 @@ def _even_picture(path: Path, most_px: int) -> FloatArray:
 
 
 def night(seed: int, height: int, width: int) -> FloatArray:
-    """Give a black surrounding with one lit place and lamps."""
+    """Return a black surrounding with one lit place and lamps."""
     rng = np.random.default_rng(seed)
     lit = procedural_scene(seed, height, width)
     mask = _spot(rng, height, width, share=0.25)
@@ -123,7 +123,7 @@ def night(seed: int, height: int, width: int) -> FloatArray:
 
 
 def bokeh(seed: int, height: int, width: int) -> FloatArray:
-    """Give a sharp subject before a background far out of focus."""
+    """Return a sharp subject before a background far out of focus."""
     rng = np.random.default_rng(seed)
     sharp = np.minimum(procedural_scene(seed, height, width), 1.5)
     far = np.minimum(procedural_scene(seed + 50, height, width), 1.5)
@@ -133,12 +133,12 @@ def bokeh(seed: int, height: int, width: int) -> FloatArray:
 
 
 def texture(seed: int, height: int, width: int) -> FloatArray:
-    """Give texture everywhere: little can be skipped."""
+    """Return texture everywhere: little can be skipped."""
     return procedural_scene(seed, height, width)
 
 
 def sky(seed: int, height: int, width: int) -> FloatArray:
-    """Give a clear sky over ground."""
+    """Return a clear sky over ground."""
     rng = np.random.default_rng(seed)
     ground = np.minimum(procedural_scene(seed, height, width), 1.0)
     horizon = height * rng.uniform(0.45, 0.75)
@@ -150,7 +150,7 @@ def sky(seed: int, height: int, width: int) -> FloatArray:
 
 
 def text(seed: int, height: int, width: int) -> FloatArray:
-    """Give a page: lines of words on paper, wide margins, a picture."""
+    """Return a page: lines of words on paper, wide margins, a picture."""
     rng = np.random.default_rng(seed)
     page = np.full((height, width), PAPER, np.uint8)
     margin = int(0.16 * width)
@@ -166,7 +166,7 @@ def text(seed: int, height: int, width: int) -> FloatArray:
 
 
 def _spot(rng: np.random.Generator, height: int, width: int, *, share: float) -> FloatArray:
-    """Give (h, w) in 0..1: an ellipse of about this share of the picture, its edge 6 px wide."""
+    """Return (h, w) in 0..1: an ellipse of about this share of the picture, its edge 6 px wide."""
     scale = np.sqrt(share / np.pi)
     ry, rx = height * scale * rng.uniform(0.8, 1.2), width * scale * rng.uniform(0.8, 1.2)
     cy, cx = height * rng.uniform(0.35, 0.65), width * rng.uniform(0.3, 0.7)

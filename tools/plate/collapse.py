@@ -55,7 +55,7 @@ Reader = Callable[[Tensor], Tensor]
 
 
 def small_recipe(cells: int, steps: int, seed: int) -> PlateRecipe:
-    """Give the thesis's design with wider cells and shorter streaks, in green."""
+    """Return the thesis's design with wider cells and shorter streaks, in green."""
     return to_plate_recipe(
         {
             "name": "small",
@@ -83,7 +83,7 @@ class Lamp:
 
 
 def lamp_of(radius_px: int) -> Lamp:
-    """Give a lamp; pixels up to 2 px beside it are clipped by its tail."""
+    """Return a lamp; pixels up to 2 px beside it are clipped by its tail."""
     place = torch.arange(-SEEN_PX, SEEN_PX + 1)
     y, x = torch.meshgrid(place, place, indexing="ij")
     distance = (y.double() ** 2 + x.double() ** 2).sqrt()
@@ -97,7 +97,7 @@ def lamp_of(radius_px: int) -> Lamp:
 
 
 def linear_error(psf: Tensor, lamps: tuple[Lamp, ...]) -> Tensor:
-    """Give the expected squared error of a picture under the best linear estimate.
+    """Return the expected squared error of a picture under the best linear estimate.
 
     Args:
         psf: (side, side) of 2 HALF_PX + 1.
@@ -115,7 +115,7 @@ def linear_error(psf: Tensor, lamps: tuple[Lamp, ...]) -> Tensor:
 
 
 def _picture_error(psf: Tensor) -> Tensor:
-    """Give the error of a Wiener filter on a picture whose power falls with frequency."""
+    """Return the error of a Wiener filter on a picture whose power falls with frequency."""
     side = 256
     fx = torch.fft.fftfreq(side, dtype=torch.float64)
     power = 1 / (fx[:, None] ** 2 + fx[None, :] ** 2 + 1e-4) ** 1.25
@@ -126,7 +126,7 @@ def _picture_error(psf: Tensor) -> Tensor:
 
 
 def scenes_of(count: int, seed: int) -> Tensor:
-    """Give (count, h, w) smooth pictures with lamps over CLIPPED of their pixels."""
+    """Return (count, h, w) smooth pictures with lamps over CLIPPED of their pixels."""
     rng = np.random.default_rng(seed)
     place = np.arange(SCENE_PX)
     made = []
@@ -144,7 +144,7 @@ def scenes_of(count: int, seed: int) -> Tensor:
 
 
 def captures(psf: Tensor, scenes: Tensor) -> Tensor:
-    """Give what a sensor shows of scenes, clipped at white."""
+    """Return what a sensor shows of scenes, clipped at white."""
     size = [SCENE_PX + 2 * HALF_PX] * 2
     full: Tensor = torch.fft.irfft2(
         torch.fft.rfft2(scenes, s=size) * torch.fft.rfft2(psf.double(), s=size), s=size
@@ -153,7 +153,7 @@ def captures(psf: Tensor, scenes: Tensor) -> Tensor:
 
 
 def blind_loss(psf: Tensor, scenes: Tensor) -> Tensor:
-    """Give eq. (5.11) between clipped captures and scenes."""
+    """Return eq. (5.11) between clipped captures and scenes."""
     return torch.nn.functional.huber_loss(captures(psf, scenes).sqrt(), scenes.sqrt())
 
 
@@ -166,7 +166,7 @@ class Trial:
     scenes: Tensor
 
     def psf(self, height_um: Tensor) -> Tensor:
-        """Give the PSF (side, side) of heights."""
+        """Return the PSF (side, side) of heights."""
         pixels = self.recipe.pixels
         grid = PixelGrid(
             side_px=pixels.side_px, pitch_um=pixels.pitch_um, samples=pixels.samples or None
@@ -175,7 +175,7 @@ class Trial:
         return plate_psf(height_um, INDEX, WAVE_UM, bench=bench, grid=grid, depth_mm=bench.focus_mm)
 
     def row(self, height_um: Tensor) -> dict[str, float]:
-        """Tell what a plate does with the light, and what both readers make of it."""
+        """Return what a plate does with the light, and what both readers make of it."""
         with torch.no_grad():
             psf, bare = self.psf(height_um), self.psf(torch.zeros_like(height_um))
             masks = masks_of(self.recipe.goal, self.recipe.pixels.side_px)
@@ -194,7 +194,7 @@ class Trial:
             }
 
     def moved(self, made: HeightMap, read: Reader, *, steps: int, rate: float) -> Tensor:
-        """Give the heights after steps of Adam under a reader."""
+        """Return the heights after steps of Adam under a reader."""
         optimizer = torch.optim.Adam(made.parameters(), lr=rate)
         for step in range(steps):
             for group in optimizer.param_groups:

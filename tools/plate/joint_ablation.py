@@ -49,7 +49,7 @@ LOG_STEPS: Final = 25
 
 
 def recipes_of(steps: int, seed: int, reader: dict[str, Any]) -> dict[str, PlateRecipe]:
-    """Give the runs by name, in their order; later ones begin at the files of earlier ones."""
+    """Return the runs by name, in their order; later ones begin at the files of earlier ones."""
     later = max(1, round(LATER * steps))
 
     def recipe(name: str, count: int, rate: float, of_map: Any, **of_reader: Any) -> PlateRecipe:
@@ -86,7 +86,7 @@ def _free(recipe: PlateRecipe, name: str) -> PlateRecipe:
 
 
 def measured(recipe: PlateRecipe, height_um: Tensor) -> dict[str, Any]:
-    """Tell where a plate sends the light of each colour, beside the bare lens.
+    """Return where a plate sends the light of each colour, beside the bare lens.
 
     Shares sum to 1; `core_of_bare` is against the core of the bare lens, `written` what the streaks
     hold beyond its light there, `reach_px` the longest streak that is found.
@@ -163,7 +163,7 @@ def _moment(entry: dict[str, Any]) -> dict[str, float]:
 
 
 def _linear(recipe: PlateRecipe, height_um: Tensor) -> dict[str, float]:
-    """Tell what a reader without a network makes of it, in green; see `collapse`."""
+    """Return what a reader without a network makes of it, in green; see `collapse`."""
     lamps = tuple(lamp_of(radius) for radius in RADII_PX)
     row = Trial(recipe=recipe, lamps=lamps, scenes=scenes_of(1, 1)).row(height_um)
     return {"linear_db": row["linear_db"], "strehl": row["strehl"]}

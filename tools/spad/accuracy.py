@@ -64,7 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def verdicts(
     rows: Sequence[dict[str, Any]], alarms: Sequence[dict[str, Any]]
 ) -> list[dict[str, Any]]:
-    """Give what was aimed at, with the worst that was reached."""
+    """Return what was aimed at, with the worst that was reached."""
     log = {(row["photons"], row["sbr"]): row for row in rows if row["method"] == "log"}
     lsq = {(row["photons"], row["sbr"]): row for row in rows if row["method"] == "lsq"}
     slow = {(r["photons"], r["sbr"]): r for r in rows if r["method"] == "curve_fit"}

@@ -95,7 +95,7 @@ class Baseline:
     training_data: str
 
     def stage(self, role: str) -> SuperResolve:
-        """Give its stage."""
+        """Return its stage."""
         mode, plan = self.sampling.mode, self.recipe.sampling
         return SuperResolve(
             role=role,
@@ -211,7 +211,7 @@ def round_mantissa(value: torch.Tensor, bits: int = MANTISSA_BITS) -> torch.Tens
 def _loss_db(
     exact: nn.Module, rounded: nn.Module, sampling: Sampling, pictures: Sequence[FloatArray]
 ) -> float:
-    """Give what rounding costs at worst over the levels of light; a gain is as large a change."""
+    """Return what rounding costs at worst over the levels of light; a gain is as large a change."""
     changes = []
     for photons in LEVELS:
         exposure = Exposure(photons=photons)

@@ -69,7 +69,7 @@ def main(words: Sequence[str] | None = None) -> None:
 def measure(
     camera: FineCamera, photons: float, sbr: float, scenes: int
 ) -> Iterator[dict[str, Any]]:
-    """Give a row for every way, at one level of light."""
+    """Return a row for every way, at one level of light."""
     ways = _ways(camera)
     found: dict[str, list[tuple[float, ...]]] = {name: [] for name in ways}
     ratios: dict[str, list[NDArray[np.float64]]] = {name: [] for name in ways}
@@ -105,7 +105,7 @@ def measure(
 def record(
     camera: FineCamera, seed: int, photons: float, sbr: float
 ) -> tuple[NDArray[np.float64], FloatArray]:
-    """Give depth in metres on the fine grid, and counts (h, w, bins) of it."""
+    """Return depth in metres on the fine grid, and counts (h, w, bins) of it."""
     axis, pulse = times_of(camera)
     depth = stage_set(camera, seed)
     coded = np.clip(procedural_scene(seed, *depth.shape).mean(axis=0), 0, 1) ** (1 / 2.2)
@@ -134,7 +134,7 @@ def _ways(camera: FineCamera) -> dict[str, Any]:
 
 
 def _enlarged(found: Sharpened, camera: FineCamera) -> Any:
-    """Give a map of the array's pixels on the fine grid, by linear interpolation."""
+    """Return a map of the array's pixels on the fine grid, by linear interpolation."""
     scale, phase = camera.scale, camera.sensor.phase
     places = np.array([[scale, 0, phase], [0, scale, phase]], np.float64)
     size = (scale * camera.sensor.width_px, scale * camera.sensor.height_px)

@@ -71,7 +71,7 @@ class Errors:
     bin_ps: float
 
     def quantile(self, shares: SigmaShares) -> float:
-        """Give the 68 % quantile of |error| / sigma."""
+        """Return the 68 % quantile of |error| / sigma."""
         sigma = shares.sigma_ps(
             self.linear_ps, self.slopes_ps, photons=self.photons, bin_ps=self.bin_ps
         )
@@ -95,7 +95,7 @@ def main(words: Sequence[str] | None = None) -> None:
 
 
 def constants(camera: FineCamera, scenes: int) -> dict[str, Any]:
-    """Give all constants, with what they were chosen by."""
+    """Return all constants, with what they were chosen by."""
     least, lights = camera.stage.network_from_photons, LIGHTS
     sizes = tuple(camera.sizes)
     linear = {light: _errors(camera, *light, None, scenes) for light in lights}
@@ -174,7 +174,7 @@ def _mean_mm(camera: FineCamera, photons: float, sbr: float, sharper: float, sce
 
 
 def _fitted(errors: dict[Any, Errors], start: SigmaShares, names: Iterable[str]) -> dict[str, Any]:
-    """Give the shares of least largest departure from 1, beside those taken."""
+    """Return the shares of least largest departure from 1, beside those taken."""
     names = tuple(names)
 
     def shares(values: NDArray[np.float64]) -> SigmaShares:

@@ -30,7 +30,7 @@ class PlainBicubic(nn.Module):
         self.register_buffer("around", around, persistent=False)
 
     def forward(self, samples: Tensor) -> Tensor:
-        """Give (b, c, scale h, scale w) from (b, c, h, w)."""
+        """Return (b, c, scale h, scale w) from (b, c, h, w)."""
         wide = self._grown(samples, (0, 1))
         wide = self._grown(wide, (1, 0))
         fine = functional.conv2d(wide, self.filters, groups=self.channels)

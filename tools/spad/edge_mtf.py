@@ -82,7 +82,7 @@ class Edge:
     levels: tuple[float, float]
 
     def drawn(self, side_px: int) -> Tensor:
-        """Give the picture (1, 1, side, side)."""
+        """Return the picture (1, 1, side, side)."""
         scene = slanted_edge(
             side_px,
             side_px,
@@ -119,20 +119,20 @@ class Row:
 
     @property
     def mean(self) -> Curve:
-        """Give the mean over the edges."""
+        """Return the mean over the edges."""
         return np.asarray(self.curves.mean(0))
 
     def at(self, cycles_per_px: float) -> float:
-        """Give the mean at a frequency."""
+        """Return the mean at a frequency."""
         return float(np.interp(cycles_per_px, CYCLES_PER_PX, self.mean))
 
     def largest(self, *, mean: bool) -> float:
-        """Give the largest value at any frequency, of the mean or of any edge."""
+        """Return the largest value at any frequency, of the mean or of any edge."""
         return float((self.mean if mean else self.curves).max())
 
     @property
     def tenth(self) -> float:
-        """Give the first frequency at which the mean is 0.1; the last one where there is none."""
+        """Return the first frequency at which the mean is 0.1; the last one where there is none."""
         below = np.flatnonzero(self.mean < 0.1)
         if not below.size:
             return float(CYCLES_PER_PX[-1])
@@ -140,7 +140,7 @@ class Row:
         return float(np.interp(-0.1, -self.mean[last], CYCLES_PER_PX[last]))
 
     def line(self) -> str:
-        """Give the row of the table."""
+        """Return the row of the table."""
         level = "no noise" if math.isinf(self.photons) else f"{self.photons:g}"
         numbers = (self.at(ARRAY_NYQUIST), self.at(0.25), self.at(FINE_NYQUIST))
         told = " | ".join(f"{number:.3f}" for number in numbers)
@@ -150,7 +150,7 @@ class Row:
         )
 
     def entry(self) -> dict[str, Any]:
-        """Give plain JSON values; no noise is null."""
+        """Return plain JSON values; no noise is null."""
         return {
             "sampling": self.sampling,
             "method": self.method,
@@ -191,7 +191,7 @@ def main(words: Sequence[str] | None = None) -> None:
 
 
 def measure(options: argparse.Namespace) -> list[Row]:
-    """Give the rows of all methods, each printed as soon as it is known."""
+    """Return the rows of all methods, each printed as soon as it is known."""
     plate = read_plate_psf(options.psf)
     samplings = [
         make_sampling(mode, kernel=plate if mode == "learned" else None) for mode in SAMPLINGS
@@ -254,7 +254,7 @@ def read_network(path: Path, mode: str) -> Restorer:
 
 
 def _pairs(sampling: Sampling, exposure: Exposure) -> Iterable[tuple[Tensor, Tensor]]:
-    """Give light and pictures of procedural scenes, to fit to."""
+    """Return light and pictures of procedural scenes, to fit to."""
     source = open_source(None, picture_share=0, scenes=FIT_CROPS // 2, scene_px=2 * FIT_PX)
     rng = np.random.default_rng(FIT_SEED)
     for _ in range(FIT_CROPS):
@@ -263,7 +263,7 @@ def _pairs(sampling: Sampling, exposure: Exposure) -> Iterable[tuple[Tensor, Ten
 
 
 def _seen(edge: Edge, sampling: Sampling, exposure: Exposure, draws: int) -> Tensor:
-    """Give light and noise (draw, 2, h, w)."""
+    """Return light and noise (draw, 2, h, w)."""
     fine = edge.drawn(SIDE_PX)
     seeds = range(draws)
     return torch.cat(

@@ -44,7 +44,7 @@ class Fan:
     turn_rad: float = math.radians(18)
 
     def frames(self, count: int) -> tuple[FloatArray, Floats]:
-        """Give frames (n, h, w), white = 1, and the mean angle of a blade in each."""
+        """Return frames (n, h, w), white = 1, and the mean angle of a blade in each."""
         step = self.turn_rad / SUB_FRAMES
         found = np.empty((count, *self.size_px), np.float32)
         middles = np.empty(count)
@@ -55,7 +55,7 @@ class Fan:
         return found, middles
 
     def still(self, angle_rad: float) -> FloatArray:
-        """Give a picture (h, w) without motion, the middle of a blade at an angle."""
+        """Return a picture (h, w) without motion, the middle of a blade at an angle."""
         radius, around = self._polar()
         period = 2 * math.pi / self.blades
         beside = np.abs((around - angle_rad + period / 2) % period - period / 2)
@@ -80,7 +80,7 @@ class Fan:
         return float(np.angle(total) % (2 * math.pi)) / self.blades
 
     def off_by(self, found_rad: float, true_rad: float) -> float:
-        """Give by how much an angle is off; blades look alike."""
+        """Return by how much an angle is off; blades look alike."""
         period = 2 * math.pi / self.blades
         return (found_rad - true_rad + period / 2) % period - period / 2
 

@@ -119,7 +119,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def fan_before(camera: FineCamera) -> Fan:
-    """Give the fan that fills the height of an array."""
+    """Return the fan that fills the height of an array."""
     height = camera.scale * camera.sensor.height_px
     turn = 2 * math.pi * TURNS_PER_MINUTE / 60 / WORKING_POINTS["high_speed"].rate_hz
     return Fan(
@@ -131,7 +131,7 @@ def fan_before(camera: FineCamera) -> Fan:
 
 
 def ways_of(camera: FineCamera, plain: FineCamera | None) -> list[Way]:
-    """Give all ways; `plain` has the network of the array without a plate."""
+    """Return all ways; `plain` has the network of the array without a plate."""
     found = [
         Way(plate=True, method=f"net {size}", restore=_by_network(camera, size))
         for size in camera.sizes

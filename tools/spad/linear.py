@@ -13,7 +13,7 @@ from camkit.runtime.kinds.spad.finer.linear import Grid, linear_estimate
 
 
 def linear_restorer(told: Sampling, exposure: Exposure) -> Restorer:
-    """Give the best linear estimate, at the photons that a picture shows.
+    """Return the best linear estimate, at the photons that a picture shows.
 
     Args:
         told: How the array is believed to sample, which need not be how it does.

@@ -35,7 +35,7 @@ class Sight:
 
 
 def mirrored(size_px: tuple[int, int], span_ps: tuple[float, float]) -> Sight:
-    """Give an object and its mirror image.
+    """Return an object and its mirror image.
 
     Args:
         size_px: (height, width), of even width.
@@ -63,7 +63,7 @@ def mirrored(size_px: tuple[int, int], span_ps: tuple[float, float]) -> Sight:
 
 
 def pixel_mm(sight: Sight) -> float:
-    """Give how large a sub-pixel is at the object: what light travels in the time between two."""
+    """Return how large a sub-pixel is at the object: what light travels in the time between two."""
     half = sight.times_ps.shape[1] // 2
     # along the mirror's foot, where the way from the lamp grows by one sub-pixel in each
     row = int(0.85 * sight.times_ps.shape[0])
@@ -72,7 +72,7 @@ def pixel_mm(sight: Sight) -> float:
 
 
 def _object(height: int, width: int) -> Floats:
-    """Give a vase with a board of squares behind it, (h, w) albedo."""
+    """Return a vase with a board of squares behind it, (h, w) albedo."""
     y, x = np.mgrid[:height, :width]
     v, u = (y + 0.5) / height, (x + 0.5) / width
     squares = (np.floor(CELLS * u) + np.floor(CELLS * v)) % 2

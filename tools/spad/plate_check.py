@@ -143,7 +143,7 @@ def _seen(plate: DotPlate, target: FloatGrid, view: View) -> Row:
 
 
 def _beside(height_um: FloatGrid, camera: DotCamera, view: View) -> float:
-    """Give the light in places outside the 11x11, as a share of that in them."""
+    """Return the light in places outside the 11x11, as a share of that in them."""
     light = effective_psf(height_um, camera, view, side=WIDE)
     edge = (WIDE - ORDERS) // 2
     inside = float(light[edge:-edge, edge:-edge].sum())

@@ -56,7 +56,7 @@ def main(words: Sequence[str] | None = None) -> None:
 
 
 def measure(folder: Path, side: int, bins: int, layout: str, max_mem: str) -> dict[str, Any]:
-    """Give what a process took for a cube, and how near it came."""
+    """Return what a process took for a cube, and how near it came."""
     axis = TimeAxis.regular("histogram", bins=bins, time_bin_ps=BIN_PS)
     reach = axis.centres_ps[-1]
     y, x = np.mgrid[:side, :side] / side
@@ -102,7 +102,7 @@ def measure(folder: Path, side: int, bins: int, layout: str, max_mem: str) -> di
 
 
 def _rows(axis: TimeAxis, times_ps: NDArray[np.float64]) -> Iterator[tuple[int, NDArray[np.int64]]]:
-    """Give counts row by row, (1, w, bins)."""
+    """Return counts row by row, (1, w, bins)."""
     rng = np.random.default_rng(0)
     pulse = GaussianPulse(sigma_ps=SIGMA_PS)
     for row, of_row in enumerate(times_ps):

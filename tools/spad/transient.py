@@ -107,7 +107,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def flight_before(camera: FineCamera) -> Flight:
-    """Give the scene of an array.
+    """Return the scene of an array.
 
     Raises:
         ContractError: If its bundle states no time bins and pulse.
@@ -131,7 +131,7 @@ def flight_before(camera: FineCamera) -> Flight:
 def _measured(
     camera: FineCamera, flight: Flight, photons: float, rows: list[dict[str, Any]]
 ) -> dict[str, FloatArray]:
-    """Give what is shown of every way, white = 1, and put a row for each to the others."""
+    """Return what is shown of every way, white = 1, and put a row for each to the others."""
     counts, scale = _counted(flight.seen, photons)
     light = flight.light[flight.kept] * np.float32(scale)
     white = float(np.percentile(light, WHITE))
@@ -157,7 +157,7 @@ def _show(films: dict[str, FloatArray], flight: Flight, folder: Path) -> None:
 
 
 def ways_of(camera: FineCamera) -> dict[str, Callable[[FloatArray], FloatArray]]:
-    """Give way -> photons (bins, h, w) to photons (bins, m h, m w)."""
+    """Return way -> photons (bins, h, w) to photons (bins, m h, m w)."""
 
     def finer(counts: FloatArray, *, size: str | None) -> FloatArray:
         return finer_frames(camera, counts, 0.0, size)
@@ -170,7 +170,7 @@ def ways_of(camera: FineCamera) -> dict[str, Callable[[FloatArray], FloatArray]]
 
 
 def _counted(seen: FloatArray, photons: float) -> tuple[FloatArray, float]:
-    """Give counts (bins, h, w), and photons over light."""
+    """Return counts (bins, h, w), and photons over light."""
     mean = scaled_to(seen, photons)
     scale = photons * seen[0].size / float(seen.sum(dtype=np.float64))
     rng = np.random.default_rng((SEED, int(photons)))

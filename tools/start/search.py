@@ -52,7 +52,7 @@ def design(recipe: LensRecipe) -> DesignResult:
 
 
 def with_rounded_numbers(lens: Lens) -> Lens:
-    """Give the lens as a drawing would state it: 0.1 um, conics to 4 places, terms to 6 digits."""
+    """Return lens as a drawing would state it: 0.1 um, conics to 4 places, terms to 6 digits."""
     return replace(
         lens,
         surfaces=tuple(
@@ -69,7 +69,7 @@ def with_rounded_numbers(lens: Lens) -> Lens:
 
 
 def problem_of(recipe: LensRecipe) -> Problem:
-    """Give the problem that a recipe states: the last curvature is solved, the sensor rides."""
+    """Return the problem that a recipe states: the last curvature is solved, the sensor rides."""
     corner = float(np.tan(to_radians(recipe.half_field_deg)))
     # square-root spacing: every ring of the picture has the same area
     slopes = corner * torch.sqrt(torch.linspace(0, 1, recipe.fields, dtype=torch.float64))
@@ -115,7 +115,7 @@ def _variables(recipe: LensRecipe) -> tuple[Variable, ...]:
 
 
 def _middle(recipe: LensRecipe, slopes: Tensor) -> Lens:
-    """Give a lens in the middle of the ranges; what is searched for does not depend on it."""
+    """Return a lens in the middle of the ranges; what is searched for does not depend on it."""
     surfaces = tuple(
         Surface(
             curvature_per_mm=sum(s.curvature_range_per_mm) / 2,

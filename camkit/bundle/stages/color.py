@@ -17,7 +17,7 @@ class Color(StageEntry):
     gives: tuple[Word, ...] = ("picture",)
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
-        """Give three planes in the colour of the output."""
+        """Return three planes in the colour of the output."""
         del parts
         plane = one_linear(taken)
         if plane.channels == MOSAIC:

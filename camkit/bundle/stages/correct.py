@@ -16,7 +16,7 @@ class Correct(StageEntry):
     gives: tuple[Word, ...] = ("photons",)
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
-        """Give the photons, over the axes of the capture."""
+        """Return the photons, over the axes of the capture."""
         del parts
         need_count(taken, 1)
         need_domain(taken[0], "counts")

@@ -41,7 +41,7 @@ class Deglare(StageEntry):
         return self
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
-        """Give the plane as taken."""
+        """Return the plane as taken."""
         del parts
         plane = one_linear(taken)
         need_rows(plane)

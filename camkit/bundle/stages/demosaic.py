@@ -18,7 +18,7 @@ class Demosaic(StageEntry):
     method: Literal["fast", "quality"] = "quality"
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
-        """Give the three planes."""
+        """Return the three planes."""
         del parts
         plane = one_linear(taken)
         if plane.channels != MOSAIC:

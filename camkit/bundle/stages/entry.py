@@ -30,7 +30,7 @@ class Parts:
     networks: Mapping[str, Mapping[str, NetworkFacts]]
 
     def need_optics(self, why: str) -> Optics:
-        """Give the optics.
+        """Return the optics.
 
         Raises:
             JoinError: If there are none.
@@ -54,7 +54,7 @@ class StageEntry(Entry):
     gives: tuple[Word, ...]
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
-        """Say what the stage makes of the planes it takes; one plane for each name in `gives`.
+        """Return what the stage makes of the planes it takes; one plane for each name in `gives`.
 
         Raises:
             JoinError: If it cannot take them.
@@ -95,7 +95,7 @@ def need_rows(plane: Plane) -> None:
 
 
 def one_linear(taken: Sequence[Plane]) -> Plane:
-    """Give the one linear plane that a stage takes.
+    """Return the one linear plane that a stage takes.
 
     Raises:
         JoinError: If it is given none, several or one of another domain.

@@ -38,7 +38,7 @@ class Dehaze(StageEntry):
     rounds: Annotated[int, Field(ge=1, le=16)] = 3
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
-        """Give the plane as taken, its light in the cores."""
+        """Return the plane as taken, its light in the cores."""
         need_count(taken, 1, 2)
         plane = taken[0]
         need_domain(plane, "linear")

@@ -37,7 +37,7 @@ class Highlights(StageEntry):
         return len(self.takes) > 1
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
-        """Give the plane as taken; its lights may lie far above white."""
+        """Return the plane as taken; its lights may lie far above white."""
         need_count(taken, 1, 2)
         plane = one_linear(taken[:1])
         if len(taken) > 1:

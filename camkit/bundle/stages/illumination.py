@@ -16,7 +16,7 @@ class Illumination(StageEntry):
     gives: tuple[Word, ...] = ("even",)
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
-        """Give a plane of the kind taken."""
+        """Return a plane of the kind taken."""
         plane = one_linear(taken)
         need_rows(plane)
         optics = parts.need_optics("it divides by the illumination of optics")

@@ -17,7 +17,7 @@ class Linearise(StageEntry):
     gives: tuple[Word, ...] = ("light", "clipped")
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
-        """Give the linear plane and the mask."""
+        """Return the linear plane and the mask."""
         need_count(taken, 1)
         need_domain(taken[0], "dn")
         if not isinstance(parts.sensor, ColorSensor):

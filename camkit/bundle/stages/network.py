@@ -64,7 +64,7 @@ class Network(StageEntry):
         return 0 if self.light is None else BOUND_REACH_PX
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
-        """Give the outputs of the network, on a finer grid where it says so."""
+        """Return the outputs of the network, on a finer grid where it says so."""
         sizes = parts.networks.get(self.role)
         if not sizes:
             raise JoinError(f"the bundle holds no network of the role {self.role!r}")

@@ -17,7 +17,7 @@ class RaiseClipped(StageEntry):
     gives: tuple[Word, ...] = ("neutral",)
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
-        """Give a plane of the kind taken."""
+        """Return a plane of the kind taken."""
         del parts
         plane = one_linear(taken)
         if plane.channels != RGB:

@@ -20,7 +20,7 @@ class Repair(StageEntry):
     gives: tuple[Word, ...] = ("sound", "unknown")
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
-        """Give planes of the kind taken."""
+        """Return planes of the kind taken."""
         del parts
         need_count(taken, 1, 2)
         need_domain(taken[0], "linear")

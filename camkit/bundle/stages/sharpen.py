@@ -36,7 +36,7 @@ class Sharpen(StageEntry):
     laser_wavelength_nm: Positive | None = None
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
-        """Give the depth."""
+        """Return the depth."""
         need_count(taken, 1)
         need_domain(taken[0], "counts")
         if not isinstance(parts.sensor, SpadSensor) or taken[0].axes != "t y x":

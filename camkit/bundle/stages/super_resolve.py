@@ -54,7 +54,7 @@ class SuperResolve(StageEntry):
         return self
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
-        """Give the photons on the fine grid."""
+        """Return the photons on the fine grid."""
         need_count(taken, 1)
         need_domain(taken[0], "counts")
         sensor, optics = parts.sensor, parts.need_optics("it undoes their blur")

@@ -30,7 +30,7 @@ class Undistort(StageEntry):
     overshoot: Overshoot = "kept"
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
-        """Give the plane in ideal geometry."""
+        """Return the plane in ideal geometry."""
         plane = one_linear(taken)
         need_rows(plane)
         optics = parts.need_optics("it undoes the distortion of optics")

@@ -17,7 +17,7 @@ class WhiteBalance(StageEntry):
     gives: tuple[Word, ...] = ("balanced",)
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
-        """Give a plane of the kind taken."""
+        """Return a plane of the kind taken."""
         plane = one_linear(taken)
         if parts.sensor.channels != RGB or plane.channels not in (MOSAIC, RGB):
             raise JoinError("it balances red, green and blue, which these planes are not")

@@ -68,7 +68,7 @@ class Wiener(StageEntry):
         return self
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
-        """Give the plane as taken: deconvolved."""
+        """Return the plane as taken: deconvolved."""
         need_count(taken, 1, 2)
         plane = taken[0]
         need_domain(plane, "linear")

@@ -265,7 +265,7 @@ def _freeze(optics: "Optics", out: Path, wanted: _Wanted) -> "FreezeReport | Pla
 
 
 def _camera_of(recipe: Path) -> "tuple[ColorSensor, Wiener | None]":
-    """Give the sensor of a recipe, and its bank."""
+    """Return the sensor of a recipe, and its bank."""
     from camkit.bundle.sensor import ColorSensor
     from camkit.bundle.stages import Wiener
     from camkit.models_def.training.kind import read_recipe, training_kind

@@ -88,7 +88,7 @@ def focus_range_um(optics: "Optics", text: str | None) -> float:
 
 
 def _of_bundle(path: Path, depths_mm: tuple[float, ...]) -> "tuple[EdgeCamera, dict[str, str]]":
-    """Give the camera of a bundle, and how a unit names it: by its lens where it says that."""
+    """Return the camera of a bundle, and how a unit names it: by its lens where it says that."""
     from camkit.bundle.reader import PRESCRIPTION, open_bundle
     from camkit.runtime.calibration.focus import EdgeCamera
     from camkit.runtime.unit import lens_hash

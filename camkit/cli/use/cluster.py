@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def cluster_client(
     scheduler: str | None, workers: int | None, jobs: int
 ) -> "Iterator[Client | None]":
-    """Give a client of dask.distributed; None where this process makes the pictures.
+    """Return a client of dask.distributed; None where this process makes the pictures.
 
     Raises:
         ContractError: If both are given, or jobs beside one of them, or no scheduler answers.

@@ -30,7 +30,7 @@ def decoding_ahead(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def _needs_decoder(files: Sequence[str]) -> bool:
-    """Tell whether the first file is likely a RAW file: no picture, no photon counts."""
+    """Return whether the first file is likely a RAW file: no picture, no photon counts."""
     from camkit.kinds import all_kinds
 
     first = Path(files[0])

@@ -181,7 +181,7 @@ def _lines(value: Any, indent: str) -> list[str]:
 
 
 def _shortened(value: Any) -> str:
-    """Give a value as text; of one that fills lines the beginning, --json has it all."""
+    """Return a value as text; of one that fills lines the beginning, --json has it all."""
     text = str(value)
     if len(text) <= LONGEST:
         return text

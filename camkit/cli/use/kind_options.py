@@ -10,7 +10,7 @@ from camkit.kinds import KindOption, all_kinds
 
 
 def with_kind_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the options of every kind; they reach it as further keywords.
+    """Return a command the options of every kind; they reach it as further keywords.
 
     Args:
         command: Its last parameter is **of_kind.
@@ -35,7 +35,7 @@ def with_kind_options(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def _options() -> list[tuple[str, KindOption]]:
-    """Give (kind, option) for every option of a name, from the first kind that has it."""
+    """Return (kind, option) for every option of a name, from the first kind that has it."""
     found: dict[str, tuple[str, KindOption]] = {}
     for kind in all_kinds():
         for option in kind.options:

@@ -29,7 +29,7 @@ def print_plans(
     *,
     as_json: bool,
 ) -> bool | None:
-    """Say what would be done with every input.
+    """Return what would be done with every input.
 
     Returns:
         Whether all of it could be done; None where nothing matches.
@@ -86,7 +86,7 @@ def _planned(
 
 
 def plan_lines(facts: dict[str, Any]) -> list[str]:
-    """Give a plan as lines for people."""
+    """Return a plan as lines for people."""
     lines = [f"{facts['input']} -> {facts['output']}"]
     if facts["status"] == "failed":
         return [*lines, f"  failed: {facts['error']}"]

@@ -194,7 +194,7 @@ def _check_truth(truth: Path | None, out: Path, bundle: "Bundle") -> None:
 def _exposed(
     scene: "FloatArray", sensor: "Sensor", options: "SimulationOptions", share: float | None
 ) -> "tuple[FloatArray, Saturation | None]":
-    """Give the scene to photograph with the options, and what of its picture saturates."""
+    """Return the scene to photograph with the options, and what of its picture saturates."""
     from camkit.runtime.twin.saturation import exposure_for_share, saturation_of
     from camkit.scenes.saturation import with_exposure
 
@@ -213,7 +213,7 @@ def _exposed(
 def _facts(
     out: Path, truth: Path | None, simulation: "Simulation", saturation: "Saturation | None"
 ) -> dict[str, Any]:
-    """Give what `--json` prints."""
+    """Return what `--json` prints."""
     height, width = simulation.samples.shape[-2:]
     facts = {
         "path": str(out),
@@ -227,14 +227,14 @@ def _facts(
 
 
 def _metres(depth_mm: float | None) -> float | str | None:
-    """Give a distance as JSON can hold it, which has no infinity."""
+    """Return a distance as JSON can hold it, which has no infinity."""
     if depth_mm is None or math.isfinite(depth_mm):
         return depth_mm and depth_mm / MM_PER_M
     return "inf"
 
 
 def _line(out: Path, simulation: "Simulation", saturation: "Saturation | None") -> str:
-    """Give what is printed for people; a saturation only where it was asked for."""
+    """Return what is printed for people; a saturation only where it was asked for."""
     from camkit.contracts import depth_name
 
     height, width = simulation.samples.shape[-2:]
@@ -250,12 +250,12 @@ def _line(out: Path, simulation: "Simulation", saturation: "Saturation | None") 
 
 
 def _depth_mm(bundle: "Bundle") -> float | None:
-    """Give the distance of focus; None for a camera that states no optics."""
+    """Return the distance of focus; None for a camera that states no optics."""
     return None if bundle.manifest.optics is None else bundle.reference_depth_mm
 
 
 def _focus_um(path: Path | None, bundle: "Bundle") -> float:
-    """Give the focus of a body, which must be one of the bundle's camera."""
+    """Return the focus of a body, which must be one of the bundle's camera."""
     if path is None:
         return 0.0
     from camkit.runtime.unit import read_unit

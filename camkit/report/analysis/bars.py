@@ -53,7 +53,7 @@ class Bars:
 
 
 def contrast_of(line: Array, width_px: int) -> float:
-    """Give the signed contrast of bars behind a line spread, both pixels where the peak puts them.
+    """Return signed contrast of bars behind a line spread, both pixels where the peak puts them.
 
     Args:
         line: (n,) light by pixel, n odd, the peak in the middle.
@@ -108,7 +108,7 @@ def see_bars(
 
 
 def least_difference(mean: float, noise: NoiseModel, step: float) -> float:
-    """Give the difference that two pixels of the same mean light exceed once in twenty only.
+    """Return the difference that two pixels of the same mean light exceed once in twenty only.
 
     Args:
         mean: Their light, 1.0 = white level.
@@ -120,7 +120,7 @@ def least_difference(mean: float, noise: NoiseModel, step: float) -> float:
 
 
 def interval(count: int, total: int) -> tuple[float, float]:
-    """Give the interval (95 %) of a share that was counted.
+    """Return the interval (95 %) of a share that was counted.
 
     Args:
         count: Those that count.

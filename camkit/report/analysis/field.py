@@ -94,7 +94,7 @@ class FieldPoint:
 
     @property
     def weaker(self) -> Direction:
-        """Give the direction in which bars have the least contrast."""
+        """Return the direction in which bars have the least contrast."""
         return min(DIRECTIONS, key=lambda direction: self.bars[direction].contrast)
 
 
@@ -193,7 +193,7 @@ def _point(
 
 
 def to_json(found: Sequence[LensField], options: FieldOptions) -> dict[str, Any]:
-    """Give what was found as plain JSON values."""
+    """Return what was found as plain JSON values."""
     return {
         "iso": options.iso,
         "bars_px": options.bars_px,
@@ -259,7 +259,7 @@ def _short(value: float) -> float:
 
 
 def to_text(told: dict[str, Any]) -> str:
-    """Give what was found, as `to_json` has it, as a table for each lens."""
+    """Return what was found, as `to_json` has it, as a table for each lens."""
     head = (
         "mm",
         "deg",

@@ -17,7 +17,7 @@ from camkit.units import to_degrees
 
 
 def field_html(found: Sequence[LensField], options: FieldOptions) -> str:
-    """Give the page."""
+    """Return the page."""
     colour = (
         "the middle colour of each sensor"
         if options.wavelength_um is None

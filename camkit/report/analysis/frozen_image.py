@@ -37,7 +37,7 @@ def frozen_images(
     depth_mm: float | None = None,
     angle_at: Callable[[float], float | None] = lambda _: None,
 ) -> list[PointImage]:
-    """Give the images of points.
+    """Return the images of points.
 
     Args:
         optics: Kernels, and the haze beside them.
@@ -138,7 +138,7 @@ def _image(
 
 
 def within_cells(cells: Array, cell_px: int, off_px: tuple[int, int], radius_px: float) -> float:
-    """Give the light of cells, each even, within a radius of a place beside their middle.
+    """Return the light of cells, each even, within a radius of a place beside their middle.
 
     Args:
         cells: (n, n) light, n odd.
@@ -155,12 +155,12 @@ def within_cells(cells: Array, cell_px: int, off_px: tuple[int, int], radius_px:
 
 
 def _centred(line: Array, off_px: int) -> Array:
-    """Give a line with zeros added so that its peak lies in the middle."""
+    """Return a line with zeros added so that its peak lies in the middle."""
     return np.pad(line, (max(-2 * off_px, 0), max(2 * off_px, 0)))
 
 
 def _in_pixels(cells: Array, cell_px: int, off_px: int) -> Array:
-    """Give light by pixel of light by cell, linear between the middles of the cells."""
+    """Return light by pixel of light by cell, linear between the middles of the cells."""
     reach = (cells.size // 2 + 1) * cell_px
     at = np.arange(-reach, reach + 1)
     middles = (np.arange(cells.size + 2) - (cells.size // 2 + 1)) * cell_px
@@ -176,7 +176,7 @@ def _sum(one: Array, other: Array) -> Array:
 
 
 def sensor_heights_mm(sensor: ColorSensor, fields: int) -> Array:
-    """Give heights from the axis to the sensor's corner, evenly spaced."""
+    """Return heights from the axis to the sensor's corner, evenly spaced."""
     extent = sensor.known_extent
     corner_px = float(np.hypot(extent.width_px, extent.height_px)) / 2
     return np.linspace(0.0, corner_px * to_mm(extent.pixel_pitch_um), fields)

@@ -96,11 +96,11 @@ class Method:
     worst: tuple[Crop, ...] = ()
 
     def values(self, measure: str) -> Array:
-        """Give a measure of every patch."""
+        """Return a measure of every patch."""
         return np.array([patch.values[measure] for patch in self.patches])
 
     def maps(self, measure: str) -> dict[str, Array]:
-        """Give a measure of the patches of every picture, by row and column."""
+        """Return a measure of the patches of every picture, by row and column."""
         found: dict[str, list[Patch]] = {}
         for patch in self.patches:
             found.setdefault(patch.scene, []).append(patch)
@@ -165,7 +165,7 @@ class Report:
     control: Control
 
     def method(self, name: str) -> Method:
-        """Give a method by its name."""
+        """Return a method by its name."""
         return next(method for method in self.methods if method.name == name)
 
 
@@ -248,7 +248,7 @@ def _take(held: _Gathered, picture: FloatArray, view: _View, options: Options) -
 
 
 def _restored(rig: Rig, shot: Shot) -> dict[str, FloatArray]:
-    """Give the picture of every method.
+    """Return the picture of every method.
 
     Raises:
         ContractError: If one gives none.
@@ -291,7 +291,7 @@ def _judge(
 
 
 def to_json(report: Report, crops: Sequence[str] = ()) -> dict[str, Any]:
-    """Give what was found as plain JSON values.
+    """Return what was found as plain JSON values.
 
     Args:
         report: It.
@@ -342,7 +342,7 @@ def _known(value: float) -> float | None:
 
 
 def to_text(told: dict[str, Any]) -> str:
-    """Give what was found, as `to_json` has it, as a table."""
+    """Return what was found, as `to_json` has it, as a table."""
     lines = [f"{told['patches']} patches of {told['patch_px']} px, ISO {told['iso']:g}"]
     lines.append(f"perceptual: {told['perceptual']}")
     lines.append(f"  {'':16}" + "".join(f"{name + ' median, p99':>24}" for name in MEASURES))

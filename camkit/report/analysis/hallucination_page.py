@@ -28,7 +28,7 @@ _GAP_PX: Final = 4
 
 
 def hallucination_html(report: Report) -> str:
-    """Give the page."""
+    """Return the page."""
     control = report.control
     shown = [m for m in report.methods if m.name not in {TRUTH, INPUT}]
     primary = report.method(control.method)
@@ -128,7 +128,7 @@ def draw_maps(plain: Method, planted: Method) -> "Figure":
 
 
 def crop_picture(crop: Crop) -> NDArray[np.uint8]:
-    """Give truth, capture and restored side by side, (h, w, 3) BGR, twice as large."""
+    """Return truth, capture and restored side by side, (h, w, 3) BGR, twice as large."""
     parts = (crop.truth, crop.capture, crop.restored)
     wide = np.concatenate([np.clip(part, 0, 1) for part in parts], axis=2)
     levels = np.rint(255 * wide[::-1].transpose(1, 2, 0)).astype(np.uint8)
@@ -137,12 +137,12 @@ def crop_picture(crop: Crop) -> NDArray[np.uint8]:
 
 
 def crop_png(crop: Crop) -> bytes:
-    """Give the PNG of `crop_picture`."""
+    """Return the PNG of `crop_picture`."""
     return _png(crop_picture(crop))
 
 
 def crops_png(crops: Sequence[Crop]) -> bytes:
-    """Give the PNG of several, in rows of four."""
+    """Return the PNG of several, in rows of four."""
     pictures = [
         np.pad(crop_picture(crop), ((0, _GAP_PX), (0, _GAP_PX), (0, 0)), constant_values=255)
         for crop in crops

@@ -35,7 +35,7 @@ class Patch:
 
 
 def corners_of(height: int, width: int, side_px: int) -> list[tuple[int, int]]:
-    """Give the first pixels (y, x) of whole patches, row by row, away from the border."""
+    """Return the first pixels (y, x) of whole patches, row by row, away from the border."""
     rows, columns = (
         range(BORDER_PX, side - BORDER_PX - side_px + 1, side_px) for side in (height, width)
     )
@@ -81,7 +81,7 @@ def measure_patches(
 
 
 def overshoot_of(picture: FloatArray, truth: FloatArray) -> Array:
-    """Give by how much a picture leaves the range of the truth around, (h, w); 0 inside it."""
+    """Return by how much a picture leaves the range of the truth around, (h, w); 0 inside it."""
     size = (1, 2 * REACH_PX + 1, 2 * REACH_PX + 1)
     above = picture - scipy.ndimage.maximum_filter(truth, size)
     below = scipy.ndimage.minimum_filter(truth, size) - picture
@@ -89,7 +89,7 @@ def overshoot_of(picture: FloatArray, truth: FloatArray) -> Array:
 
 
 def summary(values: Array) -> dict[str, float | None]:
-    """Give median, 95th and 99th percentile and maximum of what is known."""
+    """Return median, 95th and 99th percentile and maximum of what is known."""
     known = values[np.isfinite(values)]
     if known.size == 0:
         return dict.fromkeys(("median", "p95", "p99", "max"))

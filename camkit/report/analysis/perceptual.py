@@ -26,7 +26,7 @@ Measure = Callable[[FloatArray, FloatArray], Array]
 
 
 def looks_different(first: FloatArray, second: FloatArray) -> Array:
-    """Give the dissimilarity (h, w) of two pictures (3, h, w) of sRGB values, without weights."""
+    """Return the dissimilarity (h, w) of two pictures (3, h, w) of sRGB values, without weights."""
     one, other = (np.tensordot(LUMA, p.astype(np.float64), axes=1) for p in (first, second))
     height, width = one.shape
     total = np.zeros((height, width))
@@ -39,7 +39,7 @@ def looks_different(first: FloatArray, second: FloatArray) -> Array:
 
 
 def vgg_measure(weights: Path) -> Measure:
-    """Give the measure by the features of VGG-19 (needs torch).
+    """Return the measure by the features of VGG-19 (needs torch).
 
     Raises:
         ContractError: If the file does not hold its weights.

@@ -48,7 +48,7 @@ class Band:
 
 
 def band_of(sensor: ColorSensor, wavelength_um: float | None = None) -> Band:
-    """Give the middle colour of a sensor, or one wavelength.
+    """Return the middle colour of a sensor, or one wavelength.
 
     Raises:
         ContractError: If the wavelength is not > 0.
@@ -106,7 +106,7 @@ class PointImage:
 
     @property
     def fwhm_px(self) -> float:
-        """Give the width of the peak: the diameter of a disc of the area above half its height.
+        """Return the width of the peak: the diameter of a disc of the area above half its height.
 
         Only what is joined to the highest place counts, on a grid eight times finer than pixels,
         linear between them.
@@ -117,7 +117,7 @@ class PointImage:
         return float(2 * np.sqrt((above == here).sum() / np.pi) / _FINER)
 
     def mtf(self, direction: Direction, cycles_per_px: Array) -> Array:
-        """Give the modulation transfer at spatial frequencies, that of the pixel included.
+        """Return the modulation transfer at spatial frequencies, that of the pixel included.
 
         Args:
             direction: In which the sinusoid varies.
@@ -165,14 +165,14 @@ def find_peak(light: Array) -> Peak:
 
 
 def disc(radius_px: float) -> Array:
-    """Give (n, n) of 1 where the middle of a pixel lies within a radius, 0 elsewhere."""
+    """Return (n, n) of 1 where the middle of a pixel lies within a radius, 0 elsewhere."""
     reach = int(radius_px)
     offset = np.arange(-reach, reach + 1)
     return np.asarray(np.hypot(offset[:, None], offset) < radius_px, np.float64)
 
 
 def likeness(first: PointImage, second: PointImage) -> float:
-    """Give the correlation of two peaks, where they lie best upon each other: 1 for equal ones.
+    """Return the correlation of two peaks, where they lie best upon each other: 1 for equal ones.
 
     The largest sum of products over shifts of up to 16 whole pixels, both patches scaled to 1.
     """
@@ -184,7 +184,7 @@ def likeness(first: PointImage, second: PointImage) -> float:
 
 
 def _finer(patch: Array) -> Array:
-    """Give a patch on a grid `_FINER` times finer, linear between the pixels."""
+    """Return a patch on a grid `_FINER` times finer, linear between the pixels."""
     return np.asarray(
         scipy.ndimage.zoom(patch, _FINER, order=1, grid_mode=True, mode="grid-constant")
     )

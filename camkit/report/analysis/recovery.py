@@ -129,7 +129,7 @@ def filled(picture: FloatArray, width: int, height: int) -> FloatArray:
 
 
 def zones_of(window: SensorWindow, scale: int, heights_mm: Array) -> NDArray[np.intp]:
-    """Give the number of the nearest field (h, w) of every sample of a picture.
+    """Return the number of the nearest field (h, w) of every sample of a picture.
 
     Of fields at one height the first counts.
     """
@@ -144,7 +144,7 @@ def zones_of(window: SensorWindow, scale: int, heights_mm: Array) -> NDArray[np.
 
 
 def _chosen(rig: Rig) -> Sequence[Method]:
-    """Give the capture, the last method without networks, and the network where there is one."""
+    """Return the capture, the last method without networks, and the network where there is one."""
     simple = [method for method in rig.methods if not method.networks]
     capture = next(method for method in simple if method.name == INPUT)
     named = {method.name: method for method in rig.networks}
@@ -153,7 +153,7 @@ def _chosen(rig: Rig) -> Sequence[Method]:
 
 
 def restored(pipeline: Pipeline, made: Simulation) -> FloatArray:
-    """Give what a pipeline makes of a simulated capture, (3, h, w) linear Rec.709."""
+    """Return what a pipeline makes of a simulated capture, (3, h, w) linear Rec.709."""
     capture = pipeline.capture_of(
         made.samples,
         iso=made.iso,
@@ -168,5 +168,5 @@ def _decibels(square: float) -> float:
 
 
 def _three(values: Sequence[float]) -> tuple[float, float, float]:
-    """Give capture, filter and method; the filter twice where it is the method."""
+    """Return capture, filter and method; the filter twice where it is the method."""
     return values[0], values[1], values[-1]

@@ -99,7 +99,7 @@ def find_subject(name: str, like: ColorSensor | None = None) -> Subject:
 
 
 def usual_sensor() -> ColorSensor:
-    """Give the sensor behind what has none."""
+    """Return the sensor behind what has none."""
     return light_sensor(open_bundle(find_bundle(USUAL_SENSOR)).manifest)
 
 
@@ -234,7 +234,7 @@ def _manifest_name(name: str) -> str:
 
 
 def _efl_mm(bundle: Bundle) -> float | None:
-    """Give the focal length of the lens that a bundle carries; None without one, or torch."""
+    """Return the focal length of the lens that a bundle carries; None without one, or torch."""
     if PRESCRIPTION not in bundle.names or util.find_spec("torch") is None:
         return None
     from camkit.models_def.optics.paraxial import paraxial_data
@@ -244,7 +244,7 @@ def _efl_mm(bundle: Bundle) -> float | None:
 
 
 def ideal_angle_rad(distortion: RadialDistortion, height_mm: float, efl_mm: float) -> float:
-    """Give the field angle whose light comes to a height, by the distortion of a lens.
+    """Return the field angle whose light comes to a height, by the distortion of a lens.
 
     Args:
         distortion: As its frozen PSF has it.

@@ -69,7 +69,7 @@ def traced_images(
 
 
 def last_angle_rad(lens: Lens, sensor: ColorSensor) -> float:
-    """Give the angle whose peak lies at the corner; where none does, the ideal one's."""
+    """Return the angle whose peak lies at the corner; where none does, the ideal one's."""
     pitch_um = sensor.known_extent.pixel_pitch_um
     corner_mm = corner_height_mm(sensor)
     try:
@@ -97,7 +97,7 @@ def land_band(lens: Lens, angle_rad: float, band: Band, pitch_um: float, rays: i
 def image_of(
     light: LandedLight, height_px: float, angle_rad: float, pitch_mm: float, illumination: float
 ) -> PointImage:
-    """Give the image of a point of rays with x >= 0 in the pupil, their mirror images added."""
+    """Return the image of a point of rays with x >= 0 in the pupil, their mirror images added."""
     total = float(light.share.sum())
     x, y, share = light.x_px, light.y_px - height_px, light.share / total
     columns, rows = np.rint(x), np.rint(y)
@@ -135,7 +135,7 @@ def _patch(rows: Array, columns: Array, share: Array) -> Array:
 
 
 def _illumination(lens: Lens, heights_px: Array, pitch_um: float) -> Array:
-    """Give how an even scene lights the sensor, (n,) of heights (n,), 1 on the axis.
+    """Return how an even scene lights the sensor, (n,) of heights (n,), 1 on the axis.
 
     Haze counts; a lens none of whose peaks lies at the corner is taken by its chief rays.
     """

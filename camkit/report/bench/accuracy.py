@@ -64,7 +64,7 @@ class Scores:
     error: str | None = None
 
     def picture_means(self, column: str) -> dict[str, float]:
-        """Give the mean over the captures of each picture."""
+        """Return the mean over the captures of each picture."""
         return {p: statistics.fmean(v[column]) for p, v in self.by_picture.items() if column in v}
 
 
@@ -79,7 +79,7 @@ class Restorers:
     def restore(
         self, trial: Trial | None, known: KnownCapture, products: Iterable[str] = (IMAGE,)
     ) -> dict[str, FloatArray]:
-        """Give products (c, h, w) in the geometry of the capture's truth; pictures linear Rec.709.
+        """Return products (c, h, w) in the geometry of the truth; pictures in linear Rec.709.
 
         Args:
             trial: The method; None, or one without a bundle, restores nothing.
@@ -114,7 +114,7 @@ class Restorers:
 
 
 def score_key(trial: Trial) -> Key:
-    """Give under which key a trial has its scores: rows that restore nothing are the input."""
+    """Return under which key a trial has its scores: rows that restore nothing are the input."""
     return INPUT if trial.method == DEVELOP else trial.accuracy_key
 
 
@@ -193,20 +193,20 @@ def _add(
 
 
 def mean_and_spread(values: Iterable[float]) -> tuple[float | None, float | None]:
-    """Give mean and standard deviation (n - 1); None for what the count does not allow."""
+    """Return mean and standard deviation (n - 1); None for what the count does not allow."""
     known = list(values)
     mean = statistics.fmean(known) if known else None
     return mean, statistics.stdev(known) if len(known) > 1 else None
 
 
 def mean_gain(scores: Scores, other: Scores, column: str) -> float | None:
-    """Give the mean over pictures of the gain over another method; None without pictures."""
+    """Return the mean over pictures of the gain over another method; None without pictures."""
     gains = _gains(scores, other, column)
     return statistics.fmean(gains) if gains else None
 
 
 def standard_error_of_gain(scores: Scores, other: Scores, column: str) -> float | None:
-    """Give the standard error over pictures of the gain over another; None for fewer than two.
+    """Return the standard error over pictures of the gain over another; None for fewer than two.
 
     The gain is taken picture by picture, so that the contents of the pictures, which move all
     methods alike, cancel.

@@ -83,7 +83,7 @@ class CropCollector:
 
 
 def display_gain(linear: FloatArray) -> np.float32:
-    """Give the whole factor that brings a dark patch's bright parts to middle grey, 1 for others.
+    """Return the whole factor that brings a dark patch's bright parts to middle grey, 1 for others.
 
     Args:
         linear: (3, h, w) float32 of the sharp patch.
@@ -93,7 +93,7 @@ def display_gain(linear: FloatArray) -> np.float32:
 
 
 def busiest_place(sharp: FloatArray, side_px: int = SIDE_PX) -> tuple[slice, slice]:
-    """Give rows and columns of the patch with most detail inside the border that is judged.
+    """Return rows and columns of the patch with most detail inside the border that is judged.
 
     Args:
         sharp: (3, h, w) float32 sRGB values.

@@ -60,7 +60,7 @@ class Edges:
     skips: tuple[Skip, ...] = ()
 
     def columns(self, key: Key) -> dict[str, float | None]:
-        """Give all columns of a row; None for what was not measured."""
+        """Return all columns of a row; None for what was not measured."""
         known = {**self.shared, **self.by_method.get(key, {})}
         return {f"{of}{name}": known.get(f"{of}{name}") for of in _OF for name in COLUMNS}
 
@@ -103,7 +103,7 @@ def measure_edges(bundle: Bundle, trials: Iterable[Trial], restorers: Restorers)
 
 
 def _drawn(manifest: Manifest, scale: int) -> NDArray[np.float32]:
-    """Give the edge; it runs along the longer side, where it shows more."""
+    """Return the edge; it runs along the longer side, where it shows more."""
     extent = manifest.sensor.extent
     most = (SIDE_PX, SIDE_PX) if extent is None else (extent.height_px, extent.width_px)
     height, width = (min(SIDE_PX, scale * side) // (2 * scale) * 2 * scale for side in most)

@@ -89,7 +89,7 @@ class KnownCapture:
 
 
 def golden_captures(bundle: Bundle) -> list[KnownCapture]:
-    """Give the golden cases of a bundle that are large enough to be judged."""
+    """Return the golden cases of a bundle that are large enough to be judged."""
     cases = bundle.manifest.golden
     arrays = golden_from_bytes(bundle.member(GOLDEN)) if cases else {}
     places = {case.name: _golden_place(bundle, arrays, case) for case in cases}
@@ -116,7 +116,7 @@ def golden_captures(bundle: Bundle) -> list[KnownCapture]:
 def _golden_place(
     bundle: Bundle, arrays: Mapping[str, GoldenArrays], case: GoldenCase
 ) -> tuple[float | None, float | None]:
-    """Give field share and distance of a golden case; None where the sensor has no size."""
+    """Return field share and distance of a golden case; None where the sensor has no size."""
     extent = bundle.manifest.sensor.extent
     if extent is None:
         return None, None
@@ -132,7 +132,7 @@ def _golden_place(
 
 
 def _field_share(window: SensorWindow) -> float:
-    """Give how far a window lies from the middle of its sensor; 1 touches a corner."""
+    """Return how far a window lies from the middle of its sensor; 1 touches a corner."""
     spare = [
         whole - side for whole, side in zip(window.sensor_size_px, window.size_px, strict=True)
     ]
@@ -209,7 +209,7 @@ def _photographed(
 
 
 def bench_scene(path: Path, bundle: Bundle, saturate: float | None = None) -> FloatArray:
-    """Give a picture as large and as bright as a camera photographs it.
+    """Return a picture as large and as bright as a camera photographs it.
 
     Args:
         path: A picture; of a large one the middle is taken.
@@ -230,7 +230,7 @@ def bench_scene(path: Path, bundle: Bundle, saturate: float | None = None) -> Fl
 
 
 def drawn_scene(name: str, bundle: Bundle, saturate: float | None = None) -> FloatArray:
-    """Give a scene of the register, at most `SCENE_PX` a side; else as `bench_scene`."""
+    """Return a scene of the register, at most `SCENE_PX` a side; else as `bench_scene`."""
     sensor, scale = light_sensor(bundle.manifest), picture_scale(bundle.manifest)
     width, height = (scale * min(SCENE_PX, side) for side in (sensor.width_px, sensor.height_px))
     return _exposed(named_scene(name, height, width), sensor, saturate, name)
@@ -260,7 +260,7 @@ def _whole_pixels(scene: FloatArray, scale: int) -> FloatArray:
 
 
 def known_capture(shot: Shot, exposed: Exposed) -> KnownCapture:
-    """Give what was photographed as a capture with a known truth, in sensor geometry."""
+    """Return what was photographed as a capture with a known truth, in sensor geometry."""
     simulation, share = exposed.simulation, FIELD_SHARES[shot.position]
     x, y = (int(v) for v in simulation.window.origin_px)
     return KnownCapture(

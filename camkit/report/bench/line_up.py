@@ -15,14 +15,14 @@ from camkit.runtime.plan.ways import offered_methods
 
 
 def makers_of(manifest: Manifest) -> tuple[RowMaker, ...]:
-    """Give the row makers of a camera, by name; one of its kind goes before a common one."""
+    """Return the row makers of a camera, by name; one of its kind goes before a common one."""
     own = find_part(manifest.kind, "bench", BenchPart).rows
     known = {maker.name: maker for maker in (*row_makers(), *own)}
     return tuple(known[name] for name in sorted(known))
 
 
 def metrics_of(manifest: Manifest) -> tuple[Metric, ...]:
-    """Give the metrics that a kind of camera names, for the products that the bundle has.
+    """Return the metrics that a kind of camera names, for the products that the bundle has.
 
     Raises:
         UnsupportedError: If it names one that is not there.
@@ -41,7 +41,7 @@ def metrics_of(manifest: Manifest) -> tuple[Metric, ...]:
 def make_trials(
     entrants: Sequence[Entrant], axes: Axes, ground: Ground
 ) -> tuple[list[Trial], list[Skip]]:
-    """Give the trials of all bundles, and what cannot be measured.
+    """Return the trials of all bundles, and what cannot be measured.
 
     Raises:
         ContractError: If a method has no maker.
@@ -63,7 +63,7 @@ def make_trials(
 
 
 def _axes_of(entrant: Entrant, axes: Axes) -> Axes:
-    """Give the axes of one bundle, its best methods named where that many are wanted."""
+    """Return the axes of one bundle, its best methods named where that many are wanted."""
     if axes.methods is not None or axes.best is None:
         return axes
     manifest = entrant.bundle.manifest

@@ -17,7 +17,7 @@ _TELLING: Final = ("sse4_2", "avx", "fma", "f16c", "amx", "neon", "asimd", "sve"
 
 
 def describe_machine() -> dict[str, Any]:
-    """Give processor, its vector instructions, cores, memory, and the versions in use.
+    """Return processor, its vector instructions, cores, memory, and the versions in use.
 
     Values that the system does not tell are None.
     """
@@ -39,12 +39,12 @@ def describe_machine() -> dict[str, Any]:
 
 
 def processor_name() -> str:
-    """Give what the processor calls itself, or else its architecture."""
+    """Return what the processor calls itself, or else its architecture."""
     return _cpuinfo("model name") or platform.processor() or platform.machine()
 
 
 def memory_mb() -> int | None:
-    """Give the memory of the machine; None where the system does not tell."""
+    """Return the memory of the machine; None where the system does not tell."""
     try:
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 10**6
     except (AttributeError, ValueError, OSError):
@@ -52,7 +52,7 @@ def memory_mb() -> int | None:
 
 
 def package_version(package: str) -> str | None:
-    """Give the version of an installed package; None if it is not there."""
+    """Return the version of an installed package; None if it is not there."""
     try:
         return metadata.version(package)
     except metadata.PackageNotFoundError:
@@ -60,17 +60,17 @@ def package_version(package: str) -> str | None:
 
 
 def free_memory_bytes() -> int | None:
-    """Give the memory that is free now; None where the system does not tell."""
+    """Return the memory that is free now; None where the system does not tell."""
     return _meminfo("MemAvailable")
 
 
 def telling_flags(flags: str) -> list[str]:
-    """Give those of a processor's flags that name its vector and matrix instructions."""
+    """Return those of a processor's flags that name its vector and matrix instructions."""
     return sorted(flag for flag in set(flags.split()) if flag.startswith(_TELLING))
 
 
 def _cpuinfo(key: str) -> str | None:
-    """Give the first value of a key in /proc/cpuinfo; None where there is none."""
+    """Return the first value of a key in /proc/cpuinfo; None where there is none."""
     try:
         with Path("/proc/cpuinfo").open(encoding="utf-8") as lines:
             for line in lines:

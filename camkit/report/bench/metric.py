@@ -53,5 +53,5 @@ class Metric:
 
 
 def registered_metrics() -> tuple[Metric, ...]:
-    """Give the metrics that any kind of camera may name."""
+    """Return the metrics that any kind of camera may name."""
     return discover("camkit.report.bench.metrics", "METRIC", Metric)

@@ -6,7 +6,7 @@ from camkit.runtime.plan.ways import offered_methods
 
 
 def method_rows(name: str, method: str, *, lacking: str) -> RowMaker:
-    """Give the maker of one row per bundle, on the first number of threads asked for.
+    """Return the maker of one row per bundle, on the first number of threads asked for.
 
     Args:
         name: Of the maker.

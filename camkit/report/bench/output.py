@@ -52,6 +52,6 @@ def write_csv(path: Path, rows: list[Row]) -> None:
 
 
 def flatten(row: Row) -> dict[str, Any]:
-    """Give a row without nesting: `stages` becomes columns `stage_NAME_s`; the other parts go."""
+    """Return a row without nesting: `stages` becomes columns `stage_NAME_s`; the other parts go."""
     flat = {name: value for name, value in row.items() if not isinstance(value, dict | list)}
     return flat | {f"stage_{name}_s": value for name, value in row.get("stages", {}).items()}

@@ -6,7 +6,7 @@ Point = tuple[float, float]
 
 
 def pareto_front(points: Sequence[Point]) -> list[int]:
-    """Give the indices of the points that no other point dominates, by increasing cost.
+    """Return the indices of the points that no other point dominates, by increasing cost.
 
     A point (cost, gain) is dominated if another costs no more and gains no less, and is better in
     one of the two. Of equal points the first stays.

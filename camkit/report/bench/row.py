@@ -123,7 +123,7 @@ def _spread_columns(name: str, spread: Spread | None) -> Row:
 
 
 def _network_share(trial: Trial, runs: Sequence[Run], facts: Facts) -> Row:
-    """Give the networks' useful multiply-adds per second over the machine's peak (CPU only)."""
+    """Return the networks' useful multiply-adds per second over the machine's peak (CPU only)."""
     stages = _stage_medians(runs).items()
     seconds = sum(s for stage, s in stages if stage.split()[0] == NETWORK)
     share = None
@@ -169,7 +169,7 @@ def _accuracy(trial: Trial, facts: Facts) -> Row:
 
 
 def _each_picture(metrics: Sequence[Metric], scores: Scores | None, of_input: Scores | None) -> Row:
-    """Give the numbers of every picture, of the metrics that want it; nothing where none does."""
+    """Return the numbers of every picture, of the metrics that want it; nothing where none does."""
     columns = [column for m in metrics if m.each_picture for column in m.columns]
     if not columns:
         return {}
@@ -186,7 +186,7 @@ def _each_picture(metrics: Sequence[Metric], scores: Scores | None, of_input: Sc
 def _gain(
     scores: Scores | None, other: Scores | None, column: str
 ) -> tuple[float | None, float | None]:
-    """Give mean and standard error over pictures of the gain over another method."""
+    """Return mean and standard error over pictures of the gain over another method."""
     if scores is None or other is None or scores is other:
         return None, None
     return mean_gain(scores, other, column), standard_error_of_gain(scores, other, column)

@@ -26,5 +26,5 @@ class RowMaker:
 
 
 def row_makers() -> tuple[RowMaker, ...]:
-    """Give the makers that serve every camera."""
+    """Return the makers that serve every camera."""
     return discover("camkit.report.bench.rows", "ROWS", RowMaker)

@@ -128,7 +128,7 @@ def run_bench(settings: Settings, tell: Tell = lambda _text: None) -> Result:
 
 
 def _nothing(entrants: Sequence[Entrant], skips: Sequence[Skip]) -> str:
-    """Say why there is nothing to measure, and what there is."""
+    """Return why there is nothing to measure, and what there is."""
     why = [f"{skip.what}: {skip.reason}" for skip in skips]
     have = [
         f"{entrant.label} has {', '.join(offered_methods(manifest.stages, manifest.all_planes))}"
@@ -232,7 +232,7 @@ def time_trials(
 
 
 def _twins(capture: Path, folder: Path) -> tuple[Path, ...]:
-    """Give the capture under two names: the first run of a process, and the steady one."""
+    """Return the capture under two names: the first run of a process, and the steady one."""
     folder.mkdir()
     twins = tuple(folder / f"{name}{capture.suffix}" for name in ("first", "steady"))
     for twin in twins:
@@ -289,7 +289,7 @@ def _judge(
 def _known_captures(
     bundle: Bundle, settings: Settings, folder: Path
 ) -> tuple[Iterable[KnownCapture], int, str]:
-    """Give the captures to judge on, how many there are, and what they are."""
+    """Return the captures to judge on, how many there are, and what they are."""
     part = find_part(bundle.manifest.kind, "bench", BenchPart)
     asked, psf = settings.images, folder / "psf"
     if settings.data is not None:
@@ -373,6 +373,6 @@ def _join(
 
 
 def _base_of(trial: Trial, trials: Sequence[Trial]) -> Trial:
-    """Give the trial that the others of its camera are compared with: size M, or the first."""
+    """Return the trial that the others of its camera are compared with: size M, or the first."""
     own = [other for other in trials if other.camera == trial.camera]
     return next((o for o in own if o.size == BASE_SIZE and o.bundle == o.camera), own[0])

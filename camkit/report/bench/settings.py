@@ -84,7 +84,7 @@ class Settings:
                 raise ContractError(f"{name} must be > 0; got {number:g}")
 
     def folder(self) -> Path:
-        """Give the folder for captures and PSFs, which only this user can read, and make it."""
+        """Return the folder for captures and PSFs, which only this user can read, and make it."""
         if self.work_dir is not None:
             self.work_dir.mkdir(parents=True, exist_ok=True)
             return self.work_dir

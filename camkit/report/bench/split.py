@@ -13,7 +13,7 @@ Cell = dict[str, Any]
 def split_columns(
     scores: Scores | None, of_input: Scores | None, metrics: Sequence[Metric]
 ) -> dict[str, list[Cell]]:
-    """Give `by_iso`, `by_field` and `by_iso_and_field` of a row.
+    """Return `by_iso`, `by_field` and `by_iso_and_field` of a row.
 
     A cell holds what its captures share (`iso`; `field_share`, and their mean `field_mm`), how
     many `captures` of how many `images` there are, and the mean over pictures of every column that
@@ -68,7 +68,7 @@ def _grouped(
 
 
 def picture_mean(taken: Iterable[Taken], column: str) -> float | None:
-    """Give the mean over pictures of the means over their captures; None without any."""
+    """Return the mean over pictures of the means over their captures; None without any."""
     by_picture: dict[str, list[float]] = {}
     for one in taken:
         if column in one.values:

@@ -52,7 +52,7 @@ class Trial:
 
     @property
     def accuracy_key(self) -> tuple[object, ...]:
-        """Give what decides the pixels: neither threads nor tiles change a bit of them."""
+        """Return what decides the pixels: neither threads nor tiles change a bit of them."""
         pixels = self.size, self.mode, self.dtype, self.provider, self.extra
         return (self.camera, self.bundle, self.method, *pixels)
 
@@ -79,7 +79,7 @@ class Trial:
         return found
 
     def options(self) -> dict[str, Any]:
-        """Give what differs from the default `Options`, as plain JSON values."""
+        """Return what differs from the default `Options`, as plain JSON values."""
         chosen: dict[str, Any] = {
             "method": None if self.path is None else self.method,
             "size": self.size,
@@ -161,7 +161,7 @@ class Ground:
     free_bytes: int | None
 
     def base_threads(self, axes: Axes) -> int:
-        """Give the threads of rows that do not vary them: the first asked for, if there."""
+        """Return the threads of rows that do not vary them: the first asked for, if there."""
         return min((axes.threads or (self.threads,))[0], self.threads)
 
 
@@ -201,7 +201,7 @@ class Vary(NamedTuple):
 
 
 def spread_out(base: Trial, axes: Sequence[Vary], *, vary: bool) -> Iterator[Trial]:
-    """Give a trial for every product of the axes asked for, then those varied one at a time.
+    """Return a trial for every product of the axes asked for, then those varied one at a time.
 
     Args:
         base: Gives the fields that no axis sets.

@@ -59,7 +59,7 @@ def _told(key: tuple[str, str, str, str | None], tuning: Tuning) -> dict[str, An
 
 
 def tuning_of(trial: Trial, bundle: Bundle) -> Tuning:
-    """Say how the method of a trial was tuned.
+    """Return how the method of a trial was tuned.
 
     Args:
         trial: The trial.
@@ -74,7 +74,7 @@ def tuning_of(trial: Trial, bundle: Bundle) -> Tuning:
 
 
 def _of_network(size: str, bundle: Bundle) -> Tuning:
-    """Say what the networks of a size were trained on, in the words of the manifest."""
+    """Return what the networks of a size were trained on, in the words of the manifest."""
     manifest = bundle.manifest
     roles = [role for role, sizes in manifest.networks.items() if size in sizes]
     weights = sum(bundle.network_facts(role, size).parameters for role in roles)

@@ -46,7 +46,7 @@ class Curve:
 
 
 def bundle_html(before: Bundle, made: Bundle, record: Mapping[str, Any]) -> str:
-    """Give the page.
+    """Return the page.
 
     Args:
         before: What was copied.
@@ -74,7 +74,7 @@ def bundle_html(before: Bundle, made: Bundle, record: Mapping[str, Any]) -> str:
 
 
 def moved(before: Bundle, made: Bundle) -> Curve:
-    """Give how much farther out light lies than without distortion, px; 0 where none is stated."""
+    """Return how much farther out light lies than undistorted, in px; 0 where none is stated."""
     extent = made.manifest.sensor.known_extent
     pitch_mm, ideal_mm = to_mm(extent.pixel_pitch_um), half_diagonal_mm(extent)
     found = []
@@ -89,7 +89,7 @@ def moved(before: Bundle, made: Bundle) -> Curve:
 
 
 def light(before: Bundle, made: Bundle) -> Curve:
-    """Give relative illumination over the height in mm; 1 where a bundle states none."""
+    """Return relative illumination over the height in mm; 1 where a bundle states none."""
     found = [_light_of(bundle) for bundle in (before, made)]
     heights_mm = np.linspace(0, max(known[0][-1] for known in found), POINTS)
     first, second = (np.interp(heights_mm**2, at**2, value) for at, value in found)
@@ -97,7 +97,7 @@ def light(before: Bundle, made: Bundle) -> Curve:
 
 
 def held(bundle: Bundle) -> list[FloatGrid]:
-    """Give the share of every colour's light within 0.5, 1.5, ... px of the middle, on the axis."""
+    """Return share of every colour's light within 0.5, 1.5, ... px of the middle, on the axis."""
     kernels = color_kernels(bundle.psf, *_sensor(bundle).response_arrays())
     return [light_within(kernel) for kernel in kernels.at(0.0, 0.0)]
 
@@ -109,7 +109,7 @@ def _sensor(bundle: Bundle) -> BayerSensor | PlanesSensor:
 
 
 def _states(bundle: Bundle, part: str) -> bool:
-    """Tell whether a lens profile has a part; optics with kernels have both."""
+    """Return whether a lens profile has a part; optics with kernels have both."""
     return bool(getattr(bundle.manifest.optics, part, True))
 
 

@@ -15,7 +15,7 @@ _MOST_PICTURES: Final = 8
 
 
 def flat_html(facts: FlatFacts) -> str:
-    """Give the page."""
+    """Return the page."""
     told = "Lens and display were told apart." if facts.separated else "NOT told apart:"
     words = sentences(told, *facts.notes)
     rows = tuple(

@@ -13,7 +13,7 @@ from camkit.runtime.calibration.geometry.geometry import Geometry
 
 
 def geometry_sections(found: Geometry) -> list[Section]:
-    """Give the sections of the page, pictures drawn."""
+    """Return the sections of the page, pictures drawn."""
     coverage, radial = found.coverage, found.radial
     beyond = (
         "The board reached the corners of the picture."

@@ -26,7 +26,7 @@ _FITTED: Final = "#2e8b57"
 
 
 def enlargement(residuals: FloatGrid, size: tuple[int, int]) -> int:
-    """Give the factor by which residuals are enlarged: of a round number, so that all fit."""
+    """Return the factor by which residuals are enlarged: of a round number, so that all fit."""
     longest = float(np.linalg.norm(residuals, axis=-1).max())
     fitting = [n for n in FACTORS if n * longest <= LONGEST * max(size)]
     return fitting[-1] if fitting else FACTORS[0]
@@ -113,13 +113,13 @@ def draw_distortion(found: Geometry) -> bytes:
 
 
 def _at_least(limits: tuple[float, float]) -> tuple[float, float]:
-    """Give limits of an axis that make nothing of what is nothing."""
+    """Return limits of an axis that make nothing of what is nothing."""
     low, high = limits
     return min(low, -_SMALL_PX), max(high, _SMALL_PX)
 
 
 def _picture_axes(found: Geometry) -> "tuple[Figure, Axes]":
-    """Give axes that are the picture, y down."""
+    """Return axes that are the picture, y down."""
     width, height = found.size
     figure = new_figure(WIDTH_IN, WIDTH_IN * min(1.5, height / width) + 0.6)
     axes = figure.add_subplot()

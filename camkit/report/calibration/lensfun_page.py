@@ -41,18 +41,18 @@ class Curves:
 
 
 def entry_html(made: Entry) -> str:
-    """Give the page of an entry for lensfun."""
+    """Return the page of an entry for lensfun."""
     return _html(f"camkit calibrate lensfun-out: {made.name.model}", curves_of_entry(made), made)
 
 
 def bundle_html(made: LensBundle) -> str:
-    """Give the page of a bundle of a lens that lensfun knows."""
+    """Return the page of a bundle of a lens that lensfun knows."""
     title = f"camkit calibrate lensfun-in: {made.found.lens.name}"
     return _html(title, curves_of_bundle(made), made)
 
 
 def curves_of_entry(made: Entry) -> Curves:
-    """Give what an entry says and what it misses of its source."""
+    """Return what an entry says and what it misses of its source."""
     placed = np.linspace(0, made.source.corner_px, POINTS)
     straight = made.straight_px(placed)
     half_px = float(np.hypot(*made.size_px)) / 2
@@ -65,7 +65,7 @@ def curves_of_entry(made: Entry) -> Curves:
 
 
 def curves_of_bundle(made: LensBundle) -> Curves:
-    """Give what a bundle does and what it misses of lensfun's formula; green, else all colours."""
+    """Return what a bundle does, and misses of lensfun's formula; green, else all colours."""
     found, extent = made.found, made.manifest.sensor.known_extent
     pitch_mm, ideal_mm = to_mm(extent.pixel_pitch_um), half_diagonal_mm(extent)
     profile = found.profile
@@ -87,13 +87,13 @@ def curves_of_bundle(made: LensBundle) -> Curves:
 
 
 def half_diagonal_mm(extent: Extent) -> FloatGrid:
-    """Give `POINTS` radii from the middle of a sensor to its corner."""
+    """Return `POINTS` radii from the middle of a sensor to its corner."""
     half_px = np.hypot(extent.width_px, extent.height_px) / 2
     return np.linspace(0, half_px * to_mm(extent.pixel_pitch_um), POINTS)
 
 
 def placed_along(ideal_mm: FloatGrid, rows: RadialDistortion, channel: int) -> FloatGrid:
-    """Give where light of ideal radii falls."""
+    """Return where light of ideal radii falls."""
     points = np.stack([ideal_mm, np.zeros(ideal_mm.size)], axis=-1)
     return distort_points(points, rows, channel=channel)[:, 0]
 

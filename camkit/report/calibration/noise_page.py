@@ -21,7 +21,7 @@ _SURE: Final = 2.0
 
 
 def noise_html(facts: NoiseFacts) -> str:
-    """Give the page."""
+    """Return the page."""
     table = Table(header=_HEADER, rows=tuple(_row(iso) for iso in facts.isos))
     sections = [Section(title="Noise by ISO", paragraph=sentences(*facts.notes), table=table)]
     for iso in facts.isos:

@@ -34,7 +34,7 @@ class Table:
 
 
 def sentences(*notes: str) -> str | None:
-    """Give notes as one paragraph of sentences, names of files as they are; None without any."""
+    """Return notes as one paragraph of sentences, names of files as they are; None without any."""
     ended = (note if note.endswith((".", ":")) else f"{note}." for note in notes if note)
     return " ".join(map(_begun, ended)) or None
 
@@ -66,7 +66,7 @@ class Section:
 
 
 def to_html(title: str, sections: Sequence[Section]) -> str:
-    """Give the page.
+    """Return the page.
 
     Args:
         title: Heading.

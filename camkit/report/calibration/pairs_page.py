@@ -18,7 +18,7 @@ LONGEST: Final = 0.06
 
 
 def pairs_html(found: Pairs) -> str:
-    """Give the page."""
+    """Return the page."""
     rows = tuple(
         (
             pair.target.name,

@@ -20,7 +20,7 @@ _DECADES: Final = 6
 
 
 def psf_html(found: MeasuredPsf) -> str:
-    """Give the page."""
+    """Return the page."""
     (field,) = found.fields
     told = (
         f"The light lies at ({found.centre_px[0]:.2f}, {found.centre_px[1]:.2f}) px, "

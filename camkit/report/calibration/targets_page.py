@@ -28,7 +28,7 @@ _USES: Final = {
 
 
 def shrunk(codes: Codes) -> Codes:
-    """Give a target (h, w, 3) as small as the page shows it."""
+    """Return a target (h, w, 3) as small as the page shows it."""
     height, width = codes.shape[:2]
     ratio = min(1.0, SMALL_PX / max(height, width))
     size = max(1, round(ratio * width)), max(1, round(ratio * height))
@@ -36,7 +36,7 @@ def shrunk(codes: Codes) -> Codes:
 
 
 def targets_html(planned: Targets, small: Sequence[Codes]) -> str:
-    """Give the page.
+    """Return the page.
 
     Args:
         planned: What is shown.

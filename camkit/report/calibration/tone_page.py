@@ -15,7 +15,7 @@ _POINTS: Final = 256
 
 
 def tone_html(facts: ToneFacts) -> str:
-    """Give the page."""
+    """Return the page."""
     rest = facts.residuals
     if rest is None:
         rest = np.full(facts.levels.size, np.nan)

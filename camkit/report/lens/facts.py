@@ -94,7 +94,7 @@ class LensFacts:
         return sum(surface.thickness_mm for surface in self.lens.surfaces)
 
     def drawn_fields(self, at_most: int = 5) -> list[int]:
-        """Give the fields that a crowded chart shows: the first, the last, and some between."""
+        """Return the fields that a crowded chart shows: the first, the last, and some between."""
         count = len(self.lens.field_angles_rad)
         if count <= at_most:
             return list(range(count))
@@ -167,7 +167,7 @@ def _try(what: str, compute: Callable[[], Found], otherwise: Found, notes: list[
 
 
 def _warnings(lens: Lens, spots: Spots) -> list[str]:
-    """Say which glasses cannot be and which fields lose rays."""
+    """Return which glasses cannot be and which fields lose rays."""
     found = [
         f"surface {i}: {surface.glass} is {surface.thickness_mm:g} mm thick, which cannot be made"
         for i, surface in enumerate(lens.surfaces)
@@ -191,7 +191,7 @@ def _warnings(lens: Lens, spots: Spots) -> list[str]:
 
 
 def _sampling_note(pupil: Pupil, convergence: Convergence) -> list[str]:
-    """Say how far the chosen sampling is from the converged RMS."""
+    """Return how far the chosen sampling is from the converged RMS."""
     if pupil.sampling not in convergence.samplings:
         return []
     mine = convergence.rms_mm[convergence.samplings.index(pupil.sampling)]
@@ -206,7 +206,7 @@ def _sampling_note(pupil: Pupil, convergence: Convergence) -> list[str]:
 
 
 def to_json(facts: LensFacts) -> dict[str, Any]:
-    """Give the object that `camkit lens show --json` prints; None where there is no number."""
+    """Return the object that `camkit lens show --json` prints; None where there is no number."""
     data, sums = facts.paraxial, facts.seidel
     found = {
         "name": facts.lens.name,
@@ -269,7 +269,7 @@ def _convergence(facts: LensFacts) -> list[dict[str, Any]]:
 
 
 def _finite(value: Any) -> Any:
-    """Give JSON values with None for what is no number: NaN and infinity are not JSON."""
+    """Return JSON values with None for what is no number: NaN and infinity are not JSON."""
     if isinstance(value, dict):
         return {name: _finite(inner) for name, inner in value.items()}
     if isinstance(value, list):

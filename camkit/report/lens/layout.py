@@ -69,7 +69,7 @@ def draw_layout_on(panel: "Panel", facts: LensFacts) -> None:
 
 
 def _vertices(lens: Lens) -> list[float]:
-    """Give the places of all vertices and of the sensor."""
+    """Return the places of all vertices and of the sensor."""
     places = [0.0]
     for surface in lens.surfaces:
         places.append(places[-1] + surface.thickness_mm)
@@ -77,7 +77,7 @@ def _vertices(lens: Lens) -> list[float]:
 
 
 def _ray_paths(facts: LensFacts, field: int) -> tuple[Tensor, Tensor]:
-    """Give z and y (point, ray) of a fan; NaN from where a ray is lost."""
+    """Return z and y (point, ray) of a fan; NaN from where a ray is lost."""
     lens = facts.lens
     across = torch.linspace(-1, 1, RAYS_PER_FIELD, dtype=torch.float64)
     fan = PupilSamples(x=torch.zeros_like(across), y=across)
@@ -100,7 +100,7 @@ def _ray_paths(facts: LensFacts, field: int) -> tuple[Tensor, Tensor]:
 
 
 def _semi_diameters(facts: LensFacts, paths: list[tuple[Tensor, Tensor]]) -> list[float]:
-    """Give the height to which each surface is drawn: its rim, or a little beyond the rays."""
+    """Return the height to which each surface is drawn: its rim, or a little beyond the rays."""
     reach = torch.stack([torch.nan_to_num(torch.abs(y[1:-1])).amax(-1) for _, y in paths]).amax(0)
     least = facts.paraxial.stop_semi_diameter_mm
     heights = []
@@ -111,7 +111,7 @@ def _semi_diameters(facts: LensFacts, paths: list[tuple[Tensor, Tensor]]) -> lis
 
 
 def _profile(lens: Lens, number: int, height_mm: float) -> tuple[Tensor, Tensor]:
-    """Give z and y of a surface, cut off where it ends."""
+    """Return z and y of a surface, cut off where it ends."""
     surface = lens.surfaces[number]
     square = (1 + surface.conic) * surface.curvature_per_mm**2
     if square > 0:

@@ -71,7 +71,7 @@ def draw_mtf(facts: LensFacts) -> "Figure":
 
 
 def trace_mtf(facts: LensFacts) -> tuple[Tensor, str, Mtf, Mtf]:
-    """Give frequencies in cycles/mm, the model used, the contrast and its diffraction limit."""
+    """Return frequencies in cycles/mm, the model used, the contrast and its diffraction limit."""
     lens, waves = facts.lens, facts.wavelengths_um
     definition = facts.pupil.definition
     rim = trace_wavefront(lens, facts.slopes, waves, pupil_samples(_RIM_SAMPLING), definition)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def page_path(folder: Path, name: str) -> Path:
-    """Give the page's file."""
+    """Return the page's file."""
     return folder / f"{name}.html"
 
 

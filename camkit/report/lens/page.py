@@ -40,7 +40,7 @@ _CAPTIONS: Final = {
 
 
 def to_html(facts: LensFacts, pictures: Mapping[str, str]) -> str:
-    """Give the page.
+    """Return the page.
 
     Args:
         facts: Of the lens.

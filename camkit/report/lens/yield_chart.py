@@ -21,7 +21,7 @@ _WORST: Final = 10
 
 
 def chart_paths(folder: Path, name: str) -> tuple[Path, Path, Path]:
-    """Give the files of a run: PNG, SVG, JSON."""
+    """Return the files of a run: PNG, SVG, JSON."""
     endings = (".png", ".svg", ".json")
     png, svg, text = (folder / f"{name}-tolerance{ending}" for ending in endings)
     return png, svg, text
@@ -89,7 +89,7 @@ def _overall_um(measured: Measured) -> "np.ndarray[Any, np.dtype[np.float64]]":
 
 
 def to_json(result: ToleranceResult) -> dict[str, Any]:
-    """Give the object that `camkit lens tolerance --json` prints."""
+    """Return the object that `camkit lens tolerance --json` prints."""
     nominal, copies, run = result.nominal, result.copies, result.run
     nominal_db = float(nominal.mean_db[0])
     return {
@@ -158,7 +158,7 @@ def _offender(found: Offender) -> dict[str, Any]:
 
 
 def to_text(result: ToleranceResult) -> str:
-    """Give the table for the terminal."""
+    """Return the table for the terminal."""
     nominal = float(result.nominal.mean_db[0])
     spots = _overall_um(result.copies)
     low, middle, high = (result.percentile_db(p) for p in PERCENTS)

@@ -52,7 +52,7 @@ def draw_cuts(facts: PlateFacts) -> "Figure":
 
 
 def along(psf: Tensor, angle_deg: float) -> Tensor:
-    """Give the light (distance,) of both arms of a line, within HALF_WIDTH_PX of it.
+    """Return the light (distance,) of both arms of a line, within HALF_WIDTH_PX of it.
 
     Pixels are looked at four by four times, so that a slanted line is as smooth as an upright one.
 
@@ -77,7 +77,7 @@ def along(psf: Tensor, angle_deg: float) -> Tensor:
 
 
 def farther(psf: Tensor) -> Tensor:
-    """Give the share (distance,) of the light beyond each whole distance from the middle."""
+    """Return the share (distance,) of the light beyond each whole distance from the middle."""
     half = psf.shape[-1] // 2
     place = torch.arange(psf.shape[-1], dtype=torch.float64) - half
     at = (place[:, None] ** 2 + place[None, :] ** 2).sqrt().ceil().long().clamp(max=half + 1)

@@ -20,13 +20,13 @@ _MASK: Final = re.compile(r"mask_\d+\.png")
 
 
 def dot_paths(folder: Path, levels: int) -> list[Path]:
-    """Give the files of a plate of so many levels: its masks, the shallowest first, and heights."""
+    """Return files of a plate of so many levels: its masks, the shallowest first, and heights."""
     count = levels.bit_length() - 1
     return [*(folder / f"mask_{number}.png" for number in range(1, count + 1)), folder / PLATE]
 
 
 def older_files(folder: Path) -> list[Path]:
-    """Give what an earlier plate left in a folder, masks of other numbers of levels among it."""
+    """Return what an earlier plate left in a folder, masks of other numbers of levels among it."""
     if not folder.is_dir():
         return []
     return sorted(p for p in folder.iterdir() if p.name == PLATE or _MASK.fullmatch(p.name))
@@ -90,7 +90,7 @@ def _masks(plate: DotPlate, paths: Sequence[Path]) -> list[dict[str, Any]]:
 
 
 def _npz(plate: DotPlate, seen: FloatGrid) -> bytes:
-    """Give the archive: one unit, and the PSFs of dots and of the array, of unit sum."""
+    """Return the archive: one unit, and the PSFs of dots and of the array, of unit sum."""
     light = plate.light
     data = io.BytesIO()
     np.savez(

@@ -117,7 +117,7 @@ def analyse(plate: Plate, look: Look) -> PlateFacts:
 
 
 def to_json(facts: PlateFacts) -> dict[str, Any]:
-    """Give what stands on the page as numbers; shares are rounded to 1e-5."""
+    """Return what stands on the page as numbers; shares are rounded to 1e-5."""
     return {
         "name": facts.plate.name,
         "depth_m": facts.depth_mm / MM_PER_M if np.isfinite(facts.depth_mm) else "inf",
@@ -146,7 +146,7 @@ def _shares(channels: tuple[str, ...], found: tuple[Shares, ...]) -> dict[str, d
 
 
 def _colours(plate: Plate, look: Look, depth_mm: float, *, bare: bool) -> Tensor:
-    """Give the PSF (colour, side, side) of the sensor's colours, flat spectrum."""
+    """Return the PSF (colour, side, side) of the sensor's colours, flat spectrum."""
     response_um, response = look.sensor.response_arrays()
     waves_um = np.linspace(response_um[0], response_um[-1], WAVELENGTHS)
     weights = torch.from_numpy(wavelength_weights(waves_um, response_um, response))

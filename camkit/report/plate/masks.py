@@ -19,7 +19,7 @@ POLARITY: Final = "white: glass stays; black: glass is etched away to depth_um"
 
 
 def etching_of(plate: Plate) -> Etching:
-    """Give how a plate is etched.
+    """Return how a plate is etched.
 
     Raises:
         ContractError: If its file does not say.
@@ -33,7 +33,7 @@ def etching_of(plate: Plate) -> Etching:
 
 
 def mask_paths(plate: Plate, folder: Path, name: str, kind: MaskFormat) -> list[Path]:
-    """Give the files of the masks, the shallowest first, and of their JSON.
+    """Return the files of the masks, the shallowest first, and of their JSON.
 
     Raises:
         ContractError: If the plate is not etched.
@@ -94,7 +94,7 @@ def write_masks(plate: Plate, folder: Path, name: str, kind: MaskFormat) -> dict
 
 
 def mask_image(layer: NDArray[np.bool_], kind: MaskFormat) -> bytes:
-    """Give an image file of a mask: a PNG of one bit, or a TIFF of eight."""
+    """Return an image file of a mask: a PNG of one bit, or a TIFF of eight."""
     import cv2
 
     picture = np.where(layer, np.uint8(WHITE), np.uint8(0))

@@ -14,7 +14,7 @@ from camkit.runtime.output.part_file import atomic_outputs
 
 
 def page_path(folder: Path, name: str) -> Path:
-    """Give the page's file."""
+    """Return the page's file."""
     return folder / f"{name}.html"
 
 

@@ -27,7 +27,7 @@ _CAPTIONS: Final = {
 
 
 def to_html(facts: PlateFacts, pictures: Mapping[str, str]) -> str:
-    """Give the page.
+    """Return the page.
 
     Args:
         facts: Of the plate.

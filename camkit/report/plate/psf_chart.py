@@ -45,14 +45,14 @@ def draw_psf(facts: PlateFacts) -> "Figure":
 
 
 def shown_reach_px(facts: PlateFacts) -> int:
-    """Give how far from the middle is drawn: somewhat beyond the longest streak."""
+    """Return how far from the middle is drawn: somewhat beyond the longest streak."""
     half = facts.psf.shape[-1] // 2
     longest = max((streak.reach_px for streak in facts.streaks), default=0.0)
     return min(half, max(_LEAST_PX, round(_BEYOND * longest)))
 
 
 def log_light(psf: Tensor, reach_px: int) -> Tensor:
-    """Give log10 of the middle of a PSF (side, side)."""
+    """Return log10 of the middle of a PSF (side, side)."""
     half = psf.shape[-1] // 2
     inner = slice(half - reach_px, half + reach_px + 1)
     return torch.log10(psf[inner, inner].clamp_min(1e-12))

@@ -119,7 +119,7 @@ def _finite(value: float) -> float | None:
 
 
 def _means(margins: Margins, weights: Grid) -> dict[str, Grid]:
-    """Give rule -> (n, draws) mean margin; what no scene knows is no reason to break.
+    """Return rule -> (n, draws) mean margin; what no scene knows is no reason to break.
 
     Args:
         margins: Per value and scene.
@@ -136,7 +136,7 @@ def _means(margins: Margins, weights: Grid) -> dict[str, Grid]:
 
 
 def _breaks(margins: Margins, side: Side, weights: Grid) -> tuple[Grid, list[str]]:
-    """Give the break point of every draw, infinite where there is none, and its rule."""
+    """Return the break point of every draw, infinite where there is none, and its rule."""
     means = _means(margins, weights)
     rules, stacked = list(means), np.stack(list(means.values()))
     count, nominal = margins.values.size, margins.nominal
@@ -154,7 +154,7 @@ def _breaks(margins: Margins, side: Side, weights: Grid) -> tuple[Grid, list[str
 
 
 def _crossings(sound: Grid, broken: Grid) -> Grid:
-    """Give the share of the way at which margins cross zero.
+    """Return the share of the way at which margins cross zero.
 
     A fault crosses at its end; a rule that is not broken crosses nowhere.
     """

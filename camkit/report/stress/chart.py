@@ -58,7 +58,7 @@ def draw_curve(curve: Curve, breaks: Sequence[Break]) -> bytes:
 
 
 def _common(grids: Sequence[Grid]) -> Grid:
-    """Give how far each scene lies from the others in the mean over the methods."""
+    """Return how far each scene lies from the others in the mean over the methods."""
     known = np.stack([np.where(np.isfinite(grid), grid, np.nan) for grid in grids])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # nothing is known: stays NaN
@@ -83,7 +83,7 @@ def _line(axis: "Axes", curve: Curve, method: str, found: tuple[Grid, Grid]) -> 
 
 
 def _colour(curve: Curve, method: str) -> str:
-    """Give the colour of a method."""
+    """Return the colour of a method."""
     namesake = method.removesuffix(f" {BEFORE}")
     for names, colours in ((curve.rivals, RIVAL_COLOURS), (curve.judged, JUDGED_COLOURS)):
         if namesake in names:
@@ -92,7 +92,7 @@ def _colour(curve: Curve, method: str) -> str:
 
 
 def _position(curve: Curve, value: float) -> float:
-    """Give where a value lies between the evenly spaced values."""
+    """Return where a value lies between the evenly spaced values."""
     return float(np.interp(value, np.array(curve.values), np.arange(len(curve.values))))
 
 

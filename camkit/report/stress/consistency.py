@@ -54,7 +54,7 @@ class Residual:
     contrast: NDArray[np.float64]
 
     def chi2(self, model_error: float) -> float:
-        """Give chi^2 per sample.
+        """Return chi^2 per sample.
 
         Args:
             model_error: Deviation of the model as a share of the contrast.
@@ -96,7 +96,7 @@ def residual(planes: FloatArray, shot: Shot, lens: Lens) -> Residual | None:
 
 
 def _middle(side_px: int) -> slice:
-    """Give the middle of an axis, from an even pixel so that the mosaic keeps its phase."""
+    """Return the middle of an axis, from an even pixel so that the mosaic keeps its phase."""
     length = min(MIDDLE_PX, side_px)
     start = (side_px - length) // 2 // 2 * 2
     return slice(start, start + length)
@@ -129,7 +129,7 @@ def _blur(planes: FloatArray, shot: Shot, lens: Lens, part: tuple[slice, slice])
 
 
 def judged_pixels(shot: Shot) -> NDArray[np.bool_]:
-    """Give bool of the shape of the samples, true away from border, clipped and spoiled ones."""
+    """Return bool of the shape of the samples, true away from border, clipped and spoiled ones."""
     capture = shot.capture
     clipped = capture.saturated_rows(0, capture.height)
     if shot.spoiled is not None:
@@ -143,7 +143,7 @@ def judged_pixels(shot: Shot) -> NDArray[np.bool_]:
 
 
 def near(mask: NDArray[np.bool_], reach_px: int) -> NDArray[np.bool_]:
-    """Give what lies within a square of `reach_px` around true samples, plane by plane."""
+    """Return what lies within a square of `reach_px` around true samples, plane by plane."""
     if not mask.any():
         return mask.copy()
     side = 2 * reach_px + 1
@@ -164,12 +164,12 @@ class Scale:
     unit: float = 1.0
 
     def chi2(self, found: Residual) -> float:
-        """Give chi^2 per sample, 1 (or less) on the nominal capture."""
+        """Return chi^2 per sample, 1 (or less) on the nominal capture."""
         return found.chi2(self.model_error) / self.unit
 
 
 def calibrate(nominal: Residual) -> Scale:
-    """Give the scale on which chi^2 of a nominal capture is 1; less if it is without any."""
+    """Return the scale on which chi^2 of a nominal capture is 1; less if it is without any."""
     low, high = 0.0, MOST_MODEL_ERROR
     if nominal.chi2(low) <= 1:
         return Scale()
@@ -182,7 +182,7 @@ def calibrate(nominal: Residual) -> Scale:
 
 
 def _contrast(planes: FloatArray) -> FloatArray:
-    """Give the standard deviation within a small square around every pixel, (c, h, w)."""
+    """Return the standard deviation within a small square around every pixel, (c, h, w)."""
     size = (1, CONTRAST_PX, CONTRAST_PX)
     mean = scipy.ndimage.uniform_filter(planes, size)
     square = scipy.ndimage.uniform_filter(np.square(planes), size)

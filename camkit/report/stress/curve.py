@@ -49,11 +49,11 @@ class Curve:
 
     @property
     def nominal(self) -> int:
-        """Give the index of the nominal value."""
+        """Return the index of the nominal value."""
         return self.values.index(self.scenario.nominal)
 
     def label(self, value: float) -> str:
-        """Give a value for people."""
+        """Return a value for people."""
         if self.scenario.labels:
             return self.scenario.labels[self.scenario.values.index(value)]
         return f"{value:g} {self.scenario.unit}".rstrip()
@@ -108,7 +108,7 @@ def _fill(shape: tuple[int, int], cells: Mapping[tuple[int, int], float | None])
 
 
 def margins(curve: Curve, method: str) -> Margins:
-    """Give how far a method is from breaking."""
+    """Return how far a method is from breaking."""
     rivals: Sequence[str] = curve.rivals if curve.scenario.rival else ()
     faults = np.zeros((len(curve.values), len(curve.scenes)), dtype=bool)
     for at, found in curve.outcomes.items():
@@ -139,7 +139,7 @@ def breaks_of(curve: Curve) -> tuple[Break, ...]:
 
 
 def nearest_break(curve: Curve, breaks: Sequence[Break], method: str) -> Break | None:
-    """Give the break of a method that is the fewest steps from the nominal value; None if none."""
+    """Return break of a method that is the fewest steps from the nominal value; None if none."""
     values, nominal = np.array(curve.values), curve.nominal
 
     def steps(found: Break) -> float:

@@ -27,7 +27,7 @@ def transform_kernels(kernels: FloatArray, scale: float, angle_rad: float) -> Fl
 
 
 def with_transformed(lens: Lens, scale: float, angle_rad: float) -> Lens:
-    """Give a lens all of whose kernels are enlarged and turned, those of its haze with their light.
+    """Return lens all of whose kernels are enlarged and turned, those of its haze with their light.
 
     Args:
         lens: The lens.
@@ -45,7 +45,7 @@ def with_transformed(lens: Lens, scale: float, angle_rad: float) -> Lens:
 
 
 def _with_haze_kernels(haze: HazeLens, change: KernelChange) -> HazeLens:
-    """Give a haze whose kernels are changed and hold as much light as before."""
+    """Return a haze whose kernels are changed and hold as much light as before."""
 
     def haze_at(x_mm: float, y_mm: float) -> FloatArray:
         kernels = haze.haze_at(x_mm, y_mm)

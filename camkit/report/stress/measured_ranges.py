@@ -43,7 +43,7 @@ class Seen:
 
 
 def measured_ranges(curves: Iterable[Curve], method: str) -> dict[str, Range]:
-    """Give the envelope of a method.
+    """Return the envelope of a method.
 
     Args:
         curves: Of the scenarios that were swept; those that bound nothing are passed over.
@@ -73,7 +73,7 @@ def measured_ranges(curves: Iterable[Curve], method: str) -> dict[str, Range]:
 
 
 def _seen(curve: Curve, quantity: str, method: str) -> Seen | None:
-    """Give what a curve says of a quantity; None without a sound value."""
+    """Return what a curve says of a quantity; None without a sound value."""
     if quantity not in curve.seen:
         return None
     grid = curve.seen[quantity]

@@ -52,7 +52,7 @@ def stress_page(
     skipped: Mapping[str, str],
     envelope: Mapping[str, Range],
 ) -> str:
-    """Give the page.
+    """Return the page.
 
     Args:
         title: Heading.

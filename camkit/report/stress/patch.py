@@ -70,7 +70,7 @@ def worst_patches(
 
 
 def worst_place(curve: Curve, method: str) -> tuple[int, int] | None:
-    """Give (value index, scene index) of the capture to look at; None if nothing was compared.
+    """Return (value index, scene index) of the capture to look at; None if nothing was compared.
 
     The value is the first broken one, else that of the least gain in PSNR over its rivals; the
     scene is that of the least gain.

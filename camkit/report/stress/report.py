@@ -14,7 +14,7 @@ from camkit.report.stress.scenario import Scenario
 def scenario_json(
     curve: Curve, breaks: Sequence[Break], bundle: Bundle, primary: str
 ) -> dict[str, Any]:
-    """Give one scenario as plain JSON values.
+    """Return one scenario as plain JSON values.
 
     Args:
         curve: What was measured.
@@ -47,7 +47,7 @@ def scenario_json(
 
 
 def skipped_json(scenario: Scenario, reason: str, bundle: Bundle, primary: str) -> dict[str, Any]:
-    """Give a scenario that a bundle cannot take."""
+    """Return a scenario that a bundle cannot take."""
     empty: dict[str, Any] = {"psnr_db": {}, "chi2": {}, "extra": {}, "breaks": [], "faults": []}
     return (
         _head(scenario, bundle, primary)
@@ -88,7 +88,7 @@ def _break_json(found: Break) -> dict[str, Any]:
 
 
 def _means(grids: Mapping[str, Grid]) -> dict[str, list[float | None]]:
-    """Give method -> mean over the scenes per value, None where no scene knows."""
+    """Return method -> mean over the scenes per value, None where no scene knows."""
     return {method: [_mean(row) for row in grid] for method, grid in grids.items()}
 
 

@@ -69,7 +69,7 @@ class Method:
 
     @property
     def bundle(self) -> Bundle:
-        """Give the bundle that does it."""
+        """Return the bundle that does it."""
         assert self.pipeline.bundle is not None
         return self.pipeline.bundle
 
@@ -151,7 +151,7 @@ class Rig:
         self._last: tuple[Capture, Restored] | None = None
 
     def choosing(self, **chosen: Any) -> "Rig":
-        """Give a rig like this one whose methods have further options; it is kept."""
+        """Return a rig like this one whose methods have further options; it is kept."""
         key = tuple(sorted(chosen.items()))
         if key not in self._others:
             options = self._chosen | chosen
@@ -160,7 +160,7 @@ class Rig:
 
     @property
     def networks(self) -> tuple[Method, ...]:
-        """Give the methods in which networks take part."""
+        """Return the methods in which networks take part."""
         return tuple(m for m in self.methods if m.networks)
 
     @property
@@ -170,11 +170,11 @@ class Rig:
         return REFERENCE if REFERENCE in names else (*names, INPUT)[0]
 
     def lens_at(self, depth_mm: float) -> Lens:
-        """Give the lens as the bundle knows it, for one object distance."""
+        """Return the lens as the bundle knows it, for one object distance."""
         return self._lens(depth_mm)
 
     def lens_under(self, response: Response) -> Lens:
-        """Give the lens at the reference depth where wavelengths weigh as `lens_of` says."""
+        """Return the lens at the reference depth where wavelengths weigh as `lens_of` says."""
         return self._lens(self.bundle.reference_depth_mm, response)
 
     def _lens(self, depth_mm: float, response: Response | None = None) -> Lens:
@@ -189,7 +189,7 @@ class Rig:
         return replace(lens, haze=replace(lens.haze, haze_at=known))
 
     def light(self, scene: Scene, lens: Lens | None = None) -> Light:
-        """Let a scene fall on the sensor; that through the nominal lens is kept by its name."""
+        """Project a scene on the sensor; that through the nominal lens is kept by its name."""
         if lens is None and scene.name in self._lights:
             return self._lights[scene.name]
         made = self._fall(scene, scene.linear, lens or self.lens)
@@ -198,7 +198,7 @@ class Rig:
         return made
 
     def light_amid(self, scene: Scene, around: FloatArray) -> Light:
-        """Let a scene fall on the sensor with what surrounds it, through the nominal lens.
+        """Project a scene on the sensor with what surrounds it, through the nominal lens.
 
         Args:
             scene: What is in the picture.
@@ -207,7 +207,7 @@ class Rig:
         return self._fall(scene, around, self.lens)
 
     def light_in_place(self, scene: Scene) -> Light:
-        """Let a scene fall on the sensor through the nominal lens, as if it distorted nothing.
+        """Project a scene on the sensor through the nominal lens, as if it distorted nothing.
 
         Scene, mirror images around it and capture are then in one geometry: what is photographed
         again after restoration meets the same haze.
@@ -275,7 +275,7 @@ class Rig:
         return Restored(planes=planes, pictures=pictures, faults=faults)
 
     def _shared(self, bundle: Bundle, capture: Capture) -> dict[str, Stream]:
-        """Give the planes that the first network takes, which are the same for all sizes."""
+        """Return the planes that the first network takes, which are the same for all sizes."""
         known: dict[str, Stream] = {}
         first = bundle.manifest.stage(Network)
         method = next((m for m in self.networks if m.bundle is bundle), None)
@@ -287,7 +287,7 @@ class Rig:
 
 
 def usual_sizes(manifest: Manifest) -> tuple[str, ...]:
-    """Give the size of network that stands for a bundle: M, else the largest; none without any."""
+    """Return size of network that stands for a bundle: M, else the largest; none without any."""
     return (REFERENCE,) if REFERENCE in manifest.sizes else manifest.sizes[-1:]
 
 
@@ -306,7 +306,7 @@ def _networks(
 
 
 def _simple(bundle: Bundle, chosen: Mapping[str, Any]) -> tuple[Method, ...]:
-    """Give the methods without networks that the bundle offers: nothing, and what comes first."""
+    """Return the methods without networks that the bundle offers: nothing, and what comes first."""
     manifest = bundle.manifest
     offered = offered_methods(manifest.stages, manifest.all_planes)
     usual = [methods[0] for s in manifest.stages if (methods := stage_module(s.type).METHODS)]
@@ -329,7 +329,7 @@ def _method(bundle: Bundle, name: str, chosen: Mapping[str, Any]) -> Method:
 
 
 def _same(a: Capture, b: Capture) -> bool:
-    """Tell whether two captures are restored alike."""
+    """Return whether two captures are restored alike."""
     facts = [
         (c.iso, c.white_balance, c.black_level.tolist(), c.white_level, c.origin_px, c.noise)
         for c in (a, b)

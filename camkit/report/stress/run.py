@@ -79,7 +79,7 @@ class StressResult:
 
 
 def scenarios_for(bundle: Bundle, names: str | None) -> tuple[Scenario, ...]:
-    """Give the scenarios that a comma-separated list names, those of the bundle's kind among them.
+    """Return scenarios that a comma-separated list names, those of the bundle's kind among them.
 
     Raises:
         ContractError: If one is unknown.

@@ -31,7 +31,7 @@ LEAST_ROOM_PX: Final = 160
 
 
 def photographs(bundle: Bundle) -> str | None:
-    """Say why a bundle cannot take scenarios that photograph; None if it can."""
+    """Return why a bundle cannot take scenarios that photograph; None if it can."""
     manifest = bundle.manifest
     if isinstance(manifest.sensor, SpadSensor):
         return f"it takes {manifest.sensor.inputs[0]}, the scenario a photograph"
@@ -41,12 +41,12 @@ def photographs(bundle: Bundle) -> str | None:
 
 
 def has_networks(bundle: Bundle) -> str | None:
-    """Say why a bundle cannot take scenarios of networks; None if it can."""
+    """Return why a bundle cannot take scenarios of networks; None if it can."""
     return photographs(bundle) if bundle.manifest.networks else "it holds no network"
 
 
 def varies_over_field(bundle: Bundle) -> str | None:
-    """Say why a bundle cannot take scenarios that move its kernels; None if it can."""
+    """Return why a bundle cannot take scenarios that move its kernels; None if it can."""
     optics = bundle.manifest.optics
     if optics is not None and optics.type != "lens_profile" and optics.symmetry == "uniform":
         return "its PSF is the same over the field"
@@ -54,7 +54,7 @@ def varies_over_field(bundle: Bundle) -> str | None:
 
 
 def has_haze(bundle: Bundle) -> str | None:
-    """Say why a bundle cannot take scenarios of what lies beside its peaks; None if it can."""
+    """Return why a bundle cannot take scenarios of what lies beside its peaks; None if it can."""
     reason = photographs(bundle)
     if reason is None and not bundle.manifest.has_haze:
         return "its optics have no haze beside their kernels"
@@ -126,7 +126,7 @@ class Scenario:
             raise ContractError(f"{self.name}: a scenario shoots or measures")
 
     def for_bundle(self, bundle: Bundle) -> "Scenario":
-        """Give the scenario with the values that a bundle asks for."""
+        """Return the scenario with the values that a bundle asks for."""
         return self if self.fit is None else self.fit(bundle)
 
     def take(self, judge: Examiner, scene: SweptScene, value: float) -> Verdict:
@@ -137,7 +137,7 @@ class Scenario:
         return judge.score(self.shoot(judge, scene, value))
 
     def chosen(self, *, quick: bool) -> tuple[float, ...]:
-        """Give the values to sweep."""
+        """Return the values to sweep."""
         return tuple(v for v in self.values if v in self.quick) if quick else self.values
 
 
@@ -148,7 +148,7 @@ SCENARIOS: Final = "camkit.report.stress.scenarios"
 
 
 def all_scenarios() -> tuple[Scenario, ...]:
-    """Give every scenario that serves all cameras, by folder and file."""
+    """Return every scenario that serves all cameras, by folder and file."""
     places = importlib.import_module(SCENARIOS).__path__
     folders = sorted(m.name for m in pkgutil.iter_modules(places) if m.ispkg)
     packages = [f"{SCENARIOS}.{name}" for name in folders]
@@ -156,7 +156,7 @@ def all_scenarios() -> tuple[Scenario, ...]:
 
 
 def choose(names: str | None, own: tuple[Scenario, ...] = ()) -> tuple[Scenario, ...]:
-    """Give the scenarios that a comma-separated list names; all without one.
+    """Return the scenarios that a comma-separated list names; all without one.
 
     Args:
         names: The list.

@@ -41,22 +41,22 @@ class Scene:
 
     @property
     def field_share(self) -> float:
-        """Give the place between the middle of the sensor (0) and its corner (1)."""
+        """Return the place between the middle of the sensor (0) and its corner (1)."""
         if self.share is not None:
             return self.share
         return FIELD_SHARES[self.number % len(FIELD_SHARES)]
 
     @property
     def size_px(self) -> tuple[int, int]:
-        """Give (width, height) in pixels of the sensor."""
+        """Return (width, height) in pixels of the sensor."""
         return self.linear.shape[2] // self.scale, self.linear.shape[1] // self.scale
 
     def showing(self, linear: FloatArray, name: str) -> "Scene":
-        """Give a scene of another content at a place that the number decides."""
+        """Return a scene of another content at a place that the number decides."""
         return replace(self, linear=linear, name=name, share=None)
 
     def origin_px(self, sensor_size_px: tuple[int, int]) -> tuple[int, int]:
-        """Give the even (x, y) of the scene on a sensor.
+        """Return the even (x, y) of the scene on a sensor.
 
         Raises:
             ContractError: If the scene is larger than the sensor.
@@ -66,7 +66,7 @@ class Scene:
 
 
 def stress_scenes(bundle: Bundle, count: int, folder: Path | None = None) -> tuple[Scene, ...]:
-    """Give the scenes of a sweep, as fine as the pictures of a bundle.
+    """Return the scenes of a sweep, as fine as the pictures of a bundle.
 
     Args:
         bundle: The camera; scenes are at most as large as its sensor.

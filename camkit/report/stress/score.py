@@ -69,12 +69,12 @@ class Judge:
 
     @property
     def identity(self) -> tuple[object, ...]:
-        """Give bundles and methods."""
+        """Return bundles and methods."""
         before = self.rig.before
         return self.rig.bundle.sha256, before and before.sha256, self.methods
 
     def pictures(self, shot: Shot) -> dict[str, FloatArray]:
-        """Give the truth and what every method made of a capture as sRGB values."""
+        """Return the truth and what every method made of a capture as sRGB values."""
         compare = Comparison(shot)
         restored = self.rig.restore(shot).pictures
         return {"sharp": compare.sharp} | {m: compare.finish(p) for m, p in restored.items()}
@@ -122,7 +122,7 @@ class Judge:
         return Verdict(outcomes=outcomes, seen=see(self.rig, shot))
 
     def scale(self, method: str, scene: Scene) -> Scale:
-        """Give how chi^2 of a method is counted on a scene, from its nominal capture."""
+        """Return how chi^2 of a method is counted on a scene, from its nominal capture."""
         if (method, scene.name) not in self._scales:
             shot = self.rig.shoot(scene)
             for name, planes in self.rig.restore(shot).planes.items():
@@ -138,7 +138,7 @@ class Judge:
 
 
 def judge_of(bundle: Bundle, sizes: tuple[str, ...], before: Bundle | None) -> Judge:
-    """Give the judge of a camera that photographs.
+    """Return the judge of a camera that photographs.
 
     Args:
         bundle: What is tested.
@@ -149,13 +149,13 @@ def judge_of(bundle: Bundle, sizes: tuple[str, ...], before: Bundle | None) -> J
 
 
 def see(rig: Rig, shot: Shot) -> dict[str, float]:
-    """Give what the runtime sees of a capture before it is processed."""
+    """Return what the runtime sees of a capture before it is processed."""
     noise = shot.capture.noise or rig.sensor.noise_at(shot.capture.iso or NOMINAL_ISO)
     return observe(shot.capture, noise)
 
 
 def _digest(shot: Shot) -> bytes:
-    """Give what decides the verdict on a capture."""
+    """Return what decides the verdict on a capture."""
     capture, light = shot.capture, shot.light
     parts: list[object] = [capture.iso, capture.white_balance, capture.white_level, shot.noise]
     parts += [capture.origin_px, shot.exposure, shot.border_px, shot.away_from_clipped]
@@ -182,22 +182,22 @@ class Comparison:
         self._judged = _judged_pixels(shot)
 
     def finish(self, picture: FloatArray) -> FloatArray:
-        """Give sRGB values (3, h, w) of linear Rec.709, at the brightness of the scene."""
+        """Return sRGB values (3, h, w) of linear Rec.709, at the brightness of the scene."""
         return encode_srgb(self.level(picture))
 
     def level(self, picture: FloatArray) -> FloatArray:
-        """Give linear Rec.709 (3, h, w) at the brightness of the scene."""
+        """Return linear Rec.709 (3, h, w) at the brightness of the scene."""
         return picture / self._exposure
 
     def errors(self, picture: FloatArray) -> NDArray[np.float64]:
-        """Give (h, w) squared errors of linear Rec.709, the mean over the colours."""
+        """Return (h, w) squared errors of linear Rec.709, the mean over the colours."""
         error = self.finish(picture).astype(np.float64) - self.sharp
         return np.asarray(np.square(error).mean(axis=0))
 
     def rate(
         self, error: NDArray[np.float64], least: NDArray[np.float64] | float = 0.0
     ) -> tuple[float | None, tuple[int, int] | None]:
-        """Give the PSNR in dB and the (x, y) of the worst patch.
+        """Return the PSNR in dB and the (x, y) of the worst patch.
 
         Args:
             error: Of the method, from `errors`.
@@ -214,7 +214,7 @@ class Comparison:
 
 
 def worst_patch(error: NDArray[np.float64]) -> tuple[int, int]:
-    """Give the (x, y) of the square of `PATCH_PX` with the largest mean error, inside."""
+    """Return the (x, y) of the square of `PATCH_PX` with the largest mean error, inside."""
     height, width = error.shape
     mean = scipy.ndimage.uniform_filter(error, PATCH_PX, mode="constant")
     half = PATCH_PX // 2
@@ -226,7 +226,7 @@ def worst_patch(error: NDArray[np.float64]) -> tuple[int, int]:
 
 
 def _judged_pixels(shot: Shot) -> NDArray[np.bool_]:
-    """Give (h, w) of the picture, true where pictures are compared."""
+    """Return (h, w) of the picture, true where pictures are compared."""
     capture, border = shot.capture, shot.border_px
     judged = np.ones((capture.height, capture.width), dtype=bool)
     if shot.away_from_clipped:

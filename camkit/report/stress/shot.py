@@ -44,12 +44,12 @@ class Shot:
 
     @property
     def step(self) -> float:
-        """Give the step of the converter, 1.0 = white level."""
+        """Return the step of the converter, 1.0 = white level."""
         return 1 / (self.capture.white_level - float(self.capture.black_level.max()))
 
 
 def spoil(shot: Shot, percent: float, values: tuple[float, ...], seed: int) -> Shot:
-    """Give a capture some of whose samples hold another value.
+    """Return a capture some of whose samples hold another value.
 
     Args:
         shot: The capture.

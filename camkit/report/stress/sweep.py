@@ -33,7 +33,7 @@ class Point:
 
     @property
     def key(self) -> tuple[str, float, str]:
-        """Give what names the point."""
+        """Return what names the point."""
         return self.scenario, self.value, self.scene
 
 
@@ -52,7 +52,7 @@ class Sweep:
     quick: bool = False
 
     def tasks(self) -> list[tuple[Scenario, float, SweptScene]]:
-        """Give scenario, value and scene of every point, scenario by scenario."""
+        """Return scenario, value and scene of every point, scenario by scenario."""
         return [
             (scenario, value, scene)
             for scenario in self.scenarios
@@ -85,7 +85,7 @@ def run_sweep(sweep: Sweep, judge: Examiner, journal: Path | None) -> Iterator[P
 
 
 def sweep_identity(judge: Examiner) -> str:
-    """Give a short hash of what decides the points of a journal."""
+    """Return a short hash of what decides the points of a journal."""
     parts = [JOURNAL_VERSION, *judge.identity]
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:12]
 

@@ -71,7 +71,7 @@ class Examiner(Protocol):
 
     @property
     def identity(self) -> tuple[object, ...]:
-        """Give what decides the verdicts, as plain JSON values."""
+        """Return what decides the verdicts, as plain JSON values."""
         ...
 
     def score(self, shot: Any) -> Verdict:
@@ -79,5 +79,5 @@ class Examiner(Protocol):
         ...
 
     def pictures(self, shot: Any) -> Mapping[str, FloatArray]:
-        """Give "sharp" and every method -> (3, h, w) sRGB values, to look at."""
+        """Return "sharp" and every method -> (3, h, w) sRGB values, to look at."""
         ...

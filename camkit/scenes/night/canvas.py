@@ -30,7 +30,7 @@ class Canvas:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Give (height, width) in pixels."""
+        """Return (height, width) in pixels."""
         return self.light.shape[1], self.light.shape[2]
 
     def count_lit(self) -> int:
@@ -56,12 +56,12 @@ class Patch:
 
     @property
     def at(self) -> tuple[slice, slice, slice]:
-        """Give the index of the patch in planes."""
+        """Return the index of the patch in planes."""
         return slice(None), self.rows, self.columns
 
 
 def new_canvas(rng: Generator, height: int, width: int) -> Canvas:
-    """Give a black canvas with fresh textures."""
+    """Return a black canvas with fresh textures."""
     return Canvas(
         surface=np.zeros((3, height, width), dtype=np.float32),
         light=np.zeros((3, height, width), dtype=np.float32),
@@ -73,7 +73,7 @@ def new_canvas(rng: Generator, height: int, width: int) -> Canvas:
 def patch_around(
     canvas: Canvas, cy: float, cx: float, reach_y: float, reach_x: float | None = None
 ) -> Patch | None:
-    """Give the part of a canvas within a reach of a place, in pixels; None if it lies outside."""
+    """Return the part of a canvas within a reach of a place, in pixels; None if it lies outside."""
     height, width = canvas.size
     across = reach_y if reach_x is None else reach_x
     top, bottom = max(0, int(cy - reach_y - 1)), min(height, int(cy + reach_y + 2))
@@ -117,28 +117,28 @@ def glow(canvas: Canvas, patch: Patch, radiance: FloatArray) -> None:
 def textured(
     rng: Generator, canvas: Canvas, patch: Patch, colour: FloatArray, depth: float, kind: int = 1
 ) -> FloatArray:
-    """Give (3, a, b) of a colour with a texture of some depth, the mean of the logarithm kept."""
+    """Return (3, a, b) of a colour with a texture of some depth, the mean of the logarithm kept."""
     rows, columns = patch.dy.shape[0], patch.dx.shape[1]
     cut = cut_texture(rng, canvas.textures[kind], rows, columns)
     return np.asarray(colour[:, None, None] * np.exp(np.float32(depth) * cut))
 
 
 def disc(patch: Patch, radius: float) -> FloatArray:
-    """Give the coverage of a disc, anti-aliased over one pixel; a point keeps its area."""
+    """Return the coverage of a disc, anti-aliased over one pixel; a point keeps its area."""
     alpha = np.clip(np.float32(radius + 0.5) - np.hypot(patch.dy, patch.dx), 0, 1)
     # below half a pixel the area of a disc is less than its anti-aliased one
     return np.asarray(alpha * np.float32(min(1.0, 2 * radius)))
 
 
 def rectangle(patch: Patch, half_height: float, half_width: float) -> FloatArray:
-    """Give the coverage of an upright rectangle, anti-aliased over one pixel."""
+    """Return the coverage of an upright rectangle, anti-aliased over one pixel."""
     down = np.clip(np.float32(half_height + 0.5) - np.abs(patch.dy), 0, 1)
     across = np.clip(np.float32(half_width + 0.5) - np.abs(patch.dx), 0, 1)
     return np.asarray(down * across)
 
 
 def stroke_distance(patch: Patch, points: FloatArray) -> FloatArray:
-    """Give the distance of every pixel from a line through points.
+    """Return the distance of every pixel from a line through points.
 
     Args:
         patch: Where.

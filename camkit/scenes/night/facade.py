@@ -75,7 +75,7 @@ def add_building(rng: Generator, canvas: Canvas, building: Building) -> None:
 def _openings(
     rng: Generator, place: tuple[FloatArray, FloatArray], cell: tuple[float, float]
 ) -> FloatArray:
-    """Give where windows are: coverage, with a cross of bars in large ones."""
+    """Return where windows are: coverage, with a cross of bars in large ones."""
     (down, across), (cell_height, cell_width) = place, cell
     rows, columns = down % 1, across % 1
     tall, wide = rng.uniform(0.4, 0.75), rng.uniform(0.35, 0.8)
@@ -97,7 +97,7 @@ def _soft_band(share: FloatArray, width: float, cell_px: float) -> FloatArray:
 
 
 def _rooms(rng: Generator, down: FloatArray, across: FloatArray, lit: float) -> FloatArray:
-    """Give (3, a, b) radiance of the rooms behind a front, constant colour in each."""
+    """Return (3, a, b) radiance of the rooms behind a front, constant colour in each."""
     rows, columns = down.astype(np.intp)[:, 0], across.astype(np.intp)[0]
     floors, rooms = int(rows.max()) + 1, int(columns.max()) + 1
     # some floors are lit as a whole, most rooms are not
@@ -149,7 +149,7 @@ def add_near_window(
 
 
 def _curtains(rng: Generator, patch: Patch, half_width: float) -> FloatArray:
-    """Give what two curtains with folds let through."""
+    """Return what two curtains with folds let through."""
     open_share = rng.uniform(0.0, 0.8)
     folds = 0.5 + 0.25 * np.sin(patch.dx * np.float32(2 * np.pi / rng.uniform(4, 9)))
     drawn = np.abs(patch.dx) > np.float32(open_share * half_width)
@@ -176,7 +176,7 @@ def _furnish(
 
 
 def _bars(rng: Generator, patch: Patch, half: tuple[float, float]) -> FloatArray:
-    """Give the coverage of the bars between the panes."""
+    """Return the coverage of the bars between the panes."""
     thick = np.float32(max(0.6, min(half) * 0.045))
     bars = np.zeros((patch.dy.shape[0], patch.dx.shape[1]), dtype=np.float32)
     for offsets, length, most in ((patch.dy, half[0], 4), (patch.dx, half[1], 5)):

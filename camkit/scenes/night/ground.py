@@ -55,7 +55,7 @@ def add_ground(rng: Generator, canvas: Canvas, top: int, *, water: bool) -> None
 
 
 def _crossing(rng: Generator, patch: Patch) -> FloatArray:
-    """Give the stripes of a crossing that run towards a point above the ground."""
+    """Return the stripes of a crossing that run towards a point above the ground."""
     depth = patch.dy + np.float32(12)
     at = (patch.dx - np.float32(rng.random() * patch.dx.shape[1])) / depth
     stripe = np.clip((np.abs((at * rng.uniform(1, 2)) % 1 - 0.5) - 0.25) * depth / 4 + 0.5, 0, 1)
@@ -113,7 +113,7 @@ def add_reflection(scene: FloatArray, gloss: FloatArray, mirror: Mirror) -> None
 def _roughness(
     rng: Generator, canvas: Canvas, height: int, width: int, *, water: bool
 ) -> FloatArray:
-    """Give (h, w) factors of mean about 1: waves, or puddles and grain."""
+    """Return (h, w) factors of mean about 1: waves, or puddles and grain."""
     if not water:
         puddles = np.exp(0.7 * cut_texture(rng, canvas.textures[2], height, width))
         grain = np.exp(0.3 * cut_texture(rng, canvas.textures[0], height, width))

@@ -59,7 +59,7 @@ def _shine_tube(
 
 
 def _curve(rng: Generator) -> FloatArray:
-    """Give (n, 2) points (y, x) of a curve within -1..1."""
+    """Return (n, 2) points (y, x) of a curve within -1..1."""
     kind = CURVES[int(rng.integers(len(CURVES)))]
     t = np.linspace(0, 1, 22)
     if kind == "arc":

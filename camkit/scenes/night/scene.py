@@ -21,7 +21,7 @@ MEDIANS: Final = (0.02, 0.08)
 
 
 def night_scene(seed: int, height: int, width: int) -> FloatArray:
-    """Give a scene at night; the same seed and size give the same scene.
+    """Return a scene at night; the same seed and size give the same scene.
 
     Args:
         seed: Any non-negative integer.

@@ -21,7 +21,7 @@ AMBIENT_TINT: Final = (0.80, 0.92, 1.15)
 
 
 def shade(rng: Generator, canvas: Canvas, median: float) -> FloatArray:
-    """Give the scene: surfaces in the light of the lamps, and the lamps.
+    """Return the scene: surfaces in the light of the lamps, and the lamps.
 
     Args:
         rng: Draws how high the lamps hang and how much light comes from everywhere.
@@ -53,7 +53,7 @@ def _column(colour: tuple[float, float, float]) -> FloatArray:
 
 
 def _cells(light: FloatArray) -> FloatArray:
-    """Give the means over cells of `CELL_PX`, those at the end over what they hold."""
+    """Return the means over cells of `CELL_PX`, those at the end over what they hold."""
     _, height, width = light.shape
     rows, columns = (np.arange(0, side, CELL_PX) for side in (height, width))
     sums = np.add.reduceat(np.add.reduceat(light, rows, axis=1), columns, axis=2)
@@ -73,7 +73,7 @@ def _irradiance(cells: FloatArray, height_cells: float) -> FloatArray:
 
 
 def _enlarged(cells: FloatArray, top: int, bottom: int, width: int) -> FloatArray:
-    """Give rows top..bottom of the cells in pixels, by linear interpolation between middles."""
+    """Return rows top..bottom of the cells in pixels, by linear interpolation between middles."""
     first, second, share = _between(np.arange(top, bottom), cells.shape[1])
     tall = cells[:, first] * (1 - share[:, None]) + cells[:, second] * share[:, None]
     first, second, share = _between(np.arange(width), cells.shape[2])
@@ -88,7 +88,7 @@ def _between(at_px: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, Flo
 
 
 def _factor(canvas: Canvas, lit: FloatArray, median: float) -> float:
-    """Give the factor on all illumination that gives the surfaces their median.
+    """Return the factor on all illumination that gives the surfaces their median.
 
     Where most of the picture is sky, surfaces stay darker.
     """

@@ -72,7 +72,7 @@ def runs_of(lights: Mask) -> Labels:
 
 
 def fields_of(runs: Labels, fading: FloatArray) -> FloatArray:
-    """Give what every run throws onto the rows of its column.
+    """Return what every run throws onto the rows of its column.
 
     Args:
         runs: (row, column) of `runs_of`.
@@ -93,7 +93,7 @@ def fields_of(runs: Labels, fading: FloatArray) -> FloatArray:
 def seek_arms(
     columns: Columns, fields: FloatArray, scales: tuple[float, ...], first: Amounts | None = None
 ) -> Amounts:
-    """Give the amount of every run.
+    """Return the amount of every run.
 
     Args:
         columns: Of one colour.
@@ -120,7 +120,7 @@ def seek_arms(
 
 
 def thrown(fields: FloatArray, amounts: Amounts) -> FloatArray:
-    """Give the streaks (column, row) of all runs."""
+    """Return the streaks (column, row) of all runs."""
     return np.asarray(np.matmul(fields, amounts.astype(np.float32)[:, :, None])[:, :, 0])
 
 
@@ -174,7 +174,7 @@ def _equations(columns: Columns, fields: FloatArray, amounts: Amounts, scale: fl
 
 
 def _weight(rest: FloatArray, scale: NDArray[np.floating], where: Mask) -> FloatArray:
-    """Give the weights of Geman and McClure, 0 outside a mask."""
+    """Return the weights of Geman and McClure, 0 outside a mask."""
     weight = 1 / (scale**2 * (1 + (rest / scale) ** 2) ** 2)
     return np.asarray(np.where(where, weight, 0), np.float32)
 

@@ -61,7 +61,7 @@ class Direction:
 
     @property
     def is_sure(self) -> bool:
-        """Tell whether there are streaks."""
+        """Return whether there are streaks."""
         return self.agreement >= LEAST_AGREEMENT and self.significance >= LEAST_SIGNIFICANCE
 
 
@@ -96,7 +96,7 @@ def _grid(least_rad: float, most_rad: float) -> list[float]:
 
 
 def _peaks(tried: list[Direction], mirrored: list[Direction]) -> list[Direction]:
-    """Give what rises above its neighbours, the ground on either side, and its mirror."""
+    """Return what rises above its neighbours, the ground on either side, and its mirror."""
     strength = [one.strength for one in tried]
     found = []
     for here in range(1, len(tried) - 1):
@@ -135,7 +135,7 @@ class _Trial:
         self._fade = np.float32(math.exp(-FADING / seen.shape[0]))
 
     def at(self, angle_rad: float) -> Direction:
-        """Say how surely there are streaks of an angle."""
+        """Return how surely there are streaks of an angle."""
         _, height, width = self._planes.shape
         slant = Slant(angle_rad=angle_rad, height=height, width=width)
         (seen, near, lights), share = slant.gathered(
@@ -162,7 +162,7 @@ class _Trial:
 def _both_sides(
     step: FloatArray, lights: NDArray[np.bool_], fade: np.float32
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Give the faded sums above and below every light, column by column."""
+    """Return the faded sums above and below every light, column by column."""
     wide = lights.copy()
     wide[:, 1:] |= lights[:, :-1]
     wide[:, :-1] |= lights[:, 1:]
@@ -175,7 +175,7 @@ def _both_sides(
 
 
 def _faded(step: FloatArray, fade: np.float32) -> FloatArray:
-    """Give sums down to every row that fade with distance."""
+    """Return sums down to every row that fade with distance."""
     out = step.copy()
     for row in range(1, out.shape[0]):
         out[row] += fade * out[row - 1]

@@ -34,7 +34,7 @@ class Overview:
 def overview_of(
     read: Callable[[int, int], FloatArray], height: int, width: int, level: float
 ) -> Overview:
-    """Give the overview of a picture.
+    """Return the overview of a picture.
 
     Args:
         read: Gives rows top..bottom, (c, rows, width) float32, every colour clips at 1.

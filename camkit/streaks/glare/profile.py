@@ -24,7 +24,7 @@ Curve = NDArray[np.float64]
 
 
 def first_fading(rows: int, reach_rows: float) -> FloatArray:
-    """Give the fading to start from, (row,): a straight line that ends where arms do."""
+    """Return the fading to start from, (row,): a straight line that ends where arms do."""
     return np.clip(1 - np.arange(rows) / reach_rows, 0, None).astype(np.float32)
 
 
@@ -64,7 +64,7 @@ def fitted_fading(
 def _steps(
     columns: Columns, runs: Labels, amounts: Amounts, hats: Curve
 ) -> tuple[Curve, Curve, Curve]:
-    """Give the steps across columns of every hat, those seen, and the level, where usable."""
+    """Return the steps across columns of every hat, those seen, and the level, where usable."""
     usable = columns.usable[1:] & columns.usable[:-1] & columns.joined[:, None]
     source = np.zeros(columns.seen.shape, np.float32)
     for run in range(amounts.shape[1]):
@@ -78,7 +78,7 @@ def _steps(
 
 
 def _falling(made: Curve, seen: Curve, scale: Curve, first: Curve) -> Curve:
-    """Give the falling curve, >= 0, whose steps fit those seen."""
+    """Return the falling curve, >= 0, whose steps fit those seen."""
     summed = np.triu(np.ones((KNOTS, KNOTS)))  # a curve of its falls
     made = made @ summed
     falls = np.linalg.solve(summed, first)

@@ -113,7 +113,7 @@ class Glare:
         np.copyto(planes, clean, where=~light)
 
     def to_json(self) -> dict[str, float | None]:
-        """Give what a sidecar says of it."""
+        """Return what a sidecar says of it."""
         found = self.direction
         return {
             "angle_deg": None if found is None else round(math.degrees(found.angle_rad), 3),
@@ -197,7 +197,7 @@ def _unchanged(settings: GlareSettings, lit: float, why: str) -> Glare:
 def _streaks(
     read: Read, slant: Slant, settings: GlareSettings, pause: Callable[[], None]
 ) -> tuple[FloatArray, FloatArray]:
-    """Give the streaks in the slant, and how dark what is left may become."""
+    """Return the streaks in the slant, and how dark what is left may become."""
 
     def with_lights(top: int, bottom: int) -> FloatArray:
         band = read(top, bottom)
@@ -237,7 +237,7 @@ def _columns(seen: FloatArray, usable: Mask, lights: Mask, there: NDArray[np.int
 def _solved(
     colours: list[Columns], runs: Labels, reach_rows: float, pause: Callable[[], None]
 ) -> list[FloatArray]:
-    """Give the streaks (column, row) of every colour: amounts and fading found in turns."""
+    """Return the streaks (column, row) of every colour: amounts and fading found in turns."""
     fading = first_fading(runs.shape[0], reach_rows)
     amounts: list[Amounts | None] = [None] * len(colours)
     for turn in range(TURNS):
@@ -257,7 +257,7 @@ def _solved(
 
 
 def _surroundings(clean: FloatArray, usable: Mask) -> FloatArray:
-    """Give the darkest of the smooth surroundings of every place, never below 0."""
+    """Return the darkest of the smooth surroundings of every place, never below 0."""
     weight = scipy.ndimage.gaussian_filter(usable.astype(np.float32), SURROUNDINGS_SIGMA)
     smooth = scipy.ndimage.gaussian_filter(np.where(usable, clean, 0), SURROUNDINGS_SIGMA)
     mean = np.divide(smooth, weight, out=np.zeros_like(smooth), where=weight > _FEW)

@@ -50,7 +50,7 @@ class Slant:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Give (rows, columns)."""
+        """Return (rows, columns)."""
         return self.height // self.step, self.width + math.ceil(self._span) + 1
 
     @property
@@ -58,14 +58,14 @@ class Slant:
         return abs(math.tan(self.angle_rad)) * (self.height - 1)
 
     def shift_px(self, row: float) -> float:
-        """Give the place in a row of the picture of the first column of the slant, <= 0."""
+        """Return the place in a row of the picture of the first column of the slant, <= 0."""
         slope = math.tan(self.angle_rad)
         return row * slope - max(slope, 0.0) * (self.height - 1)
 
     def gathered(
         self, read: Callable[[int, int], FloatArray], channels: int, rows_at_once: int = 256
     ) -> tuple[FloatArray, FloatArray]:
-        """Give a picture in the slant, each of its rows the mean of `step` rows.
+        """Return a picture in the slant, each of its rows the mean of `step` rows.
 
         Args:
             read: Gives rows top..bottom of the picture, (channels, rows, width) float32.

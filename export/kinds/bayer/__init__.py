@@ -24,7 +24,7 @@ class BayerPreparing:
     """Fulfils `camkit.export.preparing.PreparingKind`."""
 
     def written_last(self, recipe: BayerRecipe, runs: Path) -> Path:
-        """Give the header of the frames."""
+        """Return the header of the frames."""
         check_frames(recipe)
         return frames_folder(runs, recipe) / HEADER
 

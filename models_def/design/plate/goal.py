@@ -143,7 +143,7 @@ def masks_of(goal: Goal, side_px: int) -> Masks:
 
 
 def goal_loss(light: Tensor, bare: Tensor, masks: Masks, goal: Goal) -> Tensor:
-    """Give how far the PSF of a colour is from the goal.
+    """Return how far the PSF of a colour is from the goal.
 
     Args:
         light: (side, side), shares of the light.
@@ -163,7 +163,7 @@ def goal_loss(light: Tensor, bare: Tensor, masks: Masks, goal: Goal) -> Tensor:
 
 
 def reached(light: Tensor, bare: Tensor, masks: Masks) -> Reached:
-    """Tell what PSFs (colour, side, side) have of the goal.
+    """Return what PSFs (colour, side, side) have of the goal.
 
     What is written is what lies in the streaks beyond the bare lens's light there, which sinks as
     its core does.

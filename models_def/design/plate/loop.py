@@ -113,7 +113,7 @@ class PlateLoop:
         return self.reader.chosen.weight * slopes
 
     def _pushed(self, leaf: Tensor, made: Tensor, slopes: Tensor | None) -> Tensor:
-        """Give the slope of all losses to the heights."""
+        """Return the slope of all losses to the heights."""
         etched, count = self.recipe.schedule.etched, len(self._bare)
         pushed = torch.zeros_like(leaf)
         for colour in range(count):
@@ -160,7 +160,7 @@ class PlateLoop:
         )
 
     def _lights(self, height_um: Tensor) -> Tensor:
-        """Give the PSFs (colour, side, side), without gradients."""
+        """Return the PSFs (colour, side, side), without gradients."""
         with torch.no_grad():
             return torch.stack([self._light(height_um, c) for c in range(len(self._index))])
 
@@ -182,7 +182,7 @@ class PlateLoop:
         return etching.etched(height_um, errors)
 
     def _errors(self) -> tuple[float, ...]:
-        """Give the errors of the masks in this step."""
+        """Return the errors of the masks in this step."""
         schedule, etching = self.recipe.schedule, self.recipe.etching
         if not schedule.depth_error or etching is None:
             return ()
@@ -197,7 +197,7 @@ class PlateLoop:
             self.reader.take_average(self.best_network)
 
     def state(self) -> State:
-        """Give all that a resumed run needs; `weights` is where others look for a network."""
+        """Return all that a resumed run needs; `weights` is where others look for a network."""
         state = {
             "step": self.step,
             "best_loss": self.best_loss,

@@ -29,7 +29,7 @@ _KINDS: Final[dict[MapKind, type[HeightMap]]] = {
 
 
 def begin_map(recipe: PlateRecipe, folder: Path | None = None) -> HeightMap:
-    """Give the map that a design begins at.
+    """Return the map that a design begins at.
 
     Args:
         recipe: Its map says where.
@@ -85,7 +85,7 @@ def _map_of_plate(recipe: PlateRecipe, folder: Path | None) -> HeightMap:
 
 
 def _own_map(plate: Plate) -> HeightMap | None:
-    """Give the map that a plate is made by, if it is by few numbers."""
+    """Return the map that a plate is made by, if it is by few numbers."""
     if plate.numbers is not None:
         return map_of(plate.numbers)
     if isinstance(plate.pattern, CrossPattern):

@@ -62,7 +62,7 @@ class Night:
 
     @property
     def sharp(self) -> FloatArray:
-        """Give what may be a patch."""
+        """Return what may be a patch."""
         inner = slice(self.margin_px, self.light.shape[1] - self.margin_px)
         return self.light[:, inner, inner].astype(np.float32)
 
@@ -148,7 +148,7 @@ def _light(
     gains: tuple[float, float, float],
     share: float | None,
 ) -> NDArray[np.float16]:
-    """Give the exposed light (3, side, side) of a scene in camera space; not to be written to."""
+    """Return the exposed light (3, side, side) of a scene in camera space; not to be written to."""
     to_camera = np.array(matrix)
     scene = exposed(night_scene(seed, side_px, side_px), to_camera, gains, share)
     light = np.tensordot(to_camera.astype(np.float32), scene, axes=1).clip(0)

@@ -139,7 +139,7 @@ class PlateReader:
             )
 
     def _exposures(self, light: Tensor, patches: Patches) -> tuple[Tensor, Tensor]:
-        """Give roots of captures (b, 3, p, p) and the true light there."""
+        """Return roots of captures (b, 3, p, p) and the true light there."""
         spread = blur(patches.sharp, whole_kernels(light)[None]).clamp(min=0)
         captured = recorded(
             spread,
@@ -153,7 +153,7 @@ class PlateReader:
         return (captured.clamp(min=0) + _FLOOR).sqrt(), patches.sharp[..., inner, inner]
 
     def average(self) -> State:
-        """Give the averaged weights."""
+        """Return the averaged weights."""
         return self.fitter.average()
 
     def take_average(self, state: State) -> None:
@@ -161,7 +161,7 @@ class PlateReader:
         self.fitter.averaged.load_state_dict(state)
 
     def state(self) -> State:
-        """Give all that a resumed run needs."""
+        """Return all that a resumed run needs."""
         return {
             "weights": self.fitter.weights(),
             "average": self.fitter.average(),
@@ -205,7 +205,7 @@ def open_reader(
 
 
 def reader_digest(chosen: ReaderRecipe, folder: Path | None) -> str:
-    """Give a hash of the camera's recipe and the first weights, which the table only names."""
+    """Return a hash of the camera's recipe and the first weights, which the table only names."""
     found = hashlib.sha256()
     for name in filter(None, (chosen.recipe, chosen.begin)):
         path = _beside(name, folder)
@@ -214,7 +214,7 @@ def reader_digest(chosen: ReaderRecipe, folder: Path | None) -> str:
 
 
 def picture_loss(roots: Tensor, light: Tensor) -> Tensor:
-    """Give the Huber loss of roots, eq. (5.11).
+    """Return the Huber loss of roots, eq. (5.11).
 
     Args:
         roots: (b, 3, h, w) of a network: what it takes for the root of light.

@@ -179,14 +179,14 @@ def to_plate_recipe(table: Mapping[str, Any]) -> PlateRecipe:
 def with_plate_choices(
     recipe: PlateRecipe, *, steps: int | None = None, seed: int | None = None
 ) -> PlateRecipe:
-    """Give the recipe with what a caller chose instead; None keeps what it says."""
+    """Return the recipe with what a caller chose instead; None keeps what it says."""
     changes = {"steps": steps, "seed": seed}
     chosen = {key: value for key, value in changes.items() if value is not None}
     return replace(recipe, schedule=replace(recipe.schedule, **chosen))  # type: ignore[arg-type]
 
 
 def plate_recipe_digest(recipe: PlateRecipe) -> str:
-    """Give a hash of all that decides a run."""
+    """Return a hash of all that decides a run."""
     table = asdict(recipe)
     if recipe.reader is None:  # as before there were readers
         del table["reader"]

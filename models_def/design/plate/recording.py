@@ -52,7 +52,7 @@ def recorded(
 
 
 def whole_kernels(light: Tensor) -> Tensor:
-    """Give kernels (c, n, n) of sum 1: light that leaves the window lies over it as even haze.
+    """Return kernels (c, n, n) of sum 1: light that leaves the window lies over it as even haze.
 
     Left out it would be an absorber, which no plate is, and a design would darken lamps with it.
     """

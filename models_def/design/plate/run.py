@@ -189,7 +189,7 @@ class PlateRun:
 
 
 def _told(moment: Moment) -> dict[str, float]:
-    """Give what the reader makes of fixed patches; nothing without one."""
+    """Return what the reader makes of fixed patches; nothing without one."""
     if moment.picture is None:
         return {}
     found = moment.picture

@@ -130,7 +130,7 @@ def _known(
 
 
 def transfer_errors(bank: PsfBank, recipe: BayerRecipe) -> tuple[float, ...]:
-    """Give how far the transfer of every copy lies off the frozen one, those to train on first.
+    """Return how far the transfer of every copy lies off the frozen one, those to train on first.
 
     Root of the mean |H_copy - H|^2 over that of |H_copy|^2, below 0.3 cycles per pixel, over all
     fields and colours (and depths of a copy); tools/comparison/copies.py has it of frozen PSFs.
@@ -149,7 +149,7 @@ def transfer_errors(bank: PsfBank, recipe: BayerRecipe) -> tuple[float, ...]:
 
 
 def _line(values: NDArray[np.float64], places: NDArray[np.float64]) -> tuple[float, ...]:
-    """Give the mean around every frequency of the table, by the hats between its neighbours."""
+    """Return the mean around every frequency of the table, by the hats between its neighbours."""
     hats = [np.interp(places, FREQUENCIES, unit) for unit in np.eye(len(FREQUENCIES))]
     means = [float((hat * values).sum() / hat.sum()) for hat in hats]
     return tuple(round(mean, SPREAD_DIGITS) for mean in (0.0, *means[1:]))
@@ -273,7 +273,7 @@ def _error(case: _Case, together: Together, numbers: Numbers, recipe: BayerRecip
 def _squares(
     restored: Tensor, target: Tensor, noise: tuple[Tensor, Tensor], recipe: BayerRecipe
 ) -> Tensor:
-    """Give the mean squared error of stabilised planes."""
+    """Return the mean squared error of stabilised planes."""
     stable = stabilise(cut_middle(restored, recipe.data.sample_px), *noise, scale=recipe.scale)
     weight = recipe.scale * noise[0].sqrt()[:, None, None]
     return ((stable - target) * weight).square().mean()
@@ -292,7 +292,7 @@ def _gain_db(
 
 
 def _to_values(together: Together) -> Tensor:
-    """Give the numbers as the descent moves them: those > 0 by their logarithm."""
+    """Return the numbers as the descent moves them: those > 0 by their logarithm."""
     logs = np.log([together.scale, max(together.own, 1e-6), max(together.mistrust, 1e-6)])
     return torch.tensor(
         [*together.noise, *together.noise_rise, together.exponent, together.follow, *logs],
@@ -315,7 +315,7 @@ def _to_numbers(values: Tensor) -> Numbers:
 
 
 def _rounded(first: Together, values: Tensor) -> Together:
-    """Give the numbers as a recipe states them.
+    """Return the numbers as a recipe states them.
 
     Raises:
         ContractError: If one is not what it may be.

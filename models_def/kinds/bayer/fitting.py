@@ -17,7 +17,7 @@ class BayerFitting:
     """Fulfils `camkit.models_def.training.fitting.FittingKind`."""
 
     def fitting(self, request: FitRequest) -> OwnFitting | None:
-        """Give the fitter of the losses content and adversarial, None for the others.
+        """Return the fitter of the losses content and adversarial, None for the others.
 
         Of real pairs, `[fine_tuning]` says how many samples are cut and their share of a batch.
         """

@@ -32,7 +32,7 @@ class BayerMaterial:
     frames: Frames | None = None
 
     def digest(self) -> str:
-        """Give the sha256 of the kernels, and of the frames."""
+        """Return the sha256 of the kernels, and of the frames."""
         return self.bank.digest() if self.frames is None else self.frames.digest()
 
     def write(self, folder: Path) -> None:

@@ -71,11 +71,11 @@ class PsfBank:
         return int(self.copies.shape[0]) - self.depths * self.validation_copies
 
     def blur_kernels(self, copy: int, x_mm: float, y_mm: float) -> Tensor:
-        """Give the (1, 3, h, w) kernels of one copy at a sensor position."""
+        """Return the (1, 3, h, w) kernels of one copy at a sensor position."""
         return _at(self.copies[copy], self.copy_heights_mm, x_mm, y_mm)
 
     def frozen_kernels(self, x_mm: float, y_mm: float, depth: float | None = None) -> Tensor:
-        """Give the (1, 3, h, w) frozen kernels at a sensor position.
+        """Return the (1, 3, h, w) frozen kernels at a sensor position.
 
         Args:
             x_mm: Position.
@@ -97,11 +97,11 @@ class PsfBank:
         return _at(frozen, self.frozen_heights_mm, x_mm, y_mm)
 
     def illumination_at(self, height_mm: float) -> float:
-        """Give the relative illumination at a field height."""
+        """Return the relative illumination at a field height."""
         return float(np.interp(height_mm, self.frozen_heights_mm, self.relative_illumination))
 
     def digest(self) -> str:
-        """Give the sha256 of all kernels and positions."""
+        """Return the sha256 of all kernels and positions."""
         total = hashlib.sha256(b"" if self.depths == 1 else str(self.depths).encode())
         total.update(b"" if self.validation_copies == 1 else b"%d" % self.validation_copies)
         for name in _ARRAYS:

@@ -85,7 +85,7 @@ class LensRecipe:
             raise ContractError(f"lens.depths_mm must increase from above 0; got {self.depths_mm}")
 
     def distance_of(self, copy: int) -> float | None:
-        """Give the distance at which a copy of a lens with a haze is used; None for its own.
+        """Return the distance at which a copy of a lens with a haze is used; None for its own.
 
         Copies to choose by, which come last, begin at the first distance again.
         """
@@ -93,7 +93,7 @@ class LensRecipe:
         return self.depths_mm[turn % len(self.depths_mm)] if self.depths_mm else None
 
     def to_json(self) -> dict[str, Any]:
-        """Give what decides the kernels, to name files by; what is as usual is left out."""
+        """Return what decides the kernels, to name files by; what is as usual is left out."""
         usual = {"depths_mm": (), "validation_copies": 1, "bank_in_focus": False}
         return {name: value for name, value in asdict(self).items() if value != usual.get(name)}
 
@@ -201,7 +201,7 @@ class BayerDataRecipe(DataRecipe):
         )
 
     def lit(self, rng: np.random.Generator, scene: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Give the light of a (3, h, w) scene, and what it should become.
+        """Return the light of a (3, h, w) scene, and what it should become.
 
         Draws only where a recipe asks for it: others keep their samples.
         """
@@ -371,7 +371,7 @@ class BayerRecipe(Recipe):
             )
 
     def with_together(self, together: Together | None) -> "BayerRecipe":
-        """Give it with another model of colours in its bank."""
+        """Return it with another model of colours in its bank."""
         return replace(self, wiener=self.wiener.model_copy(update={"together": together}))
 
 
@@ -419,7 +419,7 @@ def _fine_tuning(table: Any) -> FineTuningRecipe:
 
 
 def samples_digest(recipe: BayerRecipe, seed: int) -> str:
-    """Give a hash of all that decides the training samples, to name their pool by."""
+    """Return a hash of all that decides the training samples, to name their pool by."""
     content = {
         "sensor": recipe.sensor.model_dump(mode="json"),
         "wiener": recipe.wiener.model_dump(mode="json"),

@@ -126,7 +126,7 @@ class Circumstances:
 
     @property
     def met(self) -> tuple[Tensor, Tensor]:
-        """Give the noise that the bank meets: shot and read variance of the colours."""
+        """Return the noise that the bank meets: shot and read variance of the colours."""
         noise = self.noise.raised(self.noise_rise)
         return torch.tensor(noise.shot), torch.tensor(noise.read_variance)
 
@@ -149,12 +149,12 @@ class Developed:
 
 
 def scene_side_px(recipe: BayerRecipe, bank: PsfBank) -> int:
-    """Give the side of the sharp crop that a sample needs."""
+    """Return the side of the sharp crop that a sample needs."""
     return recipe.data.sample_px + 2 * (recipe.data.margin_px + bank.radius_px)
 
 
 def corner_height_mm(recipe: BayerRecipe) -> float:
-    """Give the field height of the sensor's corner."""
+    """Return the field height of the sensor's corner."""
     sensor = recipe.sensor
     sides = (sensor.width_px - 1, sensor.height_px - 1)
     return float(np.hypot(*sides)) / 2 * sensor.pixel_pitch_um / 1000
@@ -357,7 +357,7 @@ def photograph(
 
 
 def filtered(developed: Developed, recipe: BayerRecipe) -> Tensor:
-    """Give (1, 3, S, S) of developed planes behind the recipe's bank, linear."""
+    """Return (1, 3, S, S) of developed planes behind the recipe's bank, linear."""
     given = developed.given
     return wiener_restore(
         developed.planes,
@@ -404,7 +404,7 @@ def finish_shot(developed: Developed, recipe: BayerRecipe, restored: Tensor | No
 
 
 def target_of(developed: Developed, recipe: BayerRecipe) -> Tensor:
-    """Give (1, 3, s, s) what a sample should become, stabilised; NOT_JUDGED where nobody knows."""
+    """Return (1, 3, s, s) what a sample should become, stabilised; NOT_JUDGED if unknown."""
     data, given = recipe.data, developed.given
     shot, read = torch.tensor(given.noise.shot), torch.tensor(given.noise.read_variance)
     bright = developed.true.clamp(max=data.target_max)

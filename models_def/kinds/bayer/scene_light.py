@@ -79,13 +79,13 @@ class DisplayRecipe:
 
     @property
     def to_rec709(self) -> Matrix:
-        """Give the (3, 3) matrix from the display's light to linear Rec.709; not adapted."""
+        """Return the (3, 3) matrix from the display's light to linear Rec.709; not adapted."""
         red, green, blue = (_point(one) for one in self.primaries)
         own = rgb_to_xyz((red, green, blue), _point(self.white))
         return np.asarray(np.linalg.inv(rgb_to_xyz(REC709_PRIMARIES, D65)) @ own)
 
     def codes(self, picture: FloatArray) -> FloatArray:
-        """Give what the display is told, 0..1 in steps, of linear Rec.709."""
+        """Return what the display is told, 0..1 in steps, of linear Rec.709."""
         top = np.float32(2**self.bits - 1)
         return np.asarray(np.rint(encode_srgb(picture) * top) / top, dtype=np.float32)
 
@@ -154,7 +154,7 @@ class WildRecipe:
 
 
 def daylight(kelvin: float) -> Matrix:
-    """Give the (3,) light of a daylight in linear Rec.709, of the luminance of D65.
+    """Return the (3,) light of a daylight in linear Rec.709, of the luminance of D65.
 
     Args:
         kelvin: Correlated colour temperature, 4000..25000.

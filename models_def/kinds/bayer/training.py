@@ -101,7 +101,7 @@ class BayerTraining:
         return to_bayer_recipe(table)
 
     def design(self, recipe: BayerRecipe) -> Design:
-        """Give the stages of every camera of this kind, with the recipe's bank."""
+        """Return the stages of every camera of this kind, with the recipe's bank."""
         wiener, before = recipe.wiener, recipe.wiener.takes[0]
         if recipe.haze is not None:
             (before,) = recipe.haze.gives

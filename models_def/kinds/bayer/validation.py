@@ -61,7 +61,7 @@ class BayerJudge:
     recipe: BayerRecipe
 
     def baselines(self) -> Mapping[str, float]:
-        """Give the mean dB of the capture as it is, and of the Wiener bank alone."""
+        """Return the mean dB of the capture as it is, and of the Wiener bank alone."""
         return {
             "capture": self.score(lambda planes: planes[:, :3]).mean_db,
             "wiener": self.score(lambda planes: planes[:, 3:]).mean_db,

@@ -33,7 +33,7 @@ class HdrMaterial:
     designed: Mapping[str, bytes] = field(default_factory=dict)
 
     def digest(self) -> str:
-        """Give the sha256 of the optics."""
+        """Return the sha256 of the optics."""
         return hashlib.sha256(streaks_to_bytes(self.streaks)).hexdigest()
 
     def write(self, folder: Path) -> None:
@@ -41,7 +41,7 @@ class HdrMaterial:
         write_streaks(folder / FILE, self.streaks)
 
     def color_kernels(self, recipe: HdrRecipe, *, bare: bool = False) -> FloatArray:
-        """Give the dense kernels (3, n, n) of the sensor's colours, each of sum 1."""
+        """Return the dense kernels (3, n, n) of the sensor's colours, each of sum 1."""
         psf = psf_of_streaks(self.streaks, 3, bare=bare)
         weights = wavelength_weights(psf.wavelengths_um, *recipe.sensor.response_arrays())
         kernels = np.einsum("cw,wyx->cyx", weights, psf.kernels[0, -1])

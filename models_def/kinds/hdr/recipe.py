@@ -129,7 +129,7 @@ def to_hdr_recipe(table: Mapping[str, Any]) -> HdrRecipe:
 
 
 def samples_digest(recipe: HdrRecipe, seed: int) -> str:
-    """Give a hash of all that decides the training samples, to name their pool by."""
+    """Return a hash of all that decides the training samples, to name their pool by."""
     content = {
         "sensor": recipe.sensor.model_dump(mode="json"),
         "plate": asdict(recipe.plate),
@@ -142,7 +142,7 @@ def samples_digest(recipe: HdrRecipe, seed: int) -> str:
 
 
 def reference_digest(recipe: HdrRecipe, role: str, seed: int) -> str:
-    """Give a hash of all that decides the samples of a reference role."""
+    """Return a hash of all that decides the samples of a reference role."""
     own = {"role": role, "optics": recipe.thesis.optics}
     if recipe.thesis.optics == "glare":
         own |= {key: str(value) for key, value in asdict(recipe.glare).items()}

@@ -65,12 +65,12 @@ class Located(Protocol):
 
     @property
     def clipped(self) -> NDArray[np.bool_]:
-        """Give (h, w) where a sample clipped."""
+        """Return (h, w) where a sample clipped."""
         ...
 
     @property
     def sharp(self) -> FloatArray:
-        """Give (3, h, w), the truth."""
+        """Return (3, h, w), the truth."""
         ...
 
 
@@ -144,7 +144,7 @@ def spread_light(sharp: Tensor, kernels: FloatArray) -> Tensor:
 
 
 def develop(raw: FloatArray, gains: tuple[float, float, float], cfa: CfaPattern) -> FloatArray:
-    """Give (3, h, w) white-balanced planes of an (h, w) mosaic."""
+    """Return (3, h, w) white-balanced planes of an (h, w) mosaic."""
     samples = torch.from_numpy(raw)[None]
     factors = torch.tensor(gains).reshape(1, 3, 1, 1).expand(1, 3, *samples.shape[1:])
     return np.ascontiguousarray(demosaic(samples * mosaic(factors, cfa), cfa)[0].numpy())

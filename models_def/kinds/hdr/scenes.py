@@ -34,7 +34,7 @@ class LightSource:
     picture_share: float
 
     def draw(self, rng: Generator, side_px: int) -> FloatArray:
-        """Give a scene (3, side, side) linear Rec.709, lights above 1."""
+        """Return a scene (3, side, side) linear Rec.709, lights above 1."""
         night = night_scene(NIGHT_SEED + int(rng.integers(2**31)), side_px, side_px)
         if rng.random() >= self.picture_share:
             return night
@@ -59,7 +59,7 @@ def exposed(
     gains: tuple[float, float, float],
     share: float | None,
 ) -> FloatArray:
-    """Give a scene exposed so that a share of it saturates, up to 2^8 times white.
+    """Return a scene exposed so that a share of it saturates, up to 2^8 times white.
 
     Args:
         scene: (3, h, w) linear Rec.709.

@@ -93,7 +93,7 @@ class HdrTraining:
         return to_hdr_recipe(table)
 
     def design(self, recipe: HdrRecipe) -> Design:
-        """Give the stages of every camera of this kind."""
+        """Return the stages of every camera of this kind."""
         return Design(
             stages=(
                 Linearise(),
@@ -170,7 +170,7 @@ class HdrTraining:
 
 
 def _lights_px(recipe: HdrRecipe) -> int | None:
-    """Give how far from lights the networks act; None if any acts everywhere."""
+    """Return how far from lights the networks act; None if any acts everywhere."""
     sizes = recipe.networks.get(ROLES[0], {}).values()
     reaches_px = [px for size in sizes if (px := lights_px(size.network)) is not None]
     return max(reaches_px) if reaches_px and len(reaches_px) == len(sizes) else None

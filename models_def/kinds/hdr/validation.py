@@ -35,7 +35,7 @@ class HdrJudge:
     recipe: HdrRecipe
 
     def baselines(self) -> Mapping[str, float]:
-        """Give the mean dB of the capture, and of the lights by physics alone."""
+        """Return the mean dB of the capture, and of the lights by physics alone."""
         return {
             "capture": self.score(lambda planes: planes[:, :3]).mean_db,
             "physics": self.score(lambda planes: planes[:, 3:]).mean_db,

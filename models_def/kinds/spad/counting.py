@@ -53,7 +53,7 @@ class Exposure:
         return self.photons * self.detected
 
     def brighter(self, factor: float) -> "Exposure":
-        """Give the same exposure of a pixel that collects so many times the light."""
+        """Return the same exposure of a pixel that collects so many times the light."""
         return Exposure(
             photons=self.photons * factor, detected=self.detected, dark_counts=self.dark_counts
         )
@@ -74,7 +74,7 @@ def draw_counts(light: Tensor, exposure: Exposure, rng: Generator) -> Tensor:
 
 
 def told_planes(counts: Tensor, exposure: Exposure) -> Tensor:
-    """Give light and noise (b, 2, h, w) of counts (b, 1, h, w); see the head of the module."""
+    """Return light and noise (b, 2, h, w) of counts (b, 1, h, w); see the head of the module."""
     white = exposure.white_counts
     light = (counts - exposure.dark_counts) / white
     return torch.cat([light, TOLD * torch.sqrt(counts + 1) / white], dim=1)

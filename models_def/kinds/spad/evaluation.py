@@ -63,13 +63,13 @@ def read_set(folder: Path) -> tuple[FloatArray, ...]:
 
 
 def psnr_db(found: Tensor, truth: Tensor) -> float:
-    """Give the PSNR in dB, white = 1, at most `MOST_DB`."""
+    """Return the PSNR in dB, white = 1, at most `MOST_DB`."""
     error = float((found.double() - truth.double()).square().mean())
     return min(float(-10 * np.log10(max(error, 1e-30))), MOST_DB)
 
 
 def bicubic(sampling: Sampling) -> Restorer:
-    """Give bicubic interpolation, a = -0.5, at the true phase of a sampling."""
+    """Return bicubic interpolation, a = -0.5, at the true phase of a sampling."""
     finer = Bicubic(SCALE, sampling.phase)
     return lambda planes: torch.as_tensor(finer(planes[:, :1]))
 
@@ -104,7 +104,7 @@ def evaluate_each(
     *,
     seed: int = SEED,
 ) -> tuple[tuple[float, float], ...]:
-    """Give PSNR in dB and SSIM of every picture; arguments as of `evaluate`."""
+    """Return PSNR in dB and SSIM of every picture; arguments as of `evaluate`."""
     return tuple(
         _compare(torch.from_numpy(picture)[None, None], sampling, exposure, restore, (seed, i))
         for i, picture in enumerate(pictures)

@@ -41,7 +41,7 @@ class PlateFitter:
         return float(loss.detach())
 
     def notes(self) -> dict[str, float]:
-        """Give how wide the plate spreads light: the root of its second moment along an axis."""
+        """Return how wide the plate spreads light: the root of its second moment along an axis."""
         network = cast("JointCamera", self.inner.averaged)
         with torch.no_grad():
             kernel = network.plate().double()
@@ -67,15 +67,15 @@ class PlateFitter:
             return torch.as_tensor(network.read(counted, deviation))
 
     def weights(self) -> State:
-        """Give the weights being trained, the logits of the plate among them."""
+        """Return the weights being trained, the logits of the plate among them."""
         return self.inner.weights()
 
     def average(self) -> State:
-        """Give the averaged weights."""
+        """Return the averaged weights."""
         return self.inner.average()
 
     def optimizer_state(self) -> dict[str, Any]:
-        """Give the optimiser's state."""
+        """Return the optimiser's state."""
         return self.inner.optimizer_state()
 
     def load(self, weights: State, average: State, optimizer: dict[str, Any]) -> None:
@@ -87,7 +87,7 @@ class PlateFitting:
     """Fulfils `camkit.models_def.training.fitting.FittingKind`."""
 
     def fitting(self, request: FitRequest) -> OwnFitting | None:
-        """Give the fitter of the role plate; the other has the house's.
+        """Return the fitter of the role plate; the other has the house's.
 
         Raises:
             ContractError: If the network does not suit the role, or the device.

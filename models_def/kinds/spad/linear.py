@@ -32,7 +32,7 @@ class LinearUpscaler:
     bias: Tensor
 
     def __call__(self, planes: Tensor) -> Tensor:
-        """Give the picture (b, 1, 4 h, 4 w) from planes (b, c, h, w), the first of them light."""
+        """Return the picture (b, 1, 4 h, 4 w) from planes (b, c, h, w), the first of them light."""
         return functional.pixel_shuffle(
             functional.conv2d(_widened(planes[:, :1]), self.weights, self.bias), SCALE
         )

@@ -43,16 +43,16 @@ class JointCamera(nn.Module):
         self.network = network
 
     def see(self, sharp: Tensor) -> Tensor:
-        """Give the light of the pixels (b, 1, h, w) from (b, 1, 4 h, 4 w), in float32."""
+        """Return the light of the pixels (b, 1, h, w) from (b, 1, 4 h, 4 w), in float32."""
         return see_through(sharp.float(), self.plate(), self.phase)
 
     def read(self, light: Tensor, deviation: Tensor) -> Tensor:
-        """Give the picture from counted light (b, 1, h, w) and 1 / sqrt(N) (b, 1, 1, 1)."""
+        """Return the picture from counted light (b, 1, h, w) and 1 / sqrt(N) (b, 1, 1, 1)."""
         noise = TOLD * deviation * torch.sqrt(light.clamp(min=0) + deviation.square())
         return torch.as_tensor(self.network(torch.cat([light, noise], dim=1)))
 
     def forward(self, planes: Tensor) -> Tensor:
-        """Give the picture (b, 1, 4 h, 4 w) that light without noise would make."""
+        """Return the picture (b, 1, 4 h, 4 w) that light without noise would make."""
         return self.read(self.see(planes[:, :1]), planes[:, 1:, :1, :1])
 
 

@@ -37,17 +37,17 @@ class SoftmaxPsf(nn.Module):
         self.logits = nn.Parameter(torch.from_numpy(np.log(gaussian_psf(sigma))))
 
     def forward(self) -> Tensor:
-        """Give the (11, 11) kernel."""
+        """Return the (11, 11) kernel."""
         return softmax_psf(self.logits)
 
 
 def softmax_psf(logits: Tensor) -> Tensor:
-    """Give a kernel >= 0 of unit sum, of the shape of its logits."""
+    """Return a kernel >= 0 of unit sum, of the shape of its logits."""
     return torch.softmax(logits.flatten(), 0).reshape(logits.shape)
 
 
 def frozen_psf(kernel: FloatArray) -> FrozenPsf:
-    """Give a kernel (11, 11) as a bundle holds it: the same everywhere, on the fine grid."""
+    """Return a kernel (11, 11) as a bundle holds it: the same everywhere, on the fine grid."""
     return measured_psf(kernel[None], pixel_pitch_um=FINE_PITCH_UM, wavelengths_um=(WAVELENGTH_UM,))
 
 

@@ -82,7 +82,7 @@ class SpadDataRecipe(DataRecipe):
         self.exposure(self.photons_min)
 
     def exposure(self, photons: float) -> Exposure:
-        """Give the exposure of so many photons of white."""
+        """Return the exposure of so many photons of white."""
         return Exposure(photons=photons, detected=self.detected, dark_counts=self.dark_counts)
 
 
@@ -132,7 +132,7 @@ def to_spad_recipe(table: Mapping[str, Any]) -> SpadRecipe:
 
 
 def samples_digest(recipe: SpadRecipe, role: str, seed: int) -> str:
-    """Give a hash of all that decides the training samples, to name their pool by."""
+    """Return a hash of all that decides the training samples, to name their pool by."""
     content = {
         "sampling": asdict(recipe.sampling),
         "phase": recipe.sensor.phase,

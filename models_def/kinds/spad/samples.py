@@ -30,12 +30,12 @@ Generator = np.random.Generator
 
 
 def luminance(coded: FloatArray) -> FloatArray:
-    """Give L (h, w) of sRGB-coded R, G, B (3, h, w)."""
+    """Return L (h, w) of sRGB-coded R, G, B (3, h, w)."""
     return np.asarray(np.tensordot(LUMINANCE, coded, axes=1), dtype=np.float32)
 
 
 def layout_of(recipe: SpadRecipe, role: str) -> SampleLayout:
-    """Say what the samples of a role hold."""
+    """Return what the samples of a role hold."""
     if role == PLATE:
         return SampleLayout(
             inputs=(Port(name="sharp", channels=1), Port(name="deviation", channels=1)),
@@ -60,7 +60,7 @@ def draw_luminance(source: SceneSource, rng: Generator, side_px: int) -> Tensor:
 
 
 def photograph(fine: Tensor, sampling: Sampling, exposure: Exposure, rng: Generator) -> Tensor:
-    """Give light and noise (1, 2, h, w) of a picture (1, 1, 4 h, 4 w).
+    """Return light and noise (1, 2, h, w) of a picture (1, 1, 4 h, 4 w).
 
     The exposure is that of one sub-pixel: a pixel that collects more counts more.
     """

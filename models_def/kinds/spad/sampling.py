@@ -40,14 +40,14 @@ FULL_LIGHT: Final = float(SCALE**2)
 
 
 def point_psf() -> FloatArray:
-    """Give the (11, 11) kernel of no plate at all."""
+    """Return the (11, 11) kernel of no plate at all."""
     kernel = np.zeros((PSF_SIDE, PSF_SIDE), np.float32)
     kernel[HALF, HALF] = 1
     return kernel
 
 
 def gaussian_psf(sigma: float = GAUSSIAN_SIGMA) -> FloatArray:
-    """Give an (11, 11) Gaussian of unit sum; sigma in sub-pixels, > 0.
+    """Return an (11, 11) Gaussian of unit sum; sigma in sub-pixels, > 0.
 
     Raises:
         ContractError: If sigma is not a number > 0.
@@ -60,7 +60,7 @@ def gaussian_psf(sigma: float = GAUSSIAN_SIGMA) -> FloatArray:
 
 
 def box_psf(phase: int = PHASE) -> FloatArray:
-    """Give the (11, 11) kernel whose sample at a phase is the mean of the pixel."""
+    """Return the (11, 11) kernel whose sample at a phase is the mean of the pixel."""
     kernel = np.zeros((PSF_SIDE, PSF_SIDE), np.float32)
     first = HALF + phase - (SCALE - 1)
     kernel[first : first + SCALE, first : first + SCALE] = 1 / SCALE**2
@@ -68,7 +68,7 @@ def box_psf(phase: int = PHASE) -> FloatArray:
 
 
 def see_through(fine: Tensor, kernel: Tensor, phase: int = PHASE) -> Tensor:
-    """Give the light of every pixel, S(p * I) of eq. (4.1).
+    """Return the light of every pixel, S(p * I) of eq. (4.1).
 
     Args:
         fine: (b, 1, 4 h, 4 w) light.
@@ -127,7 +127,7 @@ class Sampling:
         return FULL_LIGHT if self.mode == "full_fill" else 1.0
 
     def see(self, fine: Tensor) -> Tensor:
-        """Give (b, 1, h, w) light of the pixels from (b, 1, 4 h, 4 w), white = 1 in both."""
+        """Return (b, 1, h, w) light of the pixels from (b, 1, 4 h, 4 w), white = 1 in both."""
         return see_through(fine, torch.from_numpy(self.kernel).to(fine), self.phase)
 
 

@@ -84,7 +84,7 @@ def covariance_of(crops: Iterable[NDArray[np.floating]]) -> Covariance:
 def wiener_error(
     kernel: Tensor, covariance: Covariance, photons: float, phase: int = PHASE
 ) -> Tensor:
-    """Give the mean squared error of the best linear estimate of all sub-pixels.
+    """Return the mean squared error of the best linear estimate of all sub-pixels.
 
     Args:
         kernel: (11, 11) of unit sum; gradients reach it.
@@ -113,12 +113,12 @@ def wiener_error(
 
 
 def wiener_psnr_db(kernel: Tensor, covariance: Covariance, photons: float) -> float:
-    """Give the error of `wiener_error` as PSNR in dB, white = 1."""
+    """Return the error of `wiener_error` as PSNR in dB, white = 1."""
     return float(-10 * torch.log10(wiener_error(kernel, covariance, photons)))
 
 
 def best_gaussian(covariance: Covariance, photons: float) -> float:
-    """Give the sigma in sub-pixels of the Gaussian of least error at a level of light."""
+    """Return the sigma in sub-pixels of the Gaussian of least error at a level of light."""
 
     def error(sigma: float) -> float:
         kernel = torch.from_numpy(gaussian_psf(sigma))

@@ -52,7 +52,7 @@ class SpadMaterial:
     designed: Mapping[str, bytes] = field(default_factory=dict)
 
     def digest(self) -> str:
-        """Give the sha256 of the kernel."""
+        """Return the sha256 of the kernel."""
         return hashlib.sha256(psf_to_bytes(frozen_psf(self.kernel))).hexdigest()
 
     def write(self, folder: Path) -> None:
@@ -78,7 +78,7 @@ class SpadTraining:
         return to_spad_recipe(table)
 
     def design(self, recipe: SpadRecipe) -> Design:
-        """Give the stages: photons, the fine grid, and depth where there are time bins.
+        """Return the stages: photons, the fine grid, and depth where there are time bins.
 
         Raises:
             UnsupportedError: If its networks are not told the noise of pixels, as the stage does.
@@ -149,7 +149,7 @@ class SpadTraining:
 
 
 def sampling_of(recipe: SpadRecipe, material: SpadMaterial) -> Sampling:
-    """Give how the array of a recipe samples, with the kernel of its material."""
+    """Return how the array of a recipe samples, with the kernel of its material."""
     plan = recipe.sampling
     return Sampling(
         mode=plan.mode,  # type: ignore[arg-type]

@@ -54,7 +54,7 @@ class SpadJudge:
     sampling: Sampling
 
     def baselines(self) -> Mapping[str, float]:
-        """Give the mean dB of bicubic interpolation."""
+        """Return the mean dB of bicubic interpolation."""
         finer = bicubic(self.sampling)
         return {"bicubic": self._mean([finer(shot.light) for shot in self.shots]).mean_db}
 

@@ -46,17 +46,17 @@ class ThesisChain(nn.Module):
         self.stride_px = max(self.splitting.stride_px, self.highlight.stride_px)
 
     def outputs(self, capture: Tensor) -> ChainOutput:
-        """Give all that is between, and the result, from (b, 3, h, w) linear."""
+        """Return all that is between, and the result, from (b, 3, h, w) linear."""
         clean, streaks = self.splitting(capture)
         lights = self.highlight(streaks)
         fused = self.fusion(clean, lights * saturated(capture))
         return ChainOutput(clean=clean, streaks=streaks, lights=lights, fused=fused)
 
     def forward(self, capture: Tensor) -> Tensor:
-        """Give (b, 3, h, w) linear, 0..2^8, from a capture, 1 = white."""
+        """Return (b, 3, h, w) linear, 0..2^8, from a capture, 1 = white."""
         return self.outputs(capture).fused
 
 
 def saturated(capture: Tensor) -> Tensor:
-    """Give (b, 1, h, w): 1 where any colour is saturated, else 0."""
+    """Return (b, 1, h, w): 1 where any colour is saturated, else 0."""
     return (capture.amax(dim=1, keepdim=True) >= SATURATED).to(capture.dtype)

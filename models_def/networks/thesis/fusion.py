@@ -50,7 +50,7 @@ class FusionNetwork(nn.Module):
         self.merge = nn.Sequential(active(conv(2 * width, merged, 3)), active(conv(merged, 3, 3)))
 
     def forward(self, clean: Tensor, lights: Tensor) -> Tensor:
-        """Give (b, 3, h, w), 0..2^8.
+        """Return (b, 3, h, w), 0..2^8.
 
         Args:
             clean: (b, 3, h, w) without streaks, 0..1.

@@ -62,7 +62,7 @@ class HighlightUnet(nn.Module):
         self.last = nn.Conv2d(widths[0], 3, 1)
 
     def forward(self, streaks: Tensor) -> Tensor:
-        """Give (b, 3, h, w) lights, 1..2^8, from streaks; h, w multiples of 16."""
+        """Return (b, 3, h, w) lights, 1..2^8, from streaks; h, w multiples of 16."""
         skips: list[Tensor] = []
         x = streaks
         for i, encoder in enumerate(self.encoders):

@@ -21,7 +21,7 @@ class ScaledNorm(nn.Module):
         self.normed = nn.Parameter(torch.zeros(()))
 
     def forward(self, x: Tensor) -> Tensor:
-        """Give (b, c, h, w) from the same."""
+        """Return (b, c, h, w) from the same."""
         return self.plain * x + self.normed * instance_norm(x)
 
 
@@ -36,12 +36,12 @@ class InstanceNorm(nn.Module):
         self.offset = nn.Parameter(torch.zeros(channels))
 
     def forward(self, x: Tensor) -> Tensor:
-        """Give (b, c, h, w) from the same."""
+        """Return (b, c, h, w) from the same."""
         return self.gain[:, None, None] * instance_norm(x) + self.offset[:, None, None]
 
 
 def conv(inputs: int, outputs: int, size: int, *, dilation: int = 1) -> nn.Conv2d:
-    """Give a convolution that keeps the size of a picture, ready for a leaky ReLU behind it."""
+    """Return a convolution that keeps the size of a picture, ready for a leaky ReLU behind it."""
     layer = nn.Conv2d(inputs, outputs, size, padding=dilation * (size // 2), dilation=dilation)
     nn.init.kaiming_normal_(layer.weight, a=SLOPE, nonlinearity="leaky_relu")
     nn.init.zeros_(torch.as_tensor(layer.bias))
@@ -49,7 +49,7 @@ def conv(inputs: int, outputs: int, size: int, *, dilation: int = 1) -> nn.Conv2
 
 
 def active(layer: nn.Module, *norm: nn.Module) -> nn.Sequential:
-    """Give a row of a table: convolution, leaky ReLU, norm if there is one, in this order."""
+    """Return a row of a table: convolution, leaky ReLU, norm if there is one, in this order."""
     return nn.Sequential(layer, nn.LeakyReLU(SLOPE), *norm)
 
 

@@ -67,7 +67,7 @@ def field_curvature(
 def distortion(
     lens: Lens, slopes: Tensor, wavelengths_um: Tensor, definition: PupilDefinition
 ) -> Tensor:
-    """Give chief height / ideal height - 1 (field, wavelength); 0 on the axis, NaN if lost.
+    """Return chief height / ideal height - 1 (field, wavelength); 0 on the axis, NaN if lost.
 
     The ideal height is the paraxial one of the reference wavelength where the sensor stands (see
     `ideal_heights`), so lateral colour shows as a difference between wavelengths.
@@ -82,14 +82,14 @@ def distortion(
 def lateral_colour_mm(
     lens: Lens, slopes: Tensor, wavelengths_um: Tensor, definition: PupilDefinition
 ) -> Tensor:
-    """Give how far (field, wavelength) chief rays land beyond that of the reference wavelength."""
+    """Return how far (field, wavelength) chief rays land beyond the reference wavelength."""
     reference = torch.tensor([lens.reference_wavelength_um], dtype=torch.float64)
     heights = chief_landings(lens, slopes, torch.cat([wavelengths_um, reference]), definition)
     return heights[:, :-1] - heights[:, -1:]
 
 
 def axial_colour_mm(lens: Lens, wavelengths_um: Tensor) -> Tensor:
-    """Give the paraxial focus (wavelength,) beyond that of the reference wavelength."""
+    """Return the paraxial focus (wavelength,) beyond that of the reference wavelength."""
     reference = torch.tensor([lens.reference_wavelength_um], dtype=torch.float64)
     foci = _paraxial_foci(lens, torch.cat([wavelengths_um, reference]))
     return foci[:-1] - foci[-1]
@@ -104,7 +104,7 @@ def _paraxial_foci(lens: Lens, wavelengths_um: Tensor) -> Tensor:
 
 
 def longitudinal_mm(lens: Lens, pupil: Tensor, wavelengths_um: Tensor) -> Tensor:
-    """Give where (wavelength, pupil) axial rays cross the axis, from the sensor; NaN if lost.
+    """Return where (wavelength, pupil) axial rays cross the axis, from the sensor; NaN if lost.
 
     Args:
         lens: The prescription.

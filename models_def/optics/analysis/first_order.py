@@ -97,7 +97,7 @@ def _through(tensors: SurfaceTensors, height_mm: float, slope: float) -> Paraxia
 
 
 def ideal_heights(lens: Lens, slopes: Tensor) -> Tensor:
-    """Give the heights (field,) in mm of the paraxial chief rays on the sensor where it stands.
+    """Return the heights (field,) in mm of the paraxial chief rays on the sensor where it stands.
 
     For a distant object and a sensor in the paraxial focus this is EFL tan(angle); out of focus
     it is scaled as the chief ray is, so that defocus is not taken for distortion.
@@ -107,7 +107,7 @@ def ideal_heights(lens: Lens, slopes: Tensor) -> Tensor:
 
 
 def airy_radius_mm(lens: Lens, wavelength_um: float | None = None) -> float:
-    """Give the radius of the first dark ring on the axis, 1.22 wavelength / (2 NA).
+    """Return the radius of the first dark ring on the axis, 1.22 wavelength / (2 NA).
 
     NA is the sine of the real marginal ray in the image (of the paraxial one if that is lost):
     a near object's working aperture is counted; inf if the lens makes no cone.

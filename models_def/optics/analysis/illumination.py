@@ -29,7 +29,7 @@ from camkit.models_def.optics.trace import Rays, refract, trace
 def relative_illumination_of(
     lens: Lens, slopes: Tensor, wavelengths_um: Tensor, rays: int = 1024
 ) -> Tensor:
-    """Give the light (field, wavelength) of an even scene, 1 on the axis; NaN without chief ray.
+    """Return the light (field, wavelength) of an even scene, 1 on the axis; NaN without chief ray.
 
     Measured on the sensor where the chief ray of the field lands. The stop decides what passes,
     whatever the pupil of the spots. Losses of coating and bulk are not counted.
@@ -50,7 +50,7 @@ def relative_illumination_of(
 
 
 def relative_illumination_at(lens: Lens, heights_mm: Tensor, rays: int = 1024) -> Tensor:
-    """Give the light (point,) of an even scene at sensor heights (point,), 1 on the axis.
+    """Return the light (point,) of an even scene at sensor heights (point,), 1 on the axis.
 
     At the reference wavelength; otherwise as `relative_illumination_of`.
     """
@@ -63,7 +63,7 @@ def relative_illumination_at(lens: Lens, heights_mm: Tensor, rays: int = 1024) -
 def sensor_light(
     lens: Lens, heights_mm: Tensor, wavelengths_um: Tensor, rays: int = 1024
 ) -> Tensor:
-    """Give the irradiance (point, wavelength) of a scene of radiance 1; NaN where the height is.
+    """Return the irradiance (point, wavelength) of a scene of radiance 1; NaN where the height is.
 
     The integral of `render.beam`, whose labels are found here by aiming at even shares of the
     stop: no search, no ray that misses it.

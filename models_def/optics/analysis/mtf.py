@@ -29,14 +29,14 @@ class Mtf:
     sagittal: Tensor
 
     def times(self, other: "Mtf") -> "Mtf":
-        """Give the product."""
+        """Return the product."""
         return Mtf(
             tangential=self.tangential * other.tangential, sagittal=self.sagittal * other.sagittal
         )
 
 
 def diffraction_mtf(share: Tensor) -> Tensor:
-    """Give the contrast of a perfect round pupil at shares of its cutoff frequency.
+    """Return the contrast of a perfect round pupil at shares of its cutoff frequency.
 
     References: Goodman, Introduction to Fourier Optics, eq. (6-32) in the 3rd edition:
         2/pi (acos s - s sqrt(1 - s^2)).
@@ -46,7 +46,7 @@ def diffraction_mtf(share: Tensor) -> Tensor:
 
 
 def diffraction_limit(wavefront: Wavefront, cycles_per_mm: Tensor) -> Mtf:
-    """Give the contrast of the same pupil without aberration, an ellipse of its extents.
+    """Return the contrast of the same pupil without aberration, an ellipse of its extents.
 
     Off the axis the pupil is seen foreshortened: the extents in m and l set the cutoff of
     tangential and sagittal lines, extent / wavelength. A vignetted pupil is no ellipse: for it
@@ -68,7 +68,7 @@ def diffraction_limit(wavefront: Wavefront, cycles_per_mm: Tensor) -> Mtf:
 
 
 def geometric_mtf(spots: Spots, cycles_per_mm: Tensor) -> Mtf:
-    """Give the contrast of rays alone: the Fourier transform of the spots; no pixel is involved.
+    """Return the contrast of rays alone: the Fourier transform of the spots; no pixel is involved.
 
     NaN for a field without rays. `times` the diffraction limit it estimates the contrast of a
     lens between both models.
@@ -86,7 +86,7 @@ def geometric_mtf(spots: Spots, cycles_per_mm: Tensor) -> Mtf:
 def mtf_of_psf(
     psf: Tensor, pitch_um: float, cycles_per_mm: Tensor, energy: Tensor | None = None
 ) -> Mtf:
-    """Give the contrast of pictures of points; 1 at frequency 0.
+    """Return the contrast of pictures of points; 1 at frequency 0.
 
     Args:
         psf: (field, wavelength, y, x), on one common centre; any scale.

@@ -40,7 +40,7 @@ class PsfModel:
 
 
 def psf_model(lens: Lens, slopes: Tensor, wavelengths_um: Tensor) -> PsfModel:
-    """Say which PSF model a lens needs.
+    """Return which PSF model a lens needs.
 
     Args:
         lens: The prescription.
@@ -69,7 +69,7 @@ def psf_model(lens: Lens, slopes: Tensor, wavelengths_um: Tensor) -> PsfModel:
 def lens_psf(
     lens: Lens, slopes: Tensor, wavelengths_um: Tensor, size_px: int, pitch_um: float
 ) -> TracedPsf:
-    """Give the PSF of fields by the cheaper model that is right, every ray aimed at the stop.
+    """Return the PSF of fields by the cheaper model that is right, every ray aimed at the stop.
 
     Args:
         lens: The prescription.

@@ -48,7 +48,7 @@ class Pupil:
 
 
 def pupil_samples(name: str) -> PupilSamples:
-    """Give the points of a sampling by name.
+    """Return the points of a sampling by name.
 
     - `hexapolar:RINGS`: a centre and rings of 6, 12, ... points, each counting once, as other
       programs do; its outermost ring lies on the edge and counts in full, so that few rings
@@ -90,7 +90,7 @@ def _is_count(text: str) -> bool:
 
 
 def uniform_grid(side: int) -> PupilSamples:
-    """Give the points of a side x side grid of cells whose centres lie in the unit disc."""
+    """Return the points of a side x side grid of cells whose centres lie in the unit disc."""
     cell = (torch.arange(side, dtype=torch.float64) + 0.5) * 2 / side - 1
     y, x = torch.meshgrid(cell, cell, indexing="ij")
     inside = x**2 + y**2 <= 1
@@ -98,7 +98,7 @@ def uniform_grid(side: int) -> PupilSamples:
 
 
 def disc_quadrature(rings: int, arms: int) -> PupilSamples:
-    """Give rings x arms points and weights that integrate smooth functions over the disc."""
+    """Return rings x arms points and weights that integrate smooth functions over the disc."""
     return _rings_and_arms(*_gauss(rings), arms)
 
 
@@ -108,7 +108,7 @@ def _gauss(rings: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def _radau(rings: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Give nodes and weights in r^2 with a node at 0."""
+    """Return nodes and weights in r^2 with a node at 0."""
     both = np.zeros(rings + 1)
     both[-2:] = 1.0
     nodes = np.sort(legendre.legroots(both).real)
@@ -138,7 +138,7 @@ def _fibonacci(rays: int) -> PupilSamples:
 
 
 def sample_weights(samples: PupilSamples) -> Tensor:
-    """Give the share of the disc (rays,) of each point; the sum is 1."""
+    """Return the share of the disc (rays,) of each point; the sum is 1."""
     if samples.weight is not None:
         return samples.weight
     return torch.full_like(samples.x, 1 / len(samples.x))

@@ -44,7 +44,7 @@ class Seidel:
         return self.surfaces_mm.sum(0)
 
     def transverse_mm(self) -> dict[str, float]:
-        """Give the transverse aberrations as CODE V lists them.
+        """Return the transverse aberrations as CODE V lists them.
 
         SA spherical, TCO tangential coma, TAS and SAS tangential and sagittal astigmatism, PTB
         Petzval blur, DST distortion, AX and LAT axial and lateral colour; mm. PTZ is the Petzval
@@ -65,7 +65,7 @@ class Seidel:
 
 
 def seidel_sums(lens: Lens) -> Seidel:
-    """Give the sums at the reference wavelength, for the largest field of the file.
+    """Return the sums at the reference wavelength, for the largest field of the file.
 
     Raises:
         ContractError: If the entrance pupil is at infinity.
@@ -78,7 +78,7 @@ def seidel_sums(lens: Lens) -> Seidel:
 
 
 def seidel_of_rays(rays: ParaxialRays, dispersion: Tensor) -> Seidel:
-    """Give the sums of traced paraxial rays, differentiable.
+    """Return the sums of traced paraxial rays, differentiable.
 
     Args:
         rays: Marginal and chief ray; the image is in air.
@@ -124,7 +124,7 @@ def seidel_of_rays(rays: ParaxialRays, dispersion: Tensor) -> Seidel:
 
 
 def _departure(tensors: SurfaceTensors) -> Tensor:
-    """Give the r^4 coefficient (surface,) beyond that of the sphere with the vertex's curvature.
+    """Return the r^4 coefficient (surface,) beyond that of the sphere with the vertex's curvature.
 
     The r^2 term changes the vertex curvature, and so the sphere to compare with.
     """

@@ -32,12 +32,12 @@ CONVERGENCE_SAMPLINGS: Final = (
 
 
 def field_slopes(lens: Lens) -> Tensor:
-    """Give tan of the field angles (field,) of the file."""
+    """Return tan of the field angles (field,) of the file."""
     return torch.tan(torch.tensor(lens.field_angles_rad, dtype=torch.float64))
 
 
 def analysis_tensors(lens: Lens, wavelengths_um: Tensor) -> SurfaceTensors:
-    """Give the tensors of a lens, rims wide enough for rays that rounding put beyond them."""
+    """Return the tensors of a lens, rims wide enough for rays that rounding put beyond them."""
     tensors = surface_tensors(lens, wavelengths_um)
     return replace(tensors, semi_diameter_mm=tensors.semi_diameter_mm * (1 + _EDGE_SLACK))
 
@@ -92,7 +92,7 @@ def launch_beams(
 def chief_landings(
     lens: Lens, slopes: Tensor, wavelengths_um: Tensor, definition: PupilDefinition
 ) -> Tensor:
-    """Give the heights (field, wavelength) in mm of chief rays on the sensor; NaN if lost.
+    """Return the heights (field, wavelength) in mm of chief rays on the sensor; NaN if lost.
 
     The chief ray passes the middle of the stop, or of the paraxial entrance pupil by that
     definition. Rims do not stop it: it is a reference even where the beam is vignetted.
@@ -126,18 +126,18 @@ def spot_diagram(lens: Lens, slopes: Tensor, wavelengths_um: Tensor, pupil: Pupi
 
 
 def rms_about_centroid(spots: Spots) -> Tensor:
-    """Give the RMS radius (field, wavelength) in mm about the centroid; NaN without rays."""
+    """Return the RMS radius (field, wavelength) in mm about the centroid; NaN without rays."""
     return torch.where(spots.weight.sum(-1) > 0, rms_radius(spots), math.nan)
 
 
 def rms_about_chief(spots: Spots) -> Tensor:
-    """Give the RMS distance (field, wavelength) in mm from the chief ray; NaN without rays."""
+    """Return the RMS distance (field, wavelength) in mm from the chief ray; NaN without rays."""
     square = (spots.weight * _from_chief(spots) ** 2).sum(-1) / spots.weight.sum(-1)
     return torch.sqrt(square)
 
 
 def max_from_chief(spots: Spots) -> Tensor:
-    """Give the largest distance (field, wavelength) in mm from the chief ray; NaN without rays.
+    """Return the largest distance (field, wavelength) in mm from the chief ray; NaN without rays.
 
     The chief ray is that of the reference wavelength.
     """

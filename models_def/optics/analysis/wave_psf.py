@@ -30,7 +30,7 @@ _SPARE_ARMS: Final = 16
 
 
 def irradiance_per_mm2(wavefront: Wavefront, x_mm: Tensor, y_mm: Tensor) -> Tensor:
-    """Give the light on a grid of points about the centre, of 1 that passes the lens.
+    """Return the light on a grid of points about the centre, of 1 that passes the lens.
 
     Args:
         wavefront: (field, wavelength, rays), sampled finely enough, see `pupil_for_reach`.
@@ -64,7 +64,7 @@ def _one(wavefront: Wavefront, i: int, j: int, x_mm: Tensor, y_mm: Tensor) -> Te
 
 
 def pupil_for_reach(reach_mm: float, wavelength_um: float, aperture: float) -> PupilSamples:
-    """Give a pupil sampling fine enough for light up to a distance from the centre.
+    """Return a pupil sampling fine enough for light up to a distance from the centre.
 
     Args:
         reach_mm: Half the diagonal of the window plus the largest ray error.
@@ -87,7 +87,7 @@ def pupil_for_reach(reach_mm: float, wavelength_um: float, aperture: float) -> P
 
 
 def wave_kernels(wavefront: Wavefront, size_px: int, pitch_um: float, oversample: int) -> TracedPsf:
-    """Give kernels (field, wavelength, size, size) as `psf.splat` does: pixels are tents.
+    """Return kernels (field, wavelength, size, size) as `psf.splat` does: pixels are tents.
 
     Args:
         wavefront: Sampled for the window.
@@ -113,7 +113,7 @@ def wave_kernels(wavefront: Wavefront, size_px: int, pitch_um: float, oversample
 
 
 def _tent_weights(place_px: Tensor, size_px: int, oversample: int) -> Tensor:
-    """Give weights (pixel, point) that integrate over the tents of pixels.
+    """Return weights (pixel, point) that integrate over the tents of pixels.
 
     The midpoint rule with its first correction (Euler and Maclaurin): what it lacks comes from
     the kinks of the tent, which lie between points.
@@ -152,7 +152,7 @@ def trace_wave_psf(
 
 
 def widest_aperture(wavefront: Wavefront) -> float:
-    """Give half the widest extent of the pupil in direction cosines, the NA of its cone.
+    """Return half the widest extent of the pupil in direction cosines, the NA of its cone.
 
     Raises:
         ContractError: If no ray arrives at a field.

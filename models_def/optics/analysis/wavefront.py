@@ -73,7 +73,7 @@ def path_lengths(
 
 
 def _path_before(rays: Rays, slope: Tensor, distance_mm: float) -> Tensor:
-    """Give the path of launch points beyond that of the first vertex, written without loss."""
+    """Return the path of launch points beyond that of the first vertex, written without loss."""
     if math.isinf(distance_mm):
         return rays.x * rays.l + rays.y * rays.m + rays.z * rays.n
     vertex = distance_mm * torch.sqrt(1 + slope**2)
@@ -185,7 +185,7 @@ def _chief_path(
 
 
 def wavefront_rms_um(wavefront: Wavefront) -> Tensor:
-    """Give the RMS (field, wavelength) of the OPD in um, its mean and tilt taken out.
+    """Return the RMS (field, wavelength) of the OPD in um, its mean and tilt taken out.
 
     Rays count by their solid angle. NaN for fewer than four rays.
     """
@@ -196,7 +196,7 @@ def wavefront_rms_um(wavefront: Wavefront) -> Tensor:
 
 
 def without_tilt(wavefront: Wavefront) -> Wavefront:
-    """Give the wavefront with its mean and its slope in l and m taken out (least squares)."""
+    """Return the wavefront with its mean and its slope in l and m taken out (least squares)."""
     weight = torch.sqrt(wavefront.amplitude)[..., None]
     columns = torch.stack([torch.ones_like(wavefront.l), wavefront.l, wavefront.m], dim=-1)
     solution = torch.linalg.lstsq(

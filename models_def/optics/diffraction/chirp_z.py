@@ -52,7 +52,7 @@ def _centred(count: int) -> Tensor:
 
 
 def _chirp(place: Tensor, step: float, like: Tensor) -> Tensor:
-    """Give exp(-i pi step place^2); whole cycles are taken away before they cost digits."""
+    """Return exp(-i pi step place^2); whole cycles are taken away before they cost digits."""
     cycles = torch.remainder(step * place**2 / 2, 1.0)
     return torch.polar(torch.ones_like(cycles), -2 * math.pi * cycles).to(like.dtype)
 

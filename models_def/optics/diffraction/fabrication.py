@@ -43,16 +43,16 @@ class Etching:
 
     @property
     def masks(self) -> int:
-        """Give how many masks there are."""
+        """Return how many masks there are."""
         return self.levels.bit_length() - 1
 
     @property
     def step_um(self) -> float:
-        """Give the height of a level."""
+        """Return the height of a level."""
         return self.range_um / (self.levels if self.wraps else self.levels - 1)
 
     def level(self, height_um: Tensor) -> Tensor:
-        """Give the level of every cell, 0 .. levels - 1, int64.
+        """Return the level of every cell, 0 .. levels - 1, int64.
 
         Raises:
             ContractError: If a height is not finite.
@@ -65,7 +65,7 @@ class Etching:
         return torch.round(raised / self.step_um).clamp(0, self.levels - 1).long()
 
     def etched(self, height_um: Tensor, depth_errors: Sequence[float] = ()) -> Tensor:
-        """Give the heights as etched; gradients flow as if nothing had been rounded.
+        """Return the heights as etched; gradients flow as if nothing had been rounded.
 
         Args:
             height_um: As designed.
@@ -84,7 +84,7 @@ class Etching:
 
 
 def mask_layers(level: Tensor, levels: int) -> Tensor:
-    """Give the masks (mask, cells, cells) of levels: True where the mask of depth 2^k leaves glass.
+    """Return masks (mask, cells, cells) of levels: True where the mask of depth 2^k leaves glass.
 
     The first one is that of a single step.
     """

@@ -62,7 +62,7 @@ class PlateReport:
     of_optics: Mapping[str, float]
 
     def to_json(self) -> dict[str, int | float | str]:
-        """Give the report as a flat mapping."""
+        """Return the report as a flat mapping."""
         return {
             "plate": self.plate,
             "form": self.form,

@@ -71,13 +71,13 @@ class Bench:
 
     @property
     def distance_mm(self) -> float:
-        """Give the distance from the plate to the sensor."""
+        """Return the distance from the plate to the sensor."""
         if self.sensor_mm is not None:
             return self.sensor_mm
         return 1 / (1 / self.focal_length_mm - 1 / self.focus_mm)
 
     def path_mm(self, r2_mm: Tensor, depth_mm: float) -> Tensor:
-        """Give the path through places of the plate less that through its middle, without a plate.
+        """Return path through places of the plate less that through its middle, without a plate.
 
         Args:
             r2_mm: Squared distances from the axis, mm^2.
@@ -91,7 +91,7 @@ class Bench:
         return source - lens + _longer(r2_mm, self.distance_mm, self.kernel)
 
     def steepest(self, depth_mm: float) -> float:
-        """Give the largest slope of `path_mm` in the aperture, mm per mm."""
+        """Return the largest slope of `path_mm` in the aperture, mm per mm."""
         reach = self.diameter_mm / 2 * (math.sqrt(2) if self.aperture == "square" else 1)
         slopes = [
             _slope(radius, depth_mm, self.kernel)
@@ -103,7 +103,7 @@ class Bench:
 
 
 def _longer(r2_mm: Tensor, distance_mm: float, phase: Phase) -> Tensor:
-    """Give how much longer the way to a point is from a place off the axis."""
+    """Return how much longer the way to a point is from a place off the axis."""
     if math.isinf(distance_mm):
         return r2_mm * 0
     if phase == "parabolic":

@@ -52,7 +52,7 @@ class Streaks:
 
     @property
     def phase_rad(self) -> float:
-        """Give the amplitude of the phase of one grating.
+        """Return the amplitude of the phase of one grating.
 
         All gratings take light from the core alike: 1 - share = J0(a)^(2 lines).
         """
@@ -66,7 +66,7 @@ class Streaks:
 
 
 def chirped_gratings(streaks: Streaks, bench: Bench, cells: int) -> GratingMap:
-    """Give the map of gratings that writes streaks.
+    """Return the map of gratings that writes streaks.
 
     Args:
         streaks: What is wanted.
@@ -87,7 +87,7 @@ def chirped_gratings(streaks: Streaks, bench: Bench, cells: int) -> GratingMap:
 
 
 def chirp_along(streaks: Streaks, bench: Bench, angle_rad: float, place_mm: Tensor) -> Tensor:
-    """Give the sine (place,) of the chirp that writes a line, of amplitude 1.
+    """Return the sine (place,) of the chirp that writes a line, of amplitude 1.
 
     Args:
         streaks: What is wanted.
@@ -104,7 +104,7 @@ def chirp_along(streaks: Streaks, bench: Bench, angle_rad: float, place_mm: Tens
 
 
 def _profiles(streaks: Streaks, bench: Bench, samples: int) -> Tensor:
-    """Give a chirp (line, sample) over the diagonal for every line."""
+    """Return a chirp (line, sample) over the diagonal for every line."""
     diagonal_mm = bench.diameter_mm * math.sqrt(2)
     place_mm = torch.linspace(-0.5, 0.5, samples, dtype=torch.float64) * diagonal_mm
     made = [chirp_along(streaks, bench, angle, place_mm) for angle in streaks.angles_rad]
@@ -113,7 +113,7 @@ def _profiles(streaks: Streaks, bench: Bench, samples: int) -> Tensor:
 
 
 def _chord(place: Tensor, angle_rad: float, bench: Bench) -> Tensor:
-    """Give the width of the aperture across a direction, in diameters, at places along it."""
+    """Return the width of the aperture across a direction, in diameters, at places along it."""
     if bench.aperture == "circle":
         return 2 * (0.25 - place**2).clamp_min(0).sqrt()
     across, along = sorted((abs(math.cos(angle_rad)), abs(math.sin(angle_rad))))

@@ -28,7 +28,7 @@ class FullMap(nn.Module):
         self.height_um = nn.Parameter(height_um.clone())
 
     def forward(self) -> Tensor:
-        """Give the heights."""
+        """Return the heights."""
         return self.height_um
 
 
@@ -72,7 +72,7 @@ class RankMap(nn.Module):
         self.most_um, self.cells = most_um, cells
 
     def forward(self) -> Tensor:
-        """Give the heights."""
+        """Return the heights."""
         return self.most_um * torch.sigmoid(self.v @ self.q.T)
 
 
@@ -99,7 +99,7 @@ class GratingMap(nn.Module):
         self.cells = cells
 
     def forward(self) -> Tensor:
-        """Give the heights."""
+        """Return the heights."""
         samples = self.profiles_um.shape[1]
         place = (torch.arange(self.cells, dtype=torch.float64) + 0.5) / self.cells - 0.5
         total = torch.zeros(self.cells, self.cells, dtype=self.profiles_um.dtype)
@@ -126,7 +126,7 @@ class ZernikeMap(nn.Module):
         self.register_buffer("basis", zernike_basis(cells, coefficients_um.numel()))
 
     def forward(self) -> Tensor:
-        """Give the heights; 0 outside the circle."""
+        """Return the heights; 0 outside the circle."""
         basis = self.basis.to(self.coefficients_um.dtype)
         return torch.einsum("t,thw->hw", self.coefficients_um, basis)
 
@@ -148,13 +148,13 @@ class RadialMap(nn.Module):
         self._share = at - self._low
 
     def forward(self) -> Tensor:
-        """Give the heights."""
+        """Return the heights."""
         share = self._share.to(self.profile_um.dtype)
         return self.profile_um[self._low] * (1 - share) + self.profile_um[self._low + 1] * share
 
 
 def noll_order(term: int) -> tuple[int, int]:
-    """Give (n, m) of a term in Noll's order, which begins at 1; m < 0 is a sine.
+    """Return (n, m) of a term in Noll's order, which begins at 1; m < 0 is a sine.
 
     References: Noll 1976, table I.
     """
@@ -169,7 +169,7 @@ def noll_order(term: int) -> tuple[int, int]:
 
 
 def zernike_basis(cells: int, terms: int) -> Tensor:
-    """Give the first terms (term, cells, cells) over the circle that fits; 0 outside."""
+    """Return the first terms (term, cells, cells) over the circle that fits; 0 outside."""
     place = (torch.arange(cells, dtype=torch.float64) + 0.5) / cells * 2 - 1
     radius = (place[:, None] ** 2 + place[None, :] ** 2).sqrt()
     angle = torch.atan2(place[:, None].expand(cells, cells), place[None, :].expand(cells, cells))

@@ -39,7 +39,7 @@ _AXES: Final = {HEIGHTS: 2, "v": 2, "q": 2, "profiles_um": 2}
 
 
 def numbers_of(made: HeightMap) -> dict[str, Tensor]:
-    """Give the numbers of a map, float32."""
+    """Return the numbers of a map, float32."""
     found = {name: value.detach().float() for name, value in made.named_parameters()}
     if isinstance(made, FullMap):
         return found
@@ -51,7 +51,7 @@ def numbers_of(made: HeightMap) -> dict[str, Tensor]:
 
 
 def map_of(numbers: Mapping[str, Tensor]) -> HeightMap:
-    """Give the map of numbers.
+    """Return the map of numbers.
 
     Raises:
         ContractError: If they are those of none.

@@ -31,7 +31,7 @@ class Pattern(Protocol):
     """What gives heights for a bench."""
 
     def height_um(self, bench: Bench, index_at: IndexAt, cells: int) -> Tensor:
-        """Give the heights (cells, cells), float32."""
+        """Return the heights (cells, cells), float32."""
         ...
 
 
@@ -54,7 +54,7 @@ class StarPattern:
     wavelength_um: float = 0.55
 
     def grating_map(self, bench: Bench, index_at: IndexAt, cells: int) -> GratingMap:
-        """Give the map with its profiles; see `chirped_gratings` for what is refused."""
+        """Return the map with its profiles; see `chirped_gratings` for what is refused."""
         streaks = Streaks(
             angles_rad=tuple(math.radians(angle) for angle in self.angles_deg),
             near_um=self.near_um,
@@ -66,7 +66,7 @@ class StarPattern:
         return chirped_gratings(streaks, bench, cells)
 
     def height_um(self, bench: Bench, index_at: IndexAt, cells: int) -> Tensor:
-        """Give the heights."""
+        """Return the heights."""
         made: Tensor = self.grating_map(bench, index_at, cells)()
         return made.detach().float()
 
@@ -94,7 +94,7 @@ class CrossPattern:
     wavelength_um: float = 0.55
 
     def rank_map(self, bench: Bench, index_at: IndexAt, cells: int) -> RankMap:
-        """Give the map with its v and q."""
+        """Return the map with its v and q."""
         index = index_at(self.wavelength_um)
         streaks = Streaks(
             angles_rad=(0.0, math.pi / 2),
@@ -117,7 +117,7 @@ class CrossPattern:
         return made
 
     def height_um(self, bench: Bench, index_at: IndexAt, cells: int) -> Tensor:
-        """Give the heights."""
+        """Return the heights."""
         made: Tensor = self.rank_map(bench, index_at, cells)()
         return made.detach()
 
@@ -155,7 +155,7 @@ class PeakPattern:
             )
 
     def height_um(self, bench: Bench, index_at: IndexAt, cells: int) -> Tensor:
-        """Give the heights.
+        """Return the heights.
 
         Raises:
             ContractError: If the cells are too wide for the prism's slope.
@@ -190,7 +190,7 @@ class FlatPattern:
     """No relief: the Dirac of comparisons, which is the bare lens."""
 
     def height_um(self, bench: Bench, index_at: IndexAt, cells: int) -> Tensor:
-        """Give zeros."""
+        """Return zeros."""
         del bench, index_at
         return torch.zeros(cells, cells)
 

@@ -83,7 +83,7 @@ class Pinhole:
         return np.array(WAVELENGTHS_UM)
 
     def layout(self, corner_mm: float, fields: int) -> FieldLayout:
-        """Give heights from the axis to the corner, evenly spaced."""
+        """Return heights from the axis to the corner, evenly spaced."""
         return radial_layout(np.linspace(0.0, corner_mm, fields))
 
     def kernels(
@@ -95,7 +95,7 @@ class Pinhole:
         side_px: int,
         pitch_um: float,
     ) -> TracedPsf:
-        """Give the kernels at heights along +y.
+        """Return the kernels at heights along +y.
 
         Raises:
             ContractError: If the light is too wide for the grid of the wave.
@@ -115,23 +115,23 @@ class Pinhole:
         )
 
     def distortion(self, radius_mm: float, channels: int) -> RadialDistortion:
-        """Give none: a hole draws in true perspective."""
+        """Return none: a hole draws in true perspective."""
         straight = np.tile(np.array([[1.0, 0.0, 0.0, 0.0]]), (channels, 1))
         return RadialDistortion(coefficients=straight, radius_mm=radius_mm)
 
     def illumination(self, fields: FieldLayout) -> FloatGrid:
-        """Give cos^4 of the field angle."""
+        """Return cos^4 of the field angle."""
         return np.asarray(np.cos(np.arctan(fields.heights_mm / self.distance_mm)) ** 4)
 
     def copies(self, count: int, seed: int) -> "tuple[Pinhole, ...]":
-        """Give itself alone."""
+        """Return itself alone."""
         del count, seed
         return (self,)
 
     def _light(
         self, height_mm: float, wave_um: float, depth_mm: float, side_px: int, pitch_mm: float
     ) -> NDArray[np.float64]:
-        """Give the light by pixel (n, n) about the chief ray, of 1 that comes through the hole.
+        """Return the light by pixel (n, n) about the chief ray, of 1 that comes through the hole.
 
         Over the hole the path to a place of the sensor is quadratic: its curvature is cos(a) over
         the distance across the meridian and cos^3(a) along it; light of a near point diverges.
@@ -161,7 +161,7 @@ class Pinhole:
         return np.asarray(np.maximum(seen[cut, cut], 0) / (np.abs(wave) ** 2).sum(), np.float64)
 
     def _side(self, wanted_mm: float, finest_mm: float, step_mm: float) -> int:
-        """Give the side of a grid on which the waves do not wrap into the kernel."""
+        """Return the side of a grid on which the waves do not wrap into the kernel."""
         least = (wanted_mm + 2 * self.diameter_mm + 16 * finest_mm) / step_mm
         size = 1 << math.ceil(math.log2(max(least, 64)))
         if size > MOST_SIDE:
@@ -173,7 +173,7 @@ class Pinhole:
 
 
 def _hole(radius_mm: float, step_mm: float, size: int) -> NDArray[np.complex128]:
-    """Give the wave in the hole, the middle at [0, 0]; samples at its rim hold their share."""
+    """Return the wave in the hole, the middle at [0, 0]; samples at its rim hold their share."""
     reach = math.ceil(radius_mm / step_mm) + 1
     part = (np.arange((2 * reach + 1) * _EDGE_PARTS) + 0.5) / _EDGE_PARTS - reach - 0.5
     inside = np.hypot(part[:, None], part) * step_mm <= radius_mm

@@ -106,16 +106,16 @@ class Plate:
 
     @property
     def cell_um(self) -> float:
-        """Give the side of a cell."""
+        """Return the side of a cell."""
         return UM_PER_MM * self.bench.diameter_mm / self.height_um.shape[0]
 
     @property
     def made_um(self) -> Tensor:
-        """Give the heights as they are made."""
+        """Return the heights as they are made."""
         return self.height_um if self.etching is None else self.etching.etched(self.height_um)
 
     def index(self, wavelength_um: float) -> float:
-        """Give the index of its glass."""
+        """Return the index of its glass."""
         wave = torch.tensor([wavelength_um], dtype=torch.float64)
         return float(refractive_index(find_glass(self.glass), wave))
 
@@ -127,7 +127,7 @@ class Plate:
         *,
         bare: bool = False,
     ) -> Tensor:
-        """Give the PSF (side, side) of the plate, or of its lens without it; see `plate_psf`."""
+        """Return the PSF (side, side) of the plate, or of its lens without it; see `plate_psf`."""
         height_um = torch.zeros_like(self.height_um) if bare else self.made_um
         return plate_psf(
             height_um,
@@ -173,12 +173,12 @@ def pattern_plate(
 
 
 def built_in_plates() -> tuple[str, ...]:
-    """Give the names of the plates that come with camkit."""
+    """Return the names of the plates that come with camkit."""
     return tuple(sorted(path.stem for path in PLATES.glob("*.toml")))
 
 
 def _built_in(path: Path) -> Path:
-    """Give the file of a built-in plate, or bundle that holds one, or the path as it is."""
+    """Return the file of a built-in plate, or bundle that holds one, or the path as it is."""
     if path.is_file():
         return path
     if str(path) in built_in_plates():
@@ -234,13 +234,13 @@ def _bundled(path: Path) -> Plate:
 
 
 def plate_members(plate: Plate) -> dict[str, bytes]:
-    """Give a plate as members of a bundle: name -> content."""
+    """Return a plate as members of a bundle: name -> content."""
     text, heights = plate_to_bytes(plate, PLATE_HEIGHTS)
     return {PLATE: text} if heights is None else {PLATE: text, PLATE_HEIGHTS: heights}
 
 
 def plate_of_members(members: Mapping[str, bytes], what: str) -> Plate:
-    """Give the plate of members of a bundle.
+    """Return the plate of members of a bundle.
 
     Args:
         members: With `plate.toml`.
@@ -345,7 +345,7 @@ def write_plate(plate: Plate, path: Path) -> None:
 
 
 def plate_to_bytes(plate: Plate, heights: str) -> tuple[bytes, bytes | None]:
-    """Give the TOML of a plate, and its heights; None for a plate of a pattern.
+    """Return the TOML of a plate, and its heights; None for a plate of a pattern.
 
     Args:
         plate: The plate.

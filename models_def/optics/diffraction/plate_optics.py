@@ -37,7 +37,7 @@ def plate_kernels(
     pitch_um: float,
     bare: bool = False,
 ) -> NDArray[np.float32]:
-    """Give the light of a point through a plate, per light that its aperture lets through.
+    """Return the light of a point through a plate, per light that its aperture lets through.
 
     What lies outside the window is missing: 1 - kernels.sum((-2, -1)) is its share.
 
@@ -107,7 +107,7 @@ class PlateOptics:
         return
 
     def layout(self, corner_mm: float, fields: int) -> FieldLayout:
-        """Give one place: streaks are never turned."""
+        """Return one place: streaks are never turned."""
         del corner_mm, fields
         return uniform_layout()
 
@@ -134,16 +134,16 @@ class PlateOptics:
         return TracedPsf(kernels=light / kept[..., None, None], energy_kept=kept)
 
     def distortion(self, radius_mm: float, channels: int) -> RadialDistortion:
-        """Give none: the stop lies in the lens, which is thin."""
+        """Return none: the stop lies in the lens, which is thin."""
         rows = np.tile(np.array([[1.0, 0.0, 0.0, 0.0]]), (channels, 1))
         return RadialDistortion(coefficients=rows, radius_mm=radius_mm)
 
     def illumination(self, fields: FieldLayout) -> FloatGrid:
-        """Give even light: the fall-off of an ideal lens is left to the camera it stands in."""
+        """Return even light: the fall-off of an ideal lens is left to the camera it stands in."""
         return np.ones(fields.count)
 
     def copies(self, count: int, seed: int) -> "tuple[PlateOptics, ...]":
-        """Give itself: how well it will be etched is not known."""
+        """Return itself: how well it will be etched is not known."""
         del count, seed
         return (self,)
 
@@ -153,7 +153,7 @@ class PlateOptics:
 def _stack(
     plate: Plate, grid: PixelGrid, depth_mm: float, wavelengths_um: tuple[float, ...], *, bare: bool
 ) -> Tensor:
-    """Give the light (wavelength, side, side) of a point; not to be written to."""
+    """Return the light (wavelength, side, side) of a point; not to be written to."""
     with torch.no_grad():
         return torch.stack(
             [plate.psf(wave, grid, depth_mm, bare=bare).float() for wave in wavelengths_um]

@@ -30,7 +30,7 @@ DUAL_PEAK: Final = Etching(range_um=1.196, levels=16, wraps=True)
 
 
 def star_plate(lines: int, *, share: float = 0.06, cells: int = CELLS) -> Plate:
-    """Give a star filter: lines evenly over the half-turn, each with two arms.
+    """Return a star filter: lines evenly over the half-turn, each with two arms.
 
     Raises:
         ContractError: If the share is too large for gratings, or the cells too wide.
@@ -47,7 +47,7 @@ def star_plate(lines: int, *, share: float = 0.06, cells: int = CELLS) -> Plate:
 
 
 def cross_plate(*, share: float = 0.06, cells: int = CELLS) -> Plate:
-    """Give two lines as a map of rank 1."""
+    """Return two lines as a map of rank 1."""
     return pattern_plate(
         "streak-cross",
         CrossPattern(near_um=NEAR_UM, far_um=FAR_UM, share=share),
@@ -59,7 +59,7 @@ def cross_plate(*, share: float = 0.06, cells: int = CELLS) -> Plate:
 
 
 def dual_peak_plate(*, share: float = 0.1, cells: int = CELLS) -> Plate:
-    """Give a second peak, 30 pixels from the first: the kind of PSF that Metzler 2020 found."""
+    """Return a second peak, 30 pixels from the first: the kind of PSF that Metzler 2020 found."""
     return pattern_plate(
         "dual-peak",
         PeakPattern(right_um=26 * PITCH_UM, down_um=15 * PITCH_UM, share=share),
@@ -71,7 +71,7 @@ def dual_peak_plate(*, share: float = 0.1, cells: int = CELLS) -> Plate:
 
 
 def bare_plate(*, cells: int = CELLS) -> Plate:
-    """Give the lens without a relief: the Dirac of comparisons."""
+    """Return the lens without a relief: the Dirac of comparisons."""
     return pattern_plate(
         "bare-lens", FlatPattern(), cells=cells, bench=CAMERA, note="no relief: the Dirac"
     )

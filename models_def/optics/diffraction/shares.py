@@ -86,13 +86,13 @@ def find_streaks(psf: Tensor, bare: Tensor) -> tuple[Streak, ...]:
 
 
 def with_reach(streaks: tuple[Streak, ...], psf: Tensor, bare: Tensor) -> tuple[Streak, ...]:
-    """Give streaks as far as they reach in another colour; see `find_streaks`."""
+    """Return streaks as far as they reach in another colour; see `find_streaks`."""
     added = _added(psf, bare)
     return tuple(replace(one, reach_px=_reach(added, one.angle_deg)) for one in streaks)
 
 
 def side_for(psf: Tensor, share: float) -> int:
-    """Give the least odd side around the middle that holds a share of the light; all at most.
+    """Return the least odd side around the middle that holds a share of the light; all at most.
 
     Args:
         psf: (..., side, side), each a PSF; all must be held.
@@ -130,7 +130,7 @@ def _added(psf: Tensor, bare: Tensor) -> Tensor:
 
 
 def _distance(psf: Tensor) -> Tensor:
-    """Give the distance of every pixel from the middle."""
+    """Return the distance of every pixel from the middle."""
     place = torch.arange(psf.shape[0], dtype=torch.float64) - psf.shape[0] // 2
     return (place[:, None] ** 2 + place[None, :] ** 2).sqrt()
 
@@ -143,7 +143,7 @@ def _near_line(side: int, angle_deg: float, widths: float = 1.0) -> Tensor:
 
 
 def _refined(added: Tensor, angle_deg: float) -> float:
-    """Give the angle of the axis about which light near a line has the least moment."""
+    """Return the angle of the axis about which light near a line has the least moment."""
     light = torch.where(_distance(added) > 4 * CORE_PX, added, torch.zeros_like(added))
     place = torch.arange(added.shape[0], dtype=torch.float64) - added.shape[0] // 2
     for _ in range(_TURNS):
@@ -160,7 +160,7 @@ def _refined(added: Tensor, angle_deg: float) -> float:
 
 
 def _reach(added: Tensor, angle_deg: float) -> float:
-    """Give the distance at which a streak has ended, of both arms together."""
+    """Return the distance at which a streak has ended, of both arms together."""
     distance = _distance(added)
     band = _near_line(added.shape[0], angle_deg)
     reach = added.shape[0] // 2

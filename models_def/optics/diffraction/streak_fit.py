@@ -52,7 +52,7 @@ def fit_streaks(
     pitch_um: float,
     core_px: int = MAX_CORE_PX,
 ) -> StreakOptics:
-    """Give the streak optics of dense kernels.
+    """Return the streak optics of dense kernels.
 
     Args:
         kernels: (depth, wavelength, n, n), n odd: light of a point, shares of what enters.
@@ -88,7 +88,7 @@ def fit_streaks(
 
 
 def _arm_angles(kernel: NDArray[np.float32], bare: NDArray[np.float32]) -> list[float]:
-    """Give the directions of both arms of every streak."""
+    """Return the directions of both arms of every streak."""
     found = find_streaks(torch.from_numpy(kernel), torch.from_numpy(bare))
     if not found:
         raise NoStreaksError("no streaks were found in the kernels: they are not streak optics")
@@ -99,7 +99,7 @@ def _arm_angles(kernel: NDArray[np.float32], bare: NDArray[np.float32]) -> list[
 def _fit(
     kernel: FloatGrid, axes: Sequence[tuple[FloatGrid, FloatGrid]], outside: NDArray[np.bool_]
 ) -> tuple[FloatGrid, FloatGrid, FloatGrid]:
-    """Give profiles (arm, distance), sections (arm, offset) and haze (m, m) of one kernel."""
+    """Return profiles (arm, distance), sections (arm, offset) and haze (m, m) of one kernel."""
     near = [(al > 0) & (np.abs(ac) <= SECTION_PX) & outside for al, ac in axes]
     alone = [mine & (np.sum(near, axis=0) == 1) for mine in near]
     usable = outside & ~np.any(near, axis=0)
@@ -124,7 +124,7 @@ def _fit(
 
 
 def _haze(kernel: FloatGrid, usable: NDArray[np.bool_]) -> FloatGrid:
-    """Give the mean light of squares where no arm lies; others have that of their ring."""
+    """Return the mean light of squares where no arm lies; others have that of their ring."""
     side = kernel.shape[0]
     squares = (side // HAZE_STEP_PX - 1) // 2 * 2 + 1
     place = np.arange(side) - side // 2
@@ -149,7 +149,7 @@ def _haze(kernel: FloatGrid, usable: NDArray[np.bool_]) -> FloatGrid:
 def _separated(
     light: FloatGrid, along: FloatGrid, across: FloatGrid, side: int
 ) -> tuple[FloatGrid, FloatGrid]:
-    """Give the profile and the section whose product is nearest to an arm's light."""
+    """Return the profile and the section whose product is nearest to an arm's light."""
     steps = round(SECTION_PX / SECTION_STEP_PX)
     distances, offsets = side // 2 + 1, 2 * steps + 1
     section = np.exp(-0.5 * (SECTION_STEP_PX * (np.arange(offsets) - steps)) ** 2)
@@ -173,7 +173,7 @@ def _separated(
 
 
 def _line(light: FloatGrid, place: FloatGrid, weight: FloatGrid, count: int) -> FloatGrid:
-    """Give the line, linear between integers, whose values times weights are nearest to light."""
+    """Return the line, linear between integers, whose values times weights are nearest to light."""
     low = np.clip(np.floor(place).astype(int), 0, count - 2)
     share = np.clip(place - low, 0, 1)
     diagonal, beside, wanted = np.zeros(count), np.zeros(count - 1), np.zeros(count)
@@ -192,7 +192,7 @@ def _line(light: FloatGrid, place: FloatGrid, weight: FloatGrid, count: int) -> 
 
 
 def _reach(profiles: FloatGrid, half: int) -> int:
-    """Give the distance within which nearly all light of the longest arms lies."""
+    """Return the distance within which nearly all light of the longest arms lies."""
     beyond = profiles[..., half + 1 :]
     if (beyond[..., -_TAIL_PX:].mean(axis=-1) > _ENDED * beyond.mean(axis=-1)).any():
         raise NoStreaksError("the arms do not end within the kernels: compute a wider window")

@@ -47,7 +47,7 @@ class PixelGrid:
 
 
 def pupil(bench: Bench, cells: int) -> Tensor:
-    """Give the amplitude (cells, cells) of the aperture; cells at its rim let part of it through.
+    """Return the amplitude (cells, cells) of the aperture; cells at its rim let part of it through.
 
     Args:
         bench: Its diameter is `cells` wide.
@@ -80,7 +80,7 @@ def plate_psf(
     depth_mm: float = math.inf,
     amplitude: Tensor | None = None,
 ) -> Tensor:
-    """Give the PSF of a plate at one wavelength; gradients flow to the heights.
+    """Return the PSF of a plate at one wavelength; gradients flow to the heights.
 
     Args:
         height_um: (cells, cells), rows downwards; the diameter of the aperture is its side. A
@@ -122,7 +122,7 @@ def plate_psf(
 def strehl(
     height_um: Tensor, index: float, wavelength_um: float, *, bench: Bench, depth_mm: float
 ) -> float:
-    """Give the light in the middle of the PSF over that of an aperture of even phase.
+    """Return the light in the middle of the PSF over that of an aperture of even phase.
 
     Args:
         height_um: (cells, cells).
@@ -145,7 +145,7 @@ def _field(
     depth_mm: float,
     light: Tensor,
 ) -> Tensor:
-    """Give the field (cells, cells) behind the plate, less the phase of the sphere to the axis."""
+    """Return field (cells, cells) behind the plate, less the phase of the sphere to the axis."""
     cells = height_um.shape[0]
     places = (torch.arange(cells, dtype=torch.float64) - (cells - 1) / 2) * (
         bench.diameter_mm / cells
@@ -166,7 +166,7 @@ def _side(height_um: Tensor) -> int:
 
 
 def _needed_samples(bench: Bench, grid: PixelGrid, wave_mm: float, fringes: float = 2.0) -> int:
-    """Give the samples per pixel that the finest fringes of the light need, two for each."""
+    """Return the samples per pixel that the finest fringes of the light need, two for each."""
     fringe_mm = wave_mm * bench.distance_mm / bench.diameter_mm
     return max(1, math.ceil(fringes * grid.pitch_um / UM_PER_MM / fringe_mm))
 

@@ -21,7 +21,7 @@ proportion everywhere."""
 
 
 def best_beginning(height_um: FloatGrid, camera: DotCamera, target: FloatGrid) -> tuple[int, int]:
-    """Give by how many cells (down, right) to roll a unit, for the least error of its PSF.
+    """Return by how many cells (down, right) to roll a unit, for the least error of its PSF.
 
     Args:
         height_um: (cells, cells) of one unit.

@@ -17,7 +17,7 @@ DEPTH_ERROR: Final = 0.02
 
 
 def best_bottom(plate: DotPlate, target: FloatGrid) -> DotPlate:
-    """Give the plate of the same dots that wrong depths spoil least.
+    """Return the plate of the same dots that wrong depths spoil least.
 
     Args:
         plate: With any bottom.
@@ -31,7 +31,7 @@ def best_bottom(plate: DotPlate, target: FloatGrid) -> DotPlate:
 
 
 def _error(plate: DotPlate, target: FloatGrid) -> float:
-    """Give the larger RMSE of the dots of a plate etched too deep and not deep enough."""
+    """Return the larger RMSE of the dots of a plate etched too deep and not deep enough."""
     turns_per_um = (plate.camera.index - 1) / plate.camera.wavelength_um
     masks = plate.etching.masks
     return max(

@@ -66,7 +66,7 @@ class DotCamera:
 
     @property
     def unit_mm(self) -> float:
-        """Give the side of one unit.
+        """Return the side of one unit.
 
         References: Sun 2021, section 4.3.3, l_u = lambda f / l_p.
         """
@@ -74,17 +74,17 @@ class DotCamera:
 
     @property
     def cell_um(self) -> float:
-        """Give the side of a cell."""
+        """Return the side of a cell."""
         return UM_PER_MM * self.unit_mm / self.cells
 
     @property
     def index(self) -> float:
-        """Give the index of the plate in air, at the wavelength of the laser."""
+        """Return the index of the plate in air, at the wavelength of the laser."""
         wave = torch.tensor([self.wavelength_um], dtype=torch.float64)
         return float(refractive_index(find_glass(self.glass), wave))
 
     def etching(self, levels: int) -> Etching:
-        """Give how a plate of so many levels is etched: over one cycle of phase.
+        """Return how a plate of so many levels is etched: over one cycle of phase.
 
         Raises:
             ContractError: If levels are not 2, 4, 8, ...

@@ -26,7 +26,7 @@ SAMPLES: Final = 33
 def effective_psf(
     height_um: FloatGrid, camera: DotCamera, view: View = FOCUSED, side: int = ORDERS
 ) -> FloatGrid:
-    """Give the PSF that an array of small pixels sees through a plate.
+    """Return the PSF that an array of small pixels sees through a plate.
 
     Args:
         height_um: (cells, cells) of one unit, as it is made.
@@ -81,6 +81,6 @@ def seen_by_circles(
 
 
 def _near(place_um: FloatGrid, at_um: float, width_um: float) -> slice:
-    """Give the places that a circle can reach."""
+    """Return the places that a circle can reach."""
     first, last = np.searchsorted(place_um, [at_um - width_um, at_um + width_um])
     return slice(int(first), int(last))

@@ -14,7 +14,7 @@ ROUNDS: Final = 50
 def gerchberg_saxton(
     target: FloatGrid, cells: int, rng: np.random.Generator, rounds: int = ROUNDS
 ) -> FloatGrid:
-    """Give phases (cells, cells) in radians whose dots are near a light that is wanted.
+    """Return phases (cells, cells) in radians whose dots are near a light that is wanted.
 
     In each round the phase of the plate is kept and its amplitude made 1, the phase of the dots is
     kept and their amplitude made the root of the target; other orders are left dark.
@@ -40,6 +40,6 @@ def gerchberg_saxton(
 
 
 def _unit(field: ComplexGrid) -> ComplexGrid:
-    """Give a field of the same phase and amplitude 1; phase 0 where there is no light."""
+    """Return a field of the same phase and amplitude 1; phase 0 where there is no light."""
     size: NDArray[np.float64] = np.abs(field)
     return np.where(size > 0, field / np.where(size > 0, size, 1.0), 1.0)

@@ -22,19 +22,19 @@ LevelGrid = NDArray[np.int64]
 
 
 def rounded(phase: FloatGrid, levels: int) -> LevelGrid:
-    """Give the nearest levels (cells, cells), 0 .. levels - 1, of phases in radians."""
+    """Return the nearest levels (cells, cells), 0 .. levels - 1, of phases in radians."""
     return np.rint(phase * levels / (2 * np.pi)).astype(np.int64) % levels
 
 
 def level_field(levels: int) -> ComplexGrid:
-    """Give the field (levels,) behind a cell of each level."""
+    """Return the field (levels,) behind a cell of each level."""
     return np.asarray(np.exp(2j * np.pi * np.arange(levels) / levels))
 
 
 def descend(
     level: LevelGrid, levels: int, merit: Merit, rng: np.random.Generator, sweeps: int = SWEEPS
 ) -> LevelGrid:
-    """Give levels none of which can be changed alone for the better, or nearly so.
+    """Return levels none of which can be changed alone for the better, or nearly so.
 
     Args:
         level: (cells, cells) to begin at.
@@ -57,7 +57,7 @@ def descend(
 def moved(
     dots: ComplexGrid, cell: tuple[int, int], change: NDArray[np.complex128], matrix: ComplexGrid
 ) -> ComplexGrid:
-    """Give the amplitudes (..., n, n) of dots after the field of one cell changed.
+    """Return the amplitudes (..., n, n) of dots after the field of one cell changed.
 
     Args:
         dots: (n, n) before.

@@ -31,13 +31,13 @@ class Merit:
     weight: float = WEIGHT
 
     def of(self, light: FloatGrid) -> NDArray[np.float64]:
-        """Give the merit (...) of light (..., n, n), shares of all light."""
+        """Return the merit (...) of light (..., n, n), shares of all light."""
         held = light.sum((-2, -1))
         apart = light / np.maximum(held, _TINY)[..., None, None] - self.target
         return np.asarray(1 - held + self._price * (apart**2).sum((-2, -1)))
 
     def slope(self, light: FloatGrid) -> FloatGrid:
-        """Give the slope (n, n) of the merit by light (n, n)."""
+        """Return the slope (n, n) of the merit by light (n, n)."""
         held = max(float(light.sum()), _TINY)
         share = light / held
         apart = share - self.target

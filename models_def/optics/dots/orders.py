@@ -15,7 +15,7 @@ ComplexGrid = NDArray[np.complex128]
 
 
 def order_matrix(cells: int, orders: int = ORDERS) -> ComplexGrid:
-    """Give the matrix A (orders, cells) that carries one axis of a unit to its orders.
+    """Return the matrix A (orders, cells) that carries one axis of a unit to its orders.
 
     Args:
         cells: Along a side; places are counted from the middle.
@@ -30,7 +30,7 @@ def order_matrix(cells: int, orders: int = ORDERS) -> ComplexGrid:
 
 
 def orders_of(field: ComplexGrid, matrix: ComplexGrid) -> ComplexGrid:
-    """Give the amplitudes (orders, orders) of a field (cells, cells), both [y, x].
+    """Return the amplitudes (orders, orders) of a field (cells, cells), both [y, x].
 
     References: Sun 2021, eq. (4.7).
     """
@@ -38,7 +38,7 @@ def orders_of(field: ComplexGrid, matrix: ComplexGrid) -> ComplexGrid:
 
 
 def intensity(amplitude: ComplexGrid) -> NDArray[np.float64]:
-    """Give the light of amplitudes.
+    """Return the light of amplitudes.
 
     References: Sun 2021, eq. (4.8).
     """

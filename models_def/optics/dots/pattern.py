@@ -64,7 +64,7 @@ FOCUSED = View()
 def dot_picture(
     height_um: FloatGrid, camera: DotCamera, grid: PixelGrid, view: View = FOCUSED
 ) -> FloatGrid:
-    """Give the light of a point on a sensor, in the axes of the plate: its turn is left out.
+    """Return the light of a point on a sensor, in the axes of the plate: its turn is left out.
 
     Args:
         height_um: (cells, cells) of one unit, as it is made.

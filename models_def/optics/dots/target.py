@@ -14,7 +14,7 @@ _NUMBERS: Final = "biuf"
 
 
 def to_target(values: NDArray[Any]) -> FloatGrid:
-    """Give light (11, 11) of unit sum.
+    """Return light (11, 11) of unit sum.
 
     Args:
         values: (11, 11), >= 0 and finite, of any sum > 0.
@@ -56,7 +56,7 @@ class Likeness:
     efficiency: float
 
     def to_json(self) -> dict[str, float]:
-        """Give plain JSON values."""
+        """Return plain JSON values."""
         return {
             "correlation": round(self.correlation, 7),
             "rmse": round(self.rmse, 6),

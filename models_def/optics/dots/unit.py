@@ -44,26 +44,26 @@ class DotPlate:
 
     @property
     def etching(self) -> Etching:
-        """Give how it is etched."""
+        """Return how it is etched."""
         return self.camera.etching(self.levels)
 
     @property
     def height_um(self) -> FloatGrid:
-        """Give the heights (cells, cells) above the deepest level."""
+        """Return the heights (cells, cells) above the deepest level."""
         return np.asarray(self.level * self.etching.step_um)
 
     @property
     def masks(self) -> NDArray[np.bool_]:
-        """Give the masks (mask, cells, cells), that of one step first: True where glass stays."""
+        """Return the masks (mask, cells, cells), that of one step first: True where glass stays."""
         return np.asarray(mask_layers(torch.from_numpy(self.level), self.levels).numpy())
 
     @property
     def light(self) -> FloatGrid:
-        """Give the light (11, 11) of its dots, shares of all light."""
+        """Return the light (11, 11) of its dots, shares of all light."""
         return phase_light(np.asarray(self.level * (2 * np.pi / self.levels), dtype=np.float64))
 
     def etched_um(self, depth_errors: Sequence[float]) -> FloatGrid:
-        """Give the heights where each mask etches too deep by a share, one a mask.
+        """Return the heights where each mask etches too deep by a share, one a mask.
 
         Raises:
             ContractError: If there is not one error a mask.
@@ -73,5 +73,5 @@ class DotPlate:
 
 
 def phase_light(phase: FloatGrid) -> FloatGrid:
-    """Give the light (11, 11) of the dots of phases (cells, cells), shares of all light."""
+    """Return the light (11, 11) of the dots of phases (cells, cells), shares of all light."""
     return intensity(orders_of(np.exp(1j * phase), order_matrix(phase.shape[0])))

@@ -44,11 +44,11 @@ class GlassCatalogue:
         object.__setattr__(self, "_by_name", names)
 
     def get(self, name: str) -> Glass | None:
-        """Give the glass of exactly this strict name, or None."""
+        """Return the glass of exactly this strict name, or None."""
         return self._by_name.get(name)
 
     def with_trade_name(self, trade_name: str) -> tuple[Glass, ...]:
-        """Give the glasses of this trade name: at most one but in the literature."""
+        """Return the glasses of this trade name: at most one but in the literature."""
         if not self.literature:
             found = self.get(f"{trade_name}-{self.name}")
             return (found,) if found else ()
@@ -56,13 +56,13 @@ class GlassCatalogue:
 
 
 def trade_name_of(glass: Glass) -> str:
-    """Give the name without catalogue or source."""
+    """Return the name without catalogue or source."""
     return glass.name.rpartition("-")[0] or glass.name
 
 
 @cache
 def builtin_catalogues() -> tuple[GlassCatalogue, ...]:
-    """Give the catalogues that come with camkit, Schott's first."""
+    """Return the catalogues that come with camkit, Schott's first."""
     folder = resources.files("camkit.models_def.optics.glass") / "data"
     files = ("schott", "schott1983", "ohara", "hoya", "hikari", "cdgm", "misc", "literature")
     return tuple(
@@ -99,7 +99,7 @@ def _all(catalogues: Iterable[GlassCatalogue]) -> Iterator[Glass]:
 
 
 def find_glass(name: str, catalogues: Sequence[GlassCatalogue] = ()) -> Glass:
-    """Give the glass of this name.
+    """Return the glass of this name.
 
     Args:
         name: A strict name, "air", a model glass (see `model_glass`), or a trade name that exactly
@@ -134,7 +134,7 @@ def find_glass(name: str, catalogues: Sequence[GlassCatalogue] = ()) -> Glass:
 
 
 def own_glass(glass: Glass, catalogues: Iterable[GlassCatalogue]) -> Glass | None:
-    """Give the glass back if it comes from one of the user's catalogues, else None."""
+    """Return the glass back if it comes from one of the user's catalogues, else None."""
     return glass if any(c.get(glass.name) is glass for c in catalogues) else None
 
 

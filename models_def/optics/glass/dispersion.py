@@ -23,7 +23,7 @@ _Coefficients = tuple[float, ...]
 
 
 def refractive_index(glass: Glass, wavelengths_um: Tensor) -> Tensor:
-    """Give the index relative to air.
+    """Return the index relative to air.
 
     Args:
         glass: From `find_glass`, a catalogue, or `model_glass`.
@@ -52,7 +52,7 @@ def refractive_index(glass: Glass, wavelengths_um: Tensor) -> Tensor:
 
 
 def abbe_number(glass: Glass) -> float:
-    """Give V_d = (n_d - 1) / (n_F - n_C); inf without dispersion."""
+    """Return V_d = (n_d - 1) / (n_F - n_C); inf without dispersion."""
     lines = torch.tensor([D_LINE_UM, F_LINE_UM, C_LINE_UM], dtype=torch.float64)
     n_d, n_f, n_c = refractive_index(glass, lines).tolist()
     return float((n_d - 1) / (n_f - n_c)) if n_f != n_c else float("inf")

@@ -91,7 +91,7 @@ def cauchy_glass(
 
 
 def parse_model_name(name: str) -> Glass | None:
-    """Give the glass of a name that starts with `model:` or `cauchy:`, or None.
+    """Return the glass of a name that starts with `model:` or `cauchy:`, or None.
 
     Raises:
         ContractError: If what follows is not two numbers (three for `model:`).

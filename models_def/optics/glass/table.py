@@ -35,7 +35,7 @@ def parse_glass_table(table: Mapping[str, Any]) -> Glass:
 
 
 def glass_table(glass: Glass) -> dict[str, str | tuple[float, ...]]:
-    """Give the table of a glass; `parse_glass_table` gives it back, but for the stated values."""
+    """Return the table of a glass; `parse_glass_table` gives it back, but for the stated values."""
     return {
         "name": glass.name,
         "formula": glass.formula,

@@ -65,12 +65,12 @@ def write_lens(lens: Lens, path: Path) -> None:
 
 
 def built_in_lenses() -> tuple[str, ...]:
-    """Give the names of the lenses that come with camkit."""
+    """Return the names of the lenses that come with camkit."""
     return tuple(sorted(path.stem for path in PRESCRIPTIONS.glob("*.toml")))
 
 
 def find_lens(name: str, folder: Path | None = None) -> Lens:
-    """Give the lens that a recipe names: a built-in one, or that of a file.
+    """Return the lens that a recipe names: a built-in one, or that of a file.
 
     Args:
         name: Name of a built-in lens, or path (.toml or .zmx) relative to `folder`.

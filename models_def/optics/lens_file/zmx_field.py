@@ -29,7 +29,7 @@ class FieldType(IntEnum):
 
 
 def with_fields(lens: Lens, system: Records, mm_per_unit: float) -> Lens:
-    """Give the lens with the fields of its file, increasing, each once.
+    """Return the lens with the fields of its file, increasing, each once.
 
     Args:
         lens: Everything else about it.
@@ -65,7 +65,7 @@ def with_fields(lens: Lens, system: Records, mm_per_unit: float) -> Lens:
 
 
 def _points(system: Records) -> list[tuple[float, float]]:
-    """Give the fields (x, y) that are in use: FTYP says how many of the numbers."""
+    """Return the fields (x, y) that are in use: FTYP says how many of the numbers."""
     record = last(system, "FTYP")
     x_record = last(system, "XFLN") or last(system, "XFLD")
     y_record = last(system, "YFLN") or last(system, "YFLD")
@@ -105,7 +105,7 @@ def _angles_of_heights(lens: Lens, field_type: FieldType, heights_mm: list[float
 
 
 def _magnification(lens: Lens) -> float:
-    """Give |image height / object height|: the ratio of the marginal slopes."""
+    """Return |image height / object height|: the ratio of the marginal slopes."""
     wave = torch.tensor(lens.reference_wavelength_um, dtype=torch.float64)
     tensors = surface_tensors(lens, wave)
     one = torch.ones((), dtype=torch.float64)

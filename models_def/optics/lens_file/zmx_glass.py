@@ -53,7 +53,7 @@ class GlassOrder:
 
 
 def glass_order(names: Sequence[str], own: Sequence[GlassCatalogue]) -> GlassOrder:
-    """Give the order for a GCAT line; catalogues that camkit does not have are passed over."""
+    """Return the order for a GCAT line; catalogues that camkit does not have are passed over."""
     known = [c for c in builtin_catalogues() if not c.literature]
     wanted = [_ALIASES.get(name.casefold(), name.casefold()) for name in names]
     listed = (c for name in wanted for c in known if gcat_name(c) == name.upper())
@@ -61,13 +61,13 @@ def glass_order(names: Sequence[str], own: Sequence[GlassCatalogue]) -> GlassOrd
 
 
 def gcat_name(catalogue: GlassCatalogue) -> str:
-    """Give the name that a GCAT line has for one of camkit's catalogues."""
+    """Return the name that a GCAT line has for one of camkit's catalogues."""
     name = catalogue.name.casefold()
     return _OLDER.get(name, name).upper()
 
 
 def find_zmx_glass(name: str, order: GlassOrder) -> Glass:
-    """Give the glass of a GLAS line.
+    """Return the glass of a GLAS line.
 
     Raises:
         ContractError: If no catalogue has it, or several do that GCAT does not name.
@@ -103,7 +103,7 @@ def _in_capitals(catalogue: GlassCatalogue, name: str) -> Glass | None:
 
 
 def read_model_glass(numbers: Sequence[float], comment: str, order: GlassOrder) -> Glass:
-    """Give the glass of a `GLAS ___BLANK` line: (n_d, V_d, dP_gF), and the surface's comment."""
+    """Return the glass of a `GLAS ___BLANK` line: (n_d, V_d, dP_gF), and the surface's comment."""
     model = model_glass(*numbers)
     if comment.startswith(COMMENT):
         try:
@@ -118,7 +118,7 @@ def read_model_glass(numbers: Sequence[float], comment: str, order: GlassOrder) 
 
 
 def index_and_abbe(glass: Glass) -> tuple[float, float]:
-    """Give n_d and V_d as a GLAS line holds them; 0 where the glass has none."""
+    """Return n_d and V_d as a GLAS line holds them; 0 where the glass has none."""
     low, high = glass.range_um
     if not (low * (1 - RANGE_TOLERANCE) <= 0.4861 and high * (1 + RANGE_TOLERANCE) >= 0.6563):
         return 0.0, 0.0
@@ -128,7 +128,7 @@ def index_and_abbe(glass: Glass) -> tuple[float, float]:
 
 
 def glass_words(glass: Glass, order: GlassOrder, *, own: bool) -> tuple[str, str]:
-    """Give the text of a GLAS line and the comment that goes with it.
+    """Return the text of a GLAS line and the comment that goes with it.
 
     Args:
         glass: Not air.

@@ -150,7 +150,7 @@ def _stop(records: ZmxRecords) -> int:
 
 
 def _aperture(records: ZmxRecords, stop: int, scale: float) -> tuple[ApertureKind, float]:
-    """Give the aperture; that of OBNA is put in later, when the entrance pupil is known."""
+    """Return the aperture; that of OBNA is put in later, when the entrance pupil is known."""
     found = [r for key in _APERTURES if (r := last(records.system, key)) is not None]
     if len(found) != 1:
         given = ", ".join(record.key for record in found) or "none"
@@ -189,7 +189,7 @@ def _with_object_aperture(lens: Lens, system: Records) -> Lens:
 
 
 def _wavelengths(system: Records) -> tuple[tuple[float, ...], float]:
-    """Give the wavelengths in um, increasing, each once, and the primary one."""
+    """Return the wavelengths in um, increasing, each once, and the primary one."""
     found = [*system.get("WAVM", []), *system.get("WAVE", [])]
     listed = [(r.number(1), r.number(2, 1.0)) for r in sorted(found, key=lambda r: r.number(0))]
     old = last(system, "WAVL")
@@ -244,7 +244,7 @@ def _notes(records: ZmxRecords, surfaces: tuple[Surface, ...]) -> tuple[str, ...
 def _glass_notes(
     records: ZmxRecords, surfaces: tuple[Surface, ...], order: GlassOrder
 ) -> tuple[str, ...]:
-    """Say which glasses are not those of a catalogue that GCAT names: once for each."""
+    """Return which glasses are not those of a catalogue that GCAT names: once for each."""
     named = {c.name for c in (*order.own, *order.listed)} - {OLD_SCHOTT}
     notes: dict[str, str] = {}
     for block, surface in zip(records.surfaces[1:-1], surfaces, strict=True):

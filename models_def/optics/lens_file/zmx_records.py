@@ -27,7 +27,7 @@ class Record:
     text: str
 
     def number(self, position: int, default: float | None = None) -> float:
-        """Give a word as a number.
+        """Return a word as a number.
 
         Raises:
             DecodeError: If it is missing without default, not finite or beyond `MAX_NUMBER`.
@@ -48,7 +48,7 @@ class Record:
         return value
 
     def numbers(self) -> tuple[float, ...]:
-        """Give all words as numbers."""
+        """Return all words as numbers."""
         return tuple(self.number(i) for i in range(len(self.words)))
 
 
@@ -107,6 +107,6 @@ def _check_number(record: Record, expected: int) -> None:
 
 
 def last(records: Records, key: str) -> Record | None:
-    """Give the last record of a key, or None: a later line replaces an earlier one."""
+    """Return the last record of a key, or None: a later line replaces an earlier one."""
     found = records.get(key)
     return found[-1] if found else None

@@ -33,7 +33,7 @@ def write_zmx(lens: Lens, path: Path) -> None:
 
 
 def format_zmx(lens: Lens) -> str:
-    """Give the .zmx text of a lens; see `write_zmx`."""
+    """Return the .zmx text of a lens; see `write_zmx`."""
     if any(surface.index_offset for surface in lens.surfaces):
         raise ContractError("a lens file holds no index offsets; write the nominal lens")
     names = _catalogue_names(lens)
@@ -48,7 +48,7 @@ def format_zmx(lens: Lens) -> str:
 
 
 def _catalogue_names(lens: Lens) -> list[str]:
-    """Give the makers whose glasses the lens uses, for GCAT.
+    """Return the makers whose glasses the lens uses, for GCAT.
 
     Two makers may have glasses of one name: the order is the one in which most glasses of the
     lens can go out by their names, since other programs know no camkit model glass.
@@ -107,7 +107,7 @@ def _system_lines(lens: Lens, catalogues: list[str]) -> list[str]:
 
 
 def _height_text(lens: Lens, angle_rad: float) -> str:
-    """Give the object height that becomes this angle again."""
+    """Return the object height that becomes this angle again."""
     height_mm = math.tan(angle_rad) * lens.object_distance_mm
     low = high = height_mm
     for _ in range(8):
@@ -155,7 +155,7 @@ def _surface_lines(lens: Lens, surface: Surface, position: int, order: GlassOrde
 
 
 def _aperture_lines(lens: Lens, surface: Surface, position: int) -> list[str]:
-    """Give DIAM, fixed where the surface vignettes; a stop that floats holds the aperture there."""
+    """Return DIAM, fixed where the surface vignettes; a floating stop holds the aperture there."""
     size_mm, limit = surface.semi_diameter_mm, math.isfinite(surface.semi_diameter_mm)
     floating = position == lens.stop and lens.aperture_kind == "stop_semi_diameter_mm"
     if floating and size_mm != lens.aperture_value:

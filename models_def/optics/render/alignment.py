@@ -60,7 +60,7 @@ def fit_alignment(lens: Lens, window: Window) -> Alignment:
 
 
 def scene_radius_mm(alignment: Alignment, heights_mm: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Give the distance from the axis, in the scene, of what lands at heights on the sensor.
+    """Return the distance from the axis, in the scene, of what lands at heights on the sensor.
 
     Raises:
         ContractError: If the polynomial cannot be inverted there.
@@ -108,7 +108,7 @@ def align_reference(
 
 
 def finer(window: Window, factor: int, margin_px: int = 0) -> Window:
-    """Give a window with pixels divided by a factor and a margin of such pixels around."""
+    """Return a window with pixels divided by a factor and a margin of such pixels around."""
     pitch_mm = window.pitch_mm / factor
     shift_mm = window.pitch_mm / 2 - pitch_mm / 2 + margin_px * pitch_mm
     return replace(
@@ -122,7 +122,7 @@ def finer(window: Window, factor: int, margin_px: int = 0) -> Window:
 
 
 def averaged(planes: Tensor, factor: int) -> Tensor:
-    """Give the means of blocks of factor x factor pixels of (3, h, w)."""
+    """Return the means of blocks of factor x factor pixels of (3, h, w)."""
     if factor == 1:
         return planes
     _, h, w = planes.shape

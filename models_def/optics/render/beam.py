@@ -53,7 +53,7 @@ class Labels:
     radius_mm: float
 
     def slope(self, label: Tensor, x_mm: Tensor) -> Tensor:
-        """Give the slope dx/dz towards the scene of labels seen from sensor points."""
+        """Return the slope dx/dz towards the scene of labels seen from sensor points."""
         return (self.radius_mm * label - self.a * x_mm) / self.b
 
     @property
@@ -77,14 +77,14 @@ class BeamTable:
     radius: NDArray[np.float64]
 
     def at(self, heights_mm: NDArray[np.float64]) -> tuple[Tensor, Tensor]:
-        """Give middle and radius at heights, float32."""
+        """Return middle and radius at heights, float32."""
         middle = np.interp(heights_mm, self.heights_mm, self.middle)
         radius = np.interp(heights_mm, self.heights_mm, self.radius)
         return torch.from_numpy(middle).float(), torch.from_numpy(radius).float()
 
 
 def stop_labels(optics: Optics) -> Labels:
-    """Give the labels of the reference wavelength; gradients flow.
+    """Return the labels of the reference wavelength; gradients flow.
 
     Raises:
         ContractError: If the stop is imaged onto the sensor: no direction reaches it.
@@ -110,7 +110,7 @@ def rays_from(labels: Labels, x_mm: Tensor, y_mm: Tensor, label_x: Tensor, label
 
 
 def light_of(start: Rays, end: Rays) -> Tensor:
-    """Give the light n^4 of each ray, 0 for lost ones."""
+    """Return the light n^4 of each ray, 0 for lost ones."""
     return torch.where(end.valid, start.n**4, 0.0)
 
 
@@ -153,12 +153,12 @@ def find_beams(
 
 
 def labels_of_type(labels: Labels, dtype: torch.dtype = torch.float32) -> Labels:
-    """Give labels in another type, so that they do not widen the rays."""
+    """Return labels in another type, so that they do not widen the rays."""
     return Labels(a=labels.a.to(dtype), b=labels.b.to(dtype), radius_mm=labels.radius_mm)
 
 
 def light_at(optics: Optics, labels: Labels, beams: BeamTable, heights_mm: Tensor) -> Tensor:
-    """Give E of a scene of radiance 1 at the reference wavelength.
+    """Return E of a scene of radiance 1 at the reference wavelength.
 
     Unlike `spot.relative_illumination`, which follows the chief ray, this is right for blurred
     images too: each ray brings its own share of the scene.

@@ -104,7 +104,7 @@ class _Job:
     shapes: Shapes
 
     def chunks(self) -> Iterator[range]:
-        """Give the rows of each chunk."""
+        """Return the rows of each chunk."""
         row_rays = 3 * self.window.width_px * self.sampling.spp
         rows = max(1, self.sampling.chunk_rays // row_rays)
         for first in range(0, self.window.height_px, rows):
@@ -169,7 +169,7 @@ def _fields(tensors: SurfaceTensors) -> tuple[Tensor, ...]:
 
 
 def _lens(fields: list[Tensor], number: int, shapes: Shapes) -> SurfaceTensors:
-    """Give the lens at the wavelengths of a pass: the inverse of `_fields`."""
+    """Return the lens at the wavelengths of a pass: the inverse of `_fields`."""
     curvature, conic, even_asphere, thickness_mm, semi_diameter_mm, index = fields
     return SurfaceTensors(
         curvature_per_mm=curvature,

@@ -44,7 +44,7 @@ class Optics:
             raise ContractError(f"stop_radius_mm must be > 0; got {self.stop_radius_mm}")
 
     def stopped(self, wavelengths_um: Tensor) -> SurfaceTensors:
-        """Give the tensors with the stop's rim in place."""
+        """Return the tensors with the stop's rim in place."""
         made = self.tensors(wavelengths_um)
         rim = made.semi_diameter_mm.detach().clone()
         rim[self.stop] = rim[self.stop].clamp(max=self.stop_radius_mm)
@@ -52,7 +52,7 @@ class Optics:
 
 
 def lens_optics(lens: Lens) -> Optics:
-    """Give the optics of a prescription, without gradient.
+    """Return the optics of a prescription, without gradient.
 
     Raises:
         ContractError: If its object is at infinity.
@@ -67,7 +67,7 @@ def lens_optics(lens: Lens) -> Optics:
 
 
 def free_optics(free: FreeLens, scaled: Tensor, object_distance_mm: float) -> Optics:
-    """Give the optics of a lens of a search, with gradients to its free numbers.
+    """Return the optics of a lens of a search, with gradients to its free numbers.
 
     Args:
         free: The lens and what is free.

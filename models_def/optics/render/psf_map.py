@@ -121,7 +121,7 @@ def _illumination(lens: Lens, grid: MapGrid) -> NDArray[np.float64]:
 
 
 def map_at(psf_map: PsfMap, depth_mm: float) -> PsfMap:
-    """Give the map of one depth: linear in diopters, the nearest beyond the map."""
+    """Return the map of one depth: linear in diopters, the nearest beyond the map."""
     diopters = 1 / psf_map.depths_mm[::-1]
     place = float(np.interp(1 / depth_mm, diopters, np.arange(len(diopters))[::-1]))
     low = min(int(place), max(0, len(diopters) - 2))
@@ -185,7 +185,7 @@ def render_by_map(
 
 
 def _block_kernels(psf_map: PsfMap, fine: Window, step_px: int) -> Tensor:
-    """Give kernels (rows, columns, 3, k, k) of the blocks of a window with its margin."""
+    """Return kernels (rows, columns, 3, k, k) of the blocks of a window with its margin."""
     ys, xs = (
         block_centres_px(length, 0, step_px=step_px) * fine.pitch_mm + start_mm
         for length, start_mm in ((fine.height_px, fine.top_mm), (fine.width_px, fine.left_mm))

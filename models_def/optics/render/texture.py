@@ -36,7 +36,7 @@ class Texture:
 
 
 def look_up(texture: Texture, x_mm: Tensor, y_mm: Tensor) -> Tensor:
-    """Give the radiance at points of the scene, bilinear.
+    """Return the radiance at points of the scene, bilinear.
 
     Gradients flow to the points and to the values.
 

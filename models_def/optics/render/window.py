@@ -49,14 +49,14 @@ class Window:
         return hypot(y, max(abs(self.left_mm - half), abs(right + half)))
 
     def centres_mm(self) -> tuple[Tensor, Tensor]:
-        """Give y (h,) and x (w,) of the pixel centres, float64."""
+        """Return y (h,) and x (w,) of the pixel centres, float64."""
         rows = torch.arange(self.height_px, dtype=torch.float64)
         columns = torch.arange(self.width_px, dtype=torch.float64)
         return self.top_mm + rows * self.pitch_mm, self.left_mm + columns * self.pitch_mm
 
 
 def centred_window(height_px: int, width_px: int, pitch_um: float) -> Window:
-    """Give a window whose middle lies on the axis."""
+    """Return a window whose middle lies on the axis."""
     pitch_mm = pitch_um / UM_PER_MM
     return Window(
         height_px=height_px,
@@ -68,7 +68,7 @@ def centred_window(height_px: int, width_px: int, pitch_um: float) -> Window:
 
 
 def corner_window(height_px: int, width_px: int, pitch_um: float) -> Window:
-    """Give a window whose first corner lies on the axis: one quadrant of a sensor."""
+    """Return a window whose first corner lies on the axis: one quadrant of a sensor."""
     half_mm = pitch_um / UM_PER_MM / 2
     return Window(
         height_px=height_px,

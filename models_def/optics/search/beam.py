@@ -21,7 +21,7 @@ LEAD: Final = len(LEAD_X)
 
 
 def pupil_radius_mm(lens: Lens, reference: SurfaceTensors, magnification: Tensor) -> Tensor:
-    """Give the radius of the entrance pupil in the batch shape.
+    """Return the radius of the entrance pupil in the batch shape.
 
     Args:
         lens: States the aperture.
@@ -77,7 +77,7 @@ def launch_beam(
 
 
 def leading(rays: Rays) -> Rays:
-    """Give the rays that bound the beam, of rays (..., LEAD + ray)."""
+    """Return the rays that bound the beam, of rays (..., LEAD + ray)."""
     parts = (rays.x, rays.y, rays.z, rays.l, rays.m, rays.n)
     x, y, z, along_x, along_y, along_z = (part[..., :LEAD] for part in parts)
     return Rays(x=x, y=y, z=z, l=along_x, m=along_y, n=along_z, fate=rays.fate[..., :LEAD])

@@ -14,7 +14,7 @@ _RIM_RAYS: Final = 41
 
 
 def finished(problem: Problem, scaled: Tensor) -> Lens:
-    """Give a found lens (variable,) with semi-diameters that pass every ray of the fields.
+    """Return a found lens (variable,) with semi-diameters that pass every ray of the fields.
 
     The stop keeps its own size: it limits the beam.
     """

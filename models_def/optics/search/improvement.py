@@ -74,7 +74,7 @@ def free_lens(lens: Lens, vary: Sequence[Sequence[Vary]]) -> FreeLens:
 
 
 def refracting_surfaces(lens: Lens) -> tuple[int, ...]:
-    """Give the surfaces between different media; a stop in air is none."""
+    """Return the surfaces between different media; a stop in air is none."""
     media = ["air", *(surface.glass for surface in lens.surfaces)]
     return tuple(i for i, surface in enumerate(lens.surfaces) if media[i] != surface.glass)
 

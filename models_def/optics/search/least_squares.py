@@ -35,7 +35,7 @@ class Descent:
 
 
 def jacobian(residuals: Residuals, scaled: Tensor) -> tuple[Tensor, Tensor]:
-    """Give residuals (start, residual) and forward differences (start, residual, variable)."""
+    """Return residuals (start, residual) and forward differences (start, residual, variable)."""
     starts, count = scaled.shape
     # inwards, so that a lens at its upper bound is not asked for beyond it
     sign = torch.where(scaled > 0.5, -1.0, 1.0) * _DIFFERENCE
@@ -70,7 +70,7 @@ def descend(residuals: Residuals, scaled: Tensor, steps: int, held: Tensor) -> D
 
 
 def evaluations(starts: int, steps: int, variables: int) -> int:
-    """Give how many lenses `descend` traces."""
+    """Return how many lenses `descend` traces."""
     return starts * (steps * (variables + 2) + 1)
 
 

@@ -48,7 +48,7 @@ def limit_residuals(
     solved: int | None,
     glass: tuple[bool, ...],
 ) -> Tensor:
-    """Give residuals (start, residual). Thickness at the centre is a matter of bounds.
+    """Return residuals (start, residual). Thickness at the centre is a matter of bounds.
 
     Args:
         limits: The limits.
@@ -78,7 +78,7 @@ def limit_residuals(
 
 
 def ray_residuals(tensors: SurfaceTensors, launched: Rays, seen: Sequence[Rays]) -> Tensor:
-    """Give residuals (start, field) of rays that are lost or near to it.
+    """Return residuals (start, field) of rays that are lost or near to it.
 
     Args:
         tensors: (surface, start, 1, 1, 1).
@@ -92,7 +92,7 @@ def ray_residuals(tensors: SurfaceTensors, launched: Rays, seen: Sequence[Rays])
 
 
 def distortion_residuals(limits: Limits, chief_y: Tensor, ideal_y: Tensor) -> Tensor:
-    """Give residuals (start, field) of chief rays that land too far from their ideal heights.
+    """Return residuals (start, field) of chief rays that land too far from their ideal heights.
 
     Args:
         limits: The limits.

@@ -25,7 +25,7 @@ _LOST_RAY: Final = 1.0
 def spot_residuals(
     landed: Rays, core_mm: float, merit: Merit = "sum_abs", *, fields: int = 0
 ) -> Tensor:
-    """Give residuals (start, residual) in mm (sqrt(mm) for `sum_abs`).
+    """Return residuals (start, residual) in mm (sqrt(mm) for `sum_abs`).
 
     Args:
         landed: (start, field, wave, LEAD + ray) on the sensor, see `beam`; half the pupil,
@@ -49,7 +49,7 @@ def spot_residuals(
 
 
 def _scale(square: Tensor, core_mm: float, merit: Merit) -> Tensor:
-    """Give what turns (x, y) into residuals; finite with its gradient at the centroid."""
+    """Return what turns (x, y) into residuals; finite with its gradient at the centroid."""
     if merit == "rms":
         return torch.ones_like(square)
     if merit == "sum_abs":

@@ -21,7 +21,7 @@ _TOUCH: Final = 1e-9
 
 
 def in_own_frame(problem: Problem, scaled: Tensor) -> Problem:
-    """Give the problem with the vignetting of a lens (variable,), and limits that it keeps."""
+    """Return the problem with the vignetting of a lens (variable,), and limits that it keeps."""
     with torch.no_grad():
         framed = replace(problem, vignetting=_vignetting(problem, scaled))
         traced = trace_batch(framed, scaled[None], framed.limited_mm)
@@ -47,7 +47,7 @@ def in_own_frame(problem: Problem, scaled: Tensor) -> Problem:
 
 
 def too_small_rims(problem: Problem, scaled: Tensor) -> list[tuple[int, float, float]]:
-    """Give (surface, reach, rim) in mm where a lens's beam needs more than the rim it has."""
+    """Return (surface, reach, rim) in mm where a lens's beam needs more than the rim it has."""
     reaches = _reaches(problem, scaled)
     found = []
     for i, surface in enumerate(problem.free.lens.surfaces):
@@ -58,7 +58,7 @@ def too_small_rims(problem: Problem, scaled: Tensor) -> list[tuple[int, float, f
 
 
 def _reaches(problem: Problem, scaled: Tensor) -> list[float]:
-    """Give how far from the axis the beam meets every surface, in mm."""
+    """Return how far from the axis the beam meets every surface, in mm."""
     rim = torch.linspace(-1, 1, _LINE, dtype=torch.float64)
     samples = PupilSamples(x=torch.zeros_like(rim), y=rim)
     with torch.no_grad():
@@ -74,7 +74,7 @@ def _reaches(problem: Problem, scaled: Tensor) -> list[float]:
 
 
 def _vignetting(problem: Problem, scaled: Tensor) -> Tensor | None:
-    """Give (field, 3): shift along y, and squeeze along y and x, in radii of the pupil."""
+    """Return (field, 3): shift along y, and squeeze along y and x, in radii of the pupil."""
     lens = problem.free.lens
     rims = [s.semi_diameter_mm if i != lens.stop else math.inf for i, s in enumerate(lens.surfaces)]
     if not any(map(math.isfinite, rims)):
@@ -93,7 +93,7 @@ def _vignetting(problem: Problem, scaled: Tensor) -> Tensor | None:
 def _passing(
     problem: Problem, scaled: Tensor, samples: PupilSamples, rims: list[float]
 ) -> tuple[Tensor, Tensor]:
-    """Give the ends (field,) of the part of a line over the pupil that all rims pass."""
+    """Return the ends (field,) of the part of a line over the pupil that all rims pass."""
     passes = torch.ones(len(problem.slopes), len(samples.x), dtype=torch.bool)
     for depth_mm in problem.depths_mm:
         traced = trace_batch(replace(problem, samples=samples), scaled[None], depth_mm)

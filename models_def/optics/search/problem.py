@@ -65,12 +65,12 @@ class Problem:
 
     @property
     def depths_mm(self) -> tuple[float, ...]:
-        """Give the object distances that are looked at."""
+        """Return the object distances that are looked at."""
         return self.object_distances_mm or (self.free.lens.object_distance_mm,)
 
     @property
     def limited_mm(self) -> float:
-        """Give the object distance from which the limits are judged.
+        """Return the object distance from which the limits are judged.
 
         From another one the image lies off the sensor, larger or smaller: that is no distortion.
         """
@@ -129,7 +129,7 @@ def trace_batch(
 
 
 def valid_share(problem: Problem, scaled: Tensor) -> Tensor:
-    """Give the share of rays that reach the sensor (start,), over fields, colours and depths."""
+    """Return the share of rays that reach the sensor (start,), over fields, colours and depths."""
     with torch.no_grad():
         shares = [
             trace_batch(problem, scaled, d).landed.valid[..., LEAD:].double().flatten(1).mean(1)
@@ -139,7 +139,7 @@ def valid_share(problem: Problem, scaled: Tensor) -> Tensor:
 
 
 def residuals(problem: Problem, scaled: Tensor) -> Tensor:
-    """Give residuals (start, residual) of a batch (start, variable)."""
+    """Return residuals (start, residual) of a batch (start, variable)."""
     parts: list[Tensor] = []
     for distance_mm in problem.depths_mm:
         traced = trace_batch(problem, scaled, distance_mm)
@@ -153,7 +153,7 @@ def residuals(problem: Problem, scaled: Tensor) -> Tensor:
 
 
 def limits_of(problem: Problem, traced: Traced, distance_mm: float) -> Tensor:
-    """Give residuals (start, residual) of what the lenses must not be."""
+    """Return residuals (start, residual) of what the lenses must not be."""
     free, limits = problem.free, problem.limits
     parts = [
         limit_residuals(
@@ -176,7 +176,7 @@ def limits_of(problem: Problem, traced: Traced, distance_mm: float) -> Tensor:
 
 
 def _image_scale_mm(reference: SurfaceTensors, object_distance_mm: float) -> Tensor:
-    """Give the paraxial image height per field slope (start, 1): the EFL for a distant object."""
+    """Return the paraxial image height per field slope (start, 1): the EFL for a distant object."""
     one = torch.ones_like(reference.index[0] * reference.curvature_per_mm[0])
     surfaces = range(len(reference.aspheric))
     _, slope = trace_paraxial(reference, one, one / object_distance_mm, surfaces)

@@ -34,7 +34,7 @@ class Pixels:
 
 
 def splat_batch(landed: Rays, pixels: Pixels) -> Tensor:
-    """Give kernels (start, field, colour, k, k) about the centroid of all colours.
+    """Return kernels (start, field, colour, k, k) about the centroid of all colours.
 
     They sum to the share of the light that falls into the window.
     """

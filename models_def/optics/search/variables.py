@@ -83,23 +83,23 @@ class FreeLens:
 
     @property
     def low(self) -> Tensor:
-        """Give the lower bounds (variable,)."""
+        """Return the lower bounds (variable,)."""
         return torch.tensor([v.low for v in self.variables], dtype=torch.float64)
 
     @property
     def high(self) -> Tensor:
-        """Give the upper bounds (variable,)."""
+        """Return the upper bounds (variable,)."""
         return torch.tensor([v.high for v in self.variables], dtype=torch.float64)
 
     def scaled(self) -> Tensor:
-        """Give the lens itself as scaled variables (variable,), within the bounds."""
+        """Return the lens itself as scaled variables (variable,), within the bounds."""
         span = (self.high - self.low).clamp_min(1e-300)
         flat, _ = self._flat()
         own = torch.stack([flat[self._place(v)] for v in self.variables])
         return ((own - self.low) / span).clamp(0, 1)
 
     def outside(self) -> tuple[tuple[Variable, float], ...]:
-        """Give the variables whose value in the lens lies outside their bounds, with the value."""
+        """Return variables whose value in the lens lies outside their bounds, with the value."""
         flat, _ = self._flat()
         values = [(v, float(flat[self._place(v)])) for v in self.variables]
         return tuple(
@@ -109,7 +109,7 @@ class FreeLens:
         )
 
     def tensors(self, scaled: Tensor, wavelengths_um: Tensor) -> SurfaceTensors:
-        """Give the lenses as tensors (surface, start, 1, 1, 1), index (surface + 1, wave, 1).
+        """Return the lenses as tensors (surface, start, 1, 1, 1), index (surface + 1, wave, 1).
 
         Args:
             scaled: (start, variable); gradients flow.
@@ -150,7 +150,7 @@ class FreeLens:
         )
 
     def made(self, scaled: Tensor) -> Lens:
-        """Give one lens (variable,) as a prescription; semi-diameters are those of `lens`."""
+        """Return one lens (variable,) as a prescription; semi-diameters are those of `lens`."""
         wave = torch.tensor([self.lens.reference_wavelength_um], dtype=torch.float64)
         tensors = self.tensors(scaled.detach()[None], wave)
         surfaces = tuple(
@@ -176,7 +176,7 @@ class FreeLens:
         return max([own, *free])
 
     def _flat(self) -> tuple[Tensor, int]:
-        """Give all numbers of the lens in one row: c, k, t of each surface, terms, defocus."""
+        """Return all numbers of the lens in one row: c, k, t of each surface, terms, defocus."""
         surfaces, terms = self.lens.surfaces, self._terms()
         row = [s.curvature_per_mm for s in surfaces]
         row += [s.conic for s in surfaces]
@@ -189,7 +189,7 @@ class FreeLens:
         return flat, terms
 
     def _riding_distance_mm(self) -> float:
-        """Give the paraxial image distance of the lens as it stands."""
+        """Return the paraxial image distance of the lens as it stands."""
         wave = torch.tensor(self.lens.reference_wavelength_um, dtype=torch.float64)
         tensors = surface_tensors(self.lens, wave)
         return float(image_distance(tensors, self.lens.object_distance_mm))
@@ -228,7 +228,7 @@ class FreeLens:
 
 
 def solve_curvature(tensors: SurfaceTensors, surface: int, efl_mm: float) -> Tensor:
-    """Give the curvature of one surface that makes the focal length `efl_mm`.
+    """Return the curvature of one surface that makes the focal length `efl_mm`.
 
     The slope behind the lens of a parallel ray of height 1 is -1 / efl; it is linear in the power
     of the one surface: u' = -(alpha + beta c).

@@ -105,7 +105,7 @@ class HazyReport:
     corner_illumination: float
 
     def to_json(self) -> dict[str, int | float | str]:
-        """Give the report as a flat mapping."""
+        """Return the report as a flat mapping."""
         return {
             name: round(value, 5) if isinstance(value, float) else value
             for name in self.__slots__
@@ -202,7 +202,7 @@ def freeze_hazy(
 
 
 def arriving(angles_rad: Array, heights_px: Array) -> Array:
-    """Give the light that enters for the area that its peaks cover, 1 on the axis.
+    """Return the light that enters for the area that its peaks cover, 1 on the axis.
 
     A scene of even radiance sends cos(a) sin(a) da through a flat stop, and its peaks cover h dh.
 
@@ -218,7 +218,7 @@ def arriving(angles_rad: Array, heights_px: Array) -> Array:
 
 
 def peaks_off_px(lens: Lens, psf: FrozenPsf, *, rays: int = RAYS) -> float:
-    """Give how far the peaks (or chief rays) of a lens lie from where a PSF has them, at most.
+    """Return how far the peaks (or chief rays) of a lens lie from where a PSF has them, at most.
 
     Args:
         lens: The lens.
@@ -246,7 +246,7 @@ def flat_light(
     rays: int,
     corner_rad: float | None = None,
 ) -> Array:
-    """Give how an even scene lights the sensor, haze and walls counted, 1 on the axis.
+    """Return how an even scene lights the sensor, haze and walls counted, 1 on the axis.
 
     Args:
         lens: The lens.
@@ -324,7 +324,7 @@ def _laid(x: Array, y: Array, share: Array, side: int) -> Array:
 
 
 def _side_holding(haze: Array, wanted: Array, energy: float) -> int:
-    """Give the least odd side in cells that holds the haze which can reach the frame."""
+    """Return the least odd side in cells that holds the haze which can reach the frame."""
     most = int(haze.shape[-1])
     for side in range(1, most, 2):
         cut = slice(most // 2 - side // 2, most // 2 + side // 2 + 1)
@@ -339,7 +339,7 @@ def _side_holding(haze: Array, wanted: Array, energy: float) -> int:
 
 
 def _kept(haze: Array, wanted: Array) -> Array:
-    """Give the share that is held of what is wanted; of next to nothing all is."""
+    """Return the share that is held of what is wanted; of next to nothing all is."""
     held = haze.sum(axis=(-2, -1))
     there = wanted > LEAST_HAZE
     share = np.divide(held, wanted, out=np.ones_like(held), where=there)

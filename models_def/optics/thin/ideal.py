@@ -17,7 +17,7 @@ def ideal_phase(
     distance_mm: float,
     wavelength_um: float,
 ) -> Array:
-    """Give the phase along the meridian that sends a direction to one point of the sensor.
+    """Return the phase along the meridian that sends a direction to one point of the sensor.
 
     Args:
         radius_mm: Any shape, signed, where the light meets the plate.

@@ -44,7 +44,7 @@ class Middles:
     corner_rad: float
 
     def heights_px(self, lens: Lens, angles_rad: Array, pitch_um: float, rays: int) -> Array:
-        """Give the middles (field,) of field angles from the axis, the first one 0.
+        """Return the middles (field,) of field angles from the axis, the first one 0.
 
         Raises:
             ContractError: If no light arrives.
@@ -95,7 +95,7 @@ def find_middles(
 
 
 def corner_angle_rad(lens: Lens, corner_px: float, pitch_um: float, rays: int) -> float:
-    """Give the field angle whose peak lies at the corner, by bisection.
+    """Return the field angle whose peak lies at the corner, by bisection.
 
     Raises:
         ContractError: If none does.
@@ -118,7 +118,7 @@ def corner_angle_rad(lens: Lens, corner_px: float, pitch_um: float, rays: int) -
 
 
 def height_px(lens: Lens, angle_rad: float, wave_um: float, pitch_um: float, rays: int) -> float:
-    """Give where the peak of a field lies.
+    """Return where the peak of a field lies.
 
     Raises:
         ContractError: If no light arrives.

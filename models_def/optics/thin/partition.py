@@ -40,7 +40,7 @@ class VirtualApertures:
 def partitioned_phase(
     apertures: VirtualApertures, distance_mm: float, wavelength_um: float, terms: int
 ) -> Array:
-    """Give the even polynomial whose phase is nearest to that of every direction in its aperture.
+    """Return the even polynomial whose phase is nearest to that of every direction in its aperture.
 
     The heights of the image points are f tan(angle): the power of the profile is left to it.
     Linear least squares, with a constant phase for each direction, which moves no light.

@@ -67,7 +67,7 @@ class Peak:
     lost: dict[str, float]
 
     def within_px(self, radius_px: float) -> float:
-        """Give the share within one of `RADII_PX`."""
+        """Return the share within one of `RADII_PX`."""
         return self.within[RADII_PX.index(radius_px)]
 
 
@@ -104,7 +104,7 @@ def land_light(
 
 
 def peak_height_px(light: LandedLight) -> float:
-    """Give the place of the peak on the meridian: the middle of the disc of most light.
+    """Return the place of the peak on the meridian: the middle of the disc of most light.
 
     A point smaller than the disc fills many discs, and which of them holds most is chance: its
     place is its centre of gravity.
@@ -127,7 +127,7 @@ def peak_height_px(light: LandedLight) -> float:
 
 
 def _middle_of_point_px(light: LandedLight, best_px: float) -> float:
-    """Give the centre of gravity of a point smaller than the disc at a place, else the place."""
+    """Return the centre of gravity of a point smaller than the disc at a place, else the place."""
     middle_px = best_px
     for _ in range(_ROUNDS):
         near = np.hypot(light.x_px, light.y_px - middle_px) < PEAK_PX
@@ -141,7 +141,7 @@ def _middle_of_point_px(light: LandedLight, best_px: float) -> float:
 
 
 def within(light: LandedLight, height_px: float, radius_px: float) -> float:
-    """Give the share of the light within a distance of a place on the meridian."""
+    """Return the share of the light within a distance of a place on the meridian."""
     near = np.hypot(light.x_px, light.y_px - height_px) < radius_px
     return float(light.share[near].sum())
 

@@ -13,7 +13,7 @@ _BACK_MM: Final = 1.5
 
 
 def plate_lens(recipe: ThinRecipe, solved: SolvedPlate) -> Lens:
-    """Give the lens: a stop, the two faces of the plate, the sensor.
+    """Return the lens: a stop, the two faces of the plate, the sensor.
 
     Raises:
         UnsupportedError: If a groove is narrower than the tool.

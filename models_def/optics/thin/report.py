@@ -63,7 +63,7 @@ class PeakReport:
 
 
 def with_ideal_grooves(lens: Lens) -> Lens:
-    """Give the lens whose grooves have no walls."""
+    """Return the lens whose grooves have no walls."""
     surfaces = (
         s if s.grooves is None else replace(s, grooves=replace(s.grooves, walls=False))
         for s in lens.surfaces
@@ -72,7 +72,7 @@ def with_ideal_grooves(lens: Lens) -> Lens:
 
 
 def with_tool(lens: Lens, radius_um: float) -> Lens:
-    """Give the lens whose grooves are cut by a tool with a nose of this radius.
+    """Return the lens whose grooves are cut by a tool with a nose of this radius.
 
     Raises:
         UnsupportedError: If a groove is narrower than the tool.
@@ -85,14 +85,14 @@ def with_tool(lens: Lens, radius_um: float) -> Lens:
 
 
 def between(angles_rad: Sequence[float]) -> tuple[float, ...]:
-    """Give angles and the middles between them."""
+    """Return angles and the middles between them."""
     angles = np.array(sorted(angles_rad))
     middles = (angles[1:] + angles[:-1]) / 2
     return tuple(np.sort(np.concatenate([angles, middles])).tolist())
 
 
 def band_wavelengths_um(band: str) -> tuple[float, ...]:
-    """Give wavelengths spread evenly over the width of a colour."""
+    """Return wavelengths spread evenly over the width of a colour."""
     places = (np.arange(BAND_WAVES) + 0.5) / BAND_WAVES - 0.5
     return tuple((BANDS[band] + BAND_FWHM_UM * places).tolist())
 
@@ -164,7 +164,7 @@ def _wave_peak(
 
 
 def to_json(report: PeakReport) -> dict[str, Any]:
-    """Give the report as plain JSON values."""
+    """Return the report as plain JSON values."""
     ideal, real = ([p.within_px(10.0) for p in peaks] for peaks in (report.ideal, report.real))
     return {
         "lens": report.lens.name,
@@ -204,7 +204,7 @@ def _field(ideal: Peak, real: Peak) -> dict[str, Any]:
 
 
 def to_text(told: dict[str, Any]) -> str:
-    """Give the report, as `to_json` has it, as a table."""
+    """Return the report, as `to_json` has it, as a table."""
     lines = [
         f"surface {g['surface']}: {g['walls']} walls, grooves of {g['groove_depth_um']:.2f} um"
         + (f", narrowest {g['narrowest_mm']:.3f} mm" if g["narrowest_mm"] else "")

@@ -37,7 +37,7 @@ class SagTable:
 
 
 def sag_table(surface: Surface, step_um: float) -> SagTable:
-    """Give the profile of a surface.
+    """Return the profile of a surface.
 
     Args:
         surface: With a rim.

@@ -34,7 +34,7 @@ class PlateNumbers:
 def trace_plate(
     plate: PlateNumbers, index: float, gap_mm: float, start: tuple[Tensor, Tensor], slope: Tensor
 ) -> tuple[Tensor, Tensor]:
-    """Give where rays of a distant scene land.
+    """Return where rays of a distant scene land.
 
     Args:
         plate: The plates.

@@ -55,7 +55,7 @@ class SolvedPlate:
 
 
 def back_radius_mm(plate: PlateTable, corner_rad: float) -> float:
-    """Give how far out unbent light of the corner meets the back face."""
+    """Return how far out unbent light of the corner meets the back face."""
     inside = math.tan(math.asin(math.sin(corner_rad) / plate.index))
     return plate.aperture_mm / 2 + plate.thickness_mm * inside
 
@@ -87,7 +87,7 @@ class _Search:
         return held
 
     def scales(self) -> Tensor:
-        """Give what 1/2 of each number is, from the middle."""
+        """Return what 1/2 of each number is, from the middle."""
         plate, partition = self.recipe.plate, self.recipe.partition
         rims = (plate.aperture_mm / 2, back_radius_mm(plate, partition.field_angles_rad[-1]))
         powers = range(2, plate.terms + 1)
@@ -97,7 +97,7 @@ class _Search:
         return torch.tensor([_BEND_PER_MM, *terms, *rest], dtype=torch.float64)
 
     def meant(self, scaled: Tensor) -> tuple[PlateNumbers, Tensor]:
-        """Give the plates (plate, 1, 1) and the centres (plate, direction) of their apertures."""
+        """Return the plates (plate, 1, 1) and the centres (plate, direction) of their apertures."""
         plate = self.recipe.plate
         values = (2 * scaled - 1) * self.scales()
         bend, front, back, centres, focus = torch.split(
@@ -119,7 +119,7 @@ class _Search:
         return numbers, torch.cat([torch.zeros_like(bend), centres], dim=1)
 
     def _curvatures(self, back: Tensor) -> tuple[Tensor, Tensor]:
-        """Give the r^2 terms of both faces that keep the focal length."""
+        """Return the r^2 terms of both faces that keep the focal length."""
         plate = self.recipe.plate
         excess, wanted = plate.index - 1, 1 / plate.efl_mm
         if plate.faces == "back":
@@ -129,7 +129,7 @@ class _Search:
         return ahead / (2 * excess), back
 
     def landed(self, scaled: Tensor) -> tuple[Tensor, Tensor]:
-        """Give x and y (plate, direction, ray) on the sensor."""
+        """Return x and y (plate, direction, ray) on the sensor."""
         plate, partition = self.recipe.plate, self.recipe.partition
         numbers, centres = self.meant(scaled)
         disc = half_disc(self.recipe.solver.rays)
@@ -140,7 +140,7 @@ class _Search:
         return trace_plate(numbers, plate.index, gap_mm, (x, y), slope[:, None])
 
     def residuals(self, scaled: Tensor) -> Tensor:
-        """Give distances from the mean, whose squares sum to mean squares of spots in mm^2."""
+        """Return distances from the mean, whose squares sum to mean squares of spots in mm^2."""
         x, y = self.landed(scaled)
         y = y - y.mean(-1, keepdim=True)
         weights = self.recipe.partition.weights or (1.0,) * x.shape[1]
@@ -149,7 +149,7 @@ class _Search:
         return torch.nan_to_num(both, nan=_LOST_MM).flatten(1)
 
     def starts(self) -> Tensor:
-        """Give (2, variable): all power in the curvatures, and the profile of eq. (3.4)."""
+        """Return (2, variable): all power in the curvatures, and the profile of eq. (3.4)."""
         partition = self.recipe.partition
         begin = torch.full((2, self.count), 0.5, dtype=torch.float64)
         slope = torch.tan(torch.tensor(partition.field_angles_rad, dtype=torch.float64))[1:]
@@ -163,7 +163,7 @@ class _Search:
         return torch.where(self.held, 0.5, begin)
 
     def _partitioned(self, centres_mm: list[float]) -> Tensor:
-        """Give the bends of the profile of eq. (3.4), on the back face unless it is a plane."""
+        """Return the bends of the profile of eq. (3.4), on the back face unless it is a plane."""
         plate, partition = self.recipe.plate, self.recipe.partition
         apertures = VirtualApertures(
             field_angles_rad=partition.field_angles_rad,

@@ -55,7 +55,7 @@ def wave_shares(
     *,
     lattice_mm: float = LATTICE_MM,
 ) -> tuple[float, ...]:
-    """Give the shares of the light within distances of a place on the meridian.
+    """Return the shares of the light within distances of a place on the meridian.
 
     Args:
         lens: Of a distant scene.
@@ -90,7 +90,7 @@ def wave_shares(
 
 
 def _light(waves: _Waves, number: float, x: Tensor, y: Tensor) -> Tensor:
-    """Give |U|^2 (y, x); a ray and its mirror image together make a cosine in x."""
+    """Return |U|^2 (y, x); a ray and its mirror image together make a cosine in x."""
     field = torch.zeros(len(y), len(x), dtype=torch.complex128)
     for part in torch.split(torch.arange(len(waves.x)), _CHUNK_RAYS):
         l, m = waves.l[part], waves.m[part]  # noqa: E741
@@ -141,7 +141,7 @@ def _waves(
 
 
 def _lattice(lens: Lens, step_mm: float) -> tuple[PupilSamples, float]:
-    """Give square cells of the half stop x > 0 as points of the unit disc, and a cell's area."""
+    """Return square cells of the half stop x > 0 as points of the unit disc, and a cell's area."""
     radius_mm = lens.aperture_value
     if lens.aperture_kind != "stop_semi_diameter_mm":
         raise ContractError("waves need a stop of a stated size: stop_semi_diameter_mm")
@@ -167,7 +167,7 @@ def _cut(rays: Rays, chosen: Tensor) -> Rays:
 
 
 def _turns(tensors: SurfaceTensors, rays: Rays, landed: Rays, slope: Tensor) -> list[Tensor]:
-    """Give dl/dx, dm/dx, dl/dy, dm/dy by a ray close by.
+    """Return dl/dx, dm/dx, dl/dy, dm/dy by a ray close by.
 
     Of the rays to both sides that one counts which turns less: the other lies beyond a wall.
     """

@@ -62,7 +62,7 @@ class Deviations:
         return len(self.focus_mm)
 
     def of_copy(self, number: int) -> "Deviations":
-        """Give those of one copy alone."""
+        """Return those of one copy alone."""
         one = slice(number, number + 1)
         return Deviations(**{f.name: getattr(self, f.name)[one] for f in fields(self)})
 
@@ -134,7 +134,7 @@ def draw_deviations(
 
 
 def no_deviations(lens: Lens) -> Deviations:
-    """Give one copy without errors."""
+    """Return one copy without errors."""
     drawn = draw_deviations(lens, Tolerances(), range(1), 0)
     return Deviations(**{name: np.zeros_like(value) for name, value in _arrays(drawn)})
 
@@ -146,7 +146,7 @@ def _arrays(deviations: Deviations) -> Iterator[tuple[str, Array]]:
 def _uniform(
     seed: int, number: int, surfaces: int, elements: int
 ) -> tuple[Array, Array, Array, np.float64, Array]:
-    """Give draws of 0..1: (5, surface), (2, surface, 2), (2, element, 2), 1 number, (surface,).
+    """Return draws of 0..1: (5, surface), (2, surface, 2), (2, element, 2), 1 number, (surface,).
 
     A class that is new draws last: the errors of a seed stay what they were.
     """
@@ -176,7 +176,7 @@ class Single:
 
 
 def single_deviations(lens: Lens, tolerances: Tolerances) -> tuple[tuple[Single, ...], Deviations]:
-    """Give copies with one error each: every number at plus and minus its half-width.
+    """Return copies with one error each: every number at plus and minus its half-width.
 
     Decentres are along y, tilts turn y towards z.
     """

@@ -4,7 +4,7 @@ from camkit.models_def.optics.prescription import Lens
 
 
 def glass_elements(lens: Lens) -> tuple[range, ...]:
-    """Give the surfaces of each piece; a stop or a dummy in air belongs to none."""
+    """Return the surfaces of each piece; a stop or a dummy in air belongs to none."""
     found: list[range] = []
     start: int | None = None
     for i, surface in enumerate(lens.surfaces):

@@ -48,7 +48,7 @@ def read_tolerances(path: Path) -> Tolerances | None:
 
 
 def parse_tolerances(table: object) -> Tolerances:
-    """Give the tolerances of a [tolerance] table; classes that it does not name are 0.
+    """Return the tolerances of a [tolerance] table; classes that it does not name are 0.
 
     A class is a half-width, or `{ half_width = 0.1, distribution = "normal" }`.
 
@@ -88,7 +88,7 @@ def _width(key: str, value: object, unit: float, common: Any) -> ErrorWidth:
 
 
 def in_file_units(error_class: ErrorClass, value: float) -> str:
-    """Give an error as people write it, such as `0.2 %`."""
+    """Return an error as people write it, such as `0.2 %`."""
     texts = {
         "radius": (0.01, " %"),
         "abbe": (0.01, " %"),

@@ -133,17 +133,17 @@ class Tolerances:
             raise ContractError(f"tilts must be at most {MAX_TILT_RAD} rad; got {self}")
 
     def of(self, error_class: ErrorClass) -> ErrorWidth:
-        """Give the width of a class."""
+        """Return the width of a class."""
         width: ErrorWidth = getattr(self, error_class)
         return width
 
     def active(self) -> tuple[ErrorClass, ...]:
-        """Give the classes that are not 0."""
+        """Return the classes that are not 0."""
         return tuple(
             error_class for error_class in ERROR_CLASSES if self.of(error_class).half_width > 0
         )
 
     def only(self, error_class: ErrorClass) -> Self:
-        """Give the same with every other class 0."""
+        """Return the same with every other class 0."""
         others: dict[str, Any] = dict.fromkeys(ERROR_CLASSES, _NOTHING)
         return replace(self, **{**others, error_class: self.of(error_class)})

@@ -81,7 +81,7 @@ class Landing:
 def fabricated_tensors(
     lens: Lens, deviations: Deviations, wavelengths_um: Tensor
 ) -> SurfaceTensors:
-    """Give the tensors (surface, copy, 1, wave, 1) of copies, float64; decentres lie in poses.
+    """Return the tensors (surface, copy, 1, wave, 1) of copies, float64; decentres lie in poses.
 
     Args:
         lens: Nominal.
@@ -97,11 +97,11 @@ def fabricated_tensors(
         raise ContractError("copies whose grooves are of different depths are traced one by one")
 
     def column(values: Array) -> Tensor:
-        """Give (surface, copy, 1, 1, 1) from (copy, surface)."""
+        """Return (surface, copy, 1, 1, 1) from (copy, surface)."""
         return torch.from_numpy(values).T[:, :, None, None, None]
 
     def wide(values: Tensor) -> Tensor:
-        """Give (surface, 1, 1, 1, 1) from (surface,)."""
+        """Return (surface, 1, 1, 1, 1) from (surface,)."""
         return values[:, None, None, None, None]
 
     glass = nominal.index[1:, None]
@@ -189,7 +189,7 @@ def _joined(parts: list[Landing]) -> Landing:
 def _trace(
     lens: Lens, deviations: Deviations, view: View, *, walls: bool = True
 ) -> tuple[Rays, Tensor]:
-    """Give rays (copy, field, wave, ray) on the sensor before refocus, and their weights.
+    """Return rays (copy, field, wave, ray) on the sensor before refocus, and their weights.
 
     Without walls those of grooves take none: a chief ray is a reference.
     """
@@ -245,7 +245,7 @@ def _refocus(
     compensator: Compensator,
     traced: tuple[Rays, Tensor],
 ) -> Tensor:
-    """Give how far the compensator moves the sensors (copy,)."""
+    """Return how far the compensator moves the sensors (copy,)."""
     if compensator == "none":
         return torch.zeros(deviations.copies, dtype=torch.float64)
     nothing = no_deviations(lens)
@@ -257,7 +257,7 @@ def _refocus(
 
 
 def _image_mm(lens: Lens, deviations: Deviations) -> Tensor:
-    """Give the paraxial image distances (copy,) from the last vertex, reference wavelength."""
+    """Return the paraxial image distances (copy,) from the last vertex, reference wavelength."""
     wave = torch.tensor([lens.reference_wavelength_um], dtype=torch.float64)
     tensors = fabricated_tensors(lens, deviations, wave)
     one = torch.ones_like(tensors.index[0] * tensors.curvature_per_mm[0])

@@ -10,7 +10,7 @@ from camkit.units import UM_PER_MM
 
 
 def spot_rms_mm(landing: Landing) -> Tensor:
-    """Give RMS radii (copy, field) about the centroid of all wavelengths, which count alike."""
+    """Return RMS radii (copy, field) about the centroid of all wavelengths, which count alike."""
     weight = landing.weight / landing.weight.sum(-1, keepdim=True).clamp_min(1e-300)
     share = weight / weight.sum((-2, -1), keepdim=True)
     square = torch.zeros_like(share)
@@ -22,7 +22,7 @@ def spot_rms_mm(landing: Landing) -> Tensor:
 def copy_kernels(
     landing: Landing, color_weights: Tensor, size_px: int, pitch_um: float
 ) -> tuple[Tensor, Tensor]:
-    """Give kernels (copy, field, 3, k, k) that sum to 1, and the light kept (copy, field).
+    """Return kernels (copy, field, 3, k, k) that sum to 1, and the light kept (copy, field).
 
     As they fall on the sensor for a point at +y, the centre pixel on the copy's own chief ray of
     the reference wavelength (decision 0001).
@@ -55,7 +55,7 @@ def copy_kernels(
 
 
 def window_px(kernels: Tensor, lost: float) -> int:
-    """Give the least odd side about the centre outside which no kernel has more than `lost`.
+    """Return the least odd side about the centre outside which no kernel has more than `lost`.
 
     Args:
         kernels: (..., k, k).

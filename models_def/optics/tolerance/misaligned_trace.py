@@ -44,7 +44,7 @@ def trace_misaligned(
 
 
 def to_surface(pose: Pose, rays: Rays) -> Rays:
-    """Give rays in the frame of the surface."""
+    """Return rays in the frame of the surface."""
     dx, dy, dz = (rays.x, rays.y, rays.z)
     ox, oy, oz = pose.offset_mm.unbind(-1)
     turn = pose.turn.transpose(-1, -2)
@@ -54,7 +54,7 @@ def to_surface(pose: Pose, rays: Rays) -> Rays:
 
 
 def from_surface(pose: Pose, rays: Rays) -> Rays:
-    """Give rays in the frame of the nominal vertex."""
+    """Return rays in the frame of the nominal vertex."""
     ox, oy, oz = pose.offset_mm.unbind(-1)
     x, y, z = _turned(pose.turn, (rays.x, rays.y, rays.z))
     l, m, n = _turned(pose.turn, (rays.l, rays.m, rays.n))  # noqa: E741

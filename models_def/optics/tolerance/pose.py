@@ -27,7 +27,7 @@ class Pose:
 
 
 def rotation(vector_rad: Tensor) -> Tensor:
-    """Give the rotation (..., 3, 3) about (x, y, 0) by its length, right-handed (Rodrigues).
+    """Return the rotation (..., 3, 3) about (x, y, 0) by its length, right-handed (Rodrigues).
 
     Args:
         vector_rad: (..., 2).
@@ -51,7 +51,7 @@ def poses(
     thickness_mm: Tensor,
     azimuths_rad: Tensor,
 ) -> list[Pose | None]:
-    """Give the pose of every surface (copy, field, 1, 1), seen with each field turned to +y.
+    """Return the pose of every surface (copy, field, 1, 1), seen with each field turned to +y.
 
     The nominal lens is round, so a field at an azimuth is one at +y with all errors turned back.
 
@@ -66,7 +66,7 @@ def poses(
     """
 
     def turned(vectors: Tensor) -> Tensor:
-        """Give (copy, field, part, 2) with the fields' directions turned to +y."""
+        """Return (copy, field, part, 2) with the fields' directions turned to +y."""
         cos, sin = torch.cos(azimuths_rad)[:, None], torch.sin(azimuths_rad)[:, None]
         x, y = vectors[:, None, :, 0], vectors[:, None, :, 1]
         return torch.stack([cos * x - sin * y, sin * x + cos * y], dim=-1)

@@ -90,7 +90,7 @@ def pull_back(
     slopes: Slopes,
     gather: Gather,
 ) -> Gradients:
-    """Give the gradients of a trace.
+    """Return the gradients of a trace.
 
     Args:
         settings: As the trace had it.
@@ -254,7 +254,7 @@ def _refraction(
 
 
 def _lean_slope(p: Numbers, shape: _Shape) -> Tensor:
-    """Give dq / d rho."""
+    """Return dq / d rho."""
     cube = shape.inverse * shape.inverse * shape.inverse
     slope = cube * (p.opening * p.c / 2)
     bends = [a * j for j, a in enumerate(p.slopes)][1:]

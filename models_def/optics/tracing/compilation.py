@@ -42,7 +42,7 @@ Loop = Callable[..., tuple[Tensor, ...]]
 
 @functools.cache
 def compiler_fault() -> str | None:
-    """Tell why nothing can be compiled here, after one trial; None if it can."""
+    """Return why nothing can be compiled here, after one trial; None if it can."""
     if not any(map(shutil.which, _COMPILERS)):
         return f"no C++ compiler found (looked for {', '.join(_COMPILERS)})"
     try:
@@ -53,7 +53,7 @@ def compiler_fault() -> str | None:
 
 
 def compiled_engine() -> Engine:
-    """Give the engine that compiles, or, with a warning, the plain one where that is impossible."""
+    """Return engine that compiles, or, with a warning, the plain one where that is impossible."""
     fault = compiler_fault()
     if fault is None:
         return Fused()
@@ -65,7 +65,7 @@ class Fused:
     """One loop over the rays for the whole lens; a loop per wavelength or lens of a batch."""
 
     def block_rays(self, *, gradient: bool) -> int:
-        """Give large blocks: rays stay in registers; a backward loop writes a column a number."""
+        """Return large blocks: rays stay in registers; a backward loop writes a column a number."""
         return _BACKWARD_RAYS if gradient else _FORWARD_RAYS
 
     def run(self, settings: TraceSettings, lens: LensTensors, rays: State, fate: Tensor) -> Result:
@@ -83,7 +83,7 @@ class Fused:
         return Result(State(*end[:6]), end[7] if settings.path else None, Kept(end[6], [], []))
 
     def pull(self, task: Task, lens: LensTensors, rays: State, fate: Tensor) -> Gradients:
-        """Give the gradients of a block, traced again in the same loop."""
+        """Return the gradients of a block, traced again in the same loop."""
         if task.kept is not None:
             return Eager().pull(task, lens, rays, fate)
         wanted, path = task.wanted, task.slopes.path

@@ -41,7 +41,7 @@ class Engine(Protocol):
     """What computes a block: eager here, compiled in `compilation`."""
 
     def block_rays(self, *, gradient: bool) -> int:
-        """Give how many rays a block has at most; `gradient` if it will be pulled back."""
+        """Return how many rays a block has at most; `gradient` if it will be pulled back."""
         ...
 
     def run(self, settings: TraceSettings, lens: LensTensors, rays: State, fate: Tensor) -> Result:
@@ -49,7 +49,7 @@ class Engine(Protocol):
         ...
 
     def pull(self, task: Task, lens: LensTensors, rays: State, fate: Tensor) -> Gradients:
-        """Give the gradients of a block."""
+        """Return the gradients of a block."""
         ...
 
 
@@ -57,7 +57,7 @@ class Eager:
     """One torch operation after the other."""
 
     def block_rays(self, *, gradient: bool) -> int:  # noqa: ARG002
-        """Give what fits the cache: every operation writes its result."""
+        """Return what fits the cache: every operation writes its result."""
         return BLOCK_RAYS
 
     def run(self, settings: TraceSettings, lens: LensTensors, rays: State, fate: Tensor) -> Result:
@@ -65,7 +65,7 @@ class Eager:
         return run(settings, numbers(lens), rays, fate)
 
     def pull(self, task: Task, lens: LensTensors, rays: State, fate: Tensor) -> Gradients:
-        """Give the gradients of a block."""
+        """Return the gradients of a block."""
         surfaces = numbers(lens)
         kept = task.kept
         if kept is None:
@@ -86,7 +86,7 @@ class _Block(NamedTuple):
     size: int
 
     def of(self, value: Tensor, fixed: int = 0) -> Tensor:
-        """Give the part of a tensor that broadcasts against the rays.
+        """Return the part of a tensor that broadcasts against the rays.
 
         Args:
             value: Its first `fixed` dimensions do not belong to the rays.

@@ -62,12 +62,12 @@ class GrooveMeeting(NamedTuple):
 
 
 def ring_number(p: Numbers, rho: Tensor, groove: Groove) -> Tensor:
-    """Give the number k of the ring at rho = r^2, as floats."""
+    """Return the number k of the ring at rho = r^2, as floats."""
     return torch.trunc(heights(p, rho).height / groove.depth_mm)
 
 
 def meet_grooves(p: Numbers, at: State, groove: Groove, *, adaptive: bool) -> GrooveMeeting:
-    """Give where rays from the vertex plane meet a grooved surface."""
+    """Return where rays from the vertex plane meet a grooved surface."""
     depth = groove.depth_mm
     above = heights(p, torch.addcmul(at.x * at.x, at.y, at.y)).height
     if not groove.walls:
@@ -98,7 +98,7 @@ def _rho(at: State, way: Tensor) -> Tensor:
 
 
 def _in_fillet(hit: Meeting, ring: Tensor, groove: Groove) -> Tensor:
-    """Tell which rays meet the rounding at the foot of a wall."""
+    """Return which rays meet the rounding at the foot of a wall."""
     deep = hit.z.abs()
     # the foot is where the relief is deepest in the solid
     at_full_depth = (hit.z >= 0) == groove.solid_after
@@ -113,7 +113,7 @@ def _in_fillet(hit: Meeting, ring: Tensor, groove: Groove) -> Tensor:
 def meets_again(
     p: Numbers, met: GrooveMeeting, bent: State, groove: Groove, *, adaptive: bool
 ) -> Tensor:
-    """Tell which bent rays run into the next groove before they have left the relief."""
+    """Return which bent rays run into the next groove before they have left the relief."""
     onward = bent.n.clamp_min(MIN_COSINE)
     back = torch.where(met.hit.z + met.ring * groove.depth_mm < 0, 0.0, groove.depth_mm)
     # the line of the bent ray, from the vertex plane

@@ -62,7 +62,7 @@ class LensTensors(NamedTuple):
 
 
 def numbers(lens: LensTensors) -> list[Numbers]:
-    """Give the numbers of every surface, computed for all surfaces at once."""
+    """Return the numbers of every surface, computed for all surfaces at once."""
     c, k = lens.curvature, lens.conic
     kc = c + k * c
     orders = range(1, lens.even_asphere.shape[1] + 1)
@@ -192,12 +192,12 @@ class _Lost(NamedTuple):
     again: Tensor | None = None
 
     def any(self) -> bool:
-        """Tell whether it took one."""
+        """Return whether it took one."""
         return any(mask is not None and bool(mask.any()) for mask in self)
 
 
 def _judge(p: Numbers, hit: Meeting, bends: tuple[Bound, Bound], lost: _Lost) -> Tensor:
-    """Give the first thing that is wrong with each ray, in the order of the light, as floats.
+    """Return the first thing that is wrong with each ray, in the order of the light, as floats.
 
     Args:
         p: The surface.

@@ -69,7 +69,7 @@ class Bound(NamedTuple):
     least: float
 
     def all(self) -> bool:
-        """Tell whether every ray meets it (NaN does not); far quicker than a mask."""
+        """Return whether every ray meets it (NaN does not); far quicker than a mask."""
         return bool(self.value.amin() > self.least)
 
 
@@ -96,7 +96,7 @@ class Meeting(NamedTuple):
 
 
 def meet_conic(p: Numbers, at: State) -> Meeting:
-    """Give where rays from the vertex plane meet a surface without a polynomial part."""
+    """Return where rays from the vertex plane meet a surface without a polynomial part."""
     way, exists, root, square = _conic_way(p, at)
     x, y = torch.addcmul(at.x, way, at.l), torch.addcmul(at.y, way, at.m)
     z = way * at.n
@@ -119,7 +119,7 @@ def meet_conic(p: Numbers, at: State) -> Meeting:
 
 
 def _conic_way(p: Numbers, at: State) -> tuple[Tensor, list[Bound], Tensor, Tensor]:
-    """Give the way to the conic, what must hold, N.d and its square.
+    """Return the way to the conic, what must hold, N.d and its square.
 
     The way is the root of a s^2 - 2 b s + g next to the vertex. With the normal
     (-c x, -c y, 1 - (1 + k) c z) the discriminant is the square of N.d.
@@ -142,7 +142,7 @@ class Heights(NamedTuple):
 
 
 def heights(p: Numbers, rho: Tensor) -> Heights:
-    """Give the profile of a surface; finite everywhere."""
+    """Return the profile of a surface; finite everywhere."""
     near = rho.clamp_max(MAX_RHO_MM2)
     square = 1 - near * p.opening
     height, lean = profile(p.c, square.clamp_min(TINY).sqrt(), p.terms, p.slopes, near)
@@ -150,7 +150,7 @@ def heights(p: Numbers, rho: Tensor) -> Heights:
 
 
 def meet_asphere(p: Numbers, at: State, *, adaptive: bool, drop: Tensor | None = None) -> Meeting:
-    """Give where rays from the vertex plane meet a surface, by Newton's method.
+    """Return where rays from the vertex plane meet a surface, by Newton's method.
 
     It starts from the conic (Sun 2021, eq. (6.6)), from the plane where that is missed.
 

@@ -15,7 +15,7 @@ TINY: Final = 1e-12
 
 
 def polynomial(coefficients: Sequence[Tensor], rho: Tensor) -> Tensor:
-    """Give a_0 + a_1 rho + a_2 rho^2 + ... (Horner)."""
+    """Return a_0 + a_1 rho + a_2 rho^2 + ... (Horner)."""
     total = coefficients[-1]
     for a in reversed(coefficients[:-1]):
         total = total * rho + a
@@ -25,7 +25,7 @@ def polynomial(coefficients: Sequence[Tensor], rho: Tensor) -> Tensor:
 def profile(
     c: Tensor, root: Tensor, terms: Sequence[Tensor], slopes: Sequence[Tensor], rho: Tensor
 ) -> tuple[Tensor, Tensor]:
-    """Give height h in mm and q = 2 dh/d rho in 1/mm.
+    """Return height h in mm and q = 2 dh/d rho in 1/mm.
 
     Args:
         c: Curvature.
@@ -41,7 +41,7 @@ def profile(
 
 
 def sag(curvature: Tensor, conic: Tensor, even_asphere: Tensor, rho: Tensor) -> Tensor:
-    """Give the height h(rho) of a surface, rho = r^2 in mm^2 (eq. 2.2, plus an r^2 term).
+    """Return the height h(rho) of a surface, rho = r^2 in mm^2 (eq. 2.2, plus an r^2 term).
 
     Where (1 + conic) c^2 rho > 1 there is no surface: the value is finite but meaningless.
     """
@@ -49,7 +49,7 @@ def sag(curvature: Tensor, conic: Tensor, even_asphere: Tensor, rho: Tensor) -> 
 
 
 def sag_slope(curvature: Tensor, conic: Tensor, even_asphere: Tensor, rho: Tensor) -> Tensor:
-    """Give dh/d rho (eq. 2.3, in the form c / (2 s), s the root, plus the polynomial)."""
+    """Return dh/d rho (eq. 2.3, in the form c / (2 s), s the root, plus the polynomial)."""
     return _profile(curvature, conic, even_asphere, rho)[1] / 2
 
 

@@ -41,26 +41,26 @@ class Relu32(torch.nn.Module):
             take_vgg(self.levels, vgg)
 
     def forward(self, picture: Tensor) -> Tensor:
-        """Give (b, c, h / 4, w / 4) from (b, 3, h, w) sRGB in 0..1."""
+        """Return (b, c, h / 4, w / 4) from (b, 3, h, w) sRGB in 0..1."""
         features: Tensor = self.levels(picture)[-1]
         return features
 
 
 def gram(features: Tensor) -> Tensor:
-    """Give the (b, c, c) Gram matrices of (b, c, h, w) features, eq. (3.6)."""
+    """Return the (b, c, c) Gram matrices of (b, c, h, w) features, eq. (3.6)."""
     flat = features.flatten(2)
     return flat @ flat.transpose(1, 2) / (flat.shape[1] * flat.shape[2])
 
 
 def gram_loss(found: Tensor, wanted: Tensor) -> Tensor:
-    """Give the 1-norm of the difference of Gram matrices, eq. (3.7); the mean over the batch."""
+    """Return the 1-norm of the difference of Gram matrices, eq. (3.7); the mean over the batch."""
     return (gram(found) - gram(wanted)).abs().sum((1, 2)).mean()
 
 
 def content_terms(
     views: Views, recipe: ContentRecipe, features: Features | None
 ) -> dict[str, tuple[float, Tensor]]:
-    """Give name -> weight and value of each term that counts.
+    """Return name -> weight and value of each term that counts.
 
     Args:
         views: Output and truth.

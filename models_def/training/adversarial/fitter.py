@@ -75,7 +75,7 @@ class CriticTraining:
         )
 
     def scores(self, pictures: Tensor) -> Tensor:
-        """Give (b,) scores of (b, 3, h, w) sRGB pictures in 0..1: means over all places."""
+        """Return (b,) scores of (b, 3, h, w) sRGB pictures in 0..1: means over all places."""
         return torch.as_tensor(self.network(pictures)).mean((1, 2, 3))
 
     def learn(
@@ -100,12 +100,12 @@ class CriticTraining:
         return apart.detach(), penalty.detach()
 
     def opinion(self, fake: Tensor) -> Tensor:
-        """Give what the generator minimises; the critic does not move."""
+        """Return what the generator minimises; the critic does not move."""
         self.network.requires_grad_(requires_grad=False)
         return generator_loss(self.scores(fake))
 
     def state(self) -> dict[str, Any]:
-        """Give weights and optimiser."""
+        """Return weights and optimiser."""
         return {
             "weights": dict(self.network.state_dict()),
             "optimizer": self._optimizer.state_dict(),
@@ -151,7 +151,7 @@ class PictureFitter(JudgedFitter):
             self.note("penalty", penalty)
 
     def total(self, views: Views) -> Tensor:
-        """Give the content terms, and the critic's opinion. References: eq. (3.9)."""
+        """Return the content terms, and the critic's opinion. References: eq. (3.9)."""
         terms = content_terms(views, self.schedule.content, self._features)
         if self.critic is not None:
             terms["adversarial"] = self.critic.recipe.weight, self.critic.opinion(views.seen)
@@ -160,7 +160,7 @@ class PictureFitter(JudgedFitter):
         return torch.stack([weight * value for weight, value in terms.values()]).sum()
 
     def optimizer_state(self) -> dict[str, Any]:
-        """Give the generator's optimiser, and the critic with its own: tensors and numbers."""
+        """Return the generator's optimiser, and the critic with its own: tensors and numbers."""
         state = {"generator": self.generator.optimizer_state()}
         return state if self.critic is None else state | {"critic": self.critic.state()}
 

@@ -29,7 +29,7 @@ PairReader = Callable[[Path, Any], Mix]
 def picture_fitting(
     request: FitRequest, build: NetworkBuilder, read_pairs: PairReader | None = None
 ) -> OwnFitting | None:
-    """Give the fitter of a request, None where its loss is another.
+    """Return the fitter of a request, None where its loss is another.
 
     Args:
         request: Its recipe has a sensor with a colour matrix.
@@ -84,7 +84,7 @@ def _check_files(request: FitRequest, schedule: ScheduleRecipe) -> None:
 
 
 def _credit(request: FitRequest, schedule: ScheduleRecipe) -> str:
-    """Say what else the weights learned from, for the card."""
+    """Return what else the weights learned from, for the card."""
     said = [f"; by the loss {schedule.loss}"]
     if schedule.content.looks and request.vgg is None:
         said.append("random features in place of VGG-19")

@@ -22,7 +22,7 @@ Mix = Callable[[Batch, int], Batch]
 
 
 def load_judges(network: nn.Module, weights: State) -> None:
-    """Give the opponents of a generator the weights of a checkpoint, in place.
+    """Return the opponents of a generator the weights of a checkpoint, in place.
 
     Raises:
         ContractError: If they are those of other opponents.
@@ -58,11 +58,11 @@ class JudgedFitter(ABC):
 
     @abstractmethod
     def total(self, views: Views) -> Tensor:
-        """Give the loss of the generator."""
+        """Return the loss of the generator."""
 
     @abstractmethod
     def optimizer_state(self) -> dict[str, Any]:
-        """Give the generator's optimiser, and the opponents with theirs: tensors and numbers."""
+        """Return the generator's optimiser, and the opponents with theirs: tensors and numbers."""
 
     @abstractmethod
     def load(self, weights: State, average: State, optimizer: dict[str, Any]) -> None:
@@ -88,7 +88,7 @@ class JudgedFitter(ABC):
         self._notes.setdefault(name, []).append(float(value.detach()))
 
     def notes(self) -> dict[str, float]:
-        """Give the mean of each term since the last call."""
+        """Return the mean of each term since the last call."""
         means = {name: sum(values) / len(values) for name, values in self._notes.items()}
         self._notes.clear()
         return means
@@ -98,9 +98,9 @@ class JudgedFitter(ABC):
         return self.generator.restore(planes)
 
     def weights(self) -> State:
-        """Give the generator's weights being trained."""
+        """Return the generator's weights being trained."""
         return self.generator.weights()
 
     def average(self) -> State:
-        """Give the generator's averaged weights."""
+        """Return the generator's averaged weights."""
         return self.generator.average()

@@ -54,7 +54,7 @@ def make_views(output: Tensor, target: Tensor, weight: Tensor, to_rec709: Tensor
 
 
 def to_display(root: Tensor, to_rec709: Tensor) -> Tensor:
-    """Give (b, 3, h, w) sRGB in 0..1 from the square-root domain.
+    """Return (b, 3, h, w) sRGB in 0..1 from the square-root domain.
 
     The small constant read_variance / shot under the root is left in: it is the same on both sides.
     """
@@ -64,6 +64,6 @@ def to_display(root: Tensor, to_rec709: Tensor) -> Tensor:
 
 
 def pixel_loss(views: Views) -> Tensor:
-    """Give the mean |difference| over what can be judged, in the square-root domain."""
+    """Return the mean |difference| over what can be judged, in the square-root domain."""
     gap = (views.output - views.target).abs()
     return gap.sum() / views.judged.sum().clamp(min=1)

@@ -25,7 +25,7 @@ Critic = Callable[[Tensor], Tensor]
 
 
 def critic_loss(real: Tensor, fake: Tensor) -> Tensor:
-    """Give what a critic minimises beside its penalty, from scores of any shape.
+    """Return what a critic minimises beside its penalty, from scores of any shape.
 
     Its negative estimates how far the two distributions lie apart.
     """
@@ -33,12 +33,12 @@ def critic_loss(real: Tensor, fake: Tensor) -> Tensor:
 
 
 def generator_loss(fake: Tensor) -> Tensor:
-    """Give what a generator minimises: the scores of its pictures, negative."""
+    """Return what a generator minimises: the scores of its pictures, negative."""
     return -fake.mean()
 
 
 def gradient_penalty(critic: Critic, real: Tensor, fake: Tensor, draw: torch.Generator) -> Tensor:
-    """Give the mean (|gradient| - 1)^2 of a critic between true and generated pictures.
+    """Return the mean (|gradient| - 1)^2 of a critic between true and generated pictures.
 
     Args:
         critic: Without norms over the batch: each score is one picture's.

@@ -31,7 +31,7 @@ class NoAnswer(CamkitError):  # noqa: N818 - says what it is
 
 
 def within(seconds: float, ask: Callable[[], T]) -> T:
-    """Give what a call gives; it is left alone if it takes longer.
+    """Return what a call gives; it is left alone if it takes longer.
 
     Raises:
         NoAnswer: If it does.
@@ -57,7 +57,7 @@ def within(seconds: float, ask: Callable[[], T]) -> T:
 
 @contextmanager
 def connected(address: str) -> Iterator["Client"]:
-    """Give a client of a running scheduler; it is closed at the end.
+    """Return a client of a running scheduler; it is closed at the end.
 
     Certificates and keys of tls:// are those of dask's own configuration.
 
@@ -77,7 +77,7 @@ def connected(address: str) -> Iterator["Client"]:
 
 @contextmanager
 def own_workers(count: int) -> Iterator["Client"]:
-    """Give a client of `count` worker processes on this machine, which end with the block.
+    """Return a client of `count` worker processes on this machine, which end with the block.
 
     Raises:
         UnsupportedError: If dask.distributed is not installed.
@@ -157,7 +157,7 @@ def open_client(address: str, security: "Security | None" = None) -> "Client":
 
 
 def _trouble(address: str, security: "Security") -> str | None:
-    """Say why no scheduler is reached; None if one is.
+    """Return why no scheduler is reached; None if one is.
 
     Asked before a client is made: one that finds no scheduler does not let go for many seconds.
     """

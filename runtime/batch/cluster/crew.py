@@ -39,7 +39,7 @@ class Crew:
         bundles: Mapping[str, Callable[[], bytes]],
         notice: Callable[[str], None],
     ) -> None:
-        """Say what workers must have.
+        """Return what workers must have.
 
         Args:
             needs: Of the run.
@@ -70,7 +70,7 @@ class Crew:
         self._looked_s = float("-inf")
 
     def room(self) -> int:
-        """Give how many files may be under way: those in the making, and one waiting per worker."""
+        """Return how many files may be under way: those in the making, one waiting per worker."""
         return sum(self.slots.values()) + len(self.slots)
 
     def look(self, client: "Client", *, now: bool = False) -> bool:
@@ -110,7 +110,7 @@ class Crew:
         return True
 
     def placed(self, client: "Client") -> dict[str, frozenset[str]]:
-        """Give the tasks that every worker has got, by its address.
+        """Return the tasks that every worker has got, by its address.
 
         Raises:
             NoAnswer: If the scheduler does not answer.
@@ -208,7 +208,7 @@ class Crew:
         )
 
     def busy(self, client: "Client") -> int:
-        """Give how many files of the run are in the making."""
+        """Return how many files of the run are in the making."""
         workers = list(self.slots)
         answers = within(
             REPLY_S,
@@ -218,7 +218,7 @@ class Crew:
 
 
 def _workers(client: "Client") -> dict[str, dict[str, Any]]:
-    """Give what the scheduler knows of every worker, by its address.
+    """Return what the scheduler knows of every worker, by its address.
 
     Asked of it directly: `client.scheduler_info` answers for five workers if the client has looked
     after itself meanwhile.

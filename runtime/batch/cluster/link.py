@@ -33,7 +33,7 @@ class Link:
 
     @property
     def is_up(self) -> bool:
-        """Tell whether the scheduler is there, as far as is known."""
+        """Return whether the scheduler is there, as far as is known."""
         return bool(self.client.status == "running")
 
     def check(self) -> None:

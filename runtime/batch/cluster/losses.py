@@ -56,7 +56,7 @@ class Losses:
         self._counts[number] = HOPELESS if was_alone else max(self._counts[number], SUSPECT)
 
     def fate(self, number: int) -> Fate:
-        """Say what becomes of a file that lost its worker."""
+        """Return what becomes of a file that lost its worker."""
         if self._counts[number] >= HOPELESS:
             return "failed"
         return "alone" if self._counts[number] >= SUSPECT else "again"

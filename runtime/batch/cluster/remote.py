@@ -88,12 +88,12 @@ class Order:
 
 
 def file_bytes(options: Options) -> int:
-    """Give the memory that one file may take."""
+    """Return the memory that one file may take."""
     return options.max_mem_bytes or DEFAULT_MAX_MEM_BYTES
 
 
 def look(needs: Needs, dask_worker: "Worker") -> tuple[str | None, tuple[str, ...]]:
-    """Say why this worker cannot serve a run (None if it can), and which bundles it lacks."""
+    """Return why this worker cannot serve a run (None if it can), and which bundles it lacks."""
     lacks = tuple(sha for sha in needs.bundles if not _bundle_path(sha, dask_worker).is_file())
     with speaking_here(needs.language):
         return _unfit(needs, dask_worker), lacks
@@ -142,13 +142,13 @@ async def offer(needs: Needs, dask_worker: "Worker") -> int:
 
 
 def forget(run: str) -> None:
-    """Let go of what a run that has ended used."""
+    """Release what a run that has ended used."""
     with _lock:
         _pipelines.pop(run, None)
 
 
 def busy(run: str) -> int:
-    """Give how many files of a run are in the making here."""
+    """Return how many files of a run are in the making here."""
     with _lock:
         return _busy.get(run, 0)
 
@@ -192,7 +192,7 @@ def _local(task: Task, worker: "Worker") -> Task:
 
 
 def _pipelines_of(order: Order, worker: "Worker") -> Pipelines:
-    """Give the pipelines of a run; those of runs before last are let go."""
+    """Return the pipelines of a run; those of runs before last are let go."""
     with _lock:
         if order.run not in _pipelines:
             threads = order.options.threads
@@ -215,7 +215,7 @@ def _is_given_up(worker: "Worker", key: Any) -> bool:
 
 
 def _teller(worker: "Worker", topic: str, number: int) -> Callable[[Path, int, int], None]:
-    """Give a progress that tells the caller, once a second."""
+    """Return a progress that tells the caller, once a second."""
     last = 0.0
 
     def tell(_: Path, done: int, total: int) -> None:
@@ -229,12 +229,12 @@ def _teller(worker: "Worker", topic: str, number: int) -> Callable[[Path, int, i
 
 
 def _slots(file_bytes: int, worker: "Worker") -> int:
-    """Give how many files of a size fit a worker at once."""
+    """Return how many files of a size fit a worker at once."""
     return max(1, min(worker.state.nthreads, _memory_bytes(worker) // file_bytes))
 
 
 def _memory_bytes(worker: "Worker") -> int:
-    """Give the memory that files may take: the worker's limit, or its share of the machine's."""
+    """Return the memory that files may take: the worker's limit, or its share of the machine's."""
     from dask.system import CPU_COUNT
     from distributed.system import MEMORY_LIMIT
 

@@ -355,7 +355,7 @@ class _Run:
         self._settle(number, FileResult.failure(task.source, named, error))
 
     def _as_asked(self, number: int, result: FileResult) -> FileResult:
-        """Give a result under the names that the caller gave."""
+        """Return a result under the names that the caller gave."""
         task = self._tasks[number]
         bundle = result.bundle
         if bundle is not None and result.status == "failed":
@@ -366,7 +366,7 @@ class _Run:
         return self._told_late(result) if ELSEWHERE in result.warnings else result
 
     def _told_late(self, result: FileResult) -> FileResult:
-        """Give the result of a picture that was there already when it was asked for again.
+        """Return the result of a picture that was there already when it was asked for again.
 
         Where workers were lost it was made by one of them, which could not tell: its sidecar does.
         """
@@ -456,7 +456,7 @@ class _Run:
             )
 
     def _give_up(self) -> None:
-        """Give up what is under way; wait until the workers have let go of it."""
+        """Return up what is under way; wait until the workers have let go of it."""
         with contextlib.suppress(Exception):
             self._link.client.cancel(list(self._open), force=True)
             end = time.monotonic() + STOP_S

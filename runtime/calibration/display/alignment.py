@@ -52,7 +52,7 @@ class Patch:
     ideal_px: FloatGrid
 
     def thinned(self, blur: float, every: int) -> "Patch":
-        """Give every n-th sample of the patch, blurred."""
+        """Return every n-th sample of the patch, blurred."""
         grey = cv2.GaussianBlur(self.grey, (0, 0), blur) if blur else self.grey
         lattice = np.s_[::every, ::every]
         return Patch(
@@ -116,7 +116,7 @@ def map_places(matrix: FloatGrid, places: FloatGrid) -> FloatGrid:
 
 
 def _moved(start: FloatGrid, end: FloatGrid, shape: tuple[int, ...]) -> float:
-    """Give how far the corners of a picture moved, of its diagonal."""
+    """Return how far the corners of a picture moved, of its diagonal."""
     height, width = shape[1:]
     corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]]) * (width, height)
     there = map_places(end @ np.linalg.inv(start), corners)
@@ -124,7 +124,7 @@ def _moved(start: FloatGrid, end: FloatGrid, shape: tuple[int, ...]) -> float:
 
 
 def _samples_per_px(patch: Patch, start: FloatGrid) -> float:
-    """Give how many samples of the lattice a pixel of the picture takes, in the middle."""
+    """Return how many samples of the lattice a pixel of the picture takes, in the middle."""
     row, column = (n // 2 for n in patch.grey.shape)
     near = patch.ideal_px[row : row + 2, column : column + 2]
     at = map_places(start, near)
@@ -137,7 +137,7 @@ def _softened(shown: FloatArray, blur_px: float) -> FloatArray:
 
 
 def _blur_of(patch: Patch, shown: FloatArray, matrix: FloatGrid, step: float) -> float:
-    """Give the blur with which the picture resembles the capture most."""
+    """Return the blur with which the picture resembles the capture most."""
     alike = []
     for blur in BLURS:
         soft = _softened(shown, blur / step)
@@ -148,7 +148,7 @@ def _blur_of(patch: Patch, shown: FloatArray, matrix: FloatGrid, step: float) ->
 def _compared(
     patch: Patch, soft: FloatArray, matrix: FloatGrid, margin: float
 ) -> tuple[FloatGrid, NDArray[np.bool_], float]:
-    """Give the model of the capture, where it holds, and how they correlate."""
+    """Return the model of the capture, where it holds, and how they correlate."""
     grey = patch.grey
     at = map_places(matrix, patch.ideal_px)
     inside = _inside(at, patch.usable, soft, margin)
@@ -159,7 +159,7 @@ def _compared(
 
 
 def _alike(grey: FloatArray, model: FloatGrid, inside: NDArray[np.bool_]) -> float:
-    """Give the correlation of what smooth light does not explain."""
+    """Return the correlation of what smooth light does not explain."""
     some = _some(inside)
     terms = _terms(grey.shape)[:, some]
     seen, made = (
@@ -170,7 +170,7 @@ def _alike(grey: FloatArray, model: FloatGrid, inside: NDArray[np.bool_]) -> flo
 
 
 def _some(inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Give `MIXED_SAMPLES` or so of the samples inside."""
+    """Return `MIXED_SAMPLES` or so of the samples inside."""
     every = 1 + np.count_nonzero(inside) // MIXED_SAMPLES
     some = np.zeros_like(inside)
     some.ravel()[np.flatnonzero(inside)[::every]] = True
@@ -178,7 +178,7 @@ def _some(inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _terms(shape: tuple[int, ...]) -> FloatGrid:
-    """Give the (7, h, w) smooth surfaces of which a gain, or stray light, is made."""
+    """Return the (7, h, w) smooth surfaces of which a gain, or stray light, is made."""
     y, x = np.meshgrid(*(np.linspace(-1, 1, n) for n in shape), indexing="ij")
     square = x * x + y * y
     return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y, square * square])
@@ -221,7 +221,7 @@ def _least(columns: FloatGrid, seen: FloatGrid) -> FloatGrid:
 
 
 def _refined(patch: Patch, soft: FloatArray, start: FloatGrid, margin: float) -> FloatGrid:
-    """Give the homography at which the model misses the capture least."""
+    """Return the homography at which the model misses the capture least."""
     ideal = patch.ideal_px.reshape(-1, 2)
     shape = (float(np.ptp(ideal[:, 1])) + 1, float(np.ptp(ideal[:, 0])) + 1)
     to_unit = _unit(shape, ideal.mean(axis=0))
@@ -248,7 +248,7 @@ def _step(
     to_unit: FloatGrid,
     pull: float,
 ) -> FloatGrid:
-    """Give the (8,) change of the homography between places in -1..1.
+    """Return the (8,) change of the homography between places in -1..1.
 
     Args:
         seen: The patch, the soft picture, where samples lie in it, and which count.
@@ -297,6 +297,6 @@ def _sampled(plane: FloatArray, at: FloatGrid) -> FloatGrid:
 
 
 def _unit(shape: tuple[float, ...], middle: FloatGrid) -> FloatGrid:
-    """Give the map from px to about -1..1, of one scale along both axes."""
+    """Return the map from px to about -1..1, of one scale along both axes."""
     half = max(shape) / 2
     return np.array([[1 / half, 0, -middle[0] / half], [0, 1 / half, -middle[1] / half], [0, 0, 1]])

@@ -73,7 +73,7 @@ class Lens:
         )
 
     def without_distortion(self, seen_px: FloatGrid) -> FloatGrid:
-        """Give where (n, 2) places of a picture would lie without distortion, same focal length.
+        """Return where (n, 2) places of a picture would lie without distortion, same focal length.
 
         Raises:
             DecodeError: If there is no such place.
@@ -96,7 +96,7 @@ class Lens:
         return at
 
     def lattice(self, x_px: FloatGrid, y_px: FloatGrid) -> FloatGrid:
-        """Give (len(y), len(x), 2) places without distortion of a lattice of pixels."""
+        """Return (len(y), len(x), 2) places without distortion of a lattice of pixels."""
         step = max(self.size) / NODES
         nodes = [
             np.linspace(line[0], line[-1], max(8, int(np.ptp(line) / step) + 2))
@@ -195,7 +195,7 @@ class Illumination:
         )
 
     def at(self, places_px: FloatGrid) -> FloatGrid:
-        """Give the light (...) at places (..., 2) of a picture."""
+        """Return the light (...) at places (..., 2) of a picture."""
         if self.light is None:
             return np.ones(places_px.shape[:-1])
         radius_mm = self.pitch_mm * np.hypot(*np.moveaxis(places_px - self.centre_px, -1, 0))

@@ -72,7 +72,7 @@ class Given:
             )
 
     def shown(self, target: Target) -> FloatArray:
-        """Give (3, h, w) light of what a picture's target shows, in its place.
+        """Return (3, h, w) light of what a picture's target shows, in its place.
 
         Raises:
             DecodeError: If the file is not there, or is not as the list says.
@@ -117,7 +117,7 @@ class Pair:
     reference_px: Place
 
     def to_record(self) -> dict[str, Any]:
-        """Give plain values."""
+        """Return plain values."""
         return {
             "name": self.target.name,
             "file": self.path.name,
@@ -149,12 +149,12 @@ class Pairs:
     notes: tuple[str, ...]
 
     def settings(self) -> dict[str, Any]:
-        """Give what `pairs.toml` holds."""
+        """Return what `pairs.toml` holds."""
         gains = {} if self.white_balance is None else {"white_balance": list(self.white_balance)}
         return {"iso": self.iso, **gains}
 
     def to_record(self) -> dict[str, Any]:
-        """Give plain values."""
+        """Return plain values."""
         display = {} if self.primaries is None else {"display": self.primaries.to_record()}
         return {
             **self.settings(),
@@ -211,7 +211,7 @@ def find_pairs(files: Sequence[Path], given: Given) -> Pairs:
 def draw_pairs(
     found: Pairs, given: Given
 ) -> Iterator[tuple[NDArray[np.uint16], NDArray[np.uint8]]]:
-    """Give capture (h, w, 3) of 16 bits and reference (m, n, 3) of 8 bits, pair by pair."""
+    """Return capture (h, w, 3) of 16 bits and reference (m, n, 3) of 8 bits, pair by pair."""
     from camkit.runtime.options import Options
     from camkit.runtime.pipeline import load
 
@@ -270,7 +270,7 @@ def _pair(one: Sorted, given: Given) -> tuple[Pair, Capture]:
 
 
 def _box(view: View, to_picture: FloatGrid, size: tuple[int, int]) -> Place:
-    """Give the window of the lattice that holds a picture; distortion bends it by a margin."""
+    """Return the window of the lattice that holds a picture; distortion bends it by a margin."""
     corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]]) * size
     seen = map_places(np.asarray(np.linalg.inv(to_picture)), corners) / view.scale
     height, width = view.grey.shape
@@ -295,7 +295,7 @@ def _patch(view: View, box: Place, given: Given) -> Patch:
 
 
 def _iso(pairs: Sequence[Pair], likes: Sequence[Capture]) -> float:
-    """Give the ISO of all pictures, which `pairs.toml` states once."""
+    """Return the ISO of all pictures, which `pairs.toml` states once."""
     isos = [like.iso or like.metadata.iso for like in likes]
     for pair, iso in zip(pairs, isos, strict=True):
         if iso is None:
@@ -329,7 +329,7 @@ def _primaries(colours: Sequence[Sorted], given: Given) -> tuple[Primaries | Non
 
 
 def _middle(one: Sorted, lens: Lens) -> NDArray[np.bool_]:
-    """Give (h, w) of the capture where the middle of a colour's patch is seen."""
+    """Return (h, w) of the capture where the middle of a colour's patch is seen."""
     x, y, width, height = one.target.place_px or (0, 0, 0, 0)
     rim = (1 - PATCH) / 2
     wide, high = lens.size

@@ -36,11 +36,11 @@ class Primaries:
 
     @property
     def residual(self) -> float:
-        """Give the RMS of the residuals."""
+        """Return the RMS of the residuals."""
         return float(np.sqrt(np.mean(self.residuals**2)))
 
     def to_record(self) -> dict[str, Any]:
-        """Give plain values."""
+        """Return plain values."""
         return {
             "matrix": [[float(f"{value:.6g}") for value in row] for row in self.matrix],
             "offset": [float(f"{value:.6g}") for value in self.offset],

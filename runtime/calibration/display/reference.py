@@ -28,7 +28,7 @@ _TOP: Final = 255
 def filled_rectangle(
     to_picture: FloatGrid, picture: tuple[int, int], size: tuple[int, int]
 ) -> Place:
-    """Give the rectangle of the undistorted capture that a picture fills.
+    """Return the rectangle of the undistorted capture that a picture fills.
 
     Args:
         to_picture: (3, 3) places without distortion -> px of the picture.
@@ -55,7 +55,7 @@ def filled_rectangle(
 
 
 def reference_of(shown: FloatArray, to_picture: FloatGrid, place: Place) -> NDArray[np.uint8]:
-    """Give the (h, w, 3) reference, 8-bit sRGB.
+    """Return the (h, w, 3) reference, 8-bit sRGB.
 
     Args:
         shown: (3, h, w) light of the picture, 0..1.

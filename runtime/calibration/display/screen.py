@@ -60,25 +60,25 @@ class Screen:
 
     @property
     def cell_px(self) -> int:
-        """Give the side of a cell of the marks."""
+        """Return the side of a cell of the marks."""
         return min(self.width_px, self.height_px) // CELLS_ALONG
 
     @property
     def blocks(self) -> tuple[tuple[int, int], ...]:
-        """Give x, y of the first pixel of each block: top left, then clockwise."""
+        """Return x, y of the first pixel of each block: top left, then clockwise."""
         side = BLOCK_CELLS * self.cell_px
         right, bottom = self.width_px - side, self.height_px - side
         return (0, 0), (right, 0), (right, bottom), (0, bottom)
 
     @property
     def corners(self) -> FloatGrid:
-        """Give (block, 4, 2) x, y of the corners of the words' black rims."""
+        """Return (block, 4, 2) x, y of the corners of the words' black rims."""
         cell = self.cell_px
         square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * WORD_CELLS * cell + cell - 0.5
         return np.stack([square + np.array(block) for block in self.blocks])
 
     def place(self, aspect: float) -> Place:
-        """Give where a picture goes: as large as marks leave room, in the middle.
+        """Return where a picture goes: as large as marks leave room, in the middle.
 
         Args:
             aspect: Width over height.
@@ -94,7 +94,7 @@ class Screen:
         return (self.width_px - width) // 2, (self.height_px - height) // 2, width, height
 
     def squares(self, board: Board) -> tuple[int, Place]:
-        """Give the side of a square of a board, and where the board goes, a square of white about.
+        """Return side of a square of a board, and where the board goes, a square of white about.
 
         Raises:
             ContractError: If squares would be of less than 4 px.

@@ -34,7 +34,7 @@ class Sorted:
 
 
 def sort_view(view: View, lens: Lens, targets: Targets) -> Sorted:
-    """Tell what a capture shows.
+    """Return what a capture shows.
 
     Raises:
         DecodeError: If it has no marks, or such that no target has.

@@ -79,7 +79,7 @@ class Target:
     source: tuple[str, str] | None = None
 
     def to_record(self) -> dict[str, Any]:
-        """Give plain values; what a target has not is left out."""
+        """Return plain values; what a target has not is left out."""
         record: dict[str, Any] = {"file": self.file, "name": self.name, "kind": self.kind}
         if self.kind == "grey" and self.rgb is not None:
             record["level"] = self.rgb[0]
@@ -111,11 +111,11 @@ class Targets:
 
     @property
     def by_code(self) -> dict[int, Target]:
-        """Give the targets that have marks, by what those say."""
+        """Return the targets that have marks, by what those say."""
         return {target.code: target for target in self.targets if target.code is not None}
 
     def holds(self, target: Target) -> bool:
-        """Tell whether a target lies on the screen."""
+        """Return whether a target lies on the screen."""
         if target.place_px is None:
             return True
         x, y, width, height = target.place_px
@@ -123,7 +123,7 @@ class Targets:
         return min(x, y) >= 0 and min(width, height) > 0 and across and down
 
     def to_record(self) -> dict[str, Any]:
-        """Give plain values."""
+        """Return plain values."""
         return {
             "screen_px": [self.screen.width_px, self.screen.height_px],
             "board": str(self.board),
@@ -251,7 +251,7 @@ def draw_target(planned: Targets, target: Target, light: FloatArray | None = Non
 
 
 def fit_light(light: FloatArray, size: tuple[int, int]) -> FloatArray:
-    """Give (3, h, w) light at another width and height: areas when it shrinks, cubic else."""
+    """Return (3, h, w) light at another width and height: areas when it shrinks, cubic else."""
     way = cv2.INTER_AREA if size[0] < light.shape[2] else cv2.INTER_CUBIC
     planes = [cv2.resize(plane, size, interpolation=way) for plane in np.clip(light, 0, 1)]
     return np.stack(planes).astype(np.float32)
@@ -281,7 +281,7 @@ def _squares(board: Board, side: int) -> Codes:
 
 
 def _names(pictures: Sequence[Path], taken: AbstractSet[str]) -> list[str]:
-    """Give a name for each that no other target has, of letters that any file system takes."""
+    """Return a name for each that no other target has, of letters that any file system takes."""
     names: dict[str, Path] = {}
     for path in pictures:
         name = _UNSAFE.sub("_", path.stem) or "_"

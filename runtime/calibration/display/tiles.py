@@ -71,7 +71,7 @@ def tile_shifts(
 
 
 def _shift(parts: list[FloatGrid]) -> FloatGrid | None:
-    """Give x, y by which a tile is moved; None where it does not tell."""
+    """Return x, y by which a tile is moved; None where it does not tell."""
     seen, model, along, down = parts
     columns = np.column_stack([-along, -down, model, np.ones_like(model)])
     normal = columns.T @ columns

@@ -41,11 +41,11 @@ class View:
     scale: FloatGrid
 
     def places(self, seen: FloatGrid) -> FloatGrid:
-        """Give px of the capture of (..., 2) places on the lattice."""
+        """Return px of the capture of (..., 2) places on the lattice."""
         return np.asarray((seen + 0.5) * self.scale - 0.5)
 
     def window(self, lens: Lens, box: tuple[int, int, int, int]) -> FloatGrid:
-        """Give (h, w, 2) places without distortion, px, of a window (x, y, width, height)."""
+        """Return (h, w, 2) places without distortion, px, of a window (x, y, width, height)."""
         x, y, width, height = box
         columns, rows = np.arange(x, x + width), np.arange(y, y + height)
         x_px, y_px = (
@@ -94,7 +94,7 @@ def read_view(path: Path, lens: Lens) -> tuple[View, Capture]:
 def colours_of(
     capture: Capture, seen: NDArray[np.bool_], illumination: Illumination
 ) -> tuple[FloatGrid, float]:
-    """Give the mean light (3,) of the sensor's colours where `seen`, and the clipped share."""
+    """Return the mean light (3,) of the sensor's colours where `seen`, and the clipped share."""
     light = capture.linear_rows(0, capture.height)
     clipped = clipped_rows(capture, 0, capture.height)
     rows, columns = np.nonzero(seen)

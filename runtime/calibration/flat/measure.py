@@ -68,11 +68,11 @@ class FlatFacts:
 
     @property
     def rest(self) -> float:
-        """Give the RMS of what is left, as a share."""
+        """Return the RMS of what is left, as a share."""
         return float(np.sqrt(np.mean(self.rest_maps**2)))
 
     def to_record(self) -> dict[str, Any]:
-        """Give plain values."""
+        """Return plain values."""
         return {
             "separated": self.separated,
             "heights_mm": [round(float(h), 5) for h in self.heights_mm],
@@ -164,7 +164,7 @@ def measure_flat(
 
 
 def _views(pictures: Sequence[FlatPicture], poses: Sequence[Pose], radius_px: float) -> Views:
-    """Give the pictures in units of half their diagonal, from their middle.
+    """Return the pictures in units of half their diagonal, from their middle.
 
     Raises:
         DecodeError: If the optical centre lies outside of them.
@@ -199,7 +199,7 @@ def _views(pictures: Sequence[FlatPicture], poses: Sequence[Pose], radius_px: fl
 
 
 def _sensor_middle(like: Capture, radius_px: float) -> tuple[float, float]:
-    """Give the middle of the sensor from that of a picture, in units of half its diagonal."""
+    """Return the middle of the sensor from that of a picture, in units of half its diagonal."""
     x, y = (
         ((whole - side) / 2 - origin) / radius_px
         for whole, origin, side in zip(*_place(like), (like.width, like.height), strict=True)
@@ -208,7 +208,7 @@ def _sensor_middle(like: Capture, radius_px: float) -> tuple[float, float]:
 
 
 def _place(like: Capture) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Give the size of the sensor and where a picture begins on it; alone, it is all of it."""
+    """Return the size of the sensor and where a picture begins on it; alone, it is all of it."""
     if like.origin_px is None or like.sensor_size_px is None:
         return (like.width, like.height), (0, 0)
     return like.sensor_size_px, like.origin_px

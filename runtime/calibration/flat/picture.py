@@ -82,7 +82,7 @@ def read_flat(path: Path, mosaic: MosaicOptions | None) -> FlatPicture:
 
 
 def green_of(capture: Capture) -> tuple[FloatGrid, NDArray[np.bool_], int]:
-    """Give light of green, where it is clipped, and pixels along a side of its samples.
+    """Return light of green, where it is clipped, and pixels along a side of its samples.
 
     Both greens of a cell of a mosaic are one sample, which lies in its middle.
     """

@@ -37,13 +37,13 @@ class Pose:
             raise ContractError(f"a turn is a number; got {self.turn_rad}")
 
     def places(self, x: FloatGrid, y: FloatGrid) -> tuple[FloatGrid, FloatGrid]:
-        """Give the places of what is photographed that are seen at pixels, both from the middle."""
+        """Return places of what is photographed that are seen at pixels, both from the middle."""
         cos, sin = math.cos(self.turn_rad), math.sin(self.turn_rad)
         dx, dy = x - self.shift_px[0], y - self.shift_px[1]
         return cos * dx + sin * dy, cos * dy - sin * dx
 
     def reversed(self, *, shift: bool, turn: bool) -> "Pose":
-        """Give the pose of one who counts shifts or turns the other way."""
+        """Return the pose of one who counts shifts or turns the other way."""
         x, y = self.shift_px
         return Pose(
             shift_px=(-x, -y) if shift else self.shift_px,
@@ -52,14 +52,14 @@ class Pose:
 
 
 def orientation_turn_deg(orientation: int) -> float:
-    """Give the turn in a picture whose EXIF orientation says how it is to be turned upright."""
+    """Return the turn in a picture whose EXIF orientation says how it is to be turned upright."""
     return {3: 180.0, 6: -90.0, 8: 90.0}.get(orientation, 0.0)
 
 
 def poses_of(
     shifts: Sequence[str] | None, turns: Sequence[float] | None, told: Sequence[float]
 ) -> list[Pose]:
-    """Give the poses that a person states.
+    """Return the poses that a person states.
 
     Args:
         shifts: "x,y" in pixels for each picture; None for no shifts.

@@ -88,16 +88,16 @@ class Parts:
 
     @property
     def separated(self) -> bool:
-        """Tell whether lens and display were told apart."""
+        """Return whether lens and display were told apart."""
         return self.share >= LEAST_SHARE
 
     @property
     def rms(self) -> float:
-        """Give the RMS of what is left, as a share of the light."""
+        """Return the RMS of what is left, as a share of the light."""
         return float(np.sqrt(np.mean(self.rest**2)))
 
     def illumination(self, radius: FloatGrid) -> FloatGrid:
-        """Give relative illumination, 1 at the centre."""
+        """Return relative illumination, 1 at the centre."""
         return np.exp(self.radial.terms(radius) @ self.falling)
 
 
@@ -117,11 +117,11 @@ class _Surroundings:
         self._unit = self.columns @ (mixtures[:, seen] / np.sqrt(power[seen]))
 
     def left_of(self, wanted: FloatGrid) -> FloatGrid:
-        """Give columns less what display and exposures can take over."""
+        """Return columns less what display and exposures can take over."""
         return np.asarray(wanted - self._unit @ (self._unit.T @ wanted))
 
     def least_share(self, wanted: FloatGrid) -> float:
-        """Give the least share of any mixture of columns that these cannot take over."""
+        """Return the least share of any mixture of columns that these cannot take over."""
         by_picture = wanted.reshape(self._pictures, -1, wanted.shape[1])
         alone = (by_picture - by_picture.mean(axis=1, keepdims=True)).reshape(wanted.shape)
         power, mixtures = linalg.eigh(alone.T @ alone)
@@ -176,7 +176,7 @@ def _fit(
 
 
 def _moved_centre(views: Views, around: _Surroundings, parts: Parts) -> tuple[float, float] | None:
-    """Give a better centre by one step of Gauss and Newton; None where the pictures do not tell."""
+    """Return better centre by one step of Gauss and Newton; None where the pictures do not tell."""
     dx, dy = views.x - parts.centre[0], views.y - parts.centre[1]
     radius = np.hypot(dx, dy)
     slope = parts.radial.slopes(radius) @ parts.falling / np.maximum(radius, 1e-9)
@@ -197,5 +197,5 @@ def _moved_centre(views: Views, around: _Surroundings, parts: Parts) -> tuple[fl
 
 
 def _repeated(columns: FloatGrid, views: Views) -> FloatGrid:
-    """Give columns for every picture, which all have the same lens."""
+    """Return columns for every picture, which all have the same lens."""
     return np.tile(columns, (len(views.poses), 1))

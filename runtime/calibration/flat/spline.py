@@ -13,7 +13,7 @@ _REACH: Final = 2.0
 
 
 def bumps(place: FloatGrid, intervals: int) -> FloatGrid:
-    """Give the values (place, intervals + 3) of all B-splines that reach into 0..1."""
+    """Return the values (place, intervals + 3) of all B-splines that reach into 0..1."""
     at = place[:, None] * intervals - np.arange(-1, intervals + 2)
     far = np.abs(at)
     near = 2 / 3 - far**2 + far**3 / 2
@@ -22,7 +22,7 @@ def bumps(place: FloatGrid, intervals: int) -> FloatGrid:
 
 
 def bump_slopes(place: FloatGrid, intervals: int) -> FloatGrid:
-    """Give their derivatives."""
+    """Return their derivatives."""
     at = place[:, None] * intervals - np.arange(-1, intervals + 2)
     far = np.abs(at)
     near = -2 * far + 1.5 * far**2
@@ -39,12 +39,12 @@ class Radial:
         self._at_centre = bumps(np.zeros(1), intervals)
 
     def terms(self, radius: FloatGrid) -> FloatGrid:
-        """Give (place, term); all splines together are constant, so one is left out."""
+        """Return (place, term); all splines together are constant, so one is left out."""
         share = (radius / self._reach) ** 2
         return np.asarray((bumps(share, self._intervals) - self._at_centre)[:, 1:])
 
     def slopes(self, radius: FloatGrid) -> FloatGrid:
-        """Give their derivatives by the radius."""
+        """Return their derivatives by the radius."""
         share = (radius / self._reach) ** 2
         slope = bump_slopes(share, self._intervals)[:, 1:]
         return np.asarray(slope * (2 * radius / self._reach**2)[:, None])
@@ -61,7 +61,7 @@ class Surface:
         self._spans = tuple(max(span, 1e-9) for span in spans)
 
     def terms(self, x: FloatGrid, y: FloatGrid) -> FloatGrid:
-        """Give (place, term)."""
+        """Return (place, term)."""
         along, down = (
             bumps((place - low) / span, count)
             for place, low, span, count in zip(

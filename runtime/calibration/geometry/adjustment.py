@@ -44,12 +44,12 @@ class Fit:
 
     @property
     def rms_px(self) -> float:
-        """Give the root of the mean square distance of corners from where they were computed."""
+        """Return the root of the mean square distance of corners from where they were computed."""
         return rms(self.residuals)
 
 
 def rms(residuals: FloatGrid) -> float:
-    """Give the root of the mean square distance of (..., 2) residuals."""
+    """Return the root of the mean square distance of (..., 2) residuals."""
     return float(np.sqrt(np.square(residuals).sum(axis=-1).mean()))
 
 
@@ -129,7 +129,7 @@ class _Linear:
         )
 
     def step(self, damping: float, *, lens: bool) -> tuple[FloatGrid, FloatGrid]:
-        """Give the steps of intrinsics and of poses."""
+        """Return the steps of intrinsics and of poses."""
         own = self.own + damping * _diagonals(self.own)
         own_step = _solve(own, self.own_side[..., None])[..., 0]
         if not lens:
@@ -142,7 +142,7 @@ class _Linear:
         return lens_step, own_step - np.einsum("vki,i->vk", own_mixed, lens_step)
 
     def spread(self) -> FloatGrid:
-        """Give the covariance of the intrinsics, poses being unknown too."""
+        """Return the covariance of the intrinsics, poses being unknown too."""
         if not np.isfinite(self.square):
             return np.full_like(self.shared, np.inf)
         own_mixed = _solve(self.own, self.mixed)

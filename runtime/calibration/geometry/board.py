@@ -57,11 +57,11 @@ class Board:
 
     @property
     def most(self) -> int:
-        """Give the corners along the longer side."""
+        """Return the corners along the longer side."""
         return max(self.columns, self.rows)
 
     @property
     def points(self) -> NDArray[np.float64]:
-        """Give (corner, 3) x, y, 0 of the corners, row by row, in squares."""
+        """Return (corner, 3) x, y, 0 of the corners, row by row, in squares."""
         y, x = np.mgrid[: self.rows, : self.columns]
         return np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3).astype(np.float64)

@@ -50,7 +50,7 @@ class Model:
 
     @property
     def coefficients(self) -> int:
-        """Give how many coefficients there are, fitted or not."""
+        """Return how many coefficients there are, fitted or not."""
         return _FISHEYE_COEFFICIENTS if self.fisheye else _PINHOLE_COEFFICIENTS
 
     @property
@@ -87,30 +87,30 @@ class Camera:
 
     @property
     def focal_px(self) -> float:
-        """Give the focal length."""
+        """Return the focal length."""
         return float(self.intrinsics[0])
 
     @property
     def centre_px(self) -> tuple[float, float]:
-        """Give x, y of the optical centre."""
+        """Return x, y of the optical centre."""
         return float(self.intrinsics[1]), float(self.intrinsics[2])
 
     @property
     def coefficients(self) -> FloatGrid:
-        """Give all coefficients in OpenCV's order."""
+        """Return all coefficients in OpenCV's order."""
         every = np.zeros(self.model.coefficients)
         every[list(self.model.free)] = self.intrinsics[LENS_NUMBERS:]
         return every
 
     @property
     def matrix(self) -> FloatGrid:
-        """Give the (3, 3) matrix of intrinsics."""
+        """Return the (3, 3) matrix of intrinsics."""
         x, y = self.centre_px
         return np.array([[self.focal_px, 0, x], [0, self.focal_px, y], [0, 0, 1.0]])
 
 
 def with_model(camera: Camera, model: Model) -> Camera:
-    """Give a camera in a richer form of its own kind; it sees the same."""
+    """Return a camera in a richer form of its own kind; it sees the same."""
     coefficients = camera.coefficients[list(model.free)]
     return replace(
         camera,
@@ -120,7 +120,7 @@ def with_model(camera: Camera, model: Model) -> Camera:
 
 
 def project(camera: Camera, pose: FloatGrid, points: FloatGrid) -> tuple[FloatGrid, FloatGrid]:
-    """Give where points fall on the picture, and how that changes.
+    """Return where points fall on the picture, and how that changes.
 
     Args:
         camera: The camera.
@@ -147,12 +147,12 @@ def project(camera: Camera, pose: FloatGrid, points: FloatGrid) -> tuple[FloatGr
 
 
 def depths(pose: FloatGrid, points: FloatGrid) -> FloatGrid:
-    """Give how far points lie in front of the camera."""
+    """Return how far points lie in front of the camera."""
     turn, _ = cv2.Rodrigues(pose[:3])
     return np.asarray(points @ turn[2] + pose[5])
 
 
 def distance(pose: FloatGrid, point: FloatGrid) -> float:
-    """Give how far a point (3,) lies from the camera."""
+    """Return how far a point (3,) lies from the camera."""
     turn, _ = cv2.Rodrigues(pose[:3])
     return float(np.linalg.norm(turn @ point + pose[3:]))

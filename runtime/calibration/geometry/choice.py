@@ -54,17 +54,17 @@ class Judged:
 
     @property
     def rms_px(self) -> float:
-        """Give the held-out error of all corners."""
+        """Return the held-out error of all corners."""
         return rms(self.held_out)
 
     @property
     def of_views_px(self) -> FloatGrid:
-        """Give the held-out error (view,) of every view."""
+        """Return the held-out error (view,) of every view."""
         return np.array([rms(view) for view in self.held_out])
 
     @property
     def expected_px(self) -> FloatGrid:
-        """Give the held-out error (view,) that most views, or the fit to the others, let expect.
+        """Return the held-out error (view,) that most views, or the fit to the others, let expect.
 
         Of few views, a bad one spoils the held-out error of every other, but not the fit without
         it; of many, two bad ones spoil every fit, but not the median.
@@ -97,12 +97,12 @@ class Judged:
 
     @property
     def worst_px(self) -> float:
-        """Give the held-out error of the worst view."""
+        """Return the held-out error of the worst view."""
         return float(self.of_views_px.max())
 
     @property
     def median_px(self) -> float:
-        """Give the median held-out error of the views, to which one bad view means little."""
+        """Return the median held-out error of the views, to which one bad view means little."""
         return float(np.median(self.of_views_px))
 
 
@@ -135,7 +135,7 @@ def judge(fit: Fit, corners: FloatGrid, points: FloatGrid) -> Judged:
 
 
 def _leverage(others: Fit, pose: FloatGrid, points: FloatGrid) -> float:
-    """Give by how much a camera's uncertainty raises the error of a view whose pose is fitted."""
+    """Return by how much a camera's uncertainty raises the error of a view whose pose is fitted."""
     _, slopes = project(others.camera, pose, points)
     flat = slopes.reshape(2 * len(points), -1)
     by_pose, by_lens = flat[:, :POSE_NUMBERS], flat[:, POSE_NUMBERS:]
@@ -146,7 +146,7 @@ def _leverage(others: Fit, pose: FloatGrid, points: FloatGrid) -> float:
 
 
 def simplest(judged: Sequence[Judged]) -> Judged:
-    """Give the first that is not meaningfully worse than the best.
+    """Return the first that is not meaningfully worse than the best.
 
     The same pictures judge all models, so what counts is by how much more one misses each: the mean
     over the pictures must exceed its own standard error, and be worth a number.
@@ -164,7 +164,7 @@ def simplest(judged: Sequence[Judged]) -> Judged:
 
 
 def _typical(judged: Sequence[Judged]) -> Judged:
-    """Give the simplest that most pictures are content with, whatever a bad one says."""
+    """Return the simplest that most pictures are content with, whatever a bad one says."""
     limit = TYPICAL * min(one.median_px for one in judged)
     return next(one for one in judged if one.median_px <= limit)
 
@@ -206,7 +206,7 @@ def judge_all(
 
 
 def _outlier(judged: Judged) -> int | None:
-    """Give the number of the view to drop first; None if all agree."""
+    """Return the number of the view to drop first; None if all agree."""
     views = judged.of_views_px
     bad = (views > LEAST_OUTLIER_PX) & (views > OUTLIER * judged.expected_px)
     return int(judged.others_px.argmin()) if bad.any() else None
@@ -215,7 +215,7 @@ def _outlier(judged: Judged) -> int | None:
 def _disagreeing(
     dropped: Sequence[int], rest: Judged, poses: FloatGrid, corners: FloatGrid, points: FloatGrid
 ) -> dict[int, float]:
-    """Give the error of each dropped view that the rest does not explain; poses to start from."""
+    """Return the error of each dropped view that the rest does not explain; poses to start from."""
     usual_px = float(np.median(rest.of_views_px / rest.leverage))
     errors = {}
     for view in dropped:

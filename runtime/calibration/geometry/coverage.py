@@ -28,14 +28,14 @@ class Coverage:
 
     @property
     def is_whole(self) -> bool:
-        """Tell whether nothing is left to be guessed."""
+        """Return whether nothing is left to be guessed."""
         return self.radius_px >= self.corner_px
 
 
 def coverage_of(
     corners: FloatGrid, centre_px: tuple[float, float], size: tuple[int, int]
 ) -> Coverage:
-    """Tell where the board was seen.
+    """Return where the board was seen.
 
     Args:
         corners: (view, corner, 2) x, y in px, of two views or more.
@@ -53,7 +53,7 @@ def coverage_of(
 
 
 def seen_cells(corners: FloatGrid, size: tuple[int, int]) -> NDArray[np.bool_]:
-    """Give the cells of 4x4 px that lie within the hull of a board."""
+    """Return the cells of 4x4 px that lie within the hull of a board."""
     width, height = (-(-side // _CELL_PX) for side in size)
     cells = np.zeros((height, width), dtype=np.uint8)
     for view in corners:

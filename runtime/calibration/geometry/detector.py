@@ -73,7 +73,7 @@ def find_corners(grey: FloatArray, board: Board) -> FloatGrid | None:
 
 
 def _copies(codes: Codes) -> list[tuple[int, Codes]]:
-    """Give by how much smaller, and the smaller copy; the largest first."""
+    """Return by how much smaller, and the smaller copy; the largest first."""
     height, width = codes.shape
     factor = -(-max(codes.shape) // LARGEST_PX)
     copies: list[tuple[int, Codes]] = []
@@ -107,7 +107,7 @@ def _by_squares(small: Codes, wanted: tuple[int, int]) -> Corners | None:
 
 
 def _unfolded(corners: Corners, factor: int) -> FloatGrid:
-    """Give the places on the whole picture; pixel centres are at integers."""
+    """Return the places on the whole picture; pixel centres are at integers."""
     return (corners.reshape(-1, 2).astype(np.float64) + 0.5) * factor - 0.5
 
 
@@ -161,7 +161,7 @@ def _by_gradients(grey: FloatArray, rough: FloatGrid, halves: NDArray[np.int_]) 
 
 
 def nearest_px(corners: FloatGrid, board: Board) -> FloatGrid:
-    """Give the way (corner,) from every corner to the nearest of its neighbours on the board."""
+    """Return the way (corner,) from every corner to the nearest of its neighbours on the board."""
     grid = corners.reshape(board.rows, board.columns, 2)
     near = np.full(grid.shape[:2], np.inf)
     down = np.linalg.norm(np.diff(grid, axis=0), axis=-1)

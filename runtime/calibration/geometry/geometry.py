@@ -89,16 +89,16 @@ class Geometry:
 
     @property
     def camera(self) -> Camera:
-        """Give the camera."""
+        """Return the camera."""
         return self.chosen.fit.camera
 
     @property
     def corners(self) -> FloatGrid:
-        """Give (view, corner, 2) of the views with a board, as `chosen` has them."""
+        """Return (view, corner, 2) of the views with a board, as `chosen` has them."""
         return np.stack([view.corners for view in self.views if view.corners is not None])
 
     def to_record(self) -> dict[str, Any]:
-        """Give plain values."""
+        """Return plain values."""
         return {
             "board": str(self.board),
             "width_px": self.size[0],

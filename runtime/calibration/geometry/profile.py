@@ -42,11 +42,11 @@ class Profile:
 
     @property
     def fold_px(self) -> float:
-        """Give the largest radius that the profile reaches before it folds back or ends."""
+        """Return the largest radius that the profile reaches before it folds back or ends."""
         return float(self.radii_px[-1])
 
     def ideal_px(self, radii_px: FloatGrid) -> FloatGrid:
-        """Give ideal radii of radii on the picture.
+        """Return ideal radii of radii on the picture.
 
         Raises:
             ContractError: If one lies beyond what was covered.
@@ -62,7 +62,7 @@ class Profile:
 
 
 def profile_of(camera: Camera, covered_px: float) -> Profile:
-    """Give the profile of a camera.
+    """Return the profile of a camera.
 
     Args:
         camera: The camera.
@@ -112,7 +112,7 @@ class RadialFit:
     residual_px: float
 
     def to_record(self) -> dict[str, Any]:
-        """Give plain values."""
+        """Return plain values."""
         return {
             "coefficients": list(self.coefficients),
             "radius_px": self.radius_px,
@@ -148,7 +148,7 @@ def fit_radial(profile: Profile, radius_px: float, corner_px: float) -> RadialFi
 
 
 def _continued(profile: Profile, corner_px: float) -> list[FloatGrid]:
-    """Give (sample, 2) ideal and placed radii beyond what is known, as guessed in two ways."""
+    """Return (sample, 2) ideal and placed radii beyond what is known, as guessed in two ways."""
     placed = np.linspace(profile.covered_px, RANGE_MARGIN * corner_px, FITTED)[1:]
     angles = np.interp(placed, profile.radii_px, profile.angles_rad)
     guessed = np.stack(
@@ -180,7 +180,7 @@ def _fitted(
 
 
 def _is_usable(fit: RadialFit, corner_px: float) -> bool:
-    """Tell whether the runtime would undistort by a polynomial; px stand for its mm."""
+    """Return whether the runtime would undistort by a polynomial; px stand for its mm."""
     distortion = RadialDistortion(
         coefficients=np.array([fit.coefficients]), radius_mm=fit.radius_px
     )

@@ -53,7 +53,7 @@ def refine_saddles(grey: FloatArray, rough: FloatGrid, radius_px: float) -> Floa
 
 
 def _stationary(polynomials: FloatGrid) -> FloatGrid:
-    """Give the saddle (corner, 2) of each polynomial, by Newton from the middle."""
+    """Return the saddle (corner, 2) of each polynomial, by Newton from the middle."""
     at = np.zeros((len(polynomials), 2))
     for _ in range(_NEWTON_STEPS):
         slope = np.stack([_value(polynomials, at, 1, 0), _value(polynomials, at, 0, 1)], axis=-1)
@@ -68,7 +68,7 @@ def _stationary(polynomials: FloatGrid) -> FloatGrid:
 
 
 def _value(polynomials: FloatGrid, at: FloatGrid, by_x: int, by_y: int) -> FloatGrid:
-    """Give a derivative of each polynomial at its place."""
+    """Return a derivative of each polynomial at its place."""
     value = np.zeros(len(at))
     for number, (i, j) in enumerate(_POWERS):
         if i >= by_x and j >= by_y:

@@ -106,7 +106,7 @@ def is_lens(camera: Camera, size: tuple[int, int]) -> bool:
 def _started(
     corners: FloatGrid, points: FloatGrid, size: tuple[int, int], kind: tuple[Model, Nominal]
 ) -> list[Fit]:
-    """Give the few best starts of one kind, poses adjusted."""
+    """Return the few best starts of one kind, poses adjusted."""
     (width, height), (model, nominal) = size, kind
     found: list[tuple[float, Fit]] = []
     focals = [share * max(size) for share in FOCALS]
@@ -128,7 +128,7 @@ def _started(
 
 
 def _pose(camera: Camera, seen: FloatGrid, points: FloatGrid) -> FloatGrid | None:
-    """Give the pose (6,) of a board from the directions of its corners; None if it has none."""
+    """Return the pose (6,) of a board from the directions of its corners; None if it has none."""
     flat = (seen - camera.centre_px) / camera.focal_px
     if camera.model.fisheye:
         angle = np.linalg.norm(flat, axis=1, keepdims=True)

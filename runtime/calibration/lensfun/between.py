@@ -21,7 +21,7 @@ SAME: Final = 0.01
 
 
 def distortion_at(lens: Lens, focal_mm: float) -> Distortion:
-    """Give the distortion of a lens at a focal length.
+    """Return the distortion of a lens at a focal length.
 
     Raises:
         DecodeError: If the database has none of it, or it lies outside what was measured.
@@ -51,7 +51,7 @@ def distortion_at(lens: Lens, focal_mm: float) -> Distortion:
 
 
 def _places(line: Sequence[Distortion], at: float) -> float:
-    """Give the share of the way between the neighbours of a focal length."""
+    """Return the share of the way between the neighbours of a focal length."""
     after = next(index for index, one in enumerate(line) if one.focal_mm > at)
     low, high = line[after - 1].focal_mm, line[after].focal_mm
     return (at - low) / (high - low)
@@ -71,7 +71,7 @@ def _cubic(values: Sequence[float], share: float, after: int) -> float:
 def vignetting_at(
     lens: Lens, focal_mm: float, aperture: float | None, distance_m: float | None
 ) -> Vignetting | None:
-    """Give the nearest entry of vignetting; None where the database has none.
+    """Return the nearest entry of vignetting; None where the database has none.
 
     Args:
         lens: The lens.

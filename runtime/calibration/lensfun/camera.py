@@ -48,7 +48,7 @@ LICENCE: Final = "CC-BY-SA-3.0"
 
 
 def stated_crop(path: Path) -> float | None:
-    """Give the crop factor of a file that states its focal length twice, also as that for 35 mm.
+    """Return the crop factor of a file that states its focal length twice, also as that for 35 mm.
 
     That one is whole millimetres, so it is a hint; None where it is not stated.
 
@@ -68,7 +68,7 @@ def stated_crop(path: Path) -> float | None:
 def frame_of(
     capture: Capture, crop_factor: float | None, database: Database, stated: float | None = None
 ) -> tuple[Frame, tuple[str, ...]]:
-    """Give size and scale of the captures, and what had to be taken from elsewhere.
+    """Return size and scale of the captures, and what had to be taken from elsewhere.
 
     Args:
         capture: One of them.
@@ -109,7 +109,7 @@ def frame_of(
 def manifest_of(
     name: str, capture: Capture, frame: Frame, profile: LensProfile
 ) -> tuple[Manifest, tuple[str, ...]]:
-    """Give the manifest of a bundle for captures like one, and notes."""
+    """Return the manifest of a bundle for captures like one, and notes."""
     sensor, notes = _sensor(capture, frame)
     stages = _stages(profile, mosaic=capture.cfa is not None)
     made = manifest_without_networks(
@@ -126,7 +126,7 @@ def manifest_of(
 
 
 def slug(text: str) -> str:
-    """Give a name of a bundle out of that of a file."""
+    """Return a name of a bundle out of that of a file."""
     plain = re.sub(r"[^a-z0-9_-]+", "-", text.lower()).strip("-_")
     return plain[:64] or "lens"
 

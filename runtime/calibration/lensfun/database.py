@@ -60,13 +60,13 @@ class Database:
         self._place = place
 
     def lenses(self) -> Iterator[tuple[str, Element]]:
-        """Give every lens with the name of its file."""
+        """Return every lens with the name of its file."""
         for file, root in self._files.items():
             for element in root.iter("lens"):
                 yield file, element
 
     def find(self, name: str) -> list[Lens]:
-        """Give a lens as it was measured with every camera.
+        """Return a lens as it was measured with every camera.
 
         Args:
             name: Its model, with or without its maker; case, spaces and the
@@ -89,7 +89,7 @@ class Database:
         return found
 
     def crop_factor(self, make: str, model: str) -> float | None:
-        """Give the crop factor of a camera; None if it is not known."""
+        """Return the crop factor of a camera; None if it is not known."""
         wanted = _plain(model)
         for root in self._files.values():
             for camera in root.iter("camera"):
@@ -114,7 +114,7 @@ def _files_of(place: Path) -> list[Path]:
 
 
 def _near(wanted: str, known: Iterable[str]) -> list[str]:
-    """Give names that are near, those with all the words first."""
+    """Return names that are near, those with all the words first."""
     words, names = wanted.split(), list(known)
     with_all = [one for one in names if words and all(word in one for word in words)]
     alike = difflib.get_close_matches(wanted, names, n=_NEAR, cutoff=0.5)

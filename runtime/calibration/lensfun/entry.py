@@ -136,27 +136,27 @@ class Entry:
 
     @property
     def size_px(self) -> tuple[int, int]:
-        """Give width and height of the pictures."""
+        """Return width and height of the pictures."""
         return self.source.size_px
 
     def straight_px(self, placed_px: FloatGrid) -> FloatGrid:
-        """Give the radii of the source's straight picture that fall on radii of the capture."""
+        """Return the radii of the source's straight picture that fall on radii of the capture."""
         assert self.source.distortion is not None  # without, there is no fit
         return _ideal_px(placed_px, self.source.distortion)
 
     def missed_px(self, placed_px: FloatGrid) -> FloatGrid:
-        """Give by how much the entry puts light farther out than the source, at such radii."""
+        """Return by how much the entry puts light farther out than the source, at such radii."""
         unit_px = min(self.size_px) / 2
         ideal = self.fit.scale * self.straight_px(placed_px) / unit_px
         return self.fit.distortion.placed(ideal) * unit_px - placed_px
 
     def to_xml(self) -> str:
-        """Give the file that lensfun reads."""
+        """Return the file that lensfun reads."""
         light = None if self.vignetting is None else self.vignetting[0]
         return to_xml(self.name, self.size_px, self.fit.distortion, light)
 
     def to_record(self) -> dict[str, Any]:
-        """Give plain values."""
+        """Return plain values."""
         known = self.fit.distortion
         light = None
         if self.vignetting is not None:
@@ -268,7 +268,7 @@ def _fitted(
 
 
 def _unit_scale(p: FloatGrid, powers: NDArray[np.int64]) -> float | None:
-    """Give one over the ideal radius that falls on 1."""
+    """Return one over the ideal radius that falls on 1."""
     polynomial = np.zeros(powers[-1] + 1)
     polynomial[powers[-1] - powers] = p
     polynomial[-1] = -1.0
@@ -299,7 +299,7 @@ def fit_vignetting(
 def to_xml(
     name: Name, size_px: tuple[int, int], distortion: Distortion, vignetting: Vignetting | None
 ) -> str:
-    """Give a file of lensfun's database with one lens."""
+    """Return a file of lensfun's database with one lens."""
     root = Element(ROOT, {"version": "1"})
     lens = SubElement(root, "lens")
     common = math.gcd(*size_px)
@@ -328,7 +328,7 @@ def to_xml(
 
 
 def _rounded(value: float) -> float:
-    """Give a number as the file will hold it."""
+    """Return a number as the file will hold it."""
     return float(_number(value))
 
 

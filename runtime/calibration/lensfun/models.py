@@ -50,11 +50,11 @@ class Distortion:
     terms: tuple[float, ...]
 
     def placed(self, r: FloatGrid) -> FloatGrid:
-        """Give the radius in the picture of ideal radii, by lensfun's own formula."""
+        """Return the radius in the picture of ideal radii, by lensfun's own formula."""
         return _FORMULAS[self.model](r, *self.terms)
 
     def to_radial(self, radius_mm: float, channels: int, scale: float = 1.0) -> RadialEntry:
-        """Give the same as powers, for every channel.
+        """Return the same as powers, for every channel.
 
         Args:
             radius_mm: What lensfun's unit is on the sensor; see `unit_mm`.
@@ -109,7 +109,7 @@ _FORMULAS: Final[Mapping[str, Callable[..., FloatGrid]]] = {
 
 
 def unit_mm(crop_factor: float, aspect: float) -> float:
-    """Give the unit of distortion, half the shorter side of the measured picture, in mm.
+    """Return the unit of distortion, half the shorter side of the measured picture, in mm.
 
     Args:
         crop_factor: Of the camera with which the lens was measured.
@@ -119,7 +119,7 @@ def unit_mm(crop_factor: float, aspect: float) -> float:
 
 
 def corner_mm(crop_factor: float) -> float:
-    """Give the unit of vignetting, half the diagonal of the measured picture, in mm."""
+    """Return the unit of vignetting, half the diagonal of the measured picture, in mm."""
     return FULL_FRAME_MM / 2 / crop_factor
 
 
@@ -141,7 +141,7 @@ class Vignetting:
     terms: tuple[float, float, float]
 
     def light(self, r: FloatGrid) -> FloatGrid:
-        """Give relative illumination at radii in units of half the diagonal."""
+        """Return relative illumination at radii in units of half the diagonal."""
         k1, k2, k3 = self.terms
         u = r * r
         return np.asarray(1 + u * (k1 + u * (k2 + u * k3)))

@@ -61,7 +61,7 @@ class LensBundle:
     notes: tuple[str, ...]
 
     def to_record(self) -> dict[str, Any]:
-        """Give what it is made of as JSON has it."""
+        """Return what it is made of as JSON has it."""
         found, entry, light = self.found, self.found.distortion, self.found.vignetting
         return {
             "lens": found.lens.name,

@@ -55,19 +55,19 @@ class Frame:
 
     @property
     def corner_radius_mm(self) -> float:
-        """Give the distance of the outermost pixel from the middle."""
+        """Return the distance of the outermost pixel from the middle."""
         width, height = self.size_px
         return math.hypot(width - 1, height - 1) / 2 * to_mm(self.pitch_um)
 
     @property
     def border_radii_mm(self) -> NDArray[np.float64]:
-        """Give distances of the outermost rows and columns from the middle."""
+        """Return distances of the outermost rows and columns from the middle."""
         nearest_mm = (min(self.size_px) - 1) / 2 * to_mm(self.pitch_um)
         return np.linspace(nearest_mm, self.corner_radius_mm, CHECKED)
 
     @property
     def stretch(self) -> float:
-        """Give the diagonal by pixels over that by the crop factor: 1 where both are exact."""
+        """Return the diagonal by pixels over that by the crop factor: 1 where both are exact."""
         return math.hypot(*self.size_px) * to_mm(self.pitch_um) * self.crop_factor / FULL_FRAME_MM
 
 
@@ -159,7 +159,7 @@ def profile_of(
 
 
 def filling_scale(distortion: RadialEntry, frame: Frame) -> float:
-    """Give the largest scale <= 1 of ideal radii at which no border shows what lies beyond it.
+    """Return the largest scale <= 1 of ideal radii at which no border shows what lies beyond it.
 
     Where the border of the straight picture lies at a distance r, and d(r) > r is where the capture
     is asked for, the scale is at most d^-1(r) / r.
@@ -183,7 +183,7 @@ def filling_scale(distortion: RadialEntry, frame: Frame) -> float:
 def missed_px(
     entry: Distortion, distortion: RadialEntry, frame: Frame, scale: float = 1.0
 ) -> float:
-    """Give by how many pixels a profile misses lensfun's formula at most, over the picture."""
+    """Return by how many pixels a profile misses lensfun's formula at most, over the picture."""
     ideal_mm = np.linspace(0, frame.corner_radius_mm, CHECKED)
     placed = entry.placed(scale * ideal_mm / distortion.radius_mm) * distortion.radius_mm
     points = np.stack([ideal_mm, np.zeros(CHECKED)], axis=-1)
@@ -223,7 +223,7 @@ def _illumination(entry: Vignetting, lens: Lens, frame: Frame) -> IlluminationEn
 
 
 def _told(entry: Vignetting, aperture: float | None, distance_m: float | None) -> str:
-    """Say which vignetting was taken, and what was asked for."""
+    """Return which vignetting was taken, and what was asked for."""
     wanted = "smallest aperture" if aperture is None else f"f/{aperture:g}"
     where = "far away" if distance_m is None else f"{distance_m:g} m"
     return (

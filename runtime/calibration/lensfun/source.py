@@ -42,11 +42,11 @@ class Source:
 
     @property
     def corner_px(self) -> float:
-        """Give the distance of the outermost pixel from the middle."""
+        """Return the distance of the outermost pixel from the middle."""
         return float(np.hypot(self.size_px[0] - 1, self.size_px[1] - 1)) / 2
 
     def focal_mm(self, crop_factor: float) -> float | None:
-        """Give the focal length on a sensor of a crop factor; None where it is not stated."""
+        """Return the focal length on a sensor of a crop factor; None where it is not stated."""
         diagonal_mm = FULL_FRAME_MM / crop_factor
         return self.focal_px and self.focal_px * diagonal_mm / float(np.hypot(*self.size_px))
 

@@ -65,11 +65,11 @@ class IsoFacts:
 
     @property
     def read_noise_e(self) -> float:
-        """Give the read noise, or what it lies below, in electrons."""
+        """Return the read noise, or what it lies below, in electrons."""
         return self.read.value * self.gain_e_per_dn
 
     def to_record(self) -> dict[str, Any]:
-        """Give plain values; None where exposure times do not tell of linearity."""
+        """Return plain values; None where exposure times do not tell of linearity."""
         linearity = self.linearity
         return {
             "iso": _short(self.iso),
@@ -103,7 +103,7 @@ class NoiseFacts:
     notes: tuple[str, ...]
 
     def to_record(self) -> dict[str, Any]:
-        """Give plain values."""
+        """Return plain values."""
         return {
             "camera": self.camera,
             "notes": list(self.notes),
@@ -160,7 +160,7 @@ def _by_iso(pairs: Iterable[Pair]) -> dict[float, list[Pair]]:
 
 
 def _means(darks: Sequence[Pair]) -> dict[str, float]:
-    """Give the mean of each colour in the dark, in DN above the stated black."""
+    """Return the mean of each colour in the dark, in DN above the stated black."""
     return {
         name: float(np.mean([(p.sites[name].mean + p.sites[name].second_mean) / 2 for p in darks]))
         for name in darks[0].sites
@@ -217,7 +217,7 @@ def _joined(darks: Sequence[SitePair]) -> Point:
 
 
 def _hidden_dark(step: float) -> Point:
-    """Give what noise that the converter hides adds to lit frames, and how surely that is known.
+    """Return what noise that the converter hides adds to lit frames, and how surely that is known.
 
     It is rounding, smeared by the shot noise, and anything up to the square of the bound.
     """
@@ -231,7 +231,7 @@ def _hidden_dark(step: float) -> Point:
 
 
 def _one_gain(transfers: Sequence[Transfer]) -> tuple[float, float]:
-    """Give the gain of all colours, and its error as a share: theirs, or what sets them apart."""
+    """Return the gain of all colours, and its error as a share: theirs, or what sets them apart."""
     slopes = np.array([line.dn_per_e for line in transfers])
     weight = 1 / np.array([max(line.error, 1e-12) for line in transfers]) ** 2
     slope = float(weight @ slopes / weight.sum())
@@ -242,7 +242,7 @@ def _one_gain(transfers: Sequence[Transfer]) -> tuple[float, float]:
 
 
 def _prnu(flats: Sequence[SitePair], dark_pattern: float) -> float:
-    """Give the response's spread: fixed pattern less that of the dark, over squared light.
+    """Return the response's spread: fixed pattern less that of the dark, over squared light.
 
     References: EMVA 1288 release 4.0, eq. (63).
     """
@@ -257,7 +257,7 @@ def _prnu(flats: Sequence[SitePair], dark_pattern: float) -> float:
 
 
 def _linearity(flats: Sequence[Pair], black: dict[str, float]) -> float | None:
-    """Give how far means lie from exposure times a constant; None where times do not tell."""
+    """Return how far means lie from exposure times a constant; None where times do not tell."""
     told = [pair.first.time_s for pair in flats]
     times = np.array([time for time in told if time is not None])
     if len(times) < len(told) or np.unique(times).size < LEAST_TIMES:

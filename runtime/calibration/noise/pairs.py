@@ -41,7 +41,7 @@ class Frame:
 
     @property
     def time_s(self) -> float | None:
-        """Give its exposure time, where it states one."""
+        """Return its exposure time, where it states one."""
         return self.like.metadata.exposure_time_s or self.like.exposure_time_s
 
 
@@ -63,7 +63,7 @@ class Pair:
 
     @property
     def iso(self) -> float:
-        """Give the ISO of both."""
+        """Return the ISO of both."""
         return self.first.iso
 
     @property
@@ -73,7 +73,7 @@ class Pair:
 
 
 def in_pairs(files: Sequence[Path], option: str) -> list[tuple[Path, Path]]:
-    """Give files two by two in their order.
+    """Return files two by two in their order.
 
     Raises:
         DecodeError: If there is none, or one is left over.
@@ -201,7 +201,7 @@ class PairReader:
 
 
 def _plane_of(capture: Capture) -> NDArray[Any]:
-    """Give the (h, w) samples; planes of a monochrome sensor are one and the same."""
+    """Return the (h, w) samples; planes of a monochrome sensor are one and the same."""
     return capture.samples if capture.cfa is not None else capture.samples[0]
 
 
@@ -217,7 +217,7 @@ def _names(capture: Capture) -> list[str]:
 
 
 def _planes(capture: Capture) -> Iterator[FloatGrid]:
-    """Give the samples of each colour of the cell, in DN above the stated black."""
+    """Return the samples of each colour of the cell, in DN above the stated black."""
     samples = _plane_of(capture)
     if capture.cfa is None:
         yield samples.astype(np.float64) - float(capture.black_level[0])

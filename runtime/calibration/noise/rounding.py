@@ -41,7 +41,7 @@ class Spread:
 
 
 def spread_of(variance: float, samples: int, step: float) -> Spread:
-    """Give the noise before the converter.
+    """Return the noise before the converter.
 
     Args:
         variance: Of rounded noise, in DN^2.
@@ -58,7 +58,7 @@ def spread_of(variance: float, samples: int, step: float) -> Spread:
 
 
 def rounded_variance(sigma: float, place: float) -> float:
-    """Give the variance of Gaussian noise after rounding to whole numbers.
+    """Return the variance of Gaussian noise after rounding to whole numbers.
 
     Args:
         sigma: Its standard deviation, at most `_WIDEST`.
@@ -71,7 +71,7 @@ def rounded_variance(sigma: float, place: float) -> float:
 
 
 def _bounds(seen: float) -> tuple[float, float]:
-    """Give least and most noise, in steps, that a variance in squared steps may stand for."""
+    """Return least and most noise, in steps, that a variance in squared steps may stand for."""
     sigma, on_step, between = _table()
     if seen >= on_step[-1]:
         plain = float(np.sqrt(seen - OF_ROUNDING))

@@ -55,7 +55,7 @@ class SitePair:
 
 
 def site_pair(first: FloatGrid, second: FloatGrid, dark: float | None, step: float) -> SitePair:
-    """Give what two frames tell of one colour.
+    """Return what two frames tell of one colour.
 
     Args:
         first: (h, w) DN above the stated black, h and w at least `BLOCK_PX`.
@@ -91,7 +91,7 @@ def site_pair(first: FloatGrid, second: FloatGrid, dark: float | None, step: flo
 
 
 def _blocks(plane: FloatGrid) -> FloatGrid:
-    """Give (block, sample); what fills no whole block at the right and below is left out."""
+    """Return (block, sample); what fills no whole block at the right and below is left out."""
     rows, columns = (n // BLOCK_PX for n in plane.shape)
     whole = plane[: rows * BLOCK_PX, : columns * BLOCK_PX]
     tiled = whole.reshape(rows, BLOCK_PX, columns, BLOCK_PX).swapaxes(1, 2)
@@ -99,7 +99,7 @@ def _blocks(plane: FloatGrid) -> FloatGrid:
 
 
 def _without_defects(blocks: FloatGrid, step: float) -> tuple[FloatGrid, NDArray[np.bool_]]:
-    """Give blocks less a plane each, and where a sample stands alone, which bends no plane."""
+    """Return blocks less a plane each, and where a sample stands alone, which bends no plane."""
     rest = blocks - _planes(blocks)
     limit = MOST_SPREADS * max(_MAD_TO_SIGMA * float(np.median(np.abs(rest))), step / 2)
     apart = np.abs(rest) > limit
@@ -110,7 +110,7 @@ def _without_defects(blocks: FloatGrid, step: float) -> tuple[FloatGrid, NDArray
 
 
 def _planes(blocks: FloatGrid) -> FloatGrid:
-    """Give the plane fitted to each block."""
+    """Return the plane fitted to each block."""
     y, x = np.mgrid[:BLOCK_PX, :BLOCK_PX].reshape(2, -1) - (BLOCK_PX - 1) / 2
     plane, _ = np.linalg.qr(np.stack([np.ones(BLOCK_PX**2), y, x], axis=1))
     return np.asarray((blocks @ plane) @ plane.T)

@@ -52,11 +52,11 @@ class Transfer:
     points: tuple[Point, ...]
 
     def variance_at(self, signal: float) -> float:
-        """Give the variance of the line at a signal in DN."""
+        """Return the variance of the line at a signal in DN."""
         return self.dark_variance + self.dn_per_e * signal
 
     def misfits(self) -> NDArray[np.float64]:
-        """Give how far every point lies off, as a share of the line."""
+        """Return how far every point lies off, as a share of the line."""
         return np.array([p.variance / self.variance_at(p.signal) - 1 for p in self.points])
 
 

@@ -57,12 +57,12 @@ class Bank:
 
     @property
     def step_ps(self) -> float:
-        """Give how far templates lie apart."""
+        """Return how far templates lie apart."""
         return float(self.mu_ps[1] - self.mu_ps[0])
 
     @property
     def resolved_ps(self) -> float:
-        """Give the width of bins within which a pulse's place does not show; 0 if it does."""
+        """Return the width of bins within which a pulse's place does not show; 0 if it does."""
         is_narrow = self.pulse.finest_ps < NARROW * self.axis.step_ps
         return self.axis.step_ps if is_narrow and self.axis.orientation == "histogram" else 0.0
 
@@ -137,7 +137,7 @@ class Banded:
             self._parts.append((slice(left, max(right, left + 1)), group, matrix))
 
     def product(self, counts: FloatArray) -> FloatArray:
-        """Give the sum over bins of counts (p, bins) times values: (p, n) float32."""
+        """Return the sum over bins of counts (p, bins) times values: (p, n) float32."""
         found = np.empty((len(counts), self._count), np.float32)
         for columns, group, matrix in self._parts:
             np.matmul(counts[:, columns], matrix, out=found[:, group])
@@ -162,7 +162,7 @@ class Scorer:
         self._logs = Banded(bank, rows, np.log1p(bank.shares[rows] / ratio))
 
     def score(self, counts: FloatArray, photons: FloatArray) -> FloatArray:
-        """Give the log likelihood of every template.
+        """Return the log likelihood of every template.
 
         Args:
             counts: (p, bins) float32.

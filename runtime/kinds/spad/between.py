@@ -31,7 +31,7 @@ class Between:
         self._here, self._after, self._starts = here, after, starts[:-1]
 
     def shapes(self, mu_ps: Floats) -> tuple[Floats, Floats]:
-        """Give shares, and their slopes by time (1/ps), of every bin.
+        """Return shares, and their slopes by time (1/ps), of every bin.
 
         Args:
             mu_ps: (p,) times of flight between the first and the last template.

@@ -11,7 +11,7 @@ from camkit.runtime.kinds.spad.bank import Bank
 
 
 def information(bank: Bank, ratio: float) -> NDArray[np.float64]:
-    """Give J of every template, 1/ps^2 per signal photon.
+    """Return J of every template, 1/ps^2 per signal photon.
 
     Args:
         bank: The templates.

@@ -78,5 +78,5 @@ class CorrectedRows:
 
     @property
     def blind_pixels(self) -> int:
-        """Give how many pixels of the rows read so far lost bins to pile-up."""
+        """Return how many pixels of the rows read so far lost bins to pile-up."""
         return sum(self._blind.values())

@@ -25,7 +25,7 @@ _MOST: Final = 200.0
 
 
 def search_length(bank: Bank) -> float:
-    """Give V of a bank, in radians: how far its templates, without their means, turn in all."""
+    """Return V of a bank, in radians: how far its templates, without their means, turn in all."""
     bins, s = bank.axis.bins, bank.shares
     mean = s.sum(axis=1) / bins
     norm = np.sqrt(np.maximum((s * s).sum(axis=1) - bins * mean * mean, 1e-300))
@@ -40,12 +40,12 @@ def search_length(bank: Bank) -> float:
 
 
 def false_alarm_rate(threshold: float, length: float) -> float:
-    """Give the chance that background alone exceeds a threshold somewhere."""
+    """Return the chance that background alone exceeds a threshold somewhere."""
     return float(ndtr(-np.sqrt(threshold)) + length / (2 * np.pi) * np.exp(-threshold / 2))
 
 
 def threshold_for(rate: float, length: float) -> float:
-    """Give the evidence that background alone exceeds at a rate.
+    """Return the evidence that background alone exceeds at a rate.
 
     Args:
         rate: Of false alarms per pixel, in 0..0.5, both left out.

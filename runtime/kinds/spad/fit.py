@@ -67,7 +67,7 @@ class Fitter:
 
     @cached_property
     def search_length(self) -> float:
-        """Give how much there is to search, see `camkit.runtime.kinds.spad.evidence`."""
+        """Return how much there is to search, see `camkit.runtime.kinds.spad.evidence`."""
         return search_length(self.bank)
 
     @cached_property
@@ -171,7 +171,7 @@ class Fitter:
         background: NDArray[np.float64],
         template: NDArray[np.int64],
     ) -> NDArray[np.float64]:
-        """Give the bound, between the ratios of the table by the logarithm of the ratio."""
+        """Return the bound, between the ratios of the table by the logarithm of the ratio."""
         ratio = _log_ratio(amplitude, background)
         known = np.log(np.array(RATIOS))
         place = np.interp(ratio, known, np.arange(len(known), dtype=np.float64))
@@ -194,7 +194,7 @@ def evidence_at(
     *,
     least: NDArray[np.float64] | float = LEAST_RATE,
 ) -> NDArray[np.float64]:
-    """Give twice the log likelihood over background alone, at what was found of some pixels.
+    """Return twice the log likelihood over background alone, at what was found of some pixels.
 
     Args:
         bank: The templates.
@@ -228,7 +228,7 @@ def in_blocks(fit: Callable[[FloatArray], Fit], counts: FloatArray, bank: Bank) 
 
 
 def joined(parts: Sequence[Fit]) -> Fit:
-    """Give the fits of several lots of pixels as one."""
+    """Return the fits of several lots of pixels as one."""
     if len(parts) == 1:
         return parts[0]
     names = [field.name for field in fields(Fit)]
@@ -236,7 +236,7 @@ def joined(parts: Sequence[Fit]) -> Fit:
 
 
 def summed_from_left(counts: FloatArray) -> NDArray[np.float64]:
-    """Give the counts before each bin, and all: (p, bins + 1)."""
+    """Return the counts before each bin, and all: (p, bins + 1)."""
     sums = np.zeros((len(counts), counts.shape[1] + 1))
     np.cumsum(counts, axis=1, out=sums[:, 1:])
     return sums
@@ -259,7 +259,7 @@ def _nearest_ratio(
 def peak(
     scores: FloatArray,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """Give the best template, how far beside it the parabola has its top, and how high it is."""
+    """Return the best template, how far beside it the parabola has its top, and how high it is."""
     rows, most = np.arange(len(scores)), scores.shape[1]
     best = scores.argmax(axis=1)
     middle = np.clip(best, 1, most - 2)

@@ -66,7 +66,7 @@ def check_map(hot: NDArray[np.bool_]) -> None:
 
 
 def painted_over(cube: NDArray[Any], hot: NDArray[np.bool_]) -> NDArray[Any]:
-    """Give a cube whose hot pixels are the means of those around them that are not.
+    """Return a cube whose hot pixels are the means of those around them that are not.
 
     Args:
         cube: (h, w, bins) or (h, w) counts.

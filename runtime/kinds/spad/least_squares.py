@@ -71,7 +71,7 @@ def _scatter(
     amplitude: NDArray[np.float64],
     background: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Give the standard deviation of the times: sum(g^2 mean) / (a sum(g s'))^2 of the slopes g.
+    """Return the standard deviation of the times: sum(g^2 mean) / (a sum(g s'))^2 of the slopes g.
 
     g is s' without what amplitude and background take of it.
     """

@@ -143,7 +143,7 @@ class Squares:
         self.members = np.maximum(inside.astype(np.float64), 1.0)
 
     def counts(self, rows: NDArray[np.int64]) -> FloatArray:
-        """Give the counts (p, bins) of the squares around pixels of these flat numbers."""
+        """Return the counts (p, bins) of the squares around pixels of these flat numbers."""
         height, width, bins = self._cube.shape
         if len(rows) > SPARSE * height * width:
             sound = np.where(self._sound[..., None], self._cube, np.float32(0))
@@ -161,7 +161,7 @@ class Squares:
         return found
 
     def _around(self, values: FloatArray) -> FloatArray:
-        """Give the sums of every square, (h, w, n); whole numbers of photons stay exact."""
+        """Return the sums of every square, (h, w, n); whole numbers of photons stay exact."""
         reach = self._side // 2
         found = values
         for axis in (0, 1):
@@ -172,7 +172,7 @@ class Squares:
 
 
 def _shifted(values: FloatArray, step: int, axis: int) -> FloatArray:
-    """Give what lies so many places before and after along an axis, together."""
+    """Return what lies so many places before and after along an axis, together."""
     found = np.zeros_like(values)
     check_wish()
     if step < values.shape[axis]:
@@ -191,7 +191,7 @@ def _per_pixel(fit: Fit, members: NDArray[np.float64]) -> Fit:
 def _gain(
     fitter: Fitter, own: FloatArray, fit: Fit, template: NDArray[np.int64] | None = None
 ) -> NDArray[np.float64]:
-    """Give how much pixels' own photons speak for the pulse of their square."""
+    """Return how much pixels' own photons speak for the pulse of their square."""
     bank = fitter.bank
     at = fit.template if template is None else template
     background = np.maximum(fit.background, LEAST_BACKGROUND)
@@ -201,7 +201,7 @@ def _gain(
 
 
 def _refute(fitter: Fitter, own: FloatArray, fit: Fit, single: Fit) -> NDArray[np.bool_]:
-    """Tell which pixels' own photons refute the pulse that their square found.
+    """Return which pixels' own photons refute the pulse that their square found.
 
     Args:
         fitter: The bank.
@@ -220,7 +220,7 @@ def _refute(fitter: Fitter, own: FloatArray, fit: Fit, single: Fit) -> NDArray[n
 
 
 def taken(fit: Fit, rows: NDArray[np.int64]) -> Fit:
-    """Give what was found of some pixels."""
+    """Return what was found of some pixels."""
     return Fit(**{field.name: getattr(fit, field.name)[rows] for field in fields(Fit)})
 
 
@@ -231,7 +231,7 @@ def _nothing(count: int) -> Fit:
 
 
 def _merged(old: Fit, new: Fit, rows: NDArray[np.int64]) -> Fit:
-    """Give the old fit with new ones in some rows."""
+    """Return the old fit with new ones in some rows."""
     whole = {}
     for field in fields(Fit):
         values = getattr(old, field.name).copy()

@@ -88,7 +88,7 @@ def _scanned(camera: FineCamera) -> tuple[GoldenCase, GoldenArrays]:
 
 
 def stage_set(camera: FineCamera, seed: int) -> NDArray[np.float64]:
-    """Give depth in metres (m h, m w): discs and boxes before a wall that leans away.
+    """Return depth in metres (m h, m w): discs and boxes before a wall that leans away.
 
     The wall lies a third into the time bins of the array.
     """
@@ -130,13 +130,13 @@ class SpadWork:
     size: str | None
 
     def shape_of(self, product: str) -> tuple[int, int, int]:
-        """Give (1, m h, m w)."""
+        """Return (1, m h, m w)."""
         self._check(product)
         scale, (height, width) = self.camera.scale, self.capture.shape[-2:]
         return 1, scale * height, scale * width
 
     def fill(self, out: FloatArray | None = None, product: str = IMAGE) -> FloatArray:
-        """Give a picture of counts in photons, or the depth of a scan, NaN nowhere."""
+        """Return a picture of counts in photons, or the depth of a scan, NaN nowhere."""
         self._check(product)
         found = self._picture() if product == IMAGE else self._depth()
         if out is None:
@@ -145,7 +145,7 @@ class SpadWork:
         return out
 
     def network_input(self, role: str) -> FloatArray:
-        """Give light and noise of the counts, or of all photons of a scan."""
+        """Return light and noise of the counts, or of all photons of a scan."""
         del role
         photons = self._photons()
         return network_planes(photons, white_of(photons))
@@ -185,7 +185,7 @@ def case_work(bundle: Bundle, case: GoldenCase, arrays: GoldenArrays, size: str 
 
 
 def probe(bundle: Bundle, role: str) -> FloatArray:
-    """Give light and noise of an array that is larger than that of the bundle."""
+    """Return light and noise of an array that is larger than that of the bundle."""
     camera = FineCamera.of(bundle, role=role)
     height, width = (camera.scale * side for side in PROBE_PX)
     light = luminance(procedural_scene(PROBE_SEED, height, width))[None]

@@ -45,16 +45,16 @@ class Pulse(Protocol):
     def height_ps(self) -> float: ...  # noqa: D102
 
     def density(self, u_ps: Times) -> Times:
-        """Give the density, 1/ps; it integrates to 1."""
+        """Return the density, 1/ps; it integrates to 1."""
         ...
 
     def cdf(self, u_ps: Times) -> Times:
-        """Give the share of photons that came before."""
+        """Return the share of photons that came before."""
         ...
 
 
 def pending(u_ps: Times, sigma_ps: float, decay_ps: float | Times) -> Times:
-    """Give the share that a Gaussian has begun and an exponential decay not yet let out.
+    """Return the share that a Gaussian has begun and an exponential decay not yet let out.
 
     It is the distribution of a normal less that of a normal plus an exponential; over the time
     constant it is the density of the latter.
@@ -88,36 +88,36 @@ class GaussianPulse:
 
     @property
     def start_ps(self) -> float:
-        """Give when it begins."""
+        """Return when it begins."""
         return -_SIGMAS * self.sigma_ps
 
     @property
     def end_ps(self) -> float:
-        """Give when it ends."""
+        """Return when it ends."""
         return _SIGMAS * self.sigma_ps
 
     @property
     def mean_ps(self) -> float:
-        """Give its centre."""
+        """Return its centre."""
         return 0.0
 
     @property
     def finest_ps(self) -> float:
-        """Give the standard deviation of its edges."""
+        """Return the standard deviation of its edges."""
         return self.sigma_ps
 
     @property
     def height_ps(self) -> float:
-        """Give its integral where its peak is 1."""
+        """Return its integral where its peak is 1."""
         return self.sigma_ps * float(np.sqrt(2 * np.pi))
 
     def density(self, u_ps: Times) -> Times:
-        """Give the density, 1/ps."""
+        """Return the density, 1/ps."""
         u = u_ps / self.sigma_ps
         return np.asarray(np.exp(-0.5 * u * u) / self.height_ps)
 
     def cdf(self, u_ps: Times) -> Times:
-        """Give the share of photons that came before."""
+        """Return the share of photons that came before."""
         return np.asarray(ndtr(u_ps / self.sigma_ps))
 
 
@@ -147,47 +147,47 @@ class GatedPulse:
 
     @property
     def start_ps(self) -> float:
-        """Give when it begins."""
+        """Return when it begins."""
         return -_SIGMAS * self.sigma_ps
 
     @property
     def end_ps(self) -> float:
-        """Give when it ends."""
+        """Return when it ends."""
         return self.width_ps + _SIGMAS * self.sigma_ps + _DECAYS * self.rc_ps
 
     @property
     def mean_ps(self) -> float:
-        """Give the mean of all times."""
+        """Return the mean of all times."""
         return self.width_ps / 2 + self.rc_ps
 
     @property
     def finest_ps(self) -> float:
-        """Give the standard deviation of its edges."""
+        """Return the standard deviation of its edges."""
         return max(float(np.hypot(self.sigma_ps, self.rc_ps)), self.width_ps / 100)
 
     @property
     def height_ps(self) -> float:
-        """Give the integral of p, which is the width."""
+        """Return the integral of p, which is the width."""
         return self.width_ps
 
     def density(self, u_ps: Times) -> Times:
-        """Give the density, 1/ps."""
+        """Return the density, 1/ps."""
         found = self._edge(u_ps) - self._edge(u_ps - self.width_ps)
         return np.asarray(np.maximum(found, 0.0) / self.width_ps)
 
     def cdf(self, u_ps: Times) -> Times:
-        """Give the share of photons that came before, by the integral of the edges."""
+        """Return the share of photons that came before, by the integral of the edges."""
         found = self._ramp(u_ps) - self._ramp(u_ps - self.width_ps)
         return np.asarray(np.clip(found / self.width_ps, 0.0, 1.0))
 
     def _edge(self, u: Times) -> Times:
-        """Give R convolved with the Gaussian: the distribution of an exponential plus a normal."""
+        """Return R convolved with the Gaussian: the distribution of exponential plus normal."""
         sigma = max(self.sigma_ps, _LEAST_SIGMA_PS)
         whole = np.asarray(ndtr(u / sigma))
         return whole if self.rc_ps == 0 else whole - pending(u, sigma, self.rc_ps)
 
     def _ramp(self, u: Times) -> Times:
-        """Give the integral of `_edge`."""
+        """Return the integral of `_edge`."""
         sigma = max(self.sigma_ps, _LEAST_SIGMA_PS)
         x = u / sigma
         positive = u * ndtr(x) + sigma * np.exp(-0.5 * x * x) / np.sqrt(2 * np.pi)
@@ -219,17 +219,17 @@ class SampledPulse:
 
     @property
     def start_ps(self) -> float:
-        """Give the first time."""
+        """Return the first time."""
         return float(self.times_ps[0])
 
     @property
     def end_ps(self) -> float:
-        """Give the last time."""
+        """Return the last time."""
         return float(self.times_ps[-1])
 
     @property
     def mean_ps(self) -> float:
-        """Give the mean of all times."""
+        """Return the mean of all times."""
         t, v = self.times_ps, self.values
         step = np.diff(t)
         mass = (v[1:] + v[:-1]) / 2 * step
@@ -238,22 +238,22 @@ class SampledPulse:
 
     @property
     def finest_ps(self) -> float:
-        """Give the standard deviation of a Gaussian whose flank is as steep as the steepest."""
+        """Return the standard deviation of a Gaussian whose flank is as steep as the steepest."""
         slope = np.abs(np.diff(self.values) / np.diff(self.times_ps)).max()
         return float(self.values.max() / slope * np.exp(-0.5))
 
     @property
     def height_ps(self) -> float:
-        """Give its integral where its peak is 1."""
+        """Return its integral where its peak is 1."""
         return float(np.trapezoid(self.values, self.times_ps) / self.values.max())
 
     def density(self, u_ps: Times) -> Times:
-        """Give the density, 1/ps."""
+        """Return the density, 1/ps."""
         whole = np.trapezoid(self.values, self.times_ps)
         return np.asarray(np.interp(u_ps, self.times_ps, self.values, left=0, right=0) / whole)
 
     def cdf(self, u_ps: Times) -> Times:
-        """Give the share of photons that came before, exact for straight lines."""
+        """Return the share of photons that came before, exact for straight lines."""
         t, v = self.times_ps, self.values
         sums = np.concatenate([[0.0], np.cumsum((v[1:] + v[:-1]) / 2 * np.diff(t))])
         u = np.clip(u_ps, t[0], t[-1])

@@ -28,7 +28,7 @@ TINY: Final = 1e-300
 def growth_of_bins(
     counts: FloatArray, cycles: int, orientation: Orientation
 ) -> NDArray[np.float64]:
-    """Give variance over mean of every bin, (p, bins) >= 1.
+    """Return variance over mean of every bin, (p, bins) >= 1.
 
     Args:
         counts: (p, bins) as `without_pile_up` gives them.
@@ -43,7 +43,7 @@ def growth_of_bins(
 
 
 def growth(fitter: Fitter, counts: FloatArray, cycles: int) -> NDArray[np.float64]:
-    """Give variance over mean of every pixel, (p,) >= 1.
+    """Return variance over mean of every pixel, (p,) >= 1.
 
     Args:
         fitter: Of the pulse.

@@ -41,7 +41,7 @@ class SecondReturns:
         sound: NDArray[np.bool_],
         false_alarms: float,
     ) -> Arrays:
-        """Give arrays of one return (1, h, w) with a second layer.
+        """Return arrays of one return (1, h, w) with a second layer.
 
         Where no second return is proved the layer has the time of the first, no photons, and is
         not valid.
@@ -81,7 +81,7 @@ class SecondReturns:
     def _speak_for_both(
         self, own: FloatArray, two: TwoReturns, members: NDArray[np.float64]
     ) -> NDArray[np.bool_]:
-        """Tell which pixels' own photons speak for either return beside the other."""
+        """Return which pixels' own photons speak for either return beside the other."""
         bank = self._fitter.bank
         every = np.broadcast_to(np.arange(bank.axis.bins), own.shape)
         pulses = [

@@ -52,7 +52,7 @@ class Way:
 
     @property
     def reach_px(self) -> int:
-        """Give how far beyond a row others bear on it."""
+        """Return how far beyond a row others bear on it."""
         widest = max(SIDES[self.pool])
         return AROUND // 2 + widest // 2
 
@@ -85,13 +85,13 @@ class Sharpened:
 
 
 def times_photons(found: Sharpened, factor: NDArray[np.float64]) -> Sharpened:
-    """Give it with more photons, (h, w) times as many."""
+    """Return it with more photons, (h, w) times as many."""
     changed: dict[str, Any] = {name: getattr(found, name) * factor for name in PER_PIXEL}
     return replace(found, **changed)
 
 
 def stacked(strips: Sequence[Sharpened]) -> Sharpened:
-    """Give strips, from top to bottom, as one."""
+    """Return strips, from top to bottom, as one."""
     names = [field.name for field in fields(Sharpened)]
     return Sharpened(
         **{name: np.concatenate([getattr(s, name) for s in strips], axis=1) for name in names}
@@ -188,7 +188,7 @@ class Sharpener:
         doubtful: NDArray[np.bool_],
         hot: NDArray[np.bool_],
     ) -> dict[str, NDArray[Any]]:
-        """Give the arrays of `Sharpened` for one return, (1, h, w) each."""
+        """Return the arrays of `Sharpened` for one return, (1, h, w) each."""
         shape = photons.shape
         valid = pooled.valid.reshape(shape) & ~doubtful
         of_fit = {name: getattr(pooled.fit, name).reshape(1, *shape) for name in FITTED}
@@ -209,7 +209,7 @@ class Sharpener:
 
 
 def _painted(values: NDArray[Any], hot: NDArray[np.bool_]) -> NDArray[Any]:
-    """Give them with hot pixels painted over, where any pixel is sound."""
+    """Return them with hot pixels painted over, where any pixel is sound."""
     return painted_over(values, hot) if hot.any() and not hot.all() else values
 
 

@@ -43,7 +43,7 @@ class TimeAxis:
     def regular(
         cls, orientation: Orientation, *, bins: int, time_bin_ps: float, first_ps: float = 0.0
     ) -> "TimeAxis":
-        """Give an axis of equal bins.
+        """Return an axis of equal bins.
 
         Args:
             orientation: See the class.
@@ -61,21 +61,21 @@ class TimeAxis:
 
     @property
     def bins(self) -> int:
-        """Give how many bins there are."""
+        """Return how many bins there are."""
         return len(self.edges_ps) - 1
 
     @property
     def centres_ps(self) -> NDArray[np.float64]:
-        """Give the middle of every bin."""
+        """Return the middle of every bin."""
         return np.asarray((self.edges_ps[1:] + self.edges_ps[:-1]) / 2)
 
     @property
     def step_ps(self) -> float:
-        """Give the mean width of a bin."""
+        """Return the mean width of a bin."""
         return float((self.edges_ps[-1] - self.edges_ps[0]) / self.bins)
 
     def shares(self, pulse: Pulse, mu_ps: NDArray[np.float64], bins: NDArray[np.int64]) -> Shares:
-        """Give the share of a pulse's photons that each bin sees.
+        """Return the share of a pulse's photons that each bin sees.
 
         Over an axis that holds the whole pulse they sum to 1: exactly for a histogram, and for
         gates whose steps are equal and finer than their edges.
@@ -97,7 +97,7 @@ class TimeAxis:
         return np.asarray(np.maximum(right - left, 0.0))
 
     def slopes(self, pulse: Pulse, mu_ps: NDArray[np.float64], bins: NDArray[np.int64]) -> Shares:
-        """Give the derivative of `shares` by the time of flight, 1/ps; arguments as there."""
+        """Return the derivative of `shares` by the time of flight, 1/ps; arguments as there."""
         if self.orientation == "gate":
             h = pulse.finest_ps / 50
             u = mu_ps[:, None] - self.centres_ps[bins]
@@ -109,11 +109,11 @@ class TimeAxis:
         return np.asarray(left - right)
 
     def reach_ps(self, pulse: Pulse) -> tuple[float, float]:
-        """Give from where to where a pulse is seen, relative to its time of flight."""
+        """Return from where to where a pulse is seen, relative to its time of flight."""
         if self.orientation == "gate":
             return -pulse.end_ps, -pulse.start_ps
         return pulse.start_ps, pulse.end_ps
 
     def mean_ps(self, pulse: Pulse) -> float:
-        """Give where a pulse is seen on average, relative to its time of flight."""
+        """Return where a pulse is seen on average, relative to its time of flight."""
         return -pulse.mean_ps if self.orientation == "gate" else pulse.mean_ps

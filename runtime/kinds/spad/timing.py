@@ -119,7 +119,7 @@ class Timing(_Table):
     folder: Path = Field(default=Path(), exclude=True)
 
     def axis(self, *, orientation: Orientation | None = None, bins: int | None = None) -> TimeAxis:
-        """Give the time axis of a capture.
+        """Return the time axis of a capture.
 
         Args:
             orientation: What such captures are unless something else is stated.
@@ -158,7 +158,7 @@ class Timing(_Table):
         )
 
     def pulse(self) -> Pulse | None:
-        """Give the pulse that is stated; None if none is.
+        """Return the pulse that is stated; None if none is.
 
         Raises:
             ContractError: If a measured one cannot be read, or two are stated.
@@ -178,7 +178,7 @@ class Timing(_Table):
         return GaussianPulse(sigma_ps=sigma) if sigma > 0 else None
 
     def dark(self, shape: tuple[int, int]) -> NDArray[np.float64]:
-        """Give the dark counts of a bin, (h, w).
+        """Return the dark counts of a bin, (h, w).
 
         Raises:
             ContractError: If the map cannot be read, is of another size, or negative.
@@ -193,7 +193,7 @@ class Timing(_Table):
         return found
 
     def hot(self, shape: tuple[int, int]) -> NDArray[np.bool_]:
-        """Give the pixels that are stated to be hot, (h, w).
+        """Return the pixels that are stated to be hot, (h, w).
 
         Raises:
             ContractError: If the map cannot be read or is of another size.
@@ -212,7 +212,7 @@ class Timing(_Table):
         return [self.folder / name for name in named if name is not None]
 
     def with_stated(self, stated: Mapping[str, object]) -> "Timing":
-        """Give it with what a capture states of itself, where it says nothing.
+        """Return it with what a capture states of itself, where it says nothing.
 
         Raises:
             ContractError: If the capture states what cannot be.
@@ -264,7 +264,7 @@ def read_timing(path: Path) -> Timing:
 
 
 def _plain(name: str, value: object) -> object:
-    """Give a stated value as TOML would; most files know no whole numbers, only floats."""
+    """Return a stated value as TOML would; most files know no whole numbers, only floats."""
     if isinstance(value, np.ndarray | np.generic):
         value = np.asarray(value).tolist()
     if name in WHOLE and isinstance(value, float) and value.is_integer():

@@ -68,14 +68,14 @@ class TwoFitter:
 
     @cached_property
     def _sums(self) -> tuple[Banded, Banded]:
-        """Give the templates, and their squares, for products with (p, bins)."""
+        """Return the templates, and their squares, for products with (p, bins)."""
         every = np.arange(len(self._bank.mu_ps))
         return Banded(self._bank, every, self._bank.shares), Banded(
             self._bank, every, self._bank.shares**2
         )
 
     def asks_for_second(self, counts: FloatArray, one: Fit) -> NDArray[np.bool_]:
-        """Tell which pixels have a residual that a second return may explain.
+        """Return which pixels have a residual that a second return may explain.
 
         Args:
             counts: (p, bins) >= 0.
@@ -115,7 +115,7 @@ class TwoFitter:
         return np.asarray(one.amplitude[rows, None] * shares + background[:, None])
 
     def _wish(self, counts: NDArray[Any], mean: Floats) -> tuple[Floats, Floats]:
-        """Give the gain of a second pulse at every template, and its photons: (p, m) each."""
+        """Return the gain of a second pulse at every template, and its photons: (p, m) each."""
         shares, squares = self._sums
         wish = shares.product((counts / mean).astype(np.float32)).astype(np.float64)
         wish -= self._bank.totals
@@ -125,7 +125,7 @@ class TwoFitter:
         return wish * photons, photons
 
     def _fit_block(self, counts: Floats, one: Fit, rows: slice) -> tuple[Floats, Floats, Floats]:
-        """Give parameters (5, p), evidence (p,) and sigmas (2, p) of a block."""
+        """Return parameters (5, p), evidence (p,) and sigmas (2, p) of a block."""
         bank = self._bank
         mu = np.clip(one.time_of_flight_ps[rows], bank.mu_ps[0], bank.mu_ps[-1])
         a, b = np.maximum(one.amplitude[rows], 0.1), np.maximum(one.background[rows], 1e-6)
@@ -147,7 +147,7 @@ class TwoFitter:
         return best, np.maximum(2 * (most - base), 0.0), sigmas
 
     def _starts(self, counts: Floats, alone: Floats, a: Floats, b: Floats) -> list[Floats]:
-        """Give places (5, p) to begin from."""
+        """Return places (5, p) to begin from."""
         spread = self._bank.pulse.finest_ps
         low, high = self._bank.mu_ps[[0, -1]]
         starts = [
@@ -168,7 +168,7 @@ class TwoFitter:
         return starts
 
     def _model(self, values: Floats) -> tuple[Floats, Floats]:
-        """Give mean counts (p, bins) and their derivatives (p, 5, bins) at (5, p) parameters."""
+        """Return mean counts (p, bins) and their derivatives (p, 5, bins) at (5, p) parameters."""
         (s1, d1), (s2, d2) = (self._between.shapes(values[i]) for i in (0, 1))
         a1, a2, b = (values[i][:, None] for i in (2, 3, 4))
         gradients = np.stack([a1 * d1, a2 * d2, s1, s2, np.ones_like(s1)], axis=1)
@@ -194,7 +194,7 @@ class TwoFitter:
         return values, height
 
     def _step(self, counts: Floats, mean: Floats, gradients: Floats, *, is_one: bool) -> Floats:
-        """Give the step of Fisher scoring, (5, p)."""
+        """Return the step of Fisher scoring, (5, p)."""
         wish = (gradients @ (counts / mean - 1)[..., None])[..., 0]
         step = np.linalg.solve(_fisher(mean, gradients), wish[..., None])[..., 0].T
         if is_one:
@@ -230,7 +230,7 @@ class TwoFitter:
 
 
 def _fisher(mean: Floats, gradients: Floats) -> Floats:
-    """Give the information (p, 5, 5), a little of its diagonal added so that it can be solved."""
+    """Return the information (p, 5, 5), a little of its diagonal added so that it can be solved."""
     scaled = gradients / np.sqrt(mean)[:, None]
     found = scaled @ scaled.transpose(0, 2, 1)
     diagonal = np.einsum("pii->pi", found)

@@ -70,7 +70,7 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
 
 
 def _smaller(subject: Subject, work: Work, losses: CellLosses) -> str | None:
-    """Give the smallest calibrated size below the one in use."""
+    """Return the smallest calibrated size below the one in use."""
     manifest = subject.bundle.manifest
     mac = {size: manifest.mac_per_pixel(size) for size in manifest.sizes}
     known = [size for size in mac if size in losses.extra and mac[size] < mac[work.size]]
@@ -78,7 +78,7 @@ def _smaller(subject: Subject, work: Work, losses: CellLosses) -> str | None:
 
 
 def _losses(losses: CellLosses, size: str, small: str | None, shape: tuple[int, int]) -> FloatGrid:
-    """Give (tier, row, column): what each tier adds to the error of the size in use."""
+    """Return (tier, row, column): what each tier adds to the error of the size in use."""
     grid = np.full((4, *shape), np.inf)
     grid[FULL] = 0.0
     base = losses.extra.get(size, np.zeros(shape))

@@ -16,7 +16,7 @@ ORDER: Final = 25
 
 
 def needs_lights(bundle: Bundle) -> bool:
-    """Tell whether a network of a bundle acts near lights alone."""
+    """Return whether a network of a bundle acts near lights alone."""
     return any(stage.lights_px is not None for stage in bundle.manifest.stages_of(Network))
 
 
@@ -47,7 +47,7 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
 
 
 def _near(lights: NDArray[np.bool_], reach_px: int, shape: tuple[int, int]) -> NDArray[np.bool_]:
-    """Give the cells (row, column) with a square of which a light is within reach.
+    """Return the cells (row, column) with a square of which a light is within reach.
 
     The reach holds the ramp to cells without a network, so that it lies where nothing changes.
     """

@@ -30,7 +30,7 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
 
 
 def size_cost_db(subject: Subject, size: str) -> float:
-    """Give the predicted loss of a size on this capture; 0 where nothing was calibrated."""
+    """Return the predicted loss of a size on this capture; 0 where nothing was calibrated."""
     model = read_loss_model(subject.bundle.manifest.plan)
     if model is None or subject.content is None or size == REFERENCE:
         return 0.0

@@ -39,7 +39,7 @@ def material_of(plate: str) -> HdrMaterial:
 
 
 def core_alone(streaks: StreakOptics) -> StreakOptics:
-    """Give the lens without its plate as optics whose arms and haze hold no light."""
+    """Return the lens without its plate as optics whose arms and haze hold no light."""
     shortest = streaks.bare_core.shape[-1] // 2 + 2
     return replace(
         streaks,
@@ -69,5 +69,5 @@ def write_camera(folder: Path, plate: str) -> tuple[Path, Bundle]:
 
 @lru_cache
 def shipped_recipe() -> HdrRecipe:
-    """Give the recipe whose lens and sensor all cameras of the tables have."""
+    """Return the recipe whose lens and sensor all cameras of the tables have."""
     return cast("HdrRecipe", read_recipe(RECIPES / OURS))

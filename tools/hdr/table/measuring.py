@@ -82,7 +82,7 @@ class Measured:
     scenes_left_out: dict[str, str] = field(default_factory=dict)
 
     def ldr_db(self, scene: str) -> float:
-        """Give the PSNR of the bare lens."""
+        """Return the PSNR of the bare lens."""
         return self.entries[LDR.key, scene].scores["hdr_psnr_db"]
 
 
@@ -98,7 +98,7 @@ class Bench:
         self._restorers: dict[str, Restorer] = {}
 
     def entries(self, scene: Scene, runs: Iterable[Run]) -> list[Entry]:
-        """Give runs of one plate on a scene; what is not known yet is measured.
+        """Return runs of one plate on a scene; what is not known yet is measured.
 
         Raises:
             CamkitError: If the scene cannot be read or photographed.
@@ -190,7 +190,7 @@ def _scores(picture: FloatArray, exposed: Exposed) -> Scores:
 
 
 def _obstacle(row: Row, runs: Path) -> str | None:
-    """Say why a row with networks cannot be measured; None if all of them are trained."""
+    """Return why a row with networks cannot be measured; None if all of them are trained."""
     missing = [run.name for run in row.runs if finished(runs, run) is None]
     if not missing:
         return None
@@ -227,7 +227,7 @@ def _file_digest(path: Path) -> str:
 
 @lru_cache
 def _source_digest() -> str:
-    """Give a hash of the solve as it stands: lines of another one are measured again."""
+    """Return a hash of the solve as it stands: lines of another one are measured again."""
     (folder,) = camkit.streaks.__path__
     files = [*sorted(Path(folder).glob("*.py")), Path(highlights.__file__)]
     return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()

@@ -18,7 +18,7 @@ Record = dict[str, Any]
 
 
 def record_of(rows: Iterable[Row], found: Measured, trained: Mapping[str, Any]) -> Record:
-    """Give everything that was measured as plain values.
+    """Return everything that was measured as plain values.
 
     Args:
         rows: Those asked for.
@@ -55,7 +55,7 @@ def _row(row: Row, found: Measured, trained: Mapping[str, Any]) -> Record:
 
 
 def below_input(runs: Iterable[str], found: Measured) -> list[str]:
-    """Give the scenes of LDR > 45 dB that end below the lesser of LDR - 0.5 and 65 dB, any seed."""
+    """Return scenes of LDR > 45 dB that end below the lesser of LDR - 0.5 and 65 dB, any seed."""
     easy = [scene for group in EASY for scene in found.groups.get(group, ())]
     wanted = {scene: min(found.ldr_db(scene) - TIE_DB, GOOD_DB) for scene in easy}
     return [
@@ -66,7 +66,7 @@ def below_input(runs: Iterable[str], found: Measured) -> list[str]:
 
 
 def _means(by_seed: list[list[Entry]], found: Measured) -> Record:
-    """Give mean and spread of every column: over scenes, then over seeds."""
+    """Return mean and spread of every column: over scenes, then over seeds."""
     made: Record = {}
     for name in (*COLUMNS, *ALIGNED):
         known = [[e.scores[name] for e in seed if name in e.scores] for seed in by_seed]
@@ -83,7 +83,7 @@ def _means(by_seed: list[list[Entry]], found: Measured) -> Record:
 
 
 def _summary(by_seed: list[list[float]]) -> Record:
-    """Give the mean, its spread over seeds and that over scenes (n - 1); None for one alone."""
+    """Return the mean, its spread over seeds and that over scenes (n - 1); None for one alone."""
     means = [statistics.fmean(values) for values in by_seed]
     of_scenes = [statistics.fmean(values) for values in zip(*by_seed, strict=True)]
     return {
@@ -94,5 +94,5 @@ def _summary(by_seed: list[list[float]]) -> Record:
 
 
 def is_input(key: str) -> bool:
-    """Tell whether a row is the bare lens itself."""
+    """Return whether a row is the bare lens itself."""
     return key == LDR.key

@@ -51,7 +51,7 @@ class Camera:
 
 
 def make_restorer(run: Run, camera: Camera, runs: Path) -> Restorer:
-    """Give what makes the pictures of a row.
+    """Return what makes the pictures of a row.
 
     Args:
         run: The row and its seed.
@@ -73,14 +73,14 @@ def make_restorer(run: Run, camera: Camera, runs: Path) -> Restorer:
 
 
 def timed(restore: Restorer, exposed: Exposed) -> tuple[FloatArray, float]:
-    """Give the picture of a row, and the CPU-seconds that it took."""
+    """Return the picture of a row, and the CPU-seconds that it took."""
     start = time.process_time()
     picture = restore(exposed)
     return picture, time.process_time() - start
 
 
 def _packed(run: Run, camera: Camera, runs: Path) -> Bundle:
-    """Give the bundle of a network as it would ship, made once of a checkpoint and its optics."""
+    """Return the bundle of a network as it would ship, made once of a checkpoint and its optics."""
     checkpoint = checkpoint_of(runs, run)
     content = checkpoint.read_bytes() + camera.frozen.read_bytes()
     out = runs / run.name / f"{hashlib.sha256(content).hexdigest()[:16]}.camkit"
@@ -114,7 +114,7 @@ def _by_network(network: nn.Module, bundle: Bundle) -> Restorer:
 
 
 def _raw(samples: NDArray[Any], sensor: BayerSensor) -> FloatArray:
-    """Give a capture as networks see it in training: black 0, white 1."""
+    """Return a capture as networks see it in training: black 0, white 1."""
     levels = np.float32(sensor.white_level - sensor.black_level)
     return (samples.astype(np.float32) - np.float32(sensor.black_level)) / levels
 

@@ -53,7 +53,7 @@ class Row:
 
     @property
     def runs(self) -> tuple["Run", ...]:
-        """Give what is measured: the row once, or once for every seed."""
+        """Return what is measured: the row once, or once for every seed."""
         return tuple(Run(row=self, seed=seed) for seed in self.seeds)
 
 
@@ -71,7 +71,7 @@ class Run:
 
 
 def _solved(plate: str, seeds: tuple[int, ...] = (1,)) -> tuple[Row, Row]:
-    """Give the rows of the solve behind a plate, alone and with our network."""
+    """Return the rows of the solve behind a plate, alone and with our network."""
     words = PLATES[plate]
     return (
         Row(key=f"{plate}.physics", plate=plate, label=f"{words}, solve", method="physics"),
@@ -135,7 +135,7 @@ ROWS: Final = (
 
 
 def chosen_rows(keys: Iterable[str] | None) -> tuple[Row, ...]:
-    """Give the rows of these names, in the order of the tables; None gives all.
+    """Return the rows of these names, in the order of the tables; None gives all.
 
     Raises:
         ContractError: If there is no such row.

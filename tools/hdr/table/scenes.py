@@ -47,7 +47,7 @@ class Scene:
     path: Path | None = None
 
     def light(self, bundle: Bundle) -> FloatArray:
-        """Give it exposed, (3, h, w) linear Rec.709.
+        """Return it exposed, (3, h, w) linear Rec.709.
 
         Raises:
             CamkitError: If it cannot be read, or no exposure saturates that much.
@@ -57,7 +57,7 @@ class Scene:
         return bench_scene(self.path, bundle, SATURATED)
 
     def shot(self) -> Shot:
-        """Say where it is photographed, with which noise."""
+        """Return where it is photographed, with which noise."""
         return Shot(
             set_name=NIGHT if self.path is None else self.path.parent.name,
             picture=Path(self.name),
@@ -68,7 +68,7 @@ class Scene:
         )
 
     def digest(self) -> str:
-        """Give a hash of what it is."""
+        """Return a hash of what it is."""
         content = b"" if self.path is None else self.path.read_bytes()
         return hashlib.sha256(self.name.encode() + content).hexdigest()
 
@@ -82,7 +82,7 @@ class Scene:
 
 
 def night_scenes() -> Iterator[Scene]:
-    """Give the night scenes from the first seed on; none of them was trained on."""
+    """Return the night scenes from the first seed on; none of them was trained on."""
     number = 0
     while True:
         yield Scene(name=f"{NIGHT}:{number}", number=number)
@@ -90,7 +90,7 @@ def night_scenes() -> Iterator[Scene]:
 
 
 def file_scenes(folder: Path) -> tuple[Scene, ...]:
-    """Give the pictures of a folder.
+    """Return the pictures of a folder.
 
     Raises:
         ContractError: If there are none.

@@ -24,7 +24,7 @@ Record = dict[str, Any]
 
 
 def tables_text(record: Record) -> str:
-    """Give the tables in Markdown."""
+    """Return the tables in Markdown."""
     parts = [_table(record, group) for group in record["groups"]]
     return "\n\n".join([*parts, "\n".join(_remarks(record))]) + "\n"
 

@@ -53,17 +53,17 @@ def train_rows(rows: Iterable[Row], settings: TrainSettings, tell: Tell) -> None
 
 
 def finished(out_dir: Path, run: Run) -> dict[str, Any] | None:
-    """Give how a training ended; None where it did not."""
+    """Return how a training ended; None where it did not."""
     return finished_in(out_dir / run.name)
 
 
 def checkpoint_of(out_dir: Path, run: Run) -> Path:
-    """Give the file that a training wrote."""
+    """Return the file that a training wrote."""
     return checkpoint_in(out_dir / run.name, run.row.size, run.row.role)
 
 
 def recipe_text(run: Run) -> str:
-    """Give the shipped recipe of a row with its plate and seed in place of its own.
+    """Return the shipped recipe of a row with its plate and seed in place of its own.
 
     Raises:
         ContractError: If the recipe does not say both where it is expected.

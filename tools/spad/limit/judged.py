@@ -33,11 +33,11 @@ class Sweep:
 
     @property
     def breaks_at(self) -> float | str | None:
-        """Give the first value from harmless to hard that is broken; None for none."""
+        """Return the first value from harmless to hard that is broken; None for none."""
         return next((point["value"] for point in self.points if point["broken"]), None)
 
     def row(self) -> dict[str, Any]:
-        """Give it as plain JSON values."""
+        """Return it as plain JSON values."""
         breaks = self.breaks_at
         return {"name": self.name, "unit": self.unit, "breaks_at": breaks, "points": self.points}
 
@@ -49,7 +49,7 @@ def judged(
     valid: NDArray[np.bool_],
     **more: float,
 ) -> dict[str, Any]:
-    """Give what became of some pixels.
+    """Return what became of some pixels.
 
     Args:
         value: Of the condition.

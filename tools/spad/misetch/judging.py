@@ -55,7 +55,7 @@ class Trial:
     folder: Path
 
     def trained_on(self, psf: Path) -> Checkpoint:
-        """Give the network trained on behind the PSF of a file."""
+        """Return the network trained on behind the PSF of a file."""
         _tell(f"training on with {psf}: {self.tuning.cpu_minutes:g} CPU-minutes")
         return tuned(self.start, self.checkpoint, psf, read_plate_psf(psf), self.tuning)
 
@@ -117,7 +117,7 @@ def control_of(trial: Trial) -> Checkpoint:
 
 
 def scan(trial: Trial, errors: Iterable[float]) -> Iterator[Row]:
-    """Give what errors cost without noise."""
+    """Return what errors cost without noise."""
     network, told = _network(trial.checkpoint), _told(trial.designed)
     for error in errors:
         _tell(f"scan: {error:+.0%}")

@@ -85,6 +85,6 @@ def _bracket(light: FloatGrid, folder: Path) -> list[Path]:
 
 
 def _exposed(electrons: FloatGrid, rng: np.random.Generator) -> NDArray[np.float64]:
-    """Give what is read of a mean number of electrons, 1 = white."""
+    """Return what is read of a mean number of electrons, 1 = white."""
     read = rng.normal(scale=READ_NOISE_ELECTRONS, size=electrons.shape)
     return np.asarray((rng.poisson(electrons) + read) / WHITE_ELECTRONS)

@@ -32,21 +32,21 @@ class Etched:
 
     @property
     def kernel(self) -> FloatArray:
-        """Give its PSF, of unit sum."""
+        """Return its PSF, of unit sum."""
         return np.asarray(self.seen / self.seen.sum(), np.float32)
 
     @property
     def sampling(self) -> Sampling:
-        """Give how an array samples behind it."""
+        """Return how an array samples behind it."""
         return make_sampling("learned", kernel=self.kernel)
 
     def like(self, wanted: FloatArray) -> dict[str, float]:
-        """Give how its PSF is like another, as plain values."""
+        """Return how its PSF is like another, as plain values."""
         return likeness(self.seen, wanted.astype(np.float64)).to_json()
 
 
 def matched_plate(psf: FloatArray, camera: DotCamera) -> DotPlate:
-    """Give the plate of 8 levels for a PSF (11, 11), as `camkit plate match` makes it."""
+    """Return the plate of 8 levels for a PSF (11, 11), as `camkit plate match` makes it."""
     return match_dots(to_target(psf), camera, LEVELS, np.random.default_rng(0)).plate
 
 

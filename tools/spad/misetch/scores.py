@@ -36,17 +36,17 @@ def read_sets(folder: Path) -> Sets:
 
 
 def network_method(network: nn.Module) -> Method:
-    """Give a network as a method."""
+    """Return a network as a method."""
     return lambda _: network
 
 
 def linear_method(told: Sampling) -> Method:
-    """Give the runtime's linear estimate, told a PSF that need not be the one that is."""
+    """Return the runtime's linear estimate, told a PSF that need not be the one that is."""
     return lambda exposure: linear_restorer(told, exposure)
 
 
 def scored(sets: Sets, sampling: Sampling, method: Method, photons: float) -> dict[str, Any]:
-    """Give set -> PSNR and SSIM of what a method makes of the light behind a plate."""
+    """Return set -> PSNR and SSIM of what a method makes of the light behind a plate."""
     exposure = Exposure(photons=photons)
     found = {}
     for name, pictures in sets.items():
@@ -56,5 +56,5 @@ def scored(sets: Sets, sampling: Sampling, method: Method, photons: float) -> di
 
 
 def scored_levels(sets: Sets, sampling: Sampling, method: Method) -> dict[str, Any]:
-    """Give level of light -> what `scored` gives."""
+    """Return level of light -> what `scored` gives."""
     return {name: scored(sets, sampling, method, photons) for name, photons in LEVELS.items()}

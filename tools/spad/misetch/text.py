@@ -7,7 +7,7 @@ Record = Mapping[str, Any]
 
 
 def misetched_text(record: Record) -> str:
-    """Give both tables."""
+    """Return both tables."""
     sets = " / ".join(record["pictures"])
     methods = [["every mask", "method", *record["photons"]], *_methods(record)]
     errors = [["every mask", "RMSE to the design", *record["scan"][0]["methods"]], *_scan(record)]

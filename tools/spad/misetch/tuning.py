@@ -89,7 +89,7 @@ def _is_done(known: Checkpoint, material: SpadMaterial, tuning: Tuning) -> bool:
 
 
 def ending(checkpoint: Checkpoint) -> dict[str, Any]:
-    """Give how a training ended, as plain values."""
+    """Return how a training ended, as plain values."""
     return {
         "cpu_s": round(checkpoint.cpu_s, 1),
         "steps": checkpoint.step,
@@ -98,7 +98,7 @@ def ending(checkpoint: Checkpoint) -> dict[str, Any]:
 
 
 def recipe_text(text: str, psf: str) -> str:
-    """Give a recipe that names another PSF, and the rate of learning of one who knows already.
+    """Return a recipe that names another PSF, and the rate of learning of one who knows already.
 
     Raises:
         ContractError: If it does not say both where they are expected.

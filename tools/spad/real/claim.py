@@ -27,14 +27,14 @@ class Claim:
 
     @property
     def is_met(self) -> bool | None:
-        """Tell whether the aim is met; None without one."""
+        """Return whether the aim is met; None without one."""
         if self.least is None and self.most is None:
             return None
         is_enough = self.least is None or self.value >= self.least
         return bool(is_enough and (self.most is None or self.value <= self.most))
 
     def row(self) -> dict[str, Any]:
-        """Give it as plain JSON values."""
+        """Return it as plain JSON values."""
         found = {"capture": self.capture, "what": self.what, "value": float(f"{self.value:.5g}")}
         aims = {"unit": self.unit or None, "least": self.least, "most": self.most}
         told = {name: aim for name, aim in aims.items() if aim is not None}
@@ -42,7 +42,7 @@ class Claim:
 
 
 def table(claims: Iterable[Claim]) -> str:
-    """Give claims as lines to read."""
+    """Return claims as lines to read."""
     lines = []
     for claim in claims:
         aim = ""

@@ -75,7 +75,7 @@ def measure(folder: Path, out: Path) -> list[Claim]:
 
 
 def light_cone(frames: NDArray[np.floating], half_width_m: float) -> NDArray[np.float64]:
-    """Give the hidden scene (depth, h, w) behind a confocal capture (t, h, w)."""
+    """Return the hidden scene (depth, h, w) behind a confocal capture (t, h, w)."""
     bins = DEEP
     merged = frames.reshape(bins, -1, *frames.shape[1:]).sum(axis=1).astype(np.float64)
     range_m = len(frames) * BIN_PS * LIGHT_M_PER_PS

@@ -74,14 +74,14 @@ def measure(folder: Path, out: Path) -> list[Claim]:
 
 
 def _block(rows: list[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Give rows, one per pixel, high enough to look at."""
+    """Return rows, one per pixel, high enough to look at."""
     return np.stack(rows).repeat(PER_PIXEL // len(rows) // 2, axis=0)
 
 
 def _errors(
     axis: TimeAxis, times: NDArray[np.float64], rng: np.random.Generator
 ) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Give errors and sigmas (p,) with the edges stated and with one width for all."""
+    """Return errors and sigmas (p,) with the edges stated and with one width for all."""
     pulse = GaussianPulse(sigma_ps=FWHM_PS / FWHM_PER_SIGMA)
     every = np.broadcast_to(np.arange(axis.bins), (len(times), axis.bins))
     share = np.diff(axis.edges_ps) / axis.step_ps

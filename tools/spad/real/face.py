@@ -32,7 +32,7 @@ class Product:
 
 @contextmanager
 def timing_file(text: str) -> Iterator[Path]:
-    """Give a text as a file for --timing."""
+    """Return a text as a file for --timing."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "timing.toml"
         path.write_text(text, encoding="utf-8")

@@ -83,7 +83,7 @@ def _median(what: str, arrays: dict[str, NDArray[Any]], bright: NDArray[np.bool_
 
 
 def _halves(path: Path) -> float:
-    """Give the 68 % quantile of the difference of two halves over its sigma."""
+    """Return the 68 % quantile of the difference of two halves over its sigma."""
     frames = _frames(path)
     first = np.random.default_rng(0).binomial(frames.astype(np.int64), 0.5)
     with tempfile.TemporaryDirectory() as scratch:
@@ -106,7 +106,7 @@ def _frames(path: Path) -> NDArray[Any]:
 def _by_flimlib(
     path: Path, found: Product, bright: NDArray[np.bool_]
 ) -> tuple[list[Claim], NDArray[np.float64]] | None:
-    """Give claims and lifetimes (h, w) in ps; None where flimlib is not installed."""
+    """Return claims and lifetimes (h, w) in ps; None where flimlib is not installed."""
     try:
         flimlib = importlib.import_module("flimlib")
     except ImportError:
@@ -146,7 +146,7 @@ def _by_flimlib(
 def _fitted(
     flimlib: Any, counts: NDArray[np.float32], bin_ns: float, at: float, sigma_bins: float
 ) -> NDArray[np.float64]:
-    """Give lifetimes (p,) in ns of pixels whose pulse lies at a bin."""
+    """Return lifetimes (p,) in ns of pixels whose pulse lies at a bin."""
     prompt = np.exp(-0.5 * ((np.arange(2 * int(at) + 2) - at) / sigma_bins) ** 2)
     after = int(at + 3 * sigma_bins)
     rough = flimlib.GCI_triple_integral_fitting_engine(bin_ns, counts, fit_start=after)

@@ -56,7 +56,7 @@ def measure(folder: Path, out: Path) -> list[Claim]:
 def zone_errors_mm(
     times_ps: NDArray[np.float64], true_m: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Give rms (zones,) and residuals (entries, zones) in mm, NaN where nearer than is judged.
+    """Return rms (zones,) and residuals (entries, zones) in mm, NaN where nearer than is judged.
 
     Args:
         times_ps: (entries, zones).

@@ -68,7 +68,7 @@ def measure(folder: Path, out: Path) -> list[Claim]:
 def _halved(
     cells: NDArray[Any], seed: int, pool: str
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Give depth of both halves, and how far they lie apart; NaN where either is not valid."""
+    """Return depth of both halves, and how far they lie apart; NaN where either is not valid."""
     made = []
     with tempfile.TemporaryDirectory() as scratch:
         for half in split(cells, np.random.default_rng(seed)):
@@ -86,7 +86,7 @@ def _shares(apart: NDArray[np.float64]) -> tuple[float, float]:
 def split(
     cells: NDArray[Any], rng: np.random.Generator
 ) -> tuple[NDArray[np.object_], NDArray[np.object_]]:
-    """Give cells of stamps as two: each photon falls to either by the toss of a coin."""
+    """Return cells of stamps as two: each photon falls to either by the toss of a coin."""
     halves = np.empty(cells.shape, object), np.empty(cells.shape, object)
     for place in np.ndindex(cells.shape):
         stamps = np.ravel(cells[place])

@@ -50,7 +50,7 @@ class Judged:
 
     @property
     def seeds(self) -> tuple[int, ...]:
-        """Give the seeds of its trainings; one place for what needs none."""
+        """Return the seeds of its trainings; one place for what needs none."""
         return (0,) if self.trained is None else self.trained.seeds
 
     def run(self, seed: int) -> str:
@@ -106,7 +106,7 @@ JUDGED: Final = _judged()
 
 
 def chosen_judged(names: Iterable[str] | None) -> tuple[Judged, ...]:
-    """Give rows by name; all without names.
+    """Return rows by name; all without names.
 
     Raises:
         ContractError: If there is none of that name.

@@ -73,7 +73,7 @@ Record = dict[str, Any]
 
 
 def record_of(rows: Iterable[Judged], found: Measured, trained: Mapping[str, Any]) -> Record:
-    """Give everything that was measured.
+    """Return everything that was measured.
 
     Args:
         rows: Those asked for.
@@ -177,5 +177,5 @@ def _gain_on(one: Sequence[Entry], other: Sequence[Entry]) -> Record:
 
 
 def _of_pictures(entries: Sequence[Entry]) -> list[float]:
-    """Give the PSNR of every picture, mean over seeds."""
+    """Return the PSNR of every picture, mean over seeds."""
     return [statistics.fmean(of) for of in zip(*(e.psnr_db for e in entries), strict=True)]

@@ -54,7 +54,7 @@ ROWS: Final = (
 
 
 def chosen_runs(names: Iterable[str] | None) -> list[tuple[Row, int]]:
-    """Give trainings by the names of rows or of trainings; all without names.
+    """Return trainings by the names of rows or of trainings; all without names.
 
     The first seed of every row goes before the second of any.
 

@@ -10,7 +10,7 @@ Record = Mapping[str, Any]
 
 
 def tables_text(record: Record) -> str:
-    """Give all tables."""
+    """Return all tables."""
     levels = [_table(record, level) for level in record["photons"]]
     gains = [_gains(record)] if record["gains"] else []
     return "\n\n".join([*levels, *gains, "\n".join(_remarks(record))]) + "\n"

@@ -76,17 +76,17 @@ def train_runs(
 
 
 def ended(out_dir: Path, row: Row, seed: int) -> dict[str, Any] | None:
-    """Give how a training ended; None where it did not."""
+    """Return how a training ended; None where it did not."""
     return finished(out_dir / row.run(seed))
 
 
 def checkpoint_of(out_dir: Path, row: Row, seed: int) -> Path:
-    """Give the file that a training wrote."""
+    """Return the file that a training wrote."""
     return checkpoint_in(out_dir / row.run(seed), row.size, ROLE)
 
 
 def recipe_text(row: Row, seed: int, pictures: Path | None) -> str:
-    """Give the shipped recipe with the sampling and seed of a row.
+    """Return the shipped recipe with the sampling and seed of a row.
 
     Raises:
         ContractError: If the recipe does not say both where it is expected.
@@ -108,7 +108,7 @@ def _sampling_table(sampling: Sampled, pictures: Path | None) -> str:
 
 
 def plate_file() -> Path:
-    """Give the file of the shipped plate's kernel.
+    """Return the file of the shipped plate's kernel.
 
     Raises:
         ContractError: If the recipe names none.
@@ -129,7 +129,7 @@ def natural_covariance(pictures: Path | None) -> Covariance:
 
 @lru_cache
 def level_sigma(pictures: Path | None) -> float:
-    """Give the sigma of the best Gaussian at the plate's level of light, in sub-pixels."""
+    """Return the sigma of the best Gaussian at the plate's level of light, in sub-pixels."""
     return round(best_gaussian(natural_covariance(pictures), LEVEL), 4)
 
 

@@ -64,7 +64,7 @@ def convert(
 
 
 def _clipped(lens: "Lens") -> list[str]:
-    """Say whether rims that stayed cut the beam on the axis."""
+    """Return whether rims that stayed cut the beam on the axis."""
     import torch
 
     from camkit.models_def.optics.analysis.sampling import Pupil

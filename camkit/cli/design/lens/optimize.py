@@ -137,7 +137,7 @@ def _problem(lens: "Lens", vary: str | None, *, merit: str, core_mm: float, rays
 
 
 def _spots(lens: "Lens") -> list[float]:
-    """Give the RMS spot radius in mm of every field, all wavelengths about one centroid."""
+    """Return the RMS spot radius in mm of every field, all wavelengths about one centroid."""
     import torch
 
     from camkit.models_def.optics.pupil import hexapolar

@@ -68,7 +68,7 @@ def peak(
 def measured(
     lens: "Lens", field_angles_rad: Sequence[float], pitch_um: float, *, waves: bool
 ) -> dict[str, Any]:
-    """Give the report on a lens as JSON values; waves at the first, middle and last field."""
+    """Return the report on a lens as JSON values; waves at the first, middle and last field."""
     from camkit.models_def.optics.thin.report import between, report_peaks, to_json
 
     fields = between(field_angles_rad)

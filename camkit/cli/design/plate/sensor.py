@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 def recipe_sensor(recipe: Path | None) -> "ColorSensor":
-    """Give the sensor of a recipe; duet's where none is named.
+    """Return the sensor of a recipe; duet's where none is named.
 
     Raises:
         UnsupportedError: If it has no colours.

@@ -54,7 +54,7 @@ class Folder:
 
     @contextmanager
     def writing(self, names: Sequence[str]) -> Iterator[tuple[Path, ...]]:
-        """Give the paths to write to; files appear when the block ends well, all or none.
+        """Return the paths to write to; files appear when the block ends well, all or none.
 
         Args:
             names: Paths in the folder; an absolute one may lie elsewhere.
@@ -90,6 +90,6 @@ class Folder:
 
 
 def _missing(paths: Sequence[Path]) -> list[Path]:
-    """Give the folders to be made, outer ones first."""
+    """Return the folders to be made, outer ones first."""
     missing = {folder for path in paths for folder in path.parents if not folder.exists()}
     return sorted(missing, key=lambda folder: len(folder.parts))

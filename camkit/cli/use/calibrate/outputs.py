@@ -109,7 +109,7 @@ def check_out(path: Path, suffix: str, what: str, *, overwrite: bool) -> None:
 
 
 def tell(record: Mapping[str, Any], lines: Sequence[str], *, as_json: bool) -> None:
-    """Say what was done: one object, or notes on stderr and lines."""
+    """Return what was done: one object, or notes on stderr and lines."""
     if as_json:
         say(json.dumps(record, allow_nan=False))
         return
@@ -120,7 +120,7 @@ def tell(record: Mapping[str, Any], lines: Sequence[str], *, as_json: bool) -> N
 
 
 def named(out: Path | str, page: Path | str | None) -> str:
-    """Give the names of what was written."""
+    """Return the names of what was written."""
     return ", ".join(str(path) for path in (out, page) if path is not None)
 
 

@@ -123,7 +123,7 @@ def _check_target(disc_px: float | None, dots: Path | None, *, edge: bool) -> No
 def _times(
     text: str | None, files: list[Path], darks: list[Path]
 ) -> tuple[tuple[float, ...] | None, tuple[float, ...] | None]:
-    """Give the times of frames and dark frames, which a list may leave to their files."""
+    """Return the times of frames and dark frames, which a list may leave to their files."""
     if text is None:
         return None, None
     from camkit.runtime.merging.times import stated_times

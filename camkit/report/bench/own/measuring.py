@@ -17,7 +17,7 @@ OPTIONS: Final = "--data, --images, --sizes, --repeat, --quick"
 
 
 def measures_of(bundles: Sequence[Bundle]) -> tuple[Measure, ...]:
-    """Give what measures each bundle; nothing for cameras that photograph.
+    """Return what measures each bundle; nothing for cameras that photograph.
 
     Raises:
         ContractError: If some photograph and others measure themselves.

@@ -9,7 +9,7 @@ Row = Mapping[str, Any]
 
 
 def own_lines(rows: Iterable[Row]) -> list[str]:
-    """Give the lines of all tables; columns without any value are left out."""
+    """Return the lines of all tables; columns without any value are left out."""
     sorts: dict[Any, list[Row]] = {}
     for row in rows:
         sorts.setdefault(row.get(SORT), []).append(row)

@@ -15,7 +15,7 @@ METHODS: Final = tuple(
 
 
 def make_trials(entrant: Entrant, axes: Axes, ground: Ground) -> tuple[list[Trial], list[Skip]]:
-    """Give every method once, on the first number of threads asked for."""
+    """Return every method once, on the first number of threads asked for."""
     if entrant.is_reference:
         return [], []
     manifest = entrant.bundle.manifest

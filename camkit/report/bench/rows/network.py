@@ -25,7 +25,7 @@ WHOLE_SHARE: Final = 0.7
 
 
 def make_trials(entrant: Entrant, axes: Axes, ground: Ground) -> tuple[list[Trial], list[Skip]]:
-    """Give all trials of a bundle; a reference gets its sizes in their base trial only."""
+    """Return all trials of a bundle; a reference gets its sizes in their base trial only."""
     held = list(entrant.bundle.manifest.sizes)
     sizes = [size for size in axes.sizes or held if size in held]
     skips = [
@@ -75,7 +75,7 @@ def _trials_of(
 
 
 def _facts(entrant: Entrant, size: str) -> list[NetworkFacts]:
-    """Give the facts of one size of every network of a bundle."""
+    """Return the facts of one size of every network of a bundle."""
     networks = entrant.bundle.manifest.networks
     return [entrant.bundle.network_facts(role, size) for role in networks]
 
@@ -85,7 +85,7 @@ def _has_fp16(facts: Sequence[NetworkFacts]) -> bool:
 
 
 def _obstacle(trial: Trial, facts: Sequence[NetworkFacts], ground: Ground) -> str | None:
-    """Say why a trial cannot be measured here; None if it can."""
+    """Return why a trial cannot be measured here; None if it can."""
     if trial.dtype == "fp16" and not _has_fp16(facts):
         return "the bundle holds no fp16 graph of this size"
     if trial.mode == "fast" and not all(one.halo_error for one in facts):

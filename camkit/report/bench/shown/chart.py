@@ -65,7 +65,7 @@ def draw_chart(report: dict[str, Any], *, svg: Path, png: Path) -> bool:
 
 
 def has_matplotlib() -> bool:
-    """Tell whether charts can be drawn here."""
+    """Return whether charts can be drawn here."""
     from importlib import util
 
     return util.find_spec("matplotlib") is not None

@@ -14,7 +14,7 @@ Cell = dict[str, Any]
 
 
 def field_isos(rows: Iterable[Row]) -> tuple[float, ...]:
-    """Give the ISOs of which there are panels: none where the field was not swept by pictures.
+    """Return the ISOs of which there are panels: none where the field was not swept by pictures.
 
     Golden cases differ in what they show too, so a line through them would say nothing.
     """
@@ -24,7 +24,7 @@ def field_isos(rows: Iterable[Row]) -> tuple[float, ...]:
 
 
 def is_swept(rows: Iterable[Row]) -> bool:
-    """Tell whether every picture was taken at every ISO and place."""
+    """Return whether every picture was taken at every ISO and place."""
     for row in rows:
         cells = row.get("by_iso_and_field")
         if not cells:
@@ -37,7 +37,7 @@ def is_swept(rows: Iterable[Row]) -> bool:
 
 
 def _grid(row: Row) -> dict[float, list[Cell]]:
-    """Give ISO -> cells by place, if all pictures were taken at all of two or more places."""
+    """Return ISO -> cells by place, if all pictures were taken at all of two or more places."""
     grid: dict[float, list[Cell]] = {}
     if not is_swept([row]):
         return grid

@@ -19,7 +19,7 @@ FEW_TICKS_FROM: Final = 20.0
 
 
 def plottable(rows: Sequence[Row], camera: str) -> list[Row]:
-    """Give the rows of a camera that have both a time and a PSNR."""
+    """Return the rows of a camera that have both a time and a PSNR."""
     return [
         row
         for row in rows
@@ -30,7 +30,7 @@ def plottable(rows: Sequence[Row], camera: str) -> list[Row]:
 
 
 def timed_alone(rows: Sequence[Row], cameras: Container[str]) -> list[Row]:
-    """Give the rows of some cameras that have a time and no PSNR."""
+    """Return the rows of some cameras that have a time and no PSNR."""
     return [
         row
         for row in rows
@@ -76,13 +76,13 @@ def draw_front_panel(panel: "Panel", report: dict[str, Any], rows: list[Row], lo
 
 
 def input_level(rows: Sequence[Row]) -> float | None:
-    """Give the PSNR of a camera's input."""
+    """Return the PSNR of a camera's input."""
     levels = (row["input_psnr_db"] for row in rows if row["input_psnr_db"] is not None)
     return next(levels, None)
 
 
 def title(report: dict[str, Any], rows: Sequence[Row]) -> str:
-    """Say what was judged and timed: once if all cameras share it, else for each of them."""
+    """Return what was judged and timed: once if all cameras share it, else for each of them."""
     cameras = list(dict.fromkeys(row["camera"] for row in rows))
     texts = {camera: _judged(report, rows, camera) for camera in cameras}
     if len(set(texts.values())) == 1:
@@ -214,7 +214,7 @@ def _input_labels(panel: "Panel", rows: Sequence[Row], looks: Looks) -> list[Lab
 
 
 def _line_box(panel: "Panel", level: float) -> "Bbox":
-    """Give what the line of an input covers on the canvas."""
+    """Return what the line of an input covers on the canvas."""
     from matplotlib.transforms import Bbox
 
     y = float(panel.transData.transform((panel.get_xlim()[0], level))[1])
@@ -222,7 +222,7 @@ def _line_box(panel: "Panel", level: float) -> "Bbox":
 
 
 def _drawn_boxes(panel: "Panel", row: Row) -> "list[Bbox]":
-    """Give what a row covers on the canvas: its marker, and its bars of some width."""
+    """Return what a row covers on the canvas: its marker, and its bars of some width."""
     from matplotlib.transforms import Bbox
 
     def place(x: float, y: float) -> tuple[float, float]:

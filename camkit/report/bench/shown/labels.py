@@ -46,7 +46,7 @@ class Label:
 
 
 def places_around(reach_pt: float) -> list[Place]:
-    """Give places around a marker, the best ones first."""
+    """Return places around a marker, the best ones first."""
     found: list[Place] = []
     for gap in (NEAR_PT, 11.0, FAR_PT, 35.0, 53.0, 75.0, 100.0):
         far = reach_pt + gap
@@ -64,7 +64,7 @@ def places_around(reach_pt: float) -> list[Place]:
 
 
 def places_along(step_pt: float = 45.0, count: int = 8) -> list[Place]:
-    """Give places above and below a level line, from its right end on."""
+    """Return places above and below a level line, from its right end on."""
     ends = [-3.0 - step_pt * n for n in range(count)]
     return [p for x in ends for p in (Place(x, 2, "right", "bottom"), Place(x, -2, "right", "top"))]
 
@@ -129,7 +129,7 @@ def _weight(label: Label) -> str:
 def _box_at(
     point_px: tuple[float, float], place: Place, size_px: tuple[float, float], dpi: float
 ) -> "Bbox":
-    """Give the box of a text of a known size beside a point."""
+    """Return the box of a text of a known size beside a point."""
     from matplotlib.transforms import Bbox
 
     shares = {"left": 0.0, "bottom": 0.0, "center": 0.5, "right": 1.0, "top": 1.0}
@@ -139,7 +139,7 @@ def _box_at(
 
 
 def _overlap(box: "Bbox", taken: Sequence["Bbox"], inside: "Bbox") -> float:
-    """Give the area that a box shares with others, and that lies outside the panel."""
+    """Return the area that a box shares with others, and that lies outside the panel."""
     own = float(box.width * box.height)
     return own - _shared(box, inside) + sum(_shared(box, other) for other in taken)
 

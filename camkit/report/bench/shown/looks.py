@@ -44,16 +44,16 @@ class Looks:
     markers: dict[str, str]
 
     def color(self, row: Row) -> str:
-        """Give the colour of a row's camera."""
+        """Return the colour of a row's camera."""
         return self.colors[row["camera"]]
 
     def marker(self, row: Row) -> str:
-        """Give the marker of a row's method."""
+        """Return the marker of a row's method."""
         return self.markers[method_name(row)]
 
 
 def looks_of(cameras: Sequence[str], rows: Iterable[Row]) -> Looks:
-    """Give every camera a colour and every method a marker; where they run out, they repeat."""
+    """Return every camera a colour and every method a marker; where they run out, they repeat."""
     names = dict.fromkeys(method_name(row) for row in rows)
     known = [name for name in MARKERS if name in names]
     others = [name for name in names if name not in MARKERS]
@@ -71,15 +71,15 @@ def method_name(row: Row) -> str:
 
 
 def area_pt2(row: Row) -> float:
-    """Give the area of a row's marker: its peak memory."""
+    """Return the area of a row's marker: its peak memory."""
     return max(AREA_PER_GB * float(row["peak_rss_mb"] or 0) / 1000, LEAST_AREA_PT2)
 
 
 def reach_pt(row: Row) -> float:
-    """Give the radius of a row's marker."""
+    """Return the radius of a row's marker."""
     return math.sqrt(area_pt2(row)) / 2
 
 
 def seconds_per_mp(row: Row, key: str = "seconds_median") -> float:
-    """Give seconds of a row per megapixel of the capture that was timed."""
+    """Return seconds of a row per megapixel of the capture that was timed."""
     return float(1e6 * row[key] / (row["width"] * row["height"]))

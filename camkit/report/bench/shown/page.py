@@ -100,7 +100,7 @@ for (const head of document.querySelectorAll("th")) {
 
 
 def to_html(result: Result, chart_svg_base64: str | None) -> str:
-    """Give the page.
+    """Return the page.
 
     Args:
         result: The bench.

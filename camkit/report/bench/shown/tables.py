@@ -24,7 +24,7 @@ GOLDEN_NOTE: Final = (
 
 
 def split_tables(report: Mapping[str, Any], camera: str) -> list[str]:
-    """Give the accuracy of a camera's plain rows by ISO and by place; nothing without any."""
+    """Return the accuracy of a camera's plain rows by ISO and by place; nothing without any."""
     rows = [r for r in report["rows"] if r["camera"] == camera and not r["variant"]]
     isos, places = _heads(rows, "by_iso", _iso_head), _heads(rows, "by_field", _place_head)
     if not isos and not places:
@@ -58,7 +58,7 @@ def _place_head(cell: Cell) -> str:
 
 
 def _heads(rows: Iterable[Row], name: str, head: Any) -> list[str]:
-    """Give the heads of all cells of a split, in their order, those that are not known left out."""
+    """Return heads of all cells of a split, in their order, those that are not known left out."""
     cells = sorted((c for row in rows for c in row.get(name, ())), key=_order)
     return [text for text in dict.fromkeys(map(head, cells)) if text]
 
@@ -83,7 +83,7 @@ def _td(cell: Cell | None) -> str:
 
 
 def tuning_table(tuning: Iterable[Tuned]) -> list[str]:
-    """Give how every method was tuned; nothing where nothing is known."""
+    """Return how every method was tuned; nothing where nothing is known."""
     rows = list(tuning)
     if not rows:
         return []

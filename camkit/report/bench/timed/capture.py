@@ -30,7 +30,7 @@ def timed_capture(
     folder: Path,
     photo: Path | None = None,
 ) -> tuple[Path, tuple[int, int]]:
-    """Give a file of the bundle's camera, simulated now or by an earlier call.
+    """Return a file of the bundle's camera, simulated now or by an earlier call.
 
     The lights of the procedural scene are cut at white: clipped blocks cost several times what
     others cost, and how many there are is a matter of the scene.
@@ -86,7 +86,7 @@ def timed_capture(
 def _sides(
     sensor: Sensor, width_px: int | None, height_px: int | None, name: str
 ) -> tuple[int, int]:
-    """Give (width, height): those asked for, else the sensor's, which none exceeds."""
+    """Return (width, height): those asked for, else the sensor's, which none exceeds."""
     if sensor.extent is None and width_px and height_px:
         return width_px, height_px
     width, height = width_px or sensor.width_px, height_px or sensor.height_px

@@ -151,7 +151,7 @@ def _steps(values: Sequence[float]) -> tuple[float, ...]:
 
 
 def _last_words(complaints: IO[bytes]) -> str:
-    """Give the last line that the worker wrote on stderr."""
+    """Return the last line that the worker wrote on stderr."""
     complaints.seek(max(0, complaints.seek(0, os.SEEK_END) - 4096))
     lines = complaints.read().decode(errors="replace").strip().splitlines()
     return lines[-1] if lines else SILENT
@@ -203,7 +203,7 @@ class TreeWatch:
 
 
 def tree_rss_mb(pid: int) -> float:
-    """Give the resident memory of a process and its descendants, in MB; 0 if unknown."""
+    """Return the resident memory of a process and its descendants, in MB; 0 if unknown."""
     total, waiting = 0, [pid]
     while waiting:
         one = waiting.pop()
@@ -219,7 +219,7 @@ def tree_rss_mb(pid: int) -> float:
 
 
 def _busy_s() -> float | None:
-    """Give the processor time that the machine has spent so far; None where it does not tell."""
+    """Return the processor time that the machine has spent so far; None where it does not tell."""
     try:
         line = (_PROC / "stat").read_text(encoding="ascii").splitlines()[0].split()
         user, nice, system, _idle, _iowait, irq, softirq, steal = map(int, line[1:9])
@@ -231,7 +231,7 @@ def _busy_s() -> float | None:
 def _load_of_others(
     before: float | None, after: float | None, own_s: float, elapsed_s: float
 ) -> float | None:
-    """Give the share of the machine's processor time that was neither idle nor the run's own."""
+    """Return the share of the machine's processor time that was neither idle nor the run's own."""
     if before is None or after is None or elapsed_s <= 0:
         return None
     others = after - before - own_s

@@ -38,7 +38,7 @@ class Spread:
 
 
 def quantile(values: Sequence[float], share: float) -> float:
-    """Give a quantile, linear between the order statistics.
+    """Return a quantile, linear between the order statistics.
 
     Args:
         values: At least one.
@@ -61,7 +61,7 @@ def quantile(values: Sequence[float], share: float) -> float:
 
 
 def spread_of(seconds: Sequence[float]) -> Spread | None:
-    """Give the order statistics of measurements in the order in which they were made."""
+    """Return the order statistics of measurements in the order in which they were made."""
     if not seconds:
         return None
     return Spread(
@@ -75,7 +75,7 @@ def spread_of(seconds: Sequence[float]) -> Spread | None:
 
 
 def is_noisy(spread: Spread | None, load_of_others: float | None) -> bool | None:
-    """Tell whether seconds are not to be trusted: they vary, or others used the machine.
+    """Return whether seconds are not to be trusted: they vary, or others used the machine.
 
     Args:
         spread: Of the seconds.
@@ -91,7 +91,7 @@ def is_noisy(spread: Spread | None, load_of_others: float | None) -> bool | None
 
 
 def interleaved(items: Sequence[_T], rounds: int) -> Iterator[_T]:
-    """Give all items once per round, forwards and backwards in turn.
+    """Return all items once per round, forwards and backwards in turn.
 
     A drift of the machine then falls on all of them alike.
     """
@@ -100,7 +100,7 @@ def interleaved(items: Sequence[_T], rounds: int) -> Iterator[_T]:
 
 
 def paired_ratio(seconds: Sequence[float], base: Sequence[float]) -> float | None:
-    """Give the median over rounds of seconds / base; None unless both have every round."""
+    """Return the median over rounds of seconds / base; None unless both have every round."""
     if not seconds or len(seconds) != len(base) or min(base) <= 0:
         return None
     return quantile([s / b for s, b in zip(seconds, base, strict=True)], 0.5)

@@ -6,7 +6,7 @@ from camkit.runtime.plan.decision import DEVELOP
 
 
 def make_trials(entrant: Entrant, axes: Axes, ground: Ground) -> tuple[list[Trial], list[Skip]]:
-    """Give one trial for the captures of every camera; a DNG needs no bundle to be developed."""
+    """Return one trial for the captures of every camera; a DNG needs no bundle to be developed."""
     if entrant.is_reference:
         return [], []
     threads = ground.base_threads(axes)

@@ -57,13 +57,13 @@ def photograph(shot: Shot, scene: FloatArray, bundle: Bundle, lens: FrozenOptics
 
 
 def developer(bundle: Bundle, threads: int) -> Pipeline:
-    """Give what develops captures of a camera and restores nothing, in sensor geometry."""
+    """Return what develops captures of a camera and restores nothing, in sensor geometry."""
     geometry = in_sensor_geometry(bundle.manifest)
     return Pipeline(bundle, Options(method=DEVELOP, threads=threads, **geometry))
 
 
 def capture_of(pipeline: Pipeline, simulation: Simulation) -> Capture:
-    """Give a simulated photograph as its camera's pipeline takes it."""
+    """Return a simulated photograph as its camera's pipeline takes it."""
     x, y = (int(v) for v in simulation.window.origin_px)
     return pipeline.capture_of(
         simulation.samples,
@@ -74,7 +74,7 @@ def capture_of(pipeline: Pipeline, simulation: Simulation) -> Capture:
 
 
 def clipped_planes(capture: Capture) -> NDArray[np.bool_]:
-    """Give (3, h, w): pixels of each colour that are made of a clipped sample of it."""
+    """Return (3, h, w): pixels of each colour that are made of a clipped sample of it."""
     clipped = capture.saturated_rows(0, capture.height)
     planes = sites_of(capture.cfa, clipped.shape) & clipped
     side = 2 * REACH_PX + 1
@@ -82,7 +82,7 @@ def clipped_planes(capture: Capture) -> NDArray[np.bool_]:
 
 
 def sites_of(cfa: CfaPattern | None, shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Give (3, h, w): where a mosaic (h, w) has samples of each colour; everywhere in planes."""
+    """Return (3, h, w): where a mosaic (h, w) has samples of each colour; everywhere in planes."""
     planes = np.ones((3, *shape[-2:]), dtype=bool)
     if cfa is None:
         return planes

@@ -87,7 +87,7 @@ class HdrJudge:
 
     @property
     def identity(self) -> tuple[object, ...]:
-        """Give bundles and methods."""
+        """Return bundles and methods."""
         return ("hdr", *self._common.identity)
 
     def judge(
@@ -101,7 +101,7 @@ class HdrJudge:
         return self._common.examine(shot, numbers)
 
     def lit(self, scene: Scene, share: float = SATURATED) -> Scene:
-        """Give the lights that belong to a scene, exposed so that a share of it saturates."""
+        """Return the lights that belong to a scene, exposed so that a share of it saturates."""
         key = scene.name, share
         if key not in self._lit:
             linear = exposed_night(scene, self.rig.sensor, share)
@@ -150,14 +150,14 @@ class HdrJudge:
         return self._scored[key]
 
     def pictures(self, shot: Shot | HdrShot) -> dict[str, FloatArray]:
-        """Give the truth and what every method made, to look at; lights by the mu-law."""
+        """Return the truth and what every method made, to look at; lights by the mu-law."""
         if isinstance(shot, Shot):
             return self._common.pictures(shot)
         pictures = {"sharp": shot.truth, **self._restored(shot)[0]}
         return {name: mu_law(picture).astype(np.float32) for name, picture in pictures.items()}
 
     def lens_of(self, streaks: StreakOptics) -> Lens:
-        """Give the lens that writes other streaks than the bundle knows."""
+        """Return the lens that writes other streaks than the bundle knows."""
         return self._at_focus(psf_of_streaks(streaks, len(self.rig.sensor.channels)))
 
     def _bare_lens(self) -> Lens:
@@ -169,7 +169,7 @@ class HdrJudge:
         return lens_of(psf, self.rig.sensor, depth_mm=self.rig.bundle.reference_depth_mm)
 
     def _fall(self, scene: Scene, lens: Lens, around: FloatArray | None = None) -> Light:
-        """Let a scene fall on the sensor."""
+        """Project a scene on the sensor."""
         extent = self.rig.sensor.known_extent
         origin = scene.origin_px((extent.width_px, extent.height_px))
         seen = scene.linear if around is None else around
@@ -179,7 +179,7 @@ class HdrJudge:
         return light_of(seen, self.rig.sensor, lens, window, options)
 
     def _restored(self, shot: HdrShot) -> tuple[dict[str, FloatArray], dict[str, str]]:
-        """Give the picture of every method, and why some gave none."""
+        """Return the picture of every method, and why some gave none."""
         restored = self.rig.restore(shot.coded)
         developed = {INPUT: self._developer.start(shot.bare).fill()}
         return {**restored.pictures, **developed}, dict(restored.faults)
@@ -208,7 +208,7 @@ def shortfall(found: Outcome, given: Outcome) -> str | None:
 
 
 def hdr_judge_of(bundle: Bundle, sizes: tuple[str, ...], before: Bundle | None) -> HdrJudge:
-    """Give the judge of a snapshot HDR camera.
+    """Return the judge of a snapshot HDR camera.
 
     Args:
         bundle: What is tested.
@@ -231,7 +231,7 @@ class _Comparison:
         self._clipped = np.logical_or(*masks).repeat(scale, axis=0).repeat(scale, axis=1)
 
     def errors(self, picture: FloatArray) -> NDArray[np.float64]:
-        """Give (h, w) squared errors, the mean over the colours; 0 in the border."""
+        """Return (h, w) squared errors, the mean over the colours; 0 in the border."""
         error = np.zeros(picture.shape[1:])
         difference = picture.astype(np.float64) - self._truth
         error[self._inside[1:]] = np.square(difference[self._inside]).mean(axis=0)
@@ -256,7 +256,7 @@ class _Comparison:
 
 
 def _digest(shot: HdrShot) -> bytes:
-    """Give what decides the verdict on a shot."""
+    """Return what decides the verdict on a shot."""
     capture = shot.coded.capture
     facts = (capture.iso, capture.white_level, capture.white_balance, shot.coded.border_px)
     digest = hashlib.sha256(repr(facts).encode())

@@ -22,7 +22,7 @@ _LIMB: Final = 0.4
 
 
 def writes_streaks(bundle: Bundle) -> str | None:
-    """Say why a bundle cannot take scenarios of streaks; None if it can."""
+    """Return why a bundle cannot take scenarios of streaks; None if it can."""
     optics = bundle.manifest.optics
     if optics is None or optics.type != "streaks":
         return "its optics write no streaks"
@@ -30,7 +30,7 @@ def writes_streaks(bundle: Bundle) -> str | None:
 
 
 def exposed_night(scene: Scene, sensor: ColorSensor, share: float) -> FloatArray:
-    """Give a scene with lights, exposed so that a share of it saturates; ends at 2^8 white.
+    """Return a scene with lights, exposed so that a share of it saturates; ends at 2^8 white.
 
     Args:
         scene: Taken as it is where it holds light above white, as an EXR may; else a night whose
@@ -48,7 +48,7 @@ def exposed_night(scene: Scene, sensor: ColorSensor, share: float) -> FloatArray
 
 
 def dimmed(linear: FloatArray) -> FloatArray:
-    """Give a scene without its lights."""
+    """Return a scene without its lights."""
     return np.minimum(linear, np.float32(DIM))
 
 
@@ -71,7 +71,7 @@ def with_lamp(
 
 
 def with_peak(linear: FloatArray, peak: float) -> FloatArray:
-    """Give a scene whose brightest light is `peak` times white, and what is white stays so.
+    """Return a scene whose brightest light is `peak` times white, and what is white stays so.
 
     The logarithm of what exceeds white is scaled; colours stay.
     """
@@ -84,7 +84,7 @@ def with_peak(linear: FloatArray, peak: float) -> FloatArray:
 
 
 def with_colour(linear: FloatArray, colour: Sequence[float]) -> FloatArray:
-    """Give a scene all of whose lights have one colour, as bright as their strongest was."""
+    """Return a scene all of whose lights have one colour, as bright as their strongest was."""
     strongest = linear.max(axis=0)
     coloured = strongest * np.array(colour, np.float32)[:, None, None]
     return np.asarray(np.where(strongest > 1, coloured, linear), np.float32)
@@ -115,12 +115,12 @@ def with_line(
 
 
 def turned(streaks: StreakOptics, angle_rad: float) -> StreakOptics:
-    """Give streaks that are turned from +x towards +y."""
+    """Return streaks that are turned from +x towards +y."""
     return replace(streaks, angles_rad=streaks.angles_rad + angle_rad)
 
 
 def stretched(streaks: StreakOptics, factor: float) -> StreakOptics:
-    """Give streaks that are longer by a factor and hold the same light."""
+    """Return streaks that are longer by a factor and hold the same light."""
     count = streaks.profiles.shape[-1]
     place = np.arange(int(np.ceil((count - 1) * max(factor, 1))) + 1) / factor
     low = np.minimum(place.astype(int), count - 1)

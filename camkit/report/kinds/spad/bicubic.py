@@ -17,7 +17,7 @@ REACH: Final = 2
 
 
 def cubic(distance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Give the weight of a sample at a distance in samples."""
+    """Return the weight of a sample at a distance in samples."""
     x, a = np.abs(distance), SHARPNESS
     near = (a + 2) * x**3 - (a + 3) * x**2 + 1
     far = a * (x**3 - 5 * x**2 + 8 * x - 4)
@@ -25,7 +25,7 @@ def cubic(distance: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def bicubic(light: FloatArray, grid: Grid) -> FloatArray:
-    """Give a picture (m h, m w) of samples (h, w); borders go on as they end."""
+    """Return a picture (m h, m w) of samples (h, w); borders go on as they end."""
     rows = _finer(light.astype(np.float64), grid)
     return np.ascontiguousarray(_finer(rows.T, grid).T, np.float32)
 

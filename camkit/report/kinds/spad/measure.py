@@ -65,7 +65,7 @@ def measure(bundle: Bundle, settings: OwnSettings, tell: Tell) -> OwnRows:
 
 
 def _sizes(camera: FineCamera, asked: Sequence[str] | None) -> tuple[tuple[str, ...], list[Skip]]:
-    """Give the sizes to measure, and those that are not there.
+    """Return the sizes to measure, and those that are not there.
 
     Raises:
         ContractError: If none of those asked for is there.

@@ -21,7 +21,7 @@ FIRST_SEED: Final = 40
 
 
 def coded_luminance(linear: FloatArray) -> FloatArray:
-    """Give L (h, w) of a linear Rec.709 picture (3, h, w); what exceeds white is white."""
+    """Return L (h, w) of a linear Rec.709 picture (3, h, w); what exceeds white is white."""
     return np.asarray(np.tensordot(LUMINANCE, encode_srgb(linear), axes=1), np.float32)
 
 

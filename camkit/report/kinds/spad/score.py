@@ -16,13 +16,13 @@ SIDE_PX: Final = 11
 
 
 def psnr_db(found: FloatArray, truth: FloatArray) -> float:
-    """Give the PSNR in dB, at most `MOST_DB`."""
+    """Return the PSNR in dB, at most `MOST_DB`."""
     error = float(np.mean((found.astype(np.float64) - truth) ** 2))
     return min(float(-10 * np.log10(max(error, 1e-30))), MOST_DB)
 
 
 def ssim(found: FloatArray, truth: FloatArray) -> float:
-    """Give the mean SSIM of pictures (h, w), windows that reach over the border left out."""
+    """Return the mean SSIM of pictures (h, w), windows that reach over the border left out."""
     return float(
         structural_similarity(
             truth.astype(np.float64),

@@ -116,7 +116,7 @@ def _work(camera: FineCamera, captures: Timed, size: str | None) -> Iterator[tup
 
 
 def _median_cpu_s(do: Do, times: int, repeat: int) -> float:
-    """Give the processor time of doing something once, when all is warm."""
+    """Return the processor time of doing something once, when all is warm."""
     do()
     found = []
     for _ in range(repeat):

@@ -33,7 +33,7 @@ class Light:
 
     @property
     def background(self) -> float:
-        """Give the background counts of a bin."""
+        """Return the background counts of a bin."""
         return self.photons / self.sbr / AXIS.bins
 
 
@@ -51,7 +51,7 @@ def draw(
 
 
 def bound_ps(times_ps: NDArray[np.float64], light: Light) -> NDArray[np.float64]:
-    """Give the Cramer-Rao bound of every time, amplitude and background unknown as well."""
+    """Return the Cramer-Rao bound of every time, amplitude and background unknown as well."""
     bank: Bank = make_bank(AXIS, PULSE)
     of_template = information(bank, max(light.background / light.photons, DARKEST))
     found = np.interp(times_ps, bank.mu_ps, of_template)

@@ -51,7 +51,7 @@ def timing_rows(
 
 
 def measure(light: Light, pixels: int, turns: int) -> list[dict[str, Any]]:
-    """Give the rows of all methods at one level of light."""
+    """Return the rows of all methods at one level of light."""
     rng = np.random.default_rng([int(light.photons), int(1000 / light.sbr)])
     times = rng.uniform(*SPAN_PS, pixels)
     counts, empty = draw(times, light, rng), draw(times, light, rng, empty=True)
@@ -93,7 +93,7 @@ def measure(light: Light, pixels: int, turns: int) -> list[dict[str, Any]]:
 
 
 def false_alarms(background: float, pixels: int) -> dict[str, Any]:
-    """Give the share of pixels of background alone that are believed, alone and pooled."""
+    """Return the share of pixels of background alone that are believed, alone and pooled."""
     rng = np.random.default_rng(int(1000 * background))
     rates: dict[str, list[float]] = {"1": [], "auto": []}
     ways = {pool: Sharpener(AXIS, PULSE, Way(pool=pool)) for pool in ("1", "auto")}

@@ -104,7 +104,7 @@ def read_baselines(camera: FineCamera) -> Baselines:
 def ways_of(
     bundle: Bundle, sizes: Sequence[str], baselines: Mapping[str, FineCamera]
 ) -> tuple[Way, ...]:
-    """Give all ways of sampling.
+    """Return all ways of sampling.
 
     Args:
         bundle: The camera.
@@ -149,7 +149,7 @@ def ways_of(
 
 
 def by_network(engine: NetworkEngine) -> Restore:
-    """Give what a network makes of light and noise."""
+    """Return what a network makes of light and noise."""
 
     def restore(planes: FloatArray, photons: float) -> FloatArray:
         del photons
@@ -159,7 +159,7 @@ def by_network(engine: NetworkEngine) -> Restore:
 
 
 def by_linear(camera: FineCamera, kernel: FloatArray) -> Restore:
-    """Give the best linear estimate of an array behind a kernel, at the level of its photons."""
+    """Return the best linear estimate of an array behind a kernel, at the level of its photons."""
 
     def restore(planes: FloatArray, photons: float) -> FloatArray:
         return np.asarray(camera.linear(photons, kernel)(planes[:1])[0])
@@ -168,7 +168,7 @@ def by_linear(camera: FineCamera, kernel: FloatArray) -> Restore:
 
 
 def _untrained(camera: FineCamera, kernel: FloatArray) -> tuple[Method, ...]:
-    """Give the methods that no training is needed for."""
+    """Return the methods that no training is needed for."""
     grid = camera.grid
     return (
         Method(name="linear", restore=by_linear(camera, kernel)),

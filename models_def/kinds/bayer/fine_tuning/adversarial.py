@@ -14,7 +14,7 @@ from torch import Tensor
 
 
 def discriminator_loss(real: Tensor, fake: Tensor) -> Tensor:
-    """Give the scalar that a discriminator minimises: real scores one above restored ones.
+    """Return the scalar that a discriminator minimises: real scores one above restored ones.
 
     Args:
         real: Scores of true pictures, any shape.
@@ -26,5 +26,5 @@ def discriminator_loss(real: Tensor, fake: Tensor) -> Tensor:
 
 
 def generator_loss(real: Tensor, fake: Tensor) -> Tensor:
-    """Give the scalar that a generator minimises: the discriminator's with the players swapped."""
+    """Return scalar that a generator minimises: the discriminator's with the players swapped."""
     return discriminator_loss(fake, real)

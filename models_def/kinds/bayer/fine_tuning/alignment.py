@@ -110,18 +110,18 @@ class Aligner:
         )
 
     def to_sensor_mm(self, points_px: Points) -> Points:
-        """Give (n, 2) positions from the axis."""
+        """Return (n, 2) positions from the axis."""
         return (points_px - self._centre) * self._pitch_mm
 
     def illumination(self, points_px: Points) -> NDArray[np.float64]:
-        """Give the (n,) relative illumination."""
+        """Return the (n,) relative illumination."""
         heights_mm = np.hypot(*self.to_sensor_mm(points_px).T)
         bank = self._bank
         light = np.interp(heights_mm, bank.frozen_heights_mm, bank.relative_illumination)
         return np.asarray(light, dtype=np.float64)
 
     def _ideal_grey(self, capture: FloatArray, step: int) -> FloatArray:
-        """Give every step-th pixel of the capture without distortion and vignetting, grey."""
+        """Return every step-th pixel of the capture without distortion and vignetting, grey."""
         height, width = capture.shape[1:]
         grid = np.mgrid[0:height:step, 0:width:step][::-1].reshape(2, -1).T.astype(np.float64)
         points = self._distorted(grid)
@@ -131,7 +131,7 @@ class Aligner:
         return np.asarray(seen.mean(0) / light, dtype=np.float32)
 
     def _distorted(self, points_px: Points) -> Points:
-        """Give where ideal positions fall on the sensor, both in pixels of the capture."""
+        """Return where ideal positions fall on the sensor, both in pixels of the capture."""
         if self._distortion is None:
             return points_px
         offset = points_px - self._centre
@@ -178,7 +178,7 @@ def _smooth(picture: FloatArray, side: int) -> FloatArray:
 
 
 def _growth(distortion: RadialDistortion, radius: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Give r_d / r of eq. (6.10) for the green colour."""
+    """Return r_d / r of eq. (6.10) for the green colour."""
     square = radius * radius
     c0, c1, c2, c3 = distortion.coefficients[1]
     growth = c0 + square * (c1 + square * (c2 + square * c3))
@@ -189,5 +189,5 @@ def _growth(distortion: RadialDistortion, radius: NDArray[np.float64]) -> NDArra
 
 
 def _encoded(grey: FloatArray) -> FloatArray:
-    """Give (h, w) with the curve of a display, stretched to the brightest light."""
+    """Return (h, w) with the curve of a display, stretched to the brightest light."""
     return encode_srgb(grey / max(float(np.percentile(grey, 99.5)), 1e-6))

@@ -8,7 +8,7 @@ from camkit.models_def.training.adversarial.views import Views
 
 
 def perceptual_loss(views: Views, features: Features | None) -> Tensor:
-    """Give the mean squared difference of features; of the sRGB values themselves without any.
+    """Return the mean squared difference of features; of the sRGB values themselves without any.
 
     The thesis writes a norm; the mean square is what the cited source computes, and makes a weight
     mean the same for every size of patch.

@@ -91,7 +91,7 @@ class FineTuningFitter(JudgedFitter):
             self.note(f"discriminator_{name}", loss)
 
     def total(self, views: Views) -> Tensor:
-        """Give pixels, features and what the discriminators say; they do not move."""
+        """Return pixels, features and what the discriminators say; they do not move."""
         self.opponents.requires_grad_(requires_grad=False)
         pixel, perceptual = pixel_loss(views), perceptual_loss(views, self._features)
         self.note("pixel", pixel)
@@ -104,7 +104,7 @@ class FineTuningFitter(JudgedFitter):
         return total
 
     def optimizer_state(self) -> dict[str, Any]:
-        """Give both optimisers and the discriminators: tensors and plain numbers."""
+        """Return both optimisers and the discriminators: tensors and plain numbers."""
         return {
             "generator": self.generator.optimizer_state(),
             "opponents": self._optimizer.state_dict(),

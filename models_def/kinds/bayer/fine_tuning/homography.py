@@ -146,13 +146,13 @@ def _shrunk(picture: FloatArray, scale: float) -> FloatArray:
 
 
 def _scaling(scale: float) -> Matrix:
-    """Give the map of pixel centres when a picture is resized by a factor."""
+    """Return the map of pixel centres when a picture is resized by a factor."""
     shift = (scale - 1) / 2
     return np.array([[scale, 0, shift], [0, scale, shift], [0, 0, 1]])
 
 
 def _matches(reference: FloatArray, capture: FloatArray) -> tuple[Matrix, Matrix]:
-    """Give (n, 2) positions of features in the one and their likely partners in the other."""
+    """Return (n, 2) positions of features in the one and their likely partners in the other."""
     sift = cv2.SIFT.create(nfeatures=MOST_FEATURES)
     found = [sift.detectAndCompute(_to_bytes(p), None) for p in (reference, capture)]
     (points, words), (partners, other) = found
@@ -227,7 +227,7 @@ def _refined(reference: FloatArray, capture: FloatArray, start: Matrix) -> tuple
 def _as_sharp(
     reference: FloatArray, picture: FloatArray, at_px: Matrix, keep: NDArray[np.bool_]
 ) -> FloatArray:
-    """Give the kept pixels of the reference, blurred until they resemble the picture the most.
+    """Return the kept pixels of the reference, blurred until they resemble the picture the most.
 
     Against a sharper reference Gauss-Newton overshoots, and may leave.
     """
@@ -248,7 +248,7 @@ def _newton_step(
     pictures: tuple[FloatArray, FloatArray, FloatArray],
     from_unit: Matrix,
 ) -> tuple[Matrix, float]:
-    """Give the (8,) change of the homography, and the correlation before it.
+    """Return the (8,) change of the homography, and the correlation before it.
 
     Args:
         matrix: (3, 3) between positions in -1..1, the last entry 1.
@@ -292,14 +292,14 @@ def _sampled(picture: FloatArray, at_px: FloatArray) -> Matrix:
 
 
 def _is_inner(x_px: Values, y_px: Values, shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Tell which positions lie so far inside that a blurred border does not reach them."""
+    """Return which positions lie so far inside that a blurred border does not reach them."""
     height, width = shape
     inner = (x_px >= _MARGIN_PX) & (x_px <= width - 1 - _MARGIN_PX)
     return np.asarray(inner & (y_px >= _MARGIN_PX) & (y_px <= height - 1 - _MARGIN_PX))
 
 
 def _unit(shape: tuple[int, ...]) -> Matrix:
-    """Give the map from pixels to about -1..1, of one scale along both axes."""
+    """Return the map from pixels to about -1..1, of one scale along both axes."""
     half = max(shape) / 2
     x, y = ((side - 1) / 2 for side in shape[::-1])
     return np.array([[1 / half, 0, -x / half], [0, 1 / half, -y / half], [0, 0, 1]])

@@ -75,7 +75,7 @@ class PairSamples:
         return Batch(inputs=LAYOUT.named(planes), target=targets, weight=weight)
 
     def mixer(self, share: float, seed: int) -> Mix:
-        """Give what replaces the first patches of a batch by patches of real pairs.
+        """Return what replaces the first patches of a batch by patches of real pairs.
 
         Args:
             share: How many of them are replaced; a part of a patch is one in as many steps.
@@ -260,7 +260,7 @@ def _cut(
 def _warped(
     pair: AlignedPair, place: tuple[int, int], side: int
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Give the reference as it lies in a square of the capture, and where it is valid."""
+    """Return the reference as it lies in a square of the capture, and where it is valid."""
     grid = np.mgrid[0:side, 0:side][::-1].reshape(2, -1).T + np.array(place, dtype=np.float64)
     at = pair.to_reference(grid).reshape(side, side, 2)
     return warp_to(pair.reference, at[..., 0], at[..., 1])

@@ -29,7 +29,7 @@ Distort = Callable[[BayerRecipe, Path], RadialDistortion | None]
 
 
 def trace_recipe_distortion(recipe: BayerRecipe, folder: Path) -> RadialDistortion:
-    """Give the distortion of a recipe's lens; the recipe lies in `folder`."""
+    """Return the distortion of a recipe's lens; the recipe lies in `folder`."""
     lens = find_lens(recipe.lens.prescription, folder)
     return trace_distortion(lens, corner_height_mm(recipe))
 
@@ -76,7 +76,7 @@ def make_refinement(
 
 
 def _credit(options: FineTuningOptions) -> str:
-    """Say what else the weights learned from, for the card."""
+    """Return what else the weights learned from, for the card."""
     features = "without VGG-19"
     if options.vgg is not None:
         digest = file_digest(options.vgg)[:16]

@@ -51,7 +51,7 @@ class VggFeatures(nn.Module):
         self.requires_grad_(requires_grad=False)
 
     def forward(self, picture: Tensor) -> Tensor:
-        """Give the features; sides of the picture are at least 4."""
+        """Return the features; sides of the picture are at least 4."""
         features: Tensor = self.features((picture - self.mean) / self.deviation)
         return features
 

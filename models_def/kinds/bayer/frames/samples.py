@@ -28,7 +28,7 @@ Generator = np.random.Generator
 def developed(
     tile: Tile, recipe: BayerRecipe, bank: PsfBank, offset_mm: tuple[float, float] = (0.0, 0.0)
 ) -> Developed:
-    """Give a tile as the bank meets it.
+    """Return a tile as the bank meets it.
 
     Args:
         tile: A tile.
@@ -54,7 +54,7 @@ def developed(
 
 
 def draw_developed(rng: Generator, tile: Tile, recipe: BayerRecipe, bank: PsfBank) -> Developed:
-    """Give a tile as a block beside it meets it."""
+    """Return a tile as a block beside it meets it."""
     most_mm = recipe.data.block_jitter_px * to_mm(recipe.sensor.pixel_pitch_um)
     x_mm, y_mm = (float(v) for v in rng.uniform(-most_mm, most_mm, 2))
     return developed(tile, recipe, bank, (x_mm, y_mm))
@@ -67,17 +67,17 @@ class TileMaker:
         self._recipe, self._bank, self._tiles, self._seed = recipe, bank, tiles, seed
 
     def developed(self, index: int) -> Developed:
-        """Give a tile as the bank meets it."""
+        """Return a tile as the bank meets it."""
         rng = np.random.default_rng((self._seed, 1, index))
         tile = self._tiles.read(self._tile_of(index))
         return draw_developed(rng, tile, self._recipe, self._bank)
 
     def frame_of(self, index: int) -> int:
-        """Give the number of the frame that a sample is cut from."""
+        """Return the number of the frame that a sample is cut from."""
         return self._tile_of(index) // (self._recipe.frames.shots * self._recipe.frames.tiles)
 
     def distance_mm(self, index: int) -> float | None:
-        """Give how far off the scene of a sample is; None where that is not said."""
+        """Return how far off the scene of a sample is; None where that is not said."""
         copy = self._tiles.facts("copy")[self._tile_of(index)]
         return self._recipe.lens.distance_of(int(copy))
 

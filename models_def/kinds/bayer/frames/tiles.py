@@ -88,7 +88,7 @@ class Tiles:
         return len(self._facts)
 
     def read(self, index: int) -> Tile:
-        """Give one tile."""
+        """Return one tile."""
         x_mm, y_mm, iso, red, green, blue, copy = (float(v) for v in self._facts[index])
         return Tile(
             planes=self._planes[index].astype(np.float32),
@@ -109,7 +109,7 @@ class Tiles:
         self._facts[index] = (tile.x_mm, tile.y_mm, tile.iso, *tile.noise_rise, tile.copy)
 
     def facts(self, name: str) -> NDArray[np.float64]:
-        """Give one of `FACTS` of all tiles."""
+        """Return one of `FACTS` of all tiles."""
         return np.array(self._facts[:, FACTS.index(name)])
 
 
@@ -130,12 +130,12 @@ def create_tiles(folder: Path, part: str, count: int, recipe: BayerRecipe) -> Ti
 
 
 def tile_side_px(recipe: BayerRecipe) -> int:
-    """Give the side of a tile: a sample and its surroundings."""
+    """Return the side of a tile: a sample and its surroundings."""
     return recipe.data.sample_px + 2 * recipe.data.margin_px
 
 
 def frames_folder(folder: Path, recipe: BayerRecipe) -> Path:
-    """Give where the frames of a recipe lie below the folder of its runs."""
+    """Return where the frames of a recipe lie below the folder of its runs."""
     return folder / f"{recipe.name}_frames"
 
 
@@ -184,7 +184,7 @@ class Frames:
     designed: Mapping[str, bytes]
 
     def digest(self) -> str:
-        """Give the sha256 of what they were photographed with."""
+        """Return the sha256 of what they were photographed with."""
         return hashlib.sha256((self.folder / HEADER).read_bytes()).hexdigest()
 
     def tiles(self, part: str, pictures: Path | None) -> Tiles:
@@ -240,7 +240,7 @@ def read_frames(folder: Path, recipe: BayerRecipe | None = None) -> Frames:
 
 
 def camera_digest(recipe: BayerRecipe) -> str:
-    """Give a hash of all in a recipe that decides its tiles; the bank behind them does not."""
+    """Return a hash of all in a recipe that decides its tiles; the bank behind them does not."""
     content = {
         "sensor": recipe.sensor.model_dump(mode="json"),
         "haze": None if recipe.haze is None else recipe.haze.model_dump(mode="json"),
@@ -252,7 +252,7 @@ def camera_digest(recipe: BayerRecipe) -> str:
 
 
 def names_digest(pictures: Path | None) -> str:
-    """Give a hash of the names of the pictures of a folder; empty without one."""
+    """Return a hash of the names of the pictures of a folder; empty without one."""
     if pictures is None:
         return ""
     names = ",".join(path.name for path in list_pictures(pictures))

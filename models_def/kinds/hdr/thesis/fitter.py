@@ -90,17 +90,17 @@ class ThesisFitter:
         return total + recipe.streak_weight * terms.get("streaks", zero)
 
     def perceptual(self, found: Tensor, wanted: Tensor) -> Tensor:
-        """Give the perceptual loss of (b, 3, h, w) linear pictures."""
+        """Return the perceptual loss of (b, 3, h, w) linear pictures."""
         with torch.no_grad():
             truth = self._features(wanted)
         return perceptual_loss(self._features(found)[1:], truth[1:])
 
     def network(self) -> BetweenRoots:
-        """Give the network that is being trained."""
+        """Return the network that is being trained."""
         return cast("BetweenRoots", self.inner.network)
 
     def notes(self) -> dict[str, float]:
-        """Give the mean of each term since the last call."""
+        """Return the mean of each term since the last call."""
         means = {name: sum(values) / len(values) for name, values in self._notes.items()}
         self._notes.clear()
         return means
@@ -110,15 +110,15 @@ class ThesisFitter:
         return self.inner.restore(planes)
 
     def weights(self) -> State:
-        """Give the weights being trained, VGG-19 among them."""
+        """Return the weights being trained, VGG-19 among them."""
         return self.inner.weights()
 
     def average(self) -> State:
-        """Give the averaged weights."""
+        """Return the averaged weights."""
         return self.inner.average()
 
     def optimizer_state(self) -> dict[str, Any]:
-        """Give the optimiser's state."""
+        """Return the optimiser's state."""
         return self.inner.optimizer_state()
 
     def load(self, weights: State, average: State, optimizer: dict[str, Any]) -> None:
@@ -164,7 +164,7 @@ _TERMS: Final[Mapping[str, Callable[[ThesisFitter, Tensor, Tensor], Terms]]] = {
 
 
 def give_vgg(network: torch.nn.Module, path: Path) -> None:
-    """Give every VGG-19 within a network the weights of a file; see `take_vgg`."""
+    """Return every VGG-19 within a network the weights of a file; see `take_vgg`."""
     for part in network.modules():
         if isinstance(part, VggLevels):
             take_vgg(part, path)
@@ -174,7 +174,7 @@ class ThesisFitting:
     """Fulfils `camkit.models_def.training.fitting.FittingKind`."""
 
     def fitting(self, request: FitRequest) -> OwnFitting | None:
-        """Give the fitter of the thesis's networks; all others have the house's.
+        """Return the fitter of the thesis's networks; all others have the house's.
 
         Raises:
             ContractError: If the network is not that of the role, weights of VGG-19 are missing,

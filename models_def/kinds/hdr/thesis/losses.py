@@ -27,7 +27,7 @@ _LEAST_NORM: Final = 1e-6
 def perceptual_loss(
     found: Sequence[Tensor], wanted: Sequence[Tensor], weights: Sequence[float] = LAYER_WEIGHTS
 ) -> Tensor:
-    """Give the weighted mean |difference| of features, eq. (5.7).
+    """Return the weighted mean |difference| of features, eq. (5.7).
 
     Args:
         found: (b, c, h, w) features of each layer, of what a network gave.
@@ -49,7 +49,7 @@ def perceptual_loss(
 
 
 def exclusion_loss(clean: Tensor, streaks: Tensor) -> Tensor:
-    """Give how far edges of two layers of a picture coincide, eq. (5.8).
+    """Return how far edges of two layers of a picture coincide, eq. (5.8).
 
     Gradients are differences to the next pixel, along x and y each. The Frobenius norm is taken
     over both and divided by the root of their number; the mean over the batch comes back.
@@ -68,17 +68,17 @@ def exclusion_loss(clean: Tensor, streaks: Tensor) -> Tensor:
 def unsaturated_loss(
     perceptual: Tensor, exclusion: Tensor, *, perceptual_weight: float, exclusion_weight: float
 ) -> Tensor:
-    """Give L_U = alpha_1 L_VGG + alpha_2 L_excl, eq. (5.9)."""
+    """Return L_U = alpha_1 L_VGG + alpha_2 L_excl, eq. (5.9)."""
     return perceptual_weight * perceptual + exclusion_weight * exclusion
 
 
 def saturated_loss(perceptual: Tensor, *, weight: float) -> Tensor:
-    """Give L_S = beta L_VGG of the lights, eq. (5.10)."""
+    """Return L_S = beta L_VGG of the lights, eq. (5.10)."""
     return weight * perceptual
 
 
 def fused_loss(fused: Tensor, truth: Tensor) -> Tensor:
-    """Give the Huber loss of roots, eq. (5.11), whose first I lacks its index F.
+    """Return the Huber loss of roots, eq. (5.11), whose first I lacks its index F.
 
     Args:
         fused: (b, c, h, w) I_F, >= 0.
@@ -89,17 +89,17 @@ def fused_loss(fused: Tensor, truth: Tensor) -> Tensor:
 
 
 def total_loss(unsaturated: Tensor, saturated: Tensor, fused: Tensor) -> Tensor:
-    """Give L_total = L_U + L_S + L_F, eq. (5.6)."""
+    """Return L_total = L_U + L_S + L_F, eq. (5.6)."""
     return unsaturated + saturated + fused
 
 
 def _norms(planes: Tensor) -> Tensor:
-    """Give (b,) Frobenius norms; the root of an exact zero has no gradient."""
+    """Return (b,) Frobenius norms; the root of an exact zero has no gradient."""
     return (planes.flatten(1).square().sum(dim=1) + _LEAST_NORM**2).sqrt()
 
 
 def _gradients(planes: Tensor) -> Tensor:
-    """Give (b, n) |differences| to the right and lower neighbour."""
+    """Return (b, n) |differences| to the right and lower neighbour."""
     across = planes[..., :, 1:] - planes[..., :, :-1]
     down = planes[..., 1:, :] - planes[..., :-1, :]
     return torch.cat([across.flatten(1), down.flatten(1)], dim=1).abs()

@@ -30,22 +30,22 @@ class BetweenRoots(nn.Module):
         self.stride_px: Any = body.stride_px
 
     def linear(self, light: Tensor) -> Tensor:
-        """Give (b, 3 m, h, w) linear from (b, 3 n, h, w) linear."""
+        """Return (b, 3 m, h, w) linear from (b, 3 n, h, w) linear."""
         found = self.body(*torch.split(light, PICTURE, dim=1))
         return torch.cat(found, dim=1) if isinstance(found, tuple) else torch.as_tensor(found)
 
     def forward(self, roots: Tensor) -> Tensor:
-        """Give (b, 3 m, h, w) roots from (b, 3 n, h, w) roots."""
+        """Return (b, 3 m, h, w) roots from (b, 3 n, h, w) roots."""
         return to_roots(self.linear(to_light(roots)))
 
 
 def to_light(roots: Tensor) -> Tensor:
-    """Give linear light from its roots."""
+    """Return linear light from its roots."""
     return roots.clamp(min=0).square()
 
 
 def to_roots(light: Tensor) -> Tensor:
-    """Give the roots of linear light; what is negative has 0."""
+    """Return the roots of linear light; what is negative has 0."""
     return light.clamp(min=0).sqrt()
 
 

@@ -79,7 +79,7 @@ class CodedCamera:
             self._fixed = material.color_kernels(recipe, bare=recipe.thesis.optics == "bare")
 
     def kernels(self, rng: Generator) -> FloatArray:
-        """Give the (3, n, n) kernels of a shot; a windshield's lie at another angle each time."""
+        """Return the (3, n, n) kernels of a shot; a windshield's lie at another angle each time."""
         if self._fixed is not None:
             return self._fixed
         star = star_kernel(self.recipe.glare, draw_angle_rad(self.recipe.glare, rng))

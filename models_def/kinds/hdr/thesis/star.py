@@ -17,7 +17,7 @@ from camkit.models_def.kinds.hdr.thesis_recipe import GlareRecipe
 
 
 def star_kernel(glare: GlareRecipe, angle_rad: float) -> FloatArray:
-    """Give the kernel (n, n) of sum 1, n = 2 reach + 1.
+    """Return the kernel (n, n) of sum 1, n = 2 reach + 1.
 
     Args:
         glare: Its numbers.

@@ -51,7 +51,7 @@ class CodedJudge:
     samples: Sequence[tuple[float, Tensor, Tensor]]
 
     def baselines(self) -> Mapping[str, float]:
-        """Give the mean dB of what is to be beaten."""
+        """Return the mean dB of what is to be beaten."""
         name, make = BASELINES[self.role]
         return {name: self.score(make).mean_db}
 

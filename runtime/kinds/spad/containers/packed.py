@@ -50,7 +50,7 @@ def opened_zip(path: Path) -> Iterator[zipfile.ZipFile]:
 def member_bytes(
     archive: zipfile.ZipFile, member: zipfile.ZipInfo, max_bytes: int
 ) -> memoryview | mmap.mmap:
-    """Give the bytes of a member.
+    """Return the bytes of a member.
 
     Args:
         archive: Open.
@@ -85,7 +85,7 @@ def _mapped(path: Path, member: zipfile.ZipInfo) -> mmap.mmap:
 
 
 def _at(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> int:
-    """Give where the bytes of a stored member begin (APPNOTE 4.3.7)."""
+    """Return where the bytes of a stored member begin (APPNOTE 4.3.7)."""
     with Path(str(archive.filename)).open("rb") as file:
         file.seek(member.header_offset)
         header = file.read(LOCAL_HEADER)

@@ -93,5 +93,5 @@ class ArrayFile(CountsFile):
         return checked_counts(self.path, part.transpose([axes.index(a) for a in "yxt"]), top)
 
     def close(self) -> None:
-        """Let go of what it lies in."""
+        """Release what it lies in."""
         self._close()

@@ -13,7 +13,7 @@ from camkit.runtime.kinds.spad.timing import TABLE_OF
 
 
 def chosen_name(path: Path, names: Iterable[str], hints: Hints, what: str = "arrays") -> str:
-    """Give the variable to read.
+    """Return the variable to read.
 
     Args:
         path: The file, for errors.
@@ -45,7 +45,7 @@ def chosen_name(path: Path, names: Iterable[str], hints: Hints, what: str = "arr
 
 
 def stated_values(values: Mapping[str, Any]) -> dict[str, object]:
-    """Give what small values say of times, those of other names left out."""
+    """Return what small values say of times, those of other names left out."""
     found: dict[str, object] = {}
     for name, value in values.items():
         if name not in TABLE_OF:

@@ -70,7 +70,7 @@ class CountsFile(ABC):
 
     @property
     def outside(self) -> int:
-        """Give how many time stamps of the rows read so far lay outside all bins."""
+        """Return how many time stamps of the rows read so far lay outside all bins."""
         return 0
 
     @abstractmethod
@@ -91,7 +91,7 @@ class CountsFile(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Let go of the file."""
+        """Release the file."""
 
     def __enter__(self) -> Self:
         return self
@@ -137,7 +137,7 @@ def checked_bins(path: Path, bins: int, pixels: int, kind: CountsKind) -> int:
 
 
 def checked_counts(path: Path, values: NDArray[Any], top: int) -> FloatArray:
-    """Give values (rows, w, n) as counts.
+    """Return values (rows, w, n) as counts.
 
     Raises:
         DecodeError: If one is negative, fractional, not finite or beyond what is exact; names

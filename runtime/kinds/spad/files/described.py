@@ -13,7 +13,7 @@ from camkit.runtime.kinds.spad.timing import Timing, read_timing, timing_beside
 
 
 def describe(path: Path) -> Mapping[str, Any]:
-    """Say what a capture holds, as plain JSON values.
+    """Return what a capture holds, as plain JSON values.
 
     Args:
         path: The file; a timing file beside it says its axes, if it does not.
@@ -41,7 +41,7 @@ def describe(path: Path) -> Mapping[str, Any]:
 
 
 def _told(value: object) -> object:
-    """Give a stated value; of many numbers, such as edges, how many there are and their ends."""
+    """Return a stated value; of many numbers, such as edges, how many there are and their ends."""
     if not isinstance(value, np.ndarray | np.generic):
         return value
     array = np.asarray(value)

@@ -120,7 +120,7 @@ def _listed_bytes(shape: tuple[int, ...], kind: str) -> int:
 
 
 def _may_be(name: str, shape: tuple[int, ...], kind: str) -> bool:
-    """Tell whether a variable may hold counts or cells of stamps."""
+    """Return whether a variable may hold counts or cells of stamps."""
     if name in TABLE_OF or kind in {"char", "struct", "object", "opaque", "function", "sparse"}:
         return False
     return kind == "cell" or sum(side > 1 for side in shape) > 1

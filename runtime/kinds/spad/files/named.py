@@ -18,7 +18,7 @@ LONGEST: Final = 64
 
 
 def named_bundle(path: Path) -> str | None:
-    """Give the name; None for files that name none, or cannot be read.
+    """Return the name; None for files that name none, or cannot be read.
 
     NPZ and HDF5 name it themselves, others in the timing file beside them.
 

@@ -70,7 +70,7 @@ def read_npz(
 
 
 def _header(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> Header:
-    """Give shape, order and type of an array.
+    """Return shape, order and type of an array.
 
     Raises:
         DecodeError: If the member is no array, or a pickled one.
@@ -88,7 +88,7 @@ def _header(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> Header:
 def _array(
     archive: zipfile.ZipFile, member: zipfile.ZipInfo, header: Header, max_bytes: int
 ) -> NDArray[Any]:
-    """Give an array, mapped where it is stored as it is.
+    """Return an array, mapped where it is stored as it is.
 
     Raises:
         DecodeError: If the member has fewer bytes than its header says.

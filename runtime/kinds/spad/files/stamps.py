@@ -62,7 +62,7 @@ class StampsFile(CountsFile):
         return found
 
     def _pieces(self, y: int) -> Iterator[tuple[NDArray[np.int64], NDArray[np.float64]]]:
-        """Give the stamps of a row with their pixels, so many at once as memory is no matter."""
+        """Return the stamps of a row with their pixels, so many at once as memory is no matter."""
         cells = [np.ravel(cell) for cell in self._cells(y)]
         ends = np.cumsum([cell.size for cell in cells])
         begins = ends - [cell.size for cell in cells]
@@ -78,11 +78,11 @@ class StampsFile(CountsFile):
 
     @property
     def outside(self) -> int:
-        """Give how many stamps of the rows read so far lay outside all bins."""
+        """Return how many stamps of the rows read so far lay outside all bins."""
         return sum(self._outside.values())
 
     def close(self) -> None:
-        """Let go of what they lie in."""
+        """Release what they lie in."""
         if self._close is not None:
             self._close()
 

@@ -37,7 +37,7 @@ DEFAULT_SIZE: Final = "M"
 
 
 def network_planes(photons: FloatArray, white: float, dark: FloatArray | float = 0.0) -> FloatArray:
-    """Give what a network is given of a picture, (2, h, w): light, and 3 sigma of it.
+    """Return what a network is given of a picture, (2, h, w): light, and 3 sigma of it.
 
     Args:
         photons: (h, w), without dark counts.
@@ -49,7 +49,7 @@ def network_planes(photons: FloatArray, white: float, dark: FloatArray | float =
 
 
 def white_of(photons: FloatArray) -> float:
-    """Give the photons that are taken for white in a picture (h, w), or in several (n, h, w).
+    """Return the photons that are taken for white in a picture (h, w), or in several (n, h, w).
 
     Of several, that of the brightest: most bins of light in flight are dark.
     """
@@ -102,33 +102,33 @@ class FineCamera:
 
     @property
     def sensor(self) -> SpadSensor:
-        """Give its array."""
+        """Return its array."""
         sensor = self.bundle.manifest.sensor
         assert isinstance(sensor, SpadSensor)
         return sensor
 
     @property
     def scale(self) -> int:
-        """Give the sub-pixels along a side of a pixel."""
+        """Return the sub-pixels along a side of a pixel."""
         return self.sensor.sub_pixels
 
     @property
     def grid(self) -> Grid:
-        """Give where a pixel sees."""
+        """Return where a pixel sees."""
         return Grid(scale=self.sensor.sub_pixels, phase=self.sensor.phase)
 
     @property
     def kernel(self) -> FloatArray:
-        """Give the light of a point on the fine grid, (n, n)."""
+        """Return the light of a point on the fine grid, (n, n)."""
         return sampling_kernel(self.stage, np.array(self.bundle.psf.kernels[0, 0, 0]), self.grid)
 
     @property
     def sizes(self) -> Mapping[str, object]:
-        """Give its networks by size."""
+        """Return its networks by size."""
         return self.bundle.manifest.networks.get(self.stage.role, {})
 
     def size(self, asked: str | None) -> str:
-        """Give the size of network to run: the one asked for, else M.
+        """Return the size of network to run: the one asked for, else M.
 
         Raises:
             ContractError: If there is none.
@@ -143,7 +143,7 @@ class FineCamera:
         return asked or (DEFAULT_SIZE if DEFAULT_SIZE in sizes else next(iter(sizes)))
 
     def size_of_bins(self, asked: str | None) -> str:
-        """Give the size of network that makes bins finer for depth: asked for, else the smallest.
+        """Return the size of network that makes bins finer for depth: asked for, else the smallest.
 
         A larger one brings times nearer by a few percent at most (`tools.spad.depth`), and every
         bin costs what it costs.
@@ -155,7 +155,7 @@ class FineCamera:
         return self.size(asked or small)
 
     def stated_times(self) -> dict[str, Any]:
-        """Give what the bundle says of times and pulse, by the names of a timing file."""
+        """Return what the bundle says of times and pulse, by the names of a timing file."""
         usual, sensor = self.sharpen, self.sensor
         if usual is None:
             return {}
@@ -186,7 +186,7 @@ class FineCamera:
             )
 
     def linear(self, photons: float, kernel: FloatArray | None = None) -> LinearEstimate:
-        """Give the linear estimate at a level of light.
+        """Return the linear estimate at a level of light.
 
         Args:
             photons: Of a pixel, on average; inf for no noise.
@@ -199,7 +199,7 @@ class FineCamera:
         return linear_estimate(seen, self.grid, PictureCovariance.of(self.stage), photons)
 
     def network(self, size: str) -> NetworkEngine:
-        """Give the network of a size, made when first asked for.
+        """Return the network of a size, made when first asked for.
 
         Raises:
             BundleError: If there is none, or its graph is not what the bundle says.
@@ -226,7 +226,7 @@ class FineCamera:
         dark: FloatArray | float = 0.0,
         cancel: Cancel | None = None,
     ) -> FloatArray:
-        """Give pictures (n, m h, m w) of photons (n, h, w) by the network of a size.
+        """Return pictures (n, m h, m w) of photons (n, h, w) by the network of a size.
 
         Args:
             frames: Photons without dark counts.

@@ -39,11 +39,11 @@ class PictureCovariance:
 
     @classmethod
     def of(cls, stage: SuperResolve) -> "PictureCovariance":
-        """Give what a stage takes for granted."""
+        """Return what a stage takes for granted."""
         return cls(contrast=stage.contrast, reach=stage.reach, exponent=stage.exponent)
 
     def lags(self, most: int) -> NDArray[np.float64]:
-        """Give C at all distances up to `most` sub-pixels, (2 most + 1, 2 most + 1)."""
+        """Return C at all distances up to `most` sub-pixels, (2 most + 1, 2 most + 1)."""
         line = np.arange(-most, most + 1)
         distance = np.hypot(line[:, None], line)
         return np.asarray(self.contrast**2 * np.exp(-((distance / self.reach) ** self.exponent)))

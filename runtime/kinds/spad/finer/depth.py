@@ -36,13 +36,13 @@ SHARPER: Final = 20.0
 
 
 def _lit(coarse: Sharpened) -> float:
-    """Give the signal photons of a pixel, on average over those that show a surface."""
+    """Return the signal photons of a pixel, on average over those that show a surface."""
     valid = coarse.valid[0]
     return float(coarse.amplitude[0][valid].mean()) if valid.any() else 0.0
 
 
 def bright_bin(frames: FloatArray) -> float:
-    """Give the photons of a pixel in a bin where photons are, of (bins, h, w)."""
+    """Return the photons of a pixel in a bin where photons are, of (bins, h, w)."""
     means = np.maximum(frames.mean(axis=(1, 2), dtype=np.float64), 0)
     return float((means**2).sum() / max(float(means.sum()), 1e-12))
 
@@ -157,7 +157,7 @@ class FineSharpener:
         coarse: Sharpened,
         share: NDArray[np.float64],
     ) -> Sharpened:
-        """Give it with the evidence of first returns over the background of the pixels around.
+        """Return it with the evidence of first returns over the background of the pixels around.
 
         Weights below 0 can take the background of a sub-pixel away, and anything is evidence over
         nothing.

@@ -64,18 +64,18 @@ class LinearEstimate:
 
     @property
     def noise_gain(self) -> FloatArray:
-        """Give what becomes of the deviation of independent counts, (m, m)."""
+        """Return what becomes of the deviation of independent counts, (m, m)."""
         gains = np.sqrt(np.square(self.weights, dtype=np.float64).sum(axis=(1, 2)))
         return np.asarray(gains.reshape(self.scale, self.scale), np.float32)
 
     @property
     def largest(self) -> FloatArray:
-        """Give how much of a sub-pixel one photon makes at most, (m, m)."""
+        """Return how much of a sub-pixel one photon makes at most, (m, m)."""
         most = self.weights.max(axis=(1, 2))
         return np.asarray(most.reshape(self.scale, self.scale), np.float32)
 
     def __call__(self, frames: FloatArray) -> FloatArray:
-        """Give pictures (n, m h, m w) of photons (n, h, w); borders go on as they end."""
+        """Return pictures (n, m h, m w) of photons (n, h, w); borders go on as they end."""
         count, height, width = frames.shape
         wide = np.pad(frames, ((0, 0), (REACH, REACH), (REACH, REACH)), mode="edge")
         around = np.lib.stride_tricks.sliding_window_view(wide, (SIDE, SIDE), axis=(1, 2))
@@ -94,7 +94,7 @@ class LinearEstimate:
 def linear_estimate(
     kernel: FloatArray, grid: Grid, covariance: PictureCovariance, photons: float
 ) -> LinearEstimate:
-    """Give the best linear estimate at a level of light.
+    """Return the best linear estimate at a level of light.
 
     Args:
         kernel: (n, n), n odd, of unit sum: the light of a point as it falls on the sub-pixels.

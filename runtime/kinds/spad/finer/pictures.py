@@ -20,7 +20,7 @@ Step = Callable[[int, int], None]
 
 
 def where_light_is(frame: FloatArray, dark: NDArray[np.floating] | float = 0.0) -> float:
-    """Give the photons of a pixel (h, w) where photons are: their mean, weighed by themselves.
+    """Return the photons of a pixel (h, w) where photons are: their mean, weighed by themselves.
 
     Chance alone adds one photon to that, which is taken off, and so are dark counts.
 
@@ -44,7 +44,7 @@ def finer_frames(
     progress: Step | None = None,
     cancel: Cancel | None = None,
 ) -> FloatArray:
-    """Give pictures (n, m h, m w) of photons (n, h, w), >= 0.
+    """Return pictures (n, m h, m w) of photons (n, h, w), >= 0.
 
     Frames without photons stay dark and take no time.
 

@@ -23,7 +23,7 @@ GAUSSIAN_PIXELS: Final = math.sqrt(3 * math.log(2)) / math.pi
 
 
 def sampling_kernel(stage: SuperResolve, plate: FloatArray, grid: Grid) -> FloatArray:
-    """Give the kernel (n, n) of a stage's sampling, of the size of the plate's.
+    """Return the kernel (n, n) of a stage's sampling, of the size of the plate's.
 
     Args:
         stage: Says what its pixels see through.
@@ -42,19 +42,19 @@ def sampling_kernel(stage: SuperResolve, plate: FloatArray, grid: Grid) -> Float
 
 
 def light_of(stage: SuperResolve, grid: Grid) -> float:
-    """Give how many times the light of one sub-pixel a pixel collects."""
+    """Return how many times the light of one sub-pixel a pixel collects."""
     return float(grid.scale**2) if stage.sampling == "full_fill" else 1.0
 
 
 def point_kernel(side: int) -> FloatArray:
-    """Give the kernel (side, side) of no plate at all."""
+    """Return the kernel (side, side) of no plate at all."""
     kernel = np.zeros((side, side), np.float32)
     kernel[side // 2, side // 2] = 1
     return kernel
 
 
 def box_kernel(side: int, grid: Grid) -> FloatArray:
-    """Give the kernel (side, side) whose sample at a phase is the mean of the pixel.
+    """Return the kernel (side, side) whose sample at a phase is the mean of the pixel.
 
     Raises:
         ContractError: If a pixel does not fit in.
@@ -68,7 +68,7 @@ def box_kernel(side: int, grid: Grid) -> FloatArray:
 
 
 def gaussian_kernel(side: int, sigma: float) -> FloatArray:
-    """Give a Gaussian (side, side) of unit sum; sigma in sub-pixels.
+    """Return a Gaussian (side, side) of unit sum; sigma in sub-pixels.
 
     Raises:
         ContractError: If sigma is not a number > 0.

@@ -40,7 +40,7 @@ class SigmaShares:
         photons: float,
         bin_ps: float,
     ) -> NDArray[np.float64]:
-        """Give sigma.
+        """Return sigma.
 
         Args:
             linear_ps: That of the linear estimate.
@@ -58,7 +58,7 @@ OF_NETWORK: Final = SigmaShares(noise=0.48, faint=28.0, slope=0.155, of_bin=0.03
 
 
 def slopes(times_ps: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Give how much times (returns, h, w) change from one sub-pixel to the next, over four."""
+    """Return how much times (returns, h, w) change from one sub-pixel to the next, over four."""
     wide = np.pad(times_ps, ((0, 0), (2, 2), (2, 2)), mode="edge")
     down = (wide[:, 4:, 2:-2] - wide[:, :-4, 2:-2]) / 4
     right = (wide[:, 2:-2, 4:] - wide[:, 2:-2, :-4]) / 4

@@ -73,7 +73,7 @@ class Decay:
             )
 
     def shapes(self, mu_ps: Floats, lifetime_ps: Floats) -> Shapes:
-        """Give what bins see.
+        """Return what bins see.
 
         Args:
             mu_ps: (p,) times of the pulse.
@@ -95,7 +95,7 @@ class Decay:
         )
 
     def _held(self, u: Floats, tau: Floats) -> tuple[Floats, Floats]:
-        """Give T, and its derivative by the logarithm of tau."""
+        """Return T, and its derivative by the logarithm of tau."""
         if isinstance(self.pulse, GaussianPulse):
             sigma = self.pulse.sigma_ps
             held = pending(u, sigma, tau)
@@ -110,7 +110,7 @@ class Decay:
 
 
 def _held_of_samples(pulse: SampledPulse, u: Floats, tau: Floats) -> Floats:
-    """Give T of straight lines between samples, exactly; u (p, n), tau (p, 1)."""
+    """Return T of straight lines between samples, exactly; u (p, n), tau (p, 1)."""
     t, f = pulse.times_ps, pulse.density(pulse.times_ps)
     steps, slopes = np.diff(t), np.diff(f) / np.diff(t)
     density = np.zeros((len(tau), len(t)))

@@ -90,7 +90,7 @@ class LifetimeFitter:
         return Starts(self.decay, *self.limits_ps)
 
     def threshold(self, false_alarms: float = FALSE_ALARMS) -> float:
-        """Give the evidence from which on a decay is believed."""
+        """Return the evidence from which on a decay is believed."""
         return threshold_for(false_alarms, self._starts.length)
 
     def fit(self, counts: FloatArray) -> Lifetimes:
@@ -127,7 +127,7 @@ class LifetimeFitter:
         )
 
     def _start(self, counts: FloatArray, n: Floats) -> Floats:
-        """Give parameters (4, p) to begin from."""
+        """Return parameters (4, p) to begin from."""
         starts = self._starts
         found, most = np.empty((4, len(n))), np.full(len(n), -np.inf)
         for template in starts.best(counts):
@@ -141,7 +141,7 @@ class LifetimeFitter:
         return found
 
     def _model(self, values: Floats) -> tuple[Floats, Floats]:
-        """Give mean counts (p, bins) and their derivatives (p, 4, bins) at (4, p) parameters."""
+        """Return mean counts (p, bins) and their derivatives (p, 4, bins) at (4, p) parameters."""
         shapes: Shapes = self.decay.shapes(values[1], np.exp(values[0]))
         a, b = values[2][:, None], values[3][:, None]
         gradients = np.stack(
@@ -181,7 +181,7 @@ class LifetimeFitter:
         return values, height
 
     def _step(self, counts: Floats, mean: Floats, gradients: Floats, values: Floats) -> Floats:
-        """Give the step of Fisher scoring, (4, p); a background at its floor stays there."""
+        """Return the step of Fisher scoring, (4, p); a background at its floor stays there."""
         wish = (gradients @ (counts / mean - 1)[..., None])[..., 0]
         matrix = _fisher(mean, gradients)
         floored = (values[3] <= 2 * FLOOR) & (wish[:, 3] < 0)
@@ -203,7 +203,7 @@ class LifetimeFitter:
 
 
 def _shared_out(counts: Floats, shares: Floats) -> tuple[Floats, Floats]:
-    """Give photons of a decay and counts of a bin that come near the likeliest, (p,) each."""
+    """Return photons of a decay and counts of a bin that come near the likeliest, (p,) each."""
     photons, bins = counts.sum(axis=1), counts.shape[1]
     a, b = 0.8 * photons, 0.2 * photons / bins
     seen = np.maximum(shares.sum(axis=1), 1e-6)
@@ -216,7 +216,7 @@ def _shared_out(counts: Floats, shares: Floats) -> tuple[Floats, Floats]:
 
 
 def _fisher(mean: Floats, gradients: Floats) -> Floats:
-    """Give the information (p, 4, 4), a little of its diagonal added so that it can be solved."""
+    """Return the information (p, 4, 4), a little of its diagonal added so that it can be solved."""
     scaled = gradients / np.sqrt(mean)[:, None]
     found = scaled @ scaled.transpose(0, 2, 1)
     diagonal = np.einsum("pii->pi", found)

@@ -61,13 +61,13 @@ class Starts:
         self._shares = shares if group == 1 else None
 
     def best(self, counts: FloatArray) -> list[NDArray[np.int64]]:
-        """Give the likeliest template of every pixel, by every look."""
+        """Return the likeliest template of every pixel, by every look."""
         if self._shares is None:
             counts = np.add.reduceat(counts, self._first, axis=1)
         return [(counts @ logs).argmax(axis=1) for logs in self._logs]
 
     def shares(self, templates: NDArray[np.int64]) -> Floats:
-        """Give what every bin of the axis sees of some templates, (p, bins)."""
+        """Return what every bin of the axis sees of some templates, (p, bins)."""
         if self._shares is not None:
             return np.asarray(self._shares[templates])
         return self._decay.shapes(self.mu_ps[templates], self.lifetime_ps[templates]).shares

@@ -99,7 +99,7 @@ def make_depth(making: Making, survey: Survey, began: float) -> Made:
 def _worked_through(
     making: Making, survey: Survey, sharpener: Sharpener
 ) -> tuple[Sharpened, NDArray[np.bool_], float]:
-    """Give what was found, which pixels were blind, and the worst loss to pile-up."""
+    """Return what was found, which pixels were blind, and the worst loss to pile-up."""
     way = survey.settings.way
     cut = pieces(
         survey.shape,
@@ -134,7 +134,7 @@ def _worked_through(
 def _made_finer(
     making: Making, survey: Survey, fine: FineSharpener
 ) -> tuple[Sharpened, NDArray[np.bool_], float, Mapping[str, Any]]:
-    """Give the same on the fine grid of a bundle, and how it was found."""
+    """Return the same on the fine grid of a bundle, and how it was found."""
     check_cancelled(making.cancel)
     check_room(survey.shape, survey.bins, FINE_BYTES_OF_COUNT, survey.settings.max_mem_bytes)
     strip = survey.rows.rows(0, survey.shape[0])
@@ -156,7 +156,7 @@ def _made_finer(
 
 
 def _growth(survey: Survey, sharpener: Sharpener, strip: Strip) -> NDArray[np.float64] | None:
-    """Give how much more the counts of every pixel scatter for pile-up; None where it is little."""
+    """Return how much more the counts of pixels scatter for pile-up; None where it is little."""
     if strip.worst < LITTLE_LOST:
         return None
     flat = strip.counts.reshape(-1, strip.counts.shape[2])
@@ -165,7 +165,7 @@ def _growth(survey: Survey, sharpener: Sharpener, strip: Strip) -> NDArray[np.fl
 
 
 def fine_sharpener(survey: Survey, camera: FineCamera, pulse: Pulse) -> FineSharpener:
-    """Give what sharpens a capture behind the plate of its bundle."""
+    """Return what sharpens a capture behind the plate of its bundle."""
     return FineSharpener(
         camera,
         survey.an_axis,
@@ -177,7 +177,7 @@ def fine_sharpener(survey: Survey, camera: FineCamera, pulse: Pulse) -> FineShar
 
 
 def _arrays(found: Sharpened, survey: Survey) -> dict[str, NDArray[Any]]:
-    """Give the arrays of the archive; the leading axis goes where there is one return."""
+    """Return the arrays of the archive; the leading axis goes where there is one return."""
     scale = 1 if survey.camera is None else survey.camera.scale
     dark = survey.timing.dark(survey.shape).repeat(scale, axis=0).repeat(scale, axis=1)
     depth = (found.time_of_flight_ps - survey.timing.correction.offset_ps) * LIGHT_M_PER_PS / 2

@@ -13,7 +13,7 @@ from camkit.runtime.maker import Made, Making, Write
 
 
 def make_intensity(making: Making, survey: Survey, began: float) -> Made:
-    """Give the photons of every pixel; arguments and errors as of `make_depth`.
+    """Return the photons of every pixel; arguments and errors as of `make_depth`.
 
     A capture of several frames of counts gives them all.
     """

@@ -88,7 +88,7 @@ def make_lifetime(making: Making, survey: Survey, began: float) -> Made:
 
 
 def _window(survey: Survey) -> _Window:
-    """Give the bins to fit.
+    """Return the bins to fit.
 
     Raises:
         ContractError: If too few are left.
@@ -155,7 +155,7 @@ def _arrays(
 
 
 def _strips(making: Making, survey: Survey) -> Iterator[tuple[int, FloatArray, NDArray[np.bool_]]]:
-    """Give first row, counts (rows, w, bins) and blind pixels of strip after strip."""
+    """Return first row, counts (rows, w, bins) and blind pixels of strip after strip."""
     for piece in pieces(
         survey.shape,
         survey.bins,

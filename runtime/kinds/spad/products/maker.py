@@ -53,7 +53,7 @@ def make(making: Making) -> Made:
 
 
 def plan(making: Making) -> Mapping[str, Any]:
-    """Say what `make` would do; errors as there."""
+    """Return what `make` would do; errors as there."""
     with surveyed(making) as survey:
         found: dict[str, Any] = {
             "product": survey.product,
@@ -114,7 +114,7 @@ def _neighbours(survey: Survey) -> tuple[str, str]:
 
 
 def _finer(survey: Survey, camera: FineCamera) -> list[tuple[str, str, str]]:
-    """Say how pictures become finer behind a plate, as the capture's light will decide."""
+    """Return how pictures become finer behind a plate, as the capture's light will decide."""
     size, asked = survey.size_of_pictures, survey.settings.finer is not None
     network = "linear" if size is None else f"network {size}"
     if asked or size is None:
@@ -137,7 +137,7 @@ def _finer(survey: Survey, camera: FineCamera) -> list[tuple[str, str, str]]:
 
 
 def stem(path: Path) -> str:
-    """Give the name of a capture without its type; NAME.sdt.zip is NAME."""
+    """Return the name of a capture without its type; NAME.sdt.zip is NAME."""
     return Path(path.stem).stem if path.name.lower().endswith(".sdt.zip") else path.stem
 
 

@@ -21,7 +21,7 @@ SHARE: Final = 0.4
 
 
 def frames_of(making: Making, survey: Survey) -> FloatArray:
-    """Give all photons, (bins or frames, h, w) float32.
+    """Return all photons, (bins or frames, h, w) float32.
 
     Raises:
         DecodeError: If the file is damaged, or holds no counts.
@@ -36,7 +36,7 @@ def frames_of(making: Making, survey: Survey) -> FloatArray:
 
 
 def full_pixels(survey: Survey) -> tuple[str, ...]:
-    """Give what the user should know of pixels that counted in every cycle."""
+    """Return what the user should know of pixels that counted in every cycle."""
     blind = survey.rows.blind_pixels
     if not blind:
         return ()
@@ -44,7 +44,7 @@ def full_pixels(survey: Survey) -> tuple[str, ...]:
 
 
 def sum_of(making: Making, survey: Survey) -> FloatArray:
-    """Give the photons of every pixel, (1, h, w) float32; errors as of `frames_of`."""
+    """Return the photons of every pixel, (1, h, w) float32; errors as of `frames_of`."""
     found = np.empty((1, *survey.shape), np.float32)
     for top, counts in _strips(making, survey, found.nbytes):
         found[0, top : top + len(counts)] = counts.sum(axis=2, dtype=np.float64)
@@ -52,7 +52,7 @@ def sum_of(making: Making, survey: Survey) -> FloatArray:
 
 
 def made_finer(making: Making, survey: Survey, frames: FloatArray) -> FloatArray:
-    """Give pictures (n, h, w) on the fine grid of the bundle; without one as they are.
+    """Return pictures (n, h, w) on the fine grid of the bundle; without one as they are.
 
     Raises:
         ContractError: If they do not fit the memory.
@@ -73,7 +73,7 @@ def made_finer(making: Making, survey: Survey, frames: FloatArray) -> FloatArray
 
 
 def _strips(making: Making, survey: Survey, held_bytes: int) -> Iterator[tuple[int, FloatArray]]:
-    """Give first row and counts (rows, w, n) of strip after strip."""
+    """Return first row and counts (rows, w, n) of strip after strip."""
     dark = survey.timing.dark(survey.shape)
     for piece in pieces(
         survey.shape,
@@ -99,7 +99,7 @@ def _sound(frames: FloatArray, survey: Survey) -> FloatArray:
 
 
 def _room(shape: tuple[int, int, int], max_mem_bytes: int) -> FloatArray:
-    """Give an empty array: in memory, or in a file without a name where it is too large."""
+    """Return an empty array: in memory, or in a file without a name where it is too large."""
     count = int(np.prod(shape))
     if 4 * count <= SHARE * (max_mem_bytes - KEPT_BYTES):
         return np.empty(shape, np.float32)

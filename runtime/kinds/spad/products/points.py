@@ -24,7 +24,7 @@ def directions(
     scale: int = 1,
     phase: int = 0,
 ) -> NDArray[np.float64]:
-    """Give the unit vectors (h, w, 3) along which pixels look.
+    """Return the unit vectors (h, w, 3) along which pixels look.
 
     Args:
         shape: (h, w).

@@ -25,7 +25,7 @@ MOST_CLIPPED: Final = 30.0
 
 
 def depth_picture(depth_m: NDArray[np.float64]) -> Codes:
-    """Give depth (h, w) as colours (h, w, 3) BGR: near is red, far blue, not known grey."""
+    """Return depth (h, w) as colours (h, w, 3) BGR: near is red, far blue, not known grey."""
     known = np.isfinite(depth_m)
     if not known.any():
         return np.full((*depth_m.shape, 3), UNKNOWN, np.uint8)
@@ -38,19 +38,19 @@ def depth_picture(depth_m: NDArray[np.float64]) -> Codes:
 
 
 def grey_picture(photons: NDArray[np.floating], white: float) -> Codes:
-    """Give photons (h, w) as grey (h, w, 3), `white` photons as white."""
+    """Return photons (h, w) as grey (h, w, 3), `white` photons as white."""
     share = np.clip(photons / max(white, 1e-9), 0, 1)
     codes = np.round(share ** (1 / GAMMA) * 255).astype(np.uint8)
     return np.repeat(codes[..., None], 3, axis=2)
 
 
 def white_of(photons: NDArray[np.floating]) -> float:
-    """Give how many photons are shown white in a picture (h, w)."""
+    """Return how many photons are shown white in a picture (h, w)."""
     return float(np.percentile(photons, BRIGHTEST)) if photons.size else 1.0
 
 
 def white_of_flight(frames: NDArray[np.floating]) -> float:
-    """Give how many photons are shown white in a film of light in flight (t, h, w).
+    """Return how many photons are shown white in a film of light in flight (t, h, w).
 
     The first surface may be hundreds of times brighter than what comes after it, in few frames:
     these may clip, or nothing else would be seen.
@@ -60,7 +60,7 @@ def white_of_flight(frames: NDArray[np.floating]) -> float:
 
 
 def enlarged(codes: Codes, *, even: bool = False) -> Codes:
-    """Give a picture with every pixel as a square where it would be too small to look at.
+    """Return a picture with every pixel as a square where it would be too small to look at.
 
     Args:
         codes: (h, w, 3).

@@ -10,7 +10,7 @@ from camkit.runtime.kinds.spad.time_axis import TimeAxis
 
 
 def told_way(way: Way) -> Mapping[str, Any]:
-    """Say how pixels are fitted, as plain JSON values."""
+    """Return how pixels are fitted, as plain JSON values."""
     return {
         "method": way.method,
         "pool": way.pool,
@@ -20,7 +20,7 @@ def told_way(way: Way) -> Mapping[str, Any]:
 
 
 def told_finer(survey: Survey) -> Mapping[str, Any]:
-    """Say how pictures were made finer, as plain JSON values; nothing without a bundle."""
+    """Return how pictures were made finer, as plain JSON values; nothing without a bundle."""
     if survey.camera is None:
         return {}
     size = survey.size_of_pictures
@@ -28,7 +28,7 @@ def told_finer(survey: Survey) -> Mapping[str, Any]:
 
 
 def told_axis(axis: TimeAxis) -> Mapping[str, Any]:
-    """Say where the bins lie, as plain JSON values."""
+    """Return where the bins lie, as plain JSON values."""
     return {
         "orientation": axis.orientation,
         "bins": axis.bins,
@@ -38,7 +38,7 @@ def told_axis(axis: TimeAxis) -> Mapping[str, Any]:
 
 
 def told_pulse(pulse: Pulse, *, is_guessed: bool) -> Mapping[str, Any]:
-    """Say what a pulse looks like, as plain JSON values."""
+    """Return what a pulse looks like, as plain JSON values."""
     if isinstance(pulse, GatedPulse):
         shape = {"width_ps": pulse.width_ps, "rc_ps": pulse.rc_ps, "sigma_ps": pulse.sigma_ps}
     elif isinstance(pulse, GaussianPulse):

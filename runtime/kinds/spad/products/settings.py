@@ -71,7 +71,7 @@ class Settings:
         )
 
     def product_of(self, *, is_histogram: bool) -> Product:
-        """Give what is to be made of a capture.
+        """Return what is to be made of a capture.
 
         Raises:
             ContractError: If it cannot be, or an option means nothing to it.
@@ -91,7 +91,7 @@ class Settings:
 
 
 def identity(options: Options, capture: Path) -> Mapping[str, Any]:
-    """Give the content of a capture's timing file, and of the files that it names."""
+    """Return the content of a capture's timing file, and of the files that it names."""
     file = _timing_file(options, capture)
     if file is None:
         return {}
@@ -107,7 +107,7 @@ def _digest(file: Path) -> str:
 
 
 def _timing_file(options: Options, capture: Path) -> Path | None:
-    """Give the timing file that was named, else that beside the capture, if one lies there."""
+    """Return the timing file that was named, else that beside the capture, if one lies there."""
     named = options.chosen("timing")
     if named is not None:
         return Path(named)

@@ -33,7 +33,7 @@ class Piece:
 
     @property
     def core(self) -> slice:
-        """Give the rows that are asked for among those that are read."""
+        """Return the rows that are asked for among those that are read."""
         return slice(self.top - self.first, self.bottom - self.first)
 
 

@@ -56,17 +56,17 @@ class Survey:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Give (h, w)."""
+        """Return (h, w)."""
         return self.file.height, self.file.width
 
     @property
     def bins(self) -> int:
-        """Give how many time bins, or frames, a pixel has."""
+        """Return how many time bins, or frames, a pixel has."""
         return self.file.bins if self.axis is None else self.axis.bins
 
     @property
     def an_axis(self) -> TimeAxis:
-        """Give the axis.
+        """Return the axis.
 
         Raises:
             ContractError: If the capture has no times.
@@ -77,7 +77,7 @@ class Survey:
 
     @property
     def size_of_pictures(self) -> str | None:
-        """Give the network that makes pictures finer; None for the linear estimate."""
+        """Return the network that makes pictures finer; None for the linear estimate."""
         if self.camera is None or self.settings.finer == "linear" or not self.camera.sizes:
             return None
         asked = self.settings.size
@@ -86,7 +86,7 @@ class Survey:
         return self.camera.size(asked)
 
     def pulse(self) -> tuple[Pulse, str | None]:
-        """Give the pulse, and what the user should know if nobody stated it.
+        """Return the pulse, and what the user should know if nobody stated it.
 
         Raises:
             ContractError: If none is stated and too few photons show one.
@@ -102,7 +102,7 @@ class Survey:
         return guessed, told
 
     def warnings(self) -> tuple[str, ...]:
-        """Give what the user should know of the capture itself, once its rows were read."""
+        """Return what the user should know of the capture itself, once its rows were read."""
         outside = self.file.outside
         if not outside:
             return self.notes
@@ -199,7 +199,7 @@ def _check_shape(file: CountsFile, camera: FineCamera) -> None:
 
 
 def _with_bundle(timing: Timing, camera: FineCamera) -> Timing:
-    """Give what is known of times, with what the bundle says where nobody else does."""
+    """Return what is known of times, with what the bundle says where nobody else does."""
     stated = {"pitch_um": camera.sensor.pixel_pitch_um, **camera.stated_times()}
     # a measured pulse stands for gate and laser together
     unwanted = PULSE if timing.irf.file is not None else frozenset()

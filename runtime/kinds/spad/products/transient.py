@@ -21,7 +21,7 @@ from camkit.runtime.maker import Made, Making
 
 
 def make_transient(making: Making, survey: Survey, began: float) -> Made:
-    """Give the photons of every pixel and bin; arguments and errors as of `make_depth`."""
+    """Return the photons of every pixel and bin; arguments and errors as of `make_depth`."""
     axis = survey.an_axis
     frames = frames_of(making, survey)
     read_s = time.perf_counter() - began

@@ -15,7 +15,7 @@ from camkit.runtime.kinds.spad.finer.linear import Grid
 
 
 def see_through(fine: FloatArray, kernel: FloatArray, grid: Grid) -> FloatArray:
-    """Give the light of every pixel.
+    """Return the light of every pixel.
 
     Args:
         fine: (n, m h, m w) float32.

@@ -113,7 +113,7 @@ def _check_most(expected: NDArray[np.float64]) -> None:
 
 
 def scaled_to(light: FloatArray, photons: float) -> NDArray[np.float64]:
-    """Give light by time (bins, h, w) as photons, `photons` of a pixel in all bins on average.
+    """Return light by time (bins, h, w) as photons, `photons` of a pixel in all bins on average.
 
     Raises:
         ContractError: If there is no light, or no number of photons >= 0.

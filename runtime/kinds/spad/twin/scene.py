@@ -22,7 +22,7 @@ AT_ONCE: Final = 8192
 def light_of_depth(
     depth_m: NDArray[np.floating], albedo: NDArray[np.floating], axis: TimeAxis, pulse: Pulse
 ) -> FloatArray:
-    """Give the light of surfaces, (bins, h, w) float32: shares of their albedo.
+    """Return the light of surfaces, (bins, h, w) float32: shares of their albedo.
 
     Args:
         depth_m: (h, w) from the array; NaN where there is no surface.

@@ -75,12 +75,12 @@ def record(scene: FloatArray | Path, bundle: Bundle, options: RecordingOptions) 
 
 
 def luminance(picture: FloatArray) -> FloatArray:
-    """Give the luminance (h, w) of linear Rec.709 (3, h, w)."""
+    """Return the luminance (h, w) of linear Rec.709 (3, h, w)."""
     return np.tensordot(np.array(LUMINANCE, np.float32), np.maximum(picture, 0), axes=1)
 
 
 def fitted(light: FloatArray, camera: FineCamera) -> FloatArray:
-    """Give the middle of a picture (h, w), on the fine grid of an array."""
+    """Return the middle of a picture (h, w), on the fine grid of an array."""
     height, width = _fine_shape(camera)
     if light.shape == (height, width):
         return light
@@ -94,7 +94,7 @@ def fitted(light: FloatArray, camera: FineCamera) -> FloatArray:
 
 
 def times_of(camera: FineCamera) -> tuple[TimeAxis, Pulse]:
-    """Give the time bins of an array, and the pulse that it sees.
+    """Return the time bins of an array, and the pulse that it sees.
 
     Raises:
         ContractError: If its bundle states none.
@@ -133,7 +133,7 @@ def _fine_shape(camera: FineCamera) -> tuple[int, int]:
 
 
 def seen_by(camera: FineCamera, light: FloatArray) -> FloatArray:
-    """Give the light of every pixel (n, h, w) from that of the fine grid (n, m h, m w).
+    """Return the light of every pixel (n, h, w) from that of the fine grid (n, m h, m w).
 
     Raises:
         ContractError: If it is not of this array.
@@ -149,12 +149,12 @@ def seen_by(camera: FineCamera, light: FloatArray) -> FloatArray:
 
 
 def dark_counts(camera: FineCamera, point: str) -> float:
-    """Give the dark counts of a pixel in a picture, or a step, of a working point."""
+    """Return the dark counts of a pixel in a picture, or a step, of a working point."""
     return camera.sensor.dark_count_rate_hz * WORKING_POINTS[point].time_s
 
 
 def collected(camera: FineCamera, photons: float) -> float:
-    """Give the photons of a pixel where one that sees a sub-pixel has so many.
+    """Return the photons of a pixel where one that sees a sub-pixel has so many.
 
     Pixels that see all of themselves collect those of scale^2 sub-pixels (4x4: 16 times).
     """
@@ -162,7 +162,7 @@ def collected(camera: FineCamera, photons: float) -> float:
 
 
 def dead_share(camera: FineCamera, point: str) -> float:
-    """Give the dead time over the time for which a pixel counts, at a working point."""
+    """Return the dead time over the time for which a pixel counts, at a working point."""
     return camera.sensor.dead_time_ps * S_PER_PS / WORKING_POINTS[point].time_s
 
 

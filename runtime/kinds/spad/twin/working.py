@@ -21,12 +21,12 @@ class WorkingPoint:
 
     @property
     def time_s(self) -> float:
-        """Give the time for which a picture, or a step, is counted."""
+        """Return the time for which a picture, or a step, is counted."""
         return self.frames * self.frame_us * 1e-6
 
     @property
     def rate_hz(self) -> float:
-        """Give the pictures, or steps, of a second."""
+        """Return the pictures, or steps, of a second."""
         return 1 / self.time_s
 
 

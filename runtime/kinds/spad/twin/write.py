@@ -55,7 +55,7 @@ def files_of(path: Path) -> tuple[Path, ...]:
 def timing_text(
     stated: Mapping[str, Any], *, axes: str | None = None, bundle: str | None = None
 ) -> str:
-    """Give a timing file of what is stated."""
+    """Return a timing file of what is stated."""
     tables: dict[str, list[str]] = {}
     for name, value in (("axes", axes), ("bundle", bundle)):
         if value is not None:
@@ -114,7 +114,7 @@ def _write_ptu(path: Path, recorded: Recorded) -> None:
 
 
 def _small(values: NDArray[Any]) -> NDArray[Any]:
-    """Give counts in 16 bits where they fit."""
+    """Return counts in 16 bits where they fit."""
     return values.astype(np.uint16) if values.max(initial=0) < 2**16 else values
 
 

@@ -15,7 +15,7 @@ POWER = 128.0
 
 
 def _surrounded(scene: Scene, lit: FloatArray, lamps: int) -> FloatArray:
-    """Give a scene and what lies around it: its mirror image, and lamps."""
+    """Return a scene and what lies around it: its mirror image, and lamps."""
     ring, scale = RING_PX * scene.scale, scene.scale
     around = np.pad(lit, ((0, 0), (ring, ring), (ring, ring)), mode="symmetric")
     height, width = lit.shape[1:]

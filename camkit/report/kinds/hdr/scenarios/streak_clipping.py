@@ -18,7 +18,7 @@ PANEL = 3.0
 
 
 def _panelled(dark: FloatArray, share: float, to_px: float, scale: int) -> FloatArray:
-    """Give a scene with a lamp in its middle, and a panel over a share of the circle around it."""
+    """Return scene with a lamp in its middle, and a panel over a share of the circle around it."""
     height, width = dark.shape[1:]
     middle = (height - 1) / 2, (width - 1) / 2
     y, x = np.ogrid[:height, :width]

@@ -5,10 +5,10 @@ from camkit.bundle.stages import Sharpen, SuperResolve
 
 
 def makes_finer(bundle: Bundle) -> str | None:
-    """Say why a bundle cannot take scenarios of pictures; None if it can."""
+    """Return why a bundle cannot take scenarios of pictures; None if it can."""
     return None if bundle.manifest.stage(SuperResolve) else "it makes no picture of photons finer"
 
 
 def has_times(bundle: Bundle) -> str | None:
-    """Say why a bundle cannot take scenarios of depth; None if it can."""
+    """Return why a bundle cannot take scenarios of depth; None if it can."""
     return makes_finer(bundle) if bundle.manifest.stage(Sharpen) else "it knows no times of photons"

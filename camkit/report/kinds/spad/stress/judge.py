@@ -65,7 +65,7 @@ class SpadJudge:
 
     @property
     def identity(self) -> tuple[object, ...]:
-        """Give bundles and ways."""
+        """Return bundles and ways."""
         plain = None if self.ways.plain is None else self.ways.plain.bundle
         beside = [b.sha256 for b in (self._before, plain) if b is not None]
         return ("spad", VERSION, self.ways.camera.bundle.sha256, beside, self.methods)
@@ -88,7 +88,7 @@ class SpadJudge:
         return Verdict(outcomes=self._pictures(shot))
 
     def pictures(self, shot: PictureShot | DepthShot) -> dict[str, FloatArray]:
-        """Give the truth and what every way made, grey; depth is brighter the later it is."""
+        """Return the truth and what every way made, grey; depth is brighter the later it is."""
         if isinstance(shot, PictureShot):
             shown = {"sharp": shot.truth, **self.ways.pictures(shot)}
         else:
@@ -100,7 +100,7 @@ class SpadJudge:
         return {name: np.repeat(picture[None], 3, axis=0) for name, picture in shown.items()}
 
     def undisturbed(self, scene: SpadScene) -> Mapping[str, float]:
-        """Give way -> mean squared error on the undisturbed capture of a scene."""
+        """Return way -> mean squared error on the undisturbed capture of a scene."""
         if scene.name not in self._undisturbed:
             shot = self.shoot(scene, PictureSetting())
             errors = {n: picture_errors(p, shot.truth) for n, p in self.ways.pictures(shot).items()}
@@ -127,7 +127,7 @@ class SpadJudge:
 
 
 def spad_judge_of(bundle: Bundle, sizes: tuple[str, ...], before: Bundle | None) -> SpadJudge:
-    """Give the examiner of a bundle.
+    """Return the examiner of a bundle.
 
     Args:
         bundle: What is tested.

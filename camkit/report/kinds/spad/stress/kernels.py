@@ -55,7 +55,7 @@ def blurred(kernel: FloatArray, diameter: float) -> FloatArray:
 
 
 def order_shares(levels: int, depth_error: float) -> Floats:
-    """Give the light in the orders 0, 1, ... of heights in equal levels, (levels,), of sum 1.
+    """Return the light in the orders 0, 1, ... of heights in equal levels, (levels,), of sum 1.
 
     A plate of phase phi, etched (1 + e) times too deep, is exp(i (1 + e) phi). With N levels, each
     as frequent as any other, it is the sum over m of c_m exp(i m phi),
@@ -76,7 +76,7 @@ def order_shares(levels: int, depth_error: float) -> Floats:
 
 
 def etched(kernel: FloatArray, levels: int, depth_error: float) -> FloatArray:
-    """Give what a plate etched too deep or too flat makes of its kernel (n, n) of sum 1.
+    """Return what a plate etched too deep or too flat makes of its kernel (n, n) of sum 1.
 
     Order 1 is the kernel, order 0 a point. The others, whose patterns have nothing to do with the
     picture's, are spread evenly over all dots; what orders do to each other is left out.
@@ -88,7 +88,7 @@ def etched(kernel: FloatArray, levels: int, depth_error: float) -> FloatArray:
 
 
 def opened(kernel: FloatArray, variance: float) -> FloatArray:
-    """Give a kernel (n, n) seen by areas whose variance along an axis is greater by `variance`.
+    """Return a kernel (n, n) seen by areas whose variance along an axis is greater by `variance`.
 
     To first order the ratio of two small apertures is 1 + variance / 2 times the second
     difference, whichever is larger.
@@ -106,7 +106,7 @@ def opened(kernel: FloatArray, variance: float) -> FloatArray:
 
 
 def _places(kernel: FloatArray) -> Floats:
-    """Give where the cells of a kernel lie, (2, n, n)."""
+    """Return where the cells of a kernel lie, (2, n, n)."""
     half = kernel.shape[0] // 2
     return np.stack(np.meshgrid(*[np.arange(-half, half + 1.0)] * 2, indexing="ij"))
 

@@ -35,7 +35,7 @@ class SpadScene:
 
 
 def spad_scenes(bundle: Bundle, count: int, folder: Path | None = None) -> tuple[SpadScene, ...]:
-    """Give the scenes of a sweep, as fine as the pictures of a bundle.
+    """Return the scenes of a sweep, as fine as the pictures of a bundle.
 
     Args:
         bundle: The camera.

@@ -41,7 +41,7 @@ MM_PER_PS: Final = LIGHT_M_PER_PS / 2 * 1000
 
 
 def picture_errors(picture: FloatArray, truth: FloatArray) -> NDArray[np.float64]:
-    """Give squared errors (h, w) of light; what no screen shows is cut off."""
+    """Return squared errors (h, w) of light; what no screen shows is cut off."""
     return np.square(np.clip(picture, 0, 1).astype(np.float64) - truth)
 
 

@@ -54,7 +54,7 @@ class Studio:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Give (h, w) in pixels."""
+        """Return (h, w) in pixels."""
         return self.camera.sensor.height_px, self.camera.sensor.width_px
 
     def picture(self, scene: SpadScene, setting: PictureSetting) -> PictureShot:
@@ -92,7 +92,7 @@ class Studio:
         )
 
     def times(self) -> tuple[TimeAxis, Pulse]:
-        """Give axis and pulse as the bundle states them."""
+        """Return axis and pulse as the bundle states them."""
         return times_of(self.camera)
 
     def depth(self, scene: SpadScene, setting: DepthSetting) -> DepthShot:
@@ -137,7 +137,7 @@ class Studio:
         axis: TimeAxis,
         pulse: Pulse,
     ) -> FloatArray:
-        """Give the light of every bin and pixel; the last of its kind is kept."""
+        """Return the light of every bin and pixel; the last of its kind is kept."""
         behind = float(times_ps[-1, 0, 0] - times_ps[0, 0, 0])
         key = scene.name, axis.orientation, axis.edges_ps.tobytes(), pulse, behind
         if key not in self._lit:
@@ -155,7 +155,7 @@ class Studio:
 
 
 def pane(shape: tuple[int, int]) -> NDArray[np.bool_]:
-    """Give the middle of a picture (h, w), where a second surface is seen."""
+    """Return the middle of a picture (h, w), where a second surface is seen."""
     found = np.zeros(shape, bool)
     top, left = (round(PANE * side) for side in shape)
     found[top : shape[0] - top, left : shape[1] - left] = True

@@ -45,7 +45,7 @@ class Ways:
     plain: FineCamera | None = None
 
     def pictures(self, shot: PictureShot) -> dict[str, FloatArray]:
-        """Give way -> (m h, m w), white = 1."""
+        """Return way -> (m h, m w), white = 1."""
         grid, (bare, through) = self.camera.grid, shot.photons
         frame = self._sound(shot.counts, shot)
         white = white_of(frame) * shot.told
@@ -62,7 +62,7 @@ class Ways:
         return {name: np.asarray(picture, np.float32) for name, picture in found.items()}
 
     def depths(self, shot: DepthShot) -> dict[str, Sharpened]:
-        """Give way -> what it found of every sub-pixel."""
+        """Return way -> what it found of every sub-pixel."""
         way = Way(returns=len(shot.times_ps))
         nothing, no_dark = np.zeros_like(shot.blind), np.zeros(shot.blind.shape)
         coarse = Sharpener(shot.axis, shot.pulse, way)
@@ -100,7 +100,7 @@ class Ways:
 
 
 def _growth(sharpener: Sharpener, shot: DepthShot) -> NDArray[np.float64] | None:
-    """Give (h, w) how much more counts scatter for pile-up; None where it took little."""
+    """Return (h, w) how much more counts scatter for pile-up; None where it took little."""
     if shot.cycles == 0:
         return None
     flat = shot.counts.reshape(-1, shot.counts.shape[2])

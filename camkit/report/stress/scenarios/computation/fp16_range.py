@@ -22,7 +22,7 @@ SIDE_PX: Final = 256
 
 
 def unclipped(rig: Rig, scene: Scene, factor: float) -> Capture:
-    """Give a capture of light times a factor that no converter clipped: float samples, no noise."""
+    """Return capture of light times a factor that no converter clipped: float samples, no noise."""
     whole = rig.light(scene)
     width, height = whole.window.size_px
     light = crop_light(whole, (min(SIDE_PX, width), min(SIDE_PX, height)))
@@ -33,7 +33,7 @@ def unclipped(rig: Rig, scene: Scene, factor: float) -> Capture:
 
 
 def largest_activation(method: Method, capture: Capture) -> float:
-    """Give the largest |activation| of the networks of a method, on what they are given.
+    """Return the largest |activation| of the networks of a method, on what they are given.
 
     Raises:
         ContractError: If a network in front of another gives what is not believed.

@@ -18,7 +18,7 @@ BORDER_PX = 64
 
 
 def grating(scene: Scene, cycles_per_px: float) -> Scene:
-    """Give a grey sine grating in place of a scene."""
+    """Return a grey sine grating in place of a scene."""
     height, width = scene.linear.shape[1:]
     angle = np.pi * (scene.number % 8) / 8
     y, x = np.mgrid[:height, :width]
@@ -28,7 +28,7 @@ def grating(scene: Scene, cycles_per_px: float) -> Scene:
 
 
 def modulation(plane: FloatArray, truth: FloatArray) -> float:
-    """Give the contrast of a picture at the frequencies of the truth, 1 for all of it."""
+    """Return the contrast of a picture at the frequencies of the truth, 1 for all of it."""
     inner = np.s_[BORDER_PX:-BORDER_PX, BORDER_PX:-BORDER_PX]
     got, true = (p[inner].astype(np.float64) for p in (plane, truth))
     got, true = got - got.mean(), true - true.mean()

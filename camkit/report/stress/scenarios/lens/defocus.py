@@ -32,7 +32,7 @@ def _applies(bundle: Bundle) -> str | None:
 
 
 def _inverse_per_m(psf: FrozenPsf) -> NDArray[np.float64]:
-    """Give the distances of a PSF as 1 / m, far to near."""
+    """Return the distances of a PSF as 1 / m, far to near."""
     inverse: NDArray[np.float64] = np.round(MM_PER_M / psf.depths_mm[::-1], 6)
     return inverse
 
@@ -43,7 +43,7 @@ def _off_focus_per_m(bundle: Bundle, psf: FrozenPsf) -> NDArray[np.float64]:
 
 
 def distances_of(bundle: Bundle) -> Scenario:
-    """Give the scenario with the distances of a bundle's stress PSF; nominal is the focus."""
+    """Return the scenario with the distances of a bundle's stress PSF; nominal is the focus."""
     psf = bundle.stress_psf()
     assert psf is not None
     values = tuple(float(value) for value in _inverse_per_m(psf))
@@ -68,7 +68,7 @@ def _at_known_field(scene: Scene, bundle: Bundle) -> tuple[Scene, float]:
 
 
 def _lens_at(bundle: Bundle, inverse_m: float, height_mm: float) -> Lens:
-    """Give the lens for one object distance, with the kernels of one field all around it."""
+    """Return the lens for one object distance, with the kernels of one field all around it."""
     psf = bundle.stress_psf()
     assert psf is not None
     depth_mm = MM_PER_M / inverse_m if inverse_m else np.inf

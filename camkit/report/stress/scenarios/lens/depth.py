@@ -20,7 +20,7 @@ def _applies(bundle: Bundle) -> str | None:
 
 
 def depths_of(bundle: Bundle) -> Scenario:
-    """Give the scenario with the depths of a bundle; nominal is the one nearest to its focus."""
+    """Return the scenario with the depths of a bundle; nominal is the one nearest to its focus."""
     depths_mm = bundle.psf.depths_mm.tolist()
     values = tuple(sorted({min(depth_mm / MM_PER_M, FAR_M) for depth_mm in depths_mm}))
     focus_m = bundle.reference_depth_mm / MM_PER_M

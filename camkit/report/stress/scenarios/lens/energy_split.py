@@ -14,7 +14,7 @@ from camkit.runtime.twin.haze import HazeLens
 
 
 def with_split(haze: HazeLens, moved: float) -> HazeLens:
-    """Give a haze that holds a share of the light of the core kernels as well; the sum stays.
+    """Return a haze that holds a share of the light of the core kernels as well; the sum stays.
 
     Args:
         haze: What lies beside the kernels.
@@ -36,7 +36,7 @@ def with_split(haze: HazeLens, moved: float) -> HazeLens:
 
 
 def taking_what_there_is(bundle: Bundle) -> Scenario:
-    """Give the scenario of a bundle: peaks take no more than the place with the least haze has."""
+    """Return scenario of a bundle: peaks take no more than the place with the least haze has."""
     haze = bundle.haze
     light = haze.kernels.sum(axis=(-2, -1), dtype=np.float64)
     least = -100 * float((light / haze.core_share).min())

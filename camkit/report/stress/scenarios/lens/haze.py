@@ -13,7 +13,7 @@ HAZE_SIGMA_PX = 15.0
 
 
 def add_haze(kernels: FloatArray, share: float) -> FloatArray:
-    """Give (c, h, w) kernels that lose a share of their light to a Gaussian haze."""
+    """Return (c, h, w) kernels that lose a share of their light to a Gaussian haze."""
     down, across = (
         np.exp(-0.5 * (np.arange(-(side // 2), side // 2 + 1) / HAZE_SIGMA_PX) ** 2)
         for side in kernels.shape[-2:]

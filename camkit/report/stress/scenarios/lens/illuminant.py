@@ -27,7 +27,7 @@ def _applies(bundle: Bundle) -> str | None:
 
 
 def planck(kelvin: float) -> Spectrum:
-    """Give the radiance of a black body over wavelength, 1 at 0.56 um.
+    """Return the radiance of a black body over wavelength, 1 at 0.56 um.
 
     References: Planck's law.
     """
@@ -39,7 +39,7 @@ def planck(kelvin: float) -> Spectrum:
 
 
 def bands(*peaks: tuple[float, float, float]) -> Spectrum:
-    """Give Gaussian bands (centre_um, full width at half maximum in um, height)."""
+    """Return Gaussian bands (centre_um, full width at half maximum in um, height)."""
 
     def spectrum(um: NDArray[np.float64]) -> NDArray[np.float64]:
         parts = [h * np.exp(-4 * np.log(2) * ((um - c) / w) ** 2) for c, w, h in peaks]
@@ -62,7 +62,7 @@ LIGHTS: dict[str, Spectrum] = {
 
 
 def lens_under(rig: Rig, spectrum: Spectrum) -> Lens:
-    """Give the lens and white balance under a light, the frozen response being that at 1."""
+    """Return the lens and white balance under a light, the frozen response being that at 1."""
     wavelengths_um, response = rig.sensor.response_arrays()
     fine = np.stack([np.interp(GRID_UM, wavelengths_um, r, 0, 0) for r in response])
     lit = fine * spectrum(GRID_UM)

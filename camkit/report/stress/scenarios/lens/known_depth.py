@@ -22,7 +22,7 @@ def _applies(bundle: Bundle) -> str | None:
 
 
 def depths_of(bundle: Bundle) -> Scenario:
-    """Give the scenario with the depths of a bundle."""
+    """Return the scenario with the depths of a bundle."""
     fitted = depth.depths_of(bundle)
     return replace(SCENARIO, values=fitted.values, nominal=fitted.nominal, quick=fitted.quick)
 

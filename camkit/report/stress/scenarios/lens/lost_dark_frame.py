@@ -12,7 +12,7 @@ from camkit.runtime.twin.haze import HazeLens
 
 
 def black_taken_off(haze: HazeLens, share: float) -> HazeLens:
-    """Give the haze that optics really have where a bundle's stands on a pedestal.
+    """Return the haze that optics really have where a bundle's stands on a pedestal.
 
     Args:
         haze: As the bundle has it.

@@ -15,7 +15,7 @@ FAR_PERCENT: Final = (30.0, 40.0)
 
 
 def reaching_far(bundle: Bundle) -> Scenario:
-    """Give the scenario of a bundle, with larger changes where it has a haze."""
+    """Return the scenario of a bundle, with larger changes where it has a haze."""
     if not bundle.manifest.has_haze:
         return SCENARIO
     smaller = tuple(-value for value in reversed(FAR_PERCENT))

@@ -11,7 +11,7 @@ from camkit.runtime.twin.light import Lens
 
 
 def other_lens(lens: Lens, share: float) -> Lens:
-    """Give a lens that does in the middle what this one does in the corner, by a share."""
+    """Return a lens that does in the middle what this one does in the corner, by a share."""
     corner_mm = float(lens.psf.field_heights_mm.max())
 
     def kernels_at(x_mm: float, y_mm: float) -> FloatArray:

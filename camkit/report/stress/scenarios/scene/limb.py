@@ -18,7 +18,7 @@ RADIUS_SHARE = 0.3
 
 
 def moonlit(scene: Scene, light: float) -> Scene:
-    """Give a disc on black in place of a scene.
+    """Return a disc on black in place of a scene.
 
     Args:
         scene: The scene.
@@ -33,7 +33,7 @@ def moonlit(scene: Scene, light: float) -> Scene:
 
 
 def numbers(picture: FloatArray, truth: FloatArray) -> dict[str, float]:
-    """Give what is wrong with a limb as a report has it."""
+    """Return what is wrong with a limb as a report has it."""
     found = limb_errors(picture, truth)
     return {
         "wobble_px": found.wobble_px,

@@ -18,7 +18,7 @@ PITCH_PX = 40
 
 
 def starry(scene: Scene, light: float) -> Scene:
-    """Give lone stars in place of a scene.
+    """Return lone stars in place of a scene.
 
     Args:
         scene: The scene.
@@ -31,7 +31,7 @@ def starry(scene: Scene, light: float) -> Scene:
 
 
 def numbers(picture: FloatArray, truth: FloatArray) -> dict[str, float]:
-    """Give the satellites of a scene as a report has them."""
+    """Return the satellites of a scene as a report has them."""
     found = satellites(picture, truth)
     satellite_light = {
         f"satellites_{part}_{rank}_percent": 100 * float(np.quantile(shares, share))

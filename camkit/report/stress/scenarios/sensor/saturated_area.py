@@ -14,7 +14,7 @@ POWER = 8.0
 
 
 def with_discs(scene: Scene, radius_px: float, count: int) -> Scene:
-    """Give a scene with soft-edged white discs of `POWER` times white at random places.
+    """Return a scene with soft-edged white discs of `POWER` times white at random places.
 
     Args:
         scene: The scene.

@@ -11,7 +11,7 @@ from camkit.runtime.twin.exposure import Setting
 
 
 def sunlit(scene: Scene, ratio: float) -> FloatArray:
-    """Give a scene (3, h, w) one half of which is lit so many times as strongly.
+    """Return a scene (3, h, w) one half of which is lit so many times as strongly.
 
     The edge of the shade runs through the middle, in a direction that the scene's number decides.
     """

@@ -23,7 +23,7 @@ COLD = (
 
 
 def planckian(kelvin: float) -> tuple[float, float]:
-    """Give the CIE 1931 chromaticity (x, y) of a black body of 2222 to 25000 K.
+    """Return the CIE 1931 chromaticity (x, y) of a black body of 2222 to 25000 K.
 
     References: Kang et al. 2002, J. Korean Phys. Soc. 41, 865, eq. (5), (6): cubic splines.
     """
@@ -33,7 +33,7 @@ def planckian(kelvin: float) -> tuple[float, float]:
 
 
 def tint(kelvin: float) -> NDArray[np.float64]:
-    """Give the factors on linear Rec.709 of a light against daylight, the largest 1."""
+    """Return the factors on linear Rec.709 of a light against daylight, the largest 1."""
     light, daylight = (rec709_of_light(planckian(k)) for k in (kelvin, DAYLIGHT_K))
     factors = np.maximum(light / daylight, 0)
     return np.asarray(factors / factors.max())

@@ -15,14 +15,14 @@ MOST_RING_PX = 512
 
 
 def ring_px(lens: Lens) -> int:
-    """Give how far a lens throws light, as far as it is asked for."""
+    """Return how far a lens throws light, as far as it is asked for."""
     haze = lens.haze
     reach_px = lens.margin_px if haze is None else haze.reach_cells * haze.cell_px
     return int(np.clip(reach_px, 1, MOST_RING_PX))
 
 
 def surrounded(scene: Scene, reach_px: int, factor: float) -> FloatArray:
-    """Give a scene amid its mirror image, which is so many times as bright.
+    """Return a scene amid its mirror image, which is so many times as bright.
 
     Args:
         scene: What is in the picture.

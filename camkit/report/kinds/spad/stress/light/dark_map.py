@@ -17,7 +17,7 @@ SPREAD: Final = 1.0
 
 
 def dark_map(shape: tuple[int, int], mean: float, seed: int) -> NDArray[np.float64]:
-    """Give dark counts (h, w), log-normal from pixel to pixel."""
+    """Return dark counts (h, w), log-normal from pixel to pixel."""
     chance = np.random.default_rng(seed)
     return mean * chance.lognormal(-(SPREAD**2) / 2, SPREAD, shape)
 

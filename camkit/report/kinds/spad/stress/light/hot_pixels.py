@@ -16,7 +16,7 @@ HOT_COUNTS: Final = 5 * PHOTONS
 
 
 def hot_mask(shape: tuple[int, int], share: float, seed: int) -> NDArray[np.bool_]:
-    """Give pixels (h, w) drawn at random; those of a smaller share are among them."""
+    """Return pixels (h, w) drawn at random; those of a smaller share are among them."""
     return np.asarray(np.random.default_rng(seed).random(shape) < share)
 
 

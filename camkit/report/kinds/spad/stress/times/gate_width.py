@@ -13,7 +13,7 @@ from camkit.runtime.kinds.spad.pulse import GatedPulse, Pulse
 
 
 def gate_like(stated: Pulse, *, width: float = 1.0, rc: float = 1.0) -> Pulse:
-    """Give a gate whose width and time constant are other ones, by factors.
+    """Return a gate whose width and time constant are other ones, by factors.
 
     Raises:
         UnsupportedError: If it is no gate.
