@@ -80,7 +80,7 @@ def test_what_haze_does_not_choose_is_refused(camkit_command, tmp_path: Path) ->
     words = ("freeze", LENS, "-o", out, "--haze", haze)
     outcome = camkit_command(*words, "--energy", "0.9", "--focus-um", "3")
     assert outcome.code == ExitCode.USAGE
-    assert "leave --energy, --focus-um out" in outcome.err
+    assert "--haze conflicts with --energy, --focus-um" in outcome.err
     outcome = camkit_command("freeze", "streak-hdr", "-o", out, "--haze", haze)
     assert outcome.code != 0
     assert "only a lens is frozen as core and haze" in outcome.err
