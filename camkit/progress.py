@@ -73,7 +73,7 @@ class Task:
 
 @dataclass(slots=True, kw_only=True)
 class Board:
-    """What a listener sees: the tasks in progress, the outermost first.
+    """The tasks in progress as a listener sees them, the outermost first.
 
     Attributes:
         tasks: In progress.
@@ -89,7 +89,7 @@ _board: ContextVar[Board | None] = ContextVar("camkit_progress", default=None)
 
 @contextmanager
 def listening(board: Board) -> Iterator[None]:
-    """Put the tasks of this thread on a board."""
+    """Show the tasks of this thread on a board."""
     token = _board.set(board)
     try:
         yield
@@ -134,7 +134,7 @@ def counted(items: Sequence[Item], what: str, unit: str | None = None) -> Iterat
 
 
 def note(line: str) -> None:
-    """Tell a listener a line that lasts."""
+    """Pass a lasting line to the listener."""
     board = _board.get()
     if board is not None:
         board.note(line)

@@ -59,7 +59,7 @@ class Display:
                 say(line, err=True)
 
     def flush(self) -> None:
-        """Say the lines that were held back."""
+        """Print the lines that were held back."""
         with self._lock:
             for line in self._held:
                 say(line, err=True)

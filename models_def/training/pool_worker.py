@@ -29,7 +29,7 @@ def work(folder: Path, share: tuple[int, int]) -> None:
 
 
 def _report(files: PoolFiles, number: int) -> None:
-    """Tell the trainer the CPU time so far, also while a sample is being made."""
+    """Report the CPU time so far to the trainer, also while a sample is being made."""
     while files.goal[0] >= 0:
         files.cpu_s[number] = time.process_time()
         time.sleep(REPORT_S)

@@ -1,4 +1,4 @@
-"""How far a batch is: the pictures done, and the shares of those under way."""
+"""Progress of a batch: the pictures done, and the shares of those under way."""
 
 import threading
 from collections.abc import Callable

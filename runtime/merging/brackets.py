@@ -1,4 +1,4 @@
-"""Which files are the frames of which bracket: those that are named, or those in a folder each."""
+"""Brackets and their frames: the files that are named, or those in a folder each."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

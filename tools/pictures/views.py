@@ -42,7 +42,7 @@ AS_TAKEN, RESTORED, TRUTH = "as taken", "restored", "truth"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class View:
-    """What a camera took, what was made of it, and what it should have been.
+    """A capture of a camera, its restored picture, and the truth.
 
     Attributes:
         title: The camera.
@@ -203,7 +203,7 @@ VIEWS: Final[Mapping[str, Callable[[str], View]]] = MappingProxyType(
 def _view(
     bundle: Bundle, rows: Mapping[str, Sequence[FloatArray]], decibels: tuple[float, float]
 ) -> View:
-    """Put captions over rows of three pictures; decibels are the same for all rows."""
+    """Caption rows of three pictures; decibels are the same for all rows."""
     before, after = decibels
     captions = (f"{AS_TAKEN}: {before:.1f} dB", f"{RESTORED}: {after:.1f} dB", TRUTH)
     return View(

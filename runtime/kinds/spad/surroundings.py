@@ -109,7 +109,7 @@ class _Patches:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Pulses:
-    """What squares found, of one pixel each; arrays (p,)."""
+    """The pulses that squares found, of one pixel each; arrays (p,)."""
 
     bank: Bank
     template: NDArray[np.int64]

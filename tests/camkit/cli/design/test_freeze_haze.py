@@ -83,5 +83,5 @@ def test_what_haze_does_not_choose_is_refused(camkit_command, tmp_path: Path) ->
     assert "--haze conflicts with --energy, --focus-um" in outcome.err
     outcome = camkit_command("freeze", "streak-hdr", "-o", out, "--haze", haze)
     assert outcome.code != 0
-    assert "only a lens is frozen as core and haze" in outcome.err
+    assert "--haze is for lenses only" in outcome.err
     assert not out.exists()

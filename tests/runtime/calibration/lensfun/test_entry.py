@@ -255,7 +255,9 @@ def test_the_entry_of_a_bundle_is_what_its_parts_give(tmp_path: Path) -> None:
 def test_an_entry_of_a_geometry_needs_its_crop_factor_and_obeys_the_limit(tmp_path: Path) -> None:
     path = tmp_path / "camera.toml"
     path.write_text(to_toml(GEOMETRY), encoding="utf-8")
-    with pytest.raises(ContractError, match="does not state the size of the sensor: add crop_factor"):
+    with pytest.raises(
+        ContractError, match="does not state the size of the sensor: add crop_factor"
+    ):
         lensfun_entry(path, EntryOptions(focal_mm=10.0))
     made = lensfun_entry(path, EntryOptions(focal_mm=10.0, crop_factor=1.5))
     assert made.fit.residual_px > 0
