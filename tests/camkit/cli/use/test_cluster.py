@@ -85,7 +85,10 @@ class _Foreign(BaseHTTPRequestHandler):
         pass
 
 
-@pytest.mark.parametrize("service", ["nobody", "silence", "http", "a worker"])
+@pytest.mark.parametrize(
+    "service",
+    ["silence", *(pytest.param(n, marks=pytest.mark.slow) for n in ("nobody", "http", "a worker"))],
+)
 def test_an_address_without_a_scheduler_is_one_line_within_ten_seconds(
     captures: Path, farm: Farm, service: str
 ) -> None:

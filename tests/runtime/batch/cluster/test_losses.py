@@ -143,6 +143,7 @@ def test_a_scheduler_that_is_lost_is_waited_for(tmp_path: Path) -> None:
     _check_whole(results, out, expected)
 
 
+@pytest.mark.slow
 def test_a_network_that_stays_lost_ends_the_run_with_what_to_do(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

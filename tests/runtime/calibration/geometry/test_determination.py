@@ -195,6 +195,7 @@ def test_the_covariance_alone_would_believe_the_flat_views(flat: Geometry) -> No
     assert flat.chosen.spread[0] > 5 * formal
 
 
+@pytest.mark.slow
 def test_models_that_no_lens_has_are_not_taken_however_well_they_explain() -> None:
     corners = POOR["nearly parallel, boards that are not flat"]
     judged, _ = judge_all(corners, POINTS, SIZE)
