@@ -19,7 +19,7 @@ pictures: $(RUNTIME_STAMP)  ## the pictures of the README and of docs/gallery.md
 	$(VENV)/bin/python -m tools.pictures.gallery --out-dir docs/images
 
 test: check  ## set-up with everything, gate, tests with branch coverage
-	@echo "Running all tests: about eleven minutes on two cores"
+	@echo "Running all tests: about fifteen minutes on two cores"
 	$(DEV)/bin/python -m coverage erase
 	OMP_NUM_THREADS=1 $(DEV)/bin/python -m coverage run -m pytest -q -n auto --dist loadfile
 	$(DEV)/bin/python -m coverage combine -q
