@@ -5,7 +5,8 @@
 Nothing is shown for what ends within `SILENT_S`. Times left come from work done so far.
 """
 
-import shutil
+import os
+import sys
 import threading
 import time
 from collections.abc import Iterator, Sequence
@@ -21,6 +22,7 @@ LINE_S: Final = 10.0
 """Between plain lines, where there is something new to say."""
 STILL_S: Final = 30.0
 """Between plain lines that only say that the work goes on."""
+FALLBACK_COLUMNS: Final = 80
 MOST_LINES: Final = 20
 """Lines are further apart in long runs: by the time so far over this number."""
 
@@ -52,7 +54,7 @@ class Display:
             text = tasks_text(tasks) or ("working" if self._has_begun else "starting")
             line = f"{self._name}: {text}; {duration(spent_s)} so far{left}"
             if self._is_terminal:
-                say_over(line[: shutil.get_terminal_size().columns - 1])
+                say_over(line[: _columns() - 1])
             elif self._is_time(tasks, now_s, is_first_left=bool(left) and not self._has_left):
                 self._last_s = now_s
                 self._has_left = bool(left)
@@ -88,6 +90,14 @@ class Display:
                 return
             self._last_s = now_s
             say(line, err=True)
+
+
+def _columns() -> int:
+    """Return the width of the terminal on stderr; stdout may go elsewhere."""
+    try:
+        return os.get_terminal_size(sys.stderr.fileno()).columns or FALLBACK_COLUMNS
+    except (OSError, ValueError, AttributeError):
+        return FALLBACK_COLUMNS
 
 
 def outer(tasks: Sequence[Task]) -> list[Task]:

@@ -1,9 +1,12 @@
 """Networks that look at the whole picture: one window must hold every picture of the camera."""
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from camkit.bundle.reader import Bundle
-from camkit.bundle.sensor import BayerSensor, SpadSensor
+from camkit.bundle.sensor import BayerSensor, ColorSensor, SpadSensor
 from camkit.errors import ContractError, ParityError
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
@@ -34,8 +37,11 @@ def prove_one_window(bundle: Bundle, role: str, size: str) -> str:
             "or export a network that looks at windows"
         )
     pixels = f"{sensor.extent.width_px}x{sensor.extent.height_px} px of the sensor"
+    pipeline = Pipeline(bundle, Options(size=size, threads=1))
+    grey = _grey(sensor, (sensor.extent.height_px, sensor.extent.width_px))
+    given = pipeline.capture_of(grey, iso=sensor.noise[0].iso, white_balance=None, origin_px=None)
     try:
-        _plan(bundle, size, (sensor.extent.height_px, sensor.extent.width_px), sensor.noise[0].iso)
+        pipeline.start(given)
     except ContractError as error:
         raise ParityError(
             f"size {size}: {cannot}, and the {pixels} do not fit in one window: {error}; or export "
@@ -44,13 +50,8 @@ def prove_one_window(bundle: Bundle, role: str, size: str) -> str:
     return f"{cannot}; one window holds the {pixels}"
 
 
-def _plan(bundle: Bundle, size: str, size_px: tuple[int, int], iso: float) -> None:
-    """Plan a grey capture of the whole sensor."""
-    sensor = bundle.manifest.sensor
+def _grey(sensor: ColorSensor, size_px: tuple[int, int]) -> NDArray[Any]:
+    """Return a grey capture of the whole sensor."""
     if isinstance(sensor, BayerSensor):
-        grey = np.full(size_px, sensor.white_level // 4, np.uint16)
-    else:
-        grey = np.full((len(sensor.channels), *size_px), 0.25, np.float32)
-    pipeline = Pipeline(bundle, Options(size=size, threads=1))
-    given = pipeline.capture_of(grey, iso=iso, white_balance=None, origin_px=None)
-    pipeline.start(given)
+        return np.full(size_px, sensor.white_level // 4, np.uint16)
+    return np.full((len(sensor.channels), *size_px), 0.25, np.float32)
