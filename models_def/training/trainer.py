@@ -357,9 +357,10 @@ class _Run:
         """Fit until the schedule, the time or the asked step ends; checkpoint and validate."""
         schedule, options = self.entry.schedule, self.options
         note(self._plan_line())
-        task.tell(f"{task.what}: making the first samples")
+        what = task.what
+        task.tell(f"{what}: making the first samples")
         pool.draw_batch(self.step, 1, schedule.patch_px)
-        task.tell(task.what.removesuffix(": making the first samples"))
+        task.tell(what)
         task.begin(self._progress(pool))
         self.setup_shares, first_step = self._shares(pool), self.step
         self.log.write(

@@ -184,7 +184,7 @@ class _NetworkStage:
         job.record["tiles"] = tiles[entry.role] if one else tiles
 
     def _trimmed(self, engine: NetworkEngine, cap_bytes: int) -> Run:
-        """Return run of a network that has the memory to itself, as far as that is near the cap.
+        """Return the run of a network that has the memory to itself, as far as it is near the cap.
 
         Its activations are the peak: what other stages have freed must not lie beside them.
         """
