@@ -4,6 +4,7 @@ import argparse
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import tools.evidence
 from tools.evidence.checkout import HERE
@@ -28,10 +29,14 @@ def main(words: list[str] | None = None) -> int:
     if arguments.command == "seconds":
         compare_seconds((arguments.a, arguments.b), arguments.bundle, arguments.rounds)
         return 0
-    records = [json.loads(path.read_text("utf-8")) for path in (arguments.before, arguments.after)]
-    comparison = compare(*records)
+    comparison = compare(read_record(arguments.before), read_record(arguments.after))
     print(*comparison.lines(), sep="\n")
     return int(bool(comparison.changed))
+
+
+def read_record(path: Path) -> dict[str, Any]:
+    """Read what `record` wrote."""
+    return dict(json.loads(path.read_text(encoding="utf-8")))
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -6,16 +6,19 @@
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from tools.evidence.captures import Capture, simulate_captures
 from tools.evidence.checkout import Checkout, Worker
-from tools.evidence.commands import WITH_FORMATS, run_commands
+from tools.evidence.commands import run_commands
 from tools.evidence.real import real_jobs
 from tools.evidence.scrubbed import scrubbed
 from tools.evidence.ways import FIRST_PHOTOGRAPH, PHOTOGRAPHS, PHOTONS, Options, way_name
 
 Entry = tuple[str, dict[str, Any]]
+
+WITHOUT_BUNDLE: Final = ("duet", "spad-sr")
+"""Bundles whose captures are processed without one too."""
 
 
 def make_record(
@@ -43,7 +46,7 @@ def make_record(
                 entries |= dict(_processed(worker, bundle, captures))
                 if captures[0].is_photograph:
                     entries |= dict(_golden(worker, bundle, checkout.manifest(bundle)))
-                if bundle in WITH_FORMATS:
+                if bundle in WITHOUT_BUNDLE:
                     entries |= dict(_processed(worker, None, captures))
                 entries |= dict(run_commands(checkout, bundle, captures, is_judged=is_judged))
                 print(f"{bundle}: {len(entries)} entries so far", flush=True)
