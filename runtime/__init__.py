@@ -18,5 +18,5 @@
     twin/                              the digital twin: a scene becomes a RAW file
     kind, kinds/, maker, kind_parts/   what a kind of camera brings: readers, products, proofs
 
-`runtime` and `models_def` never import each other.
+Design time may call the runtime; the runtime never imports what lies above it.
 """
