@@ -38,13 +38,13 @@ from camkit.bundle.reader import (
 from camkit.bundle.sensor import BayerSensor, ChannelResponse, Extent, PlanesSensor
 from camkit.bundle.stages import Illumination, Parts, Wiener
 from camkit.bundle.writer import write_bundle
+from camkit.calibration.measured_files import FlatFile, GeometryFile, NoiseFile
 from camkit.caller import option_text
 from camkit.contracts import FrozenPsf, RadialDistortion
 from camkit.errors import ContractError, DecodeError, ParityError
 from camkit.export.activations import with_activations
 from camkit.export.golden_cases import HAZE_SCENE, add_outputs, photograph_all
 from camkit.haze import Haze
-from camkit.runtime.calibration.measured_files import FlatFile, GeometryFile, NoiseFile
 from camkit.runtime.geometry.distortion import RANGE_MARGIN, check_distortion
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work

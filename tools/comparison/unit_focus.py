@@ -28,6 +28,7 @@ from camkit.bundle.optics import PSF
 from camkit.bundle.psf_file import psf_to_bytes
 from camkit.bundle.reader import PRESCRIPTION, Bundle, bundle_from_bytes, find_bundle, open_bundle
 from camkit.bundle.writer import bundle_to_bytes
+from camkit.calibration.focus import EdgeCamera, MeasuredFocus, measure_focus
 from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import ContractError
 from camkit.models_def.optics.frozen import with_focus
@@ -48,7 +49,6 @@ from camkit.report.quality import (
     read_picture,
 )
 from camkit.runtime.bank.psf import color_kernels
-from camkit.runtime.calibration.focus import EdgeCamera, MeasuredFocus, measure_focus
 from camkit.runtime.capture import Capture
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline

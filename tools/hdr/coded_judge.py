@@ -6,9 +6,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.calibration.peak import light_within
 from camkit.contracts import FloatArray
 from camkit.report.hdr_score import Reference, hdr_scores
-from camkit.runtime.calibration.peak import light_within
 from camkit.scenes.saturation import CEILING
 from camkit.streaks.cells import cells_of, coarser, sample_sites
 from camkit.streaks.convolution import Convolution
