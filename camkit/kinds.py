@@ -17,7 +17,8 @@ A package of somebody else brings its own: its entry point in the group `camkit.
 
 import contextlib
 import importlib
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cache
 from importlib import metadata, util
 from pathlib import PurePath
@@ -72,6 +73,8 @@ class Kind:
         file_types: Suffixes of files that only captures of this kind have, with their dots.
         shared_types: Suffixes of files that captures of this kind have too.
         options: What a caller may choose for this kind alone.
+        scenes: Sources of scenes that it brings: name -> "module:function", which draws
+            (3, h, w) float32 linear Rec.709 of (seed, height, width).
     """
 
     name: str
@@ -83,6 +86,7 @@ class Kind:
     file_types: tuple[str, ...] = ()
     shared_types: tuple[str, ...] = ()
     options: tuple[KindOption, ...] = ()
+    scenes: Mapping[str, str] = field(default_factory=dict)
 
     def part(self, floor: Floor) -> ModuleType:
         """Import what one floor knows of this kind.
@@ -125,6 +129,7 @@ HDR: Final = Kind(
         *("illumination", "undistort", "color"),
     ),
     metrics=("picture", "hdr"),
+    scenes={"night": "camkit.runtime.kinds.hdr.night:night_scene"},
 )
 
 SPAD: Final = Kind(

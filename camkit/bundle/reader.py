@@ -47,7 +47,7 @@ from camkit.bundle.stages import Highlights, Wiener
 from camkit.contracts import FrozenPsf, RadialDistortion, RadialIllumination
 from camkit.errors import BundleError, ContractError
 from camkit.haze import Haze
-from camkit.streaks.optics import StreakOptics
+from camkit.streaks import StreakOptics
 
 SUFFIX: Final = ".camkit"
 MANIFEST: Final = "manifest.json"

@@ -14,10 +14,10 @@ from camkit.runtime.cancel import check_cancelled
 from camkit.runtime.job.job import Gains, Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
+from camkit.runtime.kinds.hdr.deglare.removal import Glare, GlareSettings, Read, find_glare
 from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.rows import Rows
-from camkit.streaks.glare.removal import Glare, GlareSettings, Read, find_glare
 
 METHODS: Final = ("deglare",)
 OPTIONS: Final[tuple[str, ...]] = ()

@@ -21,19 +21,19 @@ from camkit.runtime.color import rec709_of_planes, recover_highlights
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
+from camkit.runtime.kinds.hdr.streaks.cells import COLOURS, PITCH_PX, Cells, cells_of, sample_sites
+from camkit.runtime.kinds.hdr.streaks.doubt import BLOCK_PX
+from camkit.runtime.kinds.hdr.streaks.doubt import MARGIN_PX as DOUBT_MARGIN_PX
+from camkit.runtime.kinds.hdr.streaks.kernels import StreakKernels, streak_kernels
+from camkit.runtime.kinds.hdr.streaks.painting import Painter
+from camkit.runtime.kinds.hdr.streaks.recovery import FINE_CELLS, MANY_SAMPLES, recover
+from camkit.runtime.kinds.hdr.streaks.rims import MARGIN_PX as RIM_MARGIN_PX
+from camkit.runtime.kinds.hdr.streaks.rims import near_clipped, no_brighter
 from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.rows import RollingRows, Rows
 from camkit.runtime.signal.demosaic import DemosaicMethod
 from camkit.runtime.stages.demosaic import ColorRows
-from camkit.streaks.cells import COLOURS, PITCH_PX, Cells, cells_of, sample_sites
-from camkit.streaks.doubt import BLOCK_PX
-from camkit.streaks.doubt import MARGIN_PX as DOUBT_MARGIN_PX
-from camkit.streaks.kernels import StreakKernels, streak_kernels
-from camkit.streaks.painting import Painter
-from camkit.streaks.recovery import FINE_CELLS, MANY_SAMPLES, recover
-from camkit.streaks.rims import MARGIN_PX as RIM_MARGIN_PX
-from camkit.streaks.rims import near_clipped, no_brighter
 
 METHODS: Final = ("physics",)
 OPTIONS: Final = ("depth_m", "demosaic")
