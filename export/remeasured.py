@@ -327,12 +327,7 @@ def _finish(draft: _Draft) -> None:
         focus_mm = optics.object_distance_mm
         frozen = FrozenOptics(psf=draft.psf, haze=draft.haze)
         made = frozen.entry(np.inf if focus_mm is None else focus_mm)
-        stated = tuple(map(int, manifest.format_version.split(".")))
-        least = format_of(
-            draft.psf, hazy=draft.haze is not None, bounded=draft.manifest.bounds_light
-        )
-        needed = tuple(map(int, least.split(".")))
-        newest = ".".join(map(str, max(stated, needed)))
+        newest = format_of(draft.psf, (made, *manifest.stages), least=manifest.version_pair)
         draft.change(optics=made, format_version=newest)
     parts = Parts(
         sensor=draft.manifest.sensor,
