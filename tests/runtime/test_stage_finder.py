@@ -34,7 +34,9 @@ def test_every_stage_that_a_bundle_may_list_has_a_module_that_says_all(name: str
 
 
 def test_there_are_no_modules_that_no_bundle_can_list() -> None:
-    there = {path.stem for path in Path(stages.__path__[0]).glob("*.py")} - {"__init__"}
+    runtime = Path(stages.__path__[0]).parent
+    rooms = [runtime / "stages", *runtime.glob("kinds/*/stages")]
+    there = {path.stem for room in rooms for path in room.glob("*.py")} - {"__init__"}
     assert there == set(TYPES)
     assert set(entries.__all__) >= {entry.__name__ for entry in BUILT_IN}
 

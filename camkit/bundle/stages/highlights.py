@@ -1,7 +1,7 @@
 """Lights that the sensor clipped, read back from the streaks that the optics wrote of them."""
 
 from collections.abc import Sequence
-from typing import Final, Literal
+from typing import ClassVar, Final, Literal
 
 from camkit.bundle.entry import Since, Word
 from camkit.bundle.plane import Plane
@@ -28,6 +28,7 @@ class Highlights(StageEntry):
         method: Of that demosaic.
     """
 
+    runtime: ClassVar[str] = "camkit.runtime.kinds.hdr.stages.highlights"
     type: Literal["highlights"] = "highlights"
     takes: tuple[Word, ...] = ("rgb",)
     gives: tuple[Word, ...] = ("lit",)
