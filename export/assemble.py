@@ -74,7 +74,7 @@ from camkit.runtime.kind import part_of
 from camkit.runtime.plan.loss import read_loss_model
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work
-from camkit.runtime.proof.haze import make_haze_golden
+from camkit.runtime.proof.haze_band import make_haze_golden
 from camkit.runtime.proof.laws.proof import measure_laws, with_laws
 from camkit.side_file import read_side_text
 

@@ -48,7 +48,7 @@ from camkit.haze import Haze
 from camkit.runtime.geometry.distortion import RANGE_MARGIN, check_distortion
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work
-from camkit.runtime.proof.haze import make_haze_golden
+from camkit.runtime.proof.haze_band import make_haze_golden
 from camkit.units import to_mm
 
 FloatGrid = NDArray[np.float64]
