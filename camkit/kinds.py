@@ -32,7 +32,7 @@ Floor = Literal["runtime", "models_def", "export", "report"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KindOption:
-    """What a caller may choose about the captures of some kind, beyond what every camera knows.
+    """An option for the captures of some kind, beyond those of every camera.
 
     Attributes:
         name: In Python; on the command line --name.
@@ -88,7 +88,7 @@ class Kind:
     scenes: Mapping[str, str] = field(default_factory=dict)
 
     def part(self, floor: Floor) -> ModuleType:
-        """Import what one floor knows of this kind.
+        """Import the part of this kind that belongs to one floor.
 
         Raises:
             UnsupportedError: If that floor knows nothing of it.
@@ -101,7 +101,7 @@ class Kind:
         return importlib.import_module(name)
 
     def has_part(self, floor: Floor) -> bool:
-        """Return whether a floor knows something of this kind."""
+        """Return whether a floor has a part of this kind."""
         return has_module(self._module(floor))
 
     def _module(self, floor: Floor) -> str:

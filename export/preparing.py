@@ -1,4 +1,4 @@
-"""What is made before training, for the kinds whose samples need the runtime.
+"""Preparation before training, for the kinds whose samples need the runtime.
 
 The part of such a kind (`camkit.export.kinds.NAME`, or the `export` of its own package) defines
 `PREPARING`, which fulfils `PreparingKind`.
@@ -17,7 +17,7 @@ Tell = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PrepareOptions:
-    """What is given besides a recipe.
+    """The options of a preparation besides the recipe.
 
     Attributes:
         psf: Core kernels of the lens as designed.
@@ -42,7 +42,7 @@ class PreparingKind(Protocol):
     """A kind of camera whose samples are prepared."""
 
     def written_last(self, recipe: Any, runs: Path) -> Path:
-        """Return the file that is there when all is; raise ContractError if there is nothing to do.
+        """Return the last of the files; raise ContractError if there is nothing to do.
 
         Args:
             recipe: Of the kind.
@@ -51,7 +51,7 @@ class PreparingKind(Protocol):
         ...
 
     def prepare(self, recipe: Any, options: PrepareOptions, tell: Tell) -> dict[str, Any]:
-        """Make it and say what was made; raise ContractError if something is missing or wrong."""
+        """Make the files and return a report; raise ContractError if a source is missing."""
         ...
 
 

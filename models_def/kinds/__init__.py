@@ -1,4 +1,4 @@
-"""What design time knows of each kind of camera: one folder each.
+"""The design-time part of each kind of camera: one folder each.
 
 A folder defines `PART` (`camkit.models_def.training.kind`) and where it has such
 

@@ -104,7 +104,7 @@ def _draw_weights(layers: nn.Module) -> None:
 
 
 def take_vgg(network: nn.Module, path: Path) -> None:
-    """Return a network with the names of torchvision the weights of a file, in place.
+    """Load the weights of a file into a network with the names of torchvision, in place.
 
     Raises:
         ContractError: If the file is missing, cannot be read as tensors alone, or lacks a tensor of

@@ -85,7 +85,7 @@ def _silent(_: str) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FreezeReport:
-    """What freezing kept and what it cost; every value goes into the manifest.
+    """The kept samples of freezing and their cost; every value goes into the manifest.
 
     Attributes:
         fields: Places of the field kept.

@@ -1,4 +1,4 @@
-"""What changes during training: weights, their average, the optimiser; one step at a time."""
+"""The state of training: weights, their average, the optimiser; one step at a time."""
 
 from collections.abc import Callable
 from typing import Any, Final, Protocol
@@ -27,10 +27,10 @@ NetworkBuilder = Callable[..., nn.Module]
 
 
 class Fits(Protocol):
-    """What a run asks of a fitter."""
+    """The interface of a fitter."""
 
     def fit(self, batch: Batch, step: int, progress: float) -> float:
-        """Make one step and give its loss."""
+        """Train for one step and return its loss."""
         ...
 
     def restore(self, planes: Tensor) -> Tensor:
@@ -50,11 +50,11 @@ class Fits(Protocol):
         ...
 
     def load(self, weights: State, average: State, optimizer: dict[str, Any]) -> None:
-        """Go back to a saved state."""
+        """Restore a saved state."""
         ...
 
     def notes(self) -> dict[str, float]:
-        """Return what else the log should hold since the last call."""
+        """Return further entries of the log since the last call."""
         ...
 
 
@@ -98,7 +98,7 @@ class Fitter:
         )
 
     def fit(self, batch: Batch, step: int, progress: float) -> float:
-        """Make one step and give its loss.
+        """Train for one step and return its loss.
 
         Args:
             batch: Patches.
@@ -137,7 +137,7 @@ class Fitter:
         update_average(self._average, self.network.parameters(), ema_decay(schedule, step))
 
     def notes(self) -> dict[str, float]:
-        """Return what else the log should hold; nothing."""
+        """Return no further entries of the log."""
         return {}
 
     def restore(self, planes: Tensor) -> Tensor:
@@ -158,7 +158,7 @@ class Fitter:
         return self._optimizer.state_dict()
 
     def load(self, weights: State, average: State, optimizer: dict[str, Any]) -> None:
-        """Go back to a saved state.
+        """Restore a saved state.
 
         Raises:
             ContractError: If it was saved by another fitter.

@@ -183,7 +183,7 @@ def freeze(
 
 
 def _report(told: dict[str, int | float | str], report: Path | None, json_: bool) -> None:
-    """Write the report where it is wanted, and say it."""
+    """Write the report where it is wanted, and print it."""
     from camkit.cli.design.design_time import print_report
 
     if report is not None:
@@ -233,7 +233,7 @@ def _write_optics(frozen: "FrozenOptics", out: Path, haze_out: Path) -> None:
 
 
 class _Wanted(NamedTuple):
-    """How optics are frozen."""
+    """The settings of freezing."""
 
     sensor: "ColorSensor"
     bank: "Wiener | None"

@@ -93,7 +93,7 @@ class BayerTraining:
 
     @property
     def camera_parts(self) -> tuple[str, ...]:
-        """What says which camera a recipe describes."""
+        """Attributes of a recipe that describe the camera."""
         return CAMERA_PARTS
 
     def to_recipe(self, table: Mapping[str, Any]) -> BayerRecipe:
@@ -133,12 +133,12 @@ class BayerTraining:
         return build_network(name, **config)
 
     def layout(self, recipe: BayerRecipe, role: str) -> SampleLayout:
-        """Capture and Wiener planes in, clean planes out."""
+        """Return the layout: capture and Wiener planes in, clean planes out."""
         del role
         return layout_of(recipe)
 
     def finish(self, recipe: BayerRecipe, role: str) -> Finish | None:
-        """Take back the light that a network may not move."""
+        """Return the stage that removes light that a network may not move."""
         del role
         return finish_of(recipe)
 
@@ -153,7 +153,7 @@ class BayerTraining:
         return read_material(folder)
 
     def samples_digest(self, recipe: BayerRecipe, role: str, seed: int) -> str:
-        """Hash what decides the samples."""
+        """Hash the values that decide the samples."""
         del role
         return samples_digest(recipe, seed)
 

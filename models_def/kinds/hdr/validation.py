@@ -42,7 +42,7 @@ class HdrJudge:
         }
 
     def score(self, restore: Restorer) -> Score:
-        """Judge a restoration by its mean PSNR in dB, by ISO."""
+        """Compute the mean PSNR of a restoration in dB, by ISO."""
         by_iso: dict[str, list[float]] = {}
         with torch.no_grad():
             for iso, shot in self.shots:

@@ -26,7 +26,7 @@ class PlateFitter:
         self.inner = Fitter(request.entry, build_spad_network, request.device, request.first)
 
     def fit(self, batch: Batch, step: int, progress: float) -> float:
-        """Make one step and give its loss."""
+        """Train for one step and return its loss."""
         inner, schedule = self.inner, self.inner.schedule
         generator = torch.Generator().manual_seed(schedule.seed * 1_000_003 + step)
         sharp, deviation = batch.planes[:, :1], batch.planes[:, 1:, :1, :1]
@@ -41,7 +41,7 @@ class PlateFitter:
         return float(loss.detach())
 
     def notes(self) -> dict[str, float]:
-        """Return how wide the plate spreads light: the root of its second moment along an axis."""
+        """Return the width of the plate's PSF: the root of its second moment along an axis."""
         network = cast("JointCamera", self.inner.averaged)
         with torch.no_grad():
             kernel = network.plate().double()
@@ -79,7 +79,7 @@ class PlateFitter:
         return self.inner.optimizer_state()
 
     def load(self, weights: State, average: State, optimizer: dict[str, Any]) -> None:
-        """Go back to a saved state."""
+        """Restore a saved state."""
         self.inner.load(weights, average, optimizer)
 
 
@@ -87,7 +87,7 @@ class PlateFitting:
     """Fulfils `camkit.models_def.training.fitting.FittingKind`."""
 
     def fitting(self, request: FitRequest) -> OwnFitting | None:
-        """Return the fitter of the role plate; the other has the house's.
+        """Return the fitter of the role plate; None for the other.
 
         Raises:
             ContractError: If the network does not suit the role, or the device.

@@ -70,7 +70,7 @@ class SpadTraining:
 
     @property
     def camera_parts(self) -> tuple[str, ...]:
-        """What says which camera a recipe describes."""
+        """Attributes of a recipe that describe the camera."""
         return CAMERA_PARTS
 
     def to_recipe(self, table: Mapping[str, Any]) -> SpadRecipe:
@@ -100,11 +100,11 @@ class SpadTraining:
         return build_spad_network(name, **config)
 
     def layout(self, recipe: SpadRecipe, role: str) -> SampleLayout:
-        """Light and its noise in, a picture four times as fine out."""
+        """Return the layout: light and its noise in, a picture four times as fine out."""
         return layout_of(recipe, role)
 
     def finish(self, recipe: SpadRecipe, role: str) -> None:
-        """Nothing is done behind a network."""
+        """Return None: no stage follows a network."""
         del recipe, role
 
     def prepare(self, recipe: SpadRecipe, recipe_folder: Path, cache_folder: Path) -> SpadMaterial:
@@ -120,7 +120,7 @@ class SpadTraining:
         return SpadMaterial(kernel=read_plate_psf(folder / PSF_FILE))
 
     def samples_digest(self, recipe: SpadRecipe, role: str, seed: int) -> str:
-        """Hash what decides the samples."""
+        """Hash the values that decide the samples."""
         return samples_digest(recipe, role, seed)
 
     def maker(
@@ -149,7 +149,7 @@ class SpadTraining:
 
 
 def sampling_of(recipe: SpadRecipe, material: SpadMaterial) -> Sampling:
-    """Return how the array of a recipe samples, with the kernel of its material."""
+    """Return the sampling by the array of a recipe, with the kernel of its material."""
     plan = recipe.sampling
     return Sampling(
         mode=plan.mode,  # type: ignore[arg-type]

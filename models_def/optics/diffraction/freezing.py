@@ -38,7 +38,7 @@ WINDOW: Final = FreezeGrid(energy=0.999, max_side_px=401, least_energy=0.9)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlateReport:
-    """What freezing a plate kept.
+    """The result of freezing a plate.
 
     Attributes:
         plate: Name of the plate.

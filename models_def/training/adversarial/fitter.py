@@ -41,7 +41,7 @@ STEP_SEED: Final = 1_000_003
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PictureParts:
-    """What a `PictureFitter` is given besides its network and schedule.
+    """The parts of a `PictureFitter` besides its network and schedule.
 
     Attributes:
         to_rec709: (3, 3) white-balanced camera colours to linear Rec.709.
@@ -81,7 +81,7 @@ class CriticTraining:
     def learn(
         self, real: Tensor, fake: Tensor, draw: torch.Generator, *, decay: float
     ) -> tuple[Tensor, Tensor]:
-        """Make one step; give the loss without its penalty, and the penalty before its weight.
+        """Train for one step; return the loss without penalty, and the penalty before its weight.
 
         Args:
             real: (b, 3, h, w) true pictures.
@@ -100,7 +100,7 @@ class CriticTraining:
         return apart.detach(), penalty.detach()
 
     def opinion(self, fake: Tensor) -> Tensor:
-        """Return what the generator minimises; the critic does not move."""
+        """Return the loss of the generator; the critic does not move."""
         self.network.requires_grad_(requires_grad=False)
         return generator_loss(self.scores(fake))
 
@@ -112,7 +112,7 @@ class CriticTraining:
         }
 
     def load(self, state: dict[str, Any]) -> None:
-        """Go back to a saved state.
+        """Restore a saved state.
 
         Raises:
             ContractError: If it is that of another critic.
@@ -137,7 +137,7 @@ class PictureFitter(JudgedFitter):
         )
 
     def teach(self, views: Views, step: int, decay: float) -> None:
-        """Make the critic's steps."""
+        """Train the critic for its steps."""
         critic, sharp = self.critic, self._sharp
         if critic is None:
             return
@@ -165,7 +165,7 @@ class PictureFitter(JudgedFitter):
         return state if self.critic is None else state | {"critic": self.critic.state()}
 
     def load(self, weights: State, average: State, optimizer: dict[str, Any]) -> None:
-        """Go back to a saved state.
+        """Restore a saved state.
 
         Raises:
             ContractError: If it was saved by another fitter, or with a critic where there is none

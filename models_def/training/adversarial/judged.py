@@ -1,4 +1,4 @@
-"""What fitters have in common whose generator is judged by what its pictures look like.
+"""The base of fitters whose generator is judged by the look of its pictures.
 
 batch (+ real pairs) -> generator -> views -+-> opponents learn
                                             +-> total loss -> weights of the generator
@@ -22,7 +22,7 @@ Mix = Callable[[Batch, int], Batch]
 
 
 def load_judges(network: nn.Module, weights: State) -> None:
-    """Return the opponents of a generator the weights of a checkpoint, in place.
+    """Load the weights of a checkpoint into the opponents of a generator, in place.
 
     Raises:
         ContractError: If they are those of other opponents.
@@ -40,7 +40,7 @@ class JudgedFitter(ABC):
     """Fits a generator; who judges it, and by what, is left to others."""
 
     def __init__(self, generator: Fitter, to_rec709: Tensor, mix: Mix | None) -> None:
-        """Take what is judged.
+        """Store the generator and the sources of real pictures.
 
         Args:
             generator: Fits the network.
@@ -54,7 +54,7 @@ class JudgedFitter(ABC):
 
     @abstractmethod
     def teach(self, views: Views, step: int, decay: float) -> None:
-        """Let the opponents learn, if there are any, at a share `decay` of their rate."""
+        """Train the opponents, if there are any, at a share `decay` of their rate."""
 
     @abstractmethod
     def total(self, views: Views) -> Tensor:
@@ -66,10 +66,10 @@ class JudgedFitter(ABC):
 
     @abstractmethod
     def load(self, weights: State, average: State, optimizer: dict[str, Any]) -> None:
-        """Go back to a saved state."""
+        """Restore a saved state."""
 
     def fit(self, batch: Batch, step: int, progress: float) -> float:
-        """Make one step of all networks and give the generator's loss."""
+        """Train all networks for one step and return the generator's loss."""
         if self._mix is not None:
             batch = self._mix(batch, step)
         device = self.generator.device
@@ -84,7 +84,7 @@ class JudgedFitter(ABC):
         return float(loss.detach())
 
     def note(self, name: str, value: Tensor) -> None:
-        """Keep the value of a term for the log."""
+        """Record the value of a term for the log."""
         self._notes.setdefault(name, []).append(float(value.detach()))
 
     def notes(self) -> dict[str, float]:

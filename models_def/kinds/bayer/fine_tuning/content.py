@@ -1,4 +1,4 @@
-"""What fine-tuning compares, eq. (6.12): pixels (`pixel_loss`) and features."""
+"""The content loss of fine-tuning, eq. (6.12): pixels (`pixel_loss`) and features."""
 
 import torch
 from torch import Tensor

@@ -30,7 +30,7 @@ BETAS: Final = (0.9, 0.999)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FineTuningParts:
-    """What fine-tuning is given besides its recipe.
+    """The parts of fine-tuning besides its recipe.
 
     Attributes:
         first: Weights that the generator starts from.
@@ -75,7 +75,7 @@ class FineTuningFitter(JudgedFitter):
         )
 
     def teach(self, views: Views, step: int, decay: float) -> None:
-        """Make one step of both discriminators."""
+        """Train both discriminators for one step."""
         del step
         for group in self._optimizer.param_groups:
             group["lr"] = self.recipe.discriminator_rate * decay
@@ -91,7 +91,7 @@ class FineTuningFitter(JudgedFitter):
             self.note(f"discriminator_{name}", loss)
 
     def total(self, views: Views) -> Tensor:
-        """Return pixels, features and what the discriminators say; they do not move."""
+        """Return the sum of pixel, feature and discriminator losses; discriminators do not move."""
         self.opponents.requires_grad_(requires_grad=False)
         pixel, perceptual = pixel_loss(views), perceptual_loss(views, self._features)
         self.note("pixel", pixel)
@@ -112,7 +112,7 @@ class FineTuningFitter(JudgedFitter):
         }
 
     def load(self, weights: State, average: State, optimizer: dict[str, Any]) -> None:
-        """Go back to a saved state.
+        """Restore a saved state.
 
         Raises:
             ContractError: If it is that of other discriminators.

@@ -57,7 +57,7 @@ class VggFeatures(nn.Module):
 
 
 def read_vgg(path: Path) -> VggFeatures:
-    """Read the weights and give the features.
+    """Read the weights and return the features.
 
     Raises:
         ContractError: If the file is missing, cannot be read as tensors alone, or lacks a tensor of

@@ -66,7 +66,7 @@ class ThesisFitter:
         self._notes: dict[str, list[float]] = {}
 
     def fit(self, batch: Batch, step: int, progress: float) -> float:
-        """Make one step and give its loss."""
+        """Train for one step and return its loss."""
         device = self.inner.device
         given, target = (to_light(x.to(device)) for x in (batch.planes, batch.target))
         terms = _TERMS[self.role](self, given, target)
@@ -122,7 +122,7 @@ class ThesisFitter:
         return self.inner.optimizer_state()
 
     def load(self, weights: State, average: State, optimizer: dict[str, Any]) -> None:
-        """Go back to a saved state."""
+        """Restore a saved state."""
         self.inner.load(weights, average, optimizer)
 
 
@@ -164,7 +164,7 @@ _TERMS: Final[Mapping[str, Callable[[ThesisFitter, Tensor, Tensor], Terms]]] = {
 
 
 def give_vgg(network: torch.nn.Module, path: Path) -> None:
-    """Return every VGG-19 within a network the weights of a file; see `take_vgg`."""
+    """Load the weights of a file into every VGG-19 within a network; see `take_vgg`."""
     for part in network.modules():
         if isinstance(part, VggLevels):
             take_vgg(part, path)
@@ -174,7 +174,7 @@ class ThesisFitting:
     """Fulfils `camkit.models_def.training.fitting.FittingKind`."""
 
     def fitting(self, request: FitRequest) -> OwnFitting | None:
-        """Return the fitter of the thesis's networks; all others have the house's.
+        """Return the fitter of the thesis's networks; None for all others.
 
         Raises:
             ContractError: If the network is not that of the role, weights of VGG-19 are missing,
