@@ -171,6 +171,19 @@ def training_kind(name: str) -> TrainingKind[Any, Any]:
     return cast("TrainingKind[Any, Any]", part.PART)
 
 
+def special_part(kind: str, name: str) -> Any | None:
+    """Return what the design side of a kind defines beside its `PART`; None if it does not.
+
+    Args:
+        kind: Name of the kind.
+        name: FITTING, REFINING, BANK_FITTING or PREPARING.
+
+    Raises:
+        UnsupportedError: If there is no such kind, or it cannot be trained.
+    """
+    return getattr(find_kind(kind).part("models_def"), name, None)
+
+
 def read_recipe(path: Path) -> Recipe:
     """Read and check a recipe of any kind.
 

@@ -12,6 +12,7 @@ angle, through walls and off the frame, over the area that its peaks cover.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -22,6 +23,7 @@ from camkit.bundle.sensor import ColorSensor
 from camkit.contracts import FrozenPsf, RadialDistortion
 from camkit.errors import ContractError
 from camkit.haze import MOST_CELLS, Haze
+from camkit.models_def.optics.distortion import refuse_other_lens
 from camkit.models_def.optics.frozen import corner_height_mm, rounded, wavelength_bands
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
@@ -44,6 +46,9 @@ COPY_RAYS: Final = 8000
 ENERGY: Final = 0.995
 LEAST_HAZE: Final = 1e-6
 """Of the light: less beside a core is none."""
+SAME_PEAKS_PX: Final = 4.0
+"""Peaks are found to a pixel or so and fitted to within one or two; those of other plates lie tens
+of pixels off."""
 _ANGLES: Final = 120
 _RINGS: Final = 24
 _TERMS: Final = 4
@@ -236,6 +241,15 @@ def peaks_off_px(lens: Lens, psf: FrozenPsf, *, rays: int = RAYS) -> float:
     middles = find_middles(lens, float(frozen_px[-1]), pitch_um, rays)
     found = middles.heights_px(lens, np.arctan(ideal_mm[1:] / efl_mm), pitch_um, rays)
     return float(np.abs(found - frozen_px).max())
+
+
+def check_peaks(lens: Lens, psf: FrozenPsf, path: Path) -> None:
+    """Refuse core kernels that were frozen from another lens with a haze.
+
+    Raises:
+        ContractError: If their peaks lie elsewhere.
+    """
+    refuse_other_lens(lens, path, peaks_off_px(lens, psf), SAME_PEAKS_PX)
 
 
 def flat_light(

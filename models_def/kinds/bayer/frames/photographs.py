@@ -3,8 +3,8 @@
     crops of pictures -> a scene of the whole sensor -> light through a copy of the lens
         -> shots at ISOs of their own -> the runtime, up to the stage `haze` -> tiles
 
-What networks are trained on is what the runtime gives them: nothing of it is written again for
-training (`camkit.models_def.kinds.bayer.frames` takes tiles through the bank).
+Networks are trained on what the runtime gives them: nothing of it is written again for training
+(`samples` takes the tiles through the bank).
 """
 
 import tempfile
