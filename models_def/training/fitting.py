@@ -12,7 +12,7 @@ from typing import Any, Final, Protocol
 from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.models_def.training.first_weights import FirstWeights
-from camkit.models_def.training.fitter import Fits
+from camkit.models_def.training.fitter import Fitter
 from camkit.models_def.training.kind import special_part
 from camkit.models_def.training.recipe import PICTURE_LOSSES, NetworkRecipe
 
@@ -60,7 +60,7 @@ class OwnFitting:
         credit: What it adds to the training data, for the card.
     """
 
-    make: Callable[[Any], Fits]
+    make: Callable[[Any], Fitter]
     credit: str = ""
 
 

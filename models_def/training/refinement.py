@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 from camkit.errors import UnsupportedError
 from camkit.models_def.training.first_weights import FirstWeights
-from camkit.models_def.training.fitter import Fits
+from camkit.models_def.training.fitter import Fitter
 from camkit.models_def.training.kind import special_part
 from camkit.models_def.training.recipe import NetworkRecipe, ScheduleRecipe
 
@@ -29,7 +29,7 @@ class Refinement:
 
     name: str
     schedule: ScheduleRecipe
-    make_fitter: Callable[[NetworkRecipe, Any], Fits]
+    make_fitter: Callable[[NetworkRecipe, Any], Fitter]
     first: FirstWeights | None = None
     credit: str = ""
 
