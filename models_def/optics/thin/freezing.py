@@ -10,7 +10,6 @@ angle, through walls and off the frame, over the area that its peaks cover.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -24,6 +23,7 @@ from camkit.contracts import FrozenPsf, RadialDistortion
 from camkit.errors import ContractError
 from camkit.haze import MOST_CELLS, Haze
 from camkit.models_def.optics.distortion import refuse_other_lens
+from camkit.models_def.optics.freeze import Facts, Tell, rounded_facts
 from camkit.models_def.optics.frozen import corner_height_mm, rounded, wavelength_bands
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
@@ -33,7 +33,6 @@ from camkit.progress import counted
 from camkit.units import to_mm
 
 Array = NDArray[np.float64]
-Tell = Callable[[str], None]
 
 CORE_PX: Final = 64
 FADE_PX: Final = 40
@@ -83,41 +82,6 @@ FINE: Final = HazyGrid()
 """For a bundle."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class HazyReport:
-    """What was frozen.
-
-    Attributes:
-        about: What light is gathered about.
-        fields: Places from the axis to the corner, `LEAST_FIELDS` at least.
-        wavelengths: Samples of the response.
-        core_px: Reach of the core.
-        cell_px: Side of a cell.
-        cells: Side of a kernel of the haze in cells.
-        core_share: Least share in the core of the light that arrives of a field and wavelength.
-        haze_kept: Least share in the cells of the haze that lands within the corner's radius.
-        corner_illumination: Relative illumination at the corner.
-    """
-
-    about: Middle
-    fields: int
-    wavelengths: int
-    core_px: int
-    cell_px: int
-    cells: int
-    core_share: float
-    haze_kept: float
-    corner_illumination: float
-
-    def to_json(self) -> dict[str, int | float | str]:
-        """Return the report as a flat mapping."""
-        return {
-            name: round(value, 5) if isinstance(value, float) else value
-            for name in self.__slots__
-            for value in [getattr(self, name)]
-        }
-
-
 def freeze_hazy(
     lens: Lens,
     sensor: ColorSensor,
@@ -125,7 +89,7 @@ def freeze_hazy(
     *,
     about: Middle | None = None,
     tell: Tell = lambda _: None,
-) -> tuple[FrozenOptics, HazyReport]:
+) -> tuple[FrozenOptics, Facts]:
     """Freeze a lens that makes peaks and haze.
 
     Args:
@@ -134,6 +98,11 @@ def freeze_hazy(
         grid: How finely.
         about: What light is gathered about; None to choose, see `find_middles`.
         tell: Takes a line for every field.
+
+    Returns:
+        Core and haze, and what they hold: `core_share` is the least share in the core of the light
+        that arrives of a field and wavelength, `haze_kept` the least share in the cells of the haze
+        that lands within the corner's radius.
 
     Raises:
         ContractError: If neither a peak nor a chief ray reaches the corner, or the haze is wider
@@ -192,18 +161,18 @@ def freeze_hazy(
         pixel_pitch_um=pitch_um,
     )
     near = share / (share + haze.sum(axis=(-2, -1)))
-    report = HazyReport(
-        about=middles.about,
-        fields=fields,
-        wavelengths=wavelengths,
-        core_px=core_px,
-        cell_px=cell_px,
-        cells=cells,
-        core_share=float(near.min()),
-        haze_kept=float(_kept(haze / light[:, None, None, None], wanted).min()),
-        corner_illumination=float(illumination[-1]),
-    )
-    return FrozenOptics(psf=psf, haze=found), report
+    facts: Facts = {
+        "about": middles.about,
+        "fields": fields,
+        "wavelengths": wavelengths,
+        "core_px": core_px,
+        "cell_px": cell_px,
+        "cells": cells,
+        "core_share": float(near.min()),
+        "haze_kept": float(_kept(haze / light[:, None, None, None], wanted).min()),
+        "corner_illumination": float(illumination[-1]),
+    }
+    return FrozenOptics(psf=psf, haze=found), rounded_facts(facts)
 
 
 def arriving(angles_rad: Array, heights_px: Array) -> Array:
