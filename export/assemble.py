@@ -30,6 +30,7 @@ from camkit.bundle.manifest import (
     LIGHT_VERSION,
     Manifest,
     Threshold,
+    format_of,
     planes_of,
 )
 from camkit.bundle.psf_file import psf_to_bytes, read_psf
@@ -312,7 +313,7 @@ def _manifest(camera: _Camera, parts: Parts, networks: Networks) -> Manifest:
     known = KnownParts(sensor=recipe.sensor, optics=optics, networks=facts)
     data = (c.training_data for sizes in camera.checkpoints.values() for c in sizes.values())
     return Manifest(
-        format_version=".".join(map(str, LIGHT_VERSION)),  # it states the laws of its pictures
+        format_version=format_of(camera.optics.psf, (optics, *stages), least=LIGHT_VERSION),  # laws
         kind=recipe.kind,
         name=recipe.name,
         version=parts.version,

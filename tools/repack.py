@@ -22,7 +22,7 @@ import numpy as np
 
 from camkit.bundle.golden import golden_from_bytes, golden_to_bytes
 from camkit.bundle.light_bound import LightBound
-from camkit.bundle.manifest import FORMAT_VERSION, Manifest
+from camkit.bundle.manifest import LIGHT_VERSION, Manifest
 from camkit.bundle.optics import PSF
 from camkit.bundle.psf_file import psf_to_bytes, read_psf
 from camkit.bundle.reader import CARD, GOLDEN, open_bundle
@@ -81,8 +81,8 @@ def repack(
     members = {name: bundle.member(name) for name in bundle.names}
     if GOLDEN in members:
         members[GOLDEN] = golden_to_bytes(golden_from_bytes(members[GOLDEN]))
-    newest = {"format_version": ".".join(map(str, FORMAT_VERSION))}
-    manifest = bundle.manifest.model_copy(update=newest)
+    newest = max(bundle.manifest.version_pair, LIGHT_VERSION)
+    manifest = bundle.manifest.model_copy(update={"format_version": ".".join(map(str, newest))})
     with tempfile.TemporaryDirectory() as folder:
         trial = Path(folder) / "trial.camkit"
         changes = _simple_changes(clip_reach_px, floor, limited=limited)
