@@ -23,7 +23,7 @@ from camkit.models_def.optics.diffraction.streak_fit import NoStreaksError
 from camkit.models_def.optics.freeze import Facts, Tell, depths_text, rounded_facts
 from camkit.models_def.optics.frozen import FINE_WAVELENGTHS, FreezeGrid, freeze
 from camkit.models_def.optics.optics import FloatGrid
-from camkit.models_def.sensors.psf import wavelength_weights
+from camkit.runtime.bank.psf import wavelength_weights
 
 WAVELENGTH_COUNTS: Final = (3, 4, 5, 7, 9, 13)
 MISPLACED_LIMIT: Final = 0.002

@@ -27,7 +27,7 @@ from camkit.models_def.optics.measured import (
 from camkit.models_def.optics.optics import Optics, radial_layout
 from camkit.models_def.optics.optics_file import read_optics
 from camkit.models_def.sensors.forward import blur
-from camkit.models_def.sensors.psf import color_kernels
+from camkit.runtime.bank.psf import color_kernels
 from tests.psf_factory import coma_kernels, frozen_psf, streak_kernel
 
 DUET = Path(__file__).resolve().parents[3] / "models_def" / "prescriptions" / "duet.toml"
@@ -96,7 +96,7 @@ def test_streaks_of_a_grid_fall_where_direct_convolution_puts_them(sensor: Plane
     fields = color_kernels(psf, *sensor.response_arrays())
     for row, y_mm in enumerate(Y_MM):
         for column, x_mm in enumerate(X_MM):
-            kernels = fields.at(torch.tensor([x_mm]), torch.tensor([y_mm]))
+            kernels = torch.from_numpy(fields.at(x_mm, y_mm))[None]
             found = blur(torch.from_numpy(scene)[None, None], kernels)[0, 0].numpy()
             streak = middle(STREAKS[row, column], kernels.shape[-1])
             expected = scipy.signal.convolve2d(scene, streak, "valid")

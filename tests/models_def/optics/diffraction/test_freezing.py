@@ -27,7 +27,7 @@ from camkit.models_def.optics.diffraction.gratings import Streaks, chirped_grati
 from camkit.models_def.optics.diffraction.patterns import FlatPattern, Pattern, PeakPattern
 from camkit.models_def.optics.diffraction.plate import Plate, pattern_plate, write_plate
 from camkit.models_def.optics.diffraction.plate_optics import PlateOptics, plate_kernels
-from camkit.models_def.sensors.psf import wavelength_weights
+from camkit.runtime.bank.psf import wavelength_weights
 from tests.two_colours import red_and_blue_sensor
 
 BENCH = Bench(diameter_mm=2.0, focal_length_mm=20.0, focus_mm=2000.0)
