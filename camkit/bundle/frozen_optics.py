@@ -117,6 +117,23 @@ def read_optics_file(path: Path, *, channels: int) -> FrozenOptics:
     return optics_from_bytes(data, what=str(path), channels=channels)
 
 
+def write_optics_files(optics: FrozenOptics, path: Path, haze_path: Path | None = None) -> None:
+    """Write frozen optics and the haze beside them, replacing files that are there.
+
+    Args:
+        optics: Kernels, or streaks.
+        path: Receives them.
+        haze_path: Receives the haze, which must be there then.
+    """
+    _, data = optics.member
+    for file in (path, haze_path):
+        if file is not None:
+            file.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(data)
+    if haze_path is not None and optics.haze is not None:
+        haze_path.write_bytes(haze_to_bytes(optics.haze))
+
+
 def psf_of_streaks(streaks: StreakOptics, channels: int, *, bare: bool = False) -> FrozenPsf:
     """Return the dense kernels of streak optics, each of sum 1.
 

@@ -22,7 +22,7 @@ from camkit.models_def.optics.pupil import half_disc
 from camkit.models_def.optics.search.problem import Problem
 from camkit.models_def.optics.search.splat import Pixels
 from camkit.models_def.optics.search.variables import FreeLens
-from camkit.models_def.training.pictures import SceneSource, open_source
+from camkit.models_def.training.pictures import SceneSource, open_scenes
 from camkit.units import to_radians
 
 
@@ -155,9 +155,4 @@ def parts_of(
 
 def source_of(recipe: DesignRecipe, pictures: Path | None) -> SceneSource:
     """Open the pictures of a folder and the procedural scenes of a recipe."""
-    return open_source(
-        pictures,
-        picture_share=recipe.data.picture_share,
-        scenes=recipe.data.procedural_scenes,
-        scene_px=recipe.data.scene_px,
-    )
+    return open_scenes(recipe.data, pictures)

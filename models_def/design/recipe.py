@@ -18,6 +18,7 @@ from camkit.models_def.optics.prescription import FabricationErrors
 from camkit.models_def.optics.search.limits import Limits
 from camkit.models_def.optics.search.variables import Variable
 from camkit.models_def.toml_table import check_keys, read_table, section, typed
+from camkit.models_def.training.recipe import SceneRecipe
 
 Spacing = Literal["height", "area"]
 
@@ -131,21 +132,6 @@ class NetworkChoice:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DesignData:
-    """The source of sharp patches.
-
-    Attributes:
-        picture_share: Share of patches from pictures, where a folder is given.
-        procedural_scenes: How many different scenes.
-        scene_px: Their side.
-    """
-
-    picture_share: float = 0.8
-    procedural_scenes: int = 24
-    scene_px: int = 512
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class DesignRecipe:
     """A joint design.
 
@@ -167,7 +153,7 @@ class DesignRecipe:
     network: NetworkChoice
     loss: DesignLoss
     schedule: DesignSchedule
-    data: DesignData
+    data: SceneRecipe
     starts: Starts
     fabrication: FabricationErrors | None = None
 
@@ -202,7 +188,7 @@ def to_design(table: Mapping[str, Any]) -> DesignRecipe:
         network=section("network", NetworkChoice, network),
         loss=section("loss", DesignLoss, table.get("loss", {})),
         schedule=section("schedule", DesignSchedule, table.get("schedule", {})),
-        data=section("data", DesignData, table.get("data", {})),
+        data=section("data", SceneRecipe, table.get("data", {})),
         starts=section("starts", Starts, table.get("starts", {})),
         fabrication=(
             section("fabrication", FabricationErrors, table["fabrication"])

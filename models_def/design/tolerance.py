@@ -22,7 +22,7 @@ from camkit.models_def.design.front import Front
 from camkit.models_def.design.sensor import Recorder, capture
 from camkit.models_def.optics.kernel_bank import gaussian_response
 from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.pupil import PupilSamples, half_disc
+from camkit.models_def.optics.pupil import both_halves, half_disc
 from camkit.models_def.optics.tolerance.deviation import (
     Deviations,
     Single,
@@ -311,13 +311,12 @@ def _judge(lens: Lens, tolerances: Tolerances, run: ToleranceRun) -> _Judge:
 
 
 def _view(lens: Lens, fields: tuple[tuple[float, float], ...], far: float, rays: int) -> View:
-    half = half_disc(rays // 2)
     return View(
         slopes=torch.tensor([far * share for share, _ in fields], dtype=torch.float64),
         azimuths_rad=torch.tensor([to_radians(a) for _, a in fields], dtype=torch.float64),
         wavelengths_um=torch.tensor(lens.wavelengths_um, dtype=torch.float64),
         # mirrored: the nominal kernels are as symmetric as the lens
-        samples=PupilSamples(x=torch.cat([half.x, -half.x]), y=torch.cat([half.y, half.y])),
+        samples=both_halves(half_disc(rays // 2)),
     )
 
 
@@ -351,9 +350,7 @@ def _overall(spot_rms_mm: Array) -> Array:
 
 def _offenders(judge: _Judge) -> tuple[Offender, ...]:
     """Rate every single error at both its limits, by spots of few rays."""
-    half = half_disc(_SPOT_RAYS // 2)
-    few = PupilSamples(x=torch.cat([half.x, -half.x]), y=torch.cat([half.y, half.y]))
-    view = replace(judge.view, samples=few)
+    view = replace(judge.view, samples=both_halves(half_disc(_SPOT_RAYS // 2)))
 
     def overall(deviations: Deviations) -> Array:
         landing = land(judge.lens, deviations, view, judge.tolerances.compensator)

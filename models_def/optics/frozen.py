@@ -27,8 +27,8 @@ from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError
 from camkit.models_def.optics.optics import FieldLayout, FloatGrid, Optics, radial_layout
 from camkit.models_def.optics.psf import TracedPsf
-from camkit.models_def.sensors.psf import wavelength_weights
 from camkit.progress import working
+from camkit.runtime.bank.psf import wavelength_weights
 from camkit.units import MM_PER_M, UM_PER_MM
 
 STRESS_OFFSETS_PER_M: Final = (0.02, 0.05, 0.1, 0.2)

@@ -20,8 +20,8 @@ from camkit.bundle.stages import Wiener
 from camkit.contracts import FrozenPsf
 from camkit.models_def.optics.frozen import FreezeGrid, corner_height_mm, freeze_at
 from camkit.models_def.optics.optics import FieldLayout, FloatGrid, Optics, radial_layout
-from camkit.models_def.sensors.psf import color_kernels
 from camkit.models_def.sensors.wiener import to_otf, wiener_restore
+from camkit.runtime.bank.psf import color_kernels
 from camkit.scenes import procedural_scene
 from camkit.units import UM_PER_MM
 
@@ -354,8 +354,8 @@ def _kernels(
     depth_mm: float | None,
 ) -> Tensor:
     fields = color_kernels(psf, *sensor.response_arrays(), depth_mm=depth_mm)
-    x_mm, y_mm = (torch.from_numpy(values) for values in at_mm)
-    return fields.at(x_mm, y_mm)
+    places = zip(*(values.tolist() for values in at_mm), strict=True)
+    return torch.from_numpy(np.stack([fields.at(x_mm, y_mm) for x_mm, y_mm in places]))
 
 
 def _scenes(count: int, size_px: int, seed: int, channels: int) -> Tensor:

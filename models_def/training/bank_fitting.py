@@ -8,14 +8,14 @@ import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Protocol, cast
+from typing import Any, Final, Protocol
 
 from pydantic import ValidationError
 
 from camkit.bundle.stages import Together
 from camkit.bundle.stages.together import Spread
 from camkit.errors import ContractError, UnsupportedError
-from camkit.kinds import find_kind
+from camkit.models_def.training.kind import special_part
 
 _REST: Final = r"[ \t]*(?:#.*)?\n(?:(?!\[).*\n|\n)*"
 WIENER: Final = re.compile(r"^\[wiener\]" + _REST, re.MULTILINE)
@@ -94,10 +94,10 @@ def bank_fitting_kind(name: str) -> BankFittingKind:
     Raises:
         UnsupportedError: If its cameras have none.
     """
-    part = find_kind(name).part("models_def")
-    if not hasattr(part, "BANK_FITTING"):
+    part: BankFittingKind | None = special_part(name, "BANK_FITTING")
+    if part is None:
         raise UnsupportedError(f"cameras of the kind {name!r} have no bank of colours to fit")
-    return cast("BankFittingKind", part.BANK_FITTING)
+    return part
 
 
 def check_text(recipe: str) -> None:

@@ -9,11 +9,12 @@ package) defines `PART`, which fulfils `TrainingKind`.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol, TypeVar, cast
 
+import numpy as np
 from torch import Tensor, nn
 
 from camkit.bundle.stages import Stage
@@ -71,6 +72,25 @@ class Score:
 
     mean_db: float
     parts: Mapping[str, Mapping[str, float]]
+
+
+def mean_score(every_db: Sequence[float], **labels: Sequence[str]) -> Score:
+    """Return the mean over captures, and over those of each label.
+
+    Args:
+        every_db: Of the captures.
+        labels: What is told apart -> its value for every capture; by_iso=("100", "800", ...).
+    """
+    parts = {
+        name: {
+            label: float(
+                np.mean([db for db, of in zip(every_db, each, strict=True) if of == label])
+            )
+            for label in dict.fromkeys(each)
+        }
+        for name, each in labels.items()
+    }
+    return Score(mean_db=float(np.mean(every_db)), parts=parts)
 
 
 class Judge(Protocol):
@@ -169,6 +189,19 @@ def training_kind(name: str) -> TrainingKind[Any, Any]:
     if not hasattr(part, "PART"):
         raise ContractError(f"{part.__name__} must define PART as a TrainingKind")
     return cast("TrainingKind[Any, Any]", part.PART)
+
+
+def special_part(kind: str, name: str) -> Any | None:
+    """Return what the design side of a kind defines beside its `PART`; None if it does not.
+
+    Args:
+        kind: Name of the kind.
+        name: FITTING, REFINING, BANK_FITTING or PREPARING.
+
+    Raises:
+        UnsupportedError: If there is no such kind, or it cannot be trained.
+    """
+    return getattr(find_kind(kind).part("models_def"), name, None)
 
 
 def read_recipe(path: Path) -> Recipe:

@@ -45,21 +45,32 @@ def check_share(where: str, value: float) -> None:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DataRecipe:
-    """The sources and the number of samples; a kind may add keys of its own.
+class SceneRecipe:
+    """Where sharp crops come from.
 
     Attributes:
-        picture_share: Share of samples cut from pictures, the rest is procedural; without a
-            folder of pictures every sample is procedural.
+        picture_share: Share of crops of pictures, the rest is procedural; without a folder of
+            pictures every crop is procedural.
         procedural_scenes: Different procedural scenes of `scene_px` a side.
         scene_px: Side of a procedural scene.
+    """
+
+    picture_share: float = 0.8
+    procedural_scenes: int = 24
+    scene_px: int = 512
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DataRecipe(SceneRecipe):
+    """How many samples are made and held; a kind may add keys of its own.
+
+    Attributes:
         sample_px: Side of a finished sample; training patches are cut from it.
         pool_samples: Samples held on disk at one time; more than `AHEAD`.
         first_samples: Samples that must exist before the first step.
         steps_per_sample: Training steps after which one more sample replaces the oldest.
     """
 
-    picture_share: float = 0.8
     procedural_scenes: int = 48
     scene_px: int = 1024
     sample_px: int = 256

@@ -28,7 +28,7 @@ from camkit.models_def.training.first_weights import (
     read_first_weights,
     take_first_weights,
 )
-from camkit.models_def.training.fitter import Fits, Fitter
+from camkit.models_def.training.fitter import Fitter, patch_objective
 from camkit.models_def.training.fitting import FitRequest, OwnFitting, own_fitting
 from camkit.models_def.training.kind import (
     Judge,
@@ -297,11 +297,11 @@ class _Run:
         self.data = data + ("" if first is None else first.credit(data))
         if own is not None:
             self.data += own.credit
-            self.fitter: Fits = own.make(material)
+            self.fitter = own.make(material)
         elif refinement is None:
-            finish = kind.finish(self.recipe, self.role)
+            objective = patch_objective(kind.finish(self.recipe, self.role))
             self.fitter = Fitter(
-                self.entry, kind.build_network, options.device, first, finish=finish
+                self.entry, kind.build_network, options.device, first, objective=objective
             )
         else:
             self.data += refinement.credit

@@ -42,7 +42,7 @@ from camkit.models_def.sensors.stabilise import stabilise
 from camkit.models_def.sensors.together import Numbers, restore_together
 from camkit.models_def.sensors.wiener import block_facts, to_otf, wiener_restore
 from camkit.models_def.training.bank_fitting import BankFit, BankFitOptions
-from camkit.models_def.training.pictures import open_source
+from camkit.models_def.training.pictures import open_scenes
 from camkit.progress import counted
 
 FREQUENCIES: Final = (0.0, 0.015, 0.03, 0.05, 0.075, 0.1, 0.14, 0.18, 0.23, 0.3, 0.4, 0.75)
@@ -220,12 +220,7 @@ def _told(errors: Sequence[float]) -> str:
 def _photographed(
     recipe: BayerRecipe, bank: PsfBank, pictures: Path | None, count: int, seed: int
 ) -> Sequence[Developed]:
-    source = open_source(
-        pictures,
-        picture_share=recipe.data.picture_share,
-        scenes=recipe.data.procedural_scenes,
-        scene_px=recipe.data.scene_px,
-    )
+    source = open_scenes(recipe.data, pictures)
     shots = []
     for index in counted(range(count), "photographing", "samples"):
         rng = np.random.default_rng((seed, index))

@@ -17,7 +17,7 @@ from torch import Tensor
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.models_def.sensors.psf import FieldKernels
+from camkit.models_def.sensors.psf import turned_at
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -144,7 +144,4 @@ def read_bank(path: Path) -> PsfBank:
 
 def _at(kernels: FloatArray, heights_mm: NDArray[np.float64], x_mm: float, y_mm: float) -> Tensor:
     place = (torch.tensor([x_mm], dtype=torch.float64), torch.tensor([y_mm], dtype=torch.float64))
-    fields = FieldKernels(
-        kernels=torch.from_numpy(kernels), field_heights_mm=torch.from_numpy(heights_mm)
-    )
-    return fields.at(*place)
+    return turned_at(torch.from_numpy(kernels), torch.from_numpy(heights_mm), *place)

@@ -78,15 +78,8 @@ class HdrMaker:
 class HdrTraining:
     """Fulfils `camkit.models_def.training.kind.TrainingKind`."""
 
-    @property
-    def roles(self) -> tuple[str, ...]:
-        """One network, behind the lights found by physics."""
-        return ROLES
-
-    @property
-    def camera_parts(self) -> tuple[str, ...]:
-        """Attributes of a recipe that describe the camera."""
-        return CAMERA_PARTS
+    roles: Final = ROLES
+    camera_parts: Final = CAMERA_PARTS
 
     def to_recipe(self, table: Mapping[str, Any]) -> HdrRecipe:
         """Check the tables of a recipe."""
@@ -153,7 +146,7 @@ class HdrTraining:
         seed: int,
     ) -> HdrMaker | CodedMaker:
         """Open the scenes."""
-        source = _open_lights(recipe, pictures)
+        source = open_lights(recipe.data, pictures)
         if role in REFERENCE_ROLES:
             return CodedMaker(recipe, role, CodedCamera(recipe, material), source, seed)
         return HdrMaker(recipe, HdrCamera(recipe, material), source, seed)
@@ -163,7 +156,7 @@ class HdrTraining:
     ) -> HdrJudge | CodedJudge:
         """Photograph scenes that are never trained on."""
         if role in REFERENCE_ROLES:
-            source = _open_lights(recipe, pictures)
+            source = open_lights(recipe.data, pictures)
             return make_coded_judge(recipe, role, CodedCamera(recipe, material), source)
         shots = make_shots(recipe, HdrCamera(recipe, material), pictures)
         return HdrJudge(shots=shots, recipe=recipe)
@@ -174,16 +167,6 @@ def _lights_px(recipe: HdrRecipe) -> int | None:
     sizes = recipe.networks.get(ROLES[0], {}).values()
     reaches_px = [px for size in sizes if (px := lights_px(size.network)) is not None]
     return max(reaches_px) if reaches_px and len(reaches_px) == len(sizes) else None
-
-
-def _open_lights(recipe: HdrRecipe, pictures: Path | None) -> LightSource:
-    data = recipe.data
-    return open_lights(
-        pictures,
-        picture_share=data.picture_share,
-        scenes=data.procedural_scenes,
-        scene_px=data.scene_px,
-    )
 
 
 PART: Final = HdrTraining()

@@ -112,11 +112,6 @@ def wiener_error(
     return torch.as_tensor((values[centre, centre] - told).mean())
 
 
-def wiener_psnr_db(kernel: Tensor, covariance: Covariance, photons: float) -> float:
-    """Return the error of `wiener_error` as PSNR in dB, white = 1."""
-    return float(-10 * torch.log10(wiener_error(kernel, covariance, photons)))
-
-
 def best_gaussian(covariance: Covariance, photons: float) -> float:
     """Return the sigma in sub-pixels of the Gaussian of least error at a level of light."""
 

@@ -27,7 +27,7 @@ from camkit.models_def.kinds.spad.samples import SpadMaker, layout_of
 from camkit.models_def.kinds.spad.sampling import Sampling, make_sampling
 from camkit.models_def.kinds.spad.validation import SpadJudge, make_judge
 from camkit.models_def.training.kind import Design
-from camkit.models_def.training.pictures import open_source
+from camkit.models_def.training.pictures import open_scenes
 from camkit.models_def.training.sample import SampleLayout
 
 PSF_FILE: Final = "psf.safetensors"
@@ -63,15 +63,8 @@ class SpadMaterial:
 class SpadTraining:
     """Fulfils `camkit.models_def.training.kind.TrainingKind`."""
 
-    @property
-    def roles(self) -> tuple[str, ...]:
-        """One network: four times as fine."""
-        return ROLES
-
-    @property
-    def camera_parts(self) -> tuple[str, ...]:
-        """Attributes of a recipe that describe the camera."""
-        return CAMERA_PARTS
+    roles: Final = ROLES
+    camera_parts: Final = CAMERA_PARTS
 
     def to_recipe(self, table: Mapping[str, Any]) -> SpadRecipe:
         """Check the tables of a recipe."""
@@ -132,13 +125,7 @@ class SpadTraining:
         seed: int,
     ) -> SpadMaker:
         """Open the scenes."""
-        data = recipe.data
-        source = open_source(
-            pictures,
-            picture_share=data.picture_share,
-            scenes=data.procedural_scenes,
-            scene_px=data.scene_px,
-        )
+        source = open_scenes(recipe.data, pictures)
         return SpadMaker(recipe, role, sampling_of(recipe, material), source, seed)
 
     def judge(

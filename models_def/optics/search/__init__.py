@@ -4,6 +4,7 @@
 - `beam`: rays of a batch of lenses, by the paraxial entrance pupil
 - `merit`: residuals of spots, three merits
 - `limits`: residuals of what a lens must not be: too thin, too steep, losing rays
+- `penalty`: what keeps a design where rays pass
 - `problem`: merit and limits of a batch of lenses, as one residual function
 - `least_squares`: damped least squares on a batch of starts
 - `finish`: a found lens made into a prescription

@@ -12,8 +12,8 @@ from typing import Final
 import torch
 from torch import Tensor
 
-from camkit.models_def.optics.penalty import edge_gaps, reach_rho
 from camkit.models_def.optics.pupil import PupilSamples
+from camkit.models_def.optics.search.penalty import edge_gaps, reach_rho
 from camkit.models_def.optics.search.problem import Problem, trace_batch
 
 _LINE: Final = 161

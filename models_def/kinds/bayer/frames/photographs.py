@@ -3,8 +3,8 @@
     crops of pictures -> a scene of the whole sensor -> light through a copy of the lens
         -> shots at ISOs of their own -> the runtime, up to the stage `haze` -> tiles
 
-What networks are trained on is what the runtime gives them: nothing of it is written again for
-training (`camkit.models_def.kinds.bayer.frames` takes tiles through the bank).
+Networks are trained on what the runtime gives them: nothing of it is written again for training
+(`samples` takes the tiles through the bank).
 """
 
 import tempfile
@@ -41,7 +41,7 @@ from camkit.models_def.optics.prescription import Lens, format_prescription
 from camkit.models_def.optics.thin.freezing import COPY_RAYS, HazyGrid, freeze_hazy
 from camkit.models_def.optics.thin.middle import find_middles
 from camkit.models_def.training.kind import training_kind
-from camkit.models_def.training.pictures import DrawnShares, SceneSource, list_pictures, open_source
+from camkit.models_def.training.pictures import DrawnShares, SceneSource, list_pictures, open_scenes
 from camkit.runtime.bank.haze import hazy_kernels
 from camkit.runtime.geometry.illumination import illumination_band
 from camkit.runtime.options import Options
@@ -194,11 +194,10 @@ class _Studio:
         self._recipe, self._sources, self._tiles = recipe, sources, tiles
         self._choosing = part == PARTS[1]
         self._pipeline = Pipeline(bundle, Options(threads=1))
-        self._scenes = open_source(
+        self._scenes = open_scenes(
+            data,
             sources.pictures[part],
-            picture_share=1.0 if self._choosing else data.picture_share,
-            scenes=data.procedural_scenes,
-            scene_px=data.scene_px,
+            picture_share=1.0 if self._choosing else None,
             first_scene=-data.procedural_scenes if self._choosing else 0,
             drawn=DrawnShares() if self._choosing else data.drawn,
         )

@@ -1,16 +1,15 @@
-"""Preparation before training, for the kinds whose samples need the runtime.
+"""Samples made before training, for the kinds that photograph whole frames.
 
-The part of such a kind (`camkit.export.kinds.NAME`, or the `export` of its own package) defines
-`PREPARING`, which fulfils `PreparingKind`.
+The part of such a kind defines `PREPARING` beside its `PART`, which fulfils `PreparingKind`.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, cast
+from typing import Any, Protocol
 
 from camkit.errors import UnsupportedError
-from camkit.kinds import find_kind
+from camkit.models_def.training.kind import special_part
 
 Tell = Callable[[str], None]
 
@@ -61,11 +60,9 @@ def preparing_kind(name: str) -> PreparingKind:
     Raises:
         UnsupportedError: If its samples are made while it trains.
     """
-    kind = find_kind(name)
-    if kind.has_part("export"):
-        part = kind.part("export")
-        if hasattr(part, "PREPARING"):
-            return cast("PreparingKind", part.PREPARING)
-    raise UnsupportedError(
-        f"samples of the kind {name!r} are made while it trains; leave prepare out"
-    )
+    part: PreparingKind | None = special_part(name, "PREPARING")
+    if part is None:
+        raise UnsupportedError(
+            f"samples of the kind {name!r} are made while it trains; leave prepare out"
+        )
+    return part
