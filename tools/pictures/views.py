@@ -5,6 +5,7 @@
 A new camera is a line of `VIEWS`.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,7 @@ import numpy as np
 
 import camkit
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
+from camkit.bundle.stages import Deglare
 from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray
 from camkit.runtime.files.picture import read_light
@@ -23,8 +25,8 @@ from camkit.runtime.kind_parts.recording import RecordingOptions
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from camkit.runtime.kinds.spad.twin.simulate import fitted, luminance, record
 from camkit.runtime.kinds.spad.twin.write import write_recorded
+from camkit.streaks.glare.removal import Glare, GlareSettings, find_glare
 from tools.hdr.gallery import night_pictures
-from tools.hdr.glare_table import deglared
 from tools.hdr.glare_twin import exposed_scene, photographed, two_point_star
 from tools.hdr.glare_twin import psnr_db as streaks_psnr_db
 from tools.pictures.crops import Place, crop_pictures, psnr_db, take
@@ -139,7 +141,7 @@ class Windshield:
         bundle = open_bundle(find_bundle(name))
         scene = exposed_scene(f"night:{self.seed}", 384, 512)
         shot = photographed(scene, two_point_star(np.deg2rad(self.angle_deg)), self.seed)
-        glare, cleared = deglared(shot.seen)
+        glare, cleared = _deglared(shot.seen)
         level = glare.settings.level
         decibels = [streaks_psnr_db(picture, shot, level) for picture in (shot.seen, cleared)]
         part = _around_brightest(shot.seen)
@@ -223,3 +225,19 @@ def _around_brightest(picture: FloatArray) -> tuple[slice, slice, slice]:
     top = int(np.clip(y - SIDE_PX // 2, 0, height - SIDE_PX))
     left = int(np.clip(x - SIDE_PX // 2, 0, width - SIDE_PX))
     return np.s_[:, top : top + SIDE_PX, left : left + SIDE_PX]
+
+
+def _deglared(seen: FloatArray) -> tuple[Glare, FloatArray]:
+    """Take the streaks out of a picture (3, h, w) that clips at 1, as the bundle does."""
+    entry = Deglare()
+    settings = GlareSettings(
+        least_rad=math.radians(entry.least_angle_deg),
+        most_rad=math.radians(entry.most_angle_deg),
+        reach=entry.reach,
+        level=entry.level,
+    )
+    _, height, width = seen.shape
+    glare = find_glare(lambda: lambda top, bottom: seen[:, top:bottom], height, width, settings)
+    cleared = seen.copy()
+    glare.paint(cleared, 0, (1.0, 1.0, 1.0))
+    return glare, cleared
