@@ -32,7 +32,6 @@ from camkit.report.fabricated_optics import fabricated_optics, lens_text
 from camkit.report.quality import FABRICATION_SEEDS, FIELD_SHARES, Shot, list_set, read_picture
 from camkit.runtime.network.engine import available_threads
 from tools.capture.simulated import color_sensor
-from tools.comparison.compact_json import to_compact_json
 from tools.comparison.copies import transfer_error
 from tools.comparison.measurement import (
     CAPTURE_COLUMNS,
@@ -53,6 +52,7 @@ from tools.comparison.photograph import TUNING_SEED, Photograph, photograph
 from tools.comparison.quality_table import seconds_per_megapixel, summarise, to_markdown
 from tools.comparison.rows import DEFAULT_METHODS, Rival, make_rows, protocol_text
 from tools.comparison.tuning import at_edge, choose, try_peers, tuned_from_json, tuned_to_json
+from tools.tables.records import to_compact_json
 
 TUNING_SIDE_PX = 272
 SIZES = ("S", "M", "L")
