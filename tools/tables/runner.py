@@ -80,7 +80,6 @@ class Table:
         add_train_options: Adds options of its own to `train`.
         steps: At which a schedule would end; None for the recipe's.
         digits: Of numbers in its record.
-        draw: A picture of a record (PNG), which is written beside it.
     """
 
     about: str
@@ -92,7 +91,6 @@ class Table:
     add_train_options: Callable[[ArgumentParser], None] = lambda _: None
     steps: int | None = None
     digits: int = 6
-    draw: Callable[[Record, Path], bytes] | None = None
 
 
 def run(tables: Mapping[str, Table], words: Sequence[str]) -> None:
@@ -164,8 +162,6 @@ def _measure(table: Table, options: Namespace) -> None:
     record = table.measure(asked)
     with atomic_output(out) as part:
         part.write_text(to_compact_json(record, table.digits) + "\n", encoding="utf-8")
-    if table.draw is not None:
-        out.with_suffix(".png").write_bytes(table.draw(record, options.runs))
     print(table.to_text(record))
 
 

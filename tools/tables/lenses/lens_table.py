@@ -1,4 +1,4 @@
-"""Table 6.1: which lens gives the best picture after recovery? Figures 6.5, 6.7, 6.8 beside it.
+"""Table 6.1, figures 6.7 and 6.8: which lens gives the best picture after recovery?
 
     python -m tools.tables lenses measure RECIPE --lens al2550-a aca254-050-a ours=lens.toml \
         --data PICTURES --fresh OTHERS --steps 2000 --runs out/lens-table -o RECORD.json
@@ -38,14 +38,8 @@ from camkit.models_def.training.pictures import SceneSource, open_source
 from camkit.units import to_degrees
 from tools.tables.journal import Entry, digest
 from tools.tables.lenses.lens_at_rest import Seen, at_rest, at_work, window_of
-from tools.tables.lenses.lens_page import (
-    draw_lens_table,
-    lens_table,
-    mean_and_spread,
-    worst_contrast,
-)
-from tools.tables.lenses.lens_score import Captures, edge_contrasts, score_parts
-from tools.tables.lenses.slanted_edge import ACROSS
+from tools.tables.lenses.lens_page import lens_table, mean_and_spread
+from tools.tables.lenses.lens_score import Captures, score_parts
 from tools.tables.runner import Asked, Record, Table
 
 DIGITS: Final = 5
@@ -87,7 +81,7 @@ def measure(asked: Asked) -> Record:
         entry["recovered"] = [
             asked.kept(
                 conditions.digest(asdict(lens), seed),
-                partial(_timed, partial(after, lens, conditions, seed, asked.runs)),
+                partial(_timed, partial(after, lens, conditions, seed)),
                 partial(_line, name),
             )
             for seed in range(1, asked.options.seeds + 1)
@@ -237,14 +231,13 @@ def before(lens: Lens, conditions: Conditions) -> Entry:
         "arriving": seen.arriving.tolist(),
         "rms_um": (1000 * seen.rms_mm.nan_to_num(-1e-3)).tolist(),
         "capture": scores(judged, conditions),
-        "contrast": contrasts(judged),
     }
     if conditions.recipe.front.kind != "none":
         entry["front"] = scores(replace(judged, network=None), conditions)
     return entry
 
 
-def after(lens: Lens, conditions: Conditions, seed: int, folder: Path) -> Entry:
+def after(lens: Lens, conditions: Conditions, seed: int) -> Entry:
     """Train a network for the lens at rest, and judge it."""
     recipe = replace(conditions.recipe, schedule=replace(conditions.recipe.schedule, seed=seed))
     network = network_of(recipe)
@@ -266,57 +259,21 @@ def after(lens: Lens, conditions: Conditions, seed: int, folder: Path) -> Entry:
             )
     loop.take_best()
     judged, _ = parts(lens, conditions, fresh_source(conditions), network.eval(), widest=True)
-    pictures = f"{conditions.digest(asdict(lens), seed)[:16]}.npz"
-    keep_pictures(judged, recipe, folder / pictures)
-    return {
-        "seed": seed,
-        "pictures": pictures,
-        "valid_db": loop.best_db,
-        **scores(judged, conditions),
-        "contrast": contrasts(judged),
-    }
+    return {"seed": seed, "valid_db": loop.best_db, **scores(judged, conditions)}
 
 
 def scores(judged: DesignParts, plan: Conditions) -> Entry:
     """Return PSNR and SSIM of every depth and field."""
-    found = score_parts(judged, plan.recipe.schedule, plan.patches)
-    return {"db": found.db, "ssim": found.ssim}
-
-
-def contrasts(judged: DesignParts) -> Entry:
-    """Return the contrast of edges in both directions."""
-    found = {across: edge_contrasts(judged, across) for across in ACROSS}
-    return {
-        "cycles_per_px": found["tangential"].cycles_per_px.tolist(),
-        **{across: one.contrast.tolist() for across, one in found.items()},
-    }
-
-
-def keep_pictures(judged: DesignParts, recipe: DesignRecipe, path: Path) -> None:
-    """Keep PSFs and one patch a field as captured, recovered and sharp, for the picture."""
-
-    def shown(network: nn.Module | None) -> list[Any]:
-        loop = DesignLoop(replace(judged, network=network), recipe.schedule)
-        return list(loop.field_pictures(1))
-
-    captured, recovered = shown(Captures()), shown(judged.network)
-    np.savez_compressed(
-        path,
-        kernels=judged.lens()[0].numpy()[:, :, 1],
-        captured=np.stack([p[:, 0].numpy() for _, p, _ in captured], axis=1),
-        recovered=np.stack([p[:, 0].numpy() for _, p, _ in recovered], axis=1),
-        sharp=np.stack([s[0].numpy() for _, _, s in recovered]),
-    )
+    return score_parts(judged, plan.recipe.schedule, plan.patches)
 
 
 def row(name: str, entry: Entry) -> str:
     """Return the line of a lens for people."""
     db, spread = mean_and_spread(entry["recovered"], "db")
     alike, _ = mean_and_spread(entry["recovered"], "ssim")
-    largest, rise, _ = worst_contrast(entry["recovered"])
     return (
         f"{name:20} capture {np.mean(entry['capture']['db']):.2f} dB, recovered {db:.2f} +- "
-        f"{spread:.2f} dB, SSIM {alike:.3f}, contrast <= {largest:.2f}, rise {rise:.2f}"
+        f"{spread:.2f} dB, SSIM {alike:.3f}"
     )
 
 
@@ -355,5 +312,4 @@ TABLE: Final = Table(
     to_text=lens_table,
     add_options=_options,
     digits=DIGITS,
-    draw=draw_lens_table,
 )

@@ -15,6 +15,7 @@ from torch import Tensor
 
 from camkit.colorimetry import rec709_from_camera
 from camkit.contracts import depth_name
+from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.frames.samples import TileMaker
 from camkit.models_def.kinds.bayer.samples import NOT_JUDGED
 from camkit.models_def.training.adversarial.content import Features, gram_loss
@@ -23,7 +24,7 @@ from camkit.models_def.training.kind import Restorer, SampleMaker, read_recipe, 
 from camkit.models_def.training.recipe import Recipe
 from camkit.models_def.training.sample import Sample, SampleLayout
 from camkit.models_def.training.similarity import ssim
-from tools.tables.losses.classical import Numbers, with_method
+from tools.tables.losses.classical import with_method
 
 METRICS: Final = ("psnr_db", "ssim", "perceptual")
 LEAST_ERROR: Final = 1e-12
@@ -34,7 +35,7 @@ class Domain:
     """Samples to judge on.
 
     Attributes:
-        samples: Never trained on, unless numbers are tuned.
+        samples: Never trained on.
         frames: Number of the frame that a sample is of; of its own where it is cut from none.
         distances_mm: How far off their scenes are; empty where nobody says.
         layout: Of them.
@@ -67,10 +68,6 @@ class Domain:
             depth_name(far_mm): float(np.mean(decibels[far == far_mm])) for far_mm in np.unique(far)
         }
         return {**means, "each": each, "frames": list(self.frames), **({"at": at} if at else {})}
-
-    def psnr_db(self, restore: Restorer) -> float:
-        """Judge a restoration by its mean PSNR alone."""
-        return float(np.mean([_psnr_db(views) for views in self._seen(restore)]))
 
     def _seen(self, restore: Restorer) -> Iterator[Views]:
         for sample in self.samples:
@@ -110,16 +107,8 @@ class Circumstances:
     layout: SampleLayout
     to_rec709: Tensor
 
-    def domain(
-        self, count: int, method: str | None = None, numbers: Numbers | None = None
-    ) -> Domain:
-        """Make samples 0 to `count`.
-
-        Args:
-            count: Number of samples.
-            method: Classical, in place of the bank.
-            numbers: Of the method; None for the runtime's.
-        """
+    def domain(self, count: int, method: str | None = None) -> Domain:
+        """Make samples 0 to `count`, by a classical method in place of the bank if one is named."""
         maker = self.maker
         frames, distances_mm = list(range(count)), []
         if isinstance(maker, TileMaker):
@@ -127,7 +116,7 @@ class Circumstances:
             found = [maker.distance_mm(number) for number in range(count)]
             distances_mm = [far_mm for far_mm in found if far_mm is not None]
         if method is not None:
-            maker = with_method(method, maker, self.recipe, numbers)
+            maker = with_method(method, maker, self.recipe)
         return Domain(
             samples=[maker.make(number) for number in range(count)],
             frames=frames,
@@ -153,7 +142,7 @@ def circumstances(
     kind, role = training_kind(recipe.kind), recipe.role(None)
     matrix = getattr(recipe.sensor, "color_matrix", None)
     if matrix is None:
-        raise SystemExit(f"{recipe_path} has no sensor.color_matrix, to see pictures")
+        raise ContractError(f"{recipe_path} has no sensor.color_matrix, to see pictures")
     folder.mkdir(parents=True, exist_ok=True)
     material = kind.prepare(recipe, recipe_path.parent, folder)
     return Circumstances(
@@ -165,6 +154,6 @@ def circumstances(
 
 
 @lru_cache(maxsize=2)
-def judged_domain(opened: Circumstances, count: int) -> Domain:
-    """Return samples by the bank, which many rows are judged on, made once."""
-    return opened.domain(count)
+def judged_domain(opened: Circumstances, count: int, method: str | None) -> Domain:
+    """Return samples that are judged on; those by the bank serve many rows and are made once."""
+    return opened.domain(count, method)

@@ -2,8 +2,7 @@
 
     python -m tools.tables losses train RECIPE.toml --rows supervised adversarial perceptual \
         --data PICTURES --cpu-minutes 60 --out-dir out/loss-table
-    python -m tools.tables losses measure --runs out/loss-table --data OTHERS --pictures PICTURES \
-        -o RECORD.json
+    python -m tools.tables losses measure --runs out/loss-table --data OTHERS -o RECORD.json
 
 Trained is before a display, judged there and outside: `train` writes both recipes into OUT_DIR,
 RECIPE_display.toml and RECIPE_wild.toml (`--depths-mm` gives distances of scenes outside), and two
@@ -11,9 +10,9 @@ more that are judged by, RECIPE_display_judged.toml and RECIPE_wild_judged.toml,
 scenes; `--rows` without a name does no more than that. `--camera CAMERA.toml` puts another camera
 before the sizes and losses of RECIPE. Rows are sizes of its network. Those that need no training
 are `capture`, the input, `wiener`, the bank alone, and of cameras behind a mosaic `wiener-alone`
-(each colour for itself), `rl`, `admm-tv` and `cross-channel`, their numbers tuned by PSNR on
-`--tune` samples of those that networks learn from. PSNR and SSIM are those of sRGB; `perceptual` is
-the 1-norm of Gram matrices (eq. 3.7), by random features unless `--vgg FILE` gives those of VGG-19.
+(each colour for itself), `rl`, `admm-tv` and `cross-channel`. PSNR and SSIM are those of sRGB;
+`perceptual` is the 1-norm of Gram matrices (eq. 3.7), by random features unless `--vgg FILE` gives
+those of VGG-19.
 All rows are judged by the last average of their weights. Below the table stands a verdict on
 "supervised overfits", from paired samples.
 
@@ -39,10 +38,9 @@ from camkit.errors import ContractError
 from camkit.models_def.training.adversarial.content import Relu32
 from camkit.models_def.training.checkpoint import load_network, read_checkpoint
 from camkit.models_def.training.kind import Restorer, read_recipe, training_kind
-from camkit.runtime.bank.baselines import method_numbers
 from tools.tables.equal_training import Trainee, checkpoint_of, finished
 from tools.tables.journal import Entry, digest, file_digest
-from tools.tables.losses.classical import METHODS, TUNABLE, Numbers, tuned
+from tools.tables.losses.classical import METHODS
 from tools.tables.losses.domain import METRICS, Domain, as_filtered, circumstances, judged_domain
 from tools.tables.losses.overfitting import overfitting, sentences
 from tools.tables.losses.twins import Counts, judged_by, write_twins
@@ -52,7 +50,6 @@ from tools.tables.runner import Asked, Record, Table
 
 DOMAINS: Final = ("lab", "wild")
 JUDGE_SEED: Final = 909
-TUNE_SEED: Final = 808
 DIGITS: Final = 5
 JUDGED: Final = 3
 """Counts how rows are judged; what was judged before is judged again."""
@@ -157,18 +154,12 @@ def _digest(row: str, asked: Asked, *more: object) -> str:
         for path in sorted((asked.runs / recipe.stem).glob(f"*/{FRAMES}"))
     ]
     texts = [path.read_text(encoding="utf-8") for path in (*recipes, *frames)]
-    tuning = (options.tune, options.pictures) if row in TUNABLE else ()
-    return digest(JUDGED, row, *texts, options.data, options.samples, options.vgg, *tuning, *more)
+    return digest(JUDGED, row, *texts, options.data, options.samples, options.vgg, *more)
 
 
 def _judge_untrained(name: str, asked: Asked) -> Entry:
-    numbers, found = None, {}
-    if name in TUNABLE:
-        tried = tune(name, asked) if asked.options.tune else []
-        numbers = tried[0][0] if tried else None
-        found = {"numbers": numbers or dict(method_numbers(name)), "tuned": tried}
     method = name if name in METHODS else None
-    return found | _scores(UNTRAINED[name], _domains(asked, method, numbers), asked)
+    return _scores(UNTRAINED[name], _domains(asked, method), asked)
 
 
 def _judge_trained(run: Run, asked: Asked) -> Entry:
@@ -193,32 +184,14 @@ def _scores(restore: Restorer, domains: Mapping[str, Domain], asked: Asked) -> E
     return {where: domain.score(restore, features) for where, domain in domains.items()}
 
 
-def _domains(
-    asked: Asked, method: str | None = None, numbers: Numbers | None = None
-) -> dict[str, Domain]:
+def _domains(asked: Asked, method: str | None = None) -> dict[str, Domain]:
     """Return what rows are judged on: unseen pictures, and no drawn scenes."""
-    options = asked.options
-    found = {}
+    options, found = asked.options, {}
     for where, twin in zip(DOMAINS, _twins(asked.runs), strict=True):
         recipe = judged_by(twin)
         opened = circumstances(recipe, asked.runs / recipe.stem, options.data, JUDGE_SEED)
-        found[where] = (
-            judged_domain(opened, options.samples)
-            if method is None
-            else opened.domain(options.samples, method, numbers)
-        )
+        found[where] = judged_domain(opened, options.samples, method)
     return found
-
-
-def tune(method: str, asked: Asked) -> list[tuple[Numbers, float]]:
-    """Tune a method by PSNR on samples that networks learn from; see `tuned`."""
-    lab, _ = _twins(asked.runs)
-    taught = circumstances(lab, asked.runs / lab.stem, asked.options.pictures, TUNE_SEED)
-
-    def score(numbers: Numbers) -> float:
-        return taught.domain(asked.options.tune, method, numbers).psnr_db(as_filtered)
-
-    return tuned(TUNABLE[method].start, score)
 
 
 def _capture(planes: Tensor) -> Tensor:
@@ -282,9 +255,9 @@ def _counts(text: str) -> Counts:
     return Counts(frames=frames, judged=judged, copies=copies[0] if copies else 1)
 
 
-def _at_least(least: int, text: str) -> int:
+def _two_or_more(text: str) -> int:
     number = int(text)
-    if number < least:
+    if number < 2:  # fewer tell no error of their mean
         raise ValueError(text)
     return number
 
@@ -301,11 +274,8 @@ def _train_options(train: ArgumentParser) -> None:
 def _options(measure: ArgumentParser) -> None:
     more: Any = measure.add_argument
     more("--data", type=Path, help="pictures to judge on")
-    more("--pictures", type=Path, help="those trained on, to tune classical methods on")
     more("--vgg", type=Path, help="weights of VGG-19")
-    # two at least, to tell an error of their mean
-    more("--samples", type=partial(_at_least, 2), default=48, help="to judge on, of each recipe")
-    more("--tune", type=partial(_at_least, 0), default=12, help="samples; 0: runtime's numbers")
+    more("--samples", type=_two_or_more, default=48, help="to judge on, of each recipe")
     more("--rows", nargs="+", metavar="SIZE", help="those of the recipe that are trained")
 
 

@@ -18,7 +18,7 @@ from camkit.models_def.optics.search.splat import Pixels
 from camkit.models_def.optics.search.variables import FreeLens
 from tests.small_design import small_design
 from tools.tables.lenses.lens_at_rest import at_rest, at_work, window_of
-from tools.tables.lenses.lens_score import edge_contrasts, score_parts
+from tools.tables.lenses.lens_score import score_parts
 
 
 @pytest.fixture
@@ -102,19 +102,13 @@ def test_a_field_beyond_the_lens_has_an_even_kernel_and_no_light() -> None:
     assert torch.allclose(rest()[0][0, 1], even)
 
 
-def test_scores_of_a_lens_at_rest_fall_off_the_axis_and_its_edges_soften(
+def test_scores_of_a_lens_at_rest_fall_off_the_axis(
     recipe: DesignRecipe,
 ) -> None:
-    """The front alone: captures. A field that a doublet cannot image has no contrast left."""
+    """The front alone: captures of a doublet, at a field that it cannot image."""
     lens = at_work(find_lens("aca254-050-a"), f_number=4.0, object_distance_mm=1000.0)
     rest, _ = at_rest(lens, _problem(lens, 0.0, 0.35), _pixels(65), 2000)
     parts = replace(parts_of(recipe), lens=rest, network=None)
     found = score_parts(parts, recipe.schedule, 2)
-    assert found.db[0][0] > found.db[0][1] + 2
-    assert found.ssim[0][0] > found.ssim[0][1]
-    contrast = edge_contrasts(parts, "tangential", pairs=1)
-    assert contrast.contrast.shape == (1, 2, 25)
-    assert float(contrast.contrast[0, 0, 4]) > 0.5
-    assert float(contrast.contrast[0, 1, 4]) < 0.1
-    # of the sharp field: the noise has cancelled, so nothing climbs again
-    assert float(contrast.rise[0, 0]) < 0.01
+    assert found["db"][0][0] > found["db"][0][1] + 2
+    assert found["ssim"][0][0] > found["ssim"][0][1]

@@ -4,33 +4,27 @@ from typing import Any
 
 import pytest
 
-from tools.tables.lenses.lens_page import lens_table, mean_and_spread, worst_contrast
+from tools.tables.lenses.lens_page import lens_table, mean_and_spread
 
 Entry = dict[str, Any]
 
 
-def _contrast(*values: float) -> Entry:
-    cycles = [0.1 * (i + 1) for i in range(len(values))]
-    return {"cycles_per_px": cycles, "tangential": [[values]], "sagittal": [[values]]}
-
-
-def _scored(db: list[list[float]], *contrast: float) -> Entry:
+def _scored(db: list[list[float]]) -> Entry:
     ssim = [[value / 40 for value in row] for row in db]
-    return {"db": db, "ssim": ssim, "contrast": _contrast(*contrast)}
+    return {"db": db, "ssim": ssim}
 
 
 def _report(**changes: Any) -> Entry:
-    capture = _scored([[20.0, 10.0]], 0.9, 0.3)
+    capture = _scored([[20.0, 10.0]])
     lens = {
         "window_px": 201,
         "held": [[1.0, 0.25]],
         "arriving": [[1.0, 0.5]],
         "rms_um": [[10.0, 640.0]],
         "capture": capture,
-        "contrast": capture["contrast"],
         "recovered": [
-            _scored([[24.0, 14.0]], 1.0, 0.5),
-            _scored([[26.0, 16.0]], 1.1, 0.4),
+            _scored([[24.0, 14.0]]),
+            _scored([[26.0, 16.0]]),
         ],
     }
     report = {
@@ -53,27 +47,18 @@ def test_seeds_are_averaged_and_their_spread_is_that_of_their_means() -> None:
     assert mean_and_spread(found, "db") == pytest.approx((20.0, 1.0))
 
 
-def test_worst_contrast_is_of_all_seeds_and_a_rise_counts_from_the_lowest_before() -> None:
-    falling, rising = ({"contrast": _contrast(*c)} for c in ((1.0, 0.5, 0.1), (0.9, 0.2, 0.6)))
-    largest, rise, falls = worst_contrast([falling, rising])
-    assert (largest, falls) == (1.0, 0.5)
-    assert rise == pytest.approx(0.4)
-
-
-def test_page_gives_quality_by_field_light_and_contrast() -> None:
+def test_page_gives_quality_by_field_and_light() -> None:
     page = lens_table(_report())
     assert "| one | 15.00 | 0.375 | - | 20.00 ± 1.00 | 0.500 ± 0.025 |" in page
     assert "| lens | 0° | 30° |" in page
     assert "| one | 25.00 | 15.00 |" in page
     assert "| one | 201 | 25% | 50% | 640 |" in page
-    assert "| one | captured | 0.900 | yes | 0.000 | 100% |" in page
-    assert "| one | recovered | 1.100 | no | 0.000 | 100% |" in page
     assert "mars" not in page
 
 
 def test_several_depths_are_told_with_their_spread() -> None:
     report = _report(depths_mm=[500.0, 1000.0])
-    report["lenses"]["one"]["recovered"] = [_scored([[18.0, 20.0], [24.0, 25.0]], 1.0)]
+    report["lenses"]["one"]["recovered"] = [_scored([[18.0, 20.0], [24.0, 25.0]])]
     page = lens_table(report)
     assert "| lens | 500 mm | 1000 mm | spread |" in page
     assert "| one | 19.00 | 24.50 | 5.50 |" in page

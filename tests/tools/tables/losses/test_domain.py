@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 import torch
 
+from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer import training
 from camkit.models_def.training.adversarial.content import Relu32
 from tests.bayer_recipe import bank, material, recipe  # noqa: F401
@@ -35,7 +36,6 @@ def test_a_perfect_restoration_is_seen_as_one(at_home: Circumstances) -> None:
     grey = home.score(lambda _: torch.full_like(truth, 0.1), Relu32(None))
     assert grey["psnr_db"] < 40
     assert grey["perceptual"] > perfect["perceptual"]
-    assert home.psnr_db(lambda _: truth) == perfect["psnr_db"]
 
 
 def test_decibels_are_told_by_distance_where_scenes_are_at_several(
@@ -66,20 +66,16 @@ def test_what_was_asked_as_the_bank_has_it_is_not_judged() -> None:
 def test_a_method_stands_in_place_of_the_bank_on_the_same_captures(
     at_home: Circumstances,
 ) -> None:
-    by_bank, weak, strong = (
-        at_home.domain(2),
-        at_home.domain(2, "admm-tv", {"tv_weight": 0.1}),
-        at_home.domain(2, "admm-tv", {"tv_weight": 100.0}),
-    )
-    for ours, theirs in zip(by_bank.samples, weak.samples, strict=True):
+    by_bank, by_method = at_home.domain(2), at_home.domain(2, "admm-tv")
+    for ours, theirs in zip(by_bank.samples, by_method.samples, strict=True):
         assert torch.equal(ours.inputs["capture"], theirs.inputs["capture"])
-    decibels = [one.psnr_db(as_filtered) for one in (by_bank, weak, strong)]
-    assert len(set(decibels)) == 3
+    scores = [one.score(as_filtered, Relu32(None)) for one in (by_bank, by_method)]
+    assert scores[0]["psnr_db"] != scores[1]["psnr_db"]
 
 
 def test_a_camera_that_nobody_can_see_through_is_one_line(tmp_path: Path) -> None:
     path = tmp_path / "spad.toml"
     text = (Path(domain.__file__).parents[3] / "models_def/recipes/spad_sr.toml").read_text()
     path.write_text(text, encoding="utf-8")
-    with pytest.raises(SystemExit, match=r"has no sensor\.color_matrix, to see pictures"):
+    with pytest.raises(ContractError, match=r"has no sensor\.color_matrix, to see pictures"):
         circumstances(path, tmp_path / "out", None, 3)

@@ -12,7 +12,7 @@ from camkit.models_def.kinds.bayer import training
 from tests.bayer_recipe import bank, material, one_picture_to_validate_on, recipe  # noqa: F401
 from tests.normed_recipe import NORMED_RECIPE, recipe_path  # noqa: F401
 from tools.tables.losses import loss_table
-from tools.tables.losses.classical import METHODS, TUNABLE
+from tools.tables.losses.classical import METHODS
 from tools.tables.losses.domain import METRICS
 
 FREE = ["capture", "wiener", *METHODS]
@@ -43,7 +43,7 @@ def test_rows_are_trained_once_and_judged_at_home_and_abroad(
     trained = ("train", "--rows", "l1", "adversarial")
     assert losses(*trained).count("training for 10 CPU-minutes") == 2
     assert "training for" not in losses(*trained)
-    said = losses("measure", "--tune", 2)
+    said = losses("measure")
     report = _record(tmp_path)
     rows = report["rows"]
     assert (report["lab"], report["wild"]) == ("tiny_display", "tiny_wild")
@@ -58,11 +58,6 @@ def test_rows_are_trained_once_and_judged_at_home_and_abroad(
     assert rows["capture"]["lab"]["psnr_db"] != rows["capture"]["wild"]["psnr_db"]
     best = report["classical"]["best"]
     assert rows[best]["lab"]["psnr_db"] == max(rows[name]["lab"]["psnr_db"] for name in FREE[1:])
-    for name, tunable in TUNABLE.items():
-        (numbers, best_db), *others = rows[name]["tuned"]
-        assert rows[name]["numbers"] == numbers
-        assert all(db <= best_db for _, db in others)
-        assert tunable.start in [tried for tried, _ in rows[name]["tuned"]]
     (pair,) = report["overfitting"]
     assert (pair["supervised"], pair["other"]) == ("l1", "adversarial")
     each = [rows[name]["wild"]["each"]["psnr_db"] for name in ("l1", "adversarial")]
@@ -70,7 +65,7 @@ def test_rows_are_trained_once_and_judged_at_home_and_abroad(
     assert "| adversarial |" in said
     assert "l1 against adversarial, psnr_db" in said
     monkeypatch.setattr(loss_table, "_scores", lambda *_: pytest.fail("measured again"))
-    losses("measure", "--tune", 2)
+    losses("measure")
     assert _record(tmp_path) == report
 
 
@@ -91,15 +86,14 @@ def test_without_a_row_the_recipes_are_written_and_nothing_is_trained(
     assert sorted(path.name for path in (tmp_path / "runs").glob("*.toml")) == [
         f"tiny_{name}.toml" for name in ("display", "display_judged", "wild", "wild_judged")
     ]
-    said = losses("measure", "--tune", 0)
+    said = losses("measure")
     assert sorted(_record(tmp_path)["rows"]) == sorted(FREE)
     assert "no verdict" in said
 
 
-@pytest.mark.parametrize("words", [("--samples", 1), ("--tune", -1)])
-def test_numbers_that_make_no_sense_are_refused(losses: Command, words: tuple[str, int]) -> None:
+def test_one_sample_tells_no_error_and_is_refused(losses: Command) -> None:
     with pytest.raises(SystemExit):
-        losses("measure", *words)
+        losses("measure", "--samples", 1)
 
 
 def test_what_is_wrong_with_a_recipe_is_one_line(command: Command, tmp_path: Path) -> None:
