@@ -22,7 +22,7 @@ from camkit.bundle.streak_file import streaks_from_tensors, streaks_to_bytes
 from camkit.contracts import FrozenPsf, RadialDistortion
 from camkit.errors import ContractError
 from camkit.haze import Haze
-from camkit.streaks.optics import StreakOptics
+from camkit.streaks import StreakOptics
 
 PROFILES: Final = "profiles"
 """The tensor that only streaks have."""

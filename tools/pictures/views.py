@@ -22,10 +22,10 @@ from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray
 from camkit.runtime.files.picture import read_light
 from camkit.runtime.kind_parts.recording import RecordingOptions
+from camkit.runtime.kinds.hdr.deglare.removal import Glare, GlareSettings, find_glare
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from camkit.runtime.kinds.spad.twin.simulate import fitted, luminance, record
 from camkit.runtime.kinds.spad.twin.write import write_recorded
-from camkit.streaks.glare.removal import Glare, GlareSettings, find_glare
 from tools.hdr.gallery import night_pictures
 from tools.hdr.glare_twin import exposed_scene, photographed, two_point_star
 from tools.hdr.glare_twin import psnr_db as streaks_psnr_db

@@ -13,8 +13,8 @@ from camkit.errors import ContractError, UnsupportedError
 from camkit.progress import working
 
 if TYPE_CHECKING:
+    from camkit.calibration.focus import EdgeCamera
     from camkit.models_def.optics.optics import Optics
-    from camkit.runtime.calibration.focus import EdgeCamera
 
 AUTO: Final = "auto"
 STEPS: Final = (-1.0, -0.5, 0.5, 1.0)
@@ -44,7 +44,7 @@ def measure_unit(
     if len(depths_mm) > 1:
         raise ContractError("the target lies at one distance: give one with --depths-mm")
     from camkit.bundle.reader import SUFFIX
-    from camkit.runtime.calibration.focus import measure_focus
+    from camkit.calibration.focus import measure_focus
     from camkit.runtime.output.part_file import atomic_output
     from camkit.runtime.raw import read_capture
     from camkit.runtime.unit import format_unit
@@ -90,7 +90,7 @@ def focus_range_um(optics: "Optics", text: str | None) -> float:
 def _of_bundle(path: Path, depths_mm: tuple[float, ...]) -> "tuple[EdgeCamera, dict[str, str]]":
     """Return the camera of a bundle, and how a unit names it: by its lens where it says that."""
     from camkit.bundle.reader import PRESCRIPTION, open_bundle
-    from camkit.runtime.calibration.focus import EdgeCamera
+    from camkit.calibration.focus import EdgeCamera
     from camkit.runtime.unit import lens_hash
 
     bundle = open_bundle(path)
@@ -112,12 +112,12 @@ def _of_lens(
 
     require_torch("camkit freeze")
     from camkit.bundle.sensor import ColorSensor
+    from camkit.calibration.focus import EdgeCamera
     from camkit.models_def.optics.frozen import FreezeGrid, freeze, with_focus
     from camkit.models_def.optics.lens_optics import LensOptics
     from camkit.models_def.optics.optics_file import read_optics
     from camkit.models_def.optics.prescription import format_prescription
     from camkit.models_def.training.kind import read_recipe
-    from camkit.runtime.calibration.focus import EdgeCamera
     from camkit.runtime.unit import lens_hash
 
     lens = read_optics(path)

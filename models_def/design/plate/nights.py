@@ -17,7 +17,7 @@ from camkit.models_def.design.plate.recording import Pixels
 from camkit.models_def.kinds.hdr.recipe import HdrRecipe
 from camkit.models_def.kinds.hdr.samples import draw_corner
 from camkit.models_def.kinds.hdr.scenes import NIGHT_SEED, exposed
-from camkit.scenes.night import night_scene
+from camkit.runtime.kinds.hdr.night import night_scene
 
 TRAIN_SEED: Final = NIGHT_SEED
 VALID_SEED: Final = 4_000_000

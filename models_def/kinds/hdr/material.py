@@ -15,7 +15,7 @@ from camkit.models_def.kinds.hdr.recipe import HdrRecipe
 from camkit.models_def.optics.diffraction.plate import plate_members, read_plate
 from camkit.models_def.optics.diffraction.plate_streaks import plate_streaks
 from camkit.models_def.sensors.psf import wavelength_weights
-from camkit.streaks.optics import StreakOptics
+from camkit.streaks import StreakOptics
 
 FILE: Final = "streaks.safetensors"
 

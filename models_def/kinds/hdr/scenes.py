@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.models_def.training.pictures import SceneSource, open_source
-from camkit.scenes.night import night_scene
+from camkit.runtime.kinds.hdr.night import night_scene
 from camkit.scenes.saturation import CEILING, saturating_exposure
 
 NIGHT_SEED: Final = 5_000_000

@@ -9,7 +9,7 @@ from camkit.bundle.sensor import ColorSensor
 from camkit.models_def.optics.diffraction.plate import Plate
 from camkit.models_def.optics.diffraction.plate_optics import plate_kernels
 from camkit.models_def.optics.diffraction.streak_fit import fit_streaks
-from camkit.streaks.optics import StreakOptics
+from camkit.streaks import StreakOptics
 from camkit.units import MM_PER_M
 
 SIDE_PX: Final = 401

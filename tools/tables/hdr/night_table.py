@@ -19,13 +19,13 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, Final
 
-import camkit.streaks
+import camkit.runtime.kinds.hdr.streaks
 from camkit.contracts import FloatArray
 from camkit.errors import CamkitError, ContractError
 from camkit.report.bench.metrics.hdr import METRIC
 from camkit.report.kinds.hdr.capture import photograph
 from camkit.report.quality import Exposed
-from camkit.runtime.stages import highlights
+from camkit.runtime.kinds.hdr.stages import highlights
 from tools.tables.equal_training import Trainee, checkpoint_of, finished
 from tools.tables.hdr.night_record import (
     ALIGNED,
@@ -204,7 +204,7 @@ def _grouped(bench: Bench, found: Measured, nights: int, pictures: Path | None) 
 @lru_cache
 def _source_digest() -> str:
     """Return a hash of the solve as it stands: what was read by another one is measured again."""
-    (folder,) = camkit.streaks.__path__
+    (folder,) = camkit.runtime.kinds.hdr.streaks.__path__
     files = [*sorted(Path(folder).glob("*.py")), Path(highlights.__file__)]
     return digest(*(path.read_bytes() for path in files))
 

@@ -56,7 +56,7 @@ class Outputs:
         Raises:
             ContractError: If the record holds what TOML cannot.
         """
-        from camkit.runtime.calibration.record import to_toml
+        from camkit.calibration.record import to_toml
         from camkit.runtime.output.part_file import atomic_outputs
 
         texts = {self.out: to_toml(record)}

@@ -15,8 +15,8 @@ from camkit.cli.use.mosaic import BlackLevel, MosaicCfa, WhiteLevel, mosaic_opti
 from camkit.errors import ContractError
 
 if TYPE_CHECKING:
-    from camkit.runtime.calibration.dots import SeenDots
-    from camkit.runtime.calibration.measured import MeasuredPsf
+    from camkit.calibration.dots import SeenDots
+    from camkit.calibration.measured import MeasuredPsf
     from camkit.runtime.merging.survey import Survey
 
 
@@ -77,11 +77,11 @@ def psf(
     check_page(page, overwrite=overwrite)
     _check_target(disc_px, dots, edge=edge)
     from camkit.bundle.psf_file import psf_to_bytes, read_psf
-    from camkit.runtime.calibration.darks import Darks
-    from camkit.runtime.calibration.dots import dots_psf
-    from camkit.runtime.calibration.edge_psf import measure_edge
-    from camkit.runtime.calibration.measured import PsfOptions
-    from camkit.runtime.calibration.psf import measure_psf
+    from camkit.calibration.darks import Darks
+    from camkit.calibration.dots import dots_psf
+    from camkit.calibration.edge_psf import measure_edge
+    from camkit.calibration.measured import PsfOptions
+    from camkit.calibration.psf import measure_psf
     from camkit.runtime.merging.survey import survey
     from camkit.runtime.output.part_file import atomic_outputs
 

@@ -8,7 +8,7 @@ import pytest
 
 from camkit.models_def.kinds.hdr.samples import HdrCamera
 from camkit.models_def.kinds.hdr.scenes import DUSK_EV, NIGHT_SEED, exposed, open_lights
-from camkit.scenes.night import night_scene
+from camkit.runtime.kinds.hdr.night import night_scene
 from camkit.scenes.saturation import CEILING
 
 SIDE = 96
