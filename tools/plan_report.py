@@ -30,7 +30,7 @@ from camkit.runtime.plan.loss import EXACT, plan_entries
 from camkit.runtime.plan.rules.size import REFERENCE
 from camkit.runtime.plan.tiers import TierWork
 from tools.plan.cells import CaptureCells, measure_cells, photograph, pipelines
-from tools.plan.fit import Calibration, fit_model, saving_of_the_all_knowing
+from tools.plan.fit import Calibration, fit_model
 from tools.plan.proof import prove, write_report
 from tools.plan.scenes import GENERATORS, proof_scenes
 
@@ -86,8 +86,6 @@ def _calibrate(options: argparse.Namespace) -> int:
         made.model, adaptive_cost_db=made.adaptive[0], draft_cost_db=made.draft[0]
     )
     _print_calibration(made, captures)
-    known = [saving_of_the_all_knowing(c, work, small, 0.1) for c in captures]
-    print(f"were all losses known, 0.1 dB a capture would save {np.mean(known):.1%} of the work")
     for target in made.model.lines:
         sums = [c.errors[target].sum() / c.errors[EXACT].sum() for c in captures]
         print(f"{target} everywhere loses {np.mean(10 * np.log10(sums)):.2f} dB")

@@ -29,7 +29,7 @@ from camkit.runtime.kinds.spad.twin.write import write_recorded
 from tools.hdr.gallery import night_pictures
 from tools.hdr.glare_twin import exposed_scene, photographed, two_point_star
 from tools.hdr.glare_twin import psnr_db as streaks_psnr_db
-from tools.pictures.crops import Place, crop_pictures, psnr_db, take
+from tools.pictures.crops import Place, around_brightest, crop_pictures, psnr_db, take
 
 SCENES: Final = Path(__file__).parent.parent / "scenes"
 SIDE_PX: Final = 272
@@ -114,7 +114,7 @@ class Night:
             pictures = night_pictures(bundle, Path(folder) / "night.dng")
         light, decibels = zip(*(pictures[way] for way in ("developed", "network")), strict=True)
         truth, _ = pictures["truth"]
-        part = _around_brightest(truth)
+        part = around_brightest(truth, SIDE_PX, SIDE_PX)
         rows = {
             f"A synthetic night, shown {_exposure(stop)}": [
                 encode_srgb(picture[part] * np.float32(2.0**stop)) for picture in (*light, truth)
@@ -144,7 +144,7 @@ class Windshield:
         glare, cleared = _deglared(shot.seen)
         level = glare.settings.level
         decibels = [streaks_psnr_db(picture, shot, level) for picture in (shot.seen, cleared)]
-        part = _around_brightest(shot.seen)
+        part = around_brightest(shot.seen, SIDE_PX, SIDE_PX)
         shown = [encode_srgb(picture[part]) for picture in (shot.seen, cleared, shot.wanted)]
         row = {"A synthetic night behind a wiped windshield": shown}
         return _view(bundle, row, (decibels[0], decibels[1]))
@@ -216,15 +216,6 @@ def _view(
 
 def _exposure(stop: int) -> str:
     return f"{-stop} stops darker" if stop else "as exposed"
-
-
-def _around_brightest(picture: FloatArray) -> tuple[slice, slice, slice]:
-    """Return the square of `SIDE_PX` around the brightest pixel of (3, h, w)."""
-    _, height, width = picture.shape
-    y, x = np.unravel_index(np.argmax(picture.sum(axis=0)), (height, width))
-    top = int(np.clip(y - SIDE_PX // 2, 0, height - SIDE_PX))
-    left = int(np.clip(x - SIDE_PX // 2, 0, width - SIDE_PX))
-    return np.s_[:, top : top + SIDE_PX, left : left + SIDE_PX]
 
 
 def _deglared(seen: FloatArray) -> tuple[Glare, FloatArray]:

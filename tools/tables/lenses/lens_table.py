@@ -22,11 +22,11 @@ from typing import Any, Final
 
 import numpy as np
 import torch
-from torch import nn
+from torch import Tensor, nn
 
 from camkit.errors import ContractError
 from camkit.models_def.design.assembly import field_slopes, network_of, recorder_of
-from camkit.models_def.design.loop import DesignLoop, DesignParts
+from camkit.models_def.design.loop import DesignLoop, DesignParts, DesignSchedule
 from camkit.models_def.design.loss import DesignLoss
 from camkit.models_def.design.recipe import DesignRecipe, NetworkChoice, read_design
 from camkit.models_def.optics.lens_file.lens_file import find_lens, write_lens
@@ -35,11 +35,11 @@ from camkit.models_def.optics.search.problem import Problem
 from camkit.models_def.optics.search.splat import Pixels
 from camkit.models_def.optics.search.variables import FreeLens
 from camkit.models_def.training.pictures import SceneSource, open_source
+from camkit.models_def.training.similarity import ssim
 from camkit.units import to_degrees
 from tools.tables.journal import Entry, digest
 from tools.tables.lenses.lens_at_rest import Seen, at_rest, at_work, window_of
 from tools.tables.lenses.lens_page import lens_table, mean_and_spread
-from tools.tables.lenses.lens_score import Captures, score_parts
 from tools.tables.runner import Asked, Record, Table
 
 DIGITS: Final = 5
@@ -113,6 +113,14 @@ def _line(name: str, entry: Entry) -> str:
 def _timed(make: Callable[[], Entry]) -> Entry:
     begin = time.process_time()
     return {**make(), "cpu_s": round(time.process_time() - begin, 1)}
+
+
+class Captures(nn.Module):
+    """In the place of a network: shows what the sensor recorded."""
+
+    def forward(self, planes: Tensor) -> Tensor:
+        """Return the capture (b, 3, p, p) among the planes of a front."""
+        return planes[:, :3]
 
 
 def named(lenses: list[str]) -> dict[str, str]:
@@ -230,10 +238,12 @@ def before(lens: Lens, conditions: Conditions) -> Entry:
         "held": seen.held.tolist(),
         "arriving": seen.arriving.tolist(),
         "rms_um": (1000 * seen.rms_mm.nan_to_num(-1e-3)).tolist(),
-        "capture": scores(judged, conditions),
+        "capture": scores(judged, conditions.recipe.schedule, conditions.patches),
     }
     if conditions.recipe.front.kind != "none":
-        entry["front"] = scores(replace(judged, network=None), conditions)
+        entry["front"] = scores(
+            replace(judged, network=None), conditions.recipe.schedule, conditions.patches
+        )
     return entry
 
 
@@ -259,12 +269,30 @@ def after(lens: Lens, conditions: Conditions, seed: int) -> Entry:
             )
     loop.take_best()
     judged, _ = parts(lens, conditions, fresh_source(conditions), network.eval(), widest=True)
-    return {"seed": seed, "valid_db": loop.best_db, **scores(judged, conditions)}
+    return {
+        "seed": seed,
+        "valid_db": loop.best_db,
+        **scores(judged, conditions.recipe.schedule, conditions.patches),
+    }
 
 
-def scores(judged: DesignParts, plan: Conditions) -> Entry:
-    """Return PSNR and SSIM of every depth and field."""
-    return score_parts(judged, plan.recipe.schedule, plan.patches)
+def scores(judged: DesignParts, schedule: DesignSchedule, patches: int) -> Entry:
+    """Return `db` and `ssim` of sRGB values, (depth, field), means over the same patches."""
+    loop = DesignLoop(judged, replace(schedule, valid_patches=1))
+    fields = len(judged.lens.problem.slopes)
+    psnr: list[list[Tensor]] = [[] for _ in range(fields)]
+    alike: list[list[Tensor]] = [[] for _ in range(fields)]
+    for field, pictures, sharp in loop.field_pictures(patches):
+        shown = pictures[:, 0].clamp(0, 1)
+        error = (shown - sharp).square().mean((1, 2, 3)).clamp_min(1e-10)
+        psnr[field].append(-10 * torch.log10(error))
+        alike[field].append(ssim(shown, sharp.expand_as(shown)))
+
+    def table(found: list[list[Tensor]]) -> tuple[tuple[float, ...], ...]:
+        means = [torch.stack(of_field).double().mean(0) for of_field in found]
+        return tuple(tuple(row) for row in torch.stack(means, dim=1).tolist())
+
+    return {"db": table(psnr), "ssim": table(alike)}
 
 
 def row(name: str, entry: Entry) -> str:

@@ -21,13 +21,14 @@ from camkit.models_def.kinds.bayer.samples import NOT_JUDGED
 from camkit.models_def.training.adversarial.content import Features, gram_loss
 from camkit.models_def.training.adversarial.views import Views, make_views
 from camkit.models_def.training.kind import Restorer, SampleMaker, read_recipe, training_kind
-from camkit.models_def.training.recipe import Recipe
 from camkit.models_def.training.sample import Sample, SampleLayout
 from camkit.models_def.training.similarity import ssim
 from tools.tables.losses.classical import with_method
 
 METRICS: Final = ("psnr_db", "ssim", "perceptual")
 LEAST_ERROR: Final = 1e-12
+SEED: Final = 909
+"""Of the samples."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,52 +92,25 @@ def known(target: Tensor, planes: Tensor) -> Tensor:
     return torch.where(target == as_filtered(planes), torch.tensor(NOT_JUDGED), target)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Circumstances:
-    """A camera and its scenes, as a recipe says.
-
-    Attributes:
-        recipe: The recipe.
-        maker: Of samples by the bank.
-        layout: Of them.
-        to_rec709: (3, 3) white-balanced camera colours to linear Rec.709.
-    """
-
-    recipe: Recipe
-    maker: SampleMaker
-    layout: SampleLayout
-    to_rec709: Tensor
-
-    def domain(self, count: int, method: str | None = None) -> Domain:
-        """Make samples 0 to `count`, by a classical method in place of the bank if one is named."""
-        maker = self.maker
-        frames, distances_mm = list(range(count)), []
-        if isinstance(maker, TileMaker):
-            frames = [maker.frame_of(number) for number in range(count)]
-            found = [maker.distance_mm(number) for number in range(count)]
-            distances_mm = [far_mm for far_mm in found if far_mm is not None]
-        if method is not None:
-            maker = with_method(method, maker, self.recipe)
-        return Domain(
-            samples=[maker.make(number) for number in range(count)],
-            frames=frames,
-            distances_mm=distances_mm,
-            layout=self.layout,
-            to_rec709=self.to_rec709,
-        )
-
-
-@lru_cache(maxsize=4)
-def circumstances(
-    recipe_path: Path, folder: Path, pictures: Path | None, seed: int
-) -> Circumstances:
-    """Trace the lens of a recipe, or take the frames that lie in the folder, and open its scenes.
+@lru_cache(maxsize=2)
+def domain(
+    recipe_path: Path,
+    folder: Path,
+    pictures: Path | None,
+    count: int,
+    method: str | None = None,
+) -> Domain:
+    """Make the samples of a recipe: trace its lens, or take the frames that lie in the folder.
 
     Args:
         recipe_path: Of the recipe.
         folder: Of its frames and traced kernels; made if it is not there.
         pictures: Scenes.
-        seed: Of the samples.
+        count: Number of samples.
+        method: Classical, in place of the bank.
+
+    Raises:
+        ContractError: If the sensor has no colours to see pictures in.
     """
     recipe = read_recipe(recipe_path)
     kind, role = training_kind(recipe.kind), recipe.role(None)
@@ -145,15 +119,18 @@ def circumstances(
         raise ContractError(f"{recipe_path} has no sensor.color_matrix, to see pictures")
     folder.mkdir(parents=True, exist_ok=True)
     material = kind.prepare(recipe, recipe_path.parent, folder)
-    return Circumstances(
-        recipe=recipe,
-        maker=kind.maker(recipe, role, material, pictures, seed),
+    maker: SampleMaker = kind.maker(recipe, role, material, pictures, SEED)
+    frames, distances_mm = list(range(count)), []
+    if isinstance(maker, TileMaker):
+        frames = [maker.frame_of(number) for number in range(count)]
+        found = [maker.distance_mm(number) for number in range(count)]
+        distances_mm = [far_mm for far_mm in found if far_mm is not None]
+    if method is not None:
+        maker = with_method(method, maker, recipe)
+    return Domain(
+        samples=[maker.make(number) for number in range(count)],
+        frames=frames,
+        distances_mm=distances_mm,
         layout=kind.layout(recipe, role),
         to_rec709=torch.from_numpy(rec709_from_camera(np.array(matrix))).float(),
     )
-
-
-@lru_cache(maxsize=2)
-def judged_domain(opened: Circumstances, count: int, method: str | None) -> Domain:
-    """Return samples that are judged on; those by the bank serve many rows and are made once."""
-    return opened.domain(count, method)

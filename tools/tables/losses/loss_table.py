@@ -41,7 +41,7 @@ from camkit.models_def.training.kind import Restorer, read_recipe, training_kind
 from tools.tables.equal_training import Trainee, checkpoint_of, finished
 from tools.tables.journal import Entry, digest, file_digest
 from tools.tables.losses.classical import METHODS
-from tools.tables.losses.domain import METRICS, Domain, as_filtered, circumstances, judged_domain
+from tools.tables.losses.domain import METRICS, Domain, as_filtered, domain
 from tools.tables.losses.overfitting import overfitting, sentences
 from tools.tables.losses.twins import Counts, judged_by, write_twins
 from tools.tables.records import markdown_table
@@ -49,7 +49,6 @@ from tools.tables.rows import Row, Run, chosen_rows
 from tools.tables.runner import Asked, Record, Table
 
 DOMAINS: Final = ("lab", "wild")
-JUDGE_SEED: Final = 909
 DIGITS: Final = 5
 JUDGED: Final = 3
 """Counts how rows are judged; what was judged before is judged again."""
@@ -181,7 +180,7 @@ def _judge_trained(run: Run, asked: Asked) -> Entry:
 
 def _scores(restore: Restorer, domains: Mapping[str, Domain], asked: Asked) -> Entry:
     features = Relu32(asked.options.vgg)
-    return {where: domain.score(restore, features) for where, domain in domains.items()}
+    return {where: one.score(restore, features) for where, one in domains.items()}
 
 
 def _domains(asked: Asked, method: str | None = None) -> dict[str, Domain]:
@@ -189,8 +188,8 @@ def _domains(asked: Asked, method: str | None = None) -> dict[str, Domain]:
     options, found = asked.options, {}
     for where, twin in zip(DOMAINS, _twins(asked.runs), strict=True):
         recipe = judged_by(twin)
-        opened = circumstances(recipe, asked.runs / recipe.stem, options.data, JUDGE_SEED)
-        found[where] = judged_domain(opened, options.samples, method)
+        folder = asked.runs / recipe.stem
+        found[where] = domain(recipe, folder, options.data, options.samples, method)
     return found
 
 

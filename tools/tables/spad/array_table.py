@@ -21,9 +21,10 @@ from statistics import fmean
 from typing import Any, Final, cast
 
 import torch
-from torch import nn
+from torch import Tensor, nn
 from torch.utils.flop_counter import FlopCounterMode
 
+from camkit.bundle.stages import SuperResolve
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.models_def.kinds.spad.counting import Exposure
@@ -32,8 +33,11 @@ from camkit.models_def.kinds.spad.plate_psf import read_plate_psf
 from camkit.models_def.kinds.spad.recipe import SpadRecipe
 from camkit.models_def.kinds.spad.sampling import FULL_LIGHT, Mode, Sampling, make_sampling
 from camkit.models_def.kinds.spad.training import PART, sampling_of
+from camkit.models_def.networks.bicubic import SCALE
 from camkit.models_def.training.checkpoint import load_network, read_checkpoint, recipe_of
 from camkit.models_def.training.kind import Restorer
+from camkit.runtime.kinds.spad.finer.covariance import PictureCovariance
+from camkit.runtime.kinds.spad.finer.linear import Grid, linear_estimate
 from tools.tables.equal_training import checkpoint_of, finished
 from tools.tables.journal import Entry, digest, file_digest
 from tools.tables.rows import Run, chosen_rows, read_rows
@@ -47,7 +51,6 @@ from tools.tables.spad.array_record import (
     tables_text,
 )
 from tools.tables.spad.array_training import STEPS, level_sigma, plate_file, trainee
-from tools.tables.spad.linear import linear_restorer
 
 ROWS: Final = read_rows(ROWS_FILE)
 LIKE_GAUSSIAN: Final = "gaussian.M-1"
@@ -177,6 +180,25 @@ def network_mac_per_px(network: nn.Module) -> float:
     with torch.no_grad(), FlopCounterMode(display=False) as counter:
         network(planes)
     return float(counter.get_total_flops()) / 2 / COST_PX**2
+
+
+def linear_restorer(told: Sampling, exposure: Exposure) -> Restorer:
+    """Return the best linear estimate, at the photons that a picture shows.
+
+    Args:
+        told: How the array is believed to sample, which need not be how it does.
+        exposure: Of one sub-pixel.
+    """
+    covariance = PictureCovariance.of(SuperResolve())
+    grid = Grid(scale=SCALE, phase=told.phase)
+    white = exposure.brighter(told.light).white_counts
+
+    def restore(planes: Tensor) -> Tensor:
+        photons = float(planes[:, :1].mean()) * white
+        found = linear_estimate(told.kernel, grid, covariance, photons)
+        return torch.from_numpy(found(planes[0, :1].numpy()))[None]
+
+    return restore
 
 
 def _bicubic(sampling: Sampling, exposure: Exposure) -> Restorer:

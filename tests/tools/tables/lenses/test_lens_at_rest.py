@@ -18,7 +18,7 @@ from camkit.models_def.optics.search.splat import Pixels
 from camkit.models_def.optics.search.variables import FreeLens
 from tests.small_design import small_design
 from tools.tables.lenses.lens_at_rest import at_rest, at_work, window_of
-from tools.tables.lenses.lens_score import score_parts
+from tools.tables.lenses.lens_table import scores
 
 
 @pytest.fixture
@@ -109,6 +109,6 @@ def test_scores_of_a_lens_at_rest_fall_off_the_axis(
     lens = at_work(find_lens("aca254-050-a"), f_number=4.0, object_distance_mm=1000.0)
     rest, _ = at_rest(lens, _problem(lens, 0.0, 0.35), _pixels(65), 2000)
     parts = replace(parts_of(recipe), lens=rest, network=None)
-    found = score_parts(parts, recipe.schedule, 2)
+    found = scores(parts, recipe.schedule, 2)
     assert found["db"][0][0] > found["db"][0][1] + 2
     assert found["ssim"][0][0] > found["ssim"][0][1]

@@ -1,7 +1,9 @@
 """What restorations are judged on: exact, blind to what nobody knows, the same for all methods."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -12,22 +14,23 @@ from camkit.models_def.kinds.bayer import training
 from camkit.models_def.training.adversarial.content import Relu32
 from tests.bayer_recipe import bank, material, recipe  # noqa: F401
 from tests.normed_recipe import NORMED_RECIPE, recipe_path  # noqa: F401
-from tools.tables.losses import domain
-from tools.tables.losses.domain import Circumstances, as_filtered, circumstances, known
+from tools.tables.losses.domain import Domain, as_filtered, domain, known
 from tools.tables.losses.loss_table import table_of_distances
+
+Maker = Callable[..., Domain]
 
 
 @pytest.fixture
-def at_home(tmp_path, monkeypatch, material) -> Circumstances:  # noqa: F811
-    """The tiny camera; its kernels need no tracing."""
+def at_home(tmp_path, monkeypatch, material) -> Maker:  # noqa: F811
+    """Give samples of the tiny camera; its kernels need no tracing."""
     monkeypatch.setattr(training, "trace_material", lambda *_: material)
     path = tmp_path / "lab.toml"
     path.write_text(NORMED_RECIPE, encoding="utf-8")
-    return circumstances(path, tmp_path / "lab", None, 3)
+    return partial(domain, path, tmp_path / "lab", None)
 
 
-def test_a_perfect_restoration_is_seen_as_one(at_home: Circumstances) -> None:
-    home = at_home.domain(1)
+def test_a_perfect_restoration_is_seen_as_one(at_home: Maker) -> None:
+    home = at_home(1)
     truth = home.samples[0].target[None]
     perfect = home.score(lambda _: truth, Relu32(None))
     assert perfect["psnr_db"] > 60
@@ -39,9 +42,9 @@ def test_a_perfect_restoration_is_seen_as_one(at_home: Circumstances) -> None:
 
 
 def test_decibels_are_told_by_distance_where_scenes_are_at_several(
-    at_home: Circumstances,
+    at_home: Maker,
 ) -> None:
-    home = at_home.domain(3)
+    home = at_home(3)
     assert "at" not in home.score(as_filtered, Relu32(None))
     apart = replace(home, distances_mm=[math.inf, 500.0, math.inf])
     score = apart.score(as_filtered, Relu32(None))
@@ -64,9 +67,9 @@ def test_what_was_asked_as_the_bank_has_it_is_not_judged() -> None:
 
 
 def test_a_method_stands_in_place_of_the_bank_on_the_same_captures(
-    at_home: Circumstances,
+    at_home: Maker,
 ) -> None:
-    by_bank, by_method = at_home.domain(2), at_home.domain(2, "admm-tv")
+    by_bank, by_method = at_home(2), at_home(2, "admm-tv")
     for ours, theirs in zip(by_bank.samples, by_method.samples, strict=True):
         assert torch.equal(ours.inputs["capture"], theirs.inputs["capture"])
     scores = [one.score(as_filtered, Relu32(None)) for one in (by_bank, by_method)]
@@ -75,7 +78,7 @@ def test_a_method_stands_in_place_of_the_bank_on_the_same_captures(
 
 def test_a_camera_that_nobody_can_see_through_is_one_line(tmp_path: Path) -> None:
     path = tmp_path / "spad.toml"
-    text = (Path(domain.__file__).parents[3] / "models_def/recipes/spad_sr.toml").read_text()
+    text = (Path(__file__).parents[4] / "models_def/recipes/spad_sr.toml").read_text()
     path.write_text(text, encoding="utf-8")
     with pytest.raises(ContractError, match=r"has no sensor\.color_matrix, to see pictures"):
-        circumstances(path, tmp_path / "out", None, 3)
+        domain(path, tmp_path / "out", None, 1)

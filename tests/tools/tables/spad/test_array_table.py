@@ -1,16 +1,26 @@
 """Tables 4.1 and 4.2: networks trained once, rows measured once, what is missing said."""
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+import torch
+from torch import nn
 
+from camkit.bundle.stages import SuperResolve
+from camkit.models_def.kinds.spad.counting import Exposure
+from camkit.models_def.kinds.spad.sampling import make_sampling
+from camkit.models_def.networks.bicubic import SCALE
+from camkit.runtime.kinds.spad.finer.covariance import PictureCovariance
+from camkit.runtime.kinds.spad.finer.linear import Grid, linear_estimate
 from tests.tools.tables.spad.array_rig import SIGMA, Rig, rig, write_run, write_sets
 from tools.tables import runner
 from tools.tables.rows import chosen_rows
 from tools.tables.spad.array_record import THESIS
-from tools.tables.spad.array_table import ROWS, network_mac_per_px
+from tools.tables.spad.array_table import ROWS, linear_restorer, network_mac_per_px
 
 __all__ = ["rig"]
 LEVELS = ["noise-free", "10000", "1000", "100"]
@@ -108,7 +118,16 @@ def test_every_row_of_the_thesis_is_judged() -> None:
 
 
 def test_work_is_counted_for_a_pixel_of_the_array() -> None:
-    from torch import nn
-
     network = nn.Conv2d(2, 16, 3, padding=1)
     assert network_mac_per_px(network) == 2 * 16 * 9
+
+
+def test_the_estimate_is_taken_at_the_light_that_the_pixels_collect() -> None:
+    full = make_sampling("full_fill")
+    planes = torch.from_numpy(np.random.default_rng(0).random((1, 2, 9, 12), np.float32))
+    mean = float(planes[:, :1].mean())
+    covariance, grid = PictureCovariance.of(SuperResolve()), Grid(scale=SCALE, phase=full.phase)
+    for photons, of_pixel in ((10.0, 160 * mean), (math.inf, math.inf)):
+        found = linear_restorer(full, Exposure(photons=photons))(planes)
+        wanted = linear_estimate(full.kernel, grid, covariance, of_pixel)(planes[0, :1].numpy())
+        np.testing.assert_array_equal(found[0].numpy(), wanted)
