@@ -3,8 +3,8 @@
     crops of pictures -> a scene of the whole sensor -> light through a copy of the lens
         -> shots at ISOs of their own -> the runtime, up to the stage `haze` -> tiles
 
-What networks are trained on is what the runtime gives them: nothing of it is written again for
-training (`camkit.models_def.kinds.bayer.frames` takes tiles through the bank).
+Networks are trained on what the runtime gives them: nothing of it is written again for training
+(`samples` takes the tiles through the bank).
 """
 
 import tempfile
@@ -41,7 +41,7 @@ from camkit.models_def.optics.prescription import Lens, format_prescription
 from camkit.models_def.optics.thin.freezing import COPY_RAYS, HazyGrid, freeze_hazy
 from camkit.models_def.optics.thin.middle import find_middles
 from camkit.models_def.training.kind import training_kind
-from camkit.models_def.training.pictures import DrawnShares, SceneSource, list_pictures, open_source
+from camkit.models_def.training.pictures import DrawnShares, SceneSource, list_pictures, open_scenes
 from camkit.runtime.bank.haze import hazy_kernels
 from camkit.runtime.geometry.illumination import illumination_band
 from camkit.runtime.options import Options
@@ -60,7 +60,7 @@ VALIDATION_ISOS: Final = (100.0, 1600.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrameSources:
-    """What is photographed, and with what.
+    """The sources of frames: pictures, camera and optics.
 
     Attributes:
         pictures: Part of `PARTS` -> folder of pictures; None for procedural scenes alone.
@@ -78,7 +78,7 @@ class FrameSources:
 
 
 def check_frames(recipe: BayerRecipe, pictures: Mapping[str, Path | None] | None = None) -> None:
-    """Refuse, before anything takes long, what no frames can be made of.
+    """Refuse sources that no frames can be made of, before anything takes long.
 
     Raises:
         ContractError: If the recipe undoes no haze, its tiles do not fit the sensor, or a folder
@@ -194,11 +194,10 @@ class _Studio:
         self._recipe, self._sources, self._tiles = recipe, sources, tiles
         self._choosing = part == PARTS[1]
         self._pipeline = Pipeline(bundle, Options(threads=1))
-        self._scenes = open_source(
+        self._scenes = open_scenes(
+            data,
             sources.pictures[part],
-            picture_share=1.0 if self._choosing else data.picture_share,
-            scenes=data.procedural_scenes,
-            scene_px=data.scene_px,
+            picture_share=1.0 if self._choosing else None,
             first_scene=-data.procedural_scenes if self._choosing else 0,
             drawn=DrawnShares() if self._choosing else data.drawn,
         )
@@ -272,7 +271,7 @@ class _Studio:
     def _cleared(
         self, light: Light, samples: NDArray[np.uint16], iso: float
     ) -> tuple[FloatArray, tuple[float, float, float]]:
-        """Return what the stage haze makes of a shot, and what its noise was raised by."""
+        """Return a shot without haze, by the stage haze, and the factor on its noise."""
         haze = self._recipe.haze
         assert haze is not None
         capture = self._pipeline.capture_of(
@@ -298,7 +297,7 @@ def _seen(scene: FloatArray, matrix: NDArray[np.float64]) -> FloatArray:
 def draw_scene(
     rng: Generator, source: SceneSource, recipe: BayerRecipe, *, even: bool = False
 ) -> FloatArray:
-    """Put a scene of the whole sensor together, (3, h, w) float32 linear Rec.709.
+    """Draw a scene of the whole sensor, (3, h, w) float32 linear Rec.709.
 
     Args:
         rng: Draws crops, tints and exposures.
@@ -324,7 +323,7 @@ def draw_scene(
 def _places(
     rng: Generator, size: tuple[int, ...], side_px: int, count: int
 ) -> Iterator[tuple[int, int]]:
-    """Yield where tiles begin, anywhere in the frame, at the first pixel of the mosaic's cell."""
+    """Yield the first pixels of tiles, anywhere in the frame, on the mosaic's cell."""
     rooms = [(length - side_px) // 2 + 1 for length in size]
     for _ in range(count):
         top, left = (2 * int(rng.integers(room)) for room in rooms)

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.penalty import edge_gaps, ray_penalty, reach_rho
+from camkit.models_def.optics.search.penalty import edge_gaps, ray_penalty, reach_rho
 from camkit.models_def.optics.trace import Fate, Rays, SurfaceTensors, trace
 from tests.physics.printed_lenses import cooke_tensors, lens_tensors, rays_at
 

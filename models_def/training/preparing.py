@@ -1,23 +1,22 @@
-"""What is made before training, for the kinds whose samples need the runtime.
+"""Samples made before training, for the kinds that photograph whole frames.
 
-The part of such a kind (`camkit.export.kinds.NAME`, or the `export` of its own package) defines
-`PREPARING`, which fulfils `PreparingKind`.
+The part of such a kind defines `PREPARING` beside its `PART`, which fulfils `PreparingKind`.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, cast
+from typing import Any, Protocol
 
 from camkit.errors import UnsupportedError
-from camkit.kinds import find_kind
+from camkit.models_def.training.kind import special_part
 
 Tell = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PrepareOptions:
-    """What is given besides a recipe.
+    """The options of a preparation besides the recipe.
 
     Attributes:
         psf: Core kernels of the lens as designed.
@@ -42,7 +41,7 @@ class PreparingKind(Protocol):
     """A kind of camera whose samples are prepared."""
 
     def written_last(self, recipe: Any, runs: Path) -> Path:
-        """Return the file that is there when all is; raise ContractError if there is nothing to do.
+        """Return the last of the files; raise ContractError if there is nothing to do.
 
         Args:
             recipe: Of the kind.
@@ -51,7 +50,7 @@ class PreparingKind(Protocol):
         ...
 
     def prepare(self, recipe: Any, options: PrepareOptions, tell: Tell) -> dict[str, Any]:
-        """Make it and say what was made; raise ContractError if something is missing or wrong."""
+        """Make the files and return a report; raise ContractError if a source is missing."""
         ...
 
 
@@ -61,11 +60,9 @@ def preparing_kind(name: str) -> PreparingKind:
     Raises:
         UnsupportedError: If its samples are made while it trains.
     """
-    kind = find_kind(name)
-    if kind.has_part("export"):
-        part = kind.part("export")
-        if hasattr(part, "PREPARING"):
-            return cast("PreparingKind", part.PREPARING)
-    raise UnsupportedError(
-        f"samples of the kind {name!r} are made while it trains; leave prepare out"
-    )
+    part: PreparingKind | None = special_part(name, "PREPARING")
+    if part is None:
+        raise UnsupportedError(
+            f"samples of the kind {name!r} are made while it trains; leave prepare out"
+        )
+    return part

@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 
 from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.errors import ContractError
-from camkit.export import frames
-from camkit.export.frames import (
+from camkit.models_def.kinds.bayer.bank_fit import BANK_FITTING
+from camkit.models_def.kinds.bayer.frames import photographs
+from camkit.models_def.kinds.bayer.frames.photographs import (
     FrameSources,
     _with_surroundings,
     draw_scene,
     physics_bundle,
     prepare_frames,
 )
-from camkit.models_def.kinds.bayer.bank_fit import BANK_FITTING
 from camkit.models_def.kinds.bayer.frames.samples import TileMaker, developed
 from camkit.models_def.kinds.bayer.frames.tiles import Tile, Tiles, read_frames
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
@@ -121,7 +121,7 @@ def test_copies_are_frozen_at_the_distances_of_the_recipe_in_turn(
         abouts.add(about)
         return hazy_optics(), None
 
-    monkeypatch.setattr(frames, "freeze_hazy", frozen)
+    monkeypatch.setattr(photographs, "freeze_hazy", frozen)
     distances = (500.0, 2000.0, np.inf)
     choices = replace(
         recipe.lens, depths_mm=distances, copies=3, validation_copies=1, bank_in_focus=True
@@ -129,14 +129,14 @@ def test_copies_are_frozen_at_the_distances_of_the_recipe_in_turn(
     told: list[str] = []
     lens = read_lens(Path("duet"))
     deep = replace(recipe, lens=choices, frames=replace(recipe.frames, count=3))
-    made = frames.freeze_copies(deep, lens, told.append)
+    made = photographs.freeze_copies(deep, lens, told.append)
     assert len(made) == 4
     assert seen == [500.0, 2000.0, np.inf, 500.0]
     assert told[1] == "copy 2 of 4 frozen at 2 m"
     assert abouts == {find_middles(lens, 33.0, 5.96, 500).about}
     seen.clear()
     usual = replace(recipe, lens=replace(recipe.lens, copies=1, validation_copies=1))
-    frames.freeze_copies(usual, lens, told.append)
+    photographs.freeze_copies(usual, lens, told.append)
     assert seen == [lens.object_distance_mm] * 2
     with pytest.raises(ContractError, match=r"state lens\.bank_in_focus = true"):
         replace(deep, lens=replace(choices, bank_in_focus=False))

@@ -10,7 +10,10 @@ which is what these functions compute. The expectations run over the batch and a
 source takes those inside the squares over a history of 50 pictures, since its batch is 1.
 """
 
+import torch
 from torch import Tensor
+
+from camkit.models_def.training.adversarial.game import Judge, Terms
 
 
 def discriminator_loss(real: Tensor, fake: Tensor) -> Tensor:
@@ -28,3 +31,16 @@ def discriminator_loss(real: Tensor, fake: Tensor) -> Tensor:
 def generator_loss(real: Tensor, fake: Tensor) -> Tensor:
     """Return scalar that a generator minimises: the discriminator's with the players swapped."""
     return discriminator_loss(fake, real)
+
+
+class Relativistic:
+    """RaGAN-LS; fulfils `camkit.models_def.training.adversarial.game.Game`."""
+
+    def lesson(self, judge: Judge, real: Tensor, fake: Tensor, draw: torch.Generator) -> Terms:
+        """Return the loss of a discriminator."""
+        del draw
+        return {"discriminator": (1.0, discriminator_loss(judge(real), judge(fake)))}
+
+    def opinion(self, judge: Judge, real: Tensor, fake: Tensor) -> Tensor:
+        """Return what the generator minimises."""
+        return generator_loss(judge(real), judge(fake))

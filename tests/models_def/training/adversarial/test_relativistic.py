@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from camkit.models_def.kinds.bayer.fine_tuning.adversarial import discriminator_loss, generator_loss
+from camkit.models_def.training.adversarial.relativistic import discriminator_loss, generator_loss
 
 
 def slow_loss(high, low):

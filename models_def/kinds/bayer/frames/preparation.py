@@ -1,4 +1,4 @@
-"""Frames of a camera behind a mosaic whose lens has a haze, before it is trained."""
+"""Frames of a camera whose lens has a haze, as `camkit prepare` asks for them."""
 
 from pathlib import Path
 from typing import Any, Final
@@ -6,22 +6,22 @@ from typing import Any, Final
 from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.haze_file import read_haze
 from camkit.bundle.psf_file import read_psf
-from camkit.export.designed_optics import check_peaks
-from camkit.export.frames import (
+from camkit.models_def.kinds.bayer.frames.photographs import (
     FrameSources,
     check_frames,
     designed_lens,
     freeze_copies,
     prepare_frames,
 )
-from camkit.export.preparing import PrepareOptions, Tell
 from camkit.models_def.kinds.bayer.frames.tiles import HEADER, PARTS, frames_folder
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.optics.lens_file.lens_file import find_lens
+from camkit.models_def.optics.thin.freezing import check_peaks
+from camkit.models_def.training.preparing import PrepareOptions, Tell
 
 
 class BayerPreparing:
-    """Fulfils `camkit.export.preparing.PreparingKind`."""
+    """Fulfils `camkit.models_def.training.preparing.PreparingKind`."""
 
     def written_last(self, recipe: BayerRecipe, runs: Path) -> Path:
         """Return the header of the frames."""

@@ -1,4 +1,4 @@
-"""One step of fine-tuning moves each player by its own loss, and draws pairs by the step."""
+"""A step of fine-tuning moves each player by its own loss, and draws pairs by the step."""
 
 import tomllib
 from dataclasses import replace
@@ -8,23 +8,23 @@ import pytest
 import torch
 
 from camkit.errors import ContractError
-from camkit.models_def.kinds.bayer.fine_tuning.fitter import FineTuningFitter, FineTuningParts
 from camkit.models_def.kinds.bayer.fine_tuning.pairs import PairSamples
+from camkit.models_def.kinds.bayer.fine_tuning.refinement import make_refinement
 from camkit.models_def.kinds.bayer.samples import LAYOUT
-from camkit.models_def.training.first_weights import read_first_weights
 from camkit.models_def.training.kind import to_recipe
+from camkit.models_def.training.refinement import FineTuningOptions
 from camkit.models_def.training.sample import Batch
 from tests.bayer_recipe import RECIPE
 
 
 @pytest.fixture
-def make(recipe, trimmed_checkpoint):
+def make(recipe, material, trimmed_checkpoint):
     def build(**changes):
-        tuning = replace(recipe.fine_tuning, **changes)
-        entry = replace(recipe.network("full"), schedule=tuning.schedule)
-        first = read_first_weights(trimmed_checkpoint, "full")
-        parts = FineTuningParts(first=first, to_rec709=torch.eye(3))
-        return FineTuningFitter(entry, tuning, parts)
+        tuned = replace(recipe, fine_tuning=replace(recipe.fine_tuning, **changes))
+        options = FineTuningOptions(start=trimmed_checkpoint, size="full")
+        refinement = make_refinement(tuned, options)
+        entry = replace(tuned.network("full"), schedule=refinement.schedule)
+        return refinement.make_fitter(entry, material)
 
     return build
 
@@ -54,9 +54,11 @@ def test_generator_alone_follows_its_content_loss(make):
 
 def test_scores_of_the_generator_do_not_move_the_discriminators(make):
     fitter = make(discriminator_rate=1e-12)
-    before = {n: p.clone() for n, p in fitter.opponents.named_parameters()}
+    opponents = fitter.objective.states["opponents"].networks
+    assert set(opponents) == {"global", "local"}
+    before = {n: p.clone() for n, p in opponents.named_parameters()}
     fitter.fit(batch(), 0, 0.0)
-    for name, parameter in fitter.opponents.named_parameters():
+    for name, parameter in opponents.named_parameters():
         assert torch.allclose(parameter, before[name], atol=1e-9)
 
 
