@@ -217,13 +217,15 @@ def _options(measure: ArgumentParser) -> None:
     more("--rows", nargs="+", metavar="ROW", help=f"of {', '.join(row.key for row in ROWS)}")
 
 
+def _train_options(train: ArgumentParser) -> None:
+    train.add_argument("--valid", type=Path, help="pictures to choose by")
+
+
 TABLE: Final = Table(
     about=__doc__,
     rows=lambda _: ROWS,
     trainee=trainee,
-    add_train_options=lambda train: train.add_argument(
-        "--valid", type=Path, help="pictures to choose by"
-    ),
+    add_train_options=_train_options,
     steps=STEPS,
     measure=measure,
     to_text=tables_text,
