@@ -19,12 +19,11 @@ import contextlib
 import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cache
-from importlib import metadata, util
 from pathlib import PurePath
 from types import ModuleType
 from typing import Final, Literal
 
+from camkit.entry_points import entry_points, has_module, load_entry_point
 from camkit.errors import ContractError, UnsupportedError
 
 GROUP: Final = "camkit.kinds"
@@ -95,7 +94,7 @@ class Kind:
             UnsupportedError: If that floor knows nothing of it.
         """
         name = self._module(floor)
-        if not _is_there(name):
+        if not has_module(name):
             raise UnsupportedError(
                 f"cameras of the kind {self.name!r} have no part in {floor}: add the package {name}"
             )
@@ -103,7 +102,7 @@ class Kind:
 
     def has_part(self, floor: Floor) -> bool:
         """Return whether a floor has a part of this kind."""
-        return _is_there(self._module(floor))
+        return has_module(self._module(floor))
 
     def _module(self, floor: Floor) -> str:
         return f"{self.home}.{floor}" if self.home else f"camkit.{floor}.kinds.{self.name}"
@@ -171,7 +170,7 @@ KINDS: Final = {kind.name: kind for kind in (BAYER, HDR, SPAD)}
 def all_kinds() -> list[Kind]:
     """Return every kind that can be used here; a broken package brings none."""
     kinds = dict(KINDS)
-    for name in sorted(_installed()):
+    for name in sorted(entry_points(GROUP)):
         with contextlib.suppress(ContractError):
             kinds.setdefault(name, find_kind(name))
     return list(kinds.values())
@@ -192,37 +191,17 @@ def find_kind(name: str) -> Kind:
     """
     if name in KINDS:
         return KINDS[name]
-    found = _installed()
+    found = entry_points(GROUP)
     if name not in found:
         known = ", ".join(sorted({*KINDS, *found}))
         raise UnsupportedError(
             f"there is no kind of camera {name!r} here; there are: {known}. The package that "
             "brings it may not be installed"
         )
-    try:
-        kind = found[name].load()
-    except (ImportError, AttributeError) as error:
-        raise ContractError(
-            f"the kind of camera {name!r} cannot be loaded from {found[name].value!r}: {error}"
-        ) from error
+    kind = load_entry_point(found[name], "kind of camera")
     if not isinstance(kind, Kind) or kind.name != name or not kind.home:
         raise ContractError(
             f"the entry point {found[name].value!r} must be a camkit Kind called {name!r} with a "
             "home"
         )
     return kind
-
-
-def _is_there(name: str) -> bool:
-    """Return whether a module is there; one that fails for another reason still raises."""
-    try:
-        return util.find_spec(name) is not None
-    except ModuleNotFoundError as error:
-        if f"{name}.".startswith(f"{error.name}."):
-            return False
-        raise
-
-
-@cache
-def _installed() -> dict[str, metadata.EntryPoint]:
-    return {point.name: point for point in metadata.entry_points(group=GROUP)}

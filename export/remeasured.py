@@ -48,7 +48,7 @@ from camkit.haze import Haze
 from camkit.runtime.geometry.distortion import RANGE_MARGIN, check_distortion
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work
-from camkit.runtime.proof.haze import make_haze_golden
+from camkit.runtime.proof.haze_band import make_haze_golden
 from camkit.units import to_mm
 
 FloatGrid = NDArray[np.float64]
@@ -327,12 +327,7 @@ def _finish(draft: _Draft) -> None:
         focus_mm = optics.object_distance_mm
         frozen = FrozenOptics(psf=draft.psf, haze=draft.haze)
         made = frozen.entry(np.inf if focus_mm is None else focus_mm)
-        stated = tuple(map(int, manifest.format_version.split(".")))
-        least = format_of(
-            draft.psf, hazy=draft.haze is not None, bounded=draft.manifest.bounds_light
-        )
-        needed = tuple(map(int, least.split(".")))
-        newest = ".".join(map(str, max(stated, needed)))
+        newest = format_of(draft.psf, (made, *manifest.stages), least=manifest.version_pair)
         draft.change(optics=made, format_version=newest)
     parts = Parts(
         sensor=draft.manifest.sensor,

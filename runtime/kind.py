@@ -73,7 +73,7 @@ class RuntimePart:
     maker: Maker | None = None
     proving: Proving | None = None
     recording: Recording | None = None
-    laws: str = "camkit.runtime.proof.laws.pictures"
+    laws: str = "camkit.runtime.proof.laws.photographs"
 
 
 def runtime_part(kind: str) -> RuntimePart:

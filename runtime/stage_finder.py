@@ -1,4 +1,7 @@
-"""The finder of a stage's code: the module of its name in `camkit.runtime.stages`.
+"""The finder of the module that does the work of a stage.
+
+It is the one that the stage names as its `runtime`, else that of its type in
+`camkit.runtime.stages`.
 
 A module defines
 
@@ -14,14 +17,14 @@ A module defines
 """
 
 import importlib
-import pkgutil
 from collections.abc import Sequence
 from functools import cache
 from types import ModuleType
 from typing import Final
 
 from camkit.bundle.manifest import Manifest
-from camkit.bundle.stages import Stage
+from camkit.bundle.stages import Stage, StageEntry, all_stages, find_stage, type_of
+from camkit.entry_points import has_module
 from camkit.errors import UnsupportedError
 
 STAGES: Final = "camkit.runtime.stages"
@@ -33,15 +36,17 @@ def stage_module(name: str) -> ModuleType:
     """Return the module of a stage.
 
     Raises:
-        UnsupportedError: If this runtime has none.
+        UnsupportedError: If there is no such stage, or this runtime does not do it.
+        ContractError: If a package brings what is none.
     """
-    places = importlib.import_module(STAGES).__path__
-    known = {module.name for module in pkgutil.iter_modules(places)}
-    if name not in known:
-        raise UnsupportedError(
-            f"this runtime has no stage {name!r}; it has {', '.join(sorted(known))}"
-        )
-    return importlib.import_module(f"{STAGES}.{name}")
+    module = _module_name(find_stage(name))
+    if not has_module(module):
+        raise UnsupportedError(f"the stage {name!r} is not walked: there is no module {module}")
+    return importlib.import_module(module)
+
+
+def _module_name(entry: type[StageEntry]) -> str:
+    return entry.runtime or f"{STAGES}.{type_of(entry)}"
 
 
 def check_stages(manifest: Manifest, max_bytes: int) -> None:
@@ -96,6 +101,5 @@ def methods_of(stages: Sequence[Stage]) -> tuple[str, ...]:
 
 def all_methods() -> tuple[str, ...]:
     """Return the ways of every stage of this runtime, whatever a bundle lists."""
-    places = importlib.import_module(STAGES).__path__
-    names = sorted(module.name for module in pkgutil.iter_modules(places))
+    names = sorted(type_of(entry) for entry in all_stages() if has_module(_module_name(entry)))
     return tuple(dict.fromkeys(m for name in names for m in stage_module(name).METHODS))

@@ -27,8 +27,6 @@ from camkit.bundle.frozen_optics import FrozenOptics, optics_from_bytes
 from camkit.bundle.haze_file import haze_from_bytes
 from camkit.bundle.manifest import (
     FOCUS_VERSION,
-    HAZE_VERSION,
-    LIGHT_VERSION,
     PROFILE_VERSION,
     Manifest,
     read_manifest,
@@ -43,7 +41,6 @@ from camkit.bundle.optics import (
     StreakEntry,
 )
 from camkit.bundle.psf_file import psf_from_bytes
-from camkit.bundle.stages import Highlights, Wiener
 from camkit.contracts import FrozenPsf, RadialDistortion, RadialIllumination
 from camkit.errors import BundleError, ContractError
 from camkit.haze import Haze
@@ -260,15 +257,8 @@ def bundle_from_bytes(data: bytes, *, path: Path, max_bytes: int = MAX_BUNDLE_BY
 
 def _check_bundle(container: Container, path: Path) -> Bundle:
     manifest = read_container_manifest(container)
-    if manifest.bounds_light:
-        _need_version(manifest, LIGHT_VERSION, "the light that a stage makes is bounded")
-    if any(bank.depth != "mean" for bank in manifest.stages_of(Wiener)):
-        _need_version(manifest, LIGHT_VERSION, "a bank finds the distance of the scene")
-    if manifest.laws is not None:
-        _need_version(manifest, LIGHT_VERSION, "laws of a picture are stated")
-    lights = manifest.stage(Highlights)
-    if lights is not None and lights.from_samples:
-        _need_version(manifest, LIGHT_VERSION, "streaks are taken from the samples of the mosaic")
+    for need in manifest.needs():
+        _need_version(manifest, need.version, need.what)
     # Unpacking and hashing leave Python's lock to others.
     with ThreadPoolExecutor(CHECKED_AT_ONCE) as pool:
         checks = [
@@ -296,7 +286,6 @@ def _optics_of(container: Container, manifest: Manifest) -> FrozenOptics | None:
         return None
     channels = len(manifest.sensor.channels)
     if isinstance(stated, LensProfile):
-        _need_version(manifest, PROFILE_VERSION, "the optics are a lens profile")
         rows = 0 if stated.distortion is None else len(stated.distortion.coefficients)
         if rows not in (0, channels):
             raise BundleError(
@@ -321,7 +310,6 @@ def _hazy(container: Container, manifest: Manifest, optics: FrozenOptics) -> Fro
     """Add the haze to optics whose manifest states one."""
     stated = manifest.optics
     assert isinstance(stated, HazyPsfOptics)
-    _need_version(manifest, HAZE_VERSION, "the optics have a haze")
     haze = haze_from_bytes(container.read(HAZE), what=HAZE)
     if haze.cell_px != stated.cell_px:
         raise BundleError(

@@ -1,6 +1,6 @@
 """Light on its way to the sensor, in torch with gradients: blurred by one kernel or block by block.
 
-`scatter` is the twin of `camkit.runtime.geometry.scatter`; `tests/parity` holds the two together.
+`scatter` is the twin of `runtime.geometry.field_blur`; `tests/parity` holds the two together.
 """
 
 from math import cos, pi

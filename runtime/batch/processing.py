@@ -13,7 +13,7 @@ from camkit.errors import ContractError
 from camkit.field_types import check_value
 from camkit.kinds import Kind
 from camkit.progress import working
-from camkit.runtime.batch.counting import PictureCount
+from camkit.runtime.batch.batch_progress import PictureCount
 from camkit.runtime.batch.making import Common, FileProgress, Pipelines, run_task
 from camkit.runtime.batch.sources import expand
 from camkit.runtime.batch.tasks import NO_BUNDLE, Task, list_tasks

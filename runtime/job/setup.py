@@ -9,7 +9,7 @@ from camkit.bundle.stages import Color, Demosaic, Linearise, RaiseClipped, Stage
 from camkit.errors import ContractError
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.options import Options
-from camkit.runtime.plan.laws import bounded_stages
+from camkit.runtime.plan.bounded_networks import bounded_stages
 from camkit.runtime.plan.speed import Speed
 
 DEVELOPMENT: Final[tuple[Stage, ...]] = (

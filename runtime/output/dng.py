@@ -29,8 +29,8 @@ from camkit.runtime.output.directory import (
     directory_length,
     header_bytes,
 )
+from camkit.runtime.output.dng_preview import Averages, preview_jpeg
 from camkit.runtime.output.exif import main_tags, sub_directories
-from camkit.runtime.output.preview import Averages, preview_jpeg
 
 PHOTOMETRIC_CFA: Final = 32803
 PHOTOMETRIC_LINEAR_RAW: Final = 34892

@@ -14,7 +14,7 @@ from camkit.errors import ContractError
 from camkit.runtime.content import Content
 from camkit.runtime.geometry.placement import Placement
 from camkit.runtime.options import Mode, Options
-from camkit.runtime.plan.laws import bounded_stages
+from camkit.runtime.plan.bounded_networks import bounded_stages
 
 Labels = NDArray[np.int8]
 

@@ -28,7 +28,7 @@ from camkit.runtime.network.graph_walk import GraphFacts
 from camkit.runtime.network.probe import perturbation_reach, probe_runs
 from camkit.runtime.network.ranges import FP16_LIMIT, fits_fp16, node_activations
 from camkit.runtime.network.tiling import TileLayout, TileLimits, infer_bands, lay_windows
-from camkit.runtime.proof.haze import prove_haze
+from camkit.runtime.proof.haze_band import prove_haze
 from camkit.runtime.proof.one_window import prove_one_window
 from camkit.runtime.rows import ArrayRows
 

@@ -23,7 +23,7 @@ from camkit.runtime.job.walker import USUAL_BYTES
 from camkit.runtime.machine.memory import trim_heap
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.guard import TileGuard, light_bound, plain_bound
-from camkit.runtime.network.light import FAR, KeptRows
+from camkit.runtime.network.light_bound import FAR, KeptRows
 from camkit.runtime.network.light_keeper import LightKeeper
 from camkit.runtime.network.tiling import Run
 from camkit.runtime.network.white_keeper import white_keeper
@@ -33,9 +33,9 @@ from camkit.runtime.network.windows import (
     WindowLimits,
     lay_network,
 )
+from camkit.runtime.plan.bounded_networks import broken_laws, front_end
 from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.estimate import network_seconds, role_window_mp
-from camkit.runtime.plan.laws import broken_laws, front_end
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.plan.ways import planned
 from camkit.runtime.rows import RowSource, changed_bands

@@ -34,15 +34,15 @@ from camkit.runtime.bank.kernels_by_distance import (
 from camkit.runtime.bank.lights import fitted_px, light_share
 from camkit.runtime.bank.psf import FieldKernels, color_kernels
 from camkit.runtime.content import LIGHT_PX
-from camkit.runtime.job.cells import cells_of
+from camkit.runtime.job.coarse_cells import cells_of
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
 from camkit.runtime.job.walker import FIXED_BYTES
 from camkit.runtime.machine.limits import BANK_WORK
 from camkit.runtime.options import Options
-from camkit.runtime.plan.blocks import plain_blocks
 from camkit.runtime.plan.decision import Subject, Work
+from camkit.runtime.plan.idle_blocks import plain_blocks
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.plan.tuning import Tuning, stated_numbers
 from camkit.runtime.rows import Rows

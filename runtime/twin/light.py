@@ -18,7 +18,7 @@ from camkit.errors import ContractError
 from camkit.haze import Haze
 from camkit.runtime.bank.haze import hazy_kernels
 from camkit.runtime.bank.psf import color_kernels
-from camkit.runtime.geometry.scatter import (
+from camkit.runtime.geometry.field_blur import (
     KernelLookup,
     scatter,
     scatter_light,
@@ -27,7 +27,7 @@ from camkit.runtime.geometry.scatter import (
 from camkit.runtime.geometry.sensor_window import SensorWindow, centred_origin
 from camkit.runtime.geometry.shrink import shrunk
 from camkit.runtime.geometry.warp import distort_array
-from camkit.runtime.twin.haze import HazeLens, hazed, margin_px
+from camkit.runtime.twin.haze_spread import HazeLens, hazed, margin_px
 
 Gains = tuple[float, ...]
 KernelChange = Callable[[FloatArray], FloatArray]

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from camkit.bundle.frozen_optics import FrozenOptics
-from camkit.bundle.manifest import LIGHT_VERSION, format_of
+from camkit.bundle.manifest import format_of
 from camkit.bundle.optics import PSF
 from camkit.bundle.psf_file import psf_to_bytes
 from camkit.bundle.reader import PRESCRIPTION, Bundle, bundle_from_bytes, find_bundle, open_bundle
@@ -151,7 +151,7 @@ def refocusable(bundle: Bundle, range_um: float | None) -> tuple[Bundle, float]:
     psf, _ = with_focus(bundle.psf, (-reach_um, reach_um), lens.refocused, color_sensor(bundle))
     members = {name: bundle.member(name) for name in bundle.names} | {PSF: psf_to_bytes(psf)}
     stated = bundle.manifest
-    version = format_of(psf, bounded=stated.version_pair >= LIGHT_VERSION)
+    version = format_of(psf, (), least=stated.version_pair)
     manifest = stated.model_copy(update={"format_version": version})
     return bundle_from_bytes(bundle_to_bytes(manifest, members), path=bundle.path), reach_um
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator, RectBivariateSpline
 
-from camkit.calibration.geometry.camera import MODELS, Camera
+from camkit.calibration.geometry.camera_model import MODELS, Camera
 from camkit.calibration.measured_files import (
     TOP_LEVEL,
     read_flat,

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from camkit.calibration.geometry.camera import (
+from camkit.calibration.geometry.camera_model import (
     POSE_NUMBERS,
     Camera,
     FloatGrid,

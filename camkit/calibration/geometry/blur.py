@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from camkit.calibration.geometry.board import Board
-from camkit.calibration.geometry.camera import FloatGrid
+from camkit.calibration.geometry.camera_model import FloatGrid
 from camkit.contracts import FloatArray
 
 _SIDE: Final = 0.5

@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 
 from camkit.calibration.geometry.adjustment import Fit, adjust, rms
-from camkit.calibration.geometry.camera import POSE_NUMBERS, FloatGrid, project
+from camkit.calibration.geometry.camera_model import POSE_NUMBERS, FloatGrid, project
 from camkit.calibration.geometry.start import fit_models
 
 MOST_WORSE: Final = 0.1

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.calibration.geometry.camera import FloatGrid
+from camkit.calibration.geometry.camera_model import FloatGrid
 
 _CELL_PX = 4
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from camkit.calibration.geometry.blur import blur_px
 from camkit.calibration.geometry.board import Board
-from camkit.calibration.geometry.camera import FloatGrid
+from camkit.calibration.geometry.camera_model import FloatGrid
 from camkit.calibration.geometry.grey import to_codes
 from camkit.calibration.geometry.saddle import refine_saddles
 from camkit.contracts import FloatArray

@@ -13,10 +13,10 @@ from typing import Final
 
 import numpy as np
 
-from camkit.calibration.geometry.camera import CENTRE, FOCAL, FloatGrid
+from camkit.calibration.geometry.camera_model import CENTRE, FOCAL, FloatGrid
 from camkit.calibration.geometry.choice import Judged, judge, simplest
 from camkit.calibration.geometry.coverage import Coverage
-from camkit.calibration.geometry.profile import Profile
+from camkit.calibration.geometry.distortion_profile import Profile
 from camkit.calibration.geometry.start import (
     FREE,
     Nominal,

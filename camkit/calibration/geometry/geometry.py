@@ -10,7 +10,7 @@ import numpy as np
 
 from camkit.calibration.geometry.adjustment import rms
 from camkit.calibration.geometry.board import Board
-from camkit.calibration.geometry.camera import FOCAL, Camera, FloatGrid, distance
+from camkit.calibration.geometry.camera_model import FOCAL, Camera, FloatGrid, distance
 from camkit.calibration.geometry.choice import (
     LEAST_VIEWS,
     Judged,
@@ -20,12 +20,12 @@ from camkit.calibration.geometry.corner_file import CornerFile
 from camkit.calibration.geometry.coverage import Coverage
 from camkit.calibration.geometry.detector import find_corners
 from camkit.calibration.geometry.determination import Determined, determine
-from camkit.calibration.geometry.grey import read_grey
-from camkit.calibration.geometry.profile import (
+from camkit.calibration.geometry.distortion_profile import (
     Profile,
     RadialFit,
     fit_radial,
 )
+from camkit.calibration.geometry.grey import read_grey
 from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError
 from camkit.progress import counted

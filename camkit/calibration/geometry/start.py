@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 from camkit.calibration.geometry.adjustment import Fit, adjust, rms
-from camkit.calibration.geometry.camera import (
+from camkit.calibration.geometry.camera_model import (
     CENTRE,
     FOCAL,
     MODELS,

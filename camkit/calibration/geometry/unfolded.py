@@ -9,10 +9,10 @@ from typing import Final
 
 import numpy as np
 
-from camkit.calibration.geometry.camera import Camera, FloatGrid
+from camkit.calibration.geometry.camera_model import Camera, FloatGrid
 from camkit.calibration.geometry.choice import Judged, simplest
 from camkit.calibration.geometry.coverage import Coverage, coverage_of
-from camkit.calibration.geometry.profile import Profile, profile_of
+from camkit.calibration.geometry.distortion_profile import Profile, profile_of
 from camkit.calibration.geometry.start import is_lens
 from camkit.errors import DecodeError
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.bundle.chain import rewired
-from camkit.bundle.manifest import PROFILE_VERSION, Manifest, manifest_without_networks
+from camkit.bundle.manifest import Manifest, manifest_without_networks
 from camkit.bundle.optics import LensProfile
 from camkit.bundle.sensor import BayerSensor, Extent, IsoNoise, PlanesSensor, Row
 from camkit.bundle.stages import (
@@ -116,7 +116,6 @@ def manifest_of(
         stages,
         sensor,
         profile,
-        format_version=".".join(map(str, PROFILE_VERSION)),
         name=name,
         version="1.0.0",
         licence=LICENCE,

@@ -19,7 +19,7 @@ from camkit.report.bench.metrics.hdr import METRIC
 from camkit.report.journal import append_journal, read_journal
 from camkit.report.kinds.hdr.capture import photograph
 from camkit.report.quality import Exposed
-from camkit.runtime.stages import highlights
+from camkit.runtime.kinds.hdr.stages import highlights
 from tools.hdr.table.cameras import write_camera
 from tools.hdr.table.restoring import Camera, Restorer, make_restorer, timed
 from tools.hdr.table.rows import LDR, Row, Run

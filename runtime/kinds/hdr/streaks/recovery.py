@@ -18,8 +18,8 @@ from camkit.contracts import FloatArray
 from camkit.runtime.kinds.hdr.streaks.cells import COLOURS, Cells, coarser
 from camkit.runtime.kinds.hdr.streaks.convolution import Convolution, spreading
 from camkit.runtime.kinds.hdr.streaks.descent import COARSE_STEPS, not_outshining, seek_lights
-from camkit.runtime.kinds.hdr.streaks.evidence import Judge, proven
 from camkit.runtime.kinds.hdr.streaks.kernels import StreakKernels
+from camkit.runtime.kinds.hdr.streaks.light_evidence import Judge, proven
 from camkit.runtime.kinds.hdr.streaks.refinement import Found, Group, groups_of, refined
 from camkit.runtime.kinds.hdr.streaks.regions import Window, windows_of
 from camkit.runtime.kinds.hdr.streaks.shapes import pooled, rim_distance_px, upsampled

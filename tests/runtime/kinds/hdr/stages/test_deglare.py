@@ -22,13 +22,13 @@ from camkit.runtime.cancel import Cancelled
 from camkit.runtime.capture import Capture
 from camkit.runtime.development import WriteOptions, develop_file
 from camkit.runtime.kinds.hdr.deglare.removal import GlareSettings, find_glare
+from camkit.runtime.kinds.hdr.stages import deglare
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work
-from camkit.runtime.stages import deglare
 from tests.job_factory import start
 from tools.hdr.glare_bundle import build, mosaic_of
 from tools.hdr.glare_twin import exposed_scene, photographed, two_point_star

@@ -27,6 +27,7 @@ from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.cancel import Cancelled
 from camkit.runtime.capture import Capture
 from camkit.runtime.job.walker import Walk
+from camkit.runtime.kinds.hdr.stages import highlights
 from camkit.runtime.kinds.hdr.streaks.cells import cells_of, sample_sites
 from camkit.runtime.kinds.hdr.streaks.kernels import streak_kernels
 from camkit.runtime.kinds.hdr.streaks.painting import Painter
@@ -35,7 +36,6 @@ from camkit.runtime.kinds.hdr.streaks.rims import MOST_OVER, near_clipped, no_br
 from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.signal.demosaic import apply_gains, demosaic
-from camkit.runtime.stages import highlights
 from tests.hdr_bundle import DEEP_MM, SIZE_PX, hdr_stages_from_samples, write_hdr_bundle
 from tests.job_factory import made_job, start, stream_of
 from tests.streak_factory import blurred, captured, star, star_kernels, street, with_lamps

@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.calibration.noise.pairs import Pair, PairReader, in_pairs
+from camkit.calibration.noise.frame_pairs import Pair, PairReader, in_pairs
 from camkit.calibration.noise.rounding import LEAST_BOUND, OF_ROUNDING, Spread, spread_of
 from camkit.calibration.noise.site import SitePair
 from camkit.calibration.noise.transfer import Point, Transfer, fit_transfer

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from camkit.calibration.geometry.camera import Camera, FloatGrid
+from camkit.calibration.geometry.camera_model import Camera, FloatGrid
 from camkit.contracts import RadialDistortion
 from camkit.errors import ContractError
 from camkit.runtime.geometry.distortion import RANGE_MARGIN, check_distortion

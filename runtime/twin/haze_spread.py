@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.runtime.bank.haze import enlarged
-from camkit.runtime.geometry.scatter import KernelLookup, scatter_light
+from camkit.runtime.geometry.field_blur import KernelLookup, scatter_light
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.geometry.shrink import shrunk
 
