@@ -33,7 +33,7 @@ def targets(
 ) -> None:
     """Write pictures for a display: checkerboard, grey steps, colours, pictures with marks."""
     check_page(page, overwrite=overwrite)
-    from camkit.report.calibration.targets_page import shrunk, targets_html
+    from camkit.report.pages.calibration.targets_page import shrunk, targets_html
     from camkit.runtime.calibration.display.screen import Screen
     from camkit.runtime.calibration.display.targets import (
         LIST,

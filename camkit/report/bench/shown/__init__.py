@@ -5,7 +5,6 @@ labels         texts beside markers where they cover nothing
 front_panel    time against PSNR, all cameras on common axes
 field_panels   PSNR over the field, a panel for every ISO
 legend         what colours, markers and lines mean
-chart          all of that as one picture
-tables         accuracy by ISO and field, and how every method was tuned, as tables of the page
-page           the page
+bench_chart    all of that as one picture
+bench_page     the page
 """

@@ -1,14 +1,12 @@
 """PSNR over the field, a panel for every ISO; only where every picture was taken everywhere."""
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from camkit.report.bench.row import Row
 from camkit.report.bench.shown.looks import Looks
+from camkit.report.figure import Panel
 from camkit.runtime.plan.decision import DEVELOP
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes as Panel
 
 Cell = dict[str, Any]
 
@@ -66,7 +64,7 @@ def shown_rows(rows: Sequence[Row]) -> list[Row]:
     return found
 
 
-def draw_field_panel(panel: "Panel", rows: Sequence[Row], iso: float, looks: Looks) -> None:
+def draw_field_panel(panel: Panel, rows: Sequence[Row], iso: float, looks: Looks) -> None:
     """Draw one ISO.
 
     Args:
@@ -83,13 +81,10 @@ def draw_field_panel(panel: "Panel", rows: Sequence[Row], iso: float, looks: Loo
             done.add(row["camera"])
             _draw_line(panel, cells, "input_psnr_db", color=color, linestyle="--", alpha=0.7)
         _draw_line(panel, cells, "psnr_db", color=color, marker=looks.marker(row), markersize=5)
-    panel.set_title(f"ISO {iso:g}", fontsize=9, loc="left")
-    panel.set_xlabel("distance from the axis, mm", fontsize=9)
-    panel.grid(visible=True, color="#dddddd", linewidth=0.5)
-    panel.set_axisbelow(True)
-    panel.tick_params(labelsize=8)
+    panel.set_title(f"ISO {iso:g}", loc="left")
+    panel.set_xlabel("distance from the axis, mm")
 
 
-def _draw_line(panel: "Panel", cells: Sequence[Cell], key: str, **look: Any) -> None:
+def _draw_line(panel: Panel, cells: Sequence[Cell], key: str, **look: Any) -> None:
     known = [cell for cell in cells if cell.get(key) is not None]
     panel.plot([c["field_mm"] for c in known], [c[key] for c in known], linewidth=1.2, **look)

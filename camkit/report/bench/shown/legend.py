@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 from camkit.report.bench.row import Row
 from camkit.report.bench.shown.looks import AREA_PER_GB, Looks
+from camkit.report.figure import Figure
 from camkit.runtime.plan.decision import DEVELOP
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
 GREY: Final = "#555555"
@@ -26,7 +26,7 @@ NAMES: Final = {
 }
 
 
-def draw_legend(figure: "Figure", rows: Sequence[Row], looks: Looks, *, below: str) -> None:
+def draw_legend(figure: Figure, rows: Sequence[Row], looks: Looks, *, below: str) -> None:
     """Draw it to the right of all panels.
 
     Args:
@@ -47,9 +47,7 @@ def draw_legend(figure: "Figure", rows: Sequence[Row], looks: Looks, *, below: s
     entries.append(_dot("#bbbbbb", "o", "1 GB peak memory", size_pt2=AREA_PER_GB))
     if below:
         entries += [_text(LOWER), _text(below)]
-    legend = figure.legend(
-        handles=entries, fontsize=8, loc="outside right upper", frameon=False, labelspacing=0.55
-    )
+    legend = figure.legend(handles=entries, loc="outside right upper", labelspacing=0.55)
     for text in legend.get_texts():
         if text.get_text() in {CAMERA, METHOD, LINES, LOWER}:
             text.set_fontweight("bold")

@@ -8,13 +8,13 @@ import pytest
 
 from camkit.bundle.reader import open_bundle
 from camkit.bundle.writer import write_bundle
-from camkit.report.stress.chart import draw_curve
 from camkit.report.stress.curve import breaks_of, curve_of
 from camkit.report.stress.report import scenario_json
 from camkit.report.stress.scenario import LEAST_ROOM_PX, Scenario, choose, has_room
 from camkit.report.stress.scenarios.scene import limb, stars
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Comparison, Judge
+from camkit.report.stress.stress_chart import draw_curve
 from camkit.report.stress.sweep import Sweep, run_sweep
 from tests.bundle_factory import tiny_manifest, tiny_members, tiny_sensor
 
