@@ -26,7 +26,7 @@ from camkit.report.bench.known_captures import (
 from camkit.report.bench.line_up import make_trials, metrics_of
 from camkit.report.bench.machine import describe_machine, free_memory_bytes
 from camkit.report.bench.metric import Metric
-from camkit.report.bench.own.measuring import measure_own, measures_of
+from camkit.report.bench.own_rows import measure_own, measures_of
 from camkit.report.bench.part import BenchPart, Tell
 from camkit.report.bench.row import Facts, Row, make_row
 from camkit.report.bench.settings import QUICK_SIZE_PX, Settings

@@ -10,9 +10,9 @@ import pytest
 
 from camkit.bundle.reader import Bundle
 from camkit.errors import ContractError
+from camkit.report.bench import own_rows
 from camkit.report.bench.output import write_bench
-from camkit.report.bench.own import measuring
-from camkit.report.bench.own.table import own_lines
+from camkit.report.bench.own_rows import own_lines
 from camkit.report.bench.part import BenchPart, OwnRows, OwnSettings, Tell
 from camkit.report.bench.run import run_bench
 from camkit.report.bench.settings import Settings
@@ -38,7 +38,7 @@ class _Kind:
 def kind(monkeypatch: pytest.MonkeyPatch) -> _Kind:
     """Let the kind of the tiny bundle measure itself."""
     made = _Kind()
-    monkeypatch.setattr(measuring, "find_part", lambda *_: BenchPart(measure=made.measure))
+    monkeypatch.setattr(own_rows, "find_part", lambda *_: BenchPart(measure=made.measure))
     return made
 
 
@@ -111,7 +111,7 @@ def test_it_is_not_benched_beside_photographs(
     settings: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     parts = iter([BenchPart(), BenchPart(measure=_Kind().measure)])
-    monkeypatch.setattr(measuring, "find_part", lambda *_: next(parts))
+    monkeypatch.setattr(own_rows, "find_part", lambda *_: next(parts))
     other = tmp_path / "other"
     other.mkdir()
     path = write_tiny_bundle(other)

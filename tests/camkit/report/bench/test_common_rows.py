@@ -1,20 +1,17 @@
-"""Row makers and metrics register by lying in a folder; which trials a bundle gives."""
+"""Which trials a bundle gives to the row makers that serve every camera."""
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
 from camkit.bundle.facts import HaloError
 from camkit.bundle.reader import Bundle
-from camkit.errors import ContractError, UnsupportedError
+from camkit.errors import ContractError
+from camkit.report.bench.common_rows import COMMON
 from camkit.report.bench.line_up import make_trials
 from camkit.report.bench.metric import registered_metrics
 from camkit.report.bench.metrics import picture
-from camkit.report.bench.row_maker import row_makers
 from camkit.report.bench.trial import Axes, Entrant, Ground
-from camkit.report.discovery import discover
 from tests.wide_bundle import write_wide_bundle
 
 GROUND = Ground(threads=2, providers=("cpu",), free_bytes=10**10)
@@ -30,26 +27,10 @@ def labels(bundle: Bundle, axes: Axes, ground: Ground = GROUND) -> tuple[list[st
     return [trial.label for trial in trials], [f"{s.what}: {s.reason}" for s in skips]
 
 
-def test_the_row_makers_that_come_with_camkit_are_found() -> None:
-    assert [maker.name for maker in row_makers()] == ["classical", "develop", "network", "physics"]
+def test_the_row_makers_and_metrics_that_serve_every_camera_are_there() -> None:
+    assert [maker.name for maker in COMMON] == ["classical", "develop", "network", "physics"]
     assert [metric.name for metric in registered_metrics()] == ["hdr", "picture"]
     assert [column.name for column in picture.METRIC.columns] == ["psnr_db", "ssim"]
-
-
-def test_a_new_module_registers_without_any_edit(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    package = tmp_path / "more_rows"
-    package.mkdir()
-    (package / "__init__.py").write_text("")
-    (package / "spad.py").write_text("ROWS = 'a new maker'")
-    monkeypatch.syspath_prepend(tmp_path)
-    assert discover("more_rows", "ROWS", str) == ("a new maker",)
-    (package / "wrong.py").write_text("ROWS = 3")
-    with pytest.raises(UnsupportedError, match=r"more_rows\.wrong must define ROWS as a str"):
-        discover("more_rows", "ROWS", str)
-    for name in ("more_rows", "more_rows.spad", "more_rows.wrong"):
-        sys.modules.pop(name, None)
 
 
 def test_the_default_varies_one_thing_at_a_time(bundle: Bundle) -> None:
