@@ -14,7 +14,7 @@ from camkit.report.stress.score import Judge, Numbers
 from camkit.report.stress.shot import Shot
 from camkit.report.stress.verdict import Verdict
 from camkit.runtime.twin.exposure import Setting
-from camkit.runtime.twin.haze import HazeLens
+from camkit.runtime.twin.haze_spread import HazeLens
 from camkit.runtime.twin.light import Lens
 
 

@@ -26,7 +26,7 @@ from camkit.report.kinds.hdr.lights import (
 from camkit.report.stress.scenario import Shoot, row
 from camkit.report.stress.scene import Scene
 from camkit.runtime.twin.exposure import Setting
-from camkit.streaks.optics import StreakOptics
+from camkit.streaks import StreakOptics
 
 BLOB_POWER: Final = 64.0
 POWER: Final = 128.0

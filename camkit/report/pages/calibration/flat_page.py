@@ -4,9 +4,9 @@ from typing import Final
 
 import numpy as np
 
+from camkit.calibration.flat.illumination_fit import FlatFacts
 from camkit.report.figure import BLUE, Figure, chart, hide_ticks, new_figure, to_png
 from camkit.report.pages.page import Page, Picture, Section, Table, sentences, to_html
-from camkit.runtime.calibration.flat.measure import FlatFacts
 
 _MOST_PICTURES: Final = 8
 

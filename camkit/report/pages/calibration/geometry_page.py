@@ -4,12 +4,12 @@ from typing import Final
 
 import numpy as np
 
+from camkit.calibration.geometry.adjustment import rms
+from camkit.calibration.geometry.camera_model import FloatGrid
+from camkit.calibration.geometry.coverage import seen_cells
+from camkit.calibration.geometry.geometry import Geometry
 from camkit.report.figure import FIELD_COLORS, Figure, Panel, chart, new_figure, to_png
 from camkit.report.pages.page import Page, Picture, Section, Table, sentences, to_html
-from camkit.runtime.calibration.geometry.adjustment import rms
-from camkit.runtime.calibration.geometry.camera import FloatGrid
-from camkit.runtime.calibration.geometry.coverage import seen_cells
-from camkit.runtime.calibration.geometry.geometry import Geometry
 
 LONGEST: Final = 0.12
 """Of the longer side of the picture: how long the longest arrow is drawn."""

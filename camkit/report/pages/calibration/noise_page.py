@@ -4,6 +4,7 @@ from typing import Final
 
 import numpy as np
 
+from camkit.calibration.noise.sensor_noise import IsoFacts, NoiseFacts
 from camkit.report.figure import (
     CHANNEL_COLORS,
     Figure,
@@ -14,7 +15,6 @@ from camkit.report.figure import (
     to_png,
 )
 from camkit.report.pages.page import Page, Picture, Section, Table, sentences, to_html
-from camkit.runtime.calibration.noise.measure import IsoFacts, NoiseFacts
 
 _COLORS: Final = {**CHANNEL_COLORS, "G1": CHANNEL_COLORS["G"], "G2": "#8fbc5a", "Y": "#444444"}
 _HEADER: Final = (

@@ -4,10 +4,10 @@ from typing import Any, Final
 
 import numpy as np
 
+from camkit.calibration.display.pairs import Pairs
+from camkit.calibration.display.primaries import Primaries
 from camkit.report.figure import BLUE, Figure, chart, new_figure, to_png
 from camkit.report.pages.page import Page, Picture, Section, Table, sentences, to_html
-from camkit.runtime.calibration.display.pairs import Pairs
-from camkit.runtime.calibration.display.primaries import Primaries
 
 MOST_ARROWS: Final = 2000
 LONGEST: Final = 0.06

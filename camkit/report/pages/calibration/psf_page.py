@@ -4,10 +4,10 @@ from typing import Final
 
 import numpy as np
 
+from camkit.calibration.measured import ColourFacts, MeasuredPsf
+from camkit.calibration.peak import PEAK_PX, light_within
 from camkit.report.figure import CHANNEL_COLORS, Figure, chart, new_figure, to_png
 from camkit.report.pages.page import Page, Picture, Section, Table, sentences, to_html
-from camkit.runtime.calibration.measured import ColourFacts, MeasuredPsf
-from camkit.runtime.calibration.peak import PEAK_PX, light_within
 
 _COLORS: Final = {
     name: CHANNEL_COLORS[channel] for name, channel in (("blue", "B"), ("green", "G"), ("red", "R"))

@@ -6,9 +6,9 @@ from typing import Final
 import cv2
 import numpy as np
 
+from camkit.calibration.display.targets import Codes, Target, Targets
 from camkit.report.figure import Figure, chart, new_figure, to_png
 from camkit.report.pages.page import Page, Picture, Section, Table, to_html
-from camkit.runtime.calibration.display.targets import Codes, Target, Targets
 
 SMALL_PX: Final = 320
 """Longest side of a target on the page."""

@@ -4,9 +4,9 @@ from typing import Final
 
 import numpy as np
 
+from camkit.calibration.tone import ToneFacts
 from camkit.report.figure import BLUE, Figure, chart, new_figure, to_png
 from camkit.report.pages.page import Page, Picture, Section, Table, sentences, to_html
-from camkit.runtime.calibration.tone import ToneFacts
 
 _POINTS: Final = 256
 _CAPTION: Final = (

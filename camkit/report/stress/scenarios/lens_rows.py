@@ -25,7 +25,7 @@ from camkit.report.stress.shot import Shot
 from camkit.report.stress.taking import through, through_haze
 from camkit.report.stress.verdict import Verdict
 from camkit.runtime.job.choices import known_options
-from camkit.runtime.twin.haze import HazeLens
+from camkit.runtime.twin.haze_spread import HazeLens
 from camkit.runtime.twin.light import Lens, lens_of, with_axis_moved, with_kernels, with_places
 from camkit.runtime.twin.truth import light_sensor
 from camkit.units import MM_PER_M, to_mm

@@ -5,10 +5,10 @@ import re
 import numpy as np
 import pytest
 
+from camkit.calibration.geometry.camera_model import MODELS
+from camkit.calibration.geometry.geometry import Geometry, calibrate_geometry
 from camkit.report.pages.calibration.geometry_page import LONGEST, enlargement, geometry_html
-from camkit.runtime.calibration.geometry.camera import MODELS
-from camkit.runtime.calibration.geometry.geometry import Geometry, calibrate_geometry
-from tests.runtime.calibration.geometry.board_factory import (
+from tests.camkit.calibration.geometry.board_factory import (
     BOARD,
     Shot,
     camera_of,
