@@ -8,7 +8,7 @@ from camkit.report.bench.crops import SHARP, Patch
 from camkit.report.bench.pareto import pareto_front
 from camkit.report.bench.row import Row
 from camkit.report.bench.run import Result
-from camkit.report.bench.shown.field_panels import is_swept
+from camkit.report.bench.shown.bench_chart import is_swept
 from camkit.report.bench.timed.timing import LEAST_N_OF_P99, NOISY_LOAD, NOISY_SPREAD
 from camkit.report.pages.page import Cell, Page, Part, Picture, Section, Table, Words
 

@@ -7,9 +7,13 @@ import pytest
 from matplotlib.figure import Figure
 
 from camkit.report.bench.row import Row, make_row
-from camkit.report.bench.shown.bench_chart import draw_chart
+from camkit.report.bench.shown.bench_chart import (
+    draw_chart,
+    draw_field_panel,
+    field_isos,
+    shown_rows,
+)
 from camkit.report.bench.shown.bench_page import split_section, tuning_section
-from camkit.report.bench.shown.field_panels import draw_field_panel, field_isos, shown_rows
 from camkit.report.bench.shown.front_panel import (
     APART,
     draw_front_panel,
