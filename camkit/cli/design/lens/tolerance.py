@@ -58,7 +58,7 @@ def tolerance(
     from camkit.models_def.design.tolerance import ToleranceRun, run_tolerance
     from camkit.models_def.optics.glass.agf import read_agf
     from camkit.models_def.optics.lens_file.lens_file import read_noted_lens
-    from camkit.report.lens.yield_chart import chart_paths, to_json, to_text, write_tolerance
+    from camkit.report.pages.lens.yield_chart import chart_paths, to_json, to_text, write_tolerance
 
     folder = out_dir if out_dir is not None or json_ else Path()
     if folder is not None:
