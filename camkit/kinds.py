@@ -7,12 +7,11 @@ A kind of camera is one folder on each floor that it needs, and one line in `KIN
 
     camkit/runtime/kinds/NAME      readers and twin
     camkit/models_def/kinds/NAME   samples and judging, for training
-    camkit/export/kinds/NAME       what is made before training
     camkit/report/kinds/NAME       metrics, rows of the bench, scenarios of stress
 
 A package of somebody else brings its own: its entry point in the group `camkit.kinds` names a
-`Kind` whose `home` is the package that holds the folders `runtime`, `models_def`, `export` and
-`report`, or those of them that it needs.
+`Kind` whose `home` is the package that holds the folders `runtime`, `models_def` and `report`, or
+those of them that it needs.
 """
 
 import contextlib
@@ -27,12 +26,12 @@ from camkit.entry_points import entry_points, has_module, load_entry_point
 from camkit.errors import ContractError, UnsupportedError
 
 GROUP: Final = "camkit.kinds"
-Floor = Literal["runtime", "models_def", "export", "report"]
+Floor = Literal["runtime", "models_def", "report"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KindOption:
-    """What a caller may choose about the captures of some kind, beyond what every camera knows.
+    """An option for the captures of some kind, beyond those of every camera.
 
     Attributes:
         name: In Python; on the command line --name.
@@ -88,7 +87,7 @@ class Kind:
     scenes: Mapping[str, str] = field(default_factory=dict)
 
     def part(self, floor: Floor) -> ModuleType:
-        """Import what one floor knows of this kind.
+        """Import the part of this kind that belongs to one floor.
 
         Raises:
             UnsupportedError: If that floor knows nothing of it.
@@ -99,10 +98,6 @@ class Kind:
                 f"cameras of the kind {self.name!r} have no part in {floor}: add the package {name}"
             )
         return importlib.import_module(name)
-
-    def has_part(self, floor: Floor) -> bool:
-        """Return whether a floor knows something of this kind."""
-        return has_module(self._module(floor))
 
     def _module(self, floor: Floor) -> str:
         return f"{self.home}.{floor}" if self.home else f"camkit.{floor}.kinds.{self.name}"

@@ -163,7 +163,7 @@ def export_bundle(parts: Parts, out: Path) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Camera:
-    """What is exported: one camera, with every size of every role."""
+    """The exported camera, with every size of every role."""
 
     kind: TrainingKind[Any, Any]
     recipe: Recipe
@@ -200,7 +200,7 @@ def _camera(parts: Parts) -> _Camera:
 
 
 def _optics(parts: Parts, recipe: Recipe, design: Design) -> FrozenOptics:
-    """Read the optics, with their haze where a stage undoes one.
+    """Read the optics, with their haze where a stage removes one.
 
     Raises:
         ContractError: If there is a haze and no such stage, or the other way round.
@@ -258,7 +258,7 @@ def _models(networks: Networks) -> dict[str, bytes]:
 
 
 def _windows(bundle: Bundle, cases: Cases) -> dict[tuple[str, str], list[FloatArray]]:
-    """Return what every network is given: for a larger probe first, then for the golden cases."""
+    """Return the inputs of every network: for a larger probe first, then for the golden cases."""
     captures, proving = list(cases.values()), part_of(bundle.manifest).proving
     windows: dict[tuple[str, str], list[FloatArray]] = {}
     if proving is None:

@@ -47,7 +47,7 @@ def blur(planes: Tensor, kernels: Tensor) -> Tensor:
 
 
 class _Convolution(torch.autograd.Function):
-    """What has full support in the convolution of (..., h, w) with (..., kh, kw).
+    """The samples with full support in the convolution of (..., h, w) with (..., kh, kw).
 
     The slopes are correlations, by real transforms too: torch would go back through a real
     transform by a complex one, at twice the work.

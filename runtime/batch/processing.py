@@ -53,7 +53,7 @@ def process(  # noqa: PLR0913 - each says one thing to its caller
     on_notice: Callable[[str], None] | None = None,
     **choices: Unpack[ProcessKeywords],
 ) -> list[FileResult]:
-    """Turn captures into pictures, each with its sidecar.
+    """Process captures to pictures, each with its sidecar.
 
     Args:
         files: Captures, folders or globs.
@@ -173,7 +173,7 @@ def kind_of_run(bundle: str | None, options: Options, pipelines: Pipelines) -> K
 
 
 def _shared(options: Options, jobs: int) -> Options:
-    """Share threads and memory among the jobs, so that together they keep to the caller's.
+    """Divide threads and memory among the jobs, so that together they keep the caller's limits.
 
     What the process holds anyway counts once; without a cap every job takes the default.
     """

@@ -1,4 +1,4 @@
-"""Where things lie: on the sensor, through the lens, and back.
+"""Geometry: places on the sensor, through the lens, and back.
 
 sensor_window   pixels of a capture to millimetres from the axis
 placement       where a capture lies on a bundle's sensor

@@ -1,4 +1,4 @@
-"""What all captures of a pipeline share."""
+"""The setup that all captures of a pipeline share."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ DEVELOPMENT: Final[tuple[Stage, ...]] = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setup:
-    """What all captures of a pipeline share.
+    """The setup that all captures of a pipeline share.
 
     Attributes:
         bundle: The camera; None develops only.

@@ -38,7 +38,7 @@ class ToneMappedPreview:
         self._averages = Averages(height, width, longest_px=LONGEST_PREVIEW_PX)
 
     def add(self, band: FloatArray) -> None:
-        """Take the next (3, rows, w) float32 rows, linear; what is no number counts as black."""
+        """Add the next (3, rows, w) float32 rows, linear; NaN counts as black."""
         self._averages.add(np.nan_to_num(band, nan=0.0, posinf=0.0, neginf=0.0))
 
     def write(self, path: Path, color: ColorStage, orientation: int) -> None:

@@ -67,7 +67,7 @@ def check(entry: Dehaze, manifest: Manifest, _max_bytes: int) -> None:
 
 
 def prepare(entry: Dehaze, job: Job) -> StageWork:
-    """Return what the coarse picture takes."""
+    """Return the coarse picture of the haze."""
 
     def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
         picture = taken[0]

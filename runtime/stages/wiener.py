@@ -93,7 +93,7 @@ def check(entry: Wiener, manifest: Manifest, max_bytes: int) -> None:
 
 
 def bank_work(entry: Wiener, channels: int) -> float:
-    """Return how often a pixel is transformed at most: overlaps, channels, rounds of clipping.
+    """Return the most transforms per pixel: overlaps, channels, rounds of clipping.
 
     A block takes a transform for its kernel and two for its filter; where samples are clipped,
     four for every round of Richardson-Lucy and two each for what it explains and leaves.
@@ -109,7 +109,7 @@ def block_bytes(block_px: int, channels: int, *, threads: int) -> int:
 
 
 def prepare(entry: Wiener, job: Job) -> StageWork:
-    """Return which kernels are taken, where there is a choice, and what the noise is."""
+    """Return the bank: the kernels, where there is a choice, and the noise."""
     bundle, depth_mm, _ = job.known_bundle, job.options.depth_mm, job.noise
     depths_mm = bundle.psf.depths_mm
     if depths_mm.size > 1:
@@ -151,7 +151,7 @@ def _restored(entry: Wiener, job: Job, taken: Sequence[Stream]) -> Iterator[Rows
 
 
 def tuning(entry: Wiener, method: str) -> Tuning:
-    """Return how a method was tuned: the bank by what its bundle states, the others by camkit."""
+    """Return the tuning of a method: of the bank by its bundle, of the others by camkit."""
     if method == METHODS[0]:
         values = stated_numbers(entry)
         if entry.together is not None:

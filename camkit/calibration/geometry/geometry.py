@@ -45,7 +45,7 @@ _OFF_MIDDLE: Final = 0.002
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class View:
-    """A picture in which the board was looked for.
+    """A picture that was searched for the board.
 
     Attributes:
         path: The file.
@@ -157,7 +157,7 @@ def calibrate_geometry(
 
 
 def calibrate_corners(given: CornerFile, focal_px: float | None = None) -> Geometry:
-    """Measure the geometry of a camera from corners that were found before.
+    """Measure the geometry of a camera from known corners.
 
     Args:
         given: The corners; see `corner_file.read_corners`.
@@ -208,7 +208,7 @@ def _measured(views: Sequence[View], board: Board, focal_px: float | None) -> Ge
 
 
 def look_for(files: Sequence[Path], board: Board) -> list[View]:
-    """Read pictures one after the other and look for the board.
+    """Read pictures one after the other and search them for the board.
 
     Raises:
         DecodeError: If a file cannot be read or is given twice, sizes differ, or fewer than three
@@ -284,7 +284,7 @@ def _check_agree(
 
 
 def _held_notes(found: Determined, size: tuple[int, int]) -> list[str]:
-    """Return what the pictures do not determine, and what stands for it."""
+    """Return notes on numbers that the pictures do not determine, and their replacements."""
     notes = []
     if "centre_px" in found.undetermined:
         x, y = found.chosen.fit.camera.centre_px

@@ -67,7 +67,7 @@ def unfolded(
 
 
 def _doubt(camera: Camera, profile: Profile, size: tuple[int, int]) -> str:
-    """Return what of a camera no lens has; "" for nothing."""
+    """Return the property of a camera that no lens has; "" for none."""
     if not is_lens(camera, size):
         return f"a focal length of {camera.focal_px:.0f} px, which is none of a lens"
     for at, side in zip(camera.centre_px, size, strict=True):

@@ -1,4 +1,4 @@
-"""Which blocks of the bank are filtered."""
+"""The rule for the blocks of the bank that are filtered."""
 
 from typing import Final
 
