@@ -17,11 +17,11 @@ import torch
 from torch import Tensor, nn
 from torch.utils.flop_counter import FlopCounterMode
 
+from camkit.models_def.kinds.hdr.thesis.chain import ThesisChain
+from camkit.models_def.kinds.hdr.thesis.fusion import FusionNetwork
+from camkit.models_def.kinds.hdr.thesis.highlight import HighlightUnet
+from camkit.models_def.kinds.hdr.thesis.splitting import SplittingConfig, SplittingNetwork
 from camkit.models_def.networks.catalog import build_network
-from camkit.models_def.networks.thesis.chain import ThesisChain
-from camkit.models_def.networks.thesis.fusion import FusionNetwork
-from camkit.models_def.networks.thesis.highlight import HighlightUnet
-from camkit.models_def.networks.thesis.splitting import SplittingConfig, SplittingNetwork
 
 SIDE_PX: Final = 256
 FLOPS_PER_MAC: Final = 2
