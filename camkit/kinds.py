@@ -31,7 +31,7 @@ Floor = Literal["runtime", "models_def", "report"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KindOption:
-    """What a caller may choose about the captures of some kind, beyond what every camera knows.
+    """An option for the captures of some kind, beyond those of every camera.
 
     Attributes:
         name: In Python; on the command line --name.
@@ -87,7 +87,7 @@ class Kind:
     scenes: Mapping[str, str] = field(default_factory=dict)
 
     def part(self, floor: Floor) -> ModuleType:
-        """Import what one floor knows of this kind.
+        """Import the part of this kind that belongs to one floor.
 
         Raises:
             UnsupportedError: If that floor knows nothing of it.

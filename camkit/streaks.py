@@ -26,7 +26,7 @@ FloatGrid = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StreakOptics:
-    """What a point of light becomes on the sensor, the same everywhere, turned nowhere.
+    """The image of a point of light on the sensor, the same everywhere, turned nowhere.
 
     All numbers are shares of the light that enters: what is missing to 1 falls beside the kernel.
 
@@ -170,7 +170,7 @@ class StreakOptics:
 
 
 def arm_axes(place: NDArray[np.integer], angle_rad: float) -> tuple[FloatGrid, FloatGrid]:
-    """Return how far (y, x) pixels lie along an arm, and across it, both in pixels."""
+    """Return the distances of (y, x) pixels along an arm, and across it, both in pixels."""
     x, y = place[None, :], place[:, None]
     along = math.cos(angle_rad) * x + math.sin(angle_rad) * y
     across = math.cos(angle_rad) * y - math.sin(angle_rad) * x
@@ -192,7 +192,7 @@ def arm_light(
 
 
 def haze_taps(side_px: int, squares: int) -> FloatArray:
-    """Return (side, squares): how much every square counts at a pixel; linear between middles."""
+    """Return (side, squares): the weight of every square at a pixel; linear between middles."""
     place = (np.arange(side_px) - side_px // 2) / HAZE_STEP_PX + squares // 2
     return np.stack(
         [np.interp(place, np.arange(squares), unit) for unit in np.eye(squares)], axis=1

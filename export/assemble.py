@@ -74,7 +74,7 @@ from camkit.runtime.kind import part_of
 from camkit.runtime.plan.loss import read_loss_model
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work
-from camkit.runtime.proof.haze import make_haze_golden
+from camkit.runtime.proof.haze_band import make_haze_golden
 from camkit.runtime.proof.laws.proof import measure_laws, with_laws
 from camkit.side_file import read_side_text
 
@@ -163,7 +163,7 @@ def export_bundle(parts: Parts, out: Path) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Camera:
-    """What is exported: one camera, with every size of every role."""
+    """The exported camera, with every size of every role."""
 
     kind: TrainingKind[Any, Any]
     recipe: Recipe
@@ -200,7 +200,7 @@ def _camera(parts: Parts) -> _Camera:
 
 
 def _optics(parts: Parts, recipe: Recipe, design: Design) -> FrozenOptics:
-    """Read the optics, with their haze where a stage undoes one.
+    """Read the optics, with their haze where a stage removes one.
 
     Raises:
         ContractError: If there is a haze and no such stage, or the other way round.
@@ -258,7 +258,7 @@ def _models(networks: Networks) -> dict[str, bytes]:
 
 
 def _windows(bundle: Bundle, cases: Cases) -> dict[tuple[str, str], list[FloatArray]]:
-    """Return what every network is given: for a larger probe first, then for the golden cases."""
+    """Return the inputs of every network: for a larger probe first, then for the golden cases."""
     captures, proving = list(cases.values()), part_of(bundle.manifest).proving
     windows: dict[tuple[str, str], list[FloatArray]] = {}
     if proving is None:

@@ -1,6 +1,6 @@
-"""What a bundle says of how its optics were designed: a lens, a plate, or nothing.
+"""The design of a bundle's optics, as the bundle records it: a lens, a plate, or nothing.
 
-checkpoints, or a file of the user -> held against the frozen PSF -> members of the bundle
+checkpoints, or a file of the user -> checked against the frozen PSF -> members of the bundle
 """
 
 from collections.abc import Iterable, Mapping
@@ -64,7 +64,7 @@ def designed_members(
 
 
 def _carried(checkpoints: Iterable[Checkpoint]) -> Mapping[str, bytes]:
-    """Return the optics that checkpoints carry; those of before carry none."""
+    """Return the optics that checkpoints carry; old checkpoints carry none."""
     found: list[Mapping[str, bytes]] = []
     for checkpoint in checkpoints:
         if checkpoint.designed and checkpoint.designed not in found:

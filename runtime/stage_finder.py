@@ -1,4 +1,4 @@
-"""Finds the module that does the work of a stage.
+"""The finder of the module that does the work of a stage.
 
 It is the one that the stage names as its `runtime`, else that of its type in
 `camkit.runtime.stages`.
@@ -67,7 +67,7 @@ def check_stages(manifest: Manifest, max_bytes: int) -> None:
 
 
 def known_facts(stages: Sequence[Stage]) -> tuple[str, ...]:
-    """Name the facts of a camera body that some stages know."""
+    """Return the facts of a camera body that some stages know."""
     return tuple(
         dict.fromkeys(
             fact for stage in stages for fact in getattr(stage_module(stage.type), "FACTS", ())
@@ -76,7 +76,7 @@ def known_facts(stages: Sequence[Stage]) -> tuple[str, ...]:
 
 
 def stage_keys(stages: Sequence[Stage]) -> tuple[str, ...]:
-    """Name every stage for people and clocks: its type, and its role or number among twins."""
+    """Return a name of every stage for people and clocks: its type, and its role or number."""
     types: list[str] = [stage.type for stage in stages]
     roles = [(stage.type, getattr(stage, "role", None)) for stage in stages]
     keys: list[str] = []
@@ -91,7 +91,7 @@ def stage_keys(stages: Sequence[Stage]) -> tuple[str, ...]:
 
 
 def methods_of(stages: Sequence[Stage]) -> tuple[str, ...]:
-    """Name the ways of the stages, as `--method` takes them; those of the last stage first."""
+    """Return the ways of the stages, as `--method` takes them; those of the last stage first."""
     return tuple(
         dict.fromkeys(
             method for stage in reversed(stages) for method in stage_module(stage.type).METHODS
@@ -100,6 +100,6 @@ def methods_of(stages: Sequence[Stage]) -> tuple[str, ...]:
 
 
 def all_methods() -> tuple[str, ...]:
-    """Name the ways of every stage of this runtime, whatever a bundle lists."""
+    """Return the ways of every stage of this runtime, whatever a bundle lists."""
     names = sorted(type_of(entry) for entry in all_stages() if has_module(_module_name(entry)))
     return tuple(dict.fromkeys(m for name in names for m in stage_module(name).METHODS))

@@ -41,7 +41,7 @@ from camkit.errors import ContractError, ParityError
 from camkit.export.activations import with_activations
 from camkit.export.card import with_laws_text
 from camkit.export.golden_cases import add_outputs
-from camkit.runtime.plan.laws import ENFORCE, bounded_stages
+from camkit.runtime.plan.bounded_networks import ENFORCE, bounded_stages
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work
 from camkit.runtime.proof.laws.proof import measure_laws, with_laws

@@ -1,4 +1,4 @@
-"""What every part of the manifest has in common."""
+"""The base class of every part of the manifest."""
 
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar

@@ -72,7 +72,7 @@ class FrozenOptics:
         return dict([self.member]) | added
 
     def entry(self, object_distance_mm: float) -> FrozenPsfOptics | HazyPsfOptics | StreakEntry:
-        """Return what the manifest says of them; the distance may be inf."""
+        """Return the manifest's entry of these optics; the distance may be inf."""
         pitch_um = self.psf.pixel_pitch_um
         focus_mm = None if np.isinf(object_distance_mm) else object_distance_mm
         if self.streaks is not None:

@@ -195,7 +195,7 @@ class Manifest(Entry):
 
     @property
     def parts(self) -> Parts:
-        """Return what stages look at to say what they give."""
+        """Return the parts that stages use to derive their planes."""
         return Parts(sensor=self.sensor, optics=self.optics, networks=self.networks)
 
     @property
@@ -225,7 +225,7 @@ class Manifest(Entry):
         return {CAPTURE: capture_plane(self.sensor), **self.planes}
 
     def stage(self, kind: type[_S]) -> _S | None:
-        """Return the first stage of one type, or None if this camera does without it."""
+        """Return the first stage of one type, or None if this camera has none."""
         return next(iter(self.stages_of(kind)), None)
 
     def stages_of(self, kind: type[_S]) -> tuple[_S, ...]:
@@ -234,7 +234,7 @@ class Manifest(Entry):
 
     @property
     def sizes(self) -> tuple[str, ...]:
-        """Name the sizes that every role holds, from the least work to the most."""
+        """Return the names of the sizes that every role has, from the least work to the most."""
         if not self.networks:
             return ()
         first, *others = self.networks.values()
@@ -288,7 +288,7 @@ def manifest_without_networks(
 
 
 class _Head(Entry, extra="ignore"):
-    """What is read of a manifest before anything else, whatever its version."""
+    """The part of a manifest that is read first, whatever its version."""
 
     format_version: str
     exported_with: dict[str, Any] = Field(default_factory=dict)
@@ -350,7 +350,7 @@ def _with_old_windows(manifest: Manifest) -> Manifest:
 
 
 def _check_version(text: str, exported_with: Mapping[str, Any]) -> int:
-    """Refuse what this reader does not know; give the major version."""
+    """Refuse a version that this reader does not know; return the major version."""
     match = re.fullmatch(r"(\d{1,4})\.(\d{1,4})", text, flags=re.ASCII)
     if match is None:
         raise BundleError(f"format_version must read like 2.0; got {text[:20]!r}")
@@ -371,7 +371,7 @@ def _check_version(text: str, exported_with: Mapping[str, Any]) -> int:
 
 
 def _first(error: ValidationError) -> str:
-    """Put the first complaint into one line: where, what."""
+    """Return the first complaint as one line: where, what."""
     details = error.errors(include_url=False, include_input=False)
     where = "".join(f"{part}." for part in details[0]["loc"]).removesuffix(".")
     said = details[0]["msg"].removeprefix("Value error, ")

@@ -1,4 +1,4 @@
-"""What the light goes through, as a bundle states it: a tagged union.
+"""The optics of a camera, as a bundle states them: a tagged union.
 
 Optics = FrozenPsfOptics    kernels, psf.safetensors        (psf_file.py)
        | HazyPsfOptics      core kernels, psf.safetensors, and haze, haze.safetensors (haze_file.py)

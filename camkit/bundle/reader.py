@@ -118,7 +118,7 @@ class Bundle:
 
     @property
     def illumination(self) -> FrozenPsf | RadialIllumination:
-        """What says the relative illumination of the optics.
+        """The source of the relative illumination.
 
         Raises:
             BundleError: If they state none.
@@ -132,7 +132,7 @@ class Bundle:
 
     @property
     def streaks(self) -> StreakOptics:
-        """What its optics write beside a light.
+        """The streaks that the optics write beside a light.
 
         Raises:
             BundleError: If they write no streaks.
@@ -143,7 +143,7 @@ class Bundle:
 
     @property
     def haze(self) -> Haze:
-        """What its optics write far from a light.
+        """The haze that the optics write far from a light.
 
         Raises:
             BundleError: If their kernels hold all.
@@ -331,7 +331,7 @@ def _need_version(manifest: Manifest, needed: tuple[int, int], what: str) -> Non
 
 
 def read_container_manifest(container: Container) -> Manifest:
-    """Read the manifest of a container and hold it against the names of the members.
+    """Read the manifest of a container and check it against the names of the members.
 
     Raises:
         BundleError: If there is no manifest, it is refused, a member is in one of the two only,
@@ -395,7 +395,7 @@ def _check_member(container: Container, name: str, size: int, sha256: str) -> No
 def _check_psf(
     psf: FrozenPsf, stated: FrozenPsfOptics | HazyPsfOptics | StreakEntry, channels: int
 ) -> None:
-    """Hold the PSF against what the manifest says of it."""
+    """Check the PSF against the statements of the manifest."""
     if abs(psf.pixel_pitch_um - stated.pixel_pitch_um) > _PITCH_RTOL * stated.pixel_pitch_um:
         raise BundleError(
             f"{stated.member} is sampled at {psf.pixel_pitch_um} um, the manifest says "

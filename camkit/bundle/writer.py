@@ -64,7 +64,7 @@ def _write_member(archive: zipfile.ZipFile, name: str, data: bytes) -> None:
 
 
 def write_bundle(path: Path, manifest: Manifest, members: Mapping[str, bytes]) -> Bundle:
-    """Write a bundle and give it as a reader sees it.
+    """Write a bundle and return it as a reader sees it.
 
     The file appears under its name complete or not at all.
 

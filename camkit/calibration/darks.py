@@ -1,4 +1,4 @@
-"""What a sensor shows without light: its dark current, its hot pixels, its error of the black."""
+"""The signal of a sensor without light: dark current, hot pixels, error of the black level."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -33,7 +33,7 @@ class Darks:
     def __init__(
         self, means: dict[float, FloatArray], counts: dict[float, int], drift: float
     ) -> None:
-        """Take dark light by exposure time, NaN where the dark itself is clipped.
+        """Store dark light by exposure time, NaN where the dark itself is clipped.
 
         Args:
             means: By exposure time.
@@ -122,14 +122,14 @@ class Darks:
         return np.where(broken, np.float32(0), dark), broken
 
     def _taken(self, frame: Frame) -> tuple[float, float]:
-        """Return the time of the darks that a frame takes, and by which factor it takes them."""
+        """Return the time of the darks that apply to a frame, and the factor for them."""
         nearest = min(self._means, key=lambda time_s: abs(np.log(time_s / frame.time_s)))
         is_same = abs(nearest / frame.time_s - 1) <= SAME_TIME
         return nearest, 1.0 if is_same else frame.time_s / nearest
 
 
 def _why_not(times_s: Sequence[float] | None, bracket: Survey) -> str:
-    """Return why the file of a dark frame does not tell its time among those of a bracket."""
+    """Return why the time of a dark frame is not known among those of a bracket."""
     if times_s is not None or not bracket.is_timed:
         return ""
     for frame in bracket.frames:

@@ -54,7 +54,7 @@ class DiscCore:
 
     @property
     def radius_px(self) -> float:
-        """Return how far from the centre what it leaves tells whether it fits."""
+        """Return the radius within which residuals show whether the disc fits."""
         return self.diameter_px / 2 + REST_PX
 
     @property
@@ -169,7 +169,7 @@ def without_disc(
     offset_px: tuple[float, float],
     pitch_px: float = 1.0,
 ) -> FloatGrid:
-    """Take the disc out of a picture of it.
+    """Remove the disc from a picture of it.
 
     Args:
         image: (side, side) light about the middle, background taken off.
@@ -214,7 +214,7 @@ def _fade(radius: FloatGrid, start: float) -> FloatGrid:
 def _gain(
     disc: FloatGrid, frequency: FloatGrid, core: DiscCore, seen: FloatGrid, noise_power: float
 ) -> FloatGrid:
-    """Return what the spectrum of the rest is multiplied by, so that the error is least.
+    """Return the factor on the spectrum of the remainder that makes the error least.
 
     Args:
         disc: Spectrum of the disc.
@@ -258,7 +258,7 @@ def with_disc(kernel: FloatGrid, diameter_px: float) -> FloatGrid:
 
 
 def _wide(image: FloatGrid, diameter_px: float, *, dark: bool = False) -> FloatGrid:
-    """Widen (side, side) so far that a disc does not reach round, to a side with a fast FFT."""
+    """Pad (side, side) so far that a disc does not wrap around, to a side with a fast FFT."""
     side = image.shape[0]
     wide = fft.next_fast_len(side + 2 * (int(np.ceil(diameter_px)) + _MARGIN_PX), real=True)
     before = (wide - side) // 2

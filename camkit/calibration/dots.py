@@ -199,7 +199,7 @@ def _circle(image: FloatGrid, y: float, x: float, radius: float) -> float:
 
 
 def _most_like(circles: FloatGrid, designed: NDArray[np.floating]) -> tuple[tuple[int, int], float]:
-    """Return the first (row, column) of the window that is most like a PSF, and how like it is."""
+    """Return the first (row, column) of the window most like a PSF, and the likeness."""
     wanted = designed / np.sqrt(np.square(designed, dtype=np.float64).sum())
     windows = np.lib.stride_tricks.sliding_window_view(circles, wanted.shape)
     sizes = np.sqrt((windows**2).sum((-2, -1)))

@@ -121,13 +121,13 @@ class EdgeProfile:
 
     @property
     def reach_px(self) -> float:
-        """Return how far both sides are seen."""
+        """Return the distance to which both sides are seen."""
         return float(min(-self.distance_px[0], self.distance_px[-1]))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class EdgeFit:
-    """What an edge says of a PSF.
+    """The PSF that an edge shows.
 
     Attributes:
         psf: The PSF.

@@ -49,7 +49,7 @@ _LEAST_SAMPLES: Final = 4
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Profile:
-    """What one colour shows across an edge, in narrow bins.
+    """One colour across an edge, in narrow bins.
 
     Attributes:
         distance_px: (bin,) mean distance of the samples from the edge, > 0 where it is bright.
@@ -94,7 +94,7 @@ class FoundEdges:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Line:
-    """Of a picture: a point (y, x) of the edge, and the unit normal towards its bright side."""
+    """The line of an edge in a picture: a point (y, x), and the unit normal to its bright side."""
 
     y: float
     x: float
@@ -106,12 +106,12 @@ class Line:
         return float(np.sin(self.angle)), float(np.cos(self.angle))
 
     def distances(self, y: FloatGrid, x: FloatGrid) -> FloatGrid:
-        """Return how far pixels lie on its bright side."""
+        """Return the distances of pixels from the line, positive on its bright side."""
         down, right = self.normal
         return np.asarray((y - self.y) * down + (x - self.x) * right)
 
     def along(self, y: FloatGrid, x: FloatGrid) -> FloatGrid:
-        """Return how far along it pixels lie."""
+        """Return the positions of pixels along the line."""
         down, right = self.normal
         return np.asarray((y - self.y) * right - (x - self.x) * down)
 
@@ -148,7 +148,7 @@ def find_edges(capture: Capture) -> FoundEdges:
 
 
 def _square(top: int, left: int) -> tuple[slice, slice]:
-    """Return where a square lies among cells."""
+    """Return the place of a square among cells."""
     size = SQUARE_PX // _CELL_PX
     return slice(top, top + size), slice(left, left + size)
 
@@ -169,7 +169,7 @@ def _searched_cells(linear: NDArray[np.float32], capture: Capture) -> FloatGrid:
 
 
 def _steps(cells: FloatGrid) -> Iterator[tuple[float, float, float]]:
-    """Return (y, x) in pixels and angle of the steps of all squares.
+    """Yield (y, x) in pixels and angle of the steps of all squares.
 
     A square is looked at twice: where it lies, and with the step in its middle.
     """
@@ -265,7 +265,7 @@ def edge_samples(
 
 
 def _fitted(line: Line, samples: Samples) -> Line | None:
-    """Turn and move a line until its profile explains the samples best; None if it never does."""
+    """Fit a line until its profile explains the samples best; None if it never does."""
     found = fit_line(line, samples, (SQUARE_PX, SQUARE_PX))
     if found is None or found[2] < LEAST_EXPLAINED or not _is_even(found[1]):
         return None
@@ -275,7 +275,7 @@ def _fitted(line: Line, samples: Samples) -> Line | None:
 def fit_line(
     line: Line, samples: Samples, size: tuple[int, int]
 ) -> tuple[Line, Profile, float] | None:
-    """Turn and move a line until its profile explains the samples near it best.
+    """Fit place and angle of a line until its profile explains the samples near it best.
 
     A sample off the profile by r, where this rises by p' a pixel, lies r / p' nearer to the edge
     than the line says: least squares for the place and the angle of the line.

@@ -45,7 +45,7 @@ _ROUNDS: Final = 3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EdgeCamera:
-    """What is known of the camera beforehand.
+    """The facts of the camera that are known beforehand.
 
     Attributes:
         psf: Its kernels, those of a moved sensor among them.
@@ -60,7 +60,7 @@ class EdgeCamera:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeasuredFocus:
-    """The focus of a unit.
+    """The focus of a camera body.
 
     Attributes:
         focus_um: How far its sensor lies from the nominal place, away from the lens.
@@ -91,7 +91,7 @@ class MeasuredFocus:
 
 
 def measure_focus(captures: Sequence[tuple[str, Capture]], camera: EdgeCamera) -> MeasuredFocus:
-    """Measure the focus of a unit.
+    """Measure the focus of a camera body.
 
     Args:
         captures: Name and capture, of a target with straight edges at the distance of the camera's
@@ -160,7 +160,7 @@ def _squares_of(
 
 
 def edge_rises(kernels: FloatArray, normal: tuple[float, float]) -> FloatGrid:
-    """Return how the light of each colour rises across a sharp edge.
+    """Return the rise of each colour's light across a sharp edge.
 
     A sample of a kernel is taken as light spread evenly over its pixel, which is how sharp an edge
     looks to pixels.
@@ -198,7 +198,7 @@ def rise_places(height: int, width: int) -> FloatLine:
 
 
 def _box(width: float) -> FloatLine:
-    """Return a box of unit sum, whose outermost places hold what is left of a whole one."""
+    """Return a box of unit sum, whose outermost places have the remainder of a whole one."""
     half = math.ceil(max(width - 1, 0) / 2)
     box = np.ones(2 * half + 1)
     if half:
@@ -253,7 +253,7 @@ def _fit_colours(
 
 
 def _best(squares: FloatGrid, tried_um: FloatLine, captures: int) -> MeasuredFocus:
-    """Find the least mean square (edge, focus), and say how sure it is.
+    """Find the least mean square (edge, focus), and its standard error.
 
     Raises:
         ContractError: If that is no measurement.

@@ -76,7 +76,7 @@ class Lattice:
         return Lattice(values=values, matrix=self.matrix, shift=self.shift)
 
     def at(self, y: FloatGrid, x: FloatGrid, *, order: int = SPLINE_ORDER) -> FloatGrid:
-        """Return values at any pixels; what is missing is taken from its neighbours."""
+        """Return values at any pixels; missing ones are taken from their neighbours."""
         row, column = _placed(self.matrix, self.shift, y, x)
         whole = filled(self.values)
         places = np.stack([row, column])

@@ -41,11 +41,11 @@ class LightCore(Protocol):
 
     @property
     def height(self) -> float:
-        """Return how bright it is in the middle."""
+        """Return its brightness in the middle."""
 
     @property
     def radius_px(self) -> float:
-        """Return how far from the centre what it leaves tells whether it fits."""
+        """Return the radius within which residuals show whether the core fits."""
 
     @property
     def spread_px(self) -> float:
@@ -66,7 +66,7 @@ class Core:
 
     @property
     def radius_px(self) -> float:
-        """Return how far from the centre it is looked at."""
+        """Return the radius within which it is fitted."""
         return REST_PX
 
     @property
@@ -104,7 +104,7 @@ def find_light(cells: NDArray[np.floating]) -> tuple[int, int]:
 
 
 def background(planes: Sequence[NDArray[np.floating]]) -> tuple[float, float]:
-    """Return level and spread of what lies along the border of planes, robustly; NaN is left out.
+    """Return level and spread of planes along their border, robustly; NaN is left out.
 
     Both hold also where a converter cut at black what noise had brought below it: the level is a
     mean, and the spread that of the upper half.

@@ -21,7 +21,7 @@ FloatLine = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PsfOptions:
-    """What the caller says of a measurement.
+    """The caller's options of a measurement.
 
     Attributes:
         side_px: Odd side of the kernels; None for as far as the light stands out of the noise.
@@ -69,7 +69,7 @@ class Reblurred:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ColourFacts:
-    """What was measured of one colour.
+    """The measured facts of one colour.
 
     Attributes:
         colour: Its name.

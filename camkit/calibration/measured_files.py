@@ -1,4 +1,4 @@
-"""What the commands of `camkit calibrate` wrote, read back: geometry, flat, tone, noise."""
+"""Readers of the TOML that `camkit calibrate` writes: geometry, flat, tone, noise."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -29,7 +29,7 @@ class RadialRecord(Entry, extra="ignore"):
 
 
 class GeometryFile(Entry, extra="ignore"):
-    """What `camkit calibrate geometry` found, as far as bundles and pairs take it."""
+    """A result of `camkit calibrate geometry`, as far as bundles and pairs take it."""
 
     width_px: Side
     height_px: Side
@@ -42,7 +42,7 @@ class GeometryFile(Entry, extra="ignore"):
 
 
 class FlatFile(Entry, extra="ignore"):
-    """What `camkit calibrate flat` found, as far as bundles and pairs take it.
+    """A result of `camkit calibrate flat`, as far as bundles and pairs take it.
 
     Attributes:
         width_px: Of the sensor; None in files from before it was stated.
@@ -64,14 +64,14 @@ class FlatFile(Entry, extra="ignore"):
         return self
 
     def to_entry(self) -> IlluminationEntry:
-        """Return it as a lens profile holds it."""
+        """Return it as an entry of a lens profile."""
         return IlluminationEntry(
             heights_mm=self.heights_mm, relative_illumination=self.relative_illumination
         )
 
 
 class ToneFile(Entry, extra="ignore"):
-    """What `camkit calibrate tone` found, as far as pairs take it."""
+    """A result of `camkit calibrate tone`, as far as pairs take it."""
 
     levels: Annotated[tuple[NonNegative, ...], Field(min_length=2, max_length=1024)]
     luminance: tuple[NonNegative, ...]
@@ -89,7 +89,7 @@ class ToneFile(Entry, extra="ignore"):
 
 
 class IsoRecord(Entry, extra="ignore"):
-    """What was found at one ISO."""
+    """The measured values at one ISO."""
 
     iso: Positive
     gain_e_per_dn: Positive
@@ -101,7 +101,7 @@ class IsoRecord(Entry, extra="ignore"):
 
 
 class NoiseFile(Entry, extra="ignore"):
-    """What `camkit calibrate noise` found, as far as bundles take it."""
+    """A result of `camkit calibrate noise`, as far as bundles take it."""
 
     iso: Annotated[tuple[IsoRecord, ...], Field(min_length=1, max_length=256)]
 
@@ -126,7 +126,7 @@ class NoiseFile(Entry, extra="ignore"):
 
 
 def read_geometry(path: Path) -> GeometryFile:
-    """Read what `camkit calibrate geometry` wrote.
+    """Read a result of `camkit calibrate geometry`.
 
     Raises:
         DecodeError: If it cannot be read or is something else.
@@ -135,17 +135,17 @@ def read_geometry(path: Path) -> GeometryFile:
 
 
 def read_flat(path: Path) -> FlatFile:
-    """Read what `camkit calibrate flat` wrote; see `read_geometry`."""
+    """Read a result of `camkit calibrate flat`; see `read_geometry`."""
     return _read(path, FlatFile, "flat")
 
 
 def read_tone(path: Path) -> ToneFile:
-    """Read what `camkit calibrate tone` wrote; see `read_geometry`."""
+    """Read a result of `camkit calibrate tone`; see `read_geometry`."""
     return _read(path, ToneFile, "tone")
 
 
 def read_noise(path: Path) -> NoiseFile:
-    """Read what `camkit calibrate noise` wrote; see `read_geometry`."""
+    """Read a result of `camkit calibrate noise`; see `read_geometry`."""
     return _read(path, NoiseFile, "noise")
 
 

@@ -1,7 +1,7 @@
-"""How much of the light of a point lies near its peak, and how sure that is.
+"""The share of a point's light that lies near its peak, and the standard error of that share.
 
-A wrong black moves all samples alike, so that in a wide PSF a tenth of a step matters more than
-all the noise.
+A wrong black level moves all samples alike. In a wide PSF, an error of a tenth of a DN matters more
+than all the noise.
 """
 
 from dataclasses import dataclass

@@ -152,7 +152,7 @@ def _place(merged: Merged, survey: Survey, disc_px: float | None) -> tuple[int, 
 
 
 def _refuse_clipped(merged: Merged, survey: Survey, place: tuple[int, int], reach: int) -> None:
-    """Refuse a light that even the shortest frame does not hold.
+    """Refuse a light that is clipped even in the shortest frame.
 
     Raises:
         DecodeError: If samples near it are clipped there.
@@ -218,7 +218,7 @@ def _core(lattice: Lattice, place: tuple[int, int], disc_px: float | None) -> Li
 
 
 def _as_point(seen: _Centred, pitches_px: Sequence[float]) -> FloatGrid:
-    """Return (colour, side, side) light as of a point: discs are taken out."""
+    """Return (colour, side, side) light as of a point: discs are removed."""
     light, middle = seen.light.copy(), seen.cores[GREEN]
     for n, (core, pitch_px) in enumerate(zip(seen.cores, pitches_px, strict=True)):
         if isinstance(core, DiscCore):
@@ -228,7 +228,7 @@ def _as_point(seen: _Centred, pitches_px: Sequence[float]) -> FloatGrid:
 
 
 def _doubts(patch: Patch, cores: Sequence[LightCore]) -> list[str]:
-    """Return whether the core is too fine for the lattice of a colour, as any of them shows."""
+    """Return whether the core is too fine for the lattice of a colour."""
     for lattice, core in zip(patch.light, cores, strict=True):
         y, x = lattice.places()
         near = np.hypot(y - core.y, x - core.x) <= core.radius_px
@@ -268,7 +268,7 @@ def _facts(
 
 
 def _reblurred(kernel: FloatGrid, seen: FloatGrid, core: LightCore) -> Reblurred | None:
-    """Return the means of rings of a disc, as it was seen and as a kernel makes it."""
+    """Return the means of rings of a disc, as captured and as a kernel predicts it."""
     if not isinstance(core, DiscCore):
         return None
     level = core.level

@@ -1,4 +1,4 @@
-"""What a calibration found, as TOML that reads back to the same values."""
+"""The result of a calibration as TOML that reads back to the same values."""
 
 import math
 import re
@@ -13,7 +13,7 @@ _ESCAPES: Final = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t"}
 
 
 def to_toml(record: Mapping[str, Any]) -> str:
-    """Return the TOML text of a record: `tomllib.loads` gives it back but for what is not known.
+    """Return the TOML text of a record: `tomllib.loads` returns the record without unknown values.
 
     Args:
         record: Texts as keys; values are bool, int, float, str, lists (or tuples) of those and of

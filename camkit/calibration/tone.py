@@ -74,7 +74,7 @@ class PowerCurve:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ToneFacts:
-    """What was measured of a display.
+    """The measured tone curve of a display.
 
     Attributes:
         levels: (step,) increasing.
@@ -93,7 +93,7 @@ class ToneFacts:
 
     @property
     def residuals(self) -> FloatGrid | None:
-        """Return how far fitted steps lie off the curve, as a share of it; NaN of others."""
+        """Return the deviations of fitted steps from the curve, as shares of it; NaN of others."""
         if self.curve is None:
             return None
         return np.where(self.seen, self.luminance / self.curve.at(self.levels) - 1, np.nan)
@@ -218,7 +218,7 @@ def _middle(path: Path, capture: Capture) -> tuple[float, float]:
 def exposures_of(
     files: Sequence[Path], captures: Sequence[Capture]
 ) -> tuple[list[float], list[str]]:
-    """Return relative exposures, and what is to be said of them.
+    """Return relative exposures, and notes about them.
 
     Raises:
         DecodeError: If some files state time and ISO and others do not.

@@ -1,8 +1,8 @@
-"""How far light stands out of the noise, and noise that stands alone smoothed.
+"""The signal-to-noise ratio of measured light, and smoothing where a PSF holds only noise.
 
-A PSF may not be negative, and noise cut off at zero is light that is not there: a thousandth of the
-peak's noise over a hundred thousand pixels is as much as a streak. So where the scatter of
-neighbours is no more than noise their mean stands for all of them.
+A PSF may not be negative, and noise clipped at zero adds light that does not exist: a thousandth of
+the peak's noise over a hundred thousand pixels is as much as a streak. So where neighbours scatter
+by no more than the noise, their mean replaces all of them.
 
 References: Lee 1980, "Digital image enhancement and noise filtering by use of local statistics".
 """
@@ -53,7 +53,7 @@ def reach_px(light: FloatGrid, noise: FloatGrid) -> int:
 
 
 def smooth_noise(light: FloatGrid, noise: FloatGrid) -> FloatGrid:
-    """Return (side, side) light whose noise is averaged where nothing but noise is seen.
+    """Return (side, side) light, averaged where only noise is seen.
 
     Args:
         light: Background taken off, noise around zero.

@@ -87,7 +87,7 @@ def pixels_of(recipe: DesignRecipe, problem: Problem, begin: Tensor) -> Pixels:
 
 
 def recorder_of(recipe: DesignRecipe) -> Recorder:
-    """Return what the pixels of a recipe do; raises ContractError for unknown colour filters."""
+    """Return the pixel model of a recipe; raises ContractError for unknown colour filters."""
     wanted, known = recipe.pixels.cfa, {str(cfa): cfa for cfa in CFA_PATTERNS}
     if wanted and wanted not in known:
         raise ContractError(
@@ -120,7 +120,7 @@ def parts_of(
     pictures: Path | None = None,
     source: SceneSource | None = None,
 ) -> DesignParts:
-    """Return what a loop joins; a lens that is to stay (`lens_rate` 0) is not searched for.
+    """Return the parts of a loop; a lens that is to stay (`lens_rate` 0) is not searched for.
 
     Args:
         recipe: The design.

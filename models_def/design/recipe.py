@@ -30,7 +30,7 @@ _KEYS: Final = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OpticsRecipe:
-    """What the lens is looked at with.
+    """The fields, wavelengths and depths at which the lens is sampled.
 
     Attributes:
         half_field_deg: Field angle of the far end of the strip.
@@ -114,7 +114,7 @@ class PixelRecipe:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NetworkChoice:
-    """Which network; the empty name stands for none.
+    """The choice of a network; the empty name stands for none.
 
     Attributes:
         name: In the catalogue.
@@ -168,7 +168,7 @@ def read_design(path: Path) -> DesignRecipe:
 
 
 def to_design(table: Mapping[str, Any]) -> DesignRecipe:
-    """Turn a parsed TOML table into a recipe; raises ContractError as `read_design` does."""
+    """Convert a parsed TOML table to a recipe; raises ContractError as `read_design` does."""
     check_keys("design recipe", table, _KEYS)
     for key in ("name", "prescription", "vary", "optics", "pixels"):
         if key not in table:
@@ -212,7 +212,7 @@ def with_choices(
     seed: int | None = None,
     search: bool = True,
 ) -> DesignRecipe:
-    """Return the recipe with what a caller chose instead; None keeps what it says.
+    """Return the recipe with a caller's choices; None keeps the value of the recipe.
 
     Without `search` the design begins at the prescription itself.
     """

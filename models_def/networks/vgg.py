@@ -86,7 +86,8 @@ class VggLevels(nn.Module):
     def forward(self, picture: Tensor) -> tuple[Tensor, ...]:
         """Return the features, (b, widths[i], h / 2^i, w / 2^i)."""
         x = (picture - self.mean) / self.deviation
-        raw, levels = x, []
+        raw = x
+        levels: list[Tensor] = []
         for names in self.blocks:
             if levels:
                 x = self.pool(x)
@@ -108,7 +109,7 @@ def _draw_weights(layers: nn.Module) -> None:
 
 
 def take_vgg(network: nn.Module, path: Path) -> None:
-    """Return a network with the names of torchvision the weights of a file, in place.
+    """Load the weights of a file into a network with the names of torchvision, in place.
 
     Raises:
         ContractError: If the file is missing, cannot be read as tensors alone, or lacks a tensor of

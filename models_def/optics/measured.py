@@ -42,7 +42,7 @@ class MeasuredOptics:
 
     @property
     def facts(self) -> Mapping[str, float]:
-        """Nothing but its kernels is known."""
+        """No facts: nothing but the kernels is known."""
         return {}
 
     @property

@@ -37,7 +37,7 @@ class TracedPsf:
 
 
 def splat(spots: Spots, size_px: int, pitch_um: float) -> TracedPsf:
-    """Turn half-pupil spots (mirrored at x = 0) into kernels centred on the chief ray.
+    """Convert half-pupil spots (mirrored at x = 0) to kernels centred on the chief ray.
 
     Args:
         spots: Rays with x >= 0 in the pupil.
@@ -99,7 +99,7 @@ def trace_psf(
     *,
     rays: int = DEFAULT_RAYS,
 ) -> TracedPsf:
-    """Trace the PSF at sensor heights and wavelengths, and say how much light it holds.
+    """Trace the PSF at sensor heights and wavelengths, and its share of the light.
 
     Args:
         lens: The prescription.

@@ -1,4 +1,4 @@
-"""Which rays: pupil samples, launching, aiming.
+"""Rays through the pupil: samples, launching, aiming.
 
 Three definitions of the pupil; spots and PSFs differ by them, so each states its own.
 
@@ -130,7 +130,7 @@ def launch(x: Tensor, y: Tensor, slope: Tensor, object_distance_mm: float) -> Ra
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Aim:
-    """Where to launch rays so that they pass wanted points of the stop.
+    """The launch points of rays that pass wanted points of the stop.
 
     Attributes:
         x: Launch points in mm in the vertex plane of the first surface.

@@ -1,4 +1,4 @@
-"""Where rays land on the sensor: chief rays, field slopes for sensor heights, spots."""
+"""Landing points of rays on the sensor: chief rays, field slopes for sensor heights, spots."""
 
 from dataclasses import dataclass, replace
 from typing import Final

@@ -56,7 +56,7 @@ def _blend(kernels: Tensor, heights: Tensor, height: Tensor) -> Tensor:
 
 
 def _turn(kernels: Tensor, out_x: Tensor, out_y: Tensor) -> Tensor:
-    """Turn (b, 3, h, w) kernels so that their +y points along (out_x, out_y)."""
+    """Rotate (b, 3, h, w) kernels so that their +y points along (out_x, out_y)."""
     b, c, h, w = kernels.shape
     dy = torch.arange(h, dtype=torch.float64, device=kernels.device)[:, None] - h // 2
     dx = torch.arange(w, dtype=torch.float64, device=kernels.device)[None, :] - w // 2

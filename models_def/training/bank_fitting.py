@@ -35,7 +35,7 @@ _TRIED: Final = Together(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BankFitOptions:
-    """What a fit is given.
+    """The options of a fit.
 
     Attributes:
         pictures: Folder to draw scenes from; None for procedural ones.
@@ -65,7 +65,7 @@ class BankFitOptions:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BankFit:
-    """What was fitted, and what it is worth on samples that were not fitted to.
+    """The fitted numbers, and their gain on samples that were not used.
 
     Attributes:
         together: The numbers.
@@ -101,7 +101,7 @@ def bank_fitting_kind(name: str) -> BankFittingKind:
 
 
 def check_text(recipe: str) -> None:
-    """Try whether a recipe takes numbers, before they are sought.
+    """Check that a recipe takes numbers, before they are fitted.
 
     Raises:
         ContractError: As `with_bank`.

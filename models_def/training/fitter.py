@@ -1,4 +1,4 @@
-"""What changes during training: weights, their average, the optimiser; one step at a time."""
+"""The state of training: weights, their average, the optimiser; one step at a time."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -38,13 +38,13 @@ class Stateful(Protocol):
         ...
 
     def load_state_dict(self, state: Any) -> Any:
-        """Go back to a saved state."""
+        """Restore a saved state."""
         ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Objective:
-    """What a network is fitted to, in place of the errors of its patches.
+    """The loss that a network is fitted to, in place of the errors of its patches.
 
     Attributes:
         loss: The fitter, a batch, the steps done before and the share of the schedule that lies
@@ -126,7 +126,7 @@ class Fitter:
         self._noted: dict[str, list[float]] = {}
 
     def fit(self, batch: Batch, step: int, progress: float) -> float:
-        """Make one step and give its loss.
+        """Train for one step and return its loss.
 
         Args:
             batch: Patches.
@@ -192,7 +192,7 @@ class Fitter:
         return {_OWN: own} | {name: dict(part.state_dict()) for name, part in states.items()}
 
     def load(self, weights: State, average: State, optimizer: dict[str, Any]) -> None:
-        """Go back to a saved state.
+        """Restore a saved state.
 
         Raises:
             ContractError: If it was saved by another fitter.

@@ -1,4 +1,4 @@
-"""Which fitter trains a network: the house's, or one that the kind brings for a role.
+"""Choice of the fitter that trains a network: the common one, or one that the kind brings.
 
 The part of a kind with losses of its own defines `FITTING` beside its `PART`, which fulfils
 `FittingKind`.
@@ -26,7 +26,7 @@ _FILES: Final = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FitRequest:
-    """What is to be fitted.
+    """The request for a fit.
 
     Attributes:
         recipe: Of a kind.

@@ -1,4 +1,4 @@
-"""Where sharp training crops come from: a folder of pictures and procedural scenes.
+"""Sources of sharp training crops: a folder of pictures, and procedural scenes.
 
 Pictures are decoded once, brought to sRGB by their profiles and held with 8 bits, scenes as
 float16; a crop is decoded to linear Rec.709 when it is cut.

@@ -16,7 +16,7 @@ Tell = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PrepareOptions:
-    """What is given besides a recipe.
+    """The options of a preparation besides the recipe.
 
     Attributes:
         psf: Core kernels of the lens as designed.
@@ -41,7 +41,7 @@ class PreparingKind(Protocol):
     """A kind of camera whose samples are prepared."""
 
     def written_last(self, recipe: Any, runs: Path) -> Path:
-        """Return the file that is there when all is; raise ContractError if there is nothing to do.
+        """Return the last of the files; raise ContractError if there is nothing to do.
 
         Args:
             recipe: Of the kind.
@@ -50,7 +50,7 @@ class PreparingKind(Protocol):
         ...
 
     def prepare(self, recipe: Any, options: PrepareOptions, tell: Tell) -> dict[str, Any]:
-        """Make it and say what was made; raise ContractError if something is missing or wrong."""
+        """Make the files and return a report; raise ContractError if a source is missing."""
         ...
 
 

@@ -46,7 +46,7 @@ def check_share(where: str, value: float) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SceneRecipe:
-    """Where sharp crops come from.
+    """Sources of sharp crops.
 
     Attributes:
         picture_share: Share of crops of pictures, the rest is procedural; without a folder of
@@ -62,7 +62,7 @@ class SceneRecipe:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DataRecipe(SceneRecipe):
-    """How many samples are made and held; a kind may add keys of its own.
+    """Numbers of samples that are made and held; a kind may add keys of its own.
 
     Attributes:
         sample_px: Side of a finished sample; training patches are cut from it.
@@ -93,7 +93,7 @@ class DataRecipe(SceneRecipe):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContentRecipe:
-    """What output and truth are compared by.
+    """The comparison of output and truth.
 
     Attributes:
         l1_weight: On the mean |difference| in the square-root domain.
@@ -113,7 +113,7 @@ class ContentRecipe:
 
     @property
     def looks(self) -> bool:
-        """Whether pictures are looked at through features."""
+        """Return whether pictures are compared by features."""
         return self.gram_weight + self.feature_weight > 0
 
 
@@ -158,7 +158,7 @@ class CriticRecipe:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ScheduleRecipe:
-    """How the network is fitted.
+    """The schedule of a fit.
 
     Attributes:
         steps: Steps of the whole schedule; `--max-minutes` may end it sooner, decay included.
@@ -346,7 +346,7 @@ def with_new_names(table: Mapping[str, Any], older: Mapping[str, str]) -> Mappin
 
 
 def differing_part(one: Recipe, other: Recipe, parts: Iterable[str]) -> str | None:
-    """Name the first part by which two recipes describe different cameras, None if none does.
+    """Return the first part in which two recipes describe different cameras, None for none.
 
     How networks are trained, and on which samples, may differ from size to size.
     """

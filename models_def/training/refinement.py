@@ -36,7 +36,7 @@ class Refinement:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FineTuningOptions:
-    """What fine-tuning is given.
+    """The options of fine-tuning.
 
     Attributes:
         start: Checkpoint or bundle to start from.

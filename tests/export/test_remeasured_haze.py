@@ -16,7 +16,7 @@ from camkit.export.golden_cases import HAZE_SCENE
 from camkit.export.remeasured import Measured, remeasured
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work
-from camkit.runtime.proof.haze import make_haze_golden
+from camkit.runtime.proof.haze_band import make_haze_golden
 from tests.bundle_factory import tiny_psf
 from tests.haze_bundle import hazy_manifest, hazy_optics, write_hazy_bundle
 from tests.haze_factory import tiny_haze

@@ -14,7 +14,7 @@ from camkit.models_def.sensors.exposure import expose as record
 from camkit.models_def.sensors.forward import block_centres_px, scatter
 from camkit.models_def.training.kind import read_recipe
 from camkit.runtime.bank.psf import color_kernels
-from camkit.runtime.geometry.scatter import scatter as runtime_scatter
+from camkit.runtime.geometry.field_blur import scatter as runtime_scatter
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.twin.exposure import Setting, expose
 from camkit.runtime.twin.light import Light, lens_of

@@ -1,4 +1,4 @@
-"""What every stage of a bundle has in common: the planes that it takes and gives."""
+"""The base class of every stage of a bundle: the planes that it takes and gives."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ class JoinError(ValueError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parts:
-    """What stages may look at to say what they give.
+    """The parts of a bundle from which stages derive their planes.
 
     Attributes:
         sensor: Of the camera.
@@ -63,7 +63,7 @@ class StageEntry(Entry):
     type: Word
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
-        """Return what the stage makes of the planes it takes; one plane for each name in `gives`.
+        """Return the planes that the stage makes of those it takes; one for each name in `gives`.
 
         Raises:
             JoinError: If it cannot take them.

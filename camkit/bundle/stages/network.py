@@ -165,7 +165,7 @@ def _outputs(sizes: Mapping[str, NetworkFacts]) -> tuple[Port, ...]:
 
 
 def _names(port: Port, taken: Sequence[Plane], parts: Parts) -> tuple[str, ...]:
-    """Name the channels of an output: as those of the last plane of that many, else by number."""
+    """Return the channel names of an output: those of the last plane of that many, or numbers."""
     for plane in reversed(taken):
         if len(plane.channels) == port.channels:
             return plane.channels

@@ -80,7 +80,7 @@ class Aligned:
 
 
 def align(patch: Patch, shown: FloatArray, start: FloatGrid) -> Aligned:
-    """Lay a picture over a capture.
+    """Align a picture with a capture.
 
     Args:
         patch: The part of the capture.
@@ -116,7 +116,7 @@ def map_places(matrix: FloatGrid, places: FloatGrid) -> FloatGrid:
 
 
 def _moved(start: FloatGrid, end: FloatGrid, shape: tuple[int, ...]) -> float:
-    """Return how far the corners of a picture moved, of its diagonal."""
+    """Return the movement of the corners of a picture, as a share of its diagonal."""
     height, width = shape[1:]
     corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]]) * (width, height)
     there = map_places(end @ np.linalg.inv(start), corners)
@@ -124,7 +124,7 @@ def _moved(start: FloatGrid, end: FloatGrid, shape: tuple[int, ...]) -> float:
 
 
 def _samples_per_px(patch: Patch, start: FloatGrid) -> float:
-    """Return how many samples of the lattice a pixel of the picture takes, in the middle."""
+    """Return the samples of the lattice per pixel of the picture, in the middle."""
     row, column = (n // 2 for n in patch.grey.shape)
     near = patch.ideal_px[row : row + 2, column : column + 2]
     at = map_places(start, near)

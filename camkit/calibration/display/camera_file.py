@@ -1,4 +1,4 @@
-"""What earlier calibrations found, for captures of a display: lens, tone curve, illumination."""
+"""Results of earlier calibrations, for captures of a display: lens, tone curve, illumination."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator, RectBivariateSpline
 
-from camkit.calibration.geometry.camera import MODELS, Camera
+from camkit.calibration.geometry.camera_model import MODELS, Camera
 from camkit.calibration.measured_files import (
     TOP_LEVEL,
     read_flat,
@@ -73,7 +73,7 @@ class Lens:
         )
 
     def without_distortion(self, seen_px: FloatGrid) -> FloatGrid:
-        """Return where (n, 2) places of a picture would lie without distortion, same focal length.
+        """Return (n, 2) places of a picture without distortion, at the same focal length.
 
         Raises:
             DecodeError: If there is no such place.
@@ -124,7 +124,7 @@ class Lens:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Tone:
-    """Light of a display over what it is told.
+    """Light of a display over its input levels.
 
     Attributes:
         light: (256,) of levels 0 to 255, 0 at black and 1 at white.

@@ -114,7 +114,7 @@ def _seen(codes: NDArray[np.uint8]) -> SeenMarks | None:
 
 
 def _placed(blocks: list[FloatGrid]) -> dict[int, FloatGrid] | None:
-    """Tell blocks of one word by where they lie, seen as they stand upright."""
+    """Return the blocks of one word by corner of the screen, in upright orientation."""
     if not LEAST_BLOCKS <= len(blocks) <= 4:
         return None
     right = np.mean([block[1] - block[0] + block[2] - block[3] for block in blocks], axis=0)

@@ -47,7 +47,7 @@ _BAND_ROWS: Final = 256
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Given:
-    """What captures are compared with.
+    """The references of captures.
 
     Attributes:
         folder: Of the targets.
@@ -149,7 +149,7 @@ class Pairs:
     notes: tuple[str, ...]
 
     def settings(self) -> dict[str, Any]:
-        """Return what `pairs.toml` holds."""
+        """Return the values of `pairs.toml`."""
         gains = {} if self.white_balance is None else {"white_balance": list(self.white_balance)}
         return {"iso": self.iso, **gains}
 
@@ -165,7 +165,7 @@ class Pairs:
 
 
 def find_pairs(files: Sequence[Path], given: Given) -> Pairs:
-    """Sort captures and lay every picture over its own.
+    """Sort captures and align every picture with its own.
 
     Raises:
         ContractError: If a file is given twice, or there are too many.
@@ -211,7 +211,7 @@ def find_pairs(files: Sequence[Path], given: Given) -> Pairs:
 def draw_pairs(
     found: Pairs, given: Given
 ) -> Iterator[tuple[NDArray[np.uint16], NDArray[np.uint8]]]:
-    """Return capture (h, w, 3) of 16 bits and reference (m, n, 3) of 8 bits, pair by pair."""
+    """Yield capture (h, w, 3) of 16 bits and reference (m, n, 3) of 8 bits, pair by pair."""
     from camkit.runtime.options import Options
     from camkit.runtime.pipeline import load
 
@@ -231,7 +231,7 @@ def draw_pairs(
 
 
 def _pair(one: Sorted, given: Given) -> tuple[Pair, Capture]:
-    """Lay one picture over its capture.
+    """Align one picture with its capture.
 
     Raises:
         DecodeError: As `find_pairs`; names the capture.

@@ -1,4 +1,4 @@
-"""Where things lie on a screen, in its pixels: the blocks of the marks, the picture, the board."""
+"""The layout of a screen, in its pixels: the blocks of the marks, the picture, the board."""
 
 import re
 from dataclasses import dataclass
@@ -78,7 +78,7 @@ class Screen:
         return np.stack([square + np.array(block) for block in self.blocks])
 
     def place(self, aspect: float) -> Place:
-        """Return where a picture goes: as large as marks leave room, in the middle.
+        """Return the place of a picture: as large as marks leave room, in the middle.
 
         Args:
             aspect: Width over height.

@@ -1,4 +1,4 @@
-"""Which capture shows which target, and about where the screen lies on it."""
+"""Assignment of captures to the targets that they show, with the rough place of the screen."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -34,7 +34,7 @@ class Sorted:
 
 
 def sort_view(view: View, lens: Lens, targets: Targets) -> Sorted:
-    """Return what a capture shows.
+    """Return the target that a capture shows, and the rough place of the screen.
 
     Raises:
         DecodeError: If it has no marks, or such that no target has.

@@ -1,9 +1,9 @@
-"""What a display shows, one PNG after the other, and `targets.toml`, which says what each is.
+"""The targets of a display, one PNG each, and `targets.toml`, which describes them.
 
-    board, grey steps      fill the screen, without marks: nothing but themselves may be in it
-    colours, pictures      with marks, so that a capture says which of them it shows
+    board, grey steps      fill the screen, without marks: nothing else may be in it
+    colours, pictures      with marks, by which a capture is matched to its target
 
-Numbers of marks count the targets that have some, from 0.
+Numbers of marks count the targets that have marks, from 0.
 """
 
 import re
@@ -79,7 +79,7 @@ class Target:
     source: tuple[str, str] | None = None
 
     def to_record(self) -> dict[str, Any]:
-        """Return plain values; what a target has not is left out."""
+        """Return plain values, without those that a target does not have."""
         record: dict[str, Any] = {"file": self.file, "name": self.name, "kind": self.kind}
         if self.kind == "grey" and self.rgb is not None:
             record["level"] = self.rgb[0]
@@ -111,7 +111,7 @@ class Targets:
 
     @property
     def by_code(self) -> dict[int, Target]:
-        """Return the targets that have marks, by what those say."""
+        """Return the targets that have marks, by the code of the marks."""
         return {target.code: target for target in self.targets if target.code is not None}
 
     def holds(self, target: Target) -> bool:
@@ -166,7 +166,7 @@ class Targets:
 def plan_targets(
     pictures: Sequence[Path], screen: Screen, board: Board, levels: Sequence[int]
 ) -> Targets:
-    """Lay out what is shown; pictures are read once, for their size.
+    """Plan the targets; pictures are read once, for their size.
 
     Raises:
         ContractError: If a picture is given twice, two share a name, or there are too many.

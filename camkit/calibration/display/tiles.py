@@ -1,4 +1,4 @@
-"""What is left between a capture and its picture: the shift of every tile, in px of the capture."""
+"""The remaining shift between a capture and its picture, tile by tile, in px of the capture."""
 
 from typing import Final
 
@@ -26,7 +26,7 @@ _LEAST_SAMPLES: Final = 100
 def tile_shifts(
     grey: FloatArray, model: FloatGrid, inside: NDArray[np.bool_]
 ) -> tuple[FloatGrid, FloatGrid]:
-    """Measure how far the capture lies from its model, tile by tile.
+    """Measure the shift of the capture against its model, tile by tile.
 
     Args:
         grey: (h, w) the capture.
@@ -71,7 +71,7 @@ def tile_shifts(
 
 
 def _shift(parts: list[FloatGrid]) -> FloatGrid | None:
-    """Return x, y by which a tile is moved; None where it does not tell."""
+    """Return the shift x, y of a tile; None where it cannot be determined."""
     seen, model, along, down = parts
     columns = np.column_stack([-along, -down, model, np.ones_like(model)])
     normal = columns.T @ columns

@@ -56,7 +56,7 @@ class View:
 
 
 def read_view(path: Path, lens: Lens) -> tuple[View, Capture]:
-    """Read a capture, and give its pixels beside.
+    """Read a capture and its pixels.
 
     Raises:
         DecodeError: If it cannot be read, is coded, or is of another size than the geometry.

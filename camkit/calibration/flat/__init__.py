@@ -4,5 +4,5 @@ picture   a picture as the mean light of green in blocks
 pose      how what is photographed lies in a picture
 spline    smooth functions of the radius and of a place
 separate  lens, display and exposures by least squares, and whether they can be told apart
-measure   pictures to relative illumination
+illumination_fit   pictures to relative illumination
 """

@@ -1,7 +1,7 @@
-"""How what is photographed lies in a picture: moved and turned against its place at no pose.
+"""The pose of a photographed object in a picture: its shift and turn against the pose zero.
 
-A point of it that lies at q without a pose is seen at p = R q + s, both in pixels from the middle
-of the picture, x to the right and y down; R turns clockwise as one looks at the picture.
+A point of the object that lies at q in the pose zero is seen at p = R q + s, both in pixels from
+the middle of the picture, x to the right and y down; R turns clockwise as one looks at the picture.
 """
 
 import math
@@ -43,7 +43,7 @@ class Pose:
         return cos * dx + sin * dy, cos * dy - sin * dx
 
     def reversed(self, *, shift: bool, turn: bool) -> "Pose":
-        """Return the pose of one who counts shifts or turns the other way."""
+        """Return the pose with shifts or turns of the opposite sign."""
         x, y = self.shift_px
         return Pose(
             shift_px=(-x, -y) if shift else self.shift_px,
@@ -52,7 +52,7 @@ class Pose:
 
 
 def orientation_turn_deg(orientation: int) -> float:
-    """Return the turn in a picture whose EXIF orientation says how it is to be turned upright."""
+    """Return the turn in degrees of a picture that has an EXIF orientation."""
     return {3: 180.0, 6: -90.0, 8: 90.0}.get(orientation, 0.0)
 
 

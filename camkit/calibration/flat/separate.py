@@ -43,7 +43,7 @@ _TIED_RIDGE: Final = 1e-3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Views:
-    """What is known of the pictures.
+    """The pictures and the facts about them.
 
     Attributes:
         log_light: (picture, place) logarithm of the light.
@@ -66,7 +66,7 @@ class Views:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parts:
-    """What the pictures were taken apart into.
+    """The separated parts of the pictures.
 
     Attributes:
         radial: Functions of the lens.
@@ -93,7 +93,7 @@ class Parts:
 
     @property
     def rms(self) -> float:
-        """Return the RMS of what is left, as a share of the light."""
+        """Return the RMS of the residuals, as a share of the light."""
         return float(np.sqrt(np.mean(self.rest**2)))
 
     def illumination(self, radius: FloatGrid) -> FloatGrid:
@@ -102,7 +102,7 @@ class Parts:
 
 
 class _Surroundings:
-    """What stands beside the lens: the display's pattern and the exposures."""
+    """The factors beside the lens: the display's pattern and the exposures."""
 
     def __init__(self, views: Views) -> None:
         places = [pose.places(views.x, views.y) for pose in views.poses]
@@ -117,7 +117,7 @@ class _Surroundings:
         self._unit = self.columns @ (mixtures[:, seen] / np.sqrt(power[seen]))
 
     def left_of(self, wanted: FloatGrid) -> FloatGrid:
-        """Return columns less what display and exposures can take over."""
+        """Return columns without the part that display and exposures explain."""
         return np.asarray(wanted - self._unit @ (self._unit.T @ wanted))
 
     def least_share(self, wanted: FloatGrid) -> float:
@@ -132,7 +132,7 @@ class _Surroundings:
 
 
 def separate(views: Views) -> Parts:
-    """Take pictures apart, the optical centre with them where they show it."""
+    """Separate pictures into lens and display, with the optical centre where they show it."""
     around = _Surroundings(views)
     parts = middle = _fit(views, around, views.centre)
     if not parts.separated:

@@ -34,7 +34,7 @@ class Radial:
     """Functions of the radius that are 0 and even at the centre: splines of its square."""
 
     def __init__(self, reach: float, intervals: int) -> None:
-        """Take the largest radius, and intervals of its square."""
+        """Store the largest radius, and the number of intervals of its square."""
         self._reach, self._intervals = reach, intervals
         self._at_centre = bumps(np.zeros(1), intervals)
 
@@ -54,7 +54,7 @@ class Surface:
     """Functions of a place: products of splines over a rectangle."""
 
     def __init__(self, x: FloatGrid, y: FloatGrid, spacing: float) -> None:
-        """Take places that it must reach, and the distance of its knots."""
+        """Store the knots, from places that it must reach and the distance of its knots."""
         self._low = float(x.min()), float(y.min())
         spans = float(np.ptp(x)), float(np.ptp(y))
         self._counts = tuple(max(1, int(np.ceil(span / spacing))) for span in spans)

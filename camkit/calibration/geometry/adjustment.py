@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from camkit.calibration.geometry.camera import (
+from camkit.calibration.geometry.camera_model import (
     POSE_NUMBERS,
     Camera,
     FloatGrid,
@@ -86,7 +86,7 @@ def adjust(
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Linear:
-    """The problem around one place.
+    """The linearised problem around one place.
 
     Attributes:
         rest: (view, corner, 2) residuals.
@@ -156,7 +156,7 @@ def _diagonals(squares: FloatGrid) -> FloatGrid:
 
 
 def _solve(left: FloatGrid, right: FloatGrid) -> FloatGrid:
-    """Solve; where numbers cannot be told apart, take the least change."""
+    """Solve; where numbers cannot be separated, take the least change."""
     scale = 1 / np.sqrt(np.maximum(np.einsum("...ii->...i", left), _TINY))
     even = left * scale[..., :, None] * scale[..., None, :]
     inverse = np.linalg.pinv(even, rcond=1e-15, hermitian=True)

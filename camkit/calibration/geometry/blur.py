@@ -1,6 +1,6 @@
-"""How blurred the edges of a board are, where its corners are known about.
+"""Blur of the edges of a board whose corners are roughly known.
 
-Half way between two neighbouring corners lies an edge. Its light rises from one side to the other,
+An edge lies half way between two neighbouring corners. Its light rises from one side to the other
 over the blur: for a Gaussian, the greatest slope is the step / (sigma sqrt(2 pi)).
 """
 
@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from camkit.calibration.geometry.board import Board
-from camkit.calibration.geometry.camera import FloatGrid
+from camkit.calibration.geometry.camera_model import FloatGrid
 from camkit.contracts import FloatArray
 
 _SIDE: Final = 0.5

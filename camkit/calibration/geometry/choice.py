@@ -1,11 +1,12 @@
-"""Which model, and which views: judged by pictures that a fit has not seen.
+"""Choice of the camera model and of the views, by the error on pictures that a fit has not seen.
 
-The error of a fit falls with every coefficient, the error on a picture that was left out does not.
-The simplest model is taken whose held-out error is not meaningfully worse than the least one.
+The error of a fit falls with every coefficient; the error on a picture that was left out does not.
+So the simplest model is taken whose held-out error is not meaningfully above the least one.
 
-A view that contradicts the others has a large error when it is left out, larger than what the
-others know of the camera explains. It makes theirs larger too. So that view is dropped without
-which the others agree best, and so on; what then agrees with those left was wrongly dropped.
+A view that contradicts the others has a large error when it is left out, larger than the
+uncertainty of the others explains, and it makes their errors larger too. The view is dropped
+without which the others agree best, and so on. Dropped views that agree with the final fit are
+taken back.
 """
 
 from collections.abc import Sequence
@@ -15,7 +16,7 @@ from typing import Final
 import numpy as np
 
 from camkit.calibration.geometry.adjustment import Fit, adjust, rms
-from camkit.calibration.geometry.camera import POSE_NUMBERS, FloatGrid, project
+from camkit.calibration.geometry.camera_model import POSE_NUMBERS, FloatGrid, project
 from camkit.calibration.geometry.start import fit_models
 
 MOST_WORSE: Final = 0.1
@@ -34,7 +35,7 @@ LEAST_SCATTER_PX: Final = 0.02
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Judged:
-    """A fit, and what pictures say that were left out.
+    """A fit, and the errors of pictures that were left out.
 
     Attributes:
         fit: To all views.
@@ -107,7 +108,7 @@ class Judged:
 
 
 def judge(fit: Fit, corners: FloatGrid, points: FloatGrid) -> Judged:
-    """Leave every view out once.
+    """Fit again without each view in turn.
 
     Args:
         fit: Of all views.
@@ -164,7 +165,7 @@ def simplest(judged: Sequence[Judged]) -> Judged:
 
 
 def _typical(judged: Sequence[Judged]) -> Judged:
-    """Return the simplest that most pictures are content with, whatever a bad one says."""
+    """Return the simplest model that fits most pictures, whatever one bad picture shows."""
     limit = TYPICAL * min(one.median_px for one in judged)
     return next(one for one in judged if one.median_px <= limit)
 

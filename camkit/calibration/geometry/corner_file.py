@@ -17,7 +17,7 @@ from pydantic import Field, ValidationError
 
 from camkit.bundle.entry import Entry, Positive
 from camkit.calibration.geometry.board import Board
-from camkit.calibration.geometry.camera import FloatGrid
+from camkit.calibration.geometry.camera_model import FloatGrid
 from camkit.errors import ContractError, DecodeError
 from camkit.side_file import read_side_bytes
 

@@ -1,4 +1,4 @@
-"""Where in the picture the board was seen."""
+"""The part of the picture in which the board was seen."""
 
 from dataclasses import dataclass
 
@@ -6,14 +6,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.calibration.geometry.camera import FloatGrid
+from camkit.calibration.geometry.camera_model import FloatGrid
 
 _CELL_PX = 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Coverage:
-    """What was seen.
+    """The part of the picture that the board covered.
 
     Attributes:
         radius_px: From the optical centre, to which corners of two pictures or more reach: what a
@@ -28,14 +28,14 @@ class Coverage:
 
     @property
     def is_whole(self) -> bool:
-        """Return whether nothing is left to be guessed."""
+        """Return whether nothing has to be guessed."""
         return self.radius_px >= self.corner_px
 
 
 def coverage_of(
     corners: FloatGrid, centre_px: tuple[float, float], size: tuple[int, int]
 ) -> Coverage:
-    """Return where the board was seen.
+    """Return the coverage of the picture by boards.
 
     Args:
         corners: (view, corner, 2) x, y in px, of two views or more.

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from camkit.calibration.geometry.blur import blur_px
 from camkit.calibration.geometry.board import Board
-from camkit.calibration.geometry.camera import FloatGrid
+from camkit.calibration.geometry.camera_model import FloatGrid
 from camkit.calibration.geometry.grey import to_codes
 from camkit.calibration.geometry.saddle import refine_saddles
 from camkit.contracts import FloatArray
@@ -73,7 +73,7 @@ def find_corners(grey: FloatArray, board: Board) -> FloatGrid | None:
 
 
 def _copies(codes: Codes) -> list[tuple[int, Codes]]:
-    """Return by how much smaller, and the smaller copy; the largest first."""
+    """Return the scale and the smaller picture; the largest first."""
     height, width = codes.shape
     factor = -(-max(codes.shape) // LARGEST_PX)
     copies: list[tuple[int, Codes]] = []
@@ -92,7 +92,7 @@ def _by_sectors(small: Codes, wanted: tuple[int, int], flags: int = 0) -> Corner
 
 
 def _by_sectors_evened(small: Codes, wanted: tuple[int, int]) -> Corners | None:
-    """Look in a picture of even histogram, which helps in uneven light and hurts on plain walls."""
+    """Find a board in a picture of even histogram, which helps in uneven light only."""
     return _by_sectors(small, wanted, cv2.CALIB_CB_NORMALIZE_IMAGE)
 
 
@@ -161,7 +161,7 @@ def _by_gradients(grey: FloatArray, rough: FloatGrid, halves: NDArray[np.int_]) 
 
 
 def nearest_px(corners: FloatGrid, board: Board) -> FloatGrid:
-    """Return the way (corner,) from every corner to the nearest of its neighbours on the board."""
+    """Return the vector (corner,) from every corner to its nearest neighbour on the board."""
     grid = corners.reshape(board.rows, board.columns, 2)
     near = np.full(grid.shape[:2], np.inf)
     down = np.linalg.norm(np.diff(grid, axis=0), axis=-1)

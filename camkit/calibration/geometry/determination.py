@@ -13,10 +13,10 @@ from typing import Final
 
 import numpy as np
 
-from camkit.calibration.geometry.camera import CENTRE, FOCAL, FloatGrid
+from camkit.calibration.geometry.camera_model import CENTRE, FOCAL, FloatGrid
 from camkit.calibration.geometry.choice import Judged, judge, simplest
 from camkit.calibration.geometry.coverage import Coverage
-from camkit.calibration.geometry.profile import Profile
+from camkit.calibration.geometry.distortion_profile import Profile
 from camkit.calibration.geometry.start import (
     FREE,
     Nominal,
@@ -38,7 +38,7 @@ WORST_GUESS: Final = 0.1
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Determined:
-    """The camera that views can carry.
+    """The camera that the views determine.
 
     Attributes:
         judged: All models with what is held.
@@ -69,7 +69,7 @@ def determine(
     size: tuple[int, int],
     focal_px: float | None = None,
 ) -> Determined:
-    """Choose a model, and hold what the views do not determine.
+    """Choose a model, and keep the numbers fixed that the views do not determine.
 
     Args:
         judged: All models with nothing held, from simple to rich.
@@ -111,7 +111,7 @@ def _chosen(judged: Sequence[Judged], corners: FloatGrid, size: tuple[int, int])
 def _held(
     nominal: Nominal, corners: FloatGrid, points: FloatGrid, size: tuple[int, int]
 ) -> Determined:
-    """Fit and judge again with what is held."""
+    """Fit and judge again with fixed numbers."""
     fits = fit_models(corners, points, size, nominal)
     if not fits:
         raise DecodeError("no camera explains the corners: the pictures are not of one flat board")
@@ -135,7 +135,7 @@ def _is_loose(judged: Judged, size: tuple[int, int]) -> bool:
 
 
 def _check_nominal(judged: Judged, size: tuple[int, int], focal_px: float | None) -> None:
-    """Refuse a focal length that nothing determines and nobody states."""
+    """Refuse a focal length that no view determines and nobody states."""
     camera = judged.fit.camera
     error = float(judged.formal[FOCAL]) / camera.focal_px
     if focal_px is not None or (is_lens(camera, size) and error <= WORST_GUESS):

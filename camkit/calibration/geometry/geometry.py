@@ -10,7 +10,7 @@ import numpy as np
 
 from camkit.calibration.geometry.adjustment import rms
 from camkit.calibration.geometry.board import Board
-from camkit.calibration.geometry.camera import FOCAL, Camera, FloatGrid, distance
+from camkit.calibration.geometry.camera_model import FOCAL, Camera, FloatGrid, distance
 from camkit.calibration.geometry.choice import (
     LEAST_VIEWS,
     Judged,
@@ -20,12 +20,12 @@ from camkit.calibration.geometry.corner_file import CornerFile
 from camkit.calibration.geometry.coverage import Coverage
 from camkit.calibration.geometry.detector import find_corners
 from camkit.calibration.geometry.determination import Determined, determine
-from camkit.calibration.geometry.grey import read_grey
-from camkit.calibration.geometry.profile import (
+from camkit.calibration.geometry.distortion_profile import (
     Profile,
     RadialFit,
     fit_radial,
 )
+from camkit.calibration.geometry.grey import read_grey
 from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError
 from camkit.progress import counted
@@ -45,7 +45,7 @@ _OFF_MIDDLE: Final = 0.002
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class View:
-    """A picture in which the board was looked for.
+    """A picture that was searched for the board.
 
     Attributes:
         path: The file.
@@ -157,7 +157,7 @@ def calibrate_geometry(
 
 
 def calibrate_corners(given: CornerFile, focal_px: float | None = None) -> Geometry:
-    """Measure the geometry of a camera from corners that were found before.
+    """Measure the geometry of a camera from known corners.
 
     Args:
         given: The corners; see `corner_file.read_corners`.
@@ -208,7 +208,7 @@ def _measured(views: Sequence[View], board: Board, focal_px: float | None) -> Ge
 
 
 def look_for(files: Sequence[Path], board: Board) -> list[View]:
-    """Read pictures one after the other and look for the board.
+    """Read pictures one after the other and search them for the board.
 
     Raises:
         DecodeError: If a file cannot be read or is given twice, sizes differ, or fewer than three
@@ -284,7 +284,7 @@ def _check_agree(
 
 
 def _held_notes(found: Determined, size: tuple[int, int]) -> list[str]:
-    """Return what the pictures do not determine, and what stands for it."""
+    """Return notes on numbers that the pictures do not determine, and their replacements."""
     notes = []
     if "centre_px" in found.undetermined:
         x, y = found.chosen.fit.camera.centre_px

@@ -63,7 +63,7 @@ def _read_light(path: Path) -> FloatArray:
 
 
 def to_codes(grey: FloatArray) -> NDArray[np.uint8]:
-    """Spread a plane over 8 bits, as detectors ask for."""
+    """Scale a plane to 8 bits, as detectors ask for."""
     low, high = np.percentile(grey, (DARKEST, BRIGHTEST))
     spread = (grey - low) * (255 / max(float(high - low), 1e-12))
     return np.asarray(np.clip(np.rint(spread), 0, 255), dtype=np.uint8)

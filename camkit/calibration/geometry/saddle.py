@@ -12,7 +12,7 @@ from typing import Final
 import cv2
 import numpy as np
 
-from camkit.calibration.geometry.camera import FloatGrid
+from camkit.calibration.geometry.camera_model import FloatGrid
 from camkit.contracts import FloatArray
 
 MOST_SAMPLES: Final = 24

@@ -1,7 +1,7 @@
-"""Where the search for a camera starts: many focal lengths tried, straight and fisheye.
+"""Starting values for the fit of a camera: many focal lengths, for straight and fisheye lenses.
 
     a focal length and the middle of the picture -> directions of the corners
-      -> the pose of every board by its homography -> how far corners are from where they should be
+      -> the pose of every board by its homography -> distances of the corners from the predicted
 
 The best few of each kind are adjusted, and the richer models start from the simpler ones.
 
@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 from camkit.calibration.geometry.adjustment import Fit, adjust, rms
-from camkit.calibration.geometry.camera import (
+from camkit.calibration.geometry.camera_model import (
     CENTRE,
     FOCAL,
     MODELS,
@@ -41,7 +41,7 @@ _FISHEYE_MIDDLE: Final = Model(name="fisheye_middle", free=(), fisheye=True)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Nominal:
-    """Reasons why something is not fitted.
+    """The numbers that are not fitted, and the reasons.
 
     Attributes:
         centre: Whether the optical centre is held at the middle of the picture; then nothing is
@@ -54,7 +54,7 @@ class Nominal:
 
     @property
     def held(self) -> tuple[int, ...]:
-        """Return the places of what is held in a vector of intrinsics."""
+        """Return the indices of the fixed numbers in a vector of intrinsics."""
         return (() if self.focal_px is None else (FOCAL,)) + (CENTRE if self.centre else ())
 
     @property

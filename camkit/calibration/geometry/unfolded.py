@@ -9,10 +9,10 @@ from typing import Final
 
 import numpy as np
 
-from camkit.calibration.geometry.camera import Camera, FloatGrid
+from camkit.calibration.geometry.camera_model import Camera, FloatGrid
 from camkit.calibration.geometry.choice import Judged, simplest
 from camkit.calibration.geometry.coverage import Coverage, coverage_of
-from camkit.calibration.geometry.profile import Profile, profile_of
+from camkit.calibration.geometry.distortion_profile import Profile, profile_of
 from camkit.calibration.geometry.start import is_lens
 from camkit.errors import DecodeError
 
@@ -67,7 +67,7 @@ def unfolded(
 
 
 def _doubt(camera: Camera, profile: Profile, size: tuple[int, int]) -> str:
-    """Return what of a camera no lens has; "" for nothing."""
+    """Return the property of a camera that no lens has; "" for none."""
     if not is_lens(camera, size):
         return f"a focal length of {camera.focal_px:.0f} px, which is none of a lens"
     for at, side in zip(camera.centre_px, size, strict=True):

@@ -51,7 +51,7 @@ def distortion_at(lens: Lens, focal_mm: float) -> Distortion:
 
 
 def _places(line: Sequence[Distortion], at: float) -> float:
-    """Return the share of the way between the neighbours of a focal length."""
+    """Return the interpolation weights between the neighbours of a focal length."""
     after = next(index for index, one in enumerate(line) if one.focal_mm > at)
     low, high = line[after - 1].focal_mm, line[after].focal_mm
     return (at - low) / (high - low)

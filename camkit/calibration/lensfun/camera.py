@@ -68,7 +68,7 @@ def stated_crop(path: Path) -> float | None:
 def frame_of(
     capture: Capture, crop_factor: float | None, database: Database, stated: float | None = None
 ) -> tuple[Frame, tuple[str, ...]]:
-    """Return size and scale of the captures, and what had to be taken from elsewhere.
+    """Return size and scale of the captures, and notes on values taken from elsewhere.
 
     Args:
         capture: One of them.

@@ -60,7 +60,7 @@ class Database:
         self._place = place
 
     def lenses(self) -> Iterator[tuple[str, Element]]:
-        """Return every lens with the name of its file."""
+        """Yield every lens with the name of its file."""
         for file, root in self._files.items():
             for element in root.iter("lens"):
                 yield file, element
@@ -114,7 +114,7 @@ def _files_of(place: Path) -> list[Path]:
 
 
 def _near(wanted: str, known: Iterable[str]) -> list[str]:
-    """Return names that are near, those with all the words first."""
+    """Return similar names, those with all the words first."""
     words, names = wanted.split(), list(known)
     with_all = [one for one in names if words and all(word in one for word in words)]
     alike = difflib.get_close_matches(wanted, names, n=_NEAR, cutoff=0.5)
@@ -133,7 +133,7 @@ def _names(lens: Element) -> list[str]:
 
 
 def lens_of(element: Element, file: str) -> Lens:
-    """Read what a lens element says.
+    """Read a lens element.
 
     Raises:
         DecodeError: If something in it is no number, or of an unknown model.

@@ -44,7 +44,7 @@ _DIGITS: Final = 10
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EntryOptions:
-    """What an entry is for.
+    """The options of an entry.
 
     Attributes:
         focal_mm: Focal length; None for that of the source, which a bundle does not know.
@@ -65,7 +65,7 @@ class EntryOptions:
     most_residual_px: float = MOST_RESIDUAL_PX
 
     def __post_init__(self) -> None:
-        """Refuse what no entry can say.
+        """Refuse values that no entry can have.
 
         Raises:
             ContractError: If a number is not > 0, or a name is empty or cannot be printed.
@@ -86,7 +86,7 @@ class EntryOptions:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Name:
-    """What lensfun knows a lens by.
+    """The name by which lensfun knows a lens.
 
     Attributes:
         maker: Who made it.
@@ -252,7 +252,7 @@ def _ideal_px(placed: FloatGrid, distortion: RadialDistortion) -> FloatGrid:
 def _fitted(
     model: str, ideal: FloatGrid, placed: FloatGrid, focal_mm: float
 ) -> tuple[Distortion, float, float] | None:
-    """Fit one model; give it, its scale and the most that it misses. None where it has no form."""
+    """Fit one model; return it, its scale and its largest error. None where it has no form."""
     powers = np.array(POWERS[model])
     p = np.linalg.lstsq(ideal[:, None] ** powers, placed, rcond=None)[0]
     scale = float(p[0]) if model == "poly5" else _unit_scale(p, powers)
@@ -280,7 +280,7 @@ def _unit_scale(p: FloatGrid, powers: NDArray[np.int64]) -> float | None:
 def fit_vignetting(
     light: RadialIllumination, corner_px: float, focal_mm: float, aperture: float
 ) -> tuple[Vignetting, float]:
-    """Fit the model pa; give it and the most that it misses, as a share of the light.
+    """Fit the model pa; return it and its largest error, as a share of the light.
 
     Args:
         light: Relative illumination; its heights are in pixels.

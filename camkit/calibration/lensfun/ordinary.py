@@ -15,7 +15,7 @@ from camkit.runtime.raw import read_capture
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraOptions:
-    """How the captures were taken.
+    """The settings of the captures.
 
     Attributes:
         focal_mm: Focal length.
@@ -35,7 +35,7 @@ class CameraOptions:
     mosaic: MosaicOptions | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what no camera can have.
+        """Refuse values that no camera can have.
 
         Raises:
             ContractError: If a number is not > 0.
@@ -61,7 +61,7 @@ class LensBundle:
     notes: tuple[str, ...]
 
     def to_record(self) -> dict[str, Any]:
-        """Return what it is made of as JSON has it."""
+        """Return its sources as JSON values."""
         found, entry, light = self.found, self.found.distortion, self.found.vignetting
         return {
             "lens": found.lens.name,

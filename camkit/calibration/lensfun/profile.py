@@ -73,7 +73,7 @@ class Frame:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Found:
-    """A profile, and what it was made of.
+    """A profile, and its sources.
 
     Attributes:
         profile: What the manifest holds.
@@ -159,7 +159,7 @@ def profile_of(
 
 
 def filling_scale(distortion: RadialEntry, frame: Frame) -> float:
-    """Return the largest scale <= 1 of ideal radii at which no border shows what lies beyond it.
+    """Return the largest scale <= 1 of ideal radii at which no border is empty.
 
     Where the border of the straight picture lies at a distance r, and d(r) > r is where the capture
     is asked for, the scale is at most d^-1(r) / r.
@@ -183,7 +183,7 @@ def filling_scale(distortion: RadialEntry, frame: Frame) -> float:
 def missed_px(
     entry: Distortion, distortion: RadialEntry, frame: Frame, scale: float = 1.0
 ) -> float:
-    """Return by how many pixels a profile misses lensfun's formula at most, over the picture."""
+    """Return the largest error of a profile against lensfun's formula, in pixels of the picture."""
     ideal_mm = np.linspace(0, frame.corner_radius_mm, CHECKED)
     placed = entry.placed(scale * ideal_mm / distortion.radius_mm) * distortion.radius_mm
     points = np.stack([ideal_mm, np.zeros(CHECKED)], axis=-1)
@@ -223,7 +223,7 @@ def _illumination(entry: Vignetting, lens: Lens, frame: Frame) -> IlluminationEn
 
 
 def _told(entry: Vignetting, aperture: float | None, distance_m: float | None) -> str:
-    """Return which vignetting was taken, and what was asked for."""
+    """Return notes on the vignetting that was used, and on the one asked for."""
     wanted = "smallest aperture" if aperture is None else f"f/{aperture:g}"
     where = "far away" if distance_m is None else f"{distance_m:g} m"
     return (

@@ -20,7 +20,7 @@ OFF_MIDDLE_PX: Final = 0.5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Source:
-    """What an entry is made of. Pixels stand for the millimetres of its parts.
+    """The source of an entry. Pixels stand for the millimetres of its parts.
 
     Attributes:
         name: Of bundle or file.
@@ -52,7 +52,7 @@ class Source:
 
 
 def read_source(path: Path) -> Source:
-    """Read what `camkit calibrate geometry` wrote (.toml), or a bundle, by its path or name.
+    """Read a result of `camkit calibrate geometry` (.toml), or a bundle, by its path or name.
 
     Raises:
         DecodeError: If it is neither, or states no distortion.

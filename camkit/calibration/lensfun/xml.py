@@ -61,7 +61,7 @@ def parse_xml(data: bytes, what: str) -> Element:
 
 
 class _Limits:
-    """What a file may not do."""
+    """Limits of a file."""
 
     def __init__(self, what: str) -> None:
         self._what, self._depth, self._elements = what, 0, 0

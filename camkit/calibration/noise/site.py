@@ -1,4 +1,4 @@
-"""What a pair of frames tells of one colour: its means, its noise in time, its fixed pattern.
+"""Statistics of a pair of frames, for one colour: its means, its noise in time, its fixed pattern.
 
     blocks of 32x32 less a plane each -> difference: noise in time, product: fixed pattern
 
@@ -55,7 +55,7 @@ class SitePair:
 
 
 def site_pair(first: FloatGrid, second: FloatGrid, dark: float | None, step: float) -> SitePair:
-    """Return what two frames tell of one colour.
+    """Return the statistics of one colour in two frames.
 
     Args:
         first: (h, w) DN above the stated black, h and w at least `BLOCK_PX`.
@@ -91,7 +91,7 @@ def site_pair(first: FloatGrid, second: FloatGrid, dark: float | None, step: flo
 
 
 def _blocks(plane: FloatGrid) -> FloatGrid:
-    """Return (block, sample); what fills no whole block at the right and below is left out."""
+    """Return (block, sample), without the incomplete blocks at the right and lower border."""
     rows, columns = (n // BLOCK_PX for n in plane.shape)
     whole = plane[: rows * BLOCK_PX, : columns * BLOCK_PX]
     tiled = whole.reshape(rows, BLOCK_PX, columns, BLOCK_PX).swapaxes(1, 2)
@@ -99,7 +99,7 @@ def _blocks(plane: FloatGrid) -> FloatGrid:
 
 
 def _without_defects(blocks: FloatGrid, step: float) -> tuple[FloatGrid, NDArray[np.bool_]]:
-    """Return blocks less a plane each, and where a sample stands alone, which bends no plane."""
+    """Return blocks without their planes, and where a sample is a lone defect."""
     rest = blocks - _planes(blocks)
     limit = MOST_SPREADS * max(_MAD_TO_SIGMA * float(np.median(np.abs(rest))), step / 2)
     apart = np.abs(rest) > limit

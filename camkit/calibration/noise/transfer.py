@@ -56,7 +56,7 @@ class Transfer:
         return self.dark_variance + self.dn_per_e * signal
 
     def misfits(self) -> NDArray[np.float64]:
-        """Return how far every point lies off, as a share of the line."""
+        """Return the deviation of every point, as a share of the line."""
         return np.array([p.variance / self.variance_at(p.signal) - 1 for p in self.points])
 
 

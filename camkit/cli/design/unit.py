@@ -32,7 +32,7 @@ def measure_unit(
     depths_mm: tuple[float, ...],
     focus_um: str | None,
 ) -> dict[str, Any]:
-    """Measure a unit and write it; give what was found.
+    """Measure a camera body and write its file; return the measured focus.
 
     Raises:
         ContractError: If there is no capture, the names are wrong, or nothing can be measured.
@@ -64,7 +64,7 @@ def measure_unit(
 
 
 def focus_range_um(optics: "Optics", text: str | None) -> float:
-    """Read --focus-um: a number > 0, or `auto` for what the copies of a lens need; 0 for none.
+    """Read --focus-um: a number > 0, or `auto` for the range of a lens's copies; 0 for none.
 
     Raises:
         ContractError: If it is neither.
@@ -88,7 +88,7 @@ def focus_range_um(optics: "Optics", text: str | None) -> float:
 
 
 def _of_bundle(path: Path, depths_mm: tuple[float, ...]) -> "tuple[EdgeCamera, dict[str, str]]":
-    """Return the camera of a bundle, and how a unit names it: by its lens where it says that."""
+    """Return the camera of a bundle, and its name in a unit file: that of its lens where stated."""
     from camkit.bundle.reader import PRESCRIPTION, open_bundle
     from camkit.calibration.focus import EdgeCamera
     from camkit.runtime.unit import lens_hash

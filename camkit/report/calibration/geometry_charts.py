@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from camkit.calibration.geometry.adjustment import rms
-from camkit.calibration.geometry.camera import FloatGrid
+from camkit.calibration.geometry.camera_model import FloatGrid
 from camkit.calibration.geometry.coverage import seen_cells
 from camkit.calibration.geometry.geometry import Geometry
 from camkit.report.figure import GRID_COLOR, new_figure, to_png

@@ -31,7 +31,7 @@ Generator = np.random.Generator
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Patches:
-    """What is photographed in a step.
+    """The photographed patches of a step.
 
     Attributes:
         sharp: (b, 3, p + n - 1, p + n - 1) white-balanced camera space, for a PSF of n pixels.
@@ -62,7 +62,7 @@ class Night:
 
     @property
     def sharp(self) -> FloatArray:
-        """Return what may be a patch."""
+        """Return the part of the scene that patches are cut from."""
         inner = slice(self.margin_px, self.light.shape[1] - self.margin_px)
         return self.light[:, inner, inner].astype(np.float32)
 
@@ -73,7 +73,7 @@ class Nights:
     def __init__(
         self, camera: HdrRecipe, *, first_seed: int, count: int, scene_px: int, psf_px: int
     ) -> None:
-        """Make ready.
+        """Prepare the scenes.
 
         Args:
             camera: Its sensor, how much saturates, its ISO; `data.sample_px` is a patch's side.

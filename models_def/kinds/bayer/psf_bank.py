@@ -62,12 +62,12 @@ class PsfBank:
 
     @property
     def radius_px(self) -> int:
-        """How far the kernels of the copies reach."""
+        """Return the radius of the copies' kernels."""
         return int(max(self.copies.shape[-2:])) // 2
 
     @property
     def training_copies(self) -> int:
-        """How many copies may be trained on, each depth of a copy counted."""
+        """Return the number of copies for training, each depth of a copy counted."""
         return int(self.copies.shape[0]) - self.depths * self.validation_copies
 
     def blur_kernels(self, copy: int, x_mm: float, y_mm: float) -> Tensor:
@@ -133,7 +133,7 @@ def write_bank(path: Path, bank: PsfBank) -> None:
 
 
 def read_bank(path: Path) -> PsfBank:
-    """Read what `write_bank` wrote."""
+    """Read a file of `write_bank`."""
     with np.load(path, allow_pickle=False) as arrays:
         depths = int(arrays["depths"]) if "depths" in arrays else 1
         unseen = int(arrays["validation_copies"]) if "validation_copies" in arrays else 1

@@ -120,12 +120,12 @@ class BayerTraining:
         return build_network(name, **config)
 
     def layout(self, recipe: BayerRecipe, role: str) -> SampleLayout:
-        """Capture and Wiener planes in, clean planes out."""
+        """Return the layout: capture and Wiener planes in, clean planes out."""
         del role
         return layout_of(recipe)
 
     def finish(self, recipe: BayerRecipe, role: str) -> Finish | None:
-        """Take back the light that a network may not move."""
+        """Return the stage that removes light that a network may not move."""
         del role
         return finish_of(recipe)
 
@@ -140,7 +140,7 @@ class BayerTraining:
         return read_material(folder)
 
     def samples_digest(self, recipe: BayerRecipe, role: str, seed: int) -> str:
-        """Hash what decides the samples."""
+        """Hash the values that decide the samples."""
         del role
         return samples_digest(recipe, seed)
 

@@ -68,7 +68,7 @@ class BayerJudge:
         }
 
     def score(self, restore: Restorer) -> Score:
-        """Judge a restoration by its mean PSNR in dB on sRGB values, by ISO and field height."""
+        """Compute the mean PSNR of a restoration in dB on sRGB values, by ISO and field height."""
         return score(self.captures, self.recipe, restore)
 
 
@@ -139,7 +139,7 @@ def _exposure(recipe: BayerRecipe, bank: PsfBank, share: float, iso: float, turn
 
 
 def score(captures: Sequence[ValidationCapture], recipe: BayerRecipe, restore: Restorer) -> Score:
-    """Judge a restoration.
+    """Compute the scores of a restoration.
 
     Args:
         captures: From `make_validation_captures`.
@@ -173,7 +173,7 @@ def _restored(capture: ValidationCapture, recipe: BayerRecipe, restore: Restorer
 
 
 def to_srgb(stable: Tensor, capture: ValidationCapture, recipe: BayerRecipe) -> FloatArray:
-    """Take stabilised (3, s, s) planes to sRGB values, vignetting divided out."""
+    """Convert stabilised (3, s, s) planes to sRGB values, vignetting divided out."""
     noise = capture.shot.noise
     shot, read = torch.tensor(noise.shot), torch.tensor(noise.read_variance)
     linear = unstabilise(stable[None].float(), shot, read, scale=recipe.scale)[0]

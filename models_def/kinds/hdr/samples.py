@@ -133,7 +133,7 @@ class HdrCamera:
 
 
 def spread_light(sharp: Tensor, kernels: FloatArray) -> Tensor:
-    """Spread (b, 3, h, w) light by (3, n, n) kernels over a scene that goes on at its border."""
+    """Convolve (b, 3, h, w) light with (3, n, n) kernels; the scene goes on at its border."""
     half = kernels.shape[-1] // 2
     wide = torch.nn.functional.pad(sharp, (half,) * 4, mode="replicate")
     size = wide.shape[-2], wide.shape[-1]

@@ -116,15 +116,15 @@ class HdrTraining:
         return build_network(name, **config)
 
     def layout(self, recipe: HdrRecipe, role: str) -> SampleLayout:
-        """Captured and lit planes in, clean planes out; see `thesis.samples` for its roles."""
+        """Return the layout of a role's samples: captured and lit planes in, clean planes out."""
         return layout_of(recipe, role) if role in REFERENCE_ROLES else LAYOUT
 
     def finish(self, recipe: HdrRecipe, role: str) -> None:
-        """Nothing is done behind a network."""
+        """Return None: no stage follows a network."""
         del recipe, role
 
     def prepare(self, recipe: HdrRecipe, recipe_folder: Path, cache_folder: Path) -> HdrMaterial:
-        """Compute what the plate writes."""
+        """Compute the streaks of the plate."""
         return compute_material(recipe, recipe_folder, cache_folder)
 
     def read_material(self, folder: Path) -> HdrMaterial:
@@ -132,7 +132,7 @@ class HdrTraining:
         return read_material(folder)
 
     def samples_digest(self, recipe: HdrRecipe, role: str, seed: int) -> str:
-        """Hash what decides the samples."""
+        """Hash the values that decide the samples."""
         if role in REFERENCE_ROLES:
             return reference_digest(recipe, role, seed)
         return samples_digest(recipe, seed)
@@ -163,7 +163,7 @@ class HdrTraining:
 
 
 def _lights_px(recipe: HdrRecipe) -> int | None:
-    """Return how far from lights the networks act; None if any acts everywhere."""
+    """Return the distance from lights up to which networks act; None if any acts everywhere."""
     sizes = recipe.networks.get(ROLES[0], {}).values()
     reaches_px = [px for size in sizes if (px := lights_px(size.network)) is not None]
     return max(reaches_px) if reaches_px and len(reaches_px) == len(sizes) else None

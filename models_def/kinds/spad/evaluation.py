@@ -32,7 +32,7 @@ MOST_DB: Final = 100.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PictureScore:
-    """How near pictures come to the truth.
+    """The likeness of pictures to the truth.
 
     Attributes:
         psnr_db: White = 1; mean over the pictures.

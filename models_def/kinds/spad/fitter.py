@@ -65,7 +65,7 @@ class PlateFitting:
     """Fulfils `camkit.models_def.training.fitting.FittingKind`."""
 
     def fitting(self, request: FitRequest) -> OwnFitting | None:
-        """Return the fitter of the role plate; the other has the house's.
+        """Return the fitter of the role plate; None for the other.
 
         Raises:
             ContractError: If the network does not suit the role, or the device.

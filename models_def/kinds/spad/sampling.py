@@ -1,4 +1,4 @@
-"""How an array of small pixels samples light: through a kernel, at one sub-pixel of every pixel.
+"""Sampling of light by an array of small pixels: a kernel, and one sub-pixel of every pixel.
 
     fine picture (4 h, 4 w) -- kernel 11x11 -- sub-pixel `phase` of every 4x4 -- samples (h, w)
 
@@ -110,7 +110,7 @@ class Sampling:
 
     @property
     def light(self) -> float:
-        """How many times the light of one sub-pixel a pixel collects."""
+        """Return the light of a pixel in units of that of one sub-pixel."""
         return FULL_LIGHT if self.mode == "full_fill" else 1.0
 
     def see(self, fine: Tensor) -> Tensor:

@@ -1,4 +1,4 @@
-"""What the best linear estimate could know: Wiener theory on the covariance of natural pictures.
+"""The error of the best linear estimate: Wiener theory on the covariance of natural pictures.
 
 covariance C of pictures, kernel p, noise of N photons
     A   covariance of 7x7 samples    (p * p' * C)(4 (k - l)) + noise

@@ -93,11 +93,11 @@ class SpadTraining:
         return build_spad_network(name, **config)
 
     def layout(self, recipe: SpadRecipe, role: str) -> SampleLayout:
-        """Light and its noise in, a picture four times as fine out."""
+        """Return the layout: light and its noise in, a picture four times as fine out."""
         return layout_of(recipe, role)
 
     def finish(self, recipe: SpadRecipe, role: str) -> None:
-        """Nothing is done behind a network."""
+        """Return None: no stage follows a network."""
         del recipe, role
 
     def prepare(self, recipe: SpadRecipe, recipe_folder: Path, cache_folder: Path) -> SpadMaterial:
@@ -113,7 +113,7 @@ class SpadTraining:
         return SpadMaterial(kernel=read_plate_psf(folder / PSF_FILE))
 
     def samples_digest(self, recipe: SpadRecipe, role: str, seed: int) -> str:
-        """Hash what decides the samples."""
+        """Hash the values that decide the samples."""
         return samples_digest(recipe, role, seed)
 
     def maker(
@@ -136,7 +136,7 @@ class SpadTraining:
 
 
 def sampling_of(recipe: SpadRecipe, material: SpadMaterial) -> Sampling:
-    """Return how the array of a recipe samples, with the kernel of its material."""
+    """Return the sampling by the array of a recipe, with the kernel of its material."""
     plan = recipe.sampling
     return Sampling(
         mode=plan.mode,  # type: ignore[arg-type]

@@ -59,7 +59,7 @@ class SpadJudge:
         return {"bicubic": self._mean([finer(shot.light) for shot in self.shots]).mean_db}
 
     def score(self, restore: Restorer) -> Score:
-        """Judge a restoration by its mean PSNR in dB, by photons."""
+        """Compute the mean PSNR of a restoration in dB, by photons."""
         with torch.no_grad():
             return self._mean([restore(shot.planes) for shot in self.shots])
 

@@ -86,7 +86,7 @@ def distortion(
 def lateral_colour_mm(
     lens: Lens, slopes: Tensor, wavelengths_um: Tensor, definition: PupilDefinition
 ) -> Tensor:
-    """Return how far (field, wavelength) chief rays land beyond the reference wavelength."""
+    """Return the distances (field, wavelength) of chief rays from the reference wavelength's."""
     reference = torch.tensor([lens.reference_wavelength_um], dtype=torch.float64)
     heights = chief_landings(lens, slopes, torch.cat([wavelengths_um, reference]), definition)
     return heights[:, :-1] - heights[:, -1:]
@@ -108,7 +108,7 @@ def _paraxial_foci(lens: Lens, wavelengths_um: Tensor) -> Tensor:
 
 
 def longitudinal_mm(lens: Lens, pupil: Tensor, wavelengths_um: Tensor) -> Tensor:
-    """Return where (wavelength, pupil) axial rays cross the axis, from the sensor; NaN if lost.
+    """Return the crossings (wavelength, pupil) of axial rays, from the sensor; NaN if lost.
 
     Args:
         lens: The prescription.

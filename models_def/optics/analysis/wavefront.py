@@ -59,7 +59,7 @@ class Wavefront:
 def path_lengths(
     tensors: SurfaceTensors, rays: Rays, slope: Tensor, distance_mm: float
 ) -> tuple[Rays, Tensor]:
-    """Trace rays to the sensor and give their optical path lengths in mm.
+    """Trace rays to the sensor and return their optical path lengths in mm.
 
     Args:
         tensors: The lens.

@@ -24,7 +24,7 @@ def plate_streaks(
     wavelengths_um: NDArray[np.float64] | None = None,
     side_px: int = SIDE_PX,
 ) -> StreakOptics:
-    """Compute what a plate writes and give it by its parts.
+    """Compute the streaks of a plate, by their parts.
 
     Args:
         plate: Before its lens.

@@ -66,7 +66,7 @@ class PsfMap:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MapGrid:
-    """Where the PSFs of a map are traced, and how finely.
+    """The places and the density of the PSFs of a map.
 
     Attributes:
         depths_mm: Object distances, increasing.

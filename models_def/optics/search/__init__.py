@@ -1,4 +1,4 @@
-"""How a lens is found and improved: free numbers, merits of spots, damped least squares.
+"""Search and improvement of lenses: free numbers, merits of spots, damped least squares.
 
 - `variables`: which numbers of a lens are free; batches of lenses as tensors
 - `beam`: rays of a batch of lenses, by the paraxial entrance pupil

@@ -1,4 +1,4 @@
-"""What a lens must not be, as residuals that vanish inside the limits."""
+"""Limits of a lens, as residuals that vanish inside them."""
 
 import math
 from collections.abc import Sequence

@@ -58,7 +58,7 @@ def too_small_rims(problem: Problem, scaled: Tensor) -> list[tuple[int, float, f
 
 
 def _reaches(problem: Problem, scaled: Tensor) -> list[float]:
-    """Return how far from the axis the beam meets every surface, in mm."""
+    """Return the largest height of the beam on every surface, in mm."""
     rim = torch.linspace(-1, 1, _LINE, dtype=torch.float64)
     samples = PupilSamples(x=torch.zeros_like(rim), y=rim)
     with torch.no_grad():

@@ -27,7 +27,7 @@ _WITHIN: Final = 1 - 1e-3
 def ray_penalty(
     tensors: SurfaceTensors, launched: Rays, seen: Sequence[Rays], barrier: float = BARRIER
 ) -> Tensor:
-    """Return what each ray pays (shape of the rays); differentiable, also for lost rays.
+    """Return the penalty of each ray (shape of the rays); differentiable, also for lost rays.
 
     Args:
         tensors: The lens.

@@ -55,7 +55,7 @@ _TERMS: Final = 4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HazyGrid:
-    """How finely a lens is sampled.
+    """The sampling of a lens.
 
     Attributes:
         fields: Places from the axis to the corner.
@@ -192,7 +192,7 @@ def arriving(angles_rad: Array, heights_px: Array) -> Array:
 
 
 def peaks_off_px(lens: Lens, psf: FrozenPsf, *, rays: int = RAYS) -> float:
-    """Return how far the peaks (or chief rays) of a lens lie from where a PSF has them, at most.
+    """Return the largest distance of a lens's peaks (or chief rays) from those of a PSF.
 
     Args:
         lens: The lens.
@@ -229,7 +229,7 @@ def flat_light(
     rays: int,
     corner_rad: float | None = None,
 ) -> Array:
-    """Return how an even scene lights the sensor, haze and walls counted, 1 on the axis.
+    """Return the illumination by an even scene, haze and walls counted, 1 on the axis.
 
     Args:
         lens: The lens.

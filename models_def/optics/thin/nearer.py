@@ -78,7 +78,7 @@ def freeze_distances(
 
 
 def _stacked(found: dict[float, FrozenOptics], own: FrozenOptics) -> FrozenOptics:
-    """Lay distances side by side, with the places of one of them."""
+    """Stack distances side by side, with the places of one of them."""
     hazes = [optics.haze for optics in found.values() if optics.haze is not None]
     assert own.haze is not None
     side = max(haze.kernels.shape[-1] for haze in hazes)

@@ -41,7 +41,7 @@ _AIM_FRESH: Final = 1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class View:
-    """What is looked at.
+    """The fields, wavelengths and rays of an analysis.
 
     Attributes:
         slopes: (field,), tan of the field angles.
@@ -62,7 +62,7 @@ class View:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Landing:
-    """Where the light of copies falls; each field turned to +y.
+    """The landing points of the light of copies; each field turned to +y.
 
     Attributes:
         rays: (copy, field, wave, ray) on the sensor.
@@ -172,7 +172,7 @@ def land(lens: Lens, deviations: Deviations, view: View, compensator: Compensato
 
 
 def _joined(parts: list[Landing]) -> Landing:
-    """Put the landings of single copies together."""
+    """Join the landings of single copies."""
 
     def cat(values: Iterable[Tensor]) -> Tensor:
         return torch.cat(list(values))
@@ -242,7 +242,7 @@ def _refocus(
     compensator: Compensator,
     traced: tuple[Rays, Tensor],
 ) -> Tensor:
-    """Return how far the compensator moves the sensors (copy,)."""
+    """Return the movement of the sensors by the compensator (copy,)."""
     if compensator == "none":
         return torch.zeros(deviations.copies, dtype=torch.float64)
     nothing = no_deviations(lens)

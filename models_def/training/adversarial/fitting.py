@@ -108,7 +108,7 @@ def _check_files(request: FitRequest, schedule: ScheduleRecipe) -> None:
 
 
 def _credit(request: FitRequest, schedule: ScheduleRecipe) -> str:
-    """Return what else the weights learned from, for the card."""
+    """Return the further training data of the weights, for the card."""
     said = [f"; by the loss {schedule.loss}"]
     if schedule.content.looks and request.vgg is None:
         said.append("random features in place of VGG-19")

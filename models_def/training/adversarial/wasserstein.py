@@ -28,7 +28,7 @@ Critic = Callable[[Tensor], Tensor]
 
 
 def critic_loss(real: Tensor, fake: Tensor) -> Tensor:
-    """Return what a critic minimises beside its penalty, from scores of any shape.
+    """Return the loss of a critic without its penalty, from scores of any shape.
 
     Its negative estimates how far the two distributions lie apart.
     """
@@ -36,7 +36,7 @@ def critic_loss(real: Tensor, fake: Tensor) -> Tensor:
 
 
 def generator_loss(fake: Tensor) -> Tensor:
-    """Return what a generator minimises: the scores of its pictures, negative."""
+    """Return the loss of a generator: the scores of its pictures, negative."""
     return -fake.mean()
 
 

@@ -90,7 +90,7 @@ def pairs(
 
 
 def _apart(named: list[Path], targets: Path | None) -> tuple[list[Path], Path]:
-    """Return the captures, those of folders too, and the folder of what was shown.
+    """Return the captures, those of folders too, and the folder of the targets.
 
     Raises:
         ContractError: If nothing says what was shown.

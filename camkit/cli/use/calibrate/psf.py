@@ -109,7 +109,7 @@ def psf(
 
 
 def _check_target(disc_px: float | None, dots: Path | None, *, edge: bool) -> None:
-    """Refuse a light that is two things.
+    """Refuse options of two kinds of light at once.
 
     Raises:
         ContractError: If it is.
@@ -123,7 +123,7 @@ def _check_target(disc_px: float | None, dots: Path | None, *, edge: bool) -> No
 def _times(
     text: str | None, files: list[Path], darks: list[Path]
 ) -> tuple[tuple[float, ...] | None, tuple[float, ...] | None]:
-    """Return the times of frames and dark frames, which a list may leave to their files."""
+    """Return the times of frames and dark frames; a list may omit those that files state."""
     if text is None:
         return None, None
     from camkit.runtime.merging.times import stated_times

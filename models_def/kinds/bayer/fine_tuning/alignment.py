@@ -60,7 +60,7 @@ class Aligner:
     def __init__(
         self, sensor: BayerSensor, bank: PsfBank, distortion: RadialDistortion | None
     ) -> None:
-        """Take the sensor; without a distortion the lens is taken to have none."""
+        """Store the sensor; without a distortion the lens counts as free of it."""
         self._sensor, self._bank, self._distortion = sensor, bank, distortion
         self._centre = np.array([sensor.width_px - 1, sensor.height_px - 1]) / 2
         self._pitch_mm = to_mm(sensor.pixel_pitch_um)
@@ -95,7 +95,7 @@ class Aligner:
     def _pair(
         self, capture: FloatArray, reference: FloatArray, found: Homography, step: int
     ) -> AlignedPair:
-        """Make a pair of a homography to every step-th pixel."""
+        """Return a pair by a homography to every step-th pixel."""
         matrix = np.diag([step, step, 1.0]) @ found.matrix
         matrix = matrix / matrix[2, 2]
         back = np.linalg.inv(matrix)

@@ -99,7 +99,7 @@ def discriminators(recipe: FineTuningRecipe, seed: int) -> OpponentPlan:
 
 
 def _credit(options: FineTuningOptions) -> str:
-    """Return what else the weights learned from, for the card."""
+    """Return the further training data of the weights, for the card."""
     features = "without VGG-19"
     if options.vgg is not None:
         digest = file_digest(options.vgg)[:16]

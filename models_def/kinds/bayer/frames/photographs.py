@@ -60,7 +60,7 @@ VALIDATION_ISOS: Final = (100.0, 1600.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrameSources:
-    """What is photographed, and with what.
+    """The sources of frames: pictures, camera and optics.
 
     Attributes:
         pictures: Part of `PARTS` -> folder of pictures; None for procedural scenes alone.
@@ -78,7 +78,7 @@ class FrameSources:
 
 
 def check_frames(recipe: BayerRecipe, pictures: Mapping[str, Path | None] | None = None) -> None:
-    """Refuse, before anything takes long, what no frames can be made of.
+    """Refuse sources that no frames can be made of, before anything takes long.
 
     Raises:
         ContractError: If the recipe undoes no haze, its tiles do not fit the sensor, or a folder
@@ -271,7 +271,7 @@ class _Studio:
     def _cleared(
         self, light: Light, samples: NDArray[np.uint16], iso: float
     ) -> tuple[FloatArray, tuple[float, float, float]]:
-        """Return what the stage haze makes of a shot, and what its noise was raised by."""
+        """Return a shot without haze, by the stage haze, and the factor on its noise."""
         haze = self._recipe.haze
         assert haze is not None
         capture = self._pipeline.capture_of(
@@ -297,7 +297,7 @@ def _seen(scene: FloatArray, matrix: NDArray[np.float64]) -> FloatArray:
 def draw_scene(
     rng: Generator, source: SceneSource, recipe: BayerRecipe, *, even: bool = False
 ) -> FloatArray:
-    """Put a scene of the whole sensor together, (3, h, w) float32 linear Rec.709.
+    """Draw a scene of the whole sensor, (3, h, w) float32 linear Rec.709.
 
     Args:
         rng: Draws crops, tints and exposures.
@@ -323,7 +323,7 @@ def draw_scene(
 def _places(
     rng: Generator, size: tuple[int, ...], side_px: int, count: int
 ) -> Iterator[tuple[int, int]]:
-    """Yield where tiles begin, anywhere in the frame, at the first pixel of the mosaic's cell."""
+    """Yield the first pixels of tiles, anywhere in the frame, on the mosaic's cell."""
     rooms = [(length - side_px) // 2 + 1 for length in size]
     for _ in range(count):
         top, left = (2 * int(rng.integers(room)) for room in rooms)

@@ -142,7 +142,7 @@ _TERMS: Final[Mapping[str, Callable[[ThesisLoss, BetweenRoots, Tensor, Tensor], 
 
 
 def give_vgg(network: torch.nn.Module, path: Path) -> None:
-    """Return every VGG-19 within a network the weights of a file; see `take_vgg`."""
+    """Load the weights of a file into every VGG-19 within a network; see `take_vgg`."""
     for part in network.modules():
         if isinstance(part, VggLevels):
             take_vgg(part, path)
@@ -152,7 +152,7 @@ class ThesisFitting:
     """Fulfils `camkit.models_def.training.fitting.FittingKind`."""
 
     def fitting(self, request: FitRequest) -> OwnFitting | None:
-        """Return the fitter of the thesis's networks; all others have the house's.
+        """Return the fitter of the thesis's networks; None for all others.
 
         Raises:
             ContractError: If the network is not that of the role, weights of VGG-19 are missing,

@@ -51,12 +51,12 @@ class CodedJudge:
     samples: Sequence[tuple[float, Tensor, Tensor]]
 
     def baselines(self) -> Mapping[str, float]:
-        """Return the mean dB of what is to be beaten."""
+        """Return the mean dB of the baselines."""
         name, make = BASELINES[self.role]
         return {name: self.score(make).mean_db}
 
     def score(self, restore: Restorer) -> Score:
-        """Judge by the mean PSNR in dB, by ISO; the peak is 1 for layers, 2^8 with lights."""
+        """Compute the mean PSNR in dB, by ISO; the peak is 1 for layers, 2^8 with lights."""
         peak = 1.0 if self.role == "split" else CEILING
         every = []
         with torch.no_grad():

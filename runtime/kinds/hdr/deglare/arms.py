@@ -1,4 +1,4 @@
-"""How much light every light throws along its column, one colour.
+"""Amounts of light in the streaks of every light along its column, one colour.
 
     lights of the slant -> runs: neighbouring rows of one column that are light
                         -> what a run throws onto every row of its column: its field
@@ -72,7 +72,7 @@ def runs_of(lights: Mask) -> Labels:
 
 
 def fields_of(runs: Labels, fading: FloatArray) -> FloatArray:
-    """Return what every run throws onto the rows of its column.
+    """Return the light of every run on the rows of its column.
 
     Args:
         runs: (row, column) of `runs_of`.

@@ -96,7 +96,7 @@ def _grid(least_rad: float, most_rad: float) -> list[float]:
 
 
 def _peaks(tried: list[Direction], mirrored: list[Direction]) -> list[Direction]:
-    """Return what rises above its neighbours, the ground on either side, and its mirror."""
+    """Return the part that rises above its neighbours, the ground on either side, its mirror."""
     strength = [one.strength for one in tried]
     found = []
     for here in range(1, len(tried) - 1):
@@ -110,7 +110,7 @@ def _peaks(tried: list[Direction], mirrored: list[Direction]) -> list[Direction]
 
 
 def _refined(trial: "_Trial", start: Direction) -> Direction:
-    """Move to the top of the parabola that fits angles about the best one.
+    """Return the top of the parabola that fits angles about the best one.
 
     Samples between columns lose a little of their steps: single angles ripple, their fit does not.
     """
@@ -135,7 +135,7 @@ class _Trial:
         self._fade = np.float32(math.exp(-FADING / seen.shape[0]))
 
     def at(self, angle_rad: float) -> Direction:
-        """Return how surely there are streaks of an angle."""
+        """Return the evidence for streaks of an angle."""
         _, height, width = self._planes.shape
         slant = Slant(angle_rad=angle_rad, height=height, width=width)
         (seen, near, lights), share = slant.gathered(

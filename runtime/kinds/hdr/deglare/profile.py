@@ -1,4 +1,4 @@
-"""How streaks fade along their arms: one curve for all lights of a picture.
+"""The fading of streaks along their arms: one curve for all lights of a picture.
 
 amounts of all runs and colours -> steps that any fading would make -> the fading that fits best
 

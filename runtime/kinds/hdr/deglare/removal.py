@@ -57,7 +57,7 @@ Open = Callable[[], Read]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GlareSettings:
-    """What is looked for.
+    """The settings of the search for streaks.
 
     Attributes:
         least_rad: Least angle of streaks from the vertical, to either side.
@@ -95,7 +95,7 @@ class Glare:
     notes: tuple[str, ...] = ()
 
     def paint(self, planes: FloatArray, top: int, gains: tuple[float, ...]) -> None:
-        """Take the streaks out of rows of the picture, in place; its lights stay as they are.
+        """Remove the streaks from rows of the picture, in place; its lights stay as they are.
 
         Args:
             planes: (3, rows, width) float32, multiplied by the gains.
@@ -113,7 +113,7 @@ class Glare:
         np.copyto(planes, clean, where=~light)
 
     def to_json(self) -> dict[str, float | None]:
-        """Return what a sidecar says of it."""
+        """Return the values for a sidecar."""
         found = self.direction
         return {
             "angle_deg": None if found is None else round(math.degrees(found.angle_rad), 3),
@@ -178,7 +178,7 @@ def find_glare(
 
 
 def _go_on() -> None:
-    """Do not stop."""
+    """Skip the check for cancellation."""
 
 
 def _unchanged(settings: GlareSettings, lit: float, why: str) -> Glare:
@@ -223,7 +223,7 @@ def _streaks(
 
 
 def _columns(seen: FloatArray, usable: Mask, lights: Mask, there: NDArray[np.intp]) -> Columns:
-    """Take the columns that lights stand in, and those beside them."""
+    """Select the columns that contain lights, and those beside them."""
     dark = np.where(lights, 0, seen)
     level = DARK + LEVEL_SHARE * np.maximum(scipy.ndimage.gaussian_filter(dark, LEVEL_SIGMA), 0)
     return Columns(

@@ -18,7 +18,7 @@ MOST_RAD = math.radians(45)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Slant:
-    """Where the samples of a picture go.
+    """The map of a picture's samples to a slanted grid.
 
     Attributes:
         angle_rad: Of the streaks from the vertical; > 0 where they lean right going down.
@@ -101,7 +101,7 @@ class Slant:
         share[inside] += 1
 
     def laid(self, field: FloatArray, top: int, rows: int) -> FloatArray:
-        """Lay a field of the slant over rows of the picture, linear between its samples.
+        """Interpolate a field of the slant over rows of the picture, linear between its samples.
 
         Args:
             field: (..., *shape).

@@ -10,9 +10,9 @@ ground        paving and water, and what they mirror
 town          sky, rows of buildings, lamps until enough is lit
 places        street, waterfront, room, bokeh, fair
 shading       what the lamps light
-scene         all of it, from a seed
+assembly         all of it, from a seed
 """
 
-from camkit.runtime.kinds.hdr.night.scene import night_scene
+from camkit.runtime.kinds.hdr.night.assembly import night_scene
 
 __all__ = ["night_scene"]

@@ -15,7 +15,7 @@ BLUR_PX: Final = 28
 
 
 def add_bokeh(rng: Generator, canvas: Canvas, cy: float, cx: float, radius: float) -> float:
-    """Add a lamp that is out of focus, and tell how bright its disc is.
+    """Draw a lamp that is out of focus, and return the brightness of its disc.
 
     Args:
         rng: Draws colour, brightness and rim.
@@ -46,7 +46,7 @@ def add_bokeh(rng: Generator, canvas: Canvas, cy: float, cx: float, radius: floa
 
 
 def add_blur(rng: Generator, canvas: Canvas) -> None:
-    """Lay soft surfaces over the whole picture: what else is out of focus.
+    """Draw soft surfaces over the whole picture: the rest of a scene out of focus.
 
     Args:
         rng: Draws their colours and places.

@@ -1,4 +1,4 @@
-"""What a night scene is painted on: surfaces that are lit, and light that shines of itself."""
+"""The canvas of a night scene: surfaces that are lit, and light that shines of itself."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -89,7 +89,7 @@ def patch_around(
 
 
 def cover(canvas: Canvas, patch: Patch, alpha: FloatArray, paint: FloatArray) -> None:
-    """Put something opaque and dark before what is there.
+    """Paint something opaque and dark over the canvas.
 
     Args:
         canvas: Painted in place.
@@ -104,7 +104,7 @@ def cover(canvas: Canvas, patch: Patch, alpha: FloatArray, paint: FloatArray) ->
 
 
 def shine(canvas: Canvas, patch: Patch, alpha: FloatArray, radiance: FloatArray) -> None:
-    """Put something that shines before what is there; arguments as those of `cover`."""
+    """Paint something that shines over the canvas; arguments as those of `cover`."""
     light = canvas.light[patch.at]
     light += alpha * (radiance - light)
 

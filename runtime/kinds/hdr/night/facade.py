@@ -50,7 +50,7 @@ def draw_wall(rng: Generator) -> Colour:
 
 
 def add_building(rng: Generator, canvas: Canvas, building: Building) -> None:
-    """Put a building before what is there: wall, floors, windows, an edge of the roof."""
+    """Draw a building: wall, floors, windows, an edge of the roof."""
     half_height = (building.bottom - building.top) / 2
     half_width = (building.right - building.left) / 2
     cy, cx = building.top + half_height, building.left + half_width
@@ -75,7 +75,7 @@ def add_building(rng: Generator, canvas: Canvas, building: Building) -> None:
 def _openings(
     rng: Generator, place: tuple[FloatArray, FloatArray], cell: tuple[float, float]
 ) -> FloatArray:
-    """Return where windows are: coverage, with a cross of bars in large ones."""
+    """Return the coverage of windows, with a cross of bars in large ones."""
     (down, across), (cell_height, cell_width) = place, cell
     rows, columns = down % 1, across % 1
     tall, wide = rng.uniform(0.4, 0.75), rng.uniform(0.35, 0.8)
@@ -120,7 +120,7 @@ def _rooms(rng: Generator, down: FloatArray, across: FloatArray, lit: float) -> 
 def add_near_window(
     rng: Generator, canvas: Canvas, cy: float, cx: float, half: tuple[float, float]
 ) -> None:
-    """Put a window seen from near: panes, a room with a lamp, curtains, somebody or a plant.
+    """Draw a window seen from near: panes, a room with a lamp, curtains, a figure or a plant.
 
     Args:
         rng: Draws the room.
@@ -149,7 +149,7 @@ def add_near_window(
 
 
 def _curtains(rng: Generator, patch: Patch, half_width: float) -> FloatArray:
-    """Return what two curtains with folds let through."""
+    """Return the transmission of two curtains with folds."""
     open_share = rng.uniform(0.0, 0.8)
     folds = 0.5 + 0.25 * np.sin(patch.dx * np.float32(2 * np.pi / rng.uniform(4, 9)))
     drawn = np.abs(patch.dx) > np.float32(open_share * half_width)
@@ -159,7 +159,7 @@ def _curtains(rng: Generator, patch: Patch, half_width: float) -> FloatArray:
 def _furnish(
     rng: Generator, canvas: Canvas, cy: float, cx: float, half: tuple[float, float]
 ) -> None:
-    """Hang a lamp into a room and let somebody stand before its light."""
+    """Draw a lamp into a room, and a figure before its light."""
     if rng.random() < 0.6:
         x = cx + rng.uniform(-0.6, 0.6) * half[1]
         size = half[1] * rng.uniform(0.12, 0.25)

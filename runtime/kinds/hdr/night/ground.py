@@ -15,7 +15,7 @@ WAVE_PX: Final = 9.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mirror:
-    """How the ground mirrors.
+    """The reflection of the ground.
 
     Attributes:
         top: Row over which it mirrors.
@@ -29,7 +29,7 @@ class Mirror:
 
 
 def add_ground(rng: Generator, canvas: Canvas, top: int, *, water: bool) -> None:
-    """Lay the ground from a row down to the lower edge.
+    """Draw the ground from a row down to the lower edge.
 
     Args:
         rng: Draws its colour and markings.
@@ -65,7 +65,7 @@ def _crossing(rng: Generator, patch: Patch) -> FloatArray:
 
 
 def wet_ground(rng: Generator, canvas: Canvas, top: int, *, water: bool) -> Mirror | None:
-    """Make the ground mirror what stands above a row; what is put on it later hides it.
+    """Mirror the part above a row in the ground; things that are drawn later hide it.
 
     Args:
         rng: Draws how wet and how rough it is.

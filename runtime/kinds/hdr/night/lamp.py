@@ -101,7 +101,7 @@ def add_glow(
 def add_lamp(
     rng: Generator, canvas: Canvas, cy: float, cx: float, radius: float, radiance: FloatArray
 ) -> None:
-    """Put a lamp: a globe, a tube, a field of diodes or a flame.
+    """Draw a lamp: a globe, a tube, a field of diodes or a flame.
 
     Args:
         rng: Draws its form.
@@ -126,7 +126,7 @@ def add_lamp(
 def add_globe(
     rng: Generator, canvas: Canvas, cy: float, cx: float, radius: float, radiance: FloatArray
 ) -> None:
-    """Put a round lamp that dims towards its rim and to one side; arguments as of `add_lamp`."""
+    """Draw a round lamp that dims towards its rim and to one side; arguments as of `add_lamp`."""
     patch = patch_around(canvas, cy, cx, radius + 1)
     if patch is None:
         return
@@ -167,7 +167,7 @@ def _add_tube(
 def _add_diodes(
     rng: Generator, canvas: Canvas, cy: float, cx: float, radius: float, radiance: FloatArray
 ) -> None:
-    """Put a plate of points of light behind a dim cover."""
+    """Draw a plate of points of light behind a dim cover."""
     half = radius * rng.uniform(0.5, 1.0), radius
     patch = patch_around(canvas, cy, cx, half[0] + 1, half[1] + 1)
     if patch is None:
@@ -180,7 +180,7 @@ def _add_diodes(
 def _add_flame(
     rng: Generator, canvas: Canvas, cy: float, cx: float, radius: float, radiance: FloatArray
 ) -> None:
-    """Put a flame: narrow above, brightest below its middle, darker around the wick."""
+    """Draw a flame: narrow above, brightest below its middle, darker around the wick."""
     tall = radius * rng.uniform(1.6, 2.4)
     patch = patch_around(canvas, cy, cx, tall + 1, radius + 1)
     if patch is None:
@@ -196,7 +196,7 @@ def _add_flame(
 def add_shaded_lamp(
     rng: Generator, canvas: Canvas, cy: float, cx: float, size: float, radiance: FloatArray
 ) -> None:
-    """Put a lamp with a shade that glows, and its bulb below the rim.
+    """Draw a lamp with a shade that glows, and its bulb below the rim.
 
     Args:
         rng: Draws form and side.

@@ -24,7 +24,7 @@ CURVES: Final = ("arc", "wave", "spiral", "arrow", "script")
 
 
 def add_neon(rng: Generator, canvas: Canvas, cy: float, cx: float, size: float) -> None:
-    """Put a bent tube, once or twice side by side in two colours, with its glow.
+    """Draw a bent tube, once or twice side by side in two colours, with its glow.
 
     Args:
         rng: Draws curve, colour and thickness.
@@ -86,7 +86,7 @@ def _points(y: np.ndarray, x: np.ndarray) -> FloatArray:
 def add_sign(
     rng: Generator, canvas: Canvas, cy: float, cx: float, half: tuple[float, float]
 ) -> None:
-    """Put a lit panel: letters of light on a dark ground, or dark ones on a bright ground.
+    """Draw a lit panel: letters of light on a dark ground, or dark ones on a bright ground.
 
     Args:
         rng: Draws colours and letters.

@@ -43,7 +43,7 @@ MOST_BOKEH_SHARE: Final = 0.7
 
 
 def paint_street(rng: Generator, canvas: Canvas, share: float) -> Mirror | None:
-    """A street: fronts, signs, rows of lamps, wet or dry paving, cars, wires."""
+    """Draw a street: fronts, signs, rows of lamps, wet or dry paving, cars, wires."""
     height, width = canvas.size
     horizon, ground = rng.uniform(0.1, 0.4) * height, rng.uniform(0.62, 0.9) * height
     rows = Span(top=horizon, bottom=ground)
@@ -68,7 +68,7 @@ def paint_street(rng: Generator, canvas: Canvas, share: float) -> Mirror | None:
 
 
 def paint_waterfront(rng: Generator, canvas: Canvas, share: float) -> Mirror | None:
-    """A town across a river that mirrors its lights."""
+    """Draw a town across a river that mirrors its lights."""
     height, width = canvas.size
     horizon, ground = rng.uniform(0.15, 0.35) * height, rng.uniform(0.45, 0.65) * height
     rows = Span(top=horizon, bottom=ground)
@@ -88,7 +88,7 @@ def paint_waterfront(rng: Generator, canvas: Canvas, share: float) -> Mirror | N
 
 
 def paint_room(rng: Generator, canvas: Canvas, share: float) -> Mirror | None:
-    """A room or a stall full of things, lit by lamps, candles and a window."""
+    """Draw a room or a stall full of things, lit by lamps, candles and a window."""
     height, width = canvas.size
     area = height * width
     add_leaves(rng, canvas.surface, canvas.textures, least_px=LEAST_THING_PX)
@@ -110,7 +110,7 @@ def paint_room(rng: Generator, canvas: Canvas, share: float) -> Mirror | None:
 
 
 def paint_bokeh(rng: Generator, canvas: Canvas, share: float) -> Mirror | None:
-    """A street out of focus behind things that are sharp."""
+    """Draw a street out of focus behind things that are sharp."""
     height, width = canvas.size
     add_sky(rng, canvas, height * rng.uniform(0.5, 1.5))
     add_blur(rng, canvas)
@@ -134,7 +134,7 @@ def paint_bokeh(rng: Generator, canvas: Canvas, share: float) -> Mirror | None:
 
 
 def paint_fair(rng: Generator, canvas: Canvas, share: float) -> Mirror | None:
-    """A fair: wheels, garlands, tubes, a crowd that stands dark before them."""
+    """Draw a fair: wheels, garlands, tubes, a crowd that stands dark before them."""
     height, width = canvas.size
     area = height * width
     add_sky(rng, canvas, 0.8 * height)
@@ -171,7 +171,7 @@ def _paint_town(rng: Generator, canvas: Canvas, rows: Span, share: float) -> Non
 
 
 def _add_traffic(rng: Generator, canvas: Canvas, rows: Span) -> None:
-    """Put cars, the farthest first, signals, and sometimes the trails of those that are gone."""
+    """Draw cars, the farthest first, signals, and sometimes the trails of cars that are gone."""
     height, width = canvas.size
     cars = rng.uniform(rows.top, rows.bottom, _number(rng, canvas, AREA_PER_CAR_PX))
     for cy in np.sort(cars):

@@ -1,4 +1,4 @@
-"""What the lamps of a scene light: its surfaces, as far as they reach, and no brighter than white.
+"""Light of the lamps on the surfaces of a scene, as far as they reach, and no brighter than white.
 
 Irradiance falls with the distance d from a lamp as (1 + d^2 / h^2)^(-3/2), that of a point at the
 height h over a plane (inverse square and cosine law: Born and Wolf, Principles of Optics, ch. 4.8).
@@ -62,7 +62,7 @@ def _cells(light: FloatArray) -> FloatArray:
 
 
 def _irradiance(cells: FloatArray, height_cells: float) -> FloatArray:
-    """Spread the light of the cells, by FFT; nothing comes round from the other side."""
+    """Convolve the light of the cells, by FFT; nothing wraps around."""
     at = np.arange(-REACH_CELLS, REACH_CELLS + 1, dtype=np.float64)
     far = at[:, None] ** 2 + at**2
     kernel = (1 + far / height_cells**2) ** -1.5

@@ -1,4 +1,4 @@
-"""What stands and hangs in a street: rows of lamps, cars, garlands, wires, railings, wheels."""
+"""Things in a street: rows of lamps, cars, garlands, wires, railings, wheels."""
 
 from typing import Final
 
@@ -29,7 +29,7 @@ TAIL_RED: Final = (1.0, 0.04, 0.02)
 
 
 def add_lamp_row(rng: Generator, canvas: Canvas, cy: float, cx: float, size: float) -> None:
-    """Put a row of equal street lamps that runs to a vanishing point, with their posts.
+    """Draw a row of equal street lamps that runs to a vanishing point, with their posts.
 
     Args:
         rng: Draws side, number and light.
@@ -54,7 +54,7 @@ def add_lamp_row(rng: Generator, canvas: Canvas, cy: float, cx: float, size: flo
 
 
 def add_car(rng: Generator, canvas: Canvas, cy: float, cx: float, size: float) -> None:
-    """Put a car with headlights or tail lights, the cone of its glare and its light on the road.
+    """Draw a car with headlights or tail lights, the cone of its glare and its light on the road.
 
     Args:
         rng: Draws which way it drives and its colour.
@@ -95,7 +95,7 @@ def _add_cone(canvas: Canvas, cy: float, cx: float, radius: float, radiance: Flo
 
 
 def add_garland(rng: Generator, canvas: Canvas, cy: float, cx: float, half_width: float) -> None:
-    """Hang a wire with bulbs between two places; it is a parabola, as a short catenary is.
+    """Draw a wire with bulbs between two places: a parabola, like a short catenary.
 
     Args:
         rng: Draws slack, distance and colours of the bulbs.
@@ -119,7 +119,7 @@ def add_garland(rng: Generator, canvas: Canvas, cy: float, cx: float, half_width
 
 
 def add_wire(canvas: Canvas, cy: float, cx: float, points: FloatArray, thick: float) -> None:
-    """Put a dark line through points (n, 2), (y, x) offsets from a place, before what is there."""
+    """Draw a dark line through points (n, 2), (y, x) offsets from a place."""
     reach_y, reach_x = (float(np.abs(points[:, axis]).max()) + 2 for axis in (0, 1))
     patch = patch_around(canvas, cy, cx, reach_y, reach_x)
     if patch is None:
@@ -130,7 +130,7 @@ def add_wire(canvas: Canvas, cy: float, cx: float, points: FloatArray, thick: fl
 
 
 def add_long_wire(rng: Generator, canvas: Canvas, cy: float) -> None:
-    """Let a straight wire cross the picture."""
+    """Draw a straight wire across the picture."""
     _, width = canvas.size
     fall = rng.uniform(-0.25, 0.25) * min(width, 600) / 2
     for left in range(0, width, 600):
@@ -142,7 +142,7 @@ def add_long_wire(rng: Generator, canvas: Canvas, cy: float) -> None:
 
 
 def add_railing(rng: Generator, canvas: Canvas, top: float, bottom: float) -> None:
-    """Put upright bars between two rails across the picture: edges as straight as streaks."""
+    """Draw upright bars between two rails across the picture: edges as straight as streaks."""
     height, width = canvas.size
     patch = patch_around(canvas, (top + bottom) / 2, width / 2, (bottom - top) / 2 + 2, width / 2)
     if patch is None or height < 8:
@@ -157,7 +157,7 @@ def add_railing(rng: Generator, canvas: Canvas, top: float, bottom: float) -> No
 
 
 def add_wheel(rng: Generator, canvas: Canvas, cy: float, cx: float, radius: float) -> None:
-    """Put a wheel of a fair: rings and spokes set with lamps."""
+    """Draw a wheel of a fair: rings and spokes set with lamps."""
     spokes, bulb = int(rng.integers(8, 20)), max(0.6, radius * 0.012)
     power = draw_power(rng, 2.0, 100.0)
     colours = [draw_neon(rng) for _ in range(3)]
@@ -176,7 +176,7 @@ def add_wheel(rng: Generator, canvas: Canvas, cy: float, cx: float, radius: floa
 
 
 def add_moon(rng: Generator, canvas: Canvas, cy: float, cx: float) -> None:
-    """Put the moon, with its spots."""
+    """Draw the moon, with its spots."""
     radius = rng.uniform(4, 16)
     patch = patch_around(canvas, cy, cx, radius + 1)
     if patch is None:
@@ -203,7 +203,7 @@ def add_trail(rng: Generator, canvas: Canvas, cy: float, cx: float, size: float)
 
 
 def add_signal(rng: Generator, canvas: Canvas, cy: float, cx: float, radius: float) -> None:
-    """Put a traffic light: a black box with three discs, one of which is lit."""
+    """Draw a traffic light: a black box with three discs, one of which is lit."""
     box = patch_around(canvas, cy, cx, 5 * radius, 2 * radius)
     if box is None:
         return

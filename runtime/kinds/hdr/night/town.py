@@ -70,7 +70,7 @@ def add_sky(rng: Generator, canvas: Canvas, horizon: float) -> None:
 
 
 def add_buildings(rng: Generator, canvas: Canvas, rows: Span, lit: float) -> None:
-    """Put rows of buildings from the horizon down to the ground, the nearest last.
+    """Draw rows of buildings from the horizon down to the ground, the nearest last.
 
     Args:
         rng: Draws their sizes.
@@ -97,7 +97,7 @@ def add_buildings(rng: Generator, canvas: Canvas, rows: Span, lit: float) -> Non
 
 
 def add_signs(rng: Generator, canvas: Canvas, rows: Span, share: float) -> None:
-    """Put signs, tubes and near windows on the fronts, the more the more is lit."""
+    """Draw signs, tubes and near windows on the fronts, the more the more is lit."""
     height, width = canvas.size
     area = height * width
     mean = min(area / AREA_PER_SIGN_PX, share * area / 2500)
@@ -115,7 +115,7 @@ def add_signs(rng: Generator, canvas: Canvas, rows: Span, share: float) -> None:
 def add_lamps(
     rng: Generator, canvas: Canvas, rows: Span, share: float, *, coloured: float = 0.15
 ) -> None:
-    """Put lamps until a share of the pixels shines above white.
+    """Draw lamps until a share of the pixels shines above white.
 
     Args:
         rng: Draws places, sizes and colours.
@@ -153,7 +153,7 @@ def _place(rng: Generator, canvas: Canvas, rows: Span) -> tuple[float, float]:
 
 
 def add_tree(rng: Generator, canvas: Canvas, cy: float, cx: float, size: float) -> None:
-    """Put a tree before what is there: a cloud of leaves on a stem.
+    """Draw a tree: a cloud of leaves on a stem.
 
     Args:
         rng: Draws its leaves.
@@ -179,7 +179,7 @@ def add_tree(rng: Generator, canvas: Canvas, cy: float, cx: float, size: float) 
 
 
 def add_figure(rng: Generator, canvas: Canvas, cy: float, cx: float) -> None:
-    """Put somebody who stands dark before the light: a head and shoulders.
+    """Draw a figure that stands dark before the light: a head and shoulders.
 
     Args:
         rng: Draws the size and the clothes.

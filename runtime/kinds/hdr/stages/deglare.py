@@ -31,7 +31,7 @@ SEARCH_SHARE: Final = 10.0
 
 
 def prepare(entry: Deglare, job: Job) -> StageWork:
-    """Return what is looked for."""
+    """Return the search for streaks."""
     settings = GlareSettings(
         least_rad=math.radians(entry.least_angle_deg),
         most_rad=math.radians(entry.most_angle_deg),
@@ -90,7 +90,7 @@ def _cleared(
 
 
 def _opened(job: Job, plane: str, gains: Gains) -> Read:
-    """Begin to read a plane; every colour clips at 1, what is no number is dark."""
+    """Start to read a plane; every colour clips at 1, NaN is dark."""
     (rows,) = job.probe(plane)
     gain = np.array(gains, np.float32)[:, None, None]
 

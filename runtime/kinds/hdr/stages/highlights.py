@@ -55,7 +55,7 @@ LEAST_PX: Final = 4
 
 
 def prepare(entry: Highlights, job: Job) -> StageWork:
-    """Return which planes are looked at; a capture smaller than a cell is left as it is.
+    """Return the search for lights; a capture smaller than a cell is left as it is.
 
     Raises:
         ContractError: If no stage gives them.
@@ -101,7 +101,7 @@ def first_bytes(pixels: int) -> int:
 
 
 def _looked_at(entry: Highlights, stages: Sequence[Stage]) -> tuple[str, str]:
-    """Name the planes of light and of what clipped, as they are before any gain.
+    """Return the planes of light and of clipped samples, as they are before any gain.
 
     Raises:
         ContractError: If there are none.

@@ -7,7 +7,7 @@
     shapes       lights of coarse cells as lights of finer ones
     descent      the light of clipped cells that explains what lies around them
     refinement   the same in finer cells, each group of neighbours near itself
-    evidence     how much of a light the picture proves
+    light_evidence     how much of a light the picture proves
     spots        lights of cells shared out over the pixels that clipped
     thrown       what lights throw beside themselves, over pixels
     recovery     all of it: cells -> lights, their streaks, the veil of everything else

@@ -22,7 +22,7 @@ class Lattice:
     step_px: int = 1
 
     def within(self, box: tuple[int, int, int, int], shape: tuple[int, ...]) -> tuple[slice, slice]:
-        """Return which pixels lie in a box (top, left, bottom, right) of the picture.
+        """Return a mask of the pixels that lie in a box (top, left, bottom, right) of the picture.
 
         Args:
             box: In pixels.

@@ -52,7 +52,7 @@ class Cells:
 
 
 def sample_sites(cfa: CfaPattern | None) -> tuple[Sites, ...]:
-    """Return where each colour has its samples in a cell; everywhere in full planes."""
+    """Return the sites of each colour's samples in a cell; everywhere in full planes."""
     every = tuple((y, x) for y in (0, 1) for x in (0, 1))
     if cfa is None:
         return (every,) * COLOURS
@@ -126,7 +126,7 @@ def coarser(cells: Cells) -> Cells:
 
 
 def cell_kernel(kernel: FloatArray, sites: Sites) -> FloatArray:
-    """Return what the samples of a colour see, per cell of 2 px, of a cell of even light.
+    """Return the kernel of a cell of even light on the samples of a colour, per cell of 2 px.
 
     Args:
         kernel: (n, n) in pixels, n odd.

@@ -22,10 +22,10 @@ MOST_VALUES: Final = 2**22
 
 
 class Spread(Protocol):
-    """What becomes of the light of a window."""
+    """A function that convolves the light of a window with a kernel."""
 
     def spread(self, light: FloatArray) -> FloatArray:
-        """Return what light (h, w) becomes."""
+        """Return the convolution of light (h, w) with the kernel."""
         ...
 
     def gathered(self, image: FloatArray) -> FloatArray:
@@ -50,7 +50,7 @@ class FewLights:
     """A kernel laid about each of a few lights; what leaves the window is lost."""
 
     def __init__(self, kernel: FloatArray, lit: Mask) -> None:
-        """Make ready.
+        """Prepare the kernel about every light.
 
         Args:
             kernel: (n, n) float32, n odd.
@@ -72,7 +72,7 @@ class FewLights:
 
     @cached_property
     def _laid(self) -> FloatArray:
-        """Lay the kernel about every light: (lights, h w)."""
+        """Kernels about every light: (lights, h w)."""
         height, width = self._shape
         laid = np.empty((len(self._at[0]), height * width), np.float32)
         for row, y, x in zip(laid, *self._at, strict=True):
@@ -85,7 +85,7 @@ class FewLights:
         return self._wide[half - y : half - y + height, half - x : half - x + width]
 
     def spread(self, light: FloatArray) -> FloatArray:
-        """Return what light (h, w) becomes; counts where it may be alone."""
+        """Return the convolution of light (h, w); only allowed places count."""
         if "_laid" in self.__dict__:
             # a sum over rows of fixed order: products of matrices hang on threads and processors
             whole = np.einsum("ji,j->i", self._laid, light[self._at])
@@ -106,7 +106,7 @@ class Convolution:
     """A kernel made ready for windows of one size; what leaves a window is lost."""
 
     def __init__(self, kernel: FloatArray, shape: tuple[int, int]) -> None:
-        """Make ready.
+        """Prepare the transform of the kernel.
 
         Args:
             kernel: (n, n) float32, n odd.
@@ -133,7 +133,7 @@ class Convolution:
         self._transform = scipy.fft.rfft2(wrapped)
 
     def spread(self, light: FloatArray) -> FloatArray:
-        """Return what light (h, w) becomes."""
+        """Return the convolution of light (h, w) with the kernel."""
         return self._filtered(light, self._transform)
 
     def gathered(self, image: FloatArray) -> FloatArray:

@@ -48,7 +48,7 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Steps:
-    """How lights are sought at one pitch of cells.
+    """The steps of the search for lights at one pitch of cells.
 
     Attributes:
         scales: Of the penalty, one for every step.
@@ -147,7 +147,7 @@ def _beyond(thrown: FloatArray, seen: FloatArray) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Weights:
-    """Of the gradients down and across, and of what outshines the picture."""
+    """The weights of the gradients down and across, and of light above the picture."""
 
     y: FloatArray
     x: FloatArray
@@ -164,7 +164,7 @@ class _System:
     price: FloatArray
 
     def gathered(self, slope_y: FloatArray, slope_x: FloatArray, level: FloatArray) -> FloatArray:
-        """Return what a picture of these gradients and level says to every light."""
+        """Return the gradient by every light of a picture with these gradients and this level."""
         weighed = _divergence(self.weights.y * slope_y, self.weights.x * slope_x)
         weighed += self.weights.excess * level
         return self.spread.gathered(weighed)
@@ -178,7 +178,7 @@ class _System:
 def _conjugate_gradients(
     system: _System, rest: FloatArray, start: FloatArray, rounds: int
 ) -> FloatArray:
-    """Go on from a start that leaves this rest."""
+    """Solve from a start with this residual."""
     found = start
     way = rest.copy()
     size = float(np.vdot(rest, rest))
@@ -195,7 +195,7 @@ def _conjugate_gradients(
 
 
 def _price(light: FloatArray, steps: Steps) -> FloatArray:
-    """Return what more light costs, falling as the logarithm of a light rises."""
+    """Return the price of more light, which falls with the logarithm of a light."""
     return np.asarray(steps.price + steps.dim_price * DIM / (DIM + light), np.float32)
 
 
@@ -220,7 +220,7 @@ def _divergence(y: FloatArray, x: FloatArray) -> FloatArray:
 
 
 def usable_cells(clipped: Mask) -> Mask:
-    """Return which cells (h, w) are neither clipped nor beside one that is, corners included."""
+    """Return a mask of the cells (h, w) that are neither clipped nor beside a clipped one."""
     rows = clipped.copy()
     rows[1:] |= clipped[:-1]
     rows[:-1] |= clipped[1:]

@@ -1,4 +1,4 @@
-"""What was found in cells, laid over pixels: lights put in, their streaks taken out.
+"""A recovery in cells, painted over pixels: lights are added, their streaks are removed.
 
     veil of cells, streaks of lights -> taken from rows of pixels
     lights of pixels                 -> put there, in colours that the output has
@@ -44,7 +44,7 @@ class Painter:
     """
 
     def __init__(self, recovery: Recovery, to_output: Matrix = _NO_CHANGE) -> None:
-        """Lay out the lights.
+        """Prepare the lights.
 
         Args:
             recovery: Of the capture.
@@ -83,7 +83,7 @@ class Painter:
         sites: Sequence[Sites],
         gains: Sequence[float] = (1.0,) * COLOURS,
     ) -> None:
-        """Take veil and streaks from rows of a mosaic in place, with the doubt that they have.
+        """Remove veil and streaks from rows of a mosaic in place, with their uncertainty.
 
         Args:
             samples: (rows, w) float32, multiplied by the gains; see `doubt.settled` for the rows.
@@ -134,7 +134,7 @@ class Painter:
         return under
 
     def _lit_within(self, top: int, rows: int) -> tuple[slice, tuple[Index, Index]]:
-        """Return which lit pixels lie in rows, and where."""
+        """Return the lit pixels of some rows, and their places."""
         lit = self._lit
         first, last = np.searchsorted(lit.rows, [top, top + rows])
         return slice(first, last), (lit.rows[first:last] - top, lit.columns[first:last])

@@ -18,8 +18,8 @@ from camkit.contracts import FloatArray
 from camkit.runtime.kinds.hdr.streaks.cells import COLOURS, Cells, coarser
 from camkit.runtime.kinds.hdr.streaks.convolution import Convolution, spreading
 from camkit.runtime.kinds.hdr.streaks.descent import COARSE_STEPS, not_outshining, seek_lights
-from camkit.runtime.kinds.hdr.streaks.evidence import Judge, proven
 from camkit.runtime.kinds.hdr.streaks.kernels import StreakKernels
+from camkit.runtime.kinds.hdr.streaks.light_evidence import Judge, proven
 from camkit.runtime.kinds.hdr.streaks.refinement import Found, Group, groups_of, refined
 from camkit.runtime.kinds.hdr.streaks.regions import Window, windows_of
 from camkit.runtime.kinds.hdr.streaks.shapes import pooled, rim_distance_px, upsampled
@@ -56,7 +56,7 @@ class Region:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recovery:
-    """What was found of a capture.
+    """The recovered lights, streaks and veil of a capture.
 
     Attributes:
         fine: Its cells of 2 px.
@@ -83,7 +83,7 @@ class Recovery:
     blind: bool = False
 
     def to_json(self) -> dict[str, int | float]:
-        """Return what a sidecar says of it.
+        """Return the values for a sidecar.
 
         `clipped_streak_fraction` is the share of the streaks that fell on clipped samples, where
         nobody sees them; `unexplained` the share that outshines what is seen, which no true light
@@ -158,7 +158,7 @@ def _at_border(mask: Mask) -> bool:
 
 
 def veil_of(known: FloatArray, kernels: tuple[FloatArray, ...]) -> FloatArray:
-    """Return what light throws beside itself; beyond the frame it goes on as at its border.
+    """Return the light that lights spread beside themselves; the frame continues at its border.
 
     Args:
         known: (3, h, w) light.

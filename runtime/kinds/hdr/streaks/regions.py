@@ -57,7 +57,7 @@ class Window:
 
 
 def windows_of(clipped: Mask, reach: int) -> tuple[Window, ...]:
-    """Group clipped cells and give each group's window, from top to bottom, left to right.
+    """Group clipped cells and return each group's window, top to bottom, left to right.
 
     Two lights are of one group where squares of `reach` about them meet; a window that overlaps
     another's lights becomes one with it, so that no light is sought twice.

@@ -53,7 +53,7 @@ def in_own_colours(
 
 
 def near_clipped(clipped: Mask) -> Mask:
-    """Return which pixels (h, w) are so near to clipped samples that lights are put into them."""
+    """Return a mask of the pixels (h, w) near clipped samples, into which lights are painted."""
     return widened(clipped, LIT_PX, LIT_PX)
 
 

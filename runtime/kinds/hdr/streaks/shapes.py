@@ -37,7 +37,7 @@ def rim_distance_px(mask: NDArray[np.bool_], pitch_px: float) -> FloatArray:
 
 
 def dome(distance_px: FloatArray) -> FloatArray:
-    """Return what most lights look like, from the distance to their rim."""
+    """Return the usual shape of lights, from the distance to their rim."""
     return np.asarray(np.minimum(distance_px, DOME_PX) ** 2, np.float32)
 
 

@@ -119,7 +119,7 @@ def _region_pixels(region: Region, cells: Cells) -> LitPixels:
 
 
 def _excess(light: FloatArray, numbers: Index) -> FloatArray:
-    """Return what the place of every pixel exceeds white by, mean over its pixels."""
+    """Return the excess over white at the place of every pixel, mean over its pixels."""
     pixels = np.maximum(np.bincount(numbers), 1)
     over = [np.bincount(numbers, np.maximum(plane - 1, 0)) / pixels for plane in light]
     return np.asarray(over, np.float32)[:, numbers]
@@ -137,7 +137,7 @@ def _places(clipped: FloatArray, light: FloatArray) -> _Places:
 
 
 def _lit(numbers: Index, cells: Cells, region: Region) -> Mask:
-    """Return which pixels of a window are lit in each colour: (3, h + 2, w + 2), a rim of False."""
+    """Return the lit pixels of a window in each colour: (3, h + 2, w + 2), a rim of False."""
     height, width = (PITCH_PX * side for side in numbers.shape)
     lit = np.zeros((COLOURS, height + 2, width + 2), np.bool_)
     at = (slice(None), *region.window.at)
@@ -178,7 +178,7 @@ def _shaped(numbers: Index, lit: Mask, cells: Cells, region: Region) -> _Shaped:
 
 
 def _level(cells: Cells, region: Region) -> FloatArray:
-    """Return what all samples of the cells of a window say: (3, h, w), 1 where they clipped."""
+    """Return the level of all samples of the cells of a window: (3, h, w), 1 where they clipped."""
     at = (slice(None), *region.window.at)
     clipped = cells.clipped[at]
     return np.asarray(cells.light[at] * (1 - clipped) + clipped, np.float32)
@@ -201,7 +201,7 @@ def _shared_out(shaped: _Shaped, light: FloatArray) -> FloatArray:
 
 
 def _most(shaped: _Shaped, light: FloatArray) -> FloatArray:
-    """Return how bright colours may be (3, n) beside one that was seen, as the place is coloured.
+    """Return the most that colours (3, n) may be beside one that was seen, in the place's colour.
 
     Where green clipped and red was seen to be dim, the light ends: its green is not bright either.
     """
@@ -238,7 +238,7 @@ def _pixels_of(numbers: Index) -> Iterator[tuple[Index, Index]]:
 
 
 def _own(pixels: NDArray[np.uint8], rows: Index, columns: Index) -> Mask:
-    """Tell of pixels whether their own sample clipped."""
+    """Return a mask of the pixels whose own sample clipped."""
     bit = (rows % PITCH_PX) * PITCH_PX + columns % PITCH_PX
     return (pixels[rows // PITCH_PX, columns // PITCH_PX] >> bit.astype(np.uint8)) & 1 > 0
 

@@ -1,11 +1,11 @@
-"""What lights throw beside themselves, over the rows of a picture.
+"""The streaks of lights over the rows of a picture.
 
     small windows whose streaks show, colours with many samples
            -> lights of pixels, spread by kernels of pixels
     others -> streaks of cells, linear between their middles
 
-An arm is three pixels wide: in cells of two it is wider and dimmer, and leaves two dark lines and
-a bright one where it is taken away. In large windows that is the price of their size. Red and blue
+An arm is three pixels wide. In cells of two it is wider and dimmer, and leaves two dark lines and
+a bright one where it is removed. In large windows that is the price of their size. Red and blue
 of a mosaic have one sample in such a cell and see no more of an arm than it.
 """
 
@@ -30,7 +30,7 @@ Half = NDArray[np.float16]
 
 
 class Streaks(Protocol):
-    """What the lights of a window throw beside themselves."""
+    """The streaks of the lights of a window."""
 
     def add(self, under: FloatArray, colour: int, lattice: Lattice) -> None:
         """Add it to light (rows, columns) at the pixels of a lattice."""
@@ -63,7 +63,7 @@ class PixelStreaks:
     def __init__(
         self, window: Window, lit: LitPixels, kernels: tuple[FloatArray | None, ...]
     ) -> None:
-        """Spread the lights of a window.
+        """Convolve the lights of a window.
 
         Args:
             window: In cells of 2 px.
@@ -107,7 +107,7 @@ class CellStreaks:
         offset_px: tuple[tuple[float, float], ...],
         colours: tuple[int, ...] = tuple(range(COLOURS)),
     ) -> None:
-        """Take them as they were found.
+        """Store the streaks of cells.
 
         Args:
             region: The window.

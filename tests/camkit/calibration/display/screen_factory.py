@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.calibration.geometry.camera import MODELS, Camera, project
+from camkit.calibration.geometry.camera_model import MODELS, Camera, project
 from camkit.calibration.record import to_toml
 from camkit.contracts import cfa_channels
 from camkit.runtime.metadata import Metadata

@@ -5,7 +5,7 @@ import pytest
 
 from camkit.calibration.display.camera_file import Illumination, Lens, Tone
 from camkit.calibration.display.targets import Targets
-from camkit.calibration.geometry.camera import MODELS, Camera, project
+from camkit.calibration.geometry.camera_model import MODELS, Camera, project
 from camkit.errors import DecodeError
 from tests.camkit.calibration.display.screen_factory import DARK, Booth, luminance
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.calibration.geometry.board import Board
-from camkit.calibration.geometry.camera import Camera, FloatGrid, Model, project
+from camkit.calibration.geometry.camera_model import Camera, FloatGrid, Model, project
 
 BOARD = Board(columns=7, rows=5)
 WIDEST_RAD = np.radians(82)

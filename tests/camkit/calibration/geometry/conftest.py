@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from camkit.calibration.geometry.camera import MODELS, Camera
+from camkit.calibration.geometry.camera_model import MODELS, Camera
 from tests.camkit.calibration.geometry.board_factory import (
     Shot,
     camera_of,

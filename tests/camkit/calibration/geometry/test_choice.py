@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from camkit.calibration.geometry.adjustment import adjust, rms
-from camkit.calibration.geometry.camera import MODELS, Camera, FloatGrid, project
+from camkit.calibration.geometry.camera_model import MODELS, Camera, FloatGrid, project
 from camkit.calibration.geometry.choice import judge, judge_all, simplest
 from camkit.calibration.geometry.start import fit_models
 from tests.camkit.calibration.geometry.board_factory import BOARD, camera_of, poses_around

@@ -6,7 +6,7 @@ import pytest
 
 from camkit.calibration.geometry.blur import blur_px
 from camkit.calibration.geometry.board import Board
-from camkit.calibration.geometry.camera import MODELS, Camera, FloatGrid, project
+from camkit.calibration.geometry.camera_model import MODELS, Camera, FloatGrid, project
 from camkit.calibration.geometry.detector import find_corners, nearest_px, refine
 from camkit.calibration.geometry.saddle import refine_saddles
 from tests.camkit.calibration.geometry.board_factory import (

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from camkit.calibration.geometry.camera import MODELS, Camera, FloatGrid, project
+from camkit.calibration.geometry.camera_model import MODELS, Camera, FloatGrid, project
 from camkit.calibration.geometry.choice import judge, judge_all
 from camkit.calibration.geometry.corner_file import (
     CornerFile,

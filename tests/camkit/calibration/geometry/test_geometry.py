@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from camkit.calibration.geometry.board import Board
-from camkit.calibration.geometry.camera import (
+from camkit.calibration.geometry.camera_model import (
     MODELS,
     POSE_NUMBERS,
     Camera,

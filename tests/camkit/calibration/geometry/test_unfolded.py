@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from camkit.calibration.geometry.camera import MODELS, Camera, FloatGrid, project
+from camkit.calibration.geometry.camera_model import MODELS, Camera, FloatGrid, project
 from camkit.calibration.geometry.choice import Judged, judge_all
 from camkit.calibration.geometry.unfolded import MOST_FACTOR, unfolded
 from camkit.errors import DecodeError

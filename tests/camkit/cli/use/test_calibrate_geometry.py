@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from camkit.calibration.geometry.camera import MODELS, project
+from camkit.calibration.geometry.camera_model import MODELS, project
 from camkit.cli.exit_code import ExitCode
 from tests.camkit.calibration.geometry.board_factory import (
     BOARD,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from camkit.calibration.flat.measure import FlatFacts
+from camkit.calibration.flat.illumination_fit import FlatFacts
 from camkit.calibration.flat.pose import Pose
 from camkit.report.calibration.flat_page import draw_maps, draw_profile, flat_html
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from camkit.calibration.geometry.camera import MODELS
+from camkit.calibration.geometry.camera_model import MODELS
 from camkit.calibration.geometry.geometry import Geometry, calibrate_geometry
 from camkit.report.calibration.geometry import geometry_sections
 from camkit.report.calibration.geometry_charts import LONGEST, enlargement

@@ -1,7 +1,7 @@
 """The page of a sensor's noise."""
 
-from camkit.calibration.noise.measure import IsoFacts, NoiseFacts
 from camkit.calibration.noise.rounding import Spread
+from camkit.calibration.noise.sensor_noise import IsoFacts, NoiseFacts
 from camkit.calibration.noise.transfer import Point, fit_transfer
 from camkit.report.calibration.noise_page import draw_transfer, noise_html
 

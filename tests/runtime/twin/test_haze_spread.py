@@ -13,7 +13,7 @@ from camkit.runtime.bank.haze import hazy_kernels
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
-from camkit.runtime.twin.haze import BLOCK_PX, HazeLens, hazed, margin_px, mirrored_cells
+from camkit.runtime.twin.haze_spread import BLOCK_PX, HazeLens, hazed, margin_px, mirrored_cells
 from camkit.runtime.twin.light import (
     LightOptions,
     lens_of,

@@ -6,7 +6,7 @@ import rawpy
 from PIL import Image
 
 from camkit.runtime.output.dng import write_bayer_dng
-from camkit.runtime.output.preview import LONGEST_SIDE_PX, Averages, preview_jpeg
+from camkit.runtime.output.dng_preview import LONGEST_SIDE_PX, Averages, preview_jpeg
 from tests.camera_factory import COLOR_MATRIX
 from tests.dng_factory import dng_tags
 

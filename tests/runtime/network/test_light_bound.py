@@ -14,8 +14,8 @@ from camkit.bundle.light_bound import (
     LightBound,
 )
 from camkit.errors import ContractError
-from camkit.runtime.network import light
-from camkit.runtime.network.light import (
+from camkit.runtime.network import light_bound
+from camkit.runtime.network.light_bound import (
     KeptRows,
     added_light,
     keep_bright,
@@ -177,7 +177,7 @@ def test_a_pixel_reaches_as_far_as_stated_and_no_further() -> None:
 def test_the_rows_computed_at_once_do_not_change_a_bit(monkeypatch: pytest.MonkeyPatch) -> None:
     front, output = _window(7, 160, 96)
     at_once = _bounded(front, output, None, USUAL_BOUND)
-    monkeypatch.setattr(light, "_STEP_CELLS", 8)
+    monkeypatch.setattr(light_bound, "_STEP_CELLS", 8)
     np.testing.assert_array_equal(_bounded(front, output, None, USUAL_BOUND), at_once)
 
 
@@ -250,6 +250,6 @@ def test_nearly_white_is_judged_pixel_by_pixel(monkeypatch: pytest.MonkeyPatch) 
     keep_bright(front, whole, bright, scale=SCALE)
     assert (whole != output).any()
     cut = output[:, 7:30, 5:50].copy()
-    monkeypatch.setattr(light, "_STEP_CELLS", 2)
+    monkeypatch.setattr(light_bound, "_STEP_CELLS", 2)
     keep_bright(front[:, 7:30, 5:50], cut, bright, scale=SCALE)
     np.testing.assert_array_equal(cut, whole[:, 7:30, 5:50])

@@ -5,7 +5,7 @@ import pytest
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.runtime.kinds.hdr.night import night_scene, places, scene
+from camkit.runtime.kinds.hdr.night import assembly, night_scene, places
 from camkit.runtime.kinds.hdr.night.lamp import MOST_POWER
 
 SIDE_PX = 160
@@ -81,7 +81,7 @@ def test_a_large_scene_is_like_a_small_one_not_like_an_enlarged_one():
 
 @pytest.mark.parametrize("paint", places.PLACES)
 def test_every_place_is_painted_at_any_size(paint, monkeypatch):
-    monkeypatch.setattr(scene, "PLACES", {paint: 1.0})
+    monkeypatch.setattr(assembly, "PLACES", {paint: 1.0})
     for size in ((1, 1), (1, 200), (200, 1), (17, 3), (90, 140)):
         picture = night_scene(3, *size)
         assert picture.shape == (3, *size)
@@ -91,7 +91,7 @@ def test_every_place_is_painted_at_any_size(paint, monkeypatch):
 
 @pytest.mark.parametrize("paint", places.PLACES)
 def test_every_place_has_lamps_and_darkness(paint, monkeypatch):
-    monkeypatch.setattr(scene, "PLACES", {paint: 1.0})
+    monkeypatch.setattr(assembly, "PLACES", {paint: 1.0})
     found = [night_scene(seed, SIDE_PX, SIDE_PX) for seed in range(3)]
     assert light_shares(found).mean() > 0.002
     assert np.mean([np.median(picture) for picture in found]) < 0.15

@@ -33,7 +33,7 @@ _REVERSALS: Final = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlatFacts:
-    """What was measured of a lens.
+    """The measured relative illumination of a lens.
 
     Attributes:
         files: Names of the pictures.
@@ -68,7 +68,7 @@ class FlatFacts:
 
     @property
     def rest(self) -> float:
-        """Return the RMS of what is left, as a share."""
+        """Return the RMS of the residuals, as a share."""
         return float(np.sqrt(np.mean(self.rest_maps**2)))
 
     def to_record(self) -> dict[str, Any]:
@@ -104,7 +104,7 @@ def measure_flat(
     pixel_pitch_um: float | None = None,
     mosaic: MosaicOptions | None = None,
 ) -> FlatFacts:
-    """Measure how light falls off towards the corner.
+    """Measure the fall-off of light towards the corner.
 
     Args:
         files: Linear pictures of one display or wall.
@@ -215,7 +215,7 @@ def _place(like: Capture) -> tuple[tuple[int, int], tuple[int, int]]:
 
 
 def _refuse_reversed(views: Views, parts: Parts) -> None:
-    """Refuse poses that fit far better when they are counted the other way.
+    """Refuse poses that fit far better with the opposite sign.
 
     Raises:
         ContractError: If they do.

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from camkit.bundle.reader import open_bundle
-from camkit.calibration.noise.measure import measure_sensor
+from camkit.calibration.noise.sensor_noise import measure_sensor
 from camkit.contracts import CfaPattern
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.capture import MosaicOptions

@@ -68,7 +68,7 @@ class Pair:
 
     @property
     def name(self) -> str:
-        """Name both files."""
+        """Return the names of both files."""
         return f"{self.first.path.name}, {self.second.path.name}"
 
 
@@ -96,7 +96,7 @@ class PairReader:
     """Reads pairs of one sensor."""
 
     def __init__(self, mosaic: MosaicOptions | None, iso: float | None) -> None:
-        """Take what the caller says in place of the files: mosaic, levels, and ISO."""
+        """Store what the caller states in place of the files: mosaic, levels, and ISO."""
         self._mosaic, self._iso = mosaic, iso
         self._one: Frame | None = None
         self._by_iso: dict[float, Frame] = {}
@@ -206,7 +206,7 @@ def _plane_of(capture: Capture) -> NDArray[Any]:
 
 
 def _names(capture: Capture) -> list[str]:
-    """Name the colours of the cell: R, G1, G2, B in its order, or Y."""
+    """Return the names of the colours of the cell: R, G1, G2, B in its order, or Y."""
     if capture.cfa is None:
         return ["Y"]
     letters = ["RGB"[channel] for row in cfa_channels(capture.cfa) for channel in row]
@@ -217,7 +217,7 @@ def _names(capture: Capture) -> list[str]:
 
 
 def _planes(capture: Capture) -> Iterator[FloatGrid]:
-    """Return the samples of each colour of the cell, in DN above the stated black."""
+    """Yield the samples of each colour of the cell, in DN above the stated black."""
     samples = _plane_of(capture)
     if capture.cfa is None:
         yield samples.astype(np.float64) - float(capture.black_level[0])

@@ -79,7 +79,7 @@ class _Ranges:
         self._low = self._front_low = self._times = 0.0
 
     def add(self, pictures: Iterable[Exposed]) -> None:
-        """Look at pictures."""
+        """Add pictures."""
         for picture in pictures:
             self._low = min(self._low, float(picture.light.min()))
             self._front_low = min(self._front_low, float(picture.front_light.min()))

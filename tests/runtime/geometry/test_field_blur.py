@@ -4,8 +4,13 @@ import scipy.signal
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.runtime.geometry import scatter as scatter_module
-from camkit.runtime.geometry.scatter import convolve_full, scatter, scatter_light, scatter_uniform
+from camkit.runtime.geometry import field_blur as scatter_module
+from camkit.runtime.geometry.field_blur import (
+    convolve_full,
+    scatter,
+    scatter_light,
+    scatter_uniform,
+)
 from camkit.runtime.geometry.sensor_window import SensorWindow
 
 FFT_ERROR = 2e-6

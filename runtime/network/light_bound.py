@@ -189,7 +189,7 @@ def take_back(
     *,
     strength: float = 1.0,
 ) -> None:
-    """Take from an output, in place, what is not kept of it.
+    """Remove from an output, in place, the part that is not kept.
 
     Args:
         front: (c, h, w) float32, stabilised.
@@ -215,7 +215,7 @@ def take_back(
 
 
 def keep_bright(front: FloatArray, output: FloatArray, bright: FloatArray, *, scale: float) -> None:
-    """Keep an output, in place, from darkening what is nearly white in front of a network.
+    """Prevent an output, in place, from darkening nearly white light in front of a network.
 
     Args:
         front: (c, h, w) float32, stabilised: the plane that the network improves on.
@@ -249,7 +249,7 @@ def _bright_share(planes: FloatArray, bright: FloatArray) -> FloatArray | None:
 
 
 def _mix(rows: FloatArray, front: FloatArray, shares: FloatArray) -> None:
-    """Keep a share of the change; where all of it is kept, bits stay as without any mask."""
+    """Blend a share of the change; where all of it is kept, bits stay as without any mask."""
     mixed = rows - front
     mixed *= shares
     mixed += front
@@ -309,7 +309,7 @@ def _smoothed(cells: FloatArray) -> FloatArray:
 
 
 def _limit(mean: FloatArray, spread: FloatArray, bound: LightBound, scale: float) -> FloatArray:
-    """Return how far a smoothed cell may leave the front end, of mean and variance of cells."""
+    """Return the most by which a smoothed cell may leave the front end, of mean and variance."""
     cell = (0.5 / scale / CELL_PX) ** 2
     beyond = np.maximum(spread - np.float32(NOISE_OF_CELLS * cell), 0)
     variance = np.float32(bound.spread**2) * beyond

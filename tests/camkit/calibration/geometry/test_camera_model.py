@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from camkit.calibration.geometry.camera import (
+from camkit.calibration.geometry.camera_model import (
     MODELS,
     Camera,
     Model,

@@ -73,7 +73,7 @@ def scatter_light(
     step_px: int = BLOCK_STEP_PX,
     workers: int = 1,
 ) -> tuple[FloatArray, FloatArray]:
-    """Do as `scatter` does, for kernels of any sums.
+    """Blur as `scatter` does, for kernels of any sums.
 
     Returns:
         (c, h, w) float32: the light that arrives inside the window; the same of planes of ones.

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from camkit.calibration.flat.measure import FlatFacts, measure_flat
+from camkit.calibration.flat.illumination_fit import FlatFacts, measure_flat
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.output.dng import camkit_description
 from tests.camkit.calibration.display_factory import GOOD, Flats, Shift

@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.calibration.noise.pairs import Pair, PairReader, in_pairs
+from camkit.calibration.noise.frame_pairs import Pair, PairReader, in_pairs
 from camkit.calibration.noise.rounding import LEAST_BOUND, OF_ROUNDING, Spread, spread_of
 from camkit.calibration.noise.site import SitePair
 from camkit.calibration.noise.transfer import Point, Transfer, fit_transfer
@@ -32,7 +32,7 @@ _SURE: Final = 4.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class IsoFacts:
-    """What was measured at one ISO.
+    """The measured noise at one ISO.
 
     Attributes:
         iso: Which.
@@ -65,11 +65,11 @@ class IsoFacts:
 
     @property
     def read_noise_e(self) -> float:
-        """Return the read noise, or what it lies below, in electrons."""
+        """Return the read noise, or its upper limit, in electrons."""
         return self.read.value * self.gain_e_per_dn
 
     def to_record(self) -> dict[str, Any]:
-        """Return plain values; None where exposure times do not tell of linearity."""
+        """Return plain values; None where exposure times do not show linearity."""
         linearity = self.linearity
         return {
             "iso": _short(self.iso),
@@ -90,7 +90,7 @@ class IsoFacts:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NoiseFacts:
-    """What was measured of a sensor.
+    """The measured noise of a sensor.
 
     Attributes:
         camera: As the files name it; empty if they do not.
@@ -217,7 +217,7 @@ def _joined(darks: Sequence[SitePair]) -> Point:
 
 
 def _hidden_dark(step: float) -> Point:
-    """Return what noise that the converter hides adds to lit frames, and how surely that is known.
+    """Return the noise that rounding hides in dark frames, and its standard error.
 
     It is rounding, smeared by the shot noise, and anything up to the square of the bound.
     """
@@ -257,7 +257,7 @@ def _prnu(flats: Sequence[SitePair], dark_pattern: float) -> float:
 
 
 def _linearity(flats: Sequence[Pair], black: dict[str, float]) -> float | None:
-    """Return how far means lie from exposure times a constant; None where times do not tell."""
+    """Return the deviation of means from exposure times a constant; None without times."""
     told = [pair.first.time_s for pair in flats]
     times = np.array([time for time in told if time is not None])
     if len(times) < len(told) or np.unique(times).size < LEAST_TIMES:

@@ -1,4 +1,4 @@
-"""Which networks are bounded: as the bundle states it, else by the usual bound.
+"""Networks that are bounded: as the bundle states it, else by the usual bound.
 
     manifest, laws -> stages, networks behind a bank with a bound
 
@@ -36,7 +36,7 @@ def front_end(network: Network, stages: Sequence[Stage]) -> Wiener | None:
 
 
 def broken_laws(manifest: Manifest, sizes: Sequence[str]) -> tuple[str, ...]:
-    """Name the laws of a picture that a bundle states as broken by one of some sizes."""
+    """Return the laws of a picture that a bundle states as broken by one of some sizes."""
     stated = manifest.laws or {}
     named = (
         name.replace("_", " ")

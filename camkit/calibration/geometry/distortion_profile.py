@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from camkit.calibration.geometry.camera import Camera, FloatGrid
+from camkit.calibration.geometry.camera_model import Camera, FloatGrid
 from camkit.contracts import RadialDistortion
 from camkit.errors import ContractError
 from camkit.runtime.geometry.distortion import RANGE_MARGIN, check_distortion
@@ -148,7 +148,7 @@ def fit_radial(profile: Profile, radius_px: float, corner_px: float) -> RadialFi
 
 
 def _continued(profile: Profile, corner_px: float) -> list[FloatGrid]:
-    """Return (sample, 2) ideal and placed radii beyond what is known, as guessed in two ways."""
+    """Return (sample, 2) ideal and placed radii beyond the known ones, extrapolated in two ways."""
     placed = np.linspace(profile.covered_px, RANGE_MARGIN * corner_px, FITTED)[1:]
     angles = np.interp(placed, profile.radii_px, profile.angles_rad)
     guessed = np.stack(
@@ -163,7 +163,7 @@ def _continued(profile: Profile, corner_px: float) -> list[FloatGrid]:
 def _fitted(
     known: FloatGrid, beyond: FloatGrid, weight: float, terms: int, radius_px: float
 ) -> RadialFit:
-    """Fit some terms to what is known, and by a weight to what is not."""
+    """Fit some terms to the known radii, and with a weight to the extrapolated ones."""
     powers = 2 * np.arange(terms) + 1
     root = np.concatenate([np.ones(len(known)), np.full(len(beyond), np.sqrt(weight))])
     every = np.concatenate([known, beyond])

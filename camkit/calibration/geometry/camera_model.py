@@ -50,7 +50,7 @@ class Model:
 
     @property
     def coefficients(self) -> int:
-        """Return how many coefficients there are, fitted or not."""
+        """Return the number of coefficients, fitted or not."""
         return _FISHEYE_COEFFICIENTS if self.fisheye else _PINHOLE_COEFFICIENTS
 
     @property
@@ -120,7 +120,7 @@ def with_model(camera: Camera, model: Model) -> Camera:
 
 
 def project(camera: Camera, pose: FloatGrid, points: FloatGrid) -> tuple[FloatGrid, FloatGrid]:
-    """Return where points fall on the picture, and how that changes.
+    """Return the places of points on the picture, and their derivatives.
 
     Args:
         camera: The camera.
@@ -147,12 +147,12 @@ def project(camera: Camera, pose: FloatGrid, points: FloatGrid) -> tuple[FloatGr
 
 
 def depths(pose: FloatGrid, points: FloatGrid) -> FloatGrid:
-    """Return how far points lie in front of the camera."""
+    """Return the distances of points in front of the camera."""
     turn, _ = cv2.Rodrigues(pose[:3])
     return np.asarray(points @ turn[2] + pose[5])
 
 
 def distance(pose: FloatGrid, point: FloatGrid) -> float:
-    """Return how far a point (3,) lies from the camera."""
+    """Return the distance of a point (3,) from the camera."""
     turn, _ = cv2.Rodrigues(pose[:3])
     return float(np.linalg.norm(turn @ point + pose[3:]))

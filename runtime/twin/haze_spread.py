@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.runtime.bank.haze import enlarged
-from camkit.runtime.geometry.scatter import KernelLookup, scatter_light
+from camkit.runtime.geometry.field_blur import KernelLookup, scatter_light
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.geometry.shrink import shrunk
 
@@ -22,7 +22,7 @@ BLOCK_PX: Final = 256
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HazeLens:
-    """What optics write far from a light.
+    """The haze that optics write far from a light.
 
     Attributes:
         haze_at: Gives the (c, n, n) kernels in cells at a sensor position in millimetres, with
@@ -101,7 +101,7 @@ def hazed(
 def mirrored_cells(
     count: int, beyond: int, cell_px: int, scene_px: tuple[int, int]
 ) -> NDArray[np.intp]:
-    """Return which cell stands for each of a line that goes on as the mirror image of its scene.
+    """Return the index of each cell of a line that mirrors its scene at the border.
 
     Args:
         count: Cells of the line, which stand for themselves.

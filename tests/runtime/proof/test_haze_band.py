@@ -20,7 +20,7 @@ from camkit.bundle.writer import write_bundle
 from camkit.errors import BundleError, ParityError
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work
-from camkit.runtime.proof.haze import make_haze_golden, prove_haze
+from camkit.runtime.proof.haze_band import make_haze_golden, prove_haze
 from tests.bundle_factory import tiny_manifest, tiny_members
 from tests.haze_bundle import hazy_manifest, hazy_optics, write_hazy_bundle
 from tests.haze_factory import tiny_haze

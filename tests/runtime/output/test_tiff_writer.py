@@ -9,7 +9,7 @@ from camkit.errors import ContractError
 from camkit.runtime.color import color_stage, encode_uint16
 from camkit.runtime.output.icc import icc_profile
 from camkit.runtime.output.picture_writer import PictureFormat
-from camkit.runtime.output.tiff import TiffWriter
+from camkit.runtime.output.tiff_writer import TiffWriter
 
 STAGE = color_stage(None)
 

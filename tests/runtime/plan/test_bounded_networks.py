@@ -13,7 +13,7 @@ from camkit.bundle.writer import write_bundle
 from camkit.errors import BundleError, ContractError
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
-from camkit.runtime.plan.laws import bounded_stages
+from camkit.runtime.plan.bounded_networks import bounded_stages
 from tests.bundle_factory import tiny_manifest, tiny_members, tiny_network, tiny_stages
 from tests.job_factory import made_mosaic
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.runtime.kinds.hdr.streaks.convolution import Convolution
-from camkit.runtime.kinds.hdr.streaks.evidence import (
+from camkit.runtime.kinds.hdr.streaks.light_evidence import (
     ENOUGH,
     NOTHING,
     SCALE,

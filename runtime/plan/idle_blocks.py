@@ -1,4 +1,4 @@
-"""Which blocks of the bank hold nothing that any kept result reads but plain cells."""
+"""Blocks of the bank that no kept result reads, except plain cells."""
 
 import numpy as np
 

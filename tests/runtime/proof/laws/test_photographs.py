@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from camkit.runtime.proof.laws import pictures
+from camkit.runtime.proof.laws import photographs
 from camkit.runtime.proof.laws.darkroom import Exposed
 from camkit.runtime.proof.laws.law import Law
 from camkit.scenes.charts import lamp_chart, patch_chart
@@ -33,10 +33,10 @@ class Room:
 
 @pytest.fixture(autouse=True, scope="module")
 def _scenes_are_drawn_once() -> Iterator[None]:
-    drawn = pictures.procedural_scene
-    pictures.procedural_scene = lru_cache(maxsize=8)(drawn)  # type: ignore[assignment]
+    drawn = photographs.procedural_scene
+    photographs.procedural_scene = lru_cache(maxsize=8)(drawn)  # type: ignore[assignment]
     yield
-    pictures.procedural_scene = drawn
+    photographs.procedural_scene = drawn
 
 
 class Ranges:
@@ -49,13 +49,13 @@ class Ranges:
 def _laws(network: Camera, front: Camera | None = None) -> dict[str, Law]:
     room: Any = Room(network=network, front=front or (lambda scene: scene))
     ranges: Any = Ranges()
-    scenes = list(pictures._scenes(room))
+    scenes = list(photographs._scenes(room))
     laws = (
-        *pictures._white(room, ranges),
-        pictures._flat(room, ranges),
-        pictures._double(room),
-        pictures._better(scenes),
-        pictures._borders(exposed for _, exposed in scenes),
+        *photographs._white(room, ranges),
+        photographs._flat(room, ranges),
+        photographs._double(room),
+        photographs._better(scenes),
+        photographs._borders(exposed for _, exposed in scenes),
     )
     return {law.name: law for law in laws}
 
@@ -146,7 +146,7 @@ def test_the_largest_and_least_light_are_those_of_all_pictures() -> None:
             def stages_of(_: Any) -> tuple[Stage]:
                 return (Stage(),)
 
-    ranges = pictures._Ranges(Bundle)  # type: ignore[arg-type]
+    ranges = photographs._Ranges(Bundle)  # type: ignore[arg-type]
     light = np.zeros((3, 4, 4), np.float32)
     for low, high in ((-0.01, 2.0), (-0.2, 10.0)):
         made = light.copy()

@@ -41,7 +41,7 @@ class Averages:
         self._made: list[FloatArray] = []
 
     def add(self, band: NDArray[Any]) -> None:
-        """Take the next rows: (c, rows, w) uint16 or float32."""
+        """Add the next rows: (c, rows, w) uint16 or float32."""
         rows = band if self._waiting is None else np.concatenate([self._waiting, band], axis=1)
         count = rows.shape[1] // self._step_y
         if count:

@@ -1,4 +1,4 @@
-"""How much of the picture each light explains; what explains nothing is left as it was seen.
+"""The evidence for each light: how much of the picture it explains; without any it stays as seen.
 
     lights of cells -> places -> cost of the picture without each, less that with it, of all colours
                     -> share of its excess over white that stands
@@ -38,7 +38,7 @@ class Judge:
     """Tells what a window of one colour would cost more without a light."""
 
     def __init__(self, light: FloatArray, rest: FloatArray, kernel: FloatArray) -> None:
-        """Take what was found.
+        """Store the recovery of a window.
 
         Args:
             light: (h, w) float32, 0 outside the clipped cells.
@@ -85,7 +85,7 @@ class Proven:
     given_up: int
 
     def left(self, light: FloatArray) -> FloatArray:
-        """Return what is left of light (..., h, w)."""
+        """Return the proven part of light (..., h, w)."""
         over = np.maximum(light - np.float32(WHITE), 0)
         return np.asarray(light - (1 - self.share) * over, np.float32)
 
@@ -95,7 +95,7 @@ class Proven:
 
 
 def proven(light: FloatArray, judges: Sequence[Judge | None]) -> Proven:
-    """Return what the picture proves of lights.
+    """Return the evidence of the picture for lights.
 
     A light mostly has all colours: what is proven in one speaks for the others.
 

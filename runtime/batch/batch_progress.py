@@ -24,7 +24,7 @@ class PictureCount:
         self._shares: dict[Path, float] = {}
 
     def progress(self, file: Path, done: int, total: int) -> None:
-        """Note how much of a picture is made, and pass it on."""
+        """Record the finished share of a picture, and report it."""
         with self._lock:
             self._shares[file] = done / max(total, 1)
             self._show(file)
@@ -32,7 +32,7 @@ class PictureCount:
             self._on_progress(file, done, total)
 
     def result(self, result: FileResult) -> None:
-        """Note that a picture is done, skipped or failed."""
+        """Record that a picture is done, skipped or failed."""
         with self._lock:
             self._shares.pop(result.input, None)
             self._results += 1

@@ -4,8 +4,8 @@ import numpy as np
 
 from camkit.runtime.bank.blocks import lay_spans
 from camkit.runtime.content import CELL_PX
-from camkit.runtime.plan.blocks import plain_blocks, plain_share
 from camkit.runtime.plan.decision import FULL, PLAIN, WIENER
+from camkit.runtime.plan.idle_blocks import plain_blocks, plain_share
 
 
 def test_a_block_is_plain_when_all_cells_it_reaches_are() -> None:

@@ -5,8 +5,8 @@ import pytest
 from numpy.typing import NDArray
 
 from camkit.errors import DecodeError
-from camkit.runtime.merging.estimate import disagreement, estimate_response
 from camkit.runtime.merging.response import srgb_response
+from camkit.runtime.merging.response_estimate import disagreement, estimate_response
 
 TIMES_S = np.array([4.0, 2.0, 1.0, 0.5, 0.25])
 
