@@ -96,7 +96,7 @@ class Vdsr(nn.Module):
 
     def forward(self, planes: Tensor) -> Tensor:
         """Return the picture (b, 1, 4 h, 4 w) from (b, in_channels, h, w)."""
-        fine = self.finer(planes)
+        fine: Tensor = self.finer(planes)
         return _through(self.layers, fine) + fine[:, :1]
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.glass.material import Glass
+from camkit.models_def.optics.glass.material import Formula, Glass
 from camkit.models_def.toml_table import section
 
 
@@ -14,7 +14,7 @@ class _GlassTable:
     """The keys of [[glass]]."""
 
     name: str
-    formula: str
+    formula: Formula
     coefficients: tuple[float, ...]
     range_um: tuple[float, ...]
     source: str
