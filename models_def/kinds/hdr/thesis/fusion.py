@@ -16,8 +16,8 @@ import torch
 from torch import Tensor, nn
 
 from camkit.errors import ContractError
-from camkit.models_def.networks.thesis.highlight import MOST_LIGHT
-from camkit.models_def.networks.thesis.layers import active, clip, conv
+from camkit.models_def.kinds.hdr.thesis.highlight import MOST_LIGHT
+from camkit.models_def.kinds.hdr.thesis.layers import active, clip, conv
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

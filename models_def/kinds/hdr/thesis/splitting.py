@@ -25,7 +25,7 @@ import torch
 from torch import Tensor, nn
 
 from camkit.errors import ContractError
-from camkit.models_def.networks.thesis.layers import SLOPE, ScaledNorm, active, clip, conv
+from camkit.models_def.kinds.hdr.thesis.layers import SLOPE, ScaledNorm, active, clip, conv
 from camkit.models_def.networks.vgg import WIDTHS, Pooling, VggLevels
 
 DILATIONS: Final = (1, 2, 4, 8, 16, 32, 64, 1)

@@ -2,7 +2,7 @@
 
 import torch
 
-from camkit.models_def.networks.thesis.layers import InstanceNorm, ScaledNorm, clip, instance_norm
+from camkit.models_def.kinds.hdr.thesis.layers import InstanceNorm, ScaledNorm, clip, instance_norm
 
 
 def test_instance_norm_is_that_of_torch():

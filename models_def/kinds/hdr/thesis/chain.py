@@ -5,9 +5,9 @@ from typing import Final
 
 from torch import Tensor, nn
 
-from camkit.models_def.networks.thesis.fusion import FusionConfig, FusionNetwork
-from camkit.models_def.networks.thesis.highlight import HighlightConfig, HighlightUnet
-from camkit.models_def.networks.thesis.splitting import SplittingConfig, SplittingNetwork
+from camkit.models_def.kinds.hdr.thesis.fusion import FusionConfig, FusionNetwork
+from camkit.models_def.kinds.hdr.thesis.highlight import HighlightConfig, HighlightUnet
+from camkit.models_def.kinds.hdr.thesis.splitting import SplittingConfig, SplittingNetwork
 
 SATURATED: Final = 0.99
 """From where a capture counts as saturated; the thesis gives no level."""

@@ -5,8 +5,8 @@ import torch
 from torch import nn
 
 from camkit.errors import ContractError
-from camkit.models_def.networks.thesis.highlight import HighlightConfig, HighlightUnet
-from camkit.models_def.networks.thesis.layers import InstanceNorm
+from camkit.models_def.kinds.hdr.thesis.highlight import HighlightConfig, HighlightUnet
+from camkit.models_def.kinds.hdr.thesis.layers import InstanceNorm
 
 NARROW = HighlightConfig(widths=(4, 6, 8))
 

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from camkit.errors import ContractError
-from camkit.models_def.networks.thesis.fusion import FusionConfig, FusionNetwork
+from camkit.models_def.kinds.hdr.thesis.fusion import FusionConfig, FusionNetwork
 
 NARROW = FusionConfig(width=4, merged=4)
 

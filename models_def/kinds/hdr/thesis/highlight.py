@@ -22,7 +22,7 @@ import torch
 from torch import Tensor, nn
 
 from camkit.errors import ContractError
-from camkit.models_def.networks.thesis.layers import InstanceNorm, active, clip, conv
+from camkit.models_def.kinds.hdr.thesis.layers import InstanceNorm, active, clip, conv
 
 MOST_LIGHT: Final = 256.0
 """2^8; lights are clipped to 1..2^8."""

@@ -2,10 +2,10 @@
 
 import torch
 
-from camkit.models_def.networks.thesis.chain import ThesisChain, saturated
-from camkit.models_def.networks.thesis.fusion import FusionConfig
-from camkit.models_def.networks.thesis.highlight import HighlightConfig
-from camkit.models_def.networks.thesis.splitting import SplittingConfig
+from camkit.models_def.kinds.hdr.thesis.chain import ThesisChain, saturated
+from camkit.models_def.kinds.hdr.thesis.fusion import FusionConfig
+from camkit.models_def.kinds.hdr.thesis.highlight import HighlightConfig
+from camkit.models_def.kinds.hdr.thesis.splitting import SplittingConfig
 
 
 def small_chain():

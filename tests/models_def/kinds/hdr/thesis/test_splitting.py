@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from camkit.errors import ContractError
-from camkit.models_def.networks.thesis.splitting import SplittingConfig, SplittingNetwork
+from camkit.models_def.kinds.hdr.thesis.splitting import SplittingConfig, SplittingNetwork
 
 NARROW = {"width": 6, "dilations": (1, 2), "vgg_widths": (4, 6, 8, 8, 8)}
 
