@@ -17,6 +17,8 @@ A file here is a command; a folder holds what commands are made of.
     stage_profile       where the time of a photograph goes
     measure             time, tiling and RAW files of docs/results/measurements.md
     build_glass         the glass catalogues, from their sources
+    evidence            two checkouts compared: hashes of all they compute, seconds
+    weight              refuses bundles that change under one version, checkpoints, big pictures
     coverage_gate       refuses a test run that covers too little
     rooms               modules that know one camera only, and lines of code
 
