@@ -69,7 +69,7 @@ def tolerance(
     run = ToleranceRun(
         copies=samples, seed=seed, pictures=data, pitch_um=pitch_um, noise=noise, rays=rays
     )
-    with working("judging copies", unit="copies") as task:
+    with working("judging Monte-Carlo samples", unit="samples") as task:
         result = run_tolerance(lens, _tolerances(file, errors), run, task.count)
     written = () if folder is None else write_tolerance(result, folder, file.stem)
     if json_:
