@@ -1,6 +1,5 @@
 """Torch checkpoint to bundle, in the order of the work.
 
-    frozen_norms    norms that look at a picture become constants, before
     golden_cases    small captures of known scenes
     folding         its nodes in the form that costs least
     onnx_graph      a network becomes ONNX, held against torch
