@@ -34,8 +34,8 @@ from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.search.problem import Problem
 from camkit.models_def.optics.search.splat import Pixels
 from camkit.models_def.optics.search.variables import FreeLens
+from camkit.models_def.training.losses import ssim
 from camkit.models_def.training.pictures import SceneSource, open_source
-from camkit.models_def.training.similarity import ssim
 from camkit.units import to_degrees
 from tools.tables.journal import Entry, digest
 from tools.tables.lenses.lens_at_rest import Seen, at_rest, at_work, window_of

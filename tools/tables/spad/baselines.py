@@ -39,6 +39,7 @@ from camkit.errors import CamkitError, ContractError, ParityError
 from camkit.export.assemble import LICENCE, PACKAGES
 from camkit.export.card import card_text
 from camkit.export.network_facts import ExportedNetwork, draft_network, measure_network
+from camkit.export.proving import write_proved
 from camkit.models_def.kinds.spad.counting import Exposure
 from camkit.models_def.kinds.spad.evaluation import evaluate, read_set
 from camkit.models_def.kinds.spad.recipe import SpadRecipe
@@ -48,8 +49,6 @@ from camkit.models_def.kinds.spad.training import PART, sampling_of
 from camkit.models_def.training.checkpoint import load_network, read_checkpoint, recipe_of
 from camkit.report.kinds.spad.ways import BASELINES
 from camkit.runtime.kinds.spad.proving import PROVING
-from camkit.runtime.output.part_file import atomic_output
-from camkit.runtime.proof.check import check_bundle
 from camkit.scenes import procedural_scene
 from tools.tables.equal_training import checkpoint_of, finished
 from tools.tables.rows import chosen_trainings
@@ -163,12 +162,7 @@ def write_baselines(
         manifest, members = _manifest(found, networks), _members(networks)
         bundle = write_bundle(first, manifest, members)
         members[CARD] = card_text(bundle, {}).encode()
-        write_bundle(first, manifest, members)
-        report = check_bundle(first, run=PROVING.run, without=("laws",))
-    if not report.passed:
-        raise ParityError("the bundle fails its own check: " + "; ".join(report.lines()))
-    with atomic_output(out) as part:
-        write_bundle(part, manifest, members)
+    _, report = write_proved(out, manifest, members)
     losses = [
         f"{role}: rounding costs {one.loss_db:.4f} dB at worst" for role, one in found.items()
     ]
