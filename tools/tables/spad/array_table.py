@@ -221,10 +221,6 @@ def _options(measure: ArgumentParser) -> None:
     more("--rows", nargs="+", metavar="ROW", help=f"of {', '.join(row.key for row in ROWS)}")
 
 
-def _train_options(train: ArgumentParser) -> None:
-    train.add_argument("--valid", type=Path, help="pictures to choose by")
-
-
 TABLE: Final = Table(
     description=__doc__,
     rows=lambda _: ROWS,
