@@ -163,7 +163,7 @@ def _changed(manifest: Manifest, changes: Sequence[Change]) -> Manifest:
 
 
 def main() -> None:
-    """Repack what the command line names."""
+    """Write anew what the command line names."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("old", type=Path)
     parser.add_argument("-o", "--out", type=Path, required=True)
