@@ -11,7 +11,7 @@ SOURCES := camkit runtime export models_def tests tools setup.py
 
 demo: $(RUNTIME_STAMP)  ## main job on the demo capture, runtime only (no torch)
 	@echo "1 of 2: a night scene with streak-hdr, on the way to out/night.png (about ten seconds)"
-	$(VENV)/bin/python -m tools.hdr.gallery --out-dir out
+	$(VENV)/bin/python -m tools.hdr.night_gallery --out-dir out
 	@echo "2 of 2: two scenes with duet, photographed, planned, restored, compared (about a minute)"
 	$(VENV)/bin/python -m tools.demo --out-dir out
 

@@ -7,5 +7,5 @@
     training/                  samples, trainer, validation
     toml_table, torch_file     what people wrote, what torch wrote, checked
 
-`models_def` and `runtime` never import each other.
+Design time calls the runtime where no gradient is needed; the runtime never imports design time.
 """

@@ -31,7 +31,7 @@ Status = Literal["ok", "failed", "skipped"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WriteOptions:
-    """Where and how pictures are written.
+    """The place and the format of pictures.
 
     Attributes:
         out_dir: Folder of pictures and sidecars, made if needed.
@@ -97,7 +97,7 @@ class WriteOptions:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FileResult:
-    """What became of one input.
+    """The result of one input.
 
     Attributes:
         input: The capture.
@@ -192,7 +192,7 @@ def develop_file(
     progress: Progress | None = None,
     cancel: Cancel | None = None,
 ) -> FileResult:
-    """Turn one capture into a picture and a sidecar; either both appear or neither changes.
+    """Process one capture to a picture and a sidecar; either both appear or neither changes.
 
     Raises:
         DecodeError: If the capture cannot be read.
@@ -277,7 +277,7 @@ def identity_of(
     write: WriteOptions,
     mosaic: MosaicOptions | None,
 ) -> dict[str, Any]:
-    """Return what decides the bytes of a picture or of products, as plain JSON values."""
+    """Return the values that decide the bytes of a picture or of products, as JSON values."""
     from camkit import __version__
 
     free = ("threads", "max_mem_bytes", "tile_px")
@@ -336,5 +336,5 @@ def _write_picture(
 
 
 def bundle_name(pipeline: Pipeline) -> str | None:
-    """Name the bundle in use; None without one."""
+    """Return the name of the bundle in use; None without one."""
     return None if pipeline.bundle is None else pipeline.bundle.manifest.name

@@ -1,4 +1,4 @@
-"""What the runtime knows of a kind of camera: how its captures are read, and its digital twin.
+"""The runtime part of a kind of camera: the reader of its captures, and its digital twin.
 
 A kind's part of the runtime (`camkit.runtime.kinds.NAME`, or the `runtime` of its own package)
 defines `PART`, a `RuntimePart`.
@@ -73,11 +73,11 @@ class RuntimePart:
     maker: Maker | None = None
     proving: Proving | None = None
     recording: Recording | None = None
-    laws: str = "camkit.runtime.proof.laws.pictures"
+    laws: str = "camkit.runtime.proof.laws.photographs"
 
 
 def runtime_part(kind: str) -> RuntimePart:
-    """Return what the runtime knows of a kind.
+    """Return the runtime part of a kind.
 
     Raises:
         UnsupportedError: If there is no such kind, or the runtime knows nothing of it.
@@ -91,7 +91,7 @@ def runtime_part(kind: str) -> RuntimePart:
 
 
 def part_of(manifest: Manifest) -> RuntimePart:
-    """Return what the runtime knows of the kind of a bundle.
+    """Return the runtime part of the kind of a bundle.
 
     Raises:
         BundleError: If that kind cannot be used here; says why.

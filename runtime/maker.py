@@ -1,4 +1,4 @@
-"""What becomes of captures that are no photographs: products, made whole and written together.
+"""Products of captures that are no photographs, made whole and written together.
 
     file -> Maker.make -> Made: arrays by name, and who writes each file
 
@@ -49,7 +49,7 @@ class Making:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Made:
-    """What was made of one capture.
+    """The products of one capture.
 
     Attributes:
         arrays: The products by name.
@@ -102,7 +102,7 @@ def _stem(path: Path) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Maker:
-    """How a kind of camera makes its products.
+    """The maker of products of a kind of camera.
 
     Attributes:
         make: A capture -> its products.
@@ -154,7 +154,7 @@ class Maker:
             )
 
     def names(self, source: Path, options: Options, format_: str | None) -> tuple[str, ...]:
-        """Name all files that may appear of a capture, the main one first.
+        """Return all files that may appear of a capture, the main one first.
 
         Raises:
             ContractError: If the format is none of this kind.

@@ -52,7 +52,7 @@ from camkit.runtime.stage_finder import check_stages
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Picture:
-    """What became of one capture.
+    """The result of one capture.
 
     Attributes:
         image: (3, h, w) float32, linear, in the colour space asked for (Rec.709 by default), in
@@ -72,7 +72,7 @@ class Picture:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Summary:
-    """What became of a capture whose bands went to a callback.
+    """The result of a capture whose bands went to a callback.
 
     Attributes:
         shape: (3, h, w) of the picture.
@@ -102,7 +102,7 @@ class Pipeline:
     """
 
     def __init__(self, bundle: Bundle | None, options: Options, kind: Kind | None = None) -> None:
-        """Make ready what captures will need.
+        """Prepare the work that captures share.
 
         Args:
             bundle: The camera; None develops only.
@@ -478,7 +478,7 @@ def load(
     options: Options | None = None,
     **choices: Unpack[LoadKeywords],
 ) -> Pipeline:
-    """Open a bundle and make it ready.
+    """Open a bundle and prepare it for captures.
 
     Args:
         bundle: Name of a built-in bundle, path of a bundle file, or None to develop only.

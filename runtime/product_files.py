@@ -23,7 +23,7 @@ def make_file(
     progress: Progress | None = None,
     cancel: Cancel | None = None,
 ) -> FileResult:
-    """Turn one capture into its products and a sidecar; either all appear or nothing changes.
+    """Process one capture to its products and a sidecar; all appear or nothing changes.
 
     Args:
         source: The capture.

@@ -1,4 +1,7 @@
-"""Where the work of a stage is found: the module of its name in `camkit.runtime.stages`.
+"""The finder of the module that does the work of a stage.
+
+It is the one that the stage names as its `runtime`, else that of its type in
+`camkit.runtime.stages`.
 
 A module defines
 
@@ -14,14 +17,14 @@ A module defines
 """
 
 import importlib
-import pkgutil
 from collections.abc import Sequence
 from functools import cache
 from types import ModuleType
 from typing import Final
 
 from camkit.bundle.manifest import Manifest
-from camkit.bundle.stages import Stage
+from camkit.bundle.stages import Stage, StageEntry, all_stages, find_stage, type_of
+from camkit.entry_points import has_module
 from camkit.errors import UnsupportedError
 
 STAGES: Final = "camkit.runtime.stages"
@@ -33,15 +36,17 @@ def stage_module(name: str) -> ModuleType:
     """Return the module of a stage.
 
     Raises:
-        UnsupportedError: If this runtime has none.
+        UnsupportedError: If there is no such stage, or this runtime does not do it.
+        ContractError: If a package brings what is none.
     """
-    places = importlib.import_module(STAGES).__path__
-    known = {module.name for module in pkgutil.iter_modules(places)}
-    if name not in known:
-        raise UnsupportedError(
-            f"this runtime has no stage {name!r}; it has {', '.join(sorted(known))}"
-        )
-    return importlib.import_module(f"{STAGES}.{name}")
+    module = _module_name(find_stage(name))
+    if not has_module(module):
+        raise UnsupportedError(f"the stage {name!r} is not walked: there is no module {module}")
+    return importlib.import_module(module)
+
+
+def _module_name(entry: type[StageEntry]) -> str:
+    return entry.runtime or f"{STAGES}.{type_of(entry)}"
 
 
 def check_stages(manifest: Manifest, max_bytes: int) -> None:
@@ -62,7 +67,7 @@ def check_stages(manifest: Manifest, max_bytes: int) -> None:
 
 
 def known_facts(stages: Sequence[Stage]) -> tuple[str, ...]:
-    """Name the facts of a camera body that some stages know."""
+    """Return the facts of a camera body that some stages know."""
     return tuple(
         dict.fromkeys(
             fact for stage in stages for fact in getattr(stage_module(stage.type), "FACTS", ())
@@ -71,7 +76,7 @@ def known_facts(stages: Sequence[Stage]) -> tuple[str, ...]:
 
 
 def stage_keys(stages: Sequence[Stage]) -> tuple[str, ...]:
-    """Name every stage for people and clocks: its type, and its role or number among twins."""
+    """Return a name of every stage for people and clocks: its type, and its role or number."""
     types: list[str] = [stage.type for stage in stages]
     roles = [(stage.type, getattr(stage, "role", None)) for stage in stages]
     keys: list[str] = []
@@ -86,7 +91,7 @@ def stage_keys(stages: Sequence[Stage]) -> tuple[str, ...]:
 
 
 def methods_of(stages: Sequence[Stage]) -> tuple[str, ...]:
-    """Name the ways of the stages, as `--method` takes them; those of the last stage first."""
+    """Return the ways of the stages, as `--method` takes them; those of the last stage first."""
     return tuple(
         dict.fromkeys(
             method for stage in reversed(stages) for method in stage_module(stage.type).METHODS
@@ -95,7 +100,6 @@ def methods_of(stages: Sequence[Stage]) -> tuple[str, ...]:
 
 
 def all_methods() -> tuple[str, ...]:
-    """Name the ways of every stage of this runtime, whatever a bundle lists."""
-    places = importlib.import_module(STAGES).__path__
-    names = sorted(module.name for module in pkgutil.iter_modules(places))
+    """Return the ways of every stage of this runtime, whatever a bundle lists."""
+    names = sorted(type_of(entry) for entry in all_stages() if has_module(_module_name(entry)))
     return tuple(dict.fromkeys(m for name in names for m in stage_module(name).METHODS))

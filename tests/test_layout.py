@@ -17,11 +17,9 @@ ASK = (
 )
 SHIPPED = ("camkit", "runtime", "export", "models_def")
 FOUND_BY_PLACE = (
-    "camkit.report.bench.rows",
     "camkit.report.bench.metrics",
     "camkit.report.stress.scenarios",
     "camkit.report.kinds",
-    "camkit.export.kinds",
     "camkit.models_def.kinds",
     "camkit.runtime.kinds",
     "camkit.runtime.plan.rules",

@@ -25,7 +25,7 @@ WITH_A_BUNDLE: Final = frozenset({"force_bundle"})
 
 
 def known_options(stages: Sequence[Stage]) -> frozenset[str]:
-    """Name the options that mean something to some stages."""
+    """Return the names of the options that some stages use."""
     return GENERAL.union(*(stage_module(stage.type).OPTIONS for stage in stages))
 
 

@@ -39,7 +39,7 @@ Gains = tuple[float, ...]
 
 
 class Job:
-    """What is known of one capture.
+    """The facts of one capture.
 
     Attributes:
         setup: What it shares with others.

@@ -1,4 +1,4 @@
-"""What all captures of a pipeline share."""
+"""The setup that all captures of a pipeline share."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from camkit.bundle.stages import Color, Demosaic, Linearise, RaiseClipped, Stage
 from camkit.errors import ContractError
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.options import Options
-from camkit.runtime.plan.laws import bounded_stages
+from camkit.runtime.plan.bounded_networks import bounded_stages
 from camkit.runtime.plan.speed import Speed
 
 DEVELOPMENT: Final[tuple[Stage, ...]] = (
@@ -24,7 +24,7 @@ DEVELOPMENT: Final[tuple[Stage, ...]] = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setup:
-    """What all captures of a pipeline share.
+    """The setup that all captures of a pipeline share.
 
     Attributes:
         bundle: The camera; None develops only.

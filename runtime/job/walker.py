@@ -41,7 +41,7 @@ class Walk:
     """
 
     def __init__(self, job: Job, *, before: int | None = None) -> None:
-        """Make every stage ready; what was not planned yet is done by `settle`.
+        """Prepare every stage; `settle` does what was not planned yet.
 
         Args:
             job: The capture.
@@ -175,7 +175,7 @@ class Walk:
         return needed[::-1]
 
     def _taken(self, number: int) -> tuple[str, ...]:
-        """Name the planes that a stage takes; those that stand in for what is left out."""
+        """Return the names of the planes that a stage takes; stand-ins for what is left out."""
         return tuple(self._instead.get(name, name) for name in self.stages[number].takes)
 
 

@@ -1,4 +1,4 @@
-"""How a bundle of a kind proves itself whose captures are no photographs.
+"""The self-test of bundles of a kind whose captures are no photographs.
 
 A kind that has a `Maker` of products has no picture that stages make band by band, so its golden
 cases are taken and made again by the kind itself: its part of the runtime holds a `Proving`.
@@ -37,7 +37,7 @@ GoldenRun = Callable[[Bundle, GoldenCase, GoldenArrays, str | None], CaseWork]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proving:
-    """How a kind proves its bundles.
+    """The self-test of a kind's bundles.
 
     Attributes:
         cases: Takes the golden captures with the camera of a bundle, outputs still missing.

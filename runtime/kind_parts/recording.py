@@ -19,7 +19,7 @@ from camkit.errors import ContractError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordingOptions:
-    """How a scene is recorded.
+    """The options of recording a scene.
 
     Attributes:
         photons: That are counted, whatever the sensor's detection efficiency: of a pixel that sees
@@ -57,7 +57,7 @@ class Recorded:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recording:
-    """How a kind simulates captures.
+    """The simulation of a kind's captures.
 
     Attributes:
         suffixes: Of the files that can be written, with their dots.

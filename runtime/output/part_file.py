@@ -6,7 +6,7 @@ Every writer has a part file of its own, so two processes never write into one a
 import hashlib
 import os
 import secrets
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
@@ -47,14 +47,14 @@ def _part_prefix(path: Path) -> str:
 
 @contextmanager
 def atomic_output(path: Path) -> Iterator[Path]:
-    """Return the path to write one file to; see `atomic_outputs`."""
+    """Yield the path to write one file to; see `atomic_outputs`."""
     with atomic_outputs(path) as (part,):
         yield part
 
 
 @contextmanager
 def atomic_outputs(*paths: Path) -> Iterator[tuple[Path, ...]]:
-    """Return the paths to write to; the files take their real names when the block ends well.
+    """Yield the paths to write to; the files take their real names when the block ends well.
 
     The content is on the disk before the names are, so that even after a power cut no name stands
     for half a file. When the block raises, or one of the files cannot take its name, nothing new
@@ -78,8 +78,24 @@ def atomic_outputs(*paths: Path) -> Iterator[tuple[Path, ...]]:
             part.unlink(missing_ok=True)
 
 
+def write_together(files: Mapping[Path, bytes]) -> None:
+    """Write files into folders that are made if they are not there; all of them or none.
+
+    Args:
+        files: Path -> content, in the order in which they appear.
+
+    Raises:
+        OSError: If one cannot be written.
+    """
+    for path in files:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_outputs(*files) as parts:
+        for part, data in zip(parts, files.values(), strict=True):
+            part.write_bytes(data)
+
+
 def _rename(parts: Sequence[Path], paths: Sequence[Path]) -> None:
-    """Return every part its name, or none."""
+    """Rename every part, or none."""
     older: list[tuple[Path, Path | None]] = []
     try:
         for part, path in zip(parts, paths, strict=True):
@@ -102,7 +118,7 @@ def _rename(parts: Sequence[Path], paths: Sequence[Path]) -> None:
 
 
 def _kept(path: Path) -> Path | None:
-    """Keep an older file under a second name; None if there is none to replace."""
+    """Link an older file under a second name; None if there is none to replace."""
     if not path.is_file():
         return None
     kept = part_path(path)

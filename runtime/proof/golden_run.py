@@ -12,7 +12,7 @@ from camkit.runtime.pipeline import Pipeline
 
 
 def case_work(bundle: Bundle, case: GoldenCase, arrays: GoldenArrays, size: str | None) -> CaseWork:
-    """Make ready what becomes of a golden capture, on one thread.
+    """Prepare the processing of a golden capture, on one thread.
 
     Args:
         bundle: The bundle; its graphs are checked when the pipeline is made.

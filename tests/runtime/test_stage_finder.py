@@ -2,12 +2,12 @@
 
 import inspect
 from pathlib import Path
-from typing import get_args
 
 import pytest
 
 from camkit.bundle import stages as entries
-from camkit.bundle.stages import Linearise, Network, Stage, Wiener
+from camkit.bundle.stages import Linearise, Network, Wiener
+from camkit.bundle.stages.register import BUILT_IN, type_of
 from camkit.errors import UnsupportedError
 from camkit.kinds import KINDS
 from camkit.runtime import stages
@@ -16,10 +16,9 @@ from camkit.runtime.options import Options
 from camkit.runtime.stage_finder import methods_of, stage_keys, stage_module
 from tests.bundle_factory import tiny_stages
 
-UNION = get_args(Stage)[0]
 MADE = {stage for kind in KINDS.values() if runtime_part(kind.name).maker for stage in kind.stages}
 """Stages of kinds that make products: the kind does them, nobody walks them."""
-TYPES = sorted({entry.model_fields["type"].default for entry in get_args(UNION)} - MADE)
+TYPES = sorted({type_of(entry) for entry in BUILT_IN} - MADE)
 
 
 @pytest.mark.parametrize("name", TYPES)
@@ -35,9 +34,11 @@ def test_every_stage_that_a_bundle_may_list_has_a_module_that_says_all(name: str
 
 
 def test_there_are_no_modules_that_no_bundle_can_list() -> None:
-    there = {path.stem for path in Path(stages.__path__[0]).glob("*.py")} - {"__init__"}
+    runtime = Path(stages.__path__[0]).parent
+    rooms = [runtime / "stages", *runtime.glob("kinds/*/stages")]
+    there = {path.stem for room in rooms for path in room.glob("*.py")} - {"__init__"}
     assert there == set(TYPES)
-    assert set(entries.__all__) >= {entry.__name__ for entry in get_args(UNION)}
+    assert set(entries.__all__) >= {entry.__name__ for entry in BUILT_IN}
 
 
 def test_no_two_stages_have_a_method_of_one_name_and_few_options_are_shared() -> None:
@@ -48,22 +49,9 @@ def test_no_two_stages_have_a_method_of_one_name_and_few_options_are_shared() ->
 
 def test_a_stage_without_a_module_is_refused_with_those_there_are() -> None:
     with pytest.raises(
-        UnsupportedError, match=r"no stage 'dream'; it has color, deglare, demosaic"
+        UnsupportedError, match=r"brings the stage 'dream'; there are: color, correct, deglare"
     ):
         stage_module("dream")
-
-
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Give a folder whose modules are stages too."""
-    monkeypatch.setattr(stages, "__path__", [*stages.__path__, str(tmp_path)])
-    return tmp_path
-
-
-def test_a_new_file_is_a_new_stage(folder: Path) -> None:
-    (folder / "dream.py").write_text("METHODS = ('dream',)\n", encoding="utf-8")
-    assert stage_module("dream").METHODS == ("dream",)
-    stage_module.cache_clear()
 
 
 def test_stages_are_named_by_type_and_twins_by_role_or_number() -> None:

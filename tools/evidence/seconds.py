@@ -2,7 +2,6 @@
 
 import statistics
 import tempfile
-from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Final
@@ -30,31 +29,25 @@ def compare_seconds(roots: tuple[Path, Path], bundles: list[str] | None, rounds:
         print(f"median seconds of {rounds} rounds: A {first.commit}, B {second.commit}")
         print(f"{'':<28}{'A':>9}{'B':>9}{'B / A':>9}")
         ratios = []
-        starts = [
-            (first.command(list(START))[1], second.command(list(START))[1]) for _ in range(rounds)
-        ]
+        starts = [[c.command(list(START))[1] for c in (first, second)] for _ in range(rounds)]
         ratios.append(_told("camkit " + " ".join(START), starts))
         for bundle in bundles or sorted({*first.bundles} & {*second.bundles}):
             for capture in simulate_captures(first, bundle)[0]:
                 words = {**job_of(bundle, capture, {}), "planned": False}
-                if pairs := list(_pairs(workers, words, rounds)):
+                pairs = []
+                for number in range(rounds + 1):
+                    order = workers[:: 1 if number % 2 else -1]
+                    told: dict[int, Any] = {
+                        id(worker): worker.ask(words).get("seconds") for worker in order
+                    }
+                    if number and None not in told.values():  # the first round warms up
+                        pairs.append([told[id(worker)] for worker in workers])
+                if pairs:
                     ratios.append(_told(f"{bundle} {capture.name}", pairs))
         print(f"median ratio B / A: {statistics.median(ratios):.3f}")
 
 
-def _pairs(
-    workers: list[Worker], words: dict[str, Any], rounds: int
-) -> Iterator[tuple[float, float]]:
-    """Yield the seconds of two workers for a job, round by round, after one that warms up."""
-    for number in range(rounds + 1):
-        order = workers[:: 1 if number % 2 else -1]
-        seconds = {id(worker): worker.ask(words).get("seconds") for worker in order}
-        first, second = (seconds[id(worker)] for worker in workers)
-        if number and first is not None and second is not None:
-            yield first, second
-
-
-def _told(name: str, pairs: list[tuple[float, float]]) -> float:
+def _told(name: str, pairs: list[list[float]]) -> float:
     """Print the medians of pairs of seconds; return the median of their ratios."""
     first, second = (statistics.median(some) for some in zip(*pairs, strict=True))
     ratio = statistics.median(b / a for a, b in pairs)

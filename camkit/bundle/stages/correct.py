@@ -9,7 +9,7 @@ from camkit.bundle.stages.entry import Parts, StageEntry, need_count, need_domai
 
 
 class Correct(StageEntry):
-    """What an array counted, as one without dark counts and blind times would have (format 2.3)."""
+    """Counts as those of an array without dark counts and dead time (format 2.3)."""
 
     type: Literal["correct"] = "correct"
     takes: tuple[Word, ...] = ("capture",)

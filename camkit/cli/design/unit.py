@@ -1,4 +1,4 @@
-"""`camkit freeze --unit`: captures of a target to what is known of the camera body that took them.
+"""`camkit freeze --unit`: captures of a target to the facts about the camera body that took them.
 
 OPTICS a bundle: its kernels, of its nominal and its moved sensor
 OPTICS a lens:   traced with the sensor moved (needs torch)
@@ -13,8 +13,8 @@ from camkit.errors import ContractError, UnsupportedError
 from camkit.progress import working
 
 if TYPE_CHECKING:
+    from camkit.calibration.focus import EdgeCamera
     from camkit.models_def.optics.optics import Optics
-    from camkit.runtime.calibration.focus import EdgeCamera
 
 AUTO: Final = "auto"
 STEPS: Final = (-1.0, -0.5, 0.5, 1.0)
@@ -23,7 +23,7 @@ LEAST_ENERGY: Final = 0.9
 UNIT_SUFFIX: Final = ".toml"
 
 
-@working("measuring the focus of a unit")
+@working("measuring the focus of a camera body")
 def measure_unit(
     optics: Path,
     captures: list[Path],
@@ -32,19 +32,19 @@ def measure_unit(
     depths_mm: tuple[float, ...],
     focus_um: str | None,
 ) -> dict[str, Any]:
-    """Measure a unit and write it; give what was found.
+    """Measure a camera body and write its file; return the measured focus.
 
     Raises:
         ContractError: If there is no capture, the names are wrong, or nothing can be measured.
     """
     if out.suffix.lower() != UNIT_SUFFIX:
-        raise ContractError(f"a unit is TOML; expected a name in {UNIT_SUFFIX}, got {out}")
+        raise ContractError(f"a camera body is TOML; expected a name in {UNIT_SUFFIX}, got {out}")
     if not captures:
         raise ContractError("--unit needs captures of a target: camkit freeze OPTICS --unit FILES")
     if len(depths_mm) > 1:
         raise ContractError("the target lies at one distance: give one with --depths-mm")
     from camkit.bundle.reader import SUFFIX
-    from camkit.runtime.calibration.focus import measure_focus
+    from camkit.calibration.focus import measure_focus
     from camkit.runtime.output.part_file import atomic_output
     from camkit.runtime.raw import read_capture
     from camkit.runtime.unit import format_unit
@@ -64,7 +64,7 @@ def measure_unit(
 
 
 def focus_range_um(optics: "Optics", text: str | None) -> float:
-    """Read --focus-um: a number > 0, or `auto` for what the copies of a lens need; 0 for none.
+    """Read --focus-um: a number > 0, or `auto` for the range of a lens's copies; 0 for none.
 
     Raises:
         ContractError: If it is neither.
@@ -76,7 +76,9 @@ def focus_range_um(optics: "Optics", text: str | None) -> float:
         from camkit.models_def.optics.lens_optics import LensOptics
 
         if not isinstance(optics, LensOptics):
-            raise UnsupportedError("only of a lens it is known how its copies differ in focus")
+            raise UnsupportedError(
+                "auto needs a lens, whose fabricated samples differ in focus; give a number in um"
+            )
         return optics.focus_range_um()
     try:
         found = float(text)
@@ -88,9 +90,9 @@ def focus_range_um(optics: "Optics", text: str | None) -> float:
 
 
 def _of_bundle(path: Path, depths_mm: tuple[float, ...]) -> "tuple[EdgeCamera, dict[str, str]]":
-    """Return the camera of a bundle, and how a unit names it: by its lens where it says that."""
+    """Return the camera of a bundle, and its name in a unit file: that of its lens where stated."""
     from camkit.bundle.reader import PRESCRIPTION, open_bundle
-    from camkit.runtime.calibration.focus import EdgeCamera
+    from camkit.calibration.focus import EdgeCamera
     from camkit.runtime.unit import lens_hash
 
     bundle = open_bundle(path)
@@ -112,18 +114,18 @@ def _of_lens(
 
     require_torch("camkit freeze")
     from camkit.bundle.sensor import ColorSensor
+    from camkit.calibration.focus import EdgeCamera
     from camkit.models_def.optics.frozen import FreezeGrid, freeze, with_focus
     from camkit.models_def.optics.lens_optics import LensOptics
     from camkit.models_def.optics.optics_file import read_optics
     from camkit.models_def.optics.prescription import format_prescription
     from camkit.models_def.training.kind import read_recipe
-    from camkit.runtime.calibration.focus import EdgeCamera
     from camkit.runtime.unit import lens_hash
 
     lens = read_optics(path)
     if not isinstance(lens, LensOptics):
         raise UnsupportedError(
-            f"a unit is measured with a lens or a bundle; {path.name} is neither"
+            f"a camera body is measured with a lens or a bundle; {path.name} is neither"
         )
     sensor = read_recipe(recipe).sensor
     if not isinstance(sensor, ColorSensor):

@@ -150,7 +150,7 @@ def bench(
 
 
 def _cameras() -> list[str]:
-    """Name the built-in bundles that photograph and state a sensor's size."""
+    """Return the names of the built-in bundles that photograph and state a sensor's size."""
     from camkit.bundle.reader import built_in_bundles, open_bundle
     from camkit.report.bench.part import BenchPart
     from camkit.report.kind_finder import find_part
@@ -166,7 +166,7 @@ def _cameras() -> list[str]:
 
 def _run(settings: "Settings", out_dir: Path, *, as_json: bool) -> None:
     from camkit.report.bench.output import write_bench
-    from camkit.report.bench.own.table import own_lines
+    from camkit.report.bench.own_rows import own_lines
     from camkit.report.bench.run import run_bench
 
     with working("preparing") as task:

@@ -7,18 +7,33 @@ photographs, and it measures itself.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.reader import Bundle
 from camkit.contracts import FloatArray
-from camkit.errors import UnsupportedError
 from camkit.report.bench.metric import Metric
-from camkit.report.bench.row_maker import RowMaker
-from camkit.report.bench.trial import Skip
-from camkit.report.quality import FIELD_SHARES, Exposed, Shot
+from camkit.report.bench.trial import Axes, Entrant, Ground, Skip, Trial
+from camkit.report.quality import FIELD_SHARES, Exposed, Shot, expose
 
 Tell = Callable[[str], None]
+MakeTrials = Callable[[Entrant, Axes, Ground], tuple[list[Trial], list[Skip]]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RowMaker:
+    """Makes the rows of one sort, as trials that are not measured yet.
+
+    Attributes:
+        name: Stands under `kind` in its rows.
+        methods: Names that `--methods` takes for it.
+        trials: Gives the trials of a bundle, and what was asked for but cannot be measured; called
+            only if one of its methods is wanted.
+    """
+
+    name: str
+    methods: tuple[str, ...]
+    trials: MakeTrials
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,13 +73,9 @@ class OwnRows:
 Measure = Callable[[Bundle, OwnSettings, Tell], OwnRows]
 
 
-def _no_photograph(*_: object) -> NoReturn:
-    raise UnsupportedError("captures of this kind are no photographs; it measures itself")
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BenchPart:
-    """A kind of camera in the bench.
+    """A kind of camera in the bench; as it is, one whose captures are photographs.
 
     Attributes:
         photograph: (place and noise, sharp picture (3, h, w), bundle, lens) -> capture and truth.
@@ -77,7 +88,7 @@ class BenchPart:
         measure: Measures a bundle in place of all that; None for photographs.
     """
 
-    photograph: Callable[[Shot, FloatArray, Bundle, FrozenOptics], Exposed] = _no_photograph
+    photograph: Callable[[Shot, FloatArray, Bundle, FrozenOptics], Exposed] = expose
     positions: tuple[int, ...] = tuple(range(len(FIELD_SHARES)))
     isos: tuple[float, ...] = (100.0, 1600.0)
     rows: tuple[RowMaker, ...] = ()

@@ -1,4 +1,4 @@
-"""What counts of single photons tell: pulses, banks of them, fits and their bounds; products.
+"""Captures of single photons: pulses, banks of them, fits and their bounds; products.
 
 files          readers of captures
 timing         what is known of their times

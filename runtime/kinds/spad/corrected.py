@@ -37,7 +37,7 @@ class CorrectedRows:
     def __init__(
         self, file: CountsFile, axis: TimeAxis | None, *, cycles: int, stamp_ps: float
     ) -> None:
-        """Look at a file.
+        """Store a file and its axis.
 
         Args:
             file: Open.

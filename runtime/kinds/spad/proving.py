@@ -46,7 +46,7 @@ ISO: Final = 100.0
 
 
 def golden_cases(bundle: Bundle) -> Cases:
-    """Take the golden captures with the array of a bundle."""
+    """Record the golden captures with the array of a bundle."""
     camera = FineCamera.of(bundle)
     cases = {
         name: _counted(camera, name, photons, seed) for name, (photons, seed) in LIGHTS.items()
@@ -57,7 +57,7 @@ def golden_cases(bundle: Bundle) -> Cases:
 
 
 def products_of(arrays: GoldenArrays) -> tuple[str, ...]:
-    """Name the products that can be made of a golden capture."""
+    """Return the names of the products that can be made of a golden capture."""
     return (IMAGE,) if arrays.capture.ndim == 2 else (DEPTH,)
 
 
@@ -173,7 +173,7 @@ class SpadWork:
 
 
 def case_work(bundle: Bundle, case: GoldenCase, arrays: GoldenArrays, size: str | None) -> SpadWork:
-    """Make ready what becomes of a golden capture.
+    """Prepare the processing of a golden capture.
 
     Raises:
         BundleError: If the bundle makes no picture of photons finer.

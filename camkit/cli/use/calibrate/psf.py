@@ -15,8 +15,8 @@ from camkit.cli.use.mosaic import BlackLevel, MosaicCfa, WhiteLevel, mosaic_opti
 from camkit.errors import ContractError
 
 if TYPE_CHECKING:
-    from camkit.runtime.calibration.dots import SeenDots
-    from camkit.runtime.calibration.measured import MeasuredPsf
+    from camkit.calibration.dots import SeenDots
+    from camkit.calibration.measured import MeasuredPsf
     from camkit.runtime.merging.survey import Survey
 
 
@@ -77,13 +77,13 @@ def psf(
     check_page(page, overwrite=overwrite)
     _check_target(disc_px, dots, edge=edge)
     from camkit.bundle.psf_file import psf_to_bytes, read_psf
-    from camkit.runtime.calibration.darks import Darks
-    from camkit.runtime.calibration.dots import dots_psf
-    from camkit.runtime.calibration.edge_psf import measure_edge
-    from camkit.runtime.calibration.measured import PsfOptions
-    from camkit.runtime.calibration.psf import measure_psf
+    from camkit.calibration.darks import Darks
+    from camkit.calibration.dots import dots_psf
+    from camkit.calibration.edge_psf import measure_edge
+    from camkit.calibration.measured import PsfOptions
+    from camkit.calibration.psf import measure_psf
     from camkit.runtime.merging.survey import survey
-    from camkit.runtime.output.part_file import atomic_outputs
+    from camkit.runtime.output.part_file import write_together
 
     designed = None if dots is None else read_psf(dots)
     options = PsfOptions(
@@ -97,19 +97,15 @@ def psf(
     made, seen = (found.psf, None) if designed is None else dots_psf(found, designed)
     contents = {out: psf_to_bytes(made)}
     if page is not None:
-        from camkit.report.calibration.psf_page import psf_html
+        from camkit.report.pages.calibration.psf_page import psf_html
 
         contents[page] = psf_html(found).encode()
-    for path in contents:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    with atomic_outputs(*contents) as parts:
-        for part, content in zip(parts, contents.values(), strict=True):
-            part.write_bytes(content)
+    write_together(contents)
     _tell(contents, bracket, found, seen, as_json=json_)
 
 
 def _check_target(disc_px: float | None, dots: Path | None, *, edge: bool) -> None:
-    """Refuse a light that is two things.
+    """Refuse options of two kinds of light at once.
 
     Raises:
         ContractError: If it is.
@@ -123,7 +119,7 @@ def _check_target(disc_px: float | None, dots: Path | None, *, edge: bool) -> No
 def _times(
     text: str | None, files: list[Path], darks: list[Path]
 ) -> tuple[tuple[float, ...] | None, tuple[float, ...] | None]:
-    """Return the times of frames and dark frames, which a list may leave to their files."""
+    """Return the times of frames and dark frames; a list may omit those that files state."""
     if text is None:
         return None, None
     from camkit.runtime.merging.times import stated_times

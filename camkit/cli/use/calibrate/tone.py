@@ -29,13 +29,13 @@ def tone(
 ) -> None:
     """Measure the luminance of a display at each of its levels."""
     outputs = Outputs.asked(out, page, overwrite=overwrite, as_json=json_)
-    from camkit.runtime.calibration.tone import levels_of, measure_tone
+    from camkit.calibration.tone import levels_of, measure_tone
 
     said = mosaic_options(mosaic, black_level, white_level)
     found = measure_tone(files, levels_of(levels, len(files)), said)
 
     def shown() -> str:
-        from camkit.report.calibration.tone_page import tone_html
+        from camkit.report.pages.calibration.tone_page import tone_html
 
         return tone_html(found)
 

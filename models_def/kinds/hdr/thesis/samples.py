@@ -27,9 +27,9 @@ from camkit.models_def.kinds.hdr.material import HdrMaterial
 from camkit.models_def.kinds.hdr.recipe import HdrRecipe
 from camkit.models_def.kinds.hdr.samples import develop, draw_corner, spread_light
 from camkit.models_def.kinds.hdr.scenes import LightSource, exposed
+from camkit.models_def.kinds.hdr.thesis.chain import saturated
 from camkit.models_def.kinds.hdr.thesis.networks import to_roots
 from camkit.models_def.kinds.hdr.thesis.star import draw_angle_rad, star_kernel
-from camkit.models_def.networks.thesis.chain import saturated
 from camkit.models_def.sensors.exposure import expose
 from camkit.models_def.training.sample import Sample, SampleLayout
 from camkit.scenes.saturation import CEILING
@@ -46,7 +46,7 @@ PORTS: Final = {
 
 
 def layout_of(recipe: HdrRecipe, role: str) -> SampleLayout:
-    """Say what samples of a role hold; arms of a windshield stand upright, so it is not turned."""
+    """Return the layout of a role's samples; the arms of a windshield stand upright."""
     takes, gives = (tuple(Port(name=n, channels=3) for n in names) for names in PORTS[role])
     return SampleLayout(inputs=takes, outputs=gives, turned=recipe.thesis.optics != "glare")
 

@@ -32,7 +32,7 @@ from camkit.runtime.kinds.spad.sharpen import Sharpened, Sharpener, Way, times_p
 from camkit.runtime.kinds.spad.time_axis import TimeAxis
 
 SHARPER: Final = 20.0
-"""Times the photons of a bin at which the estimate is taken (`tools.spad.depth_sigma`)."""
+"""Times the photons of a bin of the estimate (`tools.spad.depth_sigma` at 2a55aa66)."""
 
 
 def _lit(coarse: Sharpened) -> float:
@@ -82,7 +82,7 @@ class FineSharpener:
         size: str | None = None,
         always: bool = False,
     ) -> None:
-        """Make the bank; errors as of `Sharpener`.
+        """Compute the bank; errors as of `Sharpener`.
 
         Args:
             camera: The array.

@@ -1,4 +1,4 @@
-"""What is written of counts: arrays first, and what people look at beside them.
+"""Products of counts: arrays first, and pictures for people beside them.
 
 settings   what the caller chose, with the timing file
 survey     an open capture with its axis and pulse: what every product begins with

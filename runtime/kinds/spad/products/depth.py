@@ -198,7 +198,7 @@ def _arrays(found: Sharpened, survey: Survey) -> dict[str, NDArray[Any]]:
 
 
 def _hot_places(found: Sharpened, scale: int) -> list[list[int]]:
-    """Name hot pixels of the array, (x, y)."""
+    """Return the hot pixels of the array, (x, y)."""
     return [[int(x), int(y)] for y, x in np.argwhere(found.hot[0][::scale, ::scale])]
 
 

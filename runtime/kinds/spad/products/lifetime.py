@@ -155,7 +155,7 @@ def _arrays(
 
 
 def _strips(making: Making, survey: Survey) -> Iterator[tuple[int, FloatArray, NDArray[np.bool_]]]:
-    """Return first row, counts (rows, w, bins) and blind pixels of strip after strip."""
+    """Yield first row, counts (rows, w, bins) and blind pixels of strip after strip."""
     for piece in pieces(
         survey.shape,
         survey.bins,

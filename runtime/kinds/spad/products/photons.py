@@ -73,7 +73,7 @@ def made_finer(making: Making, survey: Survey, frames: FloatArray) -> FloatArray
 
 
 def _strips(making: Making, survey: Survey, held_bytes: int) -> Iterator[tuple[int, FloatArray]]:
-    """Return first row and counts (rows, w, n) of strip after strip."""
+    """Yield first row and counts (rows, w, n) of strip after strip."""
     dark = survey.timing.dark(survey.shape)
     for piece in pieces(
         survey.shape,

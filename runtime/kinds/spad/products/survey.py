@@ -118,7 +118,7 @@ class Survey:
 
 @contextmanager
 def surveyed(making: Making) -> Iterator[Survey]:
-    """Open a capture and say what it is.
+    """Open a capture and determine its kind.
 
     Raises:
         DecodeError: If it cannot be read.
@@ -207,7 +207,7 @@ def _with_bundle(timing: Timing, camera: FineCamera) -> Timing:
 
 
 def _surprise(file: CountsFile, timing: Timing, camera: FineCamera) -> tuple[str, ...]:
-    """Tell that a bundle makes something else of a capture than is usual of such files."""
+    """Return a note if a bundle makes something else of a capture than is usual of such files."""
     usual, own = file.assumed.get("orientation"), camera.stated_times().get("orientation")
     if timing.timing.orientation is not None or None in (usual, own) or usual == own:
         return ()

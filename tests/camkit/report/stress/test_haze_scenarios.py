@@ -16,14 +16,13 @@ from camkit.report.stress.kernel_change import with_transformed
 from camkit.report.stress.rig import Rig
 from camkit.report.stress.run import StressOptions, run_stress
 from camkit.report.stress.scenario import all_scenarios, choose
-from camkit.report.stress.scenarios.lens.energy_split import with_split
-from camkit.report.stress.scenarios.lens.lost_dark_frame import black_taken_off
+from camkit.report.stress.scenarios.lens_rows import black_taken_off, with_split
 from camkit.report.stress.scene import Scene, stress_scenes
 from camkit.report.stress.score import Judge
 from camkit.runtime.bank.haze import hazy_kernels
 from camkit.runtime.geometry.illumination import illumination_band
 from camkit.runtime.twin.exposure import Setting
-from camkit.runtime.twin.haze import HazeLens
+from camkit.runtime.twin.haze_spread import HazeLens
 from tests.bundle_factory import tiny_sensor
 from tests.deep_bundle import deep_psf
 from tests.haze_bundle import hazy_manifest, hazy_optics, write_hazy_bundle
