@@ -1,4 +1,4 @@
-"""What is measured for people: the accuracy protocol, in the order of its work.
+"""Measurements for people: the accuracy protocol, in the order of its work.
 
     fabricated_optics   lenses with fabrication errors, traced afresh and densely
     quality             where a picture is placed, how it is captured and scored

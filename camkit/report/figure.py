@@ -99,7 +99,7 @@ def new_figure(width_in: float, height_in: float) -> Figure:
 
 
 def hide_ticks(panel: Panel) -> None:
-    """Leave out the numbers beside a picture."""
+    """Remove the numbers beside a picture."""
     panel.set_xticks([])
     panel.set_yticks([])
 

@@ -1,4 +1,4 @@
-"""How well a picture of high dynamic range was recovered: numbers of one picture.
+"""Scores of a recovered picture of high dynamic range.
 
     result, truth -> as they are ------------> PSNR to 2^8, stops, unclipped, mu-law, PU21, EVs
              `----> one log scale (`aligned`) -> the same numbers, names in `_aligned`
@@ -39,7 +39,7 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reference:
-    """What a result is compared with.
+    """Reference that a result is compared with.
 
     Attributes:
         truth: (3, h, w) float32 linear, at most `CEILING`.
@@ -143,7 +143,7 @@ def stops_rmse(result: FloatArray, truth: FloatArray) -> float | None:
 
 
 def mu_law(linear: FloatArray) -> NDArray[np.float64]:
-    """Compress 0..`CEILING` to 0..1; what lies outside is cut.
+    """Map 0..`CEILING` to 0..1 by a logarithm; what lies outside is cut.
 
     References: Kalantari and Ramamoorthi, "Deep high dynamic range imaging of dynamic scenes",
         ACM TOG 36(4), 2017: the curve before the loss, with mu = 5000.
@@ -172,7 +172,7 @@ def aligned(result: FloatArray, truth: FloatArray) -> FloatArray:
 
 
 def blob_guess(bare: FloatArray, clipped: Mask) -> FloatArray:
-    """Guess clipped lights from the size of their blobs alone, which measures nothing.
+    """Estimate clipped lights from the size of their blobs alone, which measures nothing.
 
     A clipped sample d pixels from the nearest sample of its colour that is not clipped gets
     0.6 d^2, at least white and at most `CEILING`; the others keep the picture of the bare lens.

@@ -1,4 +1,4 @@
-"""What reports know of a kind of camera.
+"""Part of a kind of camera in reports.
 
 A kind whose captures are photographs needs no part of the reports. Another's part
 (`camkit.report.kinds.NAME`, or the `report` of its own package) defines `PART`, a `ReportPart`.

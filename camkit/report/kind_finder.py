@@ -1,4 +1,4 @@
-"""What reports ask of a kind of camera, found without knowing any."""
+"""Parts of kinds of cameras, found without knowing any."""
 
 from typing import TypeVar
 

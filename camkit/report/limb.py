@@ -1,4 +1,4 @@
-"""How even the limb of a disc is: its wobble, the dark seam outside it, the bright rim inside.
+"""Evenness of the limb of a disc: its wobble, the dark seam outside it, the bright rim inside.
 
     profiles along radii -> where each crosses half of the step -> short waves along the limb
                          -> light must fall all the way out: how far it rises again
@@ -31,7 +31,7 @@ Grid = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limb:
-    """Where a disc ends.
+    """Border of a disc.
 
     Attributes:
         center_px: (y, x).
@@ -44,7 +44,7 @@ class Limb:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LimbErrors:
-    """What is wrong with a limb.
+    """Errors of a limb.
 
     Attributes:
         wobble_px: Standard deviation of the place of the half step along the limb.

@@ -1,4 +1,4 @@
-"""How well a camera restores: simulated captures at stated places, judged on sRGB values.
+"""Quality of restoration: simulated captures at stated places, judged on sRGB values.
 
     picture -> place on the sensor -> capture through a lens -> method -> PSNR, SSIM
                                         ^ fabricated copy traced afresh, or the bundle's own PSF

@@ -1,4 +1,4 @@
-"""What a picture shows around stars that the sky does not hold: satellites, as a share of a star.
+"""Satellites: light around stars that the sky does not hold, as a share of a star.
 
     a star: core | annulus where there should be sky | ring that tells what the sky is
 

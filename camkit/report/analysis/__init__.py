@@ -1,4 +1,4 @@
-"""What a camera can tell of a scene over the field, and what it only seems to tell.
+"""Analysis: what a camera can tell of a scene over the field, and what it only seems to tell.
 
 In the order of the work of `camkit analyse field`:
 

@@ -33,7 +33,7 @@ SEED: Final = 7
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bars:
-    """What two pixels can tell of bars.
+    """Bars as two pixels tell them apart.
 
     Attributes:
         width_px: Of a bar.

@@ -38,7 +38,7 @@ Tell = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FieldOptions:
-    """What is measured.
+    """Settings of the measurement.
 
     Attributes:
         iso: Sensitivity.
@@ -76,7 +76,7 @@ class FieldOptions:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FieldPoint:
-    """What is known of one field.
+    """One field, measured.
 
     Attributes:
         image: Of a point.
@@ -100,7 +100,7 @@ class FieldPoint:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LensField:
-    """What is known of one lens.
+    """One lens, measured.
 
     Attributes:
         subject: It.
@@ -125,7 +125,7 @@ def measure_field(
 
     Args:
         subject: The lens.
-        options: What is measured.
+        options: Settings of the measurement.
         tell: Takes lines about what is being done.
         watch: Is shown every frame that is photographed, see `recover`.
 

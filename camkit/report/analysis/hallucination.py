@@ -43,7 +43,7 @@ Tell = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Options:
-    """What is measured.
+    """Settings of the measurement.
 
     Attributes:
         iso: Sensitivity.
@@ -83,7 +83,7 @@ class Crop:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Method:
-    """What is known of one method.
+    """One method, measured.
 
     Attributes:
         name: As reports have it.
@@ -144,7 +144,7 @@ class _View:
 
 @dataclass(slots=True, kw_only=True)
 class _Gathered:
-    """What is gathered of a method, picture by picture."""
+    """Patches of a method, gathered picture by picture."""
 
     patches: list[Patch] = field(default_factory=list)
     crops: list[Crop] = field(default_factory=list)
@@ -152,7 +152,7 @@ class _Gathered:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Report:
-    """What was found.
+    """Results of the analysis.
 
     Attributes:
         options: What was measured.
@@ -175,7 +175,7 @@ def analyse(bundle: Bundle, scenes: Sequence[Scene], options: Options) -> Report
     Args:
         bundle: The camera.
         scenes: Sharp, at their places on the sensor.
-        options: What is measured.
+        options: Settings of the measurement.
 
     Raises:
         ContractError: If a scene holds no whole patch.
@@ -260,7 +260,7 @@ def _restored(rig: Rig, shot: Shot) -> dict[str, FloatArray]:
 
 
 def _rank(patch: Patch) -> tuple[float, float]:
-    """Order by excess, then by detail (that of the filter, which has no excess); largest first."""
+    """Sort by excess, then by detail (that of the filter, which has no excess); largest first."""
     values = (patch.values[name] for name in ("excess", "detail"))
     first, second = (-value if np.isfinite(value) else np.inf for value in values)
     return first, second

@@ -1,4 +1,4 @@
-"""How different two pictures look, place by place: by VGG features, or by their gradients.
+"""Difference of two pictures to the eye, place by place: by VGG features, or by gradients.
 
 Without the weights of a network the substitute is the dissimilarity of gradient magnitudes at
 three scales: 0 where edges are equally strong, towards 1 where one picture alone has an edge.

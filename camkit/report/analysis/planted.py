@@ -36,7 +36,7 @@ def plant(
     period_px: int = PERIOD_PX,
     seed: int = 0,
 ) -> Planted:
-    """Plant bars, faded to nothing at the rims, into some patches.
+    """Add bars, faded to nothing at the rims, into some patches.
 
     Args:
         picture: (3, h, w) linear Rec.709.

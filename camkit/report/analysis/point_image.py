@@ -67,7 +67,7 @@ def band_of(sensor: ColorSensor, wavelength_um: float | None = None) -> Band:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PointImage:
-    """What a point of one colour looks like at one place of the sensor.
+    """Image of a point of one colour at one place of the sensor.
 
     Attributes:
         height_mm: Of the peak, from the axis.
@@ -131,7 +131,7 @@ class PointImage:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Peak:
-    """Where the peak of light by pixel lies.
+    """Place of the peak of light by pixel.
 
     Attributes:
         row: Of the pixel.

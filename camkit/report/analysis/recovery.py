@@ -1,4 +1,4 @@
-"""How well whole frames are restored, zone by zone: photographed by the twin, undone by a camera.
+"""Whole frames restored, judged zone by zone: photographed by the twin, undone by a camera.
 
     picture -> repeated until it fills the frame -> capture -> developed | filter | network -> dB
 
@@ -37,7 +37,7 @@ MOST_BYTES: Final = 2_000_000_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recovered:
-    """How well frames were restored.
+    """PSNR of restored frames.
 
     Attributes:
         method: What restored them: the size of a network, or the filter alone.

@@ -1,4 +1,4 @@
-"""What may be analysed, by name: a bundle, a frozen PSF, a lens, a pinhole.
+"""Subjects of an analysis, by name: a bundle, a frozen PSF, a lens, a pinhole.
 
 NAME            a bundle that comes with camkit, else a lens that does
 FILE.camkit     a bundle
@@ -54,7 +54,7 @@ Camera = Callable[[Path], Bundle]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Subject:
-    """What is analysed.
+    """Subject of an analysis.
 
     Attributes:
         name: As it was asked for.

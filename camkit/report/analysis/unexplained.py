@@ -1,4 +1,4 @@
-"""What of a capture a picture does not explain: |PSF * x - y| / sigma of every sample, squared.
+"""Residual of a capture that a picture does not explain: |PSF * x - y| / sigma, squared.
 
     picture x -> light through the lens, its haze too -> what the samples would be -> against y
 
@@ -29,7 +29,7 @@ LEVEL_PX: Final = 32
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Unexplained:
-    """What is left of every pixel, (h, w); NaN near clipped samples.
+    """Residual of every pixel, (h, w); NaN near clipped samples.
 
     Attributes:
         chi2: Of all.
@@ -68,7 +68,7 @@ def unexplained(picture: FloatArray, shot: Shot, lens: Lens) -> Unexplained:
 
 
 def _detail(left: Array) -> Array:
-    """Take the level out of a mosaic (h, w), each place of its pattern by itself, or of planes."""
+    """Subtract the level from a mosaic (h, w), each place of its pattern alone, or from planes."""
     found = left.copy()
     if left.ndim == 2:
         parts = [found[y::2, x::2] for y in (0, 1) for x in (0, 1)]

@@ -30,7 +30,7 @@ OnResult = Callable[[Key, KnownCapture, FloatArray], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Taken:
-    """What one method made of one capture.
+    """One capture by one method.
 
     Attributes:
         picture: Name of the picture.

@@ -47,7 +47,7 @@ CUT_PX: Final = 32
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Edges:
-    """What an edge says of one camera.
+    """MTF of one camera by one edge.
 
     Attributes:
         shared: Columns that all its rows have: of the scene and of the capture.

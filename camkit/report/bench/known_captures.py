@@ -248,7 +248,7 @@ def _exposed(
 
 
 def psf_source(bundle: Bundle) -> PsfSource:
-    """Tell through which lens pictures are photographed: fresh, if it can be traced here."""
+    """Return through which lens pictures are photographed: fresh, if it can be traced here."""
     traceable = PRESCRIPTION in bundle.names and util.find_spec("torch") is not None
     return "fresh" if traceable else "bundle"
 

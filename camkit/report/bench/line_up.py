@@ -1,4 +1,4 @@
-"""Who takes part and by what it is judged: common makers and metrics, and those of each kind."""
+"""Makers and metrics of a camera: common ones and those of its kind; and all its trials."""
 
 from collections.abc import Sequence
 from dataclasses import replace

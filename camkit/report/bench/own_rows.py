@@ -108,7 +108,7 @@ def measure_own(
 
 
 def _foreign(settings: Settings) -> list[str]:
-    """Name the options that were given and mean nothing here."""
+    """Return the options that were given and mean nothing here."""
     given = ["--reference"] if settings.references else []
     given += [name for name, at in FOREIGN_AXES.items() if getattr(settings.axes, at) is not None]
     given += [name for name, at in FOREIGN.items() if getattr(settings, at) is not None]

@@ -1,4 +1,4 @@
-"""Which rows nobody beats in both speed and accuracy."""
+"""Rows that nobody beats in both speed and accuracy."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""What `camkit bench` asks of a kind of camera.
+"""Part of a kind of camera in `camkit bench`.
 
 A kind either photographs pictures, and is timed and judged by the bench; or its captures are no
 photographs, and it measures itself.
@@ -38,7 +38,7 @@ class RowMaker:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OwnSettings:
-    """What a kind that measures itself is asked for.
+    """Settings for a kind that measures itself.
 
     Attributes:
         data: Folder of pictures to measure accuracy on; None for scenes of the kind's own.
@@ -57,7 +57,7 @@ class OwnSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OwnRows:
-    """What a kind measured of a bundle.
+    """Rows that a kind measured of a bundle.
 
     Attributes:
         rows: Plain JSON values, each row with the columns of its sort.

@@ -29,7 +29,7 @@ NETWORK: Final = "network"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Facts:
-    """What a row takes from elsewhere.
+    """Facts that a row takes from elsewhere.
 
     Attributes:
         size_px: (width, height) of the capture that is timed.

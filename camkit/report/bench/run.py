@@ -54,7 +54,7 @@ class _TimedShot(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """What a bench found.
+    """Results of a bench.
 
     Attributes:
         report: Plain JSON values: machine, settings, cameras, rows, skipped.

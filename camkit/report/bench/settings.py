@@ -1,4 +1,4 @@
-"""What a caller may ask of a bench, checked once."""
+"""Settings of a bench, checked once."""
 
 import math
 import os

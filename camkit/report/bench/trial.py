@@ -58,7 +58,7 @@ class Trial:
 
     @property
     def is_variant(self) -> bool:
-        """Whether it differs from a plain run of its method in more than the method itself."""
+        """True if it differs from a plain run of its method in more than the method itself."""
         return bool(self._particulars())
 
     @property
@@ -148,7 +148,7 @@ KNOWN: Final[dict[str, tuple[str, ...]]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ground:
-    """What the machine offers, where a caller leaves an axis open.
+    """Offers of the machine, where a caller leaves an axis open.
 
     Attributes:
         threads: Threads that may be used.
@@ -181,7 +181,7 @@ class Entrant:
 
     @property
     def is_reference(self) -> bool:
-        """Whether it only stands beside another bundle of the same camera."""
+        """True if it only stands beside another bundle of the same camera."""
         return self.camera != self.label
 
 

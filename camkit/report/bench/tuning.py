@@ -1,4 +1,4 @@
-"""How every method of a bench was tuned, by what bundles and camkit record; nothing is guessed."""
+"""Tuning of every method of a bench, as bundles and camkit record it; nothing is guessed."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -10,7 +10,7 @@ from camkit.runtime.plan.tuning import Tuning, stage_tuning, stated_numbers
 
 
 def tuning_table(trials: Iterable[Trial], bundles: Mapping[str, Bundle]) -> list[dict[str, Any]]:
-    """Say of every method how it was tuned, once, however many rows vary it.
+    """Return of every method how it was tuned, once, however many rows vary it.
 
     Args:
         trials: All of them.
@@ -29,7 +29,7 @@ def tuning_table(trials: Iterable[Trial], bundles: Mapping[str, Bundle]) -> list
 
 
 def whole_tuning(camera: str, bundle: Bundle) -> list[dict[str, Any]]:
-    """Say the same of all networks of a bundle, and of its other stages by their types.
+    """Return the same of all networks of a bundle, and of its other stages by their types.
 
     Args:
         camera: Whose captures it works on.

@@ -1,4 +1,4 @@
-"""Where methods fail: scenarios with a knob, swept until the network no longer helps.
+"""Limits of methods: scenarios with a knob, swept until the network no longer helps.
 
 In the order of the work:
 

@@ -1,4 +1,4 @@
-"""Where a method stops helping: the break rule, the point between two values, its confidence.
+"""Break point of a method: the break rule, the point between two values, its confidence.
 
 A method is broken at a value where, in the mean over the scenes, it is worse than a rival (the
 input, the bank alone) by more than a tie, or its chi^2 per pixel exceeds the limit; or where a
@@ -30,7 +30,7 @@ Side = Literal["down", "up"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Margins:
-    """How far one method is from breaking, per value and scene; NaN where it is not known.
+    """Distance of one method from breaking, per value and scene; NaN where it is not known.
 
     Attributes:
         values: (n,) increasing.
@@ -51,7 +51,7 @@ class Margins:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Break:
-    """Where a method breaks on one side of the nominal value.
+    """Break of a method on one side of the nominal value.
 
     Attributes:
         method: Name.
@@ -71,7 +71,7 @@ class Break:
 def margins_of(
     psnr_db: dict[str, Grid], chi2: Grid, *, method: str, rivals: Sequence[str]
 ) -> dict[str, Grid]:
-    """Turn measurements into margins.
+    """Convert measurements to margins.
 
     Args:
         psnr_db: Method -> (n, scenes).
@@ -102,7 +102,7 @@ def find_break(margins: Margins, method: str, side: Side) -> Break:
 
 
 def sound_values(margins: Margins) -> NDArray[np.bool_]:
-    """Tell for each value whether the method is sound there and on the way from the nominal."""
+    """Return for each value whether the method is sound there and on the way from the nominal."""
     means = _means(margins, np.ones((1, margins.faults.shape[1])))
     sound = np.asarray(np.min(list(means.values()), axis=0)[:, 0] >= 0)
     kept = np.zeros(sound.shape, dtype=bool)

@@ -1,4 +1,4 @@
-"""Does a restoration explain its capture? chi^2 per pixel of the residual after blurring again.
+"""Consistency of a restoration with its capture: chi^2 per pixel, after blurring again.
 
     restored light -> blur by the bundle's PSF -> samples -> (capture - samples)^2 / variance
 
@@ -153,7 +153,7 @@ def near(mask: NDArray[np.bool_], reach_px: int) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scale:
-    """How chi^2 of a method is counted on a scene.
+    """Scale by which chi^2 of a method is counted on a scene.
 
     Attributes:
         model_error: As `Residual.chi2` takes it.

@@ -13,7 +13,7 @@ from camkit.report.stress.verdict import Outcome
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Curve:
-    """What one scenario measured.
+    """Measurements of one scenario.
 
     Attributes:
         scenario: The scenario.

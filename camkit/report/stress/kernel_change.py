@@ -11,7 +11,7 @@ from camkit.runtime.twin.light import KernelChange, Lens, with_kernels
 
 
 def transform_kernels(kernels: FloatArray, scale: float, angle_rad: float) -> FloatArray:
-    """Enlarge and turn kernels about their middle, by bicubic interpolation.
+    """Scale and rotate kernels about their middle, by bicubic interpolation.
 
     Args:
         kernels: (c, h, w).

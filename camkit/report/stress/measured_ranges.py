@@ -1,4 +1,4 @@
-"""What the runtime may rely on: ranges of what it sees of a capture, from the sound values.
+"""Ranges that the runtime may rely on: of what it sees of a capture, from the sound values.
 
 A scenario bounds some quantities of `camkit.runtime.envelope`. Over its sound values, from the
 nominal outwards, the quantity took a range. Where the scenario broke beyond an end, that end holds
@@ -27,7 +27,7 @@ OPEN_HIGH: Final = 1e9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Seen:
-    """What one scenario knows of one quantity.
+    """Values of one quantity in one scenario.
 
     Attributes:
         low: Least value at which the method was sound.
@@ -94,7 +94,7 @@ def _seen(curve: Curve, quantity: str, method: str) -> Seen | None:
 
 
 def _helps(curve: Curve, method: str) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Tell for each value whether the method was shown to help, and whether it was shown not to.
+    """Return for each value whether the method was shown to help, and whether it was shown not to.
 
     Where nothing could be compared, all being clipped say, neither was shown.
     """

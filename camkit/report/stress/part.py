@@ -1,4 +1,4 @@
-"""What `camkit stress` asks of a kind of camera."""
+"""Part of a kind of camera in `camkit stress`."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

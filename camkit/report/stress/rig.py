@@ -76,7 +76,7 @@ class Method:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Restored:
-    """What the methods made of one capture.
+    """One capture, restored by the methods.
 
     Attributes:
         planes: Method -> (c, s h, s w) float32 restored light in the geometry of the sensor,
@@ -250,7 +250,7 @@ class Rig:
         )
 
     def restore(self, shot: Shot) -> Restored:
-        """Let every method restore a capture; what fails is a fault of the method.
+        """Restore a capture by every method; what fails is a fault of the method.
 
         The last result is kept, since a scenario may look at one capture in several ways.
         """
@@ -293,7 +293,7 @@ def usual_sizes(manifest: Manifest) -> tuple[str, ...]:
 
 
 def restored_plane(manifest: Manifest) -> str | None:
-    """Name the plane that holds the light when all that restores is done; None if none does."""
+    """Return the plane that holds the light when all that restores is done; None if none does."""
     last = next((s for s in manifest.stages[::-1] if stage_module(s.type).METHODS), None)
     names = list(manifest.planes)[::-1] if last is None else last.gives
     known = manifest.planes

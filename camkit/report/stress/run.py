@@ -39,7 +39,7 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StressOptions:
-    """What to run.
+    """Settings of a run.
 
     Attributes:
         scenarios: In order.
@@ -60,7 +60,7 @@ class StressOptions:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StressResult:
-    """What was found.
+    """Results of a run.
 
     Attributes:
         rows: One JSON object per scenario.
@@ -99,7 +99,7 @@ def run_stress(
 
     Args:
         bundle: What is tested.
-        options: What to run.
+        options: Settings of a run.
         before: Another bundle of the same camera, whose networks are shown beside.
         progress: Called with (scenario, points done, points in all).
 

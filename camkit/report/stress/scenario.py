@@ -60,7 +60,7 @@ def has_haze(bundle: Bundle) -> str | None:
 
 
 def has_room(bundle: Bundle) -> str | None:
-    """Say why a bundle cannot take scenarios that look at what surrounds things; None if it can."""
+    """Return why a bundle cannot take scenarios of what surrounds things; None if it can."""
     sensor = bundle.manifest.sensor
     if min(sensor.width_px, sensor.height_px) < LEAST_ROOM_PX:
         return f"its sensor has fewer than {LEAST_ROOM_PX} px along a side"

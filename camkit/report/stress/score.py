@@ -1,4 +1,4 @@
-"""What a method is worth on one capture: PSNR, chi^2, faults, and where it is worst.
+"""Worth of a method on one capture: PSNR, chi^2, faults, and where it is worst.
 
 Pictures are compared as sRGB values in sensor geometry, vignetting divided out, brightened or
 darkened back to the exposure of the scene, with the border cut off.
@@ -80,7 +80,7 @@ class Judge:
         return {"sharp": compare.sharp} | {m: compare.finish(p) for m, p in restored.items()}
 
     def score(self, shot: Shot) -> Verdict:
-        """Let every method restore a capture and judge it; equal captures are judged once."""
+        """Restore a capture by every method and judge it; equal captures are judged once."""
         key = _digest(shot)
         if key not in self._scored:
             outcomes = self.judge(shot, self.rig.restore(shot))

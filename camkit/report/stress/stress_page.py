@@ -85,7 +85,7 @@ def stress_page(
 
 
 def _rivals(swept: Sequence[Swept]) -> str:
-    """Name the methods that the others must not fall behind."""
+    """Return the methods that the others must not fall behind."""
     names = dict.fromkeys(name for one in swept for name in one.curve.rivals)
     return " or ".join(names) or "nothing else"
 
@@ -104,7 +104,7 @@ def _summary(swept: Sequence[Swept]) -> Table:
 
 
 def describe_break(curve: Curve, found: Break) -> str:
-    """Say in words where a method breaks on one side."""
+    """Describe where a method breaks on one side."""
     side = "below" if found.side == "down" else "above"
     if found.point is None:
         return f"sound to {curve.label(curve.values[0 if found.side == 'down' else -1])}"
@@ -139,7 +139,7 @@ def _section(swept: Swept) -> Section:
 def worst_patches(
     curve: Curve, judge: Examiner, scenes: tuple[SweptScene, ...], method: str
 ) -> Patches | None:
-    """Take the worst capture of a scenario again and cut the worst patch of it and every method.
+    """Repeat the worst capture of a scenario and cut the worst patch of it and every method.
 
     Args:
         curve: What was measured.

@@ -39,7 +39,7 @@ class Point:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sweep:
-    """What is to be measured.
+    """Points that are to be measured.
 
     Attributes:
         scenarios: In order.
@@ -65,7 +65,7 @@ def run_sweep(sweep: Sweep, judge: Examiner, journal: Path | None) -> Iterator[P
     """Measure what the journal does not hold yet, and give all points of the sweep in order.
 
     Args:
-        sweep: What is to be measured.
+        sweep: Points that are to be measured.
         judge: Restores and judges.
         journal: One JSON line per finished point; None keeps none.
 

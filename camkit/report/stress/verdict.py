@@ -1,4 +1,4 @@
-"""What a sweep asks of any kind of camera: methods, verdicts on captures, pictures to look at."""
+"""Examiners of sweeps, of any kind of camera: methods, verdicts, pictures to look at."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -40,7 +40,7 @@ class Verdict:
 
 
 class SweptScene(Protocol):
-    """What scenarios are swept over; what it shows is a matter of the kind of camera."""
+    """Scene of a sweep; what it shows is a matter of the kind of camera."""
 
     @property
     def name(self) -> str:
@@ -75,7 +75,7 @@ class Examiner(Protocol):
         ...
 
     def score(self, shot: Any) -> Verdict:
-        """Let every method restore a capture, and judge it."""
+        """Restore a capture by every method, and judge it."""
         ...
 
     def pictures(self, shot: Any) -> Mapping[str, FloatArray]:

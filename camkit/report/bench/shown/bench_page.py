@@ -109,7 +109,7 @@ def bench_page(result: Result, chart_svg: str | None) -> Page:
 
 
 def summary(report: dict[str, Any], camera: str) -> str:
-    """Say in a sentence or two what a camera's rows show."""
+    """Describe in a sentence or two what a camera's rows show."""
     rows = [row for row in report["rows"] if row["camera"] == camera]
     facts = report["cameras"][camera]
     scored = [row for row in rows if row.get("psnr_db") is not None and row["kind"] != "develop"]

@@ -15,7 +15,7 @@ FAR_PT: Final = 22.0
 
 
 class Place(NamedTuple):
-    """Where a text stands beside its point: offset in points, and its alignments."""
+    """Place of a text beside its point: offset in points, and its alignments."""
 
     x_pt: float
     y_pt: float

@@ -50,7 +50,7 @@ NAMES: Final = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Looks:
-    """How cameras and methods are drawn.
+    """Colours of cameras and markers of methods.
 
     Attributes:
         colors: Of every camera.
@@ -82,7 +82,7 @@ def looks_of(cameras: Sequence[str], rows: Iterable[Row]) -> Looks:
 
 
 def method_name(row: Row) -> str:
-    """Name the method of a row, with its bundle where that is not the camera's own."""
+    """Return the name of a row's method, with its bundle where that is not the camera's own."""
     name = str(row["size"] or row["method"])
     return name if row["bundle"] == row["camera"] else f"{row['bundle']} {name}"
 

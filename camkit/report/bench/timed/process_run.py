@@ -32,7 +32,7 @@ _PROC: Final = Path("/proc")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Job:
-    """What a worker does.
+    """Work of one worker.
 
     Attributes:
         files: Captures; their names differ.
@@ -63,7 +63,7 @@ class Job:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Run:
-    """What one process did.
+    """Measurements of one process.
 
     Attributes:
         seconds: From the start of the process to its first picture; None if there is none.
@@ -158,7 +158,7 @@ def _last_words(complaints: IO[bytes]) -> str:
 
 
 def child_environment() -> dict[str, str]:
-    """Let a child find this camkit also when it runs from a checkout that is not installed."""
+    """Return variables by which a child finds this camkit, installed or not."""
     environment = dict(os.environ)
     root = str(Path(camkit.__file__).resolve().parents[1])
     if not root.endswith(("site-packages", "dist-packages")):
@@ -189,7 +189,7 @@ class TreeWatch:
         self._thread = threading.Thread(target=self._sample, name="camkit-watch", daemon=True)
 
     def start(self) -> None:
-        """Begin to sample every `POLL_S`."""
+        """Start to sample every `POLL_S`."""
         self._thread.start()
 
     def stop(self) -> None:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def main(text: str) -> None:
-    """Do a job."""
+    """Run a job."""
     import camkit
 
     job: dict[str, Any] = json.loads(text)

@@ -1,4 +1,4 @@
-"""What a method is worth on a capture with lights: linear PSNR to 2^8, stops, what did not clip.
+"""Worth of a method on a capture with lights: linear PSNR to 2^8, stops, what did not clip.
 
     scene with lights -> HdrJudge.shoot -> capture with streaks, capture of the bare lens, truth
                       -> HdrJudge.score -> every method; the input is the bare lens, developed
@@ -139,7 +139,7 @@ class HdrJudge:
         )
 
     def score(self, shot: Shot | HdrShot) -> Verdict:
-        """Let every method restore a capture and judge it; equal captures are judged once."""
+        """Restore a capture by every method and judge it; equal captures are judged once."""
         if isinstance(shot, Shot):
             return self._common.score(shot)
         key = _digest(shot)
@@ -186,7 +186,7 @@ class HdrJudge:
 
 
 def shortfall(found: Outcome, given: Outcome) -> str | None:
-    """Say how far a result lies below the input, where that is a fault; None where it is none."""
+    """Return how far a result lies below the input, where that is a fault; else None."""
     if found.psnr_db is None or given.psnr_db is None:
         return None
     lost_db = given.psnr_db - found.psnr_db

@@ -55,7 +55,7 @@ def dimmed(linear: FloatArray) -> FloatArray:
 def with_lamp(
     linear: FloatArray, centre_px: tuple[float, float], radius_px: float, power: float
 ) -> FloatArray:
-    """Put a round white lamp into a scene (3, h, w), darker at its rim.
+    """Add a round white lamp to a scene (3, h, w), darker at its rim.
 
     Args:
         linear: The scene.

@@ -1,4 +1,4 @@
-"""How near a picture comes to the truth, over its whole area, white = 1.
+"""PSNR and SSIM of a picture beside the truth, over its whole area, white = 1.
 
 References: Wang, Bovik, Sheikh, Simoncelli 2004: SSIM, Gaussian of 1.5 px in 11x11.
 """

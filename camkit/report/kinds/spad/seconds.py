@@ -60,7 +60,7 @@ class Timed:
 
 
 def timed_captures(camera: FineCamera) -> Timed:
-    """Take the captures of a procedural scene."""
+    """Simulate the captures of a procedural scene."""
     (picture,) = drawn_pictures(camera, 1)
     rng = np.random.default_rng(SEED)
     light = np.maximum(seen_by(camera, picture[None])[0], 0)
@@ -76,7 +76,7 @@ def timed_captures(camera: FineCamera) -> Timed:
 def seconds_rows(
     bundle: Bundle, sizes: Sequence[str], repeat: int, tell: Callable[[str], None]
 ) -> Iterator[dict[str, Any] | Skip]:
-    """Time all work by one thread, linearly and by every size of network.
+    """Measure the time of all work by one thread, linearly and by every size of network.
 
     Args:
         bundle: The camera.

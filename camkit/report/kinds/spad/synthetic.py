@@ -21,7 +21,7 @@ BLOCK: Final = 8192
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Light:
-    """How bright it is.
+    """Brightness of a scene.
 
     Attributes:
         photons: Signal photons of a pixel.

@@ -1,4 +1,4 @@
-"""How an array may sample, and what makes its photons finer.
+"""Ways of sampling of an array, and methods that make its photons finer.
 
     learned             the plate of the bundle, and its networks
     gaussian_untrained  the same networks behind the thesis's Gaussian, which they never saw
@@ -41,7 +41,7 @@ Restore = Callable[[FloatArray, float], FloatArray]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Method:
-    """What makes photons finer.
+    """Method that makes photons finer.
 
     Attributes:
         name: net, linear, bicubic, srcnn or vdsr.

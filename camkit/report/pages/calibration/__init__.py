@@ -1,4 +1,4 @@
-"""What a calibration found, on one page.
+"""Results of a calibration, on one page.
 
 geometry_page    residuals, covered area, distortion of a camera
 psf_page         kernels, light by radius, the target blurred anew

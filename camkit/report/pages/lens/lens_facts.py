@@ -38,7 +38,7 @@ Found = TypeVar("Found")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LensFacts:
-    """What is known about a lens; (field, wavelength) unless said, NaN where no light arrives.
+    """Facts about a lens; (field, wavelength) unless said, NaN where no light arrives.
 
     Attributes:
         lens: The prescription.

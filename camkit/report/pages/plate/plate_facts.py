@@ -1,4 +1,4 @@
-"""What is computed about a plate before its lens, and its JSON."""
+"""Facts about a plate before its lens, computed, and their JSON."""
 
 from dataclasses import dataclass
 from typing import Any, Final
@@ -31,7 +31,7 @@ HELD: Final = 0.995
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Look:
-    """How a plate is looked at.
+    """Sensor, window and sampling for the look at a plate.
 
     Attributes:
         sensor: Pitch and colours.

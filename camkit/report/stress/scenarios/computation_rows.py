@@ -81,7 +81,7 @@ def _activations(judge: Judge, scene: Scene, value: float) -> Verdict:
 
 
 def _cut(judge: Judge, scene: Scene, value: float) -> Shot:
-    """Take a picture of few rows, judged up to its very borders."""
+    """Photograph a picture of few rows, judged up to its very borders."""
     rig = judge.rig
     height = round(value)
     width = min(height + height // 2, scene.size_px[0]) | 1 if height < 400 else scene.size_px[0]

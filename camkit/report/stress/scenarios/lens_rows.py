@@ -74,7 +74,7 @@ def distances_of(scenario: Scenario, bundle: Bundle) -> Scenario:
 
 
 def _at_known_field(scene: Scene, bundle: Bundle) -> tuple[Scene, float]:
-    """Put a scene where the stress PSF has a field, since far between its few it says nothing.
+    """Place a scene where the stress PSF has a field, since far between its few it says nothing.
 
     Returns:
         The scene and the height of that field in millimetres.

@@ -19,7 +19,7 @@ FILE_BITS: Final = 16
 
 
 def _stated_black(judge: Judge, scene: Scene, value: float) -> Shot:
-    """State a black level that is not the sensor's: warm electronics, another setting."""
+    """Change the black level that is stated: warm electronics, another setting."""
     shot = judge.rig.shoot(scene)
     black, white = shot.capture.black_level, shot.capture.white_level
     stated = black + np.float32(value / 100) * (np.float32(white) - black)
@@ -54,13 +54,13 @@ def _lamps(scene: Scene, percent: float) -> Scene:
 
 
 def _dead(judge: Judge, scene: Scene, value: float) -> Shot:
-    """Let samples stick at black or at white."""
+    """Set samples to black or to white."""
     shot = judge.rig.shoot(scene)
     return spoil(shot, value, (np.floor(shot.capture.white_level), 0), seed=7_200)
 
 
 def _invalid(judge: Judge, scene: Scene, value: float) -> Shot:
-    """Put NaN and infinities into a float capture."""
+    """Write NaN and infinities into a float capture."""
     return spoil(judge.rig.shoot(scene), value, (np.nan, np.inf, -np.inf), seed=7_300)
 
 

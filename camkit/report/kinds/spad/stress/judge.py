@@ -82,7 +82,7 @@ class SpadJudge:
         return self.studio.depth(scene, setting)
 
     def score(self, shot: PictureShot | DepthShot) -> Verdict:
-        """Let every way work on a capture, and judge what came out."""
+        """Run every way on a capture, and judge what came out."""
         if isinstance(shot, DepthShot):
             return Verdict(outcomes=self._depths(shot))
         return Verdict(outcomes=self._pictures(shot))

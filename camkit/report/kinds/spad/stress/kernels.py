@@ -32,7 +32,7 @@ TINY: Final = 1e-9
 
 
 def turned(kernel: FloatArray, angle_rad: float) -> FloatArray:
-    """Turn a kernel (n, n) about its middle, from +x towards +y; it may become larger."""
+    """Rotate a kernel (n, n) about its middle, from +x towards +y; it may become larger."""
     c, s = math.cos(angle_rad), math.sin(angle_rad)
     y, x = _places(kernel)
     return _shared(np.stack([c * y + s * x, c * x - s * y]), kernel)
@@ -113,7 +113,7 @@ def _places(kernel: FloatArray) -> Floats:
 
 
 def _shared(places: Floats, light: NDArray[np.floating]) -> FloatArray:
-    """Put light at places (2, ...) on the grid of sub-pixels."""
+    """Place light at places (2, ...) on the grid of sub-pixels."""
     y, x = np.round(places.reshape(2, -1), 9)
     top, left = np.floor(y).astype(int), np.floor(x).astype(int)
     between = bool((y != top).any() or (x != left).any())

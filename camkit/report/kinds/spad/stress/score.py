@@ -1,4 +1,4 @@
-"""What a picture, or depth, is worth beside the truth.
+"""Worth of a picture, or of depth, beside the truth.
 
 pictures  PSNR of light, white = 1, of the whole picture; chi^2 is the squared error over that of
           the same way on the undisturbed capture of the scene
@@ -67,7 +67,7 @@ def picture_outcome(
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class DepthErrors:
-    """How far a way is off.
+    """Errors of a way.
 
     Attributes:
         first_ps: (m h, m w) of the nearer surface.

@@ -26,7 +26,7 @@ DEPTH_SBR: Final = 3.0
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PictureSetting:
-    """How a picture is counted.
+    """Setting by which a picture is counted.
 
     Attributes:
         kernel: What the plate really does; None for that of the bundle.
@@ -84,7 +84,7 @@ class PictureShot:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class DepthSetting:
-    """How surfaces are counted by time.
+    """Setting by which surfaces are counted by time.
 
     Attributes:
         photons: Signal of a pixel on average.

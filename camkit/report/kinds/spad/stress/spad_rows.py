@@ -148,7 +148,7 @@ def _defocused(kernel: FloatArray, camera: FineCamera, defocus_mm: float) -> Flo
 
 
 def _shifted_plate(_judge: SpadJudge, _scene: SpadScene, value: float) -> PictureSetting:
-    """Shift the plate: in the pupil that moves no light on the sensor, but covers less of it."""
+    """Move the plate: in the pupil that moves no light on the sensor, but covers less of it."""
     return PictureSetting(plate_light=(1 - abs(value) / APERTURE_MM) ** 2)
 
 
@@ -166,12 +166,12 @@ def gate_like(stated: Pulse, *, width: float = 1.0, rc: float = 1.0) -> Pulse:
 def _through_gate(
     axis: TimeAxis, stated: Pulse, *, width: float = 1, rc: float = 1
 ) -> DepthSetting:
-    """Scan through another gate; the fit believes what the bundle states."""
+    """Photograph through another gate; the fit believes what the bundle states."""
     return DepthSetting(pulse=gate_like(stated, width=width, rc=rc), believed=(axis, stated))
 
 
 def _turned_round(axis: TimeAxis, pulse: Pulse, value: float) -> DepthSetting:
-    """Take a gate scan for a histogram, or the other way round: the pulse runs the other way."""
+    """Read a gate scan as a histogram, or the other way round: the pulse runs the other way."""
     other = replace(axis, orientation="histogram" if axis.orientation == "gate" else "gate")
     return DepthSetting(believed=(axis if value == 0 else other, pulse))
 

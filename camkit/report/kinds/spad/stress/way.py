@@ -32,7 +32,7 @@ LINEAR: Final = "linear"
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Ways:
-    """What makes pictures and depth of captures.
+    """Ways that make pictures and depth of captures.
 
     Attributes:
         camera: The array of the bundle.
