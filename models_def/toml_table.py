@@ -1,42 +1,16 @@
 """TOML tables turned into dataclasses; unknown, missing and wrong keys are errors naming them."""
 
+import hashlib
+import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields
-from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from camkit.errors import ContractError
-from camkit.side_file import parse_toml, read_side_toml
 
 T = TypeVar("T")
-
-
-def read_table(path: Path, what: str) -> dict[str, Any]:
-    """Read a TOML file.
-
-    Args:
-        path: The file.
-        what: What it holds, for errors.
-
-    Raises:
-        ContractError: If it is missing or no TOML.
-    """
-    return read_side_toml(path, what)
-
-
-def parse_table(data: bytes, what: str) -> dict[str, Any]:
-    """Parse TOML.
-
-    Args:
-        data: UTF-8.
-        what: What it is, for errors.
-
-    Raises:
-        ContractError: If it is no TOML.
-    """
-    return parse_toml(data, what)
 
 
 def section(where: str, kind: type[T], table: Any) -> T:
@@ -87,6 +61,11 @@ def typed(where: str, value: Any, kind: Any) -> Any:
     if not isinstance(value, kind) or isinstance(value, bool) != (kind is bool):
         raise ContractError(f"{where} must be of type {kind.__name__}; got {value!r}")
     return value
+
+
+def table_digest(table: Mapping[str, Any]) -> str:
+    """Return the sha256 of plain values, whatever the order of their keys."""
+    return hashlib.sha256(json.dumps(table, sort_keys=True).encode()).hexdigest()
 
 
 def key_line(key: str, value: str | float | bool | Sequence[str | float]) -> str:

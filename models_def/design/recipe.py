@@ -1,7 +1,5 @@
 """A joint design as TOML: which lens, what of it is free, what it looks at, what recovers it."""
 
-import hashlib
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -17,8 +15,9 @@ from camkit.models_def.networks.catalog import NETWORK_NAMES
 from camkit.models_def.optics.prescription import FabricationErrors
 from camkit.models_def.optics.search.limits import Limits
 from camkit.models_def.optics.search.variables import Variable
-from camkit.models_def.toml_table import check_keys, read_table, section, typed
+from camkit.models_def.toml_table import check_keys, section, table_digest, typed
 from camkit.models_def.training.recipe import SceneRecipe
+from camkit.side_file import read_side_toml
 
 Spacing = Literal["height", "area"]
 
@@ -164,7 +163,7 @@ def read_design(path: Path) -> DesignRecipe:
     Raises:
         ContractError: If the file is missing, is no TOML, or a key is unknown, missing or wrong.
     """
-    return to_design(read_table(path, "design recipe"))
+    return to_design(read_side_toml(path, "design recipe"))
 
 
 def to_design(table: Mapping[str, Any]) -> DesignRecipe:
@@ -230,4 +229,4 @@ def with_choices(
 def recipe_digest(recipe: DesignRecipe) -> str:
     """Return a hash of all that decides a run."""
     table = {name: value for name, value in asdict(recipe).items() if value is not None}
-    return hashlib.sha256(json.dumps(table, sort_keys=True).encode()).hexdigest()
+    return table_digest(table)

@@ -18,7 +18,6 @@ from camkit.errors import ContractError
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import half_disc
 from camkit.models_def.optics.search.improvement import improve
-from camkit.models_def.optics.search.least_squares import evaluations
 from camkit.models_def.optics.search.merit import MERITS, Merit
 from camkit.models_def.optics.search.problem import Problem
 
@@ -108,15 +107,6 @@ def best_starts(problem: Problem, starts: Starts) -> Tensor:
         )
     formed = found.ends[np.isfinite(found.merits)]
     return formed[:1] if not starts.judged else torch.cat([formed[: starts.judged], begin[None]])
-
-
-def traced_lenses(starts: Starts, variables: int) -> int:
-    """Return the number of lenses that a search traces, those that recovery judges included."""
-    if starts.count == 0:
-        return 0
-    scouted = evaluations(starts.count, starts.scout_steps, variables)
-    ended = evaluations(starts.ends, starts.dls_steps, variables)
-    return scouted + ended + (starts.judged + 1 if starts.judged else 0)
 
 
 def best_judged(lenses: Tensor, judge: Callable[[Tensor], float]) -> Tensor:

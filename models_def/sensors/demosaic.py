@@ -6,7 +6,7 @@ Twin of `camkit.runtime.signal.demosaic` (method "fast"); `tests/parity` holds t
 import torch
 from torch import Tensor
 
-from camkit.contracts import CfaPattern, cfa_channels
+from camkit.contracts import CfaPattern, FloatArray, cfa_channels
 
 _CROSS = ((0, 0, -2, 0, 0), (0, 0, 4, 0, 0), (-2, 4, 8, 4, -2), (0, 0, 4, 0, 0), (0, 0, -2, 0, 0))
 _ALONG = (
@@ -29,6 +29,13 @@ def mosaic(planes: Tensor, cfa: CfaPattern) -> Tensor:
     """Sample the CFA: (b, 3, h, w) -> (b, h, w)."""
     masks = _cell_masks(planes.shape[-2:], cfa, planes)
     return (planes * masks).sum(dim=1)
+
+
+def developed(raw: FloatArray, gains: tuple[float, float, float], cfa: CfaPattern) -> Tensor:
+    """Return white-balanced planes (1, 3, h, w) of (h, w) linear samples."""
+    samples = torch.from_numpy(raw)[None]
+    factors = torch.tensor(gains).reshape(1, 3, 1, 1).expand(1, 3, *samples.shape[1:])
+    return demosaic(samples * mosaic(factors, cfa), cfa)
 
 
 def demosaic(mosaic: Tensor, cfa: CfaPattern) -> Tensor:

@@ -20,9 +20,10 @@ from torch import Tensor, nn
 from camkit.bundle.stages import Stage
 from camkit.errors import ContractError
 from camkit.kinds import find_kind
-from camkit.models_def.toml_table import read_table, typed
+from camkit.models_def.toml_table import typed
 from camkit.models_def.training.recipe import DEFAULT_KIND, Recipe, with_new_names
 from camkit.models_def.training.sample import Finish, Sample, SampleLayout
+from camkit.side_file import read_side_toml
 
 Restorer = Callable[[Tensor], Tensor]
 """(1, c, h, w) of all inputs -> (1, c, scale h, scale w) of all outputs."""
@@ -211,7 +212,7 @@ def read_recipe(path: Path) -> Recipe:
         ContractError: If the file is missing, is no TOML, or a key is unknown, missing or wrong.
         UnsupportedError: If its kind cannot be trained.
     """
-    return to_recipe(read_table(path, "recipe"))
+    return to_recipe(read_side_toml(path, "recipe"))
 
 
 def to_recipe(table: Mapping[str, Any]) -> Recipe:

@@ -12,7 +12,6 @@ from camkit.errors import CamkitError, ContractError
 from camkit.models_def.optics.diffraction.plate import read_plate
 from camkit.models_def.optics.glass.encoding import read_text
 from camkit.models_def.optics.prescription import read_prescription
-from camkit.models_def.toml_table import read_table
 from camkit.runtime.kinds.spad.containers.stored_array import read_columns, read_map
 from camkit.runtime.kinds.spad.files.npz import read_npz
 from camkit.runtime.kinds.spad.timing import read_timing
@@ -30,7 +29,7 @@ READERS: dict[str, Callable[[Path], object]] = {
     "glass": read_text,
     "lensfun": read_xml,
     "psf": read_psf,
-    "recipe": lambda path: read_table(path, "recipe"),
+    "recipe": lambda path: read_side_toml(path, "recipe"),
 }
 
 

@@ -6,7 +6,8 @@ from pathlib import Path
 
 from camkit.errors import ContractError
 from camkit.models_def.optics.glass.catalogue import find_glass
-from camkit.models_def.toml_table import read_table, section
+from camkit.models_def.toml_table import section
+from camkit.side_file import read_side_toml
 
 Range = tuple[float, float]
 
@@ -105,7 +106,7 @@ def read_recipe(path: Path) -> LensRecipe:
     Raises:
         ContractError: If it is not TOML or a key is unknown, missing or of a wrong type.
     """
-    table = read_table(path, "lens recipe")
+    table = read_side_toml(path, "lens recipe")
     surfaces = table.pop("surface", [])
     if not isinstance(surfaces, list):
         raise ContractError("surfaces of a lens recipe must be written as [[surface]] tables")

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from camkit.errors import ContractError
-from camkit.models_def.toml_table import read_table, section
+from camkit.models_def.toml_table import section
+from camkit.side_file import read_side_toml
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +68,7 @@ class Run:
 
 def read_rows(path: Path) -> tuple[Row, ...]:
     """Read the rows of a file (TOML), in the order of the table."""
-    rows = read_table(path, "table")["rows"]
+    rows = read_side_toml(path, "table")["rows"]
     return tuple(section(f"rows[{number}]", Row, row) for number, row in enumerate(rows))
 
 

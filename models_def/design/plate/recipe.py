@@ -1,7 +1,5 @@
 """A design of a plate as TOML: bench, map, goal, pixels, etching, how it runs, who reads it."""
 
-import hashlib
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -12,7 +10,8 @@ from camkit.models_def.design.plate.goal import Goal
 from camkit.models_def.design.plate.reader_recipe import ReaderRecipe
 from camkit.models_def.optics.diffraction.fabrication import Etching
 from camkit.models_def.optics.diffraction.geometry import Bench
-from camkit.models_def.toml_table import check_keys, read_table, section, typed
+from camkit.models_def.toml_table import check_keys, section, table_digest, typed
+from camkit.side_file import read_side_toml
 
 MapKind = Literal["full", "rank", "gratings", "zernike", "radial"]
 _TABLES: Final = ("bench", "map", "goal", "pixels", "etching", "schedule", "reader")
@@ -148,7 +147,7 @@ def read_plate_recipe(path: Path) -> PlateRecipe:
     Raises:
         ContractError: If the file is missing, is no TOML, or a key is unknown, missing or wrong.
     """
-    return to_plate_recipe(read_table(path, "plate recipe"))
+    return to_plate_recipe(read_side_toml(path, "plate recipe"))
 
 
 def to_plate_recipe(table: Mapping[str, Any]) -> PlateRecipe:
@@ -190,4 +189,4 @@ def plate_recipe_digest(recipe: PlateRecipe) -> str:
     table = asdict(recipe)
     if recipe.reader is None:  # as before there were readers
         del table["reader"]
-    return hashlib.sha256(json.dumps(table, sort_keys=True).encode()).hexdigest()
+    return table_digest(table)

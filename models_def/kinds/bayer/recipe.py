@@ -1,7 +1,5 @@
 """Recipes of cameras behind a mosaic: a lens, its light, a Wiener bank, and fine-tuning."""
 
-import hashlib
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, astuple, dataclass, field, replace
@@ -17,7 +15,7 @@ from camkit.bundle.stages.network import DEFAULT_ROLE
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.scene_light import DisplayRecipe, WildRecipe
-from camkit.models_def.toml_table import section, typed
+from camkit.models_def.toml_table import section, table_digest, typed
 from camkit.models_def.training.pictures import DrawnShares
 from camkit.models_def.training.recipe import (
     DataRecipe,
@@ -433,4 +431,4 @@ def samples_digest(recipe: BayerRecipe, seed: int) -> str:
         content["kept"] = True
     if recipe.haze is not None:
         content |= {"haze": recipe.haze.model_dump(mode="json"), "frames": asdict(recipe.frames)}
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    return table_digest(content)

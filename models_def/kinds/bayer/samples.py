@@ -24,8 +24,7 @@ from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.psf_bank import PsfBank
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.networks.light import bounded, keep_share
-from camkit.models_def.sensors.demosaic import demosaic
-from camkit.models_def.sensors.demosaic import mosaic as sample_cfa
+from camkit.models_def.sensors.demosaic import developed
 from camkit.models_def.sensors.exposure import expose
 from camkit.models_def.sensors.stabilise import stabilise
 from camkit.models_def.sensors.wiener import to_otf, wiener_restore
@@ -336,7 +335,7 @@ def photograph(
     blurred = _blur(sharp, kernels, bank.radius_px) * illumination
     capture, saturated = expose(blurred, gains, recipe.sensor, exposure.iso, rng)
     noise = sensor.noise_at(exposure.iso).with_gains(gains)
-    planes, unknown = _develop(capture, saturated, gains, recipe, exposure.borders)
+    planes, unknown = _planes(capture, saturated, gains, recipe, exposure.borders)
     frozen = bank.frozen_kernels(
         exposure.block_x_mm,
         exposure.block_y_mm,
@@ -444,7 +443,7 @@ def _blur(sharp: Tensor, kernels: Tensor, radius_px: int) -> Tensor:
     return inner.clamp(min=0)
 
 
-def _develop(
+def _planes(
     capture: FloatArray,
     saturated: NDArray[np.bool_],
     gains: tuple[float, float, float],
@@ -459,9 +458,7 @@ def _develop(
     top, bottom, left, right = (recipe.data.margin_px if side else 0 for side in borders)
     height, width = capture.shape
     inside = np.s_[top : height - bottom, left : width - right]
-    mosaic = torch.from_numpy(np.ascontiguousarray(capture[inside]))[None]
-    gain_map = torch.tensor(gains).reshape(1, 3, 1, 1).expand(1, 3, *mosaic.shape[1:])
-    planes = demosaic(mosaic * sample_cfa(gain_map, cfa), cfa)
+    planes = developed(np.ascontiguousarray(capture[inside]), gains, cfa)
     unknown = torch.from_numpy(np.ascontiguousarray(saturated[inside]))[None, None].float()
     if any(borders):
         outside = (left, right, top, bottom)

@@ -9,7 +9,7 @@ from typing import Any, Final
 from camkit.bundle.sensor import BayerSensor
 from camkit.errors import ContractError
 from camkit.models_def.kinds.hdr.thesis_recipe import GlareRecipe, ThesisRecipe
-from camkit.models_def.toml_table import section, typed
+from camkit.models_def.toml_table import section, table_digest, typed
 from camkit.models_def.training.recipe import (
     DataRecipe,
     Recipe,
@@ -138,7 +138,7 @@ def samples_digest(recipe: HdrRecipe, seed: int) -> str:
         "object_distance_mm": str(recipe.object_distance_mm),
         "seed": seed,
     }
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    return table_digest(content)
 
 
 def reference_digest(recipe: HdrRecipe, role: str, seed: int) -> str:

@@ -17,7 +17,7 @@ from camkit.colorimetry import camera_from_rec709, rec709_from_camera
 from camkit.contracts import CfaPattern, FloatArray, NoiseModel
 from camkit.models_def.kinds.hdr.material import HdrMaterial
 from camkit.models_def.kinds.hdr.recipe import HdrRecipe
-from camkit.models_def.sensors.demosaic import demosaic, mosaic
+from camkit.models_def.sensors.demosaic import developed
 from camkit.models_def.sensors.exposure import expose
 from camkit.models_def.sensors.stabilise import stabilise
 from camkit.models_def.sensors.wiener import to_otf
@@ -145,9 +145,7 @@ def spread_light(sharp: Tensor, kernels: FloatArray) -> Tensor:
 
 def develop(raw: FloatArray, gains: tuple[float, float, float], cfa: CfaPattern) -> FloatArray:
     """Return (3, h, w) white-balanced planes of an (h, w) mosaic."""
-    samples = torch.from_numpy(raw)[None]
-    factors = torch.tensor(gains).reshape(1, 3, 1, 1).expand(1, 3, *samples.shape[1:])
-    return np.ascontiguousarray(demosaic(samples * mosaic(factors, cfa), cfa)[0].numpy())
+    return np.ascontiguousarray(developed(raw, gains, cfa)[0].numpy())
 
 
 def sample_of(

@@ -1,7 +1,5 @@
 """Recipes of single-photon cameras: an array, how it samples, and how many photons it is given."""
 
-import hashlib
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Final
@@ -12,7 +10,7 @@ from camkit.errors import ContractError
 from camkit.models_def.kinds.spad.counting import Exposure
 from camkit.models_def.kinds.spad.sampling import MODES
 from camkit.models_def.networks.bicubic import SCALE
-from camkit.models_def.toml_table import section
+from camkit.models_def.toml_table import section, table_digest
 from camkit.models_def.training.recipe import DataRecipe, Recipe, common_tables, model
 
 ROLES: Final = ("upscale",)
@@ -140,4 +138,4 @@ def samples_digest(recipe: SpadRecipe, role: str, seed: int) -> str:
         "role": role,
         "seed": seed,
     }
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    return table_digest(content)

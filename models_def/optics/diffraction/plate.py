@@ -45,8 +45,8 @@ from camkit.models_def.optics.diffraction.patterns import PATTERNS, Pattern
 from camkit.models_def.optics.diffraction.wave import PixelGrid, plate_psf
 from camkit.models_def.optics.glass.catalogue import find_glass
 from camkit.models_def.optics.glass.dispersion import refractive_index
-from camkit.models_def.toml_table import key_line, parse_table, read_table, section
-from camkit.side_file import read_side_bytes
+from camkit.models_def.toml_table import key_line, section
+from camkit.side_file import parse_toml, read_side_bytes, read_side_toml
 from camkit.units import UM_PER_MM
 
 PLATES: Final = Path(__file__).resolve().parents[2] / "plates"
@@ -194,7 +194,7 @@ def is_plate(path: Path) -> bool:
         return True
     if path.suffix.lower() != ".toml" or not path.is_file():
         return False
-    return "bench" in read_table(path, "optics")
+    return "bench" in read_side_toml(path, "optics")
 
 
 def read_plate(path: Path) -> Plate:
@@ -221,7 +221,7 @@ def read_plate(path: Path) -> Plate:
             raise ContractError(f"plate {path}: heights lie beside it, not at {name!r}")
         return read_side_bytes(path.with_name(name), "the heights")
 
-    return to_plate(read_table(path, "plate"), beside, what=str(path))
+    return to_plate(read_side_toml(path, "plate"), beside, what=str(path))
 
 
 def _bundled(path: Path) -> Plate:
@@ -255,7 +255,7 @@ def plate_of_members(members: Mapping[str, bytes], what: str) -> Plate:
             raise ContractError(f"the plate of {what} lacks its heights, {name}")
         return members[name]
 
-    table = parse_table(members[PLATE], f"{PLATE} of {what}")
+    table = parse_toml(members[PLATE], f"{PLATE} of {what}")
     return to_plate(table, member, what=f"of {what}")
 
 

@@ -10,7 +10,8 @@ import torch
 from camkit.errors import ContractError
 from camkit.models_def.optics.glass.catalogue import find_glass
 from camkit.models_def.optics.glass.dispersion import refractive_index
-from camkit.models_def.toml_table import check_keys, read_table, section, typed
+from camkit.models_def.toml_table import check_keys, section, typed
+from camkit.side_file import read_side_toml
 from camkit.units import to_radians
 
 RECIPES: Final = Path(__file__).resolve().parents[2] / "recipes"
@@ -196,7 +197,7 @@ def read_thin_recipe(path: Path) -> ThinRecipe:
     Raises:
         ContractError: If a key is unknown, missing or of a wrong type, or a value is refused.
     """
-    table = read_table(path, "recipe")
+    table = read_side_toml(path, "recipe")
     check_keys(path.name, table, {"name", "note", "plate", "partition", "stop", "solver"})
     missing = [key for key in ("name", "plate", "partition") if key not in table]
     if missing:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from camkit.models_def.toml_table import read_table
+from camkit.side_file import read_side_toml
 from tools.tables.journal import Entry
 from tools.tables.records import left_out_lines, markdown_table
 from tools.tables.table_rows import Row
@@ -28,7 +28,7 @@ GAINS: Final = {
     "learned.M over learned.linear": ("learned.M", "learned.linear"),
 }
 ROWS_FILE: Final = Path(__file__).with_name("rows.toml")
-THESIS: Final[Record] = read_table(ROWS_FILE, "table")["thesis"]
+THESIS: Final[Record] = read_side_toml(ROWS_FILE, "table")["thesis"]
 """Row -> set -> PSNR in dB and SSIM, as printed."""
 LEVELS: Final = (math.inf, 1e4, 1e3, 1e2)
 """Photons of white."""

@@ -25,6 +25,7 @@ from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.psf_bank import PsfBank, read_bank, write_bank
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
+from camkit.models_def.toml_table import table_digest
 from camkit.models_def.training.pictures import list_pictures
 
 HEADER: Final = "tiles.json"
@@ -248,7 +249,7 @@ def camera_digest(recipe: BayerRecipe) -> str:
         "frames": asdict(recipe.frames),
         "data": {k: v for k, v in recipe.data.to_json().items() if k not in _OF_THE_POOL},
     }
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    return table_digest(content)
 
 
 def names_digest(pictures: Path | None) -> str:

@@ -17,7 +17,7 @@ from camkit.models_def.kinds.bayer.scene_light import (
     with_range,
 )
 from camkit.models_def.kinds.bayer.training import BayerMaker
-from camkit.models_def.toml_table import parse_table
+from camkit.side_file import parse_toml
 from tests.bayer_recipe import RECIPE, bank, recipe, recipe_path  # noqa: F401
 
 WIDE = ((0.68, 0.32), (0.265, 0.69), (0.15, 0.06))
@@ -28,7 +28,7 @@ def grey(*values):
 
 
 def read(tables):
-    return to_bayer_recipe(parse_table((RECIPE + tables).encode(), "recipe"))
+    return to_bayer_recipe(parse_toml((RECIPE + tables).encode(), "recipe"))
 
 
 def test_light_of_a_display_has_steps_of_its_codes():
