@@ -12,13 +12,17 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.bundle.plane import Plane
+from camkit.bundle.sensor import MOSAIC, RGB
 from camkit.caller import option_text
 from camkit.contracts import CFA_PATTERNS, CfaPattern, FloatArray, InputContract, NoiseModel
 from camkit.errors import ContractError
 from camkit.field_types import check_fields
 from camkit.picture_window import PictureWindow
+from camkit.runtime.job.stream import Stream
 from camkit.runtime.machine.memory import mapping_of
 from camkit.runtime.metadata import Metadata
+from camkit.runtime.rows import Rows
 
 SATURATION_SHARE: Final = 0.99
 """A sample at this share of the white level is taken as clipped.
@@ -199,6 +203,39 @@ class Capture:
         return 1 if self.cfa is not None else self.channels, self.height, self.width
 
     @property
+    def plane(self) -> Plane:
+        """Return what the samples are where no bundle states it."""
+        channels = MOSAIC if self.cfa is not None else RGB
+        return Plane(type="uint16", channels=channels, domain="dn")
+
+    def stream(self, plane: Plane) -> Stream:
+        """Return the samples as the file holds them.
+
+        Args:
+            plane: As it is stated; planes that come in place of a mosaic have their own channels.
+        """
+        if self.cfa is None and plane.channels == MOSAIC:
+            plane = plane.model_copy(update={"channels": RGB})
+        return Stream(
+            plane=plane,
+            shape=self.plane_shape,
+            gains=(1.0,) * self.channels,
+            source=_Samples(self),
+            owned=False,
+        )
+
+    def gives(self, _plane: Plane) -> bool:
+        """Return whether a plane can be a product of this capture: any can."""
+        return True
+
+    def shares_memory(self, array: NDArray[Any]) -> bool:
+        """Return whether an array may lie where the samples do."""
+        return bool(np.may_share_memory(array, self.samples))
+
+    def close(self) -> None:
+        """Release the file: it was read whole."""
+
+    @property
     def height(self) -> int:
         """Return the number of rows."""
         return int(self.samples.shape[-2])
@@ -274,3 +311,20 @@ class Capture:
     def _check_rows(self, top: int, bottom: int) -> None:
         if not 0 <= top <= bottom <= self.height:
             raise ContractError(f"rows must lie in 0..{self.height}; got {top}..{bottom}")
+
+
+class _Samples:
+    """The samples of a capture as rows."""
+
+    def __init__(self, capture: Capture) -> None:
+        self._capture = capture
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Return (channel, h, w); a mosaic is one channel."""
+        return self._capture.plane_shape
+
+    def read(self, top: int, bottom: int) -> Rows:
+        """Return rows top..bottom."""
+        rows: Rows = self._capture.samples[..., top:bottom, :]
+        return rows if rows.ndim == 3 else rows[None]

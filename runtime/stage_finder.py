@@ -1,11 +1,17 @@
-"""Where the work of a stage is found: the module of its name in `camkit.runtime.stages`.
+"""Finds the module that does the work of a stage.
+
+It is the one that the stage names as its `runtime`, else that of its type in
+`camkit.runtime.stages`.
 
 A module defines
 
     prepare(entry, job) -> StageWork     what the stage does to one capture; cheap, before any row
-    seconds(entry, subject, work, speed)    what it will take, for the plan
+    seconds(entry, subject, work, speed)    what it will take, for plans that estimate seconds
     METHODS                              names of its ways, as `--method` takes them; may be empty
     OPTIONS                              fields of `Options` that mean something to it
+    look(entry, job) -> Job              optional: looks at the capture before anything is planned;
+                                         the job returned knows what it found
+    IS_NEEDED                            optional: true where no method leaves the stage out
     is_left_out(options)                 optional: whether the caller wants it left out
     check(entry, manifest, max_bytes)    optional: refuses, when a bundle is loaded, what asks too
                                          much of a machine
@@ -14,14 +20,13 @@ A module defines
 """
 
 import importlib
-import pkgutil
 from collections.abc import Sequence
 from functools import cache
 from types import ModuleType
-from typing import Final
+from typing import Final, get_args
 
 from camkit.bundle.manifest import Manifest
-from camkit.bundle.stages import Stage
+from camkit.bundle.stages import Stage, StageEntry
 from camkit.errors import UnsupportedError
 
 STAGES: Final = "camkit.runtime.stages"
@@ -35,13 +40,27 @@ def stage_module(name: str) -> ModuleType:
     Raises:
         UnsupportedError: If this runtime has none.
     """
-    places = importlib.import_module(STAGES).__path__
-    known = {module.name for module in pkgutil.iter_modules(places)}
+    known = _entries()
     if name not in known:
         raise UnsupportedError(
             f"this runtime has no stage {name!r}; it has {', '.join(sorted(known))}"
         )
-    return importlib.import_module(f"{STAGES}.{name}")
+    return _module(known[name], name)
+
+
+def module_of(stage: StageEntry) -> ModuleType:
+    """Return the module of a stage of a list, which need not be one that a bundle may list."""
+    return _module(type(stage), stage.type)
+
+
+@cache
+def _module(entry: type[StageEntry], name: str) -> ModuleType:
+    return importlib.import_module(entry.runtime or f"{STAGES}.{name}")
+
+
+@cache
+def _entries() -> dict[str, type[StageEntry]]:
+    return {entry.model_fields["type"].default: entry for entry in get_args(get_args(Stage)[0])}
 
 
 def check_stages(manifest: Manifest, max_bytes: int) -> None:
@@ -56,21 +75,19 @@ def check_stages(manifest: Manifest, max_bytes: int) -> None:
         ContractError: If one cannot do with the memory.
     """
     for stage in manifest.stages:
-        check = getattr(stage_module(stage.type), "check", None)
+        check = getattr(module_of(stage), "check", None)
         if check is not None:
             check(stage, manifest, max_bytes)
 
 
-def known_facts(stages: Sequence[Stage]) -> tuple[str, ...]:
+def known_facts(stages: Sequence[StageEntry]) -> tuple[str, ...]:
     """Name the facts of a camera body that some stages know."""
     return tuple(
-        dict.fromkeys(
-            fact for stage in stages for fact in getattr(stage_module(stage.type), "FACTS", ())
-        )
+        dict.fromkeys(fact for stage in stages for fact in getattr(module_of(stage), "FACTS", ()))
     )
 
 
-def stage_keys(stages: Sequence[Stage]) -> tuple[str, ...]:
+def stage_keys(stages: Sequence[StageEntry]) -> tuple[str, ...]:
     """Name every stage for people and clocks: its type, and its role or number among twins."""
     types: list[str] = [stage.type for stage in stages]
     roles = [(stage.type, getattr(stage, "role", None)) for stage in stages]
@@ -85,17 +102,14 @@ def stage_keys(stages: Sequence[Stage]) -> tuple[str, ...]:
     return tuple(keys)
 
 
-def methods_of(stages: Sequence[Stage]) -> tuple[str, ...]:
+def methods_of(stages: Sequence[StageEntry]) -> tuple[str, ...]:
     """Name the ways of the stages, as `--method` takes them; those of the last stage first."""
     return tuple(
-        dict.fromkeys(
-            method for stage in reversed(stages) for method in stage_module(stage.type).METHODS
-        )
+        dict.fromkeys(method for stage in reversed(stages) for method in module_of(stage).METHODS)
     )
 
 
 def all_methods() -> tuple[str, ...]:
-    """Name the ways of every stage of this runtime, whatever a bundle lists."""
-    places = importlib.import_module(STAGES).__path__
-    names = sorted(module.name for module in pkgutil.iter_modules(places))
+    """Name the ways of every stage that kinds share, whatever a bundle lists."""
+    names = sorted(name for name, entry in _entries().items() if not entry.runtime)
     return tuple(dict.fromkeys(m for name in names for m in stage_module(name).METHODS))

@@ -75,7 +75,7 @@ def prepare(entry: Dehaze, job: Job) -> StageWork:
         @cache
         def band() -> CoarseBand:
             # whoever asks first, the time is this stage's
-            with job.clock.stage(entry.type):
+            with job.log.clock.stage(entry.type):
                 return coarse_band(entry, picture, job)
 
         cleared = picture.with_bands(_cleared(picture, band, job.threads))

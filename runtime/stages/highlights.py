@@ -198,7 +198,7 @@ def _painter(
         cells, kernels, lambda: check_cancelled(job.cancel), least_samples=least_samples
     )
     notes[:] = recovery.notes
-    job.sections["hdr"] = recovery.to_json()
+    job.log.sections["hdr"] = recovery.to_json()
     return Painter(recovery, rec709_of_planes(job.color_matrix))
 
 

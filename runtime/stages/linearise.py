@@ -87,7 +87,7 @@ class LinearRows:
         self._end = bottom
         self._clipped += int(np.count_nonzero(capture.saturated_rows(top, bottom)))
         self._counted += (bottom - top) * capture.samples.size // capture.height
-        self._job.clipped_fraction = self._clipped / self._counted
+        self._job.log.clipped_fraction = self._clipped / self._counted
 
 
 class MaskRows:

@@ -108,16 +108,21 @@ def block_bytes(block_px: int, channels: int, *, threads: int) -> int:
     return 4 * channels * block_px * block_px * (PLANES_HELD + PLANES_PER_BLOCK * threads)
 
 
+def look(_entry: Wiener, job: Job) -> Job:
+    """Look for the noise."""
+    return job.with_noise()
+
+
 def prepare(entry: Wiener, job: Job) -> StageWork:
-    """Return which kernels are taken, where there is a choice, and what the noise is."""
-    bundle, depth_mm, _ = job.known_bundle, job.options.depth_mm, job.noise
+    """Return which kernels are taken, where there is a choice."""
+    bundle, depth_mm = job.known_bundle, job.options.depth_mm
     depths_mm = bundle.psf.depths_mm
     if depths_mm.size > 1:
         known = ", ".join(map(depth_name, depths_mm))
         untold = ESTIMATED if entry.depth == ESTIMATED else f"mean of {known}"
-        job.record["depth"] = untold if depth_mm is None else depth_name(depth_mm)
+        job.log.record["depth"] = untold if depth_mm is None else depth_name(depth_mm)
     if job.options.unit is not None and FOCUS in job.options.unit.facts:
-        job.record[FOCUS] = job.options.focus_um
+        job.log.record[FOCUS] = job.options.focus_um
 
     def warnings() -> tuple[str, ...]:
         found = job.kept.get(_nearness_key(entry))
@@ -243,7 +248,7 @@ def _scene_kernels(
             cfa=seen.cfa,
             threads=job.threads,
         )
-    job.sections["distance"] = found.to_json()
+    job.log.sections["distance"] = found.to_json()
     return kernels.over(found)
 
 

@@ -19,8 +19,8 @@ from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray
 from camkit.runtime.files.picture import read_light
-from camkit.runtime.kind_parts.recording import RecordingOptions
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
+from camkit.runtime.kinds.spad.twin.recording import PhotonOptions
 from camkit.runtime.kinds.spad.twin.simulate import fitted, luminance, record
 from camkit.runtime.kinds.spad.twin.write import write_recorded
 from tools.hdr.gallery import night_pictures
@@ -167,7 +167,7 @@ class Photons:
         bundle = open_bundle(find_bundle(name))
         camera = FineCamera.of(bundle)
         light = read_light(SCENES / self.scene)
-        recorded = record(light, bundle, RecordingOptions(photons=self.photons, seed=1))
+        recorded = record(light, bundle, PhotonOptions(photons=self.photons, seed=1))
         with TemporaryDirectory() as folder:
             capture = Path(folder) / "counts.npz"
             write_recorded(capture, recorded)

@@ -47,9 +47,10 @@ from camkit.models_def.kinds.spad.sampling import Sampling
 from camkit.models_def.kinds.spad.training import PART, sampling_of
 from camkit.models_def.training.checkpoint import load_network, read_checkpoint, recipe_of
 from camkit.report.kinds.spad.ways import BASELINES
-from camkit.runtime.kinds.spad.proving import PROVING
+from camkit.runtime.kinds.spad.golden_captures import probe
 from camkit.runtime.output.part_file import atomic_output
 from camkit.runtime.proof.check import check_bundle
+from camkit.runtime.proof.golden_run import case_work
 from camkit.scenes import procedural_scene
 from tools.spad.edge_export import with_plain_borders
 from tools.spad.table.rows import chosen_runs
@@ -157,13 +158,13 @@ def write_baselines(
         height, width = WINDOW_PX
         networks = {}
         for role, one in found.items():
-            window = np.ascontiguousarray(PROVING.probe(bundle, role)[None, :, :height, :width])
+            window = np.ascontiguousarray(probe(bundle, role)[None, :, :height, :width])
             networks[role] = _slim(measure_network(drafts[role], one.network, [window]))
         manifest, members = _manifest(found, networks), _members(networks)
         bundle = write_bundle(first, manifest, members)
         members[CARD] = card_text(bundle, {}).encode()
         write_bundle(first, manifest, members)
-        report = check_bundle(first, run=PROVING.run, without=("laws",))
+        report = check_bundle(first, run=case_work, without=("laws",))
     if not report.passed:
         raise ParityError("the bundle fails its own check: " + "; ".join(report.lines()))
     with atomic_output(out) as part:

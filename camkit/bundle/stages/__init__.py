@@ -6,7 +6,7 @@ does stands in the module of the same name in `camkit.runtime.stages`.
 linearise, repair, white_balance, demosaic    the front
 haze, wiener, highlights, deglare, network    the restoration
 raise_clipped, illumination, undistort, color what every picture needs behind it
-correct, super_resolve, sharpen               single photons
+correct, super_resolve, sharpen, lifetime     single photons
 """
 
 from typing import Annotated
@@ -21,6 +21,7 @@ from camkit.bundle.stages.entry import JoinError, Parts, StageEntry
 from camkit.bundle.stages.haze import Dehaze
 from camkit.bundle.stages.highlights import Highlights
 from camkit.bundle.stages.illumination import Illumination
+from camkit.bundle.stages.lifetime import Lifetime
 from camkit.bundle.stages.linearise import Linearise
 from camkit.bundle.stages.network import Network
 from camkit.bundle.stages.raise_clipped import RaiseClipped
@@ -41,6 +42,7 @@ __all__ = [
     "Highlights",
     "Illumination",
     "JoinError",
+    "Lifetime",
     "Linearise",
     "Network",
     "Parts",
@@ -72,6 +74,7 @@ Stage = Annotated[
     | Color
     | Correct
     | SuperResolve
-    | Sharpen,
+    | Sharpen
+    | Lifetime,
     Field(discriminator="type"),
 ]

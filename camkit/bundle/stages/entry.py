@@ -45,13 +45,18 @@ class StageEntry(Entry):
 
     Attributes:
         stands_in: Which of the planes taken stands for what it gives where the stage is left out.
+        runtime: Dotted name of the module that does it, see `camkit.runtime.stage_finder`; empty
+            for the one of its type in `camkit.runtime.stages`.
         takes: Names of the planes it reads.
         gives: Names of the planes it makes; each has its entry among the manifest's planes.
+        type: Its name in manifests; a `Literal` of each stage.
     """
 
     stands_in: ClassVar[int] = 0
+    runtime: ClassVar[str] = ""
     takes: tuple[Word, ...]
     gives: tuple[Word, ...]
+    type: Word
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Return what the stage makes of the planes it takes; one plane for each name in `gives`.
@@ -92,6 +97,19 @@ def need_rows(plane: Plane) -> None:
     """
     if plane.axes != "y x":
         raise JoinError(f"it takes pictures (y x), not planes over {plane.axes}")
+
+
+def need_counts_of_pixels(taken: Sequence[Plane]) -> Plane:
+    """Return the one plane of photons that a stage takes, as the pixels of the array counted them.
+
+    Raises:
+        JoinError: If it is given none, several, one of another domain or a finer one.
+    """
+    need_count(taken, 1)
+    need_domain(taken[0], "counts")
+    if taken[0].grid.pitch_ratio != 1:
+        raise JoinError("it takes what the pixels of the array counted, not a finer plane")
+    return taken[0]
 
 
 def one_linear(taken: Sequence[Plane]) -> Plane:

@@ -125,10 +125,10 @@ def simulate(
         }
         simulate_recorded(scene, opened, out, counted, given, overwrite=overwrite, json_=json_)
         return
-    if out.suffix.lower() != part.suffix:
+    if out.suffix.lower() not in part.suffixes:
         raise ContractError(
-            f"a simulated capture of this camera is a {part.suffix[1:].upper()}; expected a name "
-            f"in {part.suffix}, got {out}"
+            f"a simulated capture of this camera is a {part.suffixes[0][1:].upper()}; expected a "
+            f"name in {part.suffixes[0]}, got {out}"
         )
     _check_bits(bits, sensor)
     _check_truth(truth, out, opened)
