@@ -9,7 +9,7 @@ The public face, free of torch and loaded only when touched:
 
 The folders, in the order in which data passes through them: `models_def` (design time: optics,
 sensors, networks, training), `export` (bundle out), `bundle` (the file both sides agree on),
-`runtime` (use time), `report` and `cli` (for people).
+`runtime` (use time), `calibration` (what a camera is, measured), `report` and `cli` (for people).
 """
 
 from importlib import import_module

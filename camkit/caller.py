@@ -54,7 +54,7 @@ def language() -> Language:
 
 @contextmanager
 def speaking(chosen: Language) -> Iterator[None]:
-    """Speak a language in this process and in the children that it starts."""
+    """Set the language of this process and of the children that it starts."""
     before = os.environ.get(VARIABLE)
     os.environ[VARIABLE] = chosen
     try:
@@ -68,7 +68,7 @@ def speaking(chosen: Language) -> Iterator[None]:
 
 @contextmanager
 def speaking_here(chosen: Language) -> Iterator[None]:
-    """Speak a language in this thread alone, whose process serves several callers."""
+    """Set the language of this thread alone, whose process serves several callers."""
     token = _task.set(chosen)
     try:
         yield

@@ -1,4 +1,4 @@
-"""What design time and use time agree on: CFA, inputs, noise, frozen PSF, radial distortion.
+"""Types shared by design time and use time: CFA, inputs, noise, frozen PSF, radial distortion.
 
 Signals are linear with 1.0 = white level (after black subtraction). Arrays are [y, x], pixel
 centres at integers. Sensor positions are in millimetres from the optical axis, +x to the right
@@ -373,7 +373,7 @@ def depth_name(depth_mm: float) -> str:
 
 
 def focus_weights(shifts_um: NDArray[np.float64] | None, focus_um: float) -> NDArray[np.float64]:
-    """Return the share that the nominal kernels, and those of every shift, have at a focus.
+    """Return the weights of the nominal kernels, and of those of every shift, at a focus.
 
     Kernels are linear between neighbouring shifts, so they stay >= 0 and of unit sum.
 

@@ -34,7 +34,7 @@ def one_line(text: str) -> str:
 
 
 def unexpected(error: Exception) -> str:
-    """Return what to say of an error that nobody foresaw, as one line."""
+    """Return one line about an error that nobody foresaw."""
     told = one_line(str(error))
     return (
         f"unexpected {type(error).__name__}{': ' if told else ''}{told}; please report it with the "

@@ -83,7 +83,7 @@ def _fits_tuple(value: object, parts: tuple[Any, ...]) -> bool:
 
 
 def _named(hint: Any) -> str:
-    """Name a type for people."""
+    """Return the name of a type for people."""
     origin, parts = get_origin(hint), get_args(hint)
     if origin in (Union, types.UnionType):
         rest = [_named(part) for part in parts if part is not type(None)]

@@ -26,7 +26,7 @@ FloatGrid = NDArray[np.float64]
 
 
 def without_pedestal(kernels: FloatArray, core_share: NDArray[Any], share: float) -> FloatArray:
-    """Take an even pedestal off kernels of haze: black that was taken for light.
+    """Subtract an even pedestal from kernels of haze: black that was taken for light.
 
     Args:
         kernels: (..., n, n) share of a point's light in every cell.
@@ -66,7 +66,7 @@ class Haze:
     pixel_pitch_um: float
 
     def __post_init__(self) -> None:
-        """Refuse what is no haze.
+        """Refuse arrays that are no haze.
 
         Raises:
             ContractError: If shapes disagree, or light is not a share of what arrives.

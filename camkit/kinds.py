@@ -7,32 +7,31 @@ A kind of camera is one folder on each floor that it needs, and one line in `KIN
 
     camkit/runtime/kinds/NAME      readers and twin
     camkit/models_def/kinds/NAME   samples and judging, for training
-    camkit/export/kinds/NAME       what is made before training
     camkit/report/kinds/NAME       metrics, rows of the bench, scenarios of stress
 
 A package of somebody else brings its own: its entry point in the group `camkit.kinds` names a
-`Kind` whose `home` is the package that holds the folders `runtime`, `models_def`, `export` and
-`report`, or those of them that it needs.
+`Kind` whose `home` is the package that holds the folders `runtime`, `models_def` and `report`, or
+those of them that it needs.
 """
 
 import contextlib
 import importlib
-from dataclasses import dataclass
-from functools import cache
-from importlib import metadata, util
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import PurePath
 from types import ModuleType
 from typing import Final, Literal
 
+from camkit.entry_points import entry_points, has_module, load_entry_point
 from camkit.errors import ContractError, UnsupportedError
 
 GROUP: Final = "camkit.kinds"
-Floor = Literal["runtime", "models_def", "export", "report"]
+Floor = Literal["runtime", "models_def", "report"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KindOption:
-    """What a caller may choose about the captures of some kind, beyond what every camera knows.
+    """An option for the captures of some kind, beyond those of every camera.
 
     Attributes:
         name: In Python; on the command line --name.
@@ -72,6 +71,8 @@ class Kind:
         file_types: Suffixes of files that only captures of this kind have, with their dots.
         shared_types: Suffixes of files that captures of this kind have too.
         options: What a caller may choose for this kind alone.
+        scenes: Sources of scenes that it brings: name -> "module:function", which draws
+            (3, h, w) float32 linear Rec.709 of (seed, height, width).
     """
 
     name: str
@@ -83,23 +84,20 @@ class Kind:
     file_types: tuple[str, ...] = ()
     shared_types: tuple[str, ...] = ()
     options: tuple[KindOption, ...] = ()
+    scenes: Mapping[str, str] = field(default_factory=dict)
 
     def part(self, floor: Floor) -> ModuleType:
-        """Import what one floor knows of this kind.
+        """Import the part of this kind that belongs to one floor.
 
         Raises:
             UnsupportedError: If that floor knows nothing of it.
         """
         name = self._module(floor)
-        if not _is_there(name):
+        if not has_module(name):
             raise UnsupportedError(
                 f"cameras of the kind {self.name!r} have no part in {floor}: add the package {name}"
             )
         return importlib.import_module(name)
-
-    def has_part(self, floor: Floor) -> bool:
-        """Return whether a floor knows something of this kind."""
-        return _is_there(self._module(floor))
 
     def _module(self, floor: Floor) -> str:
         return f"{self.home}.{floor}" if self.home else f"camkit.{floor}.kinds.{self.name}"
@@ -125,6 +123,7 @@ HDR: Final = Kind(
         *("illumination", "undistort", "color"),
     ),
     metrics=("picture", "hdr"),
+    scenes={"night": "camkit.runtime.kinds.hdr.night:night_scene"},
 )
 
 SPAD: Final = Kind(
@@ -166,7 +165,7 @@ KINDS: Final = {kind.name: kind for kind in (BAYER, HDR, SPAD)}
 def all_kinds() -> list[Kind]:
     """Return every kind that can be used here; a broken package brings none."""
     kinds = dict(KINDS)
-    for name in sorted(_installed()):
+    for name in sorted(entry_points(GROUP)):
         with contextlib.suppress(ContractError):
             kinds.setdefault(name, find_kind(name))
     return list(kinds.values())
@@ -187,37 +186,17 @@ def find_kind(name: str) -> Kind:
     """
     if name in KINDS:
         return KINDS[name]
-    found = _installed()
+    found = entry_points(GROUP)
     if name not in found:
         known = ", ".join(sorted({*KINDS, *found}))
         raise UnsupportedError(
             f"there is no kind of camera {name!r} here; there are: {known}. The package that "
             "brings it may not be installed"
         )
-    try:
-        kind = found[name].load()
-    except (ImportError, AttributeError) as error:
-        raise ContractError(
-            f"the kind of camera {name!r} cannot be loaded from {found[name].value!r}: {error}"
-        ) from error
+    kind = load_entry_point(found[name], "kind of camera")
     if not isinstance(kind, Kind) or kind.name != name or not kind.home:
         raise ContractError(
             f"the entry point {found[name].value!r} must be a camkit Kind called {name!r} with a "
             "home"
         )
     return kind
-
-
-def _is_there(name: str) -> bool:
-    """Return whether a module is there; one that fails for another reason still raises."""
-    try:
-        return util.find_spec(name) is not None
-    except ModuleNotFoundError as error:
-        if f"{name}.".startswith(f"{error.name}."):
-            return False
-        raise
-
-
-@cache
-def _installed() -> dict[str, metadata.EntryPoint]:
-    return {point.name: point for point in metadata.entry_points(group=GROUP)}

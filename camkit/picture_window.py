@@ -35,7 +35,7 @@ class PictureWindow:
 
     @property
     def note(self) -> str:
-        """Return what a person should know of it; empty for a whole picture of square pixels."""
+        """Return a note about it for people; empty for a whole picture of square pixels."""
         x0, y0, x1, y1 = self.display
         parts = []
         if not self.is_whole:

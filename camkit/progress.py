@@ -44,20 +44,20 @@ class Task:
     since_s: float = field(default_factory=time.monotonic)
 
     def tell(self, what: str) -> None:
-        """Return what is being done now."""
+        """Set the text of the present work."""
         self.what = what
 
     def count(self, done: float, total: float | None = None) -> None:
-        """Note how many units are done."""
+        """Set the number of finished units."""
         self.done, self.total = done, self.total if total is None else total
 
     def begin(self, done: float) -> None:
-        """Note that the even part of the work begins now, with so many units behind it."""
+        """Start the even part of the work, with so many units done before it."""
         self.done = self.skipped = done
         self.since_s = time.monotonic()
 
     def left_s(self, now_s: float | None = None) -> float | None:
-        """Return the time left, by the work done so far; None where that says nothing.
+        """Return the time left, by the work done so far; None where it cannot be predicted.
 
         Args:
             now_s: Seconds of `time.monotonic`; None for now.
@@ -106,7 +106,7 @@ def working(
     is_even: bool = True,
     writes_lines: bool = False,
 ) -> Iterator[Task]:
-    """Name work that is done in this block; see `Task`."""
+    """Yield a task for the work of this block; see `Task`."""
     made = Task(what=what, total=total, unit=unit, is_even=is_even, writes_lines=writes_lines)
     board = _board.get()
     if board is None:
@@ -126,7 +126,7 @@ def working(
 
 
 def counted(items: Sequence[Item], what: str, unit: str | None = None) -> Iterator[Item]:
-    """Pass items on, each counted as a unit when the next one is asked for."""
+    """Yield items, each counted as a unit when the next one is asked for."""
     with working(what, len(items), unit=unit) as made:
         for number, item in enumerate(items):
             made.count(number)
@@ -134,7 +134,7 @@ def counted(items: Sequence[Item], what: str, unit: str | None = None) -> Iterat
 
 
 def note(line: str) -> None:
-    """Pass a lasting line to the listener."""
+    """Send a lasting line to the listener."""
     board = _board.get()
     if board is not None:
         board.note(line)

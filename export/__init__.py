@@ -7,8 +7,6 @@
     network_facts   what is measured about it
     activations     its activations on golden cases, of a bundle that is there
     remeasured      a bundle that is there, with parts that were measured
-    preparing       what is made before training, by kinds
-    frames          whole frames photographed and cleared, for training behind a haze
     energy, card    the card and the preview for people
     assemble        everything packed, proved, written
 

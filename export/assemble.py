@@ -30,6 +30,7 @@ from camkit.bundle.manifest import (
     LIGHT_VERSION,
     Manifest,
     Threshold,
+    format_of,
     planes_of,
 )
 from camkit.bundle.psf_file import psf_to_bytes, read_psf
@@ -73,7 +74,7 @@ from camkit.runtime.kind import part_of
 from camkit.runtime.plan.loss import read_loss_model
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work
-from camkit.runtime.proof.haze import make_haze_golden
+from camkit.runtime.proof.haze_band import make_haze_golden
 from camkit.runtime.proof.laws.proof import measure_laws, with_laws
 from camkit.side_file import read_side_text
 
@@ -162,7 +163,7 @@ def export_bundle(parts: Parts, out: Path) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Camera:
-    """What is exported: one camera, with every size of every role."""
+    """The exported camera, with every size of every role."""
 
     kind: TrainingKind[Any, Any]
     recipe: Recipe
@@ -199,7 +200,7 @@ def _camera(parts: Parts) -> _Camera:
 
 
 def _optics(parts: Parts, recipe: Recipe, design: Design) -> FrozenOptics:
-    """Read the optics, with their haze where a stage undoes one.
+    """Read the optics, with their haze where a stage removes one.
 
     Raises:
         ContractError: If there is a haze and no such stage, or the other way round.
@@ -257,7 +258,7 @@ def _models(networks: Networks) -> dict[str, bytes]:
 
 
 def _windows(bundle: Bundle, cases: Cases) -> dict[tuple[str, str], list[FloatArray]]:
-    """Return what every network is given: for a larger probe first, then for the golden cases."""
+    """Return the inputs of every network: for a larger probe first, then for the golden cases."""
     captures, golden = list(cases.values()), part_of(bundle.manifest).golden
     windows: dict[tuple[str, str], list[FloatArray]] = {}
     if golden is None:
@@ -312,7 +313,7 @@ def _manifest(camera: _Camera, parts: Parts, networks: Networks) -> Manifest:
     known = KnownParts(sensor=recipe.sensor, optics=optics, networks=facts)
     data = (c.training_data for sizes in camera.checkpoints.values() for c in sizes.values())
     return Manifest(
-        format_version=".".join(map(str, LIGHT_VERSION)),  # it states the laws of its pictures
+        format_version=format_of(camera.optics.psf, (optics, *stages), least=LIGHT_VERSION),  # laws
         kind=recipe.kind,
         name=recipe.name,
         version=parts.version,

@@ -27,7 +27,7 @@ def card_text(
     fails_on: Sequence[str] = (),
     whites: Mapping[str, float] | None = None,
 ) -> str:
-    """Write the card: what it is, what it was trained on, what was measured, where it fails.
+    """Return the card: the camera, its training data, its measurements, its failures.
 
     Args:
         bundle: The camera, with its networks.
@@ -85,7 +85,7 @@ def card_text(
 
 
 def laws_text(found: Found) -> str:
-    """Write which laws of a picture its networks keep, to be put behind the card."""
+    """Return the part of the card that states which laws of a picture its networks keep."""
     if isinstance(found, str):
         return f"\nLaws of a picture: {found}.\n"
     lines = [f"{_LAWS} (`camkit check --level laws`)", ""]
@@ -184,7 +184,7 @@ def preview_png(bundle: Bundle, golden: Mapping[str, GoldenArrays]) -> bytes:
 
 
 def _pictures(golden: Mapping[str, GoldenArrays]) -> dict[str, GoldenArrays]:
-    """Return the cases of which the pipeline makes pictures."""
+    """Return the cases that the pipeline makes pictures of."""
     return {name: arrays for name, arrays in golden.items() if IMAGE in arrays.outputs}
 
 

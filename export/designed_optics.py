@@ -1,6 +1,6 @@
-"""What a bundle says of how its optics were designed: a lens, a plate, or nothing.
+"""The design of a bundle's optics, as the bundle records it: a lens, a plate, or nothing.
 
-checkpoints, or a file of the user -> held against the frozen PSF -> members of the bundle
+checkpoints, or a file of the user -> checked against the frozen PSF -> members of the bundle
 """
 
 from collections.abc import Iterable, Mapping
@@ -22,18 +22,12 @@ from camkit.models_def.optics.diffraction.plate import (
     read_plate,
 )
 from camkit.models_def.optics.diffraction.wave import PixelGrid
-from camkit.models_def.optics.distortion import trace_distortion
+from camkit.models_def.optics.distortion import check_distortion
 from camkit.models_def.optics.lens_file.lens_file import read_lens
 from camkit.models_def.optics.prescription import Lens, format_prescription, parse_prescription
-from camkit.models_def.optics.thin.freezing import peaks_off_px
+from camkit.models_def.optics.thin.freezing import check_peaks
 from camkit.models_def.training.checkpoint import Checkpoint
-from camkit.runtime.geometry.distortion import distort_points
-from camkit.units import UM_PER_MM
 
-SAME_LENS_PX: Final = 0.01
-SAME_PEAKS_PX: Final = 4.0
-"""Of a lens with a haze, whose peaks are found to a pixel or so and fitted to within one or two;
-those of other plates lie tens of pixels off."""
 SAME_PLATE_SHARE: Final = 0.015
 """Of the light of the middle wavelength. Built-in plates frozen for one sensor differ by 0.029 and
 more from each other, and by 0.008 at most from what was computed of them."""
@@ -60,7 +54,8 @@ def designed_members(
         )
     # written afresh: the bundle carries the user's glasses and is TOML, whatever came in
     if lens is not None:
-        _check_lens(lens, psf, parts)
+        check = check_distortion if parts.haze is None else check_peaks
+        check(lens, psf, parts.psf)
         return {PRESCRIPTION: format_prescription(lens).encode()}
     if plate is not None:
         _check_plate(plate, psf, parts.psf)
@@ -69,7 +64,7 @@ def designed_members(
 
 
 def _carried(checkpoints: Iterable[Checkpoint]) -> Mapping[str, bytes]:
-    """Return the optics that checkpoints carry; those of before carry none."""
+    """Return the optics that checkpoints carry; old checkpoints carry none."""
     found: list[Mapping[str, bytes]] = []
     for checkpoint in checkpoints:
         if checkpoint.designed and checkpoint.designed not in found:
@@ -93,39 +88,6 @@ def _plate_of(parts: Parts, carried: Mapping[str, bytes]) -> Plate | None:
     if PLATE not in carried or parts.without_plate:
         return None
     return plate_of_members(carried, "the checkpoints")
-
-
-def check_peaks(lens: Lens, psf: FrozenPsf, path: Path) -> None:
-    """Refuse core kernels that were frozen from another lens with a haze.
-
-    Raises:
-        ContractError: If their peaks lie elsewhere.
-    """
-    _refuse_other(lens, path, peaks_off_px(lens, psf), SAME_PEAKS_PX)
-
-
-def _check_lens(lens: Lens, psf: FrozenPsf, parts: Parts) -> None:
-    """Refuse a PSF that was frozen from another lens: no two have the same distortion."""
-    if parts.haze is not None:
-        check_peaks(lens, psf, parts.psf)
-    else:
-        _refuse_other(lens, parts.psf, _distortion_off_px(lens, psf), SAME_LENS_PX)
-
-
-def _refuse_other(lens: Lens, path: Path, off_px: float, most_px: float) -> None:
-    if off_px > most_px:
-        raise ContractError(
-            f"{path} was not frozen from the lens {lens.name}: their distortion differs by "
-            f"{off_px:.2g} px; freeze, train and export the same lens"
-        )
-
-
-def _distortion_off_px(lens: Lens, psf: FrozenPsf) -> float:
-    frozen = psf.distortion
-    own = trace_distortion(lens, frozen.radius_mm, channels=len(frozen.coefficients))
-    along = np.stack([np.linspace(0.0, frozen.radius_mm, 33), np.zeros(33)], axis=1)
-    off_mm = np.abs(distort_points(along, own) - distort_points(along, frozen)).max()
-    return float(off_mm * UM_PER_MM / psf.pixel_pitch_um)
 
 
 def _check_plate(plate: Plate, psf: FrozenPsf, path: Path) -> None:

@@ -32,7 +32,7 @@ process holds twice, and such kernels belong to coarse scales, where little is t
 
 
 def fold_nodes(graph: onnx.GraphProto) -> None:
-    """Rewrite the nodes of a graph, in place; what is no such pattern stays as it is."""
+    """Rewrite the nodes of a graph, in place; other patterns stay as they are."""
     weights = {w.name: numpy_helper.to_array(w) for w in graph.initializer}
     known = set(weights)
     nodes = list(graph.node)
@@ -48,7 +48,7 @@ def fold_nodes(graph: onnx.GraphProto) -> None:
 
 
 def _constants_into_weights(nodes: list[Any], weights: Weights, last: str) -> list[Any]:
-    """Take channel constants behind a convolution into its weights and its bias."""
+    """Fold channel constants behind a convolution into its weights and its bias."""
     nodes, place = list(nodes), 0
     while place < len(nodes):
         conv = nodes[place]
@@ -86,7 +86,7 @@ def _channel_constant(node: Any, conv: Any, weights: Weights) -> NDArray[Any] | 
 
 
 def _one_slope(nodes: list[Any], weights: Weights, _last: str) -> list[Any]:
-    """Name a slope that all channels share as an attribute."""
+    """Store a slope that all channels share as an attribute."""
 
     def changed(node: Any) -> Any:
         slope = weights.get(node.input[1]) if node.op_type == "PRelu" else None
@@ -133,7 +133,7 @@ def _coarse_convolutions(nodes: list[Any], weights: Weights, last: str) -> list[
 def _phases(
     source: str, conv: Any, slope: Any, weights: Weights
 ) -> Iterator[tuple[tuple[int, int], list[Any]]]:
-    """Return the nodes that make a pixel of every sample, for its four places (row, column)."""
+    """Yield the nodes that make a pixel of every sample, for its four places (row, column)."""
     weight, name = weights[conv.input[1]].astype(np.float64), conv.output[0]
     for y, x in product(range(2), range(2)):
         part = f"{name}_{y}{x}"
@@ -177,7 +177,7 @@ def _narrowed(
 
 
 def _seen_from(weight: NDArray[Any], place: tuple[int, int]) -> NDArray[Any]:
-    """Return what a 3x3 kernel on the fine grid takes from the pixels of one place.
+    """Return the part of a 3x3 kernel on the fine grid that falls on the pixels of one place.
 
     Args:
         weight: (k, c, 3, 3).

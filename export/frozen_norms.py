@@ -32,7 +32,7 @@ frames are the same ones."""
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FreezeOptions:
-    """What norms are frozen with.
+    """The settings of freezing norms.
 
     Attributes:
         pictures: Folder that calibration samples are cut from; None for procedural scenes.
@@ -53,7 +53,7 @@ class FreezeOptions:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrozenReport:
-    """What was frozen, and its cost.
+    """The frozen norms, and their cost.
 
     Attributes:
         norms: How many.

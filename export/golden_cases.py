@@ -31,7 +31,7 @@ Cases = dict[str, tuple[GoldenCase, GoldenArrays]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CaseRecipe:
-    """How one case is photographed.
+    """The settings of one case.
 
     Attributes:
         scene_seed: Seed of the procedural scene; the noise takes the same.
@@ -109,7 +109,7 @@ def photograph_all(bundle: Bundle) -> Cases:
 
 @working("computing golden cases")
 def add_outputs(bundle: Bundle, cases: Cases) -> dict[str, GoldenArrays]:
-    """Return the cases with what the pipeline makes of them, for every product and size."""
+    """Return the cases with the outputs of the pipeline, for every product and size."""
     return {
         name: replace(arrays, outputs=_outputs(bundle, case, arrays))
         for name, (case, arrays) in cases.items()

@@ -1,7 +1,7 @@
-"""What is measured about a network at export, for the manifest and for `camkit check`.
+"""Facts measured about a network at export, for the manifest and for `camkit check`.
 
-torch network -> draft_network     its graph, with what follows from that alone: enough to run it
-              -> measure_network   on what it is given in the pipeline: reach, range, parity, halo
+torch network -> draft_network     its graph, and the facts that follow from it: enough to run it
+              -> measure_network   on its inputs in the pipeline: reach, range, parity, halo
 """
 
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ class ExportedNetwork:
 
 @working("turning a network into ONNX")
 def draft_network(name: str, network: nn.Module, layout: SampleLayout) -> ExportedNetwork:
-    """Export a network with what its graph says of it; nothing is measured yet.
+    """Export a network with the facts of its graph; nothing is measured yet.
 
     Args:
         name: Of its member, without suffix.
@@ -85,7 +85,7 @@ def draft_network(name: str, network: nn.Module, layout: SampleLayout) -> Export
 def measure_network(
     draft: ExportedNetwork, network: nn.Module, windows: list[FloatArray]
 ) -> ExportedNetwork:
-    """Measure all that a bundle states of a network.
+    """Measure all facts that a bundle states of a network.
 
     Args:
         draft: Of `draft_network`.

@@ -1,4 +1,4 @@
-"""What goes into a bundle."""
+"""The parts of a bundle."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parts:
-    """What goes into a bundle.
+    """The parts of a bundle.
 
     Attributes:
         checkpoints: One per role and size, of one camera.

@@ -38,17 +38,17 @@ from camkit.bundle.reader import (
 from camkit.bundle.sensor import BayerSensor, ChannelResponse, Extent, PlanesSensor
 from camkit.bundle.stages import Illumination, Parts, Wiener
 from camkit.bundle.writer import write_bundle
+from camkit.calibration.measured_files import FlatFile, GeometryFile, NoiseFile
 from camkit.caller import option_text
 from camkit.contracts import FrozenPsf, RadialDistortion
 from camkit.errors import ContractError, DecodeError, ParityError
 from camkit.export.activations import with_activations
 from camkit.export.golden_cases import HAZE_SCENE, add_outputs, photograph_all
 from camkit.haze import Haze
-from camkit.runtime.calibration.measured_files import FlatFile, GeometryFile, NoiseFile
 from camkit.runtime.geometry.distortion import RANGE_MARGIN, check_distortion
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work
-from camkit.runtime.proof.haze import make_haze_golden
+from camkit.runtime.proof.haze_band import make_haze_golden
 from camkit.units import to_mm
 
 FloatGrid = NDArray[np.float64]
@@ -61,7 +61,7 @@ DESIGN: Final = (PRESCRIPTION, PLATE, PLATE_HEIGHTS)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Measured:
-    """What was measured; None for what was not.
+    """New measurements; None for what was not measured.
 
     Attributes:
         geometry: Distortion and optical centre.
@@ -78,7 +78,7 @@ class Measured:
 
 @dataclass(slots=True)
 class _Draft:
-    """A bundle on its way."""
+    """A bundle in the making."""
 
     manifest: Manifest
     members: dict[str, bytes]
@@ -102,7 +102,7 @@ class _Draft:
 def remeasured(
     bundle: Bundle, measured: Measured, out: Path, *, keep_networks: bool = False
 ) -> tuple[Bundle, tuple[str, ...]]:
-    """Write a copy of a bundle with what was measured; give it, and what people should know.
+    """Write a copy of a bundle with new measurements; return it, and notes for people.
 
     Args:
         bundle: What is copied.
@@ -320,19 +320,14 @@ def _put_geometry(draft: _Draft, found: GeometryFile) -> None:
 
 
 def _finish(draft: _Draft) -> None:
-    """Bring planes, products, optics and version up to the parts."""
+    """Update planes, products, optics and version to the parts."""
     manifest, optics = draft.manifest, draft.manifest.optics
     if draft.psf is not None and isinstance(optics, FrozenPsfOptics | HazyPsfOptics):
         draft.members[optics.member] = psf_to_bytes(draft.psf)
         focus_mm = optics.object_distance_mm
         frozen = FrozenOptics(psf=draft.psf, haze=draft.haze)
         made = frozen.entry(np.inf if focus_mm is None else focus_mm)
-        stated = tuple(map(int, manifest.format_version.split(".")))
-        least = format_of(
-            draft.psf, hazy=draft.haze is not None, bounded=draft.manifest.bounds_light
-        )
-        needed = tuple(map(int, least.split(".")))
-        newest = ".".join(map(str, max(stated, needed)))
+        newest = format_of(draft.psf, (made, *manifest.stages), least=manifest.version_pair)
         draft.change(optics=made, format_version=newest)
     parts = Parts(
         sensor=draft.manifest.sensor,

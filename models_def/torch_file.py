@@ -1,4 +1,4 @@
-"""What torch saved, read as tensors and plain values alone: no code of the file runs."""
+"""Reading of files that torch saved, as tensors and plain values alone: no code of them runs."""
 
 import pickle
 import struct

@@ -13,7 +13,7 @@
     envelope                           is a capture inside the bundle's measured ranges?
     options, job/                      one capture: what is decided, then the stages joined
     pipeline, development, batch       one capture in memory, one file, many files
-    merging/, calibration/             brackets to one picture; what a camera is, measured
+    merging/                           brackets to one picture
     proof/                             a bundle proves itself
     twin/                              the digital twin: a scene becomes a RAW file
     kind, kinds/, maker, kind_parts/   what a kind of camera brings: readers, products, proofs

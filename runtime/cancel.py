@@ -35,7 +35,7 @@ def is_cancelled(cancel: Cancel | None) -> bool:
 
 
 def check_cancelled(cancel: Cancel | None) -> None:
-    """End the work if the caller asked to stop.
+    """Stop the work if the caller asked to stop.
 
     Raises:
         Cancelled: If so.
@@ -46,7 +46,7 @@ def check_cancelled(cancel: Cancel | None) -> None:
 
 @contextmanager
 def watched(cancel: Cancel | None, stop: Callable[[], None]) -> Iterator[None]:
-    """Ask again and again while the block runs; call `stop` if the caller wants it to end.
+    """Poll the wish while the block runs; call `stop` if the caller wants it to end.
 
     Args:
         cancel: The wish; without one nothing is watched.
@@ -87,7 +87,7 @@ _WISH: ContextVar[Cancel | None] = ContextVar("camkit_cancel", default=None)
 
 @contextmanager
 def cancellable(cancel: Cancel | None) -> Iterator[None]:
-    """Let what the block calls know of a wish, however far down (see `current_wish`)."""
+    """Set the wish that functions called in the block can read (see `current_wish`)."""
     token = _WISH.set(cancel)
     try:
         yield
@@ -96,7 +96,7 @@ def cancellable(cancel: Cancel | None) -> Iterator[None]:
 
 
 def check_wish() -> None:
-    """End the work if the caller of what this thread works at asked to stop; see `cancellable`.
+    """Stop the work if the caller of this thread's work asked to stop; see `cancellable`.
 
     Raises:
         Cancelled: If so.

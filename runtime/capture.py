@@ -57,7 +57,7 @@ def check_iso(iso: Any) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MosaicOptions:
-    """What the caller says of a mosaic: all that a headerless one does not say, or a RAW's levels.
+    """The caller's facts of a mosaic: all of a headerless one, or the levels of a RAW.
 
     Attributes:
         cfa: Letters of the 2x2 cell at pixel (0, 0) in reading order, for a headerless mosaic

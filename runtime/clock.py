@@ -33,7 +33,7 @@ class StageClock:
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
-        """Charge the time inside the block to `name`, and no longer to the stage around it."""
+        """Count the time inside the block for `name`, and no longer for the stage around it."""
         self._charge()
         self._running.append(name)
         try:
@@ -43,7 +43,7 @@ class StageClock:
             self._running.pop()
 
     def bands(self, name: str, bands: Iterator[Rows]) -> Iterator[Rows]:
-        """Pass bands on, charging the making of each to `name`."""
+        """Yield bands, and count the making of each for `name`."""
         while True:
             with self.stage(name):
                 band = next(bands, None)

@@ -1,4 +1,4 @@
-"""What a capture holds, measured cheaply on a fixed lattice of cells before any work is spent.
+"""The content of a capture, measured cheaply on a fixed lattice of cells before any work.
 
     4 rows of every 16 -> colours of the 2x2 cells, white-balanced -> sqrt(x + BLACK)
         -> mean squared step to the neighbours, per lattice cell, minus what noise alone gives

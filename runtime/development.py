@@ -26,7 +26,7 @@ Status = Literal["ok", "failed", "skipped"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FileResult:
-    """What became of one input.
+    """The result of one input.
 
     Attributes:
         input: The capture.
@@ -233,7 +233,7 @@ def identity_of(
     write: WriteOptions,
     mosaic: MosaicOptions | None,
 ) -> dict[str, Any]:
-    """Return what decides the bytes of a picture or of products, as plain JSON values."""
+    """Return the values that decide the bytes of a picture or of products, as JSON values."""
     from camkit import __version__
 
     free = ("threads", "max_mem_bytes", "tile_px")
@@ -262,5 +262,5 @@ def identity_of(
 
 
 def bundle_name(pipeline: Pipeline) -> str | None:
-    """Name the bundle in use; None without one."""
+    """Return the name of the bundle in use; None without one."""
     return None if pipeline.bundle is None else pipeline.bundle.manifest.name

@@ -1,4 +1,4 @@
-"""Is a capture inside the ranges in which its bundle was shown to help?
+"""Check that a capture lies in the ranges in which its bundle was shown to help.
 
     capture -> what can be seen of it beforehand -> compared with the manifest's `envelope`
 
@@ -93,7 +93,7 @@ def _repair(capture: Capture, rows: FloatArray) -> tuple[FloatArray, np.ndarray]
 
 
 def findings(envelope: Mapping[str, Range], seen: Mapping[str, float]) -> tuple[str, ...]:
-    """Return what of a capture lies outside.
+    """Return the properties of a capture that lie outside.
 
     Args:
         envelope: The manifest's ranges; names that this version does not know are passed over.
@@ -113,7 +113,7 @@ def findings(envelope: Mapping[str, Range], seen: Mapping[str, float]) -> tuple[
 
 
 def verdict(found: tuple[str, ...], bundle: str, on_unsafe: OnUnsafe) -> str | None:
-    """Turn findings into a warning.
+    """Return the warning of findings.
 
     Args:
         found: From `findings`.

@@ -102,11 +102,11 @@ class RuntimePart:
     suffixes: tuple[str, ...] = ()
     files: Callable[[Path], tuple[Path, ...]] = _itself
     golden: GoldenCaptures | None = None
-    laws: str = "camkit.runtime.proof.laws.pictures"
+    laws: str = "camkit.runtime.proof.laws.photographs"
 
 
 def runtime_part(kind: str) -> RuntimePart:
-    """Return what the runtime knows of a kind.
+    """Return the runtime part of a kind.
 
     Raises:
         UnsupportedError: If there is no such kind, or the runtime knows nothing of it.
@@ -120,7 +120,7 @@ def runtime_part(kind: str) -> RuntimePart:
 
 
 def part_of(manifest: Manifest) -> RuntimePart:
-    """Return what the runtime knows of the kind of a bundle.
+    """Return the runtime part of the kind of a bundle.
 
     Raises:
         BundleError: If that kind cannot be used here; says why.

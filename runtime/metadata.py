@@ -1,7 +1,7 @@
-"""What a photograph says of itself beside its samples: camera, lens, date, exposure, place.
+"""Metadata of a photograph: camera, lens, date, exposure, place.
 
 All of it is foreign: text is bounded and holds no control characters, numbers lie in ranges that
-exist. What is not believable counts as not stated and never fails a picture.
+exist. A value that is not believable counts as not stated and never fails a picture.
 
     files.exif_tags, files.raw_metadata -> Metadata -> Capture -> output.origin -> every writer
 """
@@ -32,7 +32,7 @@ _UTC_OFFSET: Final = re.compile(r"[+-](0[0-9]|1[0-4]):[0-5][0-9]")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Metadata:
-    """What EXIF tells of a photograph, as far as camkit carries it into its pictures.
+    """The EXIF metadata that camkit carries into its pictures.
 
     Attributes:
         make: Maker of the camera; like all text empty if not stated.

@@ -1,4 +1,4 @@
-"""What a caller may choose about a reconstruction, checked once."""
+"""The caller's options of a reconstruction, checked once."""
 
 import difflib
 from collections.abc import Mapping, Set
@@ -127,7 +127,7 @@ class Options:
             )
 
     def chosen(self, name: str) -> str | None:
-        """Return what was chosen for a kind's own option; None if nothing was."""
+        """Return the caller's value of a kind's own option; None if there is none."""
         return dict(self.of_kind).get(name)
 
     @property
@@ -137,7 +137,7 @@ class Options:
 
     @property
     def focus_um(self) -> float:
-        """Return how far the sensor of the unit lies from its nominal place; 0 without one."""
+        """Return the shift of the camera body's sensor from its nominal place; 0 without a body."""
         return 0.0 if self.unit is None else self.unit.focus_um
 
 
@@ -155,7 +155,7 @@ def kind_option(name: str) -> KindOption:
 
 
 def kind_option_names() -> list[str]:
-    """Name the options that kinds of cameras bring."""
+    """Return the names of the options that kinds of cameras bring."""
     return sorted({option.name for kind in all_kinds() for option in kind.options})
 
 
@@ -177,7 +177,7 @@ def with_choices(options: Options, choices: Mapping[str, object]) -> Options:
 
 
 def plain_names() -> list[str]:
-    """Name the options of every camera."""
+    """Return the names of the options of every camera."""
     return [name for name in Options.__dataclass_fields__ if name != "of_kind"]
 
 
@@ -196,7 +196,7 @@ def check_names(choices: Mapping[str, object], known: Set[str]) -> None:
 
 
 def _text_of(name: str, value: object) -> str:
-    """Return what was chosen for an option of a kind as text."""
+    """Return the caller's value of a kind's option as text."""
     hint = str | PathLike if kind_option(name).is_file else str | int
     check_value(name, value, hint)
     return f"{value}"
@@ -217,7 +217,7 @@ def with_absolute_files(options: Options) -> Options:
 
 
 def given_options(options: Options) -> list[str]:
-    """Name the options that are not as they are by default, those of kinds by their own names."""
+    """Return the options that differ from the defaults, those of kinds by their own names."""
     plain = Options()
     given = [f.name for f in fields(Options) if getattr(options, f.name) != getattr(plain, f.name)]
     return [name for name in given if name != "of_kind"] + [name for name, _ in options.of_kind]

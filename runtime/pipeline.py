@@ -67,7 +67,7 @@ class Pipeline:
     """
 
     def __init__(self, bundle: Bundle | None, options: Options, kind: Kind | None = None) -> None:
-        """Make ready what captures will need.
+        """Prepare the work that captures share.
 
         Args:
             bundle: The camera; None develops only.
@@ -442,7 +442,7 @@ def load(
     options: Options | None = None,
     **choices: Unpack[LoadKeywords],
 ) -> Pipeline:
-    """Open a bundle and make it ready.
+    """Open a bundle and prepare it for captures.
 
     Args:
         bundle: Name of a built-in bundle, path of a bundle file, or None to develop only.

@@ -272,7 +272,7 @@ def _receive_samples(pipe: IO[bytes], header: dict[str, Any]) -> NDArray[Any] | 
 
 
 def _widen(pipe: IO[bytes]) -> None:
-    """Ask for a larger pipe, which saves thousands of switches between the two processes."""
+    """Request a larger pipe, which saves thousands of switches between the two processes."""
     try:
         import fcntl
 

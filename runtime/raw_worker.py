@@ -158,7 +158,7 @@ def _send(capture: Capture, out: BinaryIO) -> None:
 
 
 def _limit_memory(max_memory_mb: int) -> None:
-    """Cap the address space where the system can (not on Windows)."""
+    """Limit the address space where the system can (not on Windows)."""
     try:
         import resource
     except ImportError:
@@ -171,7 +171,7 @@ def _limit_memory(max_memory_mb: int) -> None:
 
 
 def end_with(parent: int) -> None:
-    """End this process when its parent does, where the system can tell it (Linux)."""
+    """Set this process to end when its parent does, where the system can tell it (Linux)."""
     if sys.platform != "linux":
         return
     import ctypes

@@ -1,4 +1,4 @@
-"""Finds the module that does the work of a stage.
+"""The finder of the module that does the work of a stage.
 
 It is the one that the stage names as its `runtime`, else that of its type in
 `camkit.runtime.stages`.
@@ -23,10 +23,11 @@ import importlib
 from collections.abc import Sequence
 from functools import cache
 from types import ModuleType
-from typing import Final, get_args
+from typing import Final
 
 from camkit.bundle.manifest import Manifest
-from camkit.bundle.stages import Stage, StageEntry
+from camkit.bundle.stages import StageEntry, all_stages, find_stage, type_of
+from camkit.entry_points import has_module
 from camkit.errors import UnsupportedError
 
 STAGES: Final = "camkit.runtime.stages"
@@ -38,29 +39,29 @@ def stage_module(name: str) -> ModuleType:
     """Return the module of a stage.
 
     Raises:
-        UnsupportedError: If this runtime has none.
+        UnsupportedError: If there is no such stage, or this runtime does not do it.
+        ContractError: If a package brings what is none.
     """
-    known = _entries()
-    if name not in known:
-        raise UnsupportedError(
-            f"this runtime has no stage {name!r}; it has {', '.join(sorted(known))}"
-        )
-    return _module(known[name], name)
+    return _module(find_stage(name))
 
 
 def module_of(stage: StageEntry) -> ModuleType:
-    """Return the module of a stage of a list, which need not be one that a bundle may list."""
-    return _module(type(stage), stage.type)
+    """Return the module of a listed stage, which need not be one that a bundle may list."""
+    return _module(type(stage))
 
 
 @cache
-def _module(entry: type[StageEntry], name: str) -> ModuleType:
-    return importlib.import_module(entry.runtime or f"{STAGES}.{name}")
+def _module(entry: type[StageEntry]) -> ModuleType:
+    module = _module_name(entry)
+    if not has_module(module):
+        raise UnsupportedError(
+            f"the stage {type_of(entry)!r} is not walked: there is no module {module}"
+        )
+    return importlib.import_module(module)
 
 
-@cache
-def _entries() -> dict[str, type[StageEntry]]:
-    return {entry.model_fields["type"].default: entry for entry in get_args(get_args(Stage)[0])}
+def _module_name(entry: type[StageEntry]) -> str:
+    return entry.runtime or f"{STAGES}.{type_of(entry)}"
 
 
 def check_stages(manifest: Manifest, max_bytes: int) -> None:
@@ -81,14 +82,14 @@ def check_stages(manifest: Manifest, max_bytes: int) -> None:
 
 
 def known_facts(stages: Sequence[StageEntry]) -> tuple[str, ...]:
-    """Name the facts of a camera body that some stages know."""
+    """Return the facts of a camera body that some stages know."""
     return tuple(
         dict.fromkeys(fact for stage in stages for fact in getattr(module_of(stage), "FACTS", ()))
     )
 
 
 def stage_keys(stages: Sequence[StageEntry]) -> tuple[str, ...]:
-    """Name every stage for people and clocks: its type, and its role or number among twins."""
+    """Return a name of every stage for people and clocks: its type, and its role or number."""
     types: list[str] = [stage.type for stage in stages]
     roles = [(stage.type, getattr(stage, "role", None)) for stage in stages]
     keys: list[str] = []
@@ -103,13 +104,14 @@ def stage_keys(stages: Sequence[StageEntry]) -> tuple[str, ...]:
 
 
 def methods_of(stages: Sequence[StageEntry]) -> tuple[str, ...]:
-    """Name the ways of the stages, as `--method` takes them; those of the last stage first."""
+    """Return the ways of the stages, as `--method` takes them; those of the last stage first."""
     return tuple(
         dict.fromkeys(method for stage in reversed(stages) for method in module_of(stage).METHODS)
     )
 
 
 def all_methods() -> tuple[str, ...]:
-    """Name the ways of every stage that kinds share, whatever a bundle lists."""
-    names = sorted(name for name, entry in _entries().items() if not entry.runtime)
-    return tuple(dict.fromkeys(m for name in names for m in stage_module(name).METHODS))
+    """Return the ways of every stage whose seconds a plan estimates, whatever a bundle lists."""
+    names = sorted(type_of(entry) for entry in all_stages() if has_module(_module_name(entry)))
+    modules = [module for name in names if hasattr(module := stage_module(name), "seconds")]
+    return tuple(dict.fromkeys(method for module in modules for method in module.METHODS))

@@ -57,7 +57,7 @@ class Unit:
 
     @property
     def focus_um(self) -> float:
-        """Return how far its sensor lies from the nominal place; 0 where that is not stated."""
+        """Return the shift of its sensor from the nominal place; 0 where that is not stated."""
         return self.facts.get(FOCUS, 0.0)
 
     def check(self, bundle: Bundle | None) -> None:

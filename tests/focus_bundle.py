@@ -52,7 +52,7 @@ def write_focus_bundle(
     psf = focus_psf(moved=moved)
     changes: dict[str, Any] = {"stages": tiny_stages("network"), "networks": {}, "golden": ()}
     sensor = tiny_sensor(SIDE_PX, SIDE_PX)
-    manifest = tiny_manifest(name=name, sensor=sensor, format_version=format_of(psf), **changes)
+    manifest = tiny_manifest(name=name, sensor=sensor, format_version=format_of(psf, ()), **changes)
     members = {"psf.safetensors": psf_to_bytes(psf)}
     if lens is not None:
         members["prescription.toml"] = lens

@@ -28,7 +28,7 @@ from camkit.bundle.stages import (
     WhiteBalance,
 )
 from camkit.bundle.writer import write_bundle
-from camkit.streaks.optics import SECTION_STEP_PX, StreakOptics
+from camkit.streaks import SECTION_STEP_PX, StreakOptics
 from tests.camera_factory import PITCH_UM, make_sensor
 
 SIZE_PX: Final = (256, 192)

@@ -1,4 +1,4 @@
-"""Optics with streaks, and captures behind them, for the tests of `camkit.streaks`."""
+"""Optics with streaks, and captures behind them, for the tests of `kinds.hdr.streaks`."""
 
 import math
 from dataclasses import replace
@@ -8,11 +8,11 @@ import scipy.signal
 from numpy.typing import NDArray
 
 from camkit.contracts import CfaPattern, FloatArray, cfa_channels
-from camkit.streaks.cells import COLOURS, Cells, cells_of, sample_sites
-from camkit.streaks.kernels import StreakKernels, streak_kernels
-from camkit.streaks.optics import StreakOptics
-from camkit.streaks.recovery import Recovery, Region
-from camkit.streaks.regions import Window
+from camkit.runtime.kinds.hdr.streaks.cells import COLOURS, Cells, cells_of, sample_sites
+from camkit.runtime.kinds.hdr.streaks.kernels import StreakKernels, streak_kernels
+from camkit.runtime.kinds.hdr.streaks.recovery import Recovery, Region
+from camkit.runtime.kinds.hdr.streaks.regions import Window
+from camkit.streaks import StreakOptics
 from tests.hdr_bundle import LAST_PX, four_lines
 
 Mask = NDArray[np.bool_]

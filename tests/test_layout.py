@@ -21,7 +21,6 @@ FOUND_BY_PLACE = (
     "camkit.report.bench.metrics",
     "camkit.report.stress.scenarios",
     "camkit.report.kinds",
-    "camkit.export.kinds",
     "camkit.models_def.kinds",
     "camkit.runtime.kinds",
     "camkit.runtime.plan.rules",

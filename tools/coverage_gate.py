@@ -3,7 +3,7 @@
 import subprocess
 import sys
 
-CORE = "camkit/bundle/*,camkit/scenes/*,camkit/streaks/*,camkit/*.py"
+CORE = "camkit/bundle/*,camkit/scenes/*,runtime/kinds/hdr/streaks/*,camkit/*.py"
 RUNTIME = "*/runtime/*"
 TOOLS = "tools/*"
 FLOOR_PERCENT = 90

@@ -22,7 +22,7 @@ import numpy as np
 
 from camkit.bundle.golden import golden_from_bytes, golden_to_bytes
 from camkit.bundle.light_bound import LightBound
-from camkit.bundle.manifest import FORMAT_VERSION, Manifest
+from camkit.bundle.manifest import LIGHT_VERSION, Manifest
 from camkit.bundle.optics import PSF
 from camkit.bundle.psf_file import psf_to_bytes, read_psf
 from camkit.bundle.reader import CARD, GOLDEN, open_bundle
@@ -41,7 +41,7 @@ from camkit.errors import ContractError, ParityError
 from camkit.export.activations import with_activations
 from camkit.export.card import with_laws_text
 from camkit.export.golden_cases import add_outputs
-from camkit.runtime.plan.laws import ENFORCE, bounded_stages
+from camkit.runtime.plan.bounded_networks import ENFORCE, bounded_stages
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work
 from camkit.runtime.proof.laws.proof import measure_laws, with_laws
@@ -81,8 +81,8 @@ def repack(
     members = {name: bundle.member(name) for name in bundle.names}
     if GOLDEN in members:
         members[GOLDEN] = golden_to_bytes(golden_from_bytes(members[GOLDEN]))
-    newest = {"format_version": ".".join(map(str, FORMAT_VERSION))}
-    manifest = bundle.manifest.model_copy(update=newest)
+    newest = max(bundle.manifest.version_pair, LIGHT_VERSION)
+    manifest = bundle.manifest.model_copy(update={"format_version": ".".join(map(str, newest))})
     with tempfile.TemporaryDirectory() as folder:
         trial = Path(folder) / "trial.camkit"
         changes = _simple_changes(clip_reach_px, floor, limited=limited)

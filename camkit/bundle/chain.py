@@ -1,11 +1,11 @@
-"""Do the stages of a manifest join? Each plane followed from the sensor to the products.
+"""Check that the stages of a manifest join, plane by plane from the sensor to the products.
 
     sensor -> capture -> stage -> planes -> stage -> ... -> product
 
-What a plane holds follows from the sensor and the stages alone; the manifest states it as well, so
-that a reader sees it, and a manifest that says otherwise is refused. So is one whose stage takes
-what no earlier stage gives, gives what nobody takes, or cannot take what it is given; the message
-names both ends.
+The contents of a plane follow from the sensor and the stages alone. The manifest states them as
+well, so that a reader sees them, and a manifest that states anything else is refused. A stage is
+refused if it takes a plane that no earlier stage gives, gives a plane that nobody takes, or cannot
+take what it is given; the message names both ends.
 """
 
 from collections.abc import Mapping, Sequence
@@ -29,7 +29,7 @@ def capture_plane(sensor: Sensor) -> Plane:
 
 
 def join_stages(stages: Sequence[Stage], parts: Parts) -> dict[str, Plane]:
-    """Follow the planes through the stages.
+    """Compute every plane by following the planes through the stages.
 
     Args:
         stages: In order.
@@ -111,7 +111,7 @@ def check_haze(stages: Sequence[Stage], optics: Optics | None) -> None:
 
 
 def rewired(stages: Sequence[Stage], usual: Sequence[Stage]) -> tuple[Stage, ...]:
-    """Wire some of the usual stages of a kind as if the others were not there.
+    """Connect some of the usual stages of a kind as if the others did not exist.
 
     Args:
         stages: Some of the usual stages, in their order, with parameters of their own.

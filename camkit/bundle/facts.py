@@ -1,4 +1,4 @@
-"""What was measured at export: facts about each network, and the card of the camera."""
+"""Facts measured at export: those about each network, and the card of the camera."""
 
 from typing import Annotated, Final, Self
 
@@ -14,7 +14,7 @@ Reach = Annotated[int, Field(ge=0, le=MAX_REACH_PX)]
 
 
 class HaloError(Entry):
-    """What a halo costs: the difference of tiled and whole picture.
+    """The error of a halo: the difference of tiled and whole picture.
 
     Attributes:
         max_abs: Largest |difference| in the network's own (stabilised) units.

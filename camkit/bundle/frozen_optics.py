@@ -22,7 +22,7 @@ from camkit.bundle.streak_file import streaks_from_tensors, streaks_to_bytes
 from camkit.contracts import FrozenPsf, RadialDistortion
 from camkit.errors import ContractError
 from camkit.haze import Haze
-from camkit.streaks.optics import StreakOptics
+from camkit.streaks import StreakOptics
 
 PROFILES: Final = "profiles"
 """The tensor that only streaks have."""
@@ -72,7 +72,7 @@ class FrozenOptics:
         return dict([self.member]) | added
 
     def entry(self, object_distance_mm: float) -> FrozenPsfOptics | HazyPsfOptics | StreakEntry:
-        """Return what the manifest says of them; the distance may be inf."""
+        """Return the manifest's entry of these optics; the distance may be inf."""
         pitch_um = self.psf.pixel_pitch_um
         focus_mm = None if np.isinf(object_distance_mm) else object_distance_mm
         if self.streaks is not None:
@@ -115,6 +115,23 @@ def read_optics_file(path: Path, *, channels: int) -> FrozenOptics:
     """
     data = read_optics_bytes(path, what="PSF")
     return optics_from_bytes(data, what=str(path), channels=channels)
+
+
+def write_optics_files(optics: FrozenOptics, path: Path, haze_path: Path | None = None) -> None:
+    """Write frozen optics and the haze beside them, replacing files that are there.
+
+    Args:
+        optics: Kernels, or streaks.
+        path: Receives them.
+        haze_path: Receives the haze, which must be there then.
+    """
+    _, data = optics.member
+    for file in (path, haze_path):
+        if file is not None:
+            file.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(data)
+    if haze_path is not None and optics.haze is not None:
+        haze_path.write_bytes(haze_to_bytes(optics.haze))
 
 
 def psf_of_streaks(streaks: StreakOptics, channels: int, *, bare: bool = False) -> FrozenPsf:

@@ -75,7 +75,7 @@ class GoldenArrays:
                 )
 
     def output(self, product: str, size: str) -> FloatArray | None:
-        """Return what the pipeline makes of the capture, None if it is not stored."""
+        """Return the stored output of a product, or None."""
         return self.outputs.get(product, {}).get(size)
 
 

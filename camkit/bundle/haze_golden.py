@@ -1,11 +1,11 @@
-"""What a bundle with a haze must find in a coarse picture of its whole sensor, as safetensors.
+"""The golden case of the stage haze: a coarse picture of the whole sensor, as safetensors.
 
 A golden capture of 192 px is a dozen cells and shows little of a haze that is wider; this case is
 the whole frame, in cells:
 
     cells      (c, h, w) float16: a capture
-    picture    (c, h, w) float16: the scene that is found behind it
-    gain       (c, h, w) float16: what the capture is multiplied by
+    picture    (c, h, w) float16: the scene that the stage restores from it
+    gain       (c, h, w) float16: the factor by which the stage multiplies the capture
 """
 
 from dataclasses import dataclass

@@ -68,7 +68,7 @@ class LightBound(Entry):
 
     @property
     def admits_detail_alone(self) -> bool:
-        """Whether no light may be moved at all."""
+        """Return whether no light may be moved at all."""
         return self.noise == self.spread == self.light == 0
 
 

@@ -27,7 +27,7 @@ _AGAIN: Final = "pack the bundle again"
 
 
 def check_local_headers(data: bytes, archive: zipfile.ZipFile) -> None:
-    """Hold the headers in front of the members against the directory.
+    """Check the headers in front of the members against the directory.
 
     Args:
         data: The whole file.
@@ -48,7 +48,7 @@ def check_local_headers(data: bytes, archive: zipfile.ZipFile) -> None:
 
 
 def _end_of(data: bytes, entry: zipfile.ZipInfo) -> int:
-    """Check the local header of a member; give the byte behind its data."""
+    """Check the local header of a member; return the position behind its data."""
     at = entry.header_offset
     if len(data) < at + _LOCAL.size:
         raise BundleError(f"member {entry.filename} has no local header; {_AGAIN}")
@@ -73,7 +73,7 @@ def _end_of(data: bytes, entry: zipfile.ZipInfo) -> int:
 
 
 def _behind_descriptor(data: bytes, end: int, entry: zipfile.ZipInfo) -> int:
-    """Check the facts that follow the data of a member; give the byte behind them."""
+    """Check the facts that follow the data of a member; return the position behind them."""
     begin = end + len(_DESCRIPTOR_MAGIC) * (data[end : end + 4] == _DESCRIPTOR_MAGIC)
     facts = data[begin : begin + _FACTS.size]
     if facts != _FACTS.pack(entry.CRC, entry.compress_size, entry.file_size):

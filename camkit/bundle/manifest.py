@@ -24,7 +24,7 @@ from typing import Annotated, Any, Final, Literal, TypeVar
 from pydantic import Field, ValidationError, model_validator
 
 from camkit.bundle.chain import CAPTURE, capture_plane, check_haze, check_use, join_stages
-from camkit.bundle.entry import Count, Entry, NonNegative, Positive, Sorted, Word
+from camkit.bundle.entry import Count, Entry, NonNegative, Positive, Since, Sorted, Word
 from camkit.bundle.facts import Card, NetworkFacts, StatedLaw
 from camkit.bundle.golden import IMAGE
 from camkit.bundle.optics import Optics
@@ -32,11 +32,8 @@ from camkit.bundle.plane import Plane
 from camkit.bundle.sensor import Sensor
 from camkit.bundle.stages import (
     JoinError,
-    Network,
     Parts,
     Stage,
-    SuperResolve,
-    Undistort,
     Wiener,
 )
 from camkit.bundle.strict_json import read_json
@@ -44,17 +41,15 @@ from camkit.bundle.upgrade import UpgradeError, upgrade
 from camkit.contracts import FrozenPsf
 from camkit.errors import BundleError
 
-FORMAT_VERSION: Final = (2, 8)
+FORMAT_VERSION: Final = (2, 9)
 TOGETHER_VERSION: Final = (2, 4)
 """From here on a bank may restore colours together, and half of a kernel fits its windows."""
 FOCUS_VERSION: Final = (2, 5)
 """From here on a PSF may hold kernels of a moved sensor; others state what they always did."""
 PROFILE_VERSION: Final = (2, 6)
-"""From here on optics may be a lens profile, and distortion have even powers."""
-HAZE_VERSION: Final = (2, 7)
-"""From here on optics may have a haze beside core kernels."""
+"""From here on distortion may have even powers."""
 LIGHT_VERSION: Final = (2, 8)
-"""From here on a stage may bound the light that it makes, and laws of a picture are stated."""
+"""From here on networks behind a bank are bounded, and laws of a picture are stated."""
 NOT_TRAINED: Final = "not trained"
 """As `training_data`: weights are random, so that time and memory mean something and pictures do
 not."""
@@ -160,13 +155,14 @@ class Manifest(Entry):
     freeze: Annotated[dict[str, int | float | str], Sorted] = Field(default_factory=dict)
     envelope: Annotated[dict[str, Range], Sorted] | None = None
     plan: Annotated[dict[str, Threshold], Sorted] | None = None
-    laws: (
+    laws: Annotated[
         Annotated[
             dict[NetworkSize, Annotated[dict[Word, StatedLaw], Field(max_length=32)]],
             Field(max_length=16),
         ]
-        | None
-    ) = None
+        | None,
+        Since(LIGHT_VERSION, "laws of a picture are stated"),
+    ] = None
     exported_with: Annotated[dict[str, str], Sorted] = Field(default_factory=dict)
     members: Annotated[dict[str, Member], Sorted] = Field(default_factory=dict)
 
@@ -192,9 +188,14 @@ class Manifest(Entry):
             raise ValueError("two golden cases have one name")
         return self
 
+    def needs(self) -> list[Since]:
+        """Return what of it readers of older formats do not know."""
+        optics = [] if self.optics is None else self.optics.needs()
+        return super().needs() + optics + [need for stage in self.stages for need in stage.needs()]
+
     @property
     def parts(self) -> Parts:
-        """Return what stages look at to say what they give."""
+        """Return the parts that stages use to derive their planes."""
         return Parts(sensor=self.sensor, optics=self.optics, networks=self.networks)
 
     @property
@@ -214,11 +215,6 @@ class Manifest(Entry):
         return int(major), int(minor)
 
     @property
-    def bounds_light(self) -> bool:
-        """Return whether the light that a stage makes is bounded."""
-        return bounds_light(self.stages)
-
-    @property
     def is_trained(self) -> bool:
         """Return whether what its networks make is a picture to be judged."""
         return self.training_data != NOT_TRAINED
@@ -229,7 +225,7 @@ class Manifest(Entry):
         return {CAPTURE: capture_plane(self.sensor), **self.planes}
 
     def stage(self, kind: type[_S]) -> _S | None:
-        """Return the first stage of one type, or None if this camera does without it."""
+        """Return the first stage of one type, or None if this camera has none."""
         return next(iter(self.stages_of(kind)), None)
 
     def stages_of(self, kind: type[_S]) -> tuple[_S, ...]:
@@ -238,7 +234,7 @@ class Manifest(Entry):
 
     @property
     def sizes(self) -> tuple[str, ...]:
-        """Name the sizes that every role holds, from the least work to the most."""
+        """Return the names of the sizes that every role has, from the least work to the most."""
         if not self.networks:
             return ()
         first, *others = self.networks.values()
@@ -248,16 +244,6 @@ class Manifest(Entry):
     def mac_per_pixel(self, size: str) -> float:
         """Return the multiplications per pixel of the networks of one size, all roles together."""
         return sum(sizes[size].mac_per_pixel for sizes in self.networks.values() if size in sizes)
-
-
-def bounds_light(stages: Iterable[Stage]) -> bool:
-    """Return whether one of the stages bounds the light that it makes."""
-    return any(
-        (isinstance(stage, Network) and (stage.light is not None or stage.keeps_white))
-        or (isinstance(stage, SuperResolve) and stage.floor > 0)
-        or (isinstance(stage, Undistort) and stage.overshoot == "limited")
-        for stage in stages
-    )
 
 
 def planes_of(stages: tuple[Stage, ...], parts: Parts) -> dict[str, Plane]:
@@ -286,7 +272,10 @@ def manifest_without_networks(
     Raises:
         BundleError: If the stages do not join.
     """
-    stated = {"training_data": "none: no network"} | facts
+    stated = {
+        "training_data": "none: no network",
+        "format_version": format_of(None, (*stages, *([] if optics is None else [optics]))),
+    } | facts
     parts = Parts(sensor=sensor, optics=optics, networks={})
     return Manifest(
         sensor=sensor,
@@ -299,29 +288,28 @@ def manifest_without_networks(
 
 
 class _Head(Entry, extra="ignore"):
-    """What is read of a manifest before anything else, whatever its version."""
+    """The part of a manifest that is read first, whatever its version."""
 
     format_version: str
     exported_with: dict[str, Any] = Field(default_factory=dict)
 
 
-def format_of(psf: FrozenPsf, *, hazy: bool = False, bounded: bool = False) -> str:
-    """Return the format of a bundle with such a PSF: what came later needs a newer one.
+def format_of(
+    psf: FrozenPsf | None, parts: Iterable[Entry], *, least: tuple[int, int] = TOGETHER_VERSION
+) -> str:
+    """Return the format of a bundle: the newest that one of its parts needs.
 
     Args:
-        psf: Of its optics.
-        hazy: Whether a haze lies beside it.
-        bounded: Whether the light of a network is bounded.
+        psf: Of its optics; None where they have none.
+        parts: Its stages, its optics, or a whole manifest.
+        least: An older one is not stated.
     """
-    if bounded:
-        return ".".join(map(str, LIGHT_VERSION))
-    if hazy:
-        return ".".join(map(str, HAZE_VERSION))
-    if psf.distortion.even_coefficients is not None:
-        return ".".join(map(str, PROFILE_VERSION))
-    if psf.focus_um is None:
-        return str(Manifest.model_fields["format_version"].default)
-    return ".".join(map(str, FOCUS_VERSION))
+    versions = [least, *(need.version for part in parts for need in part.needs())]
+    if psf is not None and psf.focus_um is not None:
+        versions.append(FOCUS_VERSION)
+    if psf is not None and psf.distortion.even_coefficients is not None:
+        versions.append(PROFILE_VERSION)
+    return ".".join(map(str, max(versions)))
 
 
 def read_manifest(data: bytes) -> Manifest:
@@ -362,7 +350,7 @@ def _with_old_windows(manifest: Manifest) -> Manifest:
 
 
 def _check_version(text: str, exported_with: Mapping[str, Any]) -> int:
-    """Refuse what this reader does not know; give the major version."""
+    """Refuse a version that this reader does not know; return the major version."""
     match = re.fullmatch(r"(\d{1,4})\.(\d{1,4})", text, flags=re.ASCII)
     if match is None:
         raise BundleError(f"format_version must read like 2.0; got {text[:20]!r}")
@@ -383,7 +371,7 @@ def _check_version(text: str, exported_with: Mapping[str, Any]) -> int:
 
 
 def _first(error: ValidationError) -> str:
-    """Put the first complaint into one line: where, what."""
+    """Return the first complaint as one line: where, what."""
     details = error.errors(include_url=False, include_input=False)
     where = "".join(f"{part}." for part in details[0]["loc"]).removesuffix(".")
     said = details[0]["msg"].removeprefix("Value error, ")

@@ -1,4 +1,4 @@
-"""What the light goes through, as a bundle states it: a tagged union.
+"""The optics of a camera, as a bundle states them: a tagged union.
 
 Optics = FrozenPsfOptics    kernels, psf.safetensors        (psf_file.py)
        | HazyPsfOptics      core kernels, psf.safetensors, and haze, haze.safetensors (haze_file.py)
@@ -7,12 +7,12 @@ Optics = FrozenPsfOptics    kernels, psf.safetensors        (psf_file.py)
 """
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, ClassVar, Final, Literal
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from camkit.bundle.entry import Entry, NonNegative, Positive
+from camkit.bundle.entry import Entry, NonNegative, Positive, Since
 from camkit.contracts import RadialDistortion, RadialIllumination, Symmetry
 from camkit.errors import ContractError
 from camkit.haze import LEAST_CELL_PX, MOST_CELL_PX
@@ -52,6 +52,7 @@ class HazyPsfOptics(Entry):
         object_distance_mm: Distance of focus; None for infinity.
     """
 
+    since: ClassVar = Since((2, 7), "the optics have a haze")
     type: Literal["hazy_psf"] = "hazy_psf"
     member: Literal["psf.safetensors"] = PSF
     haze_member: Literal["haze.safetensors"] = HAZE
@@ -152,6 +153,7 @@ class LensProfile(Entry):
         object_distance_mm: Distance for which both hold; None for infinity.
     """
 
+    since: ClassVar = Since((2, 6), "the optics are a lens profile")
     type: Literal["lens_profile"] = "lens_profile"
     distortion: RadialEntry | None = None
     illumination: IlluminationEntry | None = None

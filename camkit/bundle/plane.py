@@ -16,7 +16,7 @@ metres (2.3); lifetime: picoseconds (2.9)."""
 
 
 class Grid(Entry):
-    """Where the samples of a plane lie.
+    """The place of a plane's samples.
 
     Attributes:
         pitch_ratio: Distance of neighbouring samples over the pixel pitch of the sensor; 0.5 is
@@ -41,7 +41,7 @@ class Grid(Entry):
 
 
 class Plane(Entry):
-    """What a plane holds.
+    """The description of a plane.
 
     Attributes:
         axes: Behind the channels.
@@ -61,7 +61,7 @@ class Plane(Entry):
     grid: Grid = Grid()
 
     def describe(self) -> str:
-        """Say in words what the plane is."""
+        """Return the plane in words."""
         grid = f"pitch {self.grid.pitch_ratio:g}" + ("" if self.grid.warped else ", undistorted")
         channels = ", ".join(self.channels[:6]) + (", ..." if len(self.channels) > 6 else "")
         return f"({channels}) {self.domain} {self.type} over {self.axes}, {grid}"

@@ -62,7 +62,7 @@ def read_tensors(data: bytes, *, what: str) -> dict[str, NDArray[Any]]:
 
 
 def _check_header(data: bytes, what: str) -> None:
-    """Refuse a header that readers take differently; the rest is told by the library."""
+    """Refuse a header that readers take differently; the library reports all else."""
     stated = int.from_bytes(data[:_LENGTH_BYTES], "little")
     if data[_LENGTH_BYTES : _LENGTH_BYTES + 1] != b"{":
         raise BundleError(f"{what} is no safetensors file; is it another kind of file?")

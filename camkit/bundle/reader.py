@@ -27,8 +27,6 @@ from camkit.bundle.frozen_optics import FrozenOptics, optics_from_bytes
 from camkit.bundle.haze_file import haze_from_bytes
 from camkit.bundle.manifest import (
     FOCUS_VERSION,
-    HAZE_VERSION,
-    LIGHT_VERSION,
     PROFILE_VERSION,
     Manifest,
     read_manifest,
@@ -43,11 +41,10 @@ from camkit.bundle.optics import (
     StreakEntry,
 )
 from camkit.bundle.psf_file import psf_from_bytes
-from camkit.bundle.stages import Highlights, Wiener
 from camkit.contracts import FrozenPsf, RadialDistortion, RadialIllumination
 from camkit.errors import BundleError, ContractError
 from camkit.haze import Haze
-from camkit.streaks.optics import StreakOptics
+from camkit.streaks import StreakOptics
 
 SUFFIX: Final = ".camkit"
 MANIFEST: Final = "manifest.json"
@@ -121,7 +118,7 @@ class Bundle:
 
     @property
     def illumination(self) -> FrozenPsf | RadialIllumination:
-        """What says the relative illumination of the optics.
+        """The source of the relative illumination.
 
         Raises:
             BundleError: If they state none.
@@ -135,7 +132,7 @@ class Bundle:
 
     @property
     def streaks(self) -> StreakOptics:
-        """What its optics write beside a light.
+        """The streaks that the optics write beside a light.
 
         Raises:
             BundleError: If they write no streaks.
@@ -146,7 +143,7 @@ class Bundle:
 
     @property
     def haze(self) -> Haze:
-        """What its optics write far from a light.
+        """The haze that the optics write far from a light.
 
         Raises:
             BundleError: If their kernels hold all.
@@ -260,15 +257,8 @@ def bundle_from_bytes(data: bytes, *, path: Path, max_bytes: int = MAX_BUNDLE_BY
 
 def _check_bundle(container: Container, path: Path) -> Bundle:
     manifest = read_container_manifest(container)
-    if manifest.bounds_light:
-        _need_version(manifest, LIGHT_VERSION, "the light that a stage makes is bounded")
-    if any(bank.depth != "mean" for bank in manifest.stages_of(Wiener)):
-        _need_version(manifest, LIGHT_VERSION, "a bank finds the distance of the scene")
-    if manifest.laws is not None:
-        _need_version(manifest, LIGHT_VERSION, "laws of a picture are stated")
-    lights = manifest.stage(Highlights)
-    if lights is not None and lights.from_samples:
-        _need_version(manifest, LIGHT_VERSION, "streaks are taken from the samples of the mosaic")
+    for need in manifest.needs():
+        _need_version(manifest, need.version, need.what)
     # Unpacking and hashing leave Python's lock to others.
     with ThreadPoolExecutor(CHECKED_AT_ONCE) as pool:
         checks = [
@@ -296,7 +286,6 @@ def _optics_of(container: Container, manifest: Manifest) -> FrozenOptics | None:
         return None
     channels = len(manifest.sensor.channels)
     if isinstance(stated, LensProfile):
-        _need_version(manifest, PROFILE_VERSION, "the optics are a lens profile")
         rows = 0 if stated.distortion is None else len(stated.distortion.coefficients)
         if rows not in (0, channels):
             raise BundleError(
@@ -321,7 +310,6 @@ def _hazy(container: Container, manifest: Manifest, optics: FrozenOptics) -> Fro
     """Add the haze to optics whose manifest states one."""
     stated = manifest.optics
     assert isinstance(stated, HazyPsfOptics)
-    _need_version(manifest, HAZE_VERSION, "the optics have a haze")
     haze = haze_from_bytes(container.read(HAZE), what=HAZE)
     if haze.cell_px != stated.cell_px:
         raise BundleError(
@@ -343,7 +331,7 @@ def _need_version(manifest: Manifest, needed: tuple[int, int], what: str) -> Non
 
 
 def read_container_manifest(container: Container) -> Manifest:
-    """Read the manifest of a container and hold it against the names of the members.
+    """Read the manifest of a container and check it against the names of the members.
 
     Raises:
         BundleError: If there is no manifest, it is refused, a member is in one of the two only,
@@ -407,7 +395,7 @@ def _check_member(container: Container, name: str, size: int, sha256: str) -> No
 def _check_psf(
     psf: FrozenPsf, stated: FrozenPsfOptics | HazyPsfOptics | StreakEntry, channels: int
 ) -> None:
-    """Hold the PSF against what the manifest says of it."""
+    """Check the PSF against the statements of the manifest."""
     if abs(psf.pixel_pitch_um - stated.pixel_pitch_um) > _PITCH_RTOL * stated.pixel_pitch_um:
         raise BundleError(
             f"{stated.member} is sampled at {psf.pixel_pitch_um} um, the manifest says "

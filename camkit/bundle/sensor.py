@@ -87,7 +87,7 @@ class Extent(Entry):
 
 
 class PixelSensor(Entry):
-    """What sensors have in common.
+    """The base class of all sensors.
 
     Attributes:
         extent: Size and pitch; None for a camera that takes pictures of any size.
@@ -126,7 +126,7 @@ class PixelSensor(Entry):
 
 
 class LightSensor(PixelSensor):
-    """What sensors that integrate light have in common.
+    """The base class of sensors that integrate light.
 
     Attributes:
         black_level: DN at no light.
@@ -228,17 +228,17 @@ class BayerSensor(LightSensor):
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Name the colours."""
+        """Names of the colours."""
         return RGB
 
     @property
     def captured(self) -> tuple[str, ...]:
-        """Name the channels of a capture: one mosaic."""
+        """Names of the channels of a capture: one mosaic."""
         return MOSAIC
 
     @property
     def inputs(self) -> tuple[InputContract, ...]:
-        """Name the inputs that are taken, the sensor's own first."""
+        """Names of the inputs that are taken, the sensor's own first."""
         return ("raw_bayer_v1", "linear_rgb_v1")
 
     def noise_at(self, iso: float) -> NoiseModel:
@@ -282,17 +282,17 @@ class PlanesSensor(LightSensor):
 
     @property
     def cfa(self) -> None:
-        """Return the mosaic: none."""
+        """None: there is no mosaic."""
         return
 
     @property
     def captured(self) -> tuple[str, ...]:
-        """Name the channels of a capture."""
+        """Names of the channels of a capture."""
         return self.channels
 
     @property
     def inputs(self) -> tuple[InputContract, ...]:
-        """Name the inputs that are taken."""
+        """Names of the inputs that are taken."""
         return ("linear_rgb_v1" if len(self.channels) == len(RGB) else "linear_planes_v1",)
 
     def noise_at(self, iso: float) -> NoiseModel:
@@ -342,17 +342,17 @@ class SpadSensor(PixelSensor):
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Name the channels: photons."""
+        """Names of the channels: photons."""
         return ("photons",)
 
     @property
     def captured(self) -> tuple[str, ...]:
-        """Name the channels of a capture."""
+        """Names of the channels of a capture."""
         return self.channels
 
     @property
     def inputs(self) -> tuple[InputContract, ...]:
-        """Name the inputs that are taken."""
+        """Names of the inputs that are taken."""
         return ("spad_counts_v1", "spad_histogram_v1") if self.time_bins else ("spad_counts_v1",)
 
 

@@ -14,7 +14,7 @@ from safetensors.numpy import save
 
 from camkit.bundle.psf_file import read_optics_bytes, read_tensors
 from camkit.errors import BundleError, ContractError
-from camkit.streaks.optics import StreakOptics
+from camkit.streaks import StreakOptics
 
 LIGHT: Final = ("core", "bare_core", "profiles", "sections", "haze")
 AXES: Final = ("angles_rad", "depths_mm", "wavelengths_um")

@@ -61,7 +61,7 @@ class UpgradeError(ValueError):
 
 
 class _Old(Entry):
-    """What format 1.0 had and 2.0 has not, as its manifest held it."""
+    """The fields of a manifest of format 1.0 that 2.0 no longer has."""
 
     format_version: Literal["1.0"]
     camera: dict[str, Any]
@@ -191,7 +191,7 @@ def _optics(
 
 
 def _facts(table: Mapping[str, Any]) -> NetworkFacts:
-    """Name the inputs of a network: the capture, and behind it the bank."""
+    """Add the inputs of a network to its facts: the capture, and behind it the bank."""
     if {"inputs", "outputs"} & table.keys():
         raise UpgradeError("networks: extra inputs are not permitted")
     rest = {k: v for k, v in table.items() if k not in {"input_channels", "output_channels"}}

@@ -19,7 +19,6 @@ from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.manifest import (
     Manifest,
     Member,
-    bounds_light,
     format_of,
     manifest_to_bytes,
     manifest_without_networks,
@@ -65,7 +64,7 @@ def _write_member(archive: zipfile.ZipFile, name: str, data: bytes) -> None:
 
 
 def write_bundle(path: Path, manifest: Manifest, members: Mapping[str, bytes]) -> Bundle:
-    """Write a bundle and give it as a reader sees it.
+    """Write a bundle and return it as a reader sees it.
 
     The file appears under its name complete or not at all.
 
@@ -116,13 +115,12 @@ def write_physics(
     Raises:
         BundleError: If the stages do not join, or a reader would refuse the result.
     """
+    entry = optics.entry(object_distance_mm)
     manifest = manifest_without_networks(
         stages,
         sensor,
-        optics.entry(object_distance_mm),
-        format_version=format_of(
-            optics.psf, hazy=optics.haze is not None, bounded=bounds_light(stages)
-        ),
+        entry,
+        format_version=format_of(optics.psf, (*stages, entry)),
         **({"version": "0.1.0", "licence": "Apache-2.0"} | facts),
     )
     return write_bundle(path, manifest, optics.members)

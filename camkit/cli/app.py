@@ -73,7 +73,7 @@ add_application(app, calibrate_app, MEASURE, "Measure a camera from photographs.
 def options(
     version: Annotated[bool, typer.Option("--version", help="Print the version and stop.")] = False,
 ) -> None:
-    """Computational cameras from design to daily use."""
+    """Run computational cameras, from design to daily use."""
     if version:
         from camkit import __version__
 

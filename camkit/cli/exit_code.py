@@ -1,4 +1,4 @@
-"""What the process tells its caller when it ends."""
+"""The exit codes of the process."""
 
 from enum import IntEnum
 

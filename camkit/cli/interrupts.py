@@ -21,7 +21,7 @@ AGAIN_S: Final = 0.02
 
 @contextmanager
 def none_is_lost() -> Iterator[None]:
-    """Raise in the main thread, a moment later, what was lost; never after the block."""
+    """Raise a lost interrupt in the main thread a moment later; never after the block."""
     before, coming = sys.unraisablehook, list[threading.Timer]()
 
     def tell(lost: "UnraisableHookArgs") -> None:

@@ -42,7 +42,7 @@ class Display:
         self._lock = threading.RLock()
 
     def tick(self, now_s: float) -> None:
-        """Show what has changed, if it is time to."""
+        """Show the changes, if it is time to."""
         with self._lock:
             tasks = outer(list(self.board.tasks))
             self._has_begun |= bool(tasks)
@@ -61,7 +61,7 @@ class Display:
                 say(line, err=True)
 
     def flush(self) -> None:
-        """Print the lines that were held back."""
+        """Print the lines that were kept back."""
         with self._lock:
             for line in self._held:
                 say(line, err=True)
@@ -101,7 +101,7 @@ def _columns() -> int:
 
 
 def outer(tasks: Sequence[Task]) -> list[Task]:
-    """Return nested tasks down to the first that is counted evenly; what lies in it comes often."""
+    """Return nested tasks down to the first that is counted evenly; tasks in it change often."""
     for number, task in enumerate(tasks):
         if task.is_even and (task.total or task.unit) and not _is_one(task):
             return list(tasks[: number + 1])
@@ -109,7 +109,7 @@ def outer(tasks: Sequence[Task]) -> list[Task]:
 
 
 def _is_one(task: Task) -> bool:
-    """Return whether a task is a single unit of which no share is known: what lies in it tells."""
+    """Return whether a task is a single unit without a known share: the tasks in it say more."""
     return task.total == 1 and task.unit is not None and task.done in (0, 1)
 
 

@@ -48,13 +48,13 @@ def say_over(text: str) -> None:
 
 @contextmanager
 def said_together() -> Iterator[None]:
-    """Keep the lines of this block together, whatever other threads say."""
+    """Keep the lines of this block together, whatever other threads print."""
     with _lock:
         yield
 
 
 def erase() -> None:
-    """Take the line of `say_over` away, if one is there."""
+    """Remove the line of `say_over`, if there is one."""
     with _lock:
         if _rewritten.is_set():
             _rewritten.clear()

@@ -5,15 +5,13 @@ leaves        dead leaves: what the statistics of natural images are made of
 lettering     lines of made-up glyphs
 procedural    `procedural:SEED`, a bit of everything
 clean         edges, stars and discs whose truth is known to the last pixel
-night         `night:SEED`, dark surfaces and lights up to 256 times white
 slanted_edge  a sharp edge, to measure an MTF on
 squares       `squares:SEED`, dark squares on white, to measure the focus of a unit on
 saturation    the exposure at which a share of a scene saturates
-named         the register: a scene by its name
+named         a scene by its name; those that a kind of camera brings too (`night:SEED`)
 """
 
 from camkit.scenes.named import is_scene_name, named_scene
-from camkit.scenes.night import night_scene
 from camkit.scenes.procedural import procedural_scene
 
-__all__ = ["is_scene_name", "named_scene", "night_scene", "procedural_scene"]
+__all__ = ["is_scene_name", "named_scene", "procedural_scene"]

@@ -102,7 +102,7 @@ def night(rng: Generator, side_px: int) -> FloatArray:
 
 
 def with_lamps(rng: Generator, scene: FloatArray) -> FloatArray:
-    """Put one to three lamps, discs far brighter than white, into a (3, h, w) scene."""
+    """Draw one to three lamps, discs far brighter than white, into a (3, h, w) scene."""
     lit = scene.astype(np.float64)
     for _ in range(int(rng.integers(1, MOST_LAMPS + 1))):
         y, x = rng.uniform(0, scene.shape[1:])

@@ -11,7 +11,7 @@ GLYPH_COUNT: Final = 26
 
 
 def set_text(rng: Generator, rows: int, columns: int) -> FloatArray:
-    """Set lines of made-up glyphs.
+    """Draw lines of made-up glyphs.
 
     Returns:
         (rows, columns) float32, how much of a pixel is ink, 0..1.

@@ -1,29 +1,33 @@
-"""A scene by its name, `SOURCE:SEED`; a new source of scenes is one line of the register."""
+"""A scene by its name, `SOURCE:SEED`: a source of the register, or one that a kind brings."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Final
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.scenes.night import night_scene
+from camkit.kinds import all_kinds
 from camkit.scenes.procedural import procedural_scene
 from camkit.scenes.squares import squares_scene
 
-SOURCES: Final[Mapping[str, Callable[[int, int, int], FloatArray]]] = {
-    "procedural": procedural_scene,
-    "night": night_scene,
-    "squares": squares_scene,
-}
-"""Name -> what draws the scene of (seed, height, width)."""
+Draw = Callable[[int, int, int], FloatArray]
+SOURCES: Final[Mapping[str, Draw]] = {"procedural": procedural_scene, "squares": squares_scene}
+"""Name -> what draws the scene of (seed, height, width); for every camera."""
 MOST_DIGITS: Final = 18
+
+
+def scene_sources() -> dict[str, Draw | str]:
+    """Return every source by its name; that of a kind as the name of its function."""
+    brought = {name: place for kind in all_kinds() for name, place in kind.scenes.items()}
+    return {**SOURCES, **{name: place for name, place in brought.items() if name not in SOURCES}}
 
 
 def is_scene_name(text: str) -> bool:
     """Return whether a text names a scene, rightly or not, and not a file."""
     source, colon, seed = text.partition(":")
     meant = len(source) > 1 and source.isalpha() and seed.isdigit() and not Path(text).exists()
-    return bool(colon) and (source in SOURCES or meant)
+    return bool(colon) and (meant or source in scene_sources())
 
 
 def named_scene(name: str, height: int, width: int) -> FloatArray:
@@ -42,12 +46,17 @@ def named_scene(name: str, height: int, width: int) -> FloatArray:
             not positive.
     """
     source, _, seed = name.partition(":")
-    if source not in SOURCES:
-        known = ", ".join(f"{known}:SEED" for known in SOURCES)
+    sources = scene_sources()
+    if source not in sources:
+        known = ", ".join(f"{known}:SEED" for known in sources)
         raise ContractError(f"there is no scene {name!r}; expected one of {known}")
     if not (seed.isascii() and seed.isdigit() and len(seed) <= MOST_DIGITS):
         raise ContractError(
             f"expected {source}:SEED with a whole number of at most {MOST_DIGITS} digits; "
             f"got {name[:60]!r}"
         )
-    return SOURCES[source](int(seed), height, width)
+    draw = sources[source]
+    scene: FloatArray = (resolve_name(draw) if isinstance(draw, str) else draw)(
+        int(seed), height, width
+    )
+    return scene

@@ -51,7 +51,7 @@ def procedural_scene(seed: int, height: int, width: int) -> FloatArray:
 
 
 def _sky(rng: Generator, height: int, width: int, texture: FloatArray) -> FloatArray:
-    """Make the backdrop: a colour gradient with a soft texture."""
+    """Draw the backdrop: a colour gradient with a soft texture."""
     top, bottom = draw_colour(rng), draw_colour(rng)
     ramp = np.linspace(0, 1, height, dtype=np.float32)[:, None]
     clouds = np.exp(0.15 * cut_texture(rng, texture, height, width))
@@ -60,7 +60,7 @@ def _sky(rng: Generator, height: int, width: int, texture: FloatArray) -> FloatA
 
 
 def _add_panel(rng: Generator, scene: FloatArray) -> None:
-    """Put a rectangle of glyphs, a grating or a star on the scene."""
+    """Draw a rectangle of glyphs, a grating or a star on the scene."""
     _, height, width = scene.shape
     rows = min(height, int(rng.integers(48, 280)))
     columns = min(width, int(rng.integers(64, 420)))

@@ -1,4 +1,4 @@
-"""How bright a scene is exposed so that a share of it saturates a sensor.
+"""Exposures at which a given share of a scene saturates a sensor.
 
 A colour clips in the raw signal, so where the white balance raises it, it clips above white: a
 pixel of the scene saturates as soon as any colour c of it exceeds the gain of c in white-balanced
@@ -23,7 +23,7 @@ BAND_ROWS: Final = 256
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Saturation:
-    """An exposure and what of a scene it saturates.
+    """An exposure, and the share of a scene that it saturates.
 
     Attributes:
         exposure: Factor on the scene.
@@ -38,7 +38,7 @@ class Saturation:
 
 
 def fill_of(scene: FloatArray, matrix: NDArray[np.float64], gains: tuple[float, ...]) -> FloatArray:
-    """Return how full the fullest colour of every pixel is, 1.0 = it clips.
+    """Return the fill of the fullest colour of every pixel; 1.0 clips.
 
     Args:
         scene: (3, h, w) float32 linear Rec.709.
@@ -69,7 +69,7 @@ def saturation_at(
     *,
     ceiling: float | None = None,
 ) -> Saturation:
-    """Return what of a scene an exposure saturates.
+    """Return the shares of a scene that an exposure saturates.
 
     Args:
         exposure: Factor on the scene.

@@ -1,4 +1,4 @@
-"""What scenes are painted with: surface colours, and textures with the spectrum of nature.
+"""Surface colours of scenes, and textures with the spectrum of natural pictures.
 
 References: Field 1987 (amplitude spectra that fall as 1/f).
 """
@@ -17,7 +17,7 @@ Colour = NDArray[np.float32]
 
 
 def draw_count(rng: Generator, mean: float) -> int:
-    """Draw how many things there are, where `mean` are to be expected."""
+    """Draw the number of things, where `mean` are to be expected."""
     return int(rng.poisson(mean))
 
 

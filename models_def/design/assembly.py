@@ -22,7 +22,7 @@ from camkit.models_def.optics.pupil import half_disc
 from camkit.models_def.optics.search.problem import Problem
 from camkit.models_def.optics.search.splat import Pixels
 from camkit.models_def.optics.search.variables import FreeLens
-from camkit.models_def.training.pictures import SceneSource, open_source
+from camkit.models_def.training.pictures import SceneSource, open_scenes
 from camkit.units import to_radians
 
 
@@ -87,7 +87,7 @@ def pixels_of(recipe: DesignRecipe, problem: Problem, begin: Tensor) -> Pixels:
 
 
 def recorder_of(recipe: DesignRecipe) -> Recorder:
-    """Return what the pixels of a recipe do; raises ContractError for unknown colour filters."""
+    """Return the pixel model of a recipe; raises ContractError for unknown colour filters."""
     wanted, known = recipe.pixels.cfa, {str(cfa): cfa for cfa in CFA_PATTERNS}
     if wanted and wanted not in known:
         raise ContractError(
@@ -120,7 +120,7 @@ def parts_of(
     pictures: Path | None = None,
     source: SceneSource | None = None,
 ) -> DesignParts:
-    """Return what a loop joins; a lens that is to stay (`lens_rate` 0) is not searched for.
+    """Return the parts of a loop; a lens that is to stay (`lens_rate` 0) is not searched for.
 
     Args:
         recipe: The design.
@@ -155,9 +155,4 @@ def parts_of(
 
 def source_of(recipe: DesignRecipe, pictures: Path | None) -> SceneSource:
     """Open the pictures of a folder and the procedural scenes of a recipe."""
-    return open_source(
-        pictures,
-        picture_share=recipe.data.picture_share,
-        scenes=recipe.data.procedural_scenes,
-        scene_px=recipe.data.scene_px,
-    )
+    return open_scenes(recipe.data, pictures)

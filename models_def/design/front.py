@@ -1,4 +1,4 @@
-"""What stands between sensor and network: nothing, or the Wiener filter of the present kernels."""
+"""The front end between sensor and network: none, or the Wiener filter of the present kernels."""
 
 from dataclasses import dataclass
 from typing import Final, Literal
@@ -43,12 +43,12 @@ class Front:
 
     @property
     def channels(self) -> int:
-        """Return how many planes there are."""
+        """Return the number of planes."""
         return 3 if self.kind == "none" else 6
 
     @property
     def margin_px(self) -> int:
-        """Return what is recorded around a patch and cut off again."""
+        """Return the margin that is recorded around a patch and cut off again."""
         return 0 if self.kind == "none" else self.filter_margin_px
 
     def planes(self, recorded: Tensor, kernels: Tensor) -> Tensor:

@@ -1,4 +1,4 @@
-"""What a loop asks of its lens, whether its numbers are free or not."""
+"""The interface of a lens in a design loop, with free numbers or without."""
 
 from abc import ABC, abstractmethod
 

@@ -39,7 +39,7 @@ State = dict[str, Any]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DesignSchedule:
-    """How a design runs.
+    """The schedule of a design.
 
     Attributes:
         steps: In all.
@@ -83,7 +83,7 @@ class DesignSchedule:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DesignParts:
-    """What a loop joins.
+    """The parts that a loop joins.
 
     Attributes:
         lens: With its free numbers, if it has any.
@@ -153,7 +153,7 @@ class DesignLoop:
         self._valid = [self._draw(VALID_SEED + i, 1) for i in range(schedule.valid_patches)]
 
     def run(self, until: int | None = None) -> Iterator[Progress]:
-        """Go on to a step (the last by default), giving every validated moment."""
+        """Run up to a step (the last by default), yielding every validated moment."""
         schedule, begin = self.schedule, time.monotonic()
         end = schedule.steps if until is None else min(until, schedule.steps)
         while self.step < end:
@@ -197,7 +197,7 @@ class DesignLoop:
         return kernels.float(), penalty
 
     def _made(self, kernels: Tensor, number: int, *, moving: bool) -> Tensor:
-        """Return the kernels that captures are made with: those of copy `number`, if there are any.
+        """Return the kernels of the captures: those of copy `number`, if there are any.
 
         Args:
             kernels: Of the nominal lens.
@@ -288,7 +288,7 @@ class DesignLoop:
         return _psnr_db(pictures, sharp), loss
 
     def field_pictures(self, patches: int) -> Iterator[tuple[int, Tensor, Tensor]]:
-        """Return so many fixed patches at every field, drawn apart from all others.
+        """Yield so many fixed patches at every field, drawn apart from all others.
 
         Yields:
             Field, recovered (depth, 1, 3, p, p) and sharp (1, 3, p, p), in sRGB tone.
@@ -351,14 +351,14 @@ class DesignLoop:
         }
 
     def load(self, state: State) -> None:
-        """Go back to a saved state."""
+        """Restore a saved state."""
         self.step, self.best = state["step"], state["best"]
         self.best_db, self.best_merit = state["best_db"], state["best_merit"]
         self._set(state["weights"])
         self._optimizer.load_state_dict(state["optimizer"])
 
     def take_best(self) -> None:
-        """Put the best lens and its network in place."""
+        """Restore the best lens and its network."""
         if self.best:
             self._set(self.best)
 

@@ -1,4 +1,4 @@
-"""What a joint design minimises.
+"""The losses of a joint design.
 
 l1      eq. (6.15): mean |recovered - sharp|
 log_mse mean log of the mean square error of a patch: weighs patches as the mean of PSNR does
@@ -45,12 +45,12 @@ class DesignLoss:
 
     @property
     def needs_network(self) -> bool:
-        """Whether recovered pictures are judged, not captures."""
+        """Return whether recovered pictures are judged, not captures."""
         return self.kind != "edof"
 
     @property
     def is_psnr(self) -> bool:
-        """Whether the mean PSNR of recovered pictures says what is wanted."""
+        """Return whether the mean PSNR of recovered pictures is the aim."""
         return self.needs_network and not self.depth_weights
 
 

@@ -37,7 +37,7 @@ class _Bounded(torch.autograd.Function):
 
     @staticmethod
     def backward(ctx: Any, *slopes: Tensor) -> Tensor:
-        """Pass what does not lead further out."""
+        """Return the gradient without the part that leads further out."""
         (free,), (slope,) = ctx.saved_tensors, slopes
         outward = ((free < 0) & (slope > 0)) | ((free > 1) & (slope < 0))
         return torch.where(outward, 0.0, slope)
@@ -66,7 +66,7 @@ class LensModule(DesignLens):
         whiten: bool = True,
         units: MoveUnits = "range",
     ) -> None:
-        """Begin at `begin` (variable,), scaled.
+        """Start at `begin` (variable,), scaled.
 
         Raises:
             ContractError: If the lens has no free number.

@@ -18,6 +18,7 @@ from camkit.models_def.optics.prescription import FabricationErrors
 from camkit.models_def.optics.search.limits import Limits
 from camkit.models_def.optics.search.variables import Variable
 from camkit.models_def.toml_table import check_keys, read_table, section, typed
+from camkit.models_def.training.recipe import SceneRecipe
 
 Spacing = Literal["height", "area"]
 
@@ -29,7 +30,7 @@ _KEYS: Final = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OpticsRecipe:
-    """What the lens is looked at with.
+    """The fields, wavelengths and depths at which the lens is sampled.
 
     Attributes:
         half_field_deg: Field angle of the far end of the strip.
@@ -113,7 +114,7 @@ class PixelRecipe:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NetworkChoice:
-    """Which network; the empty name stands for none.
+    """The choice of a network; the empty name stands for none.
 
     Attributes:
         name: In the catalogue.
@@ -128,21 +129,6 @@ class NetworkChoice:
             raise ContractError(
                 f"network must be one of {', '.join(NETWORK_NAMES)}; got {self.name!r}"
             )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DesignData:
-    """Where sharp patches come from.
-
-    Attributes:
-        picture_share: Share of patches from pictures, where a folder is given.
-        procedural_scenes: How many different scenes.
-        scene_px: Their side.
-    """
-
-    picture_share: float = 0.8
-    procedural_scenes: int = 24
-    scene_px: int = 512
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -167,7 +153,7 @@ class DesignRecipe:
     network: NetworkChoice
     loss: DesignLoss
     schedule: DesignSchedule
-    data: DesignData
+    data: SceneRecipe
     starts: Starts
     fabrication: FabricationErrors | None = None
 
@@ -182,7 +168,7 @@ def read_design(path: Path) -> DesignRecipe:
 
 
 def to_design(table: Mapping[str, Any]) -> DesignRecipe:
-    """Turn a parsed TOML table into a recipe; raises ContractError as `read_design` does."""
+    """Convert a parsed TOML table to a recipe; raises ContractError as `read_design` does."""
     check_keys("design recipe", table, _KEYS)
     for key in ("name", "prescription", "vary", "optics", "pixels"):
         if key not in table:
@@ -202,7 +188,7 @@ def to_design(table: Mapping[str, Any]) -> DesignRecipe:
         network=section("network", NetworkChoice, network),
         loss=section("loss", DesignLoss, table.get("loss", {})),
         schedule=section("schedule", DesignSchedule, table.get("schedule", {})),
-        data=section("data", DesignData, table.get("data", {})),
+        data=section("data", SceneRecipe, table.get("data", {})),
         starts=section("starts", Starts, table.get("starts", {})),
         fabrication=(
             section("fabrication", FabricationErrors, table["fabrication"])
@@ -226,7 +212,7 @@ def with_choices(
     seed: int | None = None,
     search: bool = True,
 ) -> DesignRecipe:
-    """Return the recipe with what a caller chose instead; None keeps what it says.
+    """Return the recipe with a caller's choices; None keeps the value of the recipe.
 
     Without `search` the design begins at the prescription itself.
     """

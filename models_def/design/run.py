@@ -29,7 +29,7 @@ FORMAT: Final = 2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DesignOptions:
-    """Where and how a design runs.
+    """The files and the options of a design.
 
     Attributes:
         out_dir: Checkpoint, log and lens.
@@ -50,7 +50,7 @@ class DesignOptions:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DesignView:
-    """What there is to look at.
+    """The parts of a design that can be looked at.
 
     Attributes:
         lens: The present lens.
@@ -67,7 +67,7 @@ class DesignRun:
     """A design with its files."""
 
     def __init__(self, recipe: DesignRecipe, options: DesignOptions) -> None:
-        """Make ready; nothing is written before the first validated moment.
+        """Prepare the run; nothing is written before the first validated moment.
 
         Raises:
             ContractError: If there is an earlier run and neither resume nor overwrite is asked
@@ -106,7 +106,7 @@ class DesignRun:
         return not torch.distributed.is_initialized() or torch.distributed.get_rank() == 0
 
     def go(self, until: int | None = None) -> Iterator[Progress]:
-        """Run, giving every validated moment after it is on disk."""
+        """Run, yielding every validated moment after it is on disk."""
         begin, cpu = time.monotonic(), time.process_time()
         before_s, before_cpu_s = self._spent_s, self._spent_cpu_s
         if self.loop.step == 0:
@@ -164,7 +164,7 @@ class DesignRun:
         self.loop.load(table)
 
     def finish(self) -> dict[str, Any]:
-        """Put the best lens in place, write it, and tell what became of the run."""
+        """Restore the best lens, write it, and return a report on the run."""
         self.loop.take_best()
         lens = self.loop.parts.lens
         found = finished(lens.problem, lens.scaled().detach())
@@ -184,7 +184,7 @@ class DesignRun:
         }
 
     def view(self) -> DesignView:
-        """Return the present lens, its kernels and what becomes of a few fixed patches."""
+        """Return the present lens, its kernels and a few fixed patches behind it."""
         kernels, patches = self.loop.look()
         return DesignView(lens=self.loop.parts.lens.lens(), kernels=kernels, patches=patches)
 
@@ -196,7 +196,7 @@ def _join_workers() -> None:
 
 
 def _share_lens(lens: nn.Module) -> None:
-    """Let all processes begin at the lens of the first: another machine may find another start."""
+    """Copy the lens of the first process to all: another machine may find another start."""
     if torch.distributed.is_initialized():
         for value in lens.state_dict().values():
             torch.distributed.broadcast(value, 0)

@@ -12,7 +12,7 @@ from camkit.models_def.sensors.forward import blur
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recorder:
-    """What the pixels do in a design: light plus white Gaussian noise, as eq. (6.9) has it.
+    """The pixels of a design: light plus white Gaussian noise, as in eq. (6.9).
 
     Attributes:
         noise: Standard deviation, 1.0 = white level.

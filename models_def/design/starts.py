@@ -1,10 +1,10 @@
-"""Where a joint design begins: the lens as given, disturbed, or the best of many starts.
+"""Starts of a joint design: the lens as given, disturbed, or the best of many starts.
 
-A joint design goes downhill from where it begins, and its pictures say little about a lens whose
-rays are lost. Damped least squares on spots costs a fraction of a second a start, takes stiff and
-soft numbers alike, and keeps the limits: so several lenses near the given one, or from all over the
-bounds, are brought down first. The best spots are not the best recovered picture, so that the
-design's own front may judge the lenses with the best spots; the winner goes into the loop.
+A joint design descends from its start, and its pictures carry little information about a lens whose
+rays are lost. Damped least squares on spots costs a fraction of a second a start, handles stiff and
+soft numbers alike, and keeps the limits. So several lenses near the given one, or from all over the
+bounds, are improved by it first. The best spots are not the best recovered picture, so the design's
+own front end may judge the lenses with the best spots; the winner goes into the loop.
 """
 
 from collections.abc import Callable
@@ -27,7 +27,7 @@ _PUPIL_RAYS = 24
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Starts:
-    """How a design finds its start.
+    """The search for the start of a design.
 
     Attributes:
         count: Lenses that are tried, the given one among them; 0 begins at it as it is.
@@ -68,7 +68,7 @@ class Starts:
 
     @property
     def ends(self) -> int:
-        """Return how many descents go to the end."""
+        """Return the number of descents that are finished."""
         return max(1, self.count // 4) + 1 if self.count else 0
 
 
@@ -111,7 +111,7 @@ def best_starts(problem: Problem, starts: Starts) -> Tensor:
 
 
 def traced_lenses(starts: Starts, variables: int) -> int:
-    """Return how many lenses a search traces, those that the recovery judges among them."""
+    """Return the number of lenses that a search traces, those that recovery judges included."""
     if starts.count == 0:
         return 0
     scouted = evaluations(starts.count, starts.scout_steps, variables)
@@ -120,7 +120,7 @@ def traced_lenses(starts: Starts, variables: int) -> int:
 
 
 def best_judged(lenses: Tensor, judge: Callable[[Tensor], float]) -> Tensor:
-    """Return the lens (variable,) of (start, variable) that a judge gives most."""
+    """Return the lens (variable,) of (start, variable) with the best score of a judge."""
     if len(lenses) == 1:
         return lenses[0]
     marks = [judge(scaled) for scaled in lenses]
@@ -130,7 +130,7 @@ def best_judged(lenses: Tensor, judge: Callable[[Tensor], float]) -> Tensor:
 def disturbed(
     lens: Lens, rng: np.random.Generator, *, curvature_share: float, focus_mm: float
 ) -> Lens:
-    """Return a lens with every curvature and the place of its sensor off by chance.
+    """Return a lens with random errors of every curvature and of its sensor's place.
 
     Args:
         lens: As it should be.

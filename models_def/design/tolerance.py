@@ -1,9 +1,10 @@
-"""What fabrication costs after recovery: PSNR of copies, their yield, what to tighten first.
+"""The cost of fabrication errors after recovery: PSNR of Monte-Carlo samples, yield, worst errors.
 
-Captures are made with the kernels of fabricated copies and recovered by the Wiener filter of the
-nominal lens, which is all that a bundle knows. Patches and noise are the same for every copy.
-Patches repeat beyond their borders, as the Fourier transform of the filter takes them to: no
-border rings into what is judged, however wide the kernels.
+Captures are made with the kernels of fabricated lenses (Monte-Carlo samples, `copies`) and
+recovered by the Wiener filter of the nominal lens, the only one that a bundle knows. Patches and
+noise are the same for every sample. Patches repeat beyond their borders, as the Fourier transform
+of the filter takes them to: no ringing from the border reaches the judged part, however wide the
+kernels.
 """
 
 from collections.abc import Callable
@@ -21,7 +22,7 @@ from camkit.models_def.design.front import Front
 from camkit.models_def.design.sensor import Recorder, capture
 from camkit.models_def.optics.kernel_bank import gaussian_response
 from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.pupil import PupilSamples, half_disc
+from camkit.models_def.optics.pupil import both_halves, half_disc
 from camkit.models_def.optics.tolerance.deviation import (
     Deviations,
     Single,
@@ -57,7 +58,7 @@ Watch = Callable[[int, int], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ToleranceRun:
-    """How copies are drawn and judged.
+    """The settings of a run: the draw of copies, and their judgement.
 
     Attributes:
         copies: Fabricated copies.
@@ -93,7 +94,7 @@ class ToleranceRun:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Measured:
-    """What was found of copies.
+    """The results of copies.
 
     Attributes:
         psnr_db: (copy, field), of sRGB values after recovery, the mean over patches.
@@ -109,13 +110,13 @@ class Measured:
 
     @property
     def mean_db(self) -> Array:
-        """(copy,), over fields."""
+        """Mean over the fields, (copy,)."""
         return np.asarray(self.psnr_db.mean(1))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClassLoss:
-    """What one class of errors costs, alone and at its half-width.
+    """The cost of one class of errors, alone and at its half-width.
 
     Attributes:
         error_class: The class.
@@ -140,7 +141,7 @@ class Offender:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ToleranceResult:
-    """All that a run found.
+    """All results of a run.
 
     Attributes:
         lens: Nominal.
@@ -165,7 +166,7 @@ class ToleranceResult:
     offenders: tuple[Offender, ...]
 
     def percentile_db(self, percent: float) -> float:
-        """Return the PSNR that `percent` of the copies fall short of."""
+        """Return the PSNR that `percent` of the copies do not reach."""
         return float(np.percentile(self.copies.mean_db, percent))
 
     def share_at_least(self, psnr_db: float) -> float:
@@ -310,13 +311,12 @@ def _judge(lens: Lens, tolerances: Tolerances, run: ToleranceRun) -> _Judge:
 
 
 def _view(lens: Lens, fields: tuple[tuple[float, float], ...], far: float, rays: int) -> View:
-    half = half_disc(rays // 2)
     return View(
         slopes=torch.tensor([far * share for share, _ in fields], dtype=torch.float64),
         azimuths_rad=torch.tensor([to_radians(a) for _, a in fields], dtype=torch.float64),
         wavelengths_um=torch.tensor(lens.wavelengths_um, dtype=torch.float64),
         # mirrored: the nominal kernels are as symmetric as the lens
-        samples=PupilSamples(x=torch.cat([half.x, -half.x]), y=torch.cat([half.y, half.y])),
+        samples=both_halves(half_disc(rays // 2)),
     )
 
 
@@ -350,9 +350,7 @@ def _overall(spot_rms_mm: Array) -> Array:
 
 def _offenders(judge: _Judge) -> tuple[Offender, ...]:
     """Rate every single error at both its limits, by spots of few rays."""
-    half = half_disc(_SPOT_RAYS // 2)
-    few = PupilSamples(x=torch.cat([half.x, -half.x]), y=torch.cat([half.y, half.y]))
-    view = replace(judge.view, samples=few)
+    view = replace(judge.view, samples=both_halves(half_disc(_SPOT_RAYS // 2)))
 
     def overall(deviations: Deviations) -> Array:
         landing = land(judge.lens, deviations, view, judge.tolerances.compensator)

@@ -67,7 +67,7 @@ NETWORK_NAMES: Final = tuple(_BUILDERS)
 
 
 def lights_px(name: str) -> int | None:
-    """Return how far from lights a network acts; None for one that acts everywhere."""
+    """Return the distance from lights up to which a network acts; None if it acts everywhere."""
     return REACH_PX if name in _NEAR_LIGHTS else None
 
 

@@ -70,7 +70,7 @@ def picture_norm(channels: int, *, frozen: bool) -> nn.Module:
 
 
 def live_norms(network: nn.Module) -> tuple[str, ...]:
-    """Name the parts of a network that look at a whole picture."""
+    """Return the names of the parts of a network that look at a whole picture."""
     return tuple(
         name
         for name, part in network.named_modules()
@@ -120,7 +120,7 @@ def freeze_norms(live: nn.Module, frozen: nn.Module, pictures: Sequence[Tensor])
 
 @contextmanager
 def _watched(network: nn.Module, seen: dict[str, list[tuple[Tensor, Tensor]]]) -> Iterator[None]:
-    """Keep the (b, c) means and variances of what is given to the named parts."""
+    """Record the (b, c) means and variances of the inputs of named parts."""
 
     def keeper(name: str) -> Any:
         def keep(_part: nn.Module, given: tuple[Tensor, ...]) -> None:

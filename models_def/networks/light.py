@@ -23,7 +23,7 @@ _TINY = 1e-6
 
 
 def keep_share(unknown: Tensor) -> Tensor:
-    """Return how much of what a network adds is kept beside clipped samples.
+    """Return the share of a network's change that is kept beside clipped samples.
 
     Args:
         unknown: (b, 1, h, w) bool.

@@ -48,6 +48,7 @@ class VggLevels(nn.Module):
         blocks: int = len(WIDTHS),
         widths: tuple[int, ...] = WIDTHS,
         pooling: Pooling = "average",
+        next_one: bool = False,
     ) -> None:
         """Build the first blocks.
 
@@ -55,6 +56,7 @@ class VggLevels(nn.Module):
             blocks: How many; the last ends at its second convolution.
             widths: Channels of each block; others than VGG's for tests.
             pooling: Between blocks. VGG was trained with max.
+            next_one: Whether the convolution behind the last level is a level too, before its ReLU.
 
         Raises:
             ContractError: If there are no such blocks, or no such pooling.
@@ -65,11 +67,12 @@ class VggLevels(nn.Module):
         if pooling not in ("average", "max"):
             raise ContractError(f"pooling must be average or max; got {pooling!r}")
         self.pool: nn.Module = nn.AvgPool2d(2) if pooling == "average" else nn.MaxPool2d(2)
+        self.next_one = next_one
         self.blocks: list[list[str]] = []
         self.features = nn.ModuleDict()
         inputs = 3
         for block in range(blocks):
-            count = TAPPED if block == blocks - 1 else BLOCK_CONVOLUTIONS[block]
+            count = TAPPED + next_one if block == blocks - 1 else BLOCK_CONVOLUTIONS[block]
             names = [str(BLOCK_STARTS[block] + 2 * i) for i in range(count)]
             self.blocks.append(names)
             for name in names:
@@ -83,15 +86,16 @@ class VggLevels(nn.Module):
     def forward(self, picture: Tensor) -> tuple[Tensor, ...]:
         """Return the features, (b, widths[i], h / 2^i, w / 2^i)."""
         x = (picture - self.mean) / self.deviation
-        levels: list[Tensor] = []
+        raw, levels = x, []
         for names in self.blocks:
             if levels:
                 x = self.pool(x)
             for i, name in enumerate(names, start=1):
-                x = nn.functional.relu(self.features[name](x))
+                raw = self.features[name](x)
+                x = nn.functional.relu(raw)
                 if i == TAPPED:
                     levels.append(x)
-        return tuple(levels)
+        return (*levels, raw) if self.next_one else tuple(levels)
 
 
 def _draw_weights(layers: nn.Module) -> None:
@@ -104,7 +108,7 @@ def _draw_weights(layers: nn.Module) -> None:
 
 
 def take_vgg(network: nn.Module, path: Path) -> None:
-    """Return a network with the names of torchvision the weights of a file, in place.
+    """Load the weights of a file into a network with the names of torchvision, in place.
 
     Raises:
         ContractError: If the file is missing, cannot be read as tensors alone, or lacks a tensor of

@@ -10,7 +10,6 @@ In the order in which data flows:
 - `reverse`: rays from the sensor to the scene
 - `paraxial`: focal lengths, pupils, images
 - `scaling`: a lens larger or smaller, faster or slower
-- `penalty`: what keeps a design where rays pass
 - `pupil`: which rays: samples of the stop, aiming
 - `focus`: where the sensor should lie
 - `spot`: where they land: chief rays, spots, relative illumination
@@ -21,7 +20,8 @@ In the order in which data flows:
   `optics_file` reads either
 - `frozen`: a `FrozenPsf` on a grid of fields, depths and wavelengths
 - `sampling`: what coarse samples and blocks cost, in dB
-- `freeze`: the least samples within a stated loss; the file and its report
+- `freeze`: the least samples within a stated loss
+- `freezer`: any optics frozen, each by the way that suits it
 - `analysis/`: spots, MTF, curves, third order and wavefronts for people
 - `tolerance/`: errors of fabrication, decentres and tilts among them
 - `search/`: how a lens is found and improved: free numbers, merits, damped least squares

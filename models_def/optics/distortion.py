@@ -1,18 +1,22 @@
 """Radial distortion of a lens as the polynomial of eq. (6.10), fitted to traced chief rays."""
 
+from pathlib import Path
 from typing import Final
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from camkit.contracts import RadialDistortion
+from camkit.contracts import FrozenPsf, RadialDistortion
 from camkit.errors import ContractError
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.spot import slopes_for_heights
+from camkit.runtime.geometry.distortion import distort_points
+from camkit.units import UM_PER_MM
 
 FIT_POINTS: Final = 16
+SAME_LENS_PX: Final = 0.01
 _POWERS: Final = np.array([1, 3, 5, 7])
 
 
@@ -62,3 +66,29 @@ def trace_distortion(lens: Lens, radius_mm: float, *, channels: int = 3) -> Radi
     ideal_mm = ideal_heights(lens, heights_mm)
     row = fit_distortion(ideal_mm / radius_mm, heights_mm / radius_mm)
     return RadialDistortion(coefficients=np.tile(row, (channels, 1)), radius_mm=radius_mm)
+
+
+def check_distortion(lens: Lens, psf: FrozenPsf, path: Path) -> None:
+    """Refuse a PSF that was frozen from another lens: no two have the same distortion.
+
+    Raises:
+        ContractError: Naming the file.
+    """
+    frozen = psf.distortion
+    own = trace_distortion(lens, frozen.radius_mm, channels=len(frozen.coefficients))
+    along = np.stack([np.linspace(0.0, frozen.radius_mm, 33), np.zeros(33)], axis=1)
+    off_mm = np.abs(distort_points(along, own) - distort_points(along, frozen)).max()
+    refuse_other_lens(lens, path, float(off_mm * UM_PER_MM / psf.pixel_pitch_um), SAME_LENS_PX)
+
+
+def refuse_other_lens(lens: Lens, path: Path, off_px: float, most_px: float) -> None:
+    """Refuse a PSF whose places lie farther off those of a lens than the same lens may put them.
+
+    Raises:
+        ContractError: Naming the file.
+    """
+    if off_px > most_px:
+        raise ContractError(
+            f"{path} was not frozen from the lens {lens.name}: their distortion differs by "
+            f"{off_px:.2g} px; freeze, train and export the same lens"
+        )

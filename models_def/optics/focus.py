@@ -1,4 +1,4 @@
-"""Where the sensor should lie: at the paraxial image, the smallest spots, the flattest wavefront.
+"""Position of the sensor: at the paraxial image, the smallest spots, or the flattest wavefront.
 
 The last two are least squares with one solution, since rays are straight behind the lens: a point
 on a sensor moved by s is x + s l / n, and a path to a point on it grows linearly with s.
@@ -37,7 +37,7 @@ def focus_shift_mm(
     samples: PupilSamples | None = None,
     definition: PupilDefinition = "stop",
 ) -> float:
-    """Return how far the sensor should move away from the lens.
+    """Return the distance by which the sensor should move away from the lens.
 
     Args:
         lens: The prescription; its fields, wavelengths and object distance count.

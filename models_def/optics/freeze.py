@@ -1,34 +1,30 @@
-"""Freezing optics: as few PSF samples and as large blocks as the stated loss allows.
+"""Optics frozen by samples: as few of the PSF and as large blocks as the stated loss allows.
 
-candidates -> frozen_loss (dB of the Wiener filter alone) -> FrozenPsf -> psf.safetensors,
-FrozenPsf -> block_loss of block grids -> FreezeReport
+candidates -> frozen_loss (dB of the Wiener filter alone) -> FrozenPsf,
+FrozenPsf -> block_loss of block grids -> block_px, overlap_px
 
 Of several depths the nearest and the farthest are kept, and of those between them as few as the
 loss allows, with the depth known to the filter (interpolated kernels) and unknown to it (the mean
 kernel).
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from camkit.bundle.psf_file import write_psf
+from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.sensor import ColorSensor
 from camkit.bundle.stages import Wiener
-from camkit.caller import option_text
 from camkit.contracts import FrozenPsf
-from camkit.errors import ContractError, UnsupportedError
+from camkit.errors import ContractError
 from camkit.models_def.optics.frozen import (
     FreezeGrid,
     Frozen,
     corner_height_mm,
     freeze,
-    freeze_at,
-    freeze_stress,
     with_focus,
 )
 from camkit.models_def.optics.lens_optics import LensOptics
@@ -44,19 +40,9 @@ from camkit.models_def.optics.sampling import (
 )
 from camkit.models_def.sensors.wiener import PRIOR_EXPONENT, PRIOR_SCALE
 
-__all__ = [
-    "FreezeGrid",
-    "FreezeReport",
-    "Frozen",
-    "choose_blocks",
-    "choose_grid",
-    "freeze",
-    "freeze_at",
-    "freeze_optics",
-    "freeze_stress",
-]
-
 Tell = Callable[[str], None]
+Facts = dict[str, int | float | str]
+"""Report of freezing, flat: units in the names."""
 
 LOSS_LIMIT_DB: Final = 0.05
 DEPTH_SHARE: Final = 0.75
@@ -81,63 +67,6 @@ and its neighbour does not leaves a step between them, however small the mean lo
 
 def _silent(_: str) -> None:
     pass
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FreezeReport:
-    """What freezing kept and what it cost; every value goes into the manifest.
-
-    Attributes:
-        fields: Places of the field kept.
-        wavelengths: Wavelengths kept.
-        side_px: Kernel side.
-        energy_kept: Least share of a colour's light inside a kernel.
-        loss_db: Mean loss against the PSF traced at the place of use.
-        worst_loss_db: The same at the worst place, copy and ISO.
-        loss_limit_db: What was allowed for the mean.
-        block_px: Chosen block of the Wiener bank.
-        overlap_px: Its overlap.
-        block_loss_db: Mean loss of one kernel per block.
-        of_optics: What else the optics say of themselves, such as efl_mm.
-        corner_illumination: Relative illumination at the place farthest from the axis.
-        depths_mm: Depths kept; one unless several were asked for.
-        between_loss_db: Mean loss of interpolated kernels half-way (in 1 / distance) between
-            the depths kept, against those traced there; 0 with one depth. Not limited: it says
-            what a depth given to `process` may cost.
-        focus_um: How far to both sides kernels of a moved sensor reach; 0 where there are none.
-        focus_energy_kept: Least share of a colour's light inside these.
-    """
-
-    fields: int
-    wavelengths: int
-    side_px: int
-    energy_kept: float
-    loss_db: float
-    worst_loss_db: float
-    loss_limit_db: float
-    block_px: int
-    overlap_px: int
-    block_loss_db: float
-    of_optics: Mapping[str, float]
-    corner_illumination: float
-    depths_mm: tuple[float, ...] = ()
-    between_loss_db: float = 0.0
-    focus_um: float = 0.0
-    focus_energy_kept: float = 0.0
-
-    def to_json(self) -> dict[str, int | float | str]:
-        """Return the report as a flat mapping, which speaks of depths and focus where it may."""
-        facts: dict[str, Any] = {}
-        for name, value in asdict(self).items():
-            facts |= value if name == "of_optics" else {name: value}
-        depths_mm = facts.pop("depths_mm")
-        if len(depths_mm) > 1:
-            facts["depths_mm"] = ", ".join(f"{depth_mm:g}" for depth_mm in depths_mm)
-        else:
-            del facts["between_loss_db"]
-        if not self.focus_um:
-            del facts["focus_um"], facts["focus_energy_kept"]
-        return {k: round(v, 5) if isinstance(v, float) else v for k, v in facts.items()}
 
 
 def choose_grid(
@@ -253,9 +182,8 @@ def choose_blocks(psf: FrozenPsf, bench: Bench, *, tell: Tell = _silent) -> tupl
     return next(pair for pair in tried if pair[1].mean_db <= allowed_db)
 
 
-def freeze_optics(
+def freeze_samples(
     optics: Optics,
-    out_path: Path,
     *,
     sensor: ColorSensor,
     settings: Wiener | None = None,
@@ -263,29 +191,31 @@ def freeze_optics(
     grid: FreezeGrid | None = None,
     focus_um: float = 0.0,
     tell: Tell = _silent,
-) -> FreezeReport:
-    """Freeze the PSF of optics and write it.
+) -> tuple[FrozenOptics, Facts]:
+    """Freeze the PSF of optics.
 
     Args:
         optics: A lens, or a PSF that was measured; see `read_optics`.
-        out_path: Receives the frozen PSF (safetensors).
         sensor: Size, pitch, response and noise.
         settings: Of the Wiener filter that measures the loss.
         limit_db: Mean loss allowed for the samples.
         grid: Energy, largest side and depths; fields, wavelengths and which of the depths are kept
             are chosen here.
-        focus_um: How far the sensor is moved to both sides for kernels of units whose focus is
-            measured; 0 for none. The nominal kernels do not depend on it.
+        focus_um: How far the sensor of a lens is moved to both sides for kernels of units whose
+            focus is measured; 0 for none. The nominal kernels do not depend on it.
         tell: Takes a line for everything that was tried.
+
+    Returns:
+        The kernels, and what they keep and cost: `energy_kept` is the least share of a colour's
+        light inside a kernel; `loss_db` the mean loss against the PSF traced at the place of use,
+        `worst_loss_db` that of the worst place, copy and ISO; `block_loss_db` that of one kernel
+        per block. Of several depths `between_loss_db` is the mean loss of interpolated kernels
+        half-way (in 1 / distance) between those kept: it is not limited, and says what a depth
+        given to `process` may cost.
 
     Raises:
         ContractError: If the optics are wrong or no grid keeps the loss.
-        UnsupportedError: If kernels of a moved sensor are wanted of anything but a lens.
     """
-    if focus_um and not isinstance(optics, LensOptics):
-        raise UnsupportedError(
-            f"only a lens is traced with its sensor moved; leave {option_text('focus_um')} out"
-        )
     chosen = settings or Wiener(prior_scale=PRIOR_SCALE, prior_exponent=PRIOR_EXPONENT)
     # losses of samples by the same filter for every camera, each colour alone
     alone = chosen.model_copy(update={"together": None})
@@ -299,29 +229,50 @@ def freeze_optics(
     if focus_um and isinstance(optics, LensOptics):
         tell(f"tracing {optics.name} with its sensor moved by {focus_um:g} um to both sides")
         psf, focus_kept = with_focus(psf, (-focus_um, focus_um), optics.refocused, sensor)
-    write_psf(out_path, psf)
-    fields, _, wavelengths, side_px, _ = frozen.psf.kernels.shape
-    kept_mm = tuple(frozen.psf.depths_mm.tolist())
-    between_db = 0.0
-    if between := between_mm(kept_mm):
+    between = between_mm(tuple(frozen.psf.depths_mm.tolist()))
+    between_db = None
+    if between:
         there = make_bench(optics, sensor, alone, grid=replace(wanted, depths_mm=between))
         between_db = frozen_loss(frozen.psf, there).mean_db
-    farthest = int(np.argmax(frozen.psf.field_heights_mm))
-    return FreezeReport(
-        fields=fields,
-        wavelengths=wavelengths,
-        side_px=side_px,
-        energy_kept=frozen.energy_kept,
-        loss_db=loss.mean_db,
-        worst_loss_db=loss.worst_db,
-        loss_limit_db=limit_db,
-        block_px=blocks.block_px,
-        overlap_px=blocks.overlap_px,
-        block_loss_db=blocked.mean_db,
-        of_optics=optics.facts,
-        corner_illumination=float(frozen.psf.relative_illumination[farthest]),
-        depths_mm=kept_mm,
-        between_loss_db=between_db,
-        focus_um=focus_um,
-        focus_energy_kept=focus_kept,
-    )
+    facts = _facts(frozen, loss, limit_db) | {
+        "block_px": blocks.block_px,
+        "overlap_px": blocks.overlap_px,
+        "block_loss_db": blocked.mean_db,
+        **optics.facts,
+        "corner_illumination": _corner_light(frozen.psf),
+    }
+    if between_db is not None:
+        facts["between_loss_db"] = between_db
+    if focus_um:
+        facts |= {"focus_um": focus_um, "focus_energy_kept": focus_kept}
+    if between_db is not None:
+        facts["depths_mm"] = depths_text(frozen.psf)
+    return FrozenOptics(psf=psf), rounded_facts(facts)
+
+
+def _facts(frozen: Frozen, loss: Loss, limit_db: float) -> Facts:
+    fields, _, wavelengths, side_px, _ = frozen.psf.kernels.shape
+    return {
+        "fields": fields,
+        "wavelengths": wavelengths,
+        "side_px": side_px,
+        "energy_kept": frozen.energy_kept,
+        "loss_db": loss.mean_db,
+        "worst_loss_db": loss.worst_db,
+        "loss_limit_db": limit_db,
+    }
+
+
+def _corner_light(psf: FrozenPsf) -> float:
+    """Return the relative illumination at the place farthest from the axis."""
+    return float(psf.relative_illumination[int(np.argmax(psf.field_heights_mm))])
+
+
+def depths_text(psf: FrozenPsf) -> str:
+    """Return the depths of a PSF for its report."""
+    return ", ".join(f"{depth_mm:g}" for depth_mm in psf.depths_mm)
+
+
+def rounded_facts(facts: Facts) -> Facts:
+    """Return facts with numbers of five decimals."""
+    return {k: round(v, 5) if isinstance(v, float) else v for k, v in facts.items()}

@@ -27,8 +27,8 @@ from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError
 from camkit.models_def.optics.optics import FieldLayout, FloatGrid, Optics, radial_layout
 from camkit.models_def.optics.psf import TracedPsf
-from camkit.models_def.sensors.psf import wavelength_weights
 from camkit.progress import working
+from camkit.runtime.bank.psf import wavelength_weights
 from camkit.units import MM_PER_M, UM_PER_MM
 
 STRESS_OFFSETS_PER_M: Final = (0.02, 0.05, 0.1, 0.2)
@@ -45,7 +45,7 @@ _MATCH_STEPS: Final = 40
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FreezeGrid:
-    """Where a PSF is sampled.
+    """The samples of a PSF over field, depth and wavelength.
 
     Attributes:
         fields: Samples from the axis to the corner, see `Optics.layout`.
@@ -291,7 +291,7 @@ def _average(traced: TracedPsf, bands: Tensor, side_px: int) -> Tensor:
 
 
 def _match_colours(kernels: Tensor, colours: Tensor, share: Tensor) -> Tensor:
-    """Change kernels until the lookup's weights give the camera's colours exactly.
+    """Adjust kernels until the lookup's weights give the camera's colours exactly.
 
     Richardson-Lucy steps on colours = share @ kernels, from the band averages: never negative.
 

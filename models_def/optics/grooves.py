@@ -118,7 +118,7 @@ def narrowest_mm(profile: Profile, grooves: Grooves) -> float:
 
 
 def groove_facts(profile: Profile, grooves: Grooves) -> dict[str, float | bool | None]:
-    """Return what is known of the grooves of a surface, as plain values; None for no number."""
+    """Return the facts about the grooves of a surface, as plain values; None for no number."""
     narrowest = narrowest_mm(profile, grooves)
     return {
         "groove_depth_um": grooves.depth_um,

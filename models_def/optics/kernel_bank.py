@@ -25,7 +25,7 @@ GAUSS_FWHM: Final = 2 * math.sqrt(2 * math.log(2))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChannelResponse:
-    """What share of a colour's light has which wavelength (for a flat spectrum).
+    """The share of every wavelength in a colour's light (for a flat spectrum).
 
     Attributes:
         wavelengths_um: (wavelength,), increasing.
@@ -88,7 +88,7 @@ def fabricated_copies(
 def focused_copies(
     lens: Lens, count: int, seed: int, errors: FabricationErrors | None = None
 ) -> tuple[Lens, ...]:
-    """Return what `fabricated_copies` gives, each copy focused when it was assembled.
+    """Return the copies of `fabricated_copies`, each one focused at assembly.
 
     Errors of radius and index move the focus by some 0.1 mm. A camera is focused when it is
     built: the sensor keeps its nominal distance from the copy's own paraxial focus, but for the

@@ -48,7 +48,7 @@ class LensOptics:
 
     @property
     def facts(self) -> Mapping[str, float]:
-        """Its focal length."""
+        """The focal length."""
         return {"efl_mm": paraxial_data(self.lens).efl_mm}
 
     @property
@@ -63,7 +63,7 @@ class LensOptics:
 
     @property
     def reference_wavelength_um(self) -> float:
-        """That of the prescription."""
+        """The reference wavelength of the prescription."""
         return self.lens.reference_wavelength_um
 
     @property
@@ -120,7 +120,7 @@ class LensOptics:
         return replace(self, lens=with_focus_shift(self.lens, focus_um / UM_PER_MM))
 
     def focus_range_um(self) -> float:
-        """Return how far the focus of nearly all fabricated copies lies from the nominal one.
+        """Return the focus range of nearly all fabricated copies about the nominal one.
 
         Twice the standard deviation of where spots are smallest, seen from the sensor as it stands
         after assembly, in whole steps of 5 um.

@@ -25,7 +25,7 @@ from camkit.models_def.optics.optics import (
     uniform_layout,
 )
 from camkit.models_def.optics.psf import TracedPsf
-from camkit.models_def.sensors.psf import field_kernels, grid_neighbours
+from camkit.runtime.bank.psf import FieldKernels
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,7 +42,7 @@ class MeasuredOptics:
 
     @property
     def facts(self) -> Mapping[str, float]:
-        """Nothing but its kernels is known."""
+        """No facts: nothing but the kernels is known."""
         return {}
 
     @property
@@ -90,14 +90,20 @@ class MeasuredOptics:
             ContractError: If the depth lies beyond those measured.
         """
         psf = self.psf
-        shares = torch.from_numpy(depth_weights(psf.depths_mm, depth_mm))
-        known = torch.from_numpy(psf.kernels.astype(np.float64))
-        at_depth = torch.einsum("d,fdlhw->flhw", shares, known)
-        hats = [np.interp(wavelengths_um, psf.wavelengths_um, unit) for unit in _units(psf)]
-        waves = torch.einsum("ln,flhw->fnhw", torch.from_numpy(np.stack(hats)), at_depth)
-        x_mm, y_mm = (torch.from_numpy(axis) for axis in (fields.x_mm, fields.y_mm))
-        found = field_kernels(waves, psf).at(x_mm, y_mm).to(torch.float64)
-        found = resampled(found, psf.pixel_pitch_um / pitch_um)
+        shares = depth_weights(psf.depths_mm, depth_mm)
+        at_depth = np.einsum("d,fdlhw->flhw", shares, psf.kernels.astype(np.float64))
+        units = np.eye(psf.wavelengths_um.size)
+        hats = np.stack([np.interp(wavelengths_um, psf.wavelengths_um, unit) for unit in units])
+        known = FieldKernels(
+            kernels=np.einsum("ln,flhw->fnhw", hats, at_depth).astype(np.float32),
+            field_heights_mm=psf.field_heights_mm,
+            symmetry=psf.symmetry,
+            grid_x_mm=psf.grid_x_mm,
+            grid_y_mm=psf.grid_y_mm,
+        )
+        places = zip(fields.x_mm.tolist(), fields.y_mm.tolist(), strict=True)
+        blended = np.stack([known.at(x_mm, y_mm) for x_mm, y_mm in places]).astype(np.float64)
+        found = resampled(torch.from_numpy(blended), psf.pixel_pitch_um / pitch_um)
         inside = _window(found, side_px)
         kept = inside.sum((-2, -1)) / found.sum((-2, -1))
         return TracedPsf(
@@ -126,12 +132,10 @@ class MeasuredOptics:
         """Return the relative illumination, blended as kernels are."""
         psf, light = self.psf, self.psf.relative_illumination
         if psf.grid_x_mm is not None and psf.grid_y_mm is not None:
-            grid, at = (
-                (torch.from_numpy(x.copy()), torch.from_numpy(y.copy()))
-                for x, y in ((psf.grid_x_mm, psf.grid_y_mm), (fields.x_mm, fields.y_mm))
-            )
-            field, share = grid_neighbours(grid, *at)
-            return np.asarray((light[field.numpy()] * share.numpy()).sum(1), dtype=np.float64)
+            rows = light.reshape(psf.grid_y_mm.size, psf.grid_x_mm.size)
+            along_x = np.stack([np.interp(fields.x_mm, psf.grid_x_mm, row) for row in rows])
+            places = zip(fields.y_mm, along_x.T, strict=True)
+            return np.array([np.interp(y_mm, psf.grid_y_mm, line) for y_mm, line in places])
         return np.interp(np.hypot(fields.x_mm, fields.y_mm), psf.field_heights_mm, light)
 
     def copies(self, count: int, seed: int) -> "tuple[MeasuredOptics, ...]":
@@ -222,7 +226,3 @@ def _window(kernels: Tensor, side_px: int) -> Tensor:
     h, w = kernels.shape[-2:]
     rows, columns = (side_px - h) // 2, (side_px - w) // 2
     return torch.nn.functional.pad(kernels, (columns, columns, rows, rows))
-
-
-def _units(psf: FrozenPsf) -> FloatGrid:
-    return np.eye(psf.wavelengths_um.size)

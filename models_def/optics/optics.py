@@ -1,4 +1,4 @@
-"""What freezing knows of any optics: kernels over field, depth and wavelength, and the geometry.
+"""The interface of all optics for freezing: kernels over field, depth and wavelength, geometry.
 
     Optics = LensOptics        a lens, traced where it is asked for    (lens_optics.py)
            | PlateOptics       a plate, computed where it is asked for (diffraction/plate_optics.py)
@@ -22,7 +22,7 @@ FloatGrid = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FieldLayout:
-    """Where over the field kernels are sampled; see `camkit.contracts.FrozenPsf`.
+    """The positions over the field of the kernels; see `camkit.contracts.FrozenPsf`.
 
     Attributes:
         symmetry: How the kernels of other places follow.
@@ -77,7 +77,7 @@ class Optics(Protocol):
 
     @property
     def facts(self) -> Mapping[str, float]:
-        """What else people want to read in the report of freezing, units in the names."""
+        """Further facts for the report of freezing, units in the names."""
         ...
 
     @property

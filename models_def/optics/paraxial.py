@@ -153,7 +153,7 @@ class Image:
 
 
 def paraxial_image(lens: Lens, wavelength_um: float | None = None) -> Image:
-    """Return where the object plane of a lens is imaged, how large, and how fast.
+    """Return the place, the size and the f-number of the image of a lens's object plane.
 
     Args:
         lens: The prescription.

@@ -172,7 +172,7 @@ class Lens:
 
 
 def grooves_of(lens: Lens) -> list[dict[str, Any]]:
-    """Return what is known of the grooves of a lens, one entry for each grooved surface."""
+    """Return the facts about the grooves of a lens, one entry for each grooved surface."""
     return [
         {"surface": number, **groove_facts(surface.profile, surface.grooves)}
         for number, surface in enumerate(lens.surfaces)

@@ -37,7 +37,7 @@ class TracedPsf:
 
 
 def splat(spots: Spots, size_px: int, pitch_um: float) -> TracedPsf:
-    """Turn half-pupil spots (mirrored at x = 0) into kernels centred on the chief ray.
+    """Convert half-pupil spots (mirrored at x = 0) to kernels centred on the chief ray.
 
     Args:
         spots: Rays with x >= 0 in the pupil.
@@ -52,12 +52,7 @@ def splat(spots: Spots, size_px: int, pitch_um: float) -> TracedPsf:
     scale, centre = UM_PER_MM / pitch_um, (size_px - 1) / 2
     column = spots.x_mm * scale + centre
     row = (spots.y_mm - spots.chief_y_mm[:, None, None]) * scale + centre
-    flat = torch.zeros(*row.shape[:2], size_px * size_px, dtype=row.dtype)
-    for corner in range(4):
-        down, right = divmod(corner, 2)
-        place, weight = tent(row, column, (down, right), size_px)
-        flat = flat.scatter_add(-1, place, weight * spots.weight)
-    kernels = flat.reshape(*row.shape[:2], size_px, size_px)
+    kernels = spread_tents(row, column, spots.weight, size_px)
     kernels = kernels + kernels.flip(-1)
     inside = kernels.sum((-2, -1))
     if bool((inside <= 0).any()):
@@ -66,7 +61,23 @@ def splat(spots: Spots, size_px: int, pitch_um: float) -> TracedPsf:
     return TracedPsf(kernels=kernels / inside[..., None, None], energy_kept=kept)
 
 
-def tent(
+def spread_tents(row: Tensor, column: Tensor, weight: Tensor, size_px: int) -> Tensor:
+    """Return the light (..., size, size) of rays (..., ray), each spread over four pixels.
+
+    Args:
+        row: Where rays land, in pixels of the window; what falls beside it is lost.
+        column: Likewise.
+        weight: Of the rays.
+        size_px: Side of the window.
+    """
+    flat = torch.zeros(*row.shape[:-1], size_px * size_px, dtype=row.dtype)
+    for corner in range(4):
+        place, share = _tent(row, column, divmod(corner, 2), size_px)
+        flat = flat.scatter_add(-1, place, share * weight)
+    return flat.reshape(*row.shape[:-1], size_px, size_px)
+
+
+def _tent(
     row: Tensor, column: Tensor, offset: tuple[int, int], size_px: int
 ) -> tuple[Tensor, Tensor]:
     """Return flat places and weights of one of the four pixels around each ray."""
@@ -88,7 +99,7 @@ def trace_psf(
     *,
     rays: int = DEFAULT_RAYS,
 ) -> TracedPsf:
-    """Trace the PSF at sensor heights and wavelengths, and say how much light it holds.
+    """Trace the PSF at sensor heights and wavelengths, and its share of the light.
 
     Args:
         lens: The prescription.

@@ -1,4 +1,4 @@
-"""Which rays: pupil samples, launching, aiming.
+"""Rays through the pupil: samples, launching, aiming.
 
 Three definitions of the pupil; spots and PSFs differ by them, so each states its own.
 
@@ -83,6 +83,17 @@ def hexapolar(rings: int) -> PupilSamples:
     )
 
 
+def both_halves(half: PupilSamples) -> PupilSamples:
+    """Return points of the half disc x > 0 and their mirror images."""
+    return PupilSamples(x=torch.cat([half.x, -half.x]), y=torch.cat([half.y, half.y]))
+
+
+def pupil_centre() -> PupilSamples:
+    """Return the middle of the disc, where chief rays pass."""
+    zero = torch.zeros(1, dtype=torch.float64)
+    return PupilSamples(x=zero, y=zero)
+
+
 def with_fixed_stop(lens: Lens) -> Lens:
     """Return the lens with its aperture stated as the stop's size, as metal keeps it."""
     stop_mm = paraxial_data(lens).stop_semi_diameter_mm
@@ -119,7 +130,7 @@ def launch(x: Tensor, y: Tensor, slope: Tensor, object_distance_mm: float) -> Ra
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Aim:
-    """Where to launch rays so that they pass wanted points of the stop.
+    """The launch points of rays that pass wanted points of the stop.
 
     Attributes:
         x: Launch points in mm in the vertex plane of the first surface.
@@ -284,8 +295,13 @@ def pupil_rays(
     rays = launch(x, y, slope, lens.object_distance_mm)
     if definition == "paraxial":
         return rays, torch.ones_like(rays.x) * share
+    return marked(rays, weight), weight
+
+
+def marked(rays: Rays, weight: Tensor) -> Rays:
+    """Return launched rays; those without weight, which could not be aimed, as missed."""
     lost = torch.where(weight > 0, int(Fate.VALID), int(Fate.MISSED)).to(torch.int8)
-    return replace(rays, fate=lost), weight
+    return replace(rays, fate=lost)
 
 
 def _aim_at(

@@ -1,10 +1,10 @@
-"""What coarse PSF samples and coarse blocks cost, in dB of the Wiener filter alone.
+"""The cost of coarse PSF samples and coarse blocks, in dB of the Wiener filter alone.
 
 As in use: sharp procedural scenes are blurred by fabricated copies of the optics at several
 places, given the noise of the sensor at its lowest ISO and at 16 times that, and restored twice:
 with the nominal kernel under test, and with the nominal kernel traced at that very place. The
 loss is 10 log10 of the ratio of the mean squared errors, averaged over copies, ISOs and places;
-these stand for equal areas of the picture.
+each place stands for an equal area of the picture.
 """
 
 from collections.abc import Sequence
@@ -20,8 +20,8 @@ from camkit.bundle.stages import Wiener
 from camkit.contracts import FrozenPsf
 from camkit.models_def.optics.frozen import FreezeGrid, corner_height_mm, freeze_at
 from camkit.models_def.optics.optics import FieldLayout, FloatGrid, Optics, radial_layout
-from camkit.models_def.sensors.psf import color_kernels
 from camkit.models_def.sensors.wiener import to_otf, wiener_restore
+from camkit.runtime.bank.psf import color_kernels
 from camkit.scenes import procedural_scene
 from camkit.units import UM_PER_MM
 
@@ -91,7 +91,7 @@ def ring_heights(corner_mm: float, places: int) -> FloatGrid:
 def judged_places(
     optics: Optics, sensor: ColorSensor, fields: int
 ) -> tuple[FieldLayout, tuple[FloatGrid, FloatGrid]]:
-    """Return where to freeze optics densely, and the x (place,) and y (place,) to judge them at.
+    """Return a dense grid of optics, and the x (place,) and y (place,) that are judged.
 
     Radial optics are judged along +y, and traced there; others all around the axis, from the
     samples that they have.
@@ -354,8 +354,8 @@ def _kernels(
     depth_mm: float | None,
 ) -> Tensor:
     fields = color_kernels(psf, *sensor.response_arrays(), depth_mm=depth_mm)
-    x_mm, y_mm = (torch.from_numpy(values) for values in at_mm)
-    return fields.at(x_mm, y_mm)
+    places = zip(*(values.tolist() for values in at_mm), strict=True)
+    return torch.from_numpy(np.stack([fields.at(x_mm, y_mm) for x_mm, y_mm in places]))
 
 
 def _scenes(count: int, size_px: int, seed: int, channels: int) -> Tensor:
@@ -377,7 +377,7 @@ def _convolve(scenes: Tensor, kernels: Tensor) -> Tensor:
 def _noisy(
     pictures: Tensor, sensor: ColorSensor, iso_step: float, seed: int
 ) -> tuple[Tensor, Tensor, Tensor]:
-    """Add noise; give pictures, shot (c,), read variance (c,)."""
+    """Add noise; return pictures, shot (c,), read variance (c,)."""
     noise = sensor.noise_at(sensor.noise[0].iso * iso_step)
     shot, read = torch.tensor(noise.shot), torch.tensor(noise.read_variance)
     variance = pictures.clamp(min=0) * shot[:, None, None] + read[:, None, None]

@@ -1,4 +1,4 @@
-"""Where rays land on the sensor: chief rays, field slopes for sensor heights, spots."""
+"""Landing points of rays on the sensor: chief rays, field slopes for sensor heights, spots."""
 
 from dataclasses import dataclass, replace
 from typing import Final
@@ -11,6 +11,7 @@ from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import (
     PupilDefinition,
     PupilSamples,
+    pupil_centre,
     pupil_rays,
 )
 from camkit.models_def.optics.trace import surface_tensors, trace, without_walls
@@ -54,10 +55,7 @@ def chief_heights(lens: Lens, slopes: Tensor, wavelength_um: float | None = None
     """
     wave = lens.reference_wavelength_um if wavelength_um is None else wavelength_um
     tensors = without_walls(surface_tensors(lens, torch.tensor(wave, dtype=torch.float64)))
-    centre = PupilSamples(
-        x=torch.zeros(1, dtype=torch.float64), y=torch.zeros(1, dtype=torch.float64)
-    )
-    rays, _ = pupil_rays(lens, tensors, centre, slopes[:, None])
+    rays, _ = pupil_rays(lens, tensors, pupil_centre(), slopes[:, None])
     landed = trace(tensors, rays)
     if not bool(landed.valid.all()):
         lost = slopes[~landed.valid[:, 0]].tolist()

@@ -26,7 +26,7 @@ from camkit.units import to_mm
 
 
 class Fate(IntEnum):
-    """What became of a ray; the first failure is kept."""
+    """The fate of a ray; the first failure is kept."""
 
     VALID = 0
     MISSED = kernel.MISSED
@@ -97,7 +97,7 @@ class Rays:
 
     @property
     def valid(self) -> Tensor:
-        """Which rays are still alive."""
+        """Mask of the rays that are still alive."""
         return self.fate == Fate.VALID
 
 
@@ -189,7 +189,7 @@ def trace(
 
 
 def refract(tensors: SurfaceTensors, rays: Rays, i: int) -> Rays:
-    """Carry rays onto surface i, judge them, and bend them (Snell); they stay on it."""
+    """Trace rays onto surface i, judge them, and bend them (Snell); they stay on it."""
     seen: list[Rays] = []
     _trace(tensors, rays, range(i, i + 1), seen=seen)
     return seen[0]

@@ -1,11 +1,11 @@
-"""The sensor and the front end in torch; each has a twin in the runtime (tests/parity).
+"""The sensor and the front end in torch, where gradients are needed: twins of the runtime's.
 
     forward     blur by one kernel, or by one a block
     demosaic    mosaic to planes
-    psf         the kernel of an image point
+    psf         kernels turned to their azimuth
     wiener      the Wiener filter of a patch
     stabilise   the transform around the network
     tone        the sRGB curve, for losses on what a display shows
 
-All take batches and hand gradients on.
+All take batches and hand gradients on; `tests/parity` holds the twins together.
 """

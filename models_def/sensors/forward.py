@@ -1,6 +1,6 @@
 """Light on its way to the sensor, in torch with gradients: blurred by one kernel or block by block.
 
-`scatter` is the twin of `camkit.runtime.geometry.scatter`; `tests/parity` holds the two together.
+`scatter` is the twin of `runtime.geometry.field_blur`; `tests/parity` holds the two together.
 """
 
 from math import cos, pi
@@ -47,7 +47,7 @@ def blur(planes: Tensor, kernels: Tensor) -> Tensor:
 
 
 class _Convolution(torch.autograd.Function):
-    """What has full support in the convolution of (..., h, w) with (..., kh, kw).
+    """The samples with full support in the convolution of (..., h, w) with (..., kh, kw).
 
     The slopes are correlations, by real transforms too: torch would go back through a real
     transform by a complex one, at twice the work.

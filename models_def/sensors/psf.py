@@ -1,186 +1,16 @@
-"""The PSF of an image point, in torch: wavelengths weighted, fields blended, turned if radial.
+"""The kernels of image points in torch, turned to their azimuth, with gradients to the kernels.
 
-    FrozenPsf (field, depth, wavelength) -> color_kernels -> FieldKernels (field, c) -> at(x, y)
-
-Twin of `camkit.runtime.bank.psf`; `tests/parity` holds the two together.
+Twin of the lookup of a radial PSF in `camkit.runtime.bank.psf`; `tests/parity` holds the two
+together. What needs no gradient asks the runtime.
 """
 
-from dataclasses import dataclass
-
-import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
-
-from camkit.contracts import FrozenPsf, Symmetry, depth_weights, focus_weights
-from camkit.errors import ContractError
 
 PAD_PX = 2
 
 
-def wavelength_weights(
-    psf_wavelengths_um: NDArray[np.float64],
-    wavelengths_um: NDArray[np.float64],
-    response: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Integrate the response of the channels against the PSF's wavelength samples.
-
-    The PSF is taken as linear between its wavelengths and constant beyond them, the response as
-    linear between its own and zero beyond them; the integral of their product is then exact.
-
-    Args:
-        psf_wavelengths_um: (wavelength,), increasing.
-        wavelengths_um: (n,), increasing.
-        response: (c, n) >= 0.
-
-    Returns:
-        (c, wavelength) weights; each row sums to 1.
-
-    Raises:
-        ContractError: If shapes disagree or a channel has no response.
-    """
-    if response.ndim != 2 or response.shape[1] != wavelengths_um.size:
-        raise ContractError(f"response must be (c, {wavelengths_um.size}); got {response.shape}")
-    unit = np.eye(psf_wavelengths_um.size)
-
-    def product(at_um: NDArray[np.float64]) -> NDArray[np.float64]:
-        sensed = np.stack([np.interp(at_um, wavelengths_um, row) for row in response])
-        hats = np.stack([np.interp(at_um, psf_wavelengths_um, row) for row in unit])
-        return sensed[:, None, :] * hats[None, :, :]
-
-    if wavelengths_um.size == 1:
-        weights = product(wavelengths_um)[..., 0]
-    else:
-        knots = np.union1d(psf_wavelengths_um, wavelengths_um)
-        knots = knots[(knots >= wavelengths_um[0]) & (knots <= wavelengths_um[-1])]
-        low, high = knots[:-1], knots[1:]
-        simpson = product(low) + 4 * product((low + high) / 2) + product(high)
-        weights = (simpson * ((high - low) / 6)).sum(axis=-1)
-    sums = weights.sum(axis=1, keepdims=True)
-    if not (sums > 0).all():
-        raise ContractError(f"every channel needs a response > 0; sums are {sums.ravel()}")
-    return np.asarray(weights / sums, dtype=np.float64)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FieldKernels:
-    """Kernels of the channels at the fields of a PSF; see `camkit.contracts.FrozenPsf`.
-
-    Attributes:
-        kernels: (field, c, h, w) float32, odd sides, each sums to 1.
-        field_heights_mm: (field,) float64.
-        symmetry: How the kernels of other image points follow.
-        grid_x_mm: (column,) float64 of a grid.
-        grid_y_mm: (row,) float64 of a grid.
-    """
-
-    kernels: Tensor
-    field_heights_mm: Tensor
-    symmetry: Symmetry = "radial"
-    grid_x_mm: Tensor | None = None
-    grid_y_mm: Tensor | None = None
-
-    def at(self, x_mm: Tensor, y_mm: Tensor) -> Tensor:
-        """Return the kernels of image points.
-
-        Args:
-            x_mm: (b,) positions from the axis, to the right.
-            y_mm: (b,) positions from the axis, down the rows.
-
-        Returns:
-            (b, c, h, w) float32, each kernel sums to 1.
-        """
-        if self.grid_x_mm is not None and self.grid_y_mm is not None:
-            field, share = grid_neighbours((self.grid_x_mm, self.grid_y_mm), x_mm, y_mm)
-            shares = share.to(self.kernels.dtype)[..., None, None, None]
-            return (shares * self.kernels[field]).sum(1)
-        if self.symmetry == "uniform":
-            return self.kernels.expand(x_mm.numel(), -1, -1, -1)
-        return _turned_at(self.kernels, self.field_heights_mm, x_mm, y_mm)
-
-
-def color_kernels(
-    psf: FrozenPsf,
-    wavelengths_um: NDArray[np.float64],
-    response: NDArray[np.float64],
-    *,
-    depth_mm: float | None = None,
-    focus_um: float = 0.0,
-) -> FieldKernels:
-    """Weight the wavelength kernels into one kernel per field and channel.
-
-    A lens of revolution is symmetric about the meridional plane, so the kernels of a radial PSF
-    are made symmetric about their middle column, which also takes half of the noise of the
-    tracing. Others are left as they are.
-
-    Args:
-        psf: The frozen PSF.
-        wavelengths_um: (n,) grid of the response.
-        response: (c, n) response of the channels.
-        depth_mm: Object distance, see `depth_weights`; None for the mean kernel over the depths.
-        focus_um: How far the sensor lies from its nominal place, see `focus_weights`.
-
-    Raises:
-        ContractError: If the PSF does not reach depth or focus, or the response does not fit.
-    """
-    weights = torch.from_numpy(wavelength_weights(psf.wavelengths_um, wavelengths_um, response))
-    shares = torch.from_numpy(depth_weights(psf.depths_mm, depth_mm))
-    in_focus = torch.from_numpy(focus_weights(psf.focus_um, focus_um))
-    every = psf.kernels[None]
-    if psf.focus_kernels is not None:
-        every = np.concatenate([every, psf.focus_kernels])
-    kernels = torch.einsum("s,sfdlhw->fdlhw", in_focus, torch.from_numpy(every.astype(np.float64)))
-    mixed = torch.einsum("cl,flhw->fchw", weights, torch.einsum("d,fdlhw->flhw", shares, kernels))
-    if psf.symmetry == "radial":
-        mixed = 0.5 * (mixed + mixed.flip(-1))
-    return field_kernels((mixed / mixed.sum(dim=(-2, -1), keepdim=True)).to(torch.float32), psf)
-
-
-def field_kernels(kernels: Tensor, psf: FrozenPsf) -> FieldKernels:
-    """Return (field, c, h, w) kernels at the fields of a PSF."""
-    grid = (psf.grid_x_mm, psf.grid_y_mm)
-    x_mm, y_mm = (None if axis is None else torch.from_numpy(axis.copy()) for axis in grid)
-    return FieldKernels(
-        kernels=kernels,
-        field_heights_mm=torch.from_numpy(psf.field_heights_mm.copy()),
-        symmetry=psf.symmetry,
-        grid_x_mm=x_mm,
-        grid_y_mm=y_mm,
-    )
-
-
-def grid_neighbours(
-    grid_mm: tuple[Tensor, Tensor], x_mm: Tensor, y_mm: Tensor
-) -> tuple[Tensor, Tensor]:
-    """Return the four fields (b, 4) of a grid around image points, and their shares (b, 4).
-
-    Bilinear; a point beyond the rim is taken on it.
-
-    Args:
-        grid_mm: (column,) and (row,) positions, increasing; fields lie row by row.
-        x_mm: (b,).
-        y_mm: (b,).
-    """
-    columns, rows = (
-        _axis_neighbours(axis.to(torch.float64), at.to(torch.float64).contiguous())
-        for axis, at in zip(grid_mm, (x_mm, y_mm), strict=True)
-    )
-    field = rows[0][:, :, None] * grid_mm[0].numel() + columns[0][:, None, :]
-    share = rows[1][:, :, None] * columns[1][:, None, :]
-    return field.flatten(1), share.flatten(1)
-
-
-def _axis_neighbours(axis: Tensor, at: Tensor) -> tuple[Tensor, Tensor]:
-    """Return the (b, 2) neighbours on one axis and their shares."""
-    low = (torch.searchsorted(axis, at, right=True) - 1).clamp(0, max(axis.numel() - 2, 0))
-    high = (low + 1).clamp(max=axis.numel() - 1)
-    step = torch.where(high > low, axis[high] - axis[low], 1.0)
-    share = ((at - axis[low]) / step).clamp(0, 1)
-    share = torch.where(high > low, share, 0.0)
-    return torch.stack([low, high], 1), torch.stack([1 - share, share], 1)
-
-
-def _turned_at(kernels: Tensor, field_heights_mm: Tensor, x_mm: Tensor, y_mm: Tensor) -> Tensor:
+def turned_at(kernels: Tensor, field_heights_mm: Tensor, x_mm: Tensor, y_mm: Tensor) -> Tensor:
     """Return the kernels of image points, turned so that their radial direction points outward.
 
     Linear in the field height (the last one holds beyond it), a Catmull-Rom gather for the turn,
@@ -226,7 +56,7 @@ def _blend(kernels: Tensor, heights: Tensor, height: Tensor) -> Tensor:
 
 
 def _turn(kernels: Tensor, out_x: Tensor, out_y: Tensor) -> Tensor:
-    """Turn (b, 3, h, w) kernels so that their +y points along (out_x, out_y)."""
+    """Rotate (b, 3, h, w) kernels so that their +y points along (out_x, out_y)."""
     b, c, h, w = kernels.shape
     dy = torch.arange(h, dtype=torch.float64, device=kernels.device)[:, None] - h // 2
     dx = torch.arange(w, dtype=torch.float64, device=kernels.device)[None, :] - w // 2

@@ -54,7 +54,7 @@ class Numbers:
 
     @classmethod
     def of(cls, together: Together, like: Tensor) -> "Numbers":
-        """Return those of a bundle or recipe."""
+        """Return the numbers of a bundle or recipe."""
         return cls(
             noise=like.new_tensor(together.noise),
             noise_rise=like.new_tensor(together.noise_rise),

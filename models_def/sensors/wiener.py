@@ -48,7 +48,7 @@ def to_otf(kernels: Tensor, size: tuple[int, int]) -> Tensor:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class BlockFacts:
-    """What the bank knows of patches.
+    """The facts of patches that the bank uses.
 
     Attributes:
         planes: (b, c, h, w), tapered.
@@ -66,7 +66,7 @@ class BlockFacts:
 def block_facts(
     patches: Tensor, kernels: Tensor, shot: Tensor, read_variance: Tensor, settings: Wiener
 ) -> BlockFacts:
-    """Return what the bank knows of patches; arguments as of `wiener_restore`."""
+    """Return the facts of patches that the bank uses; arguments as of `wiener_restore`."""
     otf = to_otf(kernels, (patches.shape[-2], patches.shape[-1]))
     planes = taper_edges(patches, otf, settings.overlap_px // 4)
     mean = planes.mean(dim=(-2, -1)).clamp(min=0)

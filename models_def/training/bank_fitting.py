@@ -8,14 +8,14 @@ import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Protocol, cast
+from typing import Any, Final, Protocol
 
 from pydantic import ValidationError
 
 from camkit.bundle.stages import Together
 from camkit.bundle.stages.together import Spread
 from camkit.errors import ContractError, UnsupportedError
-from camkit.kinds import find_kind
+from camkit.models_def.training.kind import special_part
 
 _REST: Final = r"[ \t]*(?:#.*)?\n(?:(?!\[).*\n|\n)*"
 WIENER: Final = re.compile(r"^\[wiener\]" + _REST, re.MULTILINE)
@@ -35,7 +35,7 @@ _TRIED: Final = Together(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BankFitOptions:
-    """What a fit is given.
+    """The options of a fit.
 
     Attributes:
         pictures: Folder to draw scenes from; None for procedural ones.
@@ -65,7 +65,7 @@ class BankFitOptions:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BankFit:
-    """What was fitted, and what it is worth on samples that were not fitted to.
+    """The fitted numbers, and their gain on samples that were not used.
 
     Attributes:
         together: The numbers.
@@ -94,14 +94,14 @@ def bank_fitting_kind(name: str) -> BankFittingKind:
     Raises:
         UnsupportedError: If its cameras have none.
     """
-    part = find_kind(name).part("models_def")
-    if not hasattr(part, "BANK_FITTING"):
+    part: BankFittingKind | None = special_part(name, "BANK_FITTING")
+    if part is None:
         raise UnsupportedError(f"cameras of the kind {name!r} have no bank of colours to fit")
-    return cast("BankFittingKind", part.BANK_FITTING)
+    return part
 
 
 def check_text(recipe: str) -> None:
-    """Try whether a recipe takes numbers, before they are sought.
+    """Check that a recipe takes numbers, before they are fitted.
 
     Raises:
         ContractError: As `with_bank`.

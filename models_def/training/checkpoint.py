@@ -110,7 +110,7 @@ def read_table(path: Path) -> dict[str, Any]:
 
 
 def to_checkpoint(path: Path, table: dict[str, Any]) -> Checkpoint:
-    """Make the checkpoint of training from what was read.
+    """Make the checkpoint of training from the content of a file.
 
     Raises:
         ContractError: If it is of another format.

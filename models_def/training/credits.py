@@ -1,4 +1,4 @@
-"""What weights were trained on, in words, for the card of a bundle."""
+"""The training data of weights, in words, for the card of a bundle."""
 
 import re
 from collections import Counter
@@ -15,7 +15,7 @@ FIRST_WEIGHTS: Final = "; first weights: "
 
 
 def describe_data(data: DataRecipe, pictures: Path | None) -> str:
-    """Name the training data: folder, number and licences of pictures, procedural share.
+    """Describe the training data: folder, number and licences of pictures, procedural share.
 
     Licences are read from the table of the folder's README.md (columns file, title, author,
     licence), where there is one.

@@ -45,7 +45,7 @@ class FirstWeights:
     state: State
 
     def credit(self, data: str) -> str:
-        """Say for the card where training began; `data` is what it goes on with."""
+        """Return the text for the card on the first weights; `data` is the training data since."""
         before = self.training_data
         if data and before.startswith(data):
             before = "the same" + before.removeprefix(data)

@@ -1,4 +1,4 @@
-"""Which fitter trains a network: the house's, or one that the kind brings for a role.
+"""Choice of the fitter that trains a network: the common one, or one that the kind brings.
 
 The part of a kind with losses of its own defines `FITTING` beside its `PART`, which fulfils
 `FittingKind`.
@@ -7,13 +7,13 @@ The part of a kind with losses of its own defines `FITTING` beside its `PART`, w
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Protocol, cast
+from typing import Any, Final, Protocol
 
 from camkit.caller import option_text
 from camkit.errors import ContractError
-from camkit.kinds import find_kind
 from camkit.models_def.training.first_weights import FirstWeights
-from camkit.models_def.training.fitter import Fits
+from camkit.models_def.training.fitter import Fitter
+from camkit.models_def.training.kind import special_part
 from camkit.models_def.training.recipe import PICTURE_LOSSES, NetworkRecipe
 
 _FILES: Final = (
@@ -26,7 +26,7 @@ _FILES: Final = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FitRequest:
-    """What is to be fitted.
+    """The request for a fit.
 
     Attributes:
         recipe: Of a kind.
@@ -60,7 +60,7 @@ class OwnFitting:
         credit: What it adds to the training data, for the card.
     """
 
-    make: Callable[[Any], Fits]
+    make: Callable[[Any], Fitter]
     credit: str = ""
 
 
@@ -78,8 +78,7 @@ def own_fitting(kind: str, request: FitRequest) -> OwnFitting | None:
     Raises:
         ContractError: If something is missing, or files were given in vain.
     """
-    part = find_kind(kind).part("models_def")
-    brought = cast("FittingKind | None", getattr(part, "FITTING", None))
+    brought: FittingKind | None = special_part(kind, "FITTING")
     found = None if brought is None else brought.fitting(request)
     if found is not None:
         return found

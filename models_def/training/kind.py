@@ -1,4 +1,4 @@
-"""What training asks of a kind of camera: scenes drawn, samples made, results judged.
+"""The interface between training and a kind of camera: scenes, samples, judgement.
 
     recipe -> training_kind -> TrainingKind -> prepare   material: what samples are made with
                                             -> maker     sample i of a role
@@ -9,11 +9,12 @@ package) defines `PART`, which fulfils `TrainingKind`.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol, TypeVar, cast
 
+import numpy as np
 from torch import Tensor, nn
 
 from camkit.bundle.stages import Stage
@@ -33,7 +34,7 @@ M = TypeVar("M", bound="Material")
 
 
 class Material(Protocol):
-    """What samples are made with, prepared once: the kernels of a lens, say."""
+    """The material of samples, prepared once: the kernels of a lens, say."""
 
     @property
     def designed(self) -> Mapping[str, bytes]:
@@ -62,7 +63,7 @@ class SampleMaker(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Score:
-    """How well a network does.
+    """The score of a network.
 
     Attributes:
         mean_db: Over all captures.
@@ -73,15 +74,34 @@ class Score:
     parts: Mapping[str, Mapping[str, float]]
 
 
+def mean_score(every_db: Sequence[float], **labels: Sequence[str]) -> Score:
+    """Return the mean over captures, and over those of each label.
+
+    Args:
+        every_db: Of the captures.
+        labels: What is told apart -> its value for every capture; by_iso=("100", "800", ...).
+    """
+    parts = {
+        name: {
+            label: float(
+                np.mean([db for db, of in zip(every_db, each, strict=True) if of == label])
+            )
+            for label in dict.fromkeys(each)
+        }
+        for name, each in labels.items()
+    }
+    return Score(mean_db=float(np.mean(every_db)), parts=parts)
+
+
 class Judge(Protocol):
     """Fixed captures that are never trained on."""
 
     def baselines(self) -> Mapping[str, float]:
-        """Return what a network must beat: name -> mean dB."""
+        """Return the baselines of a network: name -> mean dB."""
         ...
 
     def score(self, restore: Restorer) -> Score:
-        """Judge a restoration."""
+        """Compute the score of a restoration."""
         ...
 
 
@@ -128,11 +148,11 @@ class TrainingKind(Protocol[R, M]):
         ...
 
     def layout(self, recipe: R, role: str) -> SampleLayout:
-        """Return what the samples of a role hold, and so what its networks take and give."""
+        """Return the layout of a role's samples, and so the inputs and outputs of its networks."""
         ...
 
     def finish(self, recipe: R, role: str) -> Finish | None:
-        """Return what is done behind the network of a role; None for nothing."""
+        """Return the stage that follows the network of a role; None for none."""
         ...
 
     def prepare(self, recipe: R, recipe_folder: Path, cache_folder: Path) -> M:
@@ -150,7 +170,7 @@ class TrainingKind(Protocol[R, M]):
     def maker(
         self, recipe: R, role: str, material: M, pictures: Path | None, seed: int
     ) -> SampleMaker:
-        """Open the scenes and give the maker of a role's samples."""
+        """Open the scenes and return the maker of a role's samples."""
         ...
 
     def judge(self, recipe: R, role: str, material: M, pictures: Path | None) -> Judge:
@@ -171,6 +191,19 @@ def training_kind(name: str) -> TrainingKind[Any, Any]:
     return cast("TrainingKind[Any, Any]", part.PART)
 
 
+def special_part(kind: str, name: str) -> Any | None:
+    """Return what the design side of a kind defines beside its `PART`; None if it does not.
+
+    Args:
+        kind: Name of the kind.
+        name: FITTING, REFINING, BANK_FITTING or PREPARING.
+
+    Raises:
+        UnsupportedError: If there is no such kind, or it cannot be trained.
+    """
+    return getattr(find_kind(kind).part("models_def"), name, None)
+
+
 def read_recipe(path: Path) -> Recipe:
     """Read and check a recipe of any kind.
 
@@ -182,7 +215,7 @@ def read_recipe(path: Path) -> Recipe:
 
 
 def to_recipe(table: Mapping[str, Any]) -> Recipe:
-    """Turn a parsed TOML table into the recipe of its kind; raises as `read_recipe` does."""
+    """Convert a parsed TOML table to the recipe of its kind; raises as `read_recipe` does."""
     kind = typed("kind", table.get("kind", DEFAULT_KIND), str)
     recipe: Recipe = training_kind(kind).to_recipe(with_new_names(table, _OLDER))
     return recipe
@@ -191,6 +224,6 @@ def to_recipe(table: Mapping[str, Any]) -> Recipe:
 def build_role(
     kind: TrainingKind[R, M], recipe: R, role: str, size: str
 ) -> tuple[nn.Module, SampleLayout]:
-    """Build the untrained network of a role and size, and say what it takes and gives."""
+    """Build the untrained network of a role and size, and return its layout too."""
     entry = recipe.network(size, role)
     return kind.build_network(entry.network, **entry.config), kind.layout(recipe, role)

@@ -14,7 +14,7 @@ class RunLog:
     """Appends entries to a file; each is on disk before the next step."""
 
     def __init__(self, path: Path, *, keep_until_step: int | None) -> None:
-        """Start a log, or go on with one.
+        """Open a log, a new one or one to continue.
 
         Args:
             path: The file.
@@ -104,5 +104,5 @@ def plot_logs(logs: Mapping[str, Path | Sequence[Path]], chart: Path) -> None:
 
 
 def _baselines(entry: Mapping[str, Any]) -> list[float]:
-    """Return what stands in an entry beside the network's own dB."""
+    """Return the baselines in an entry, beside the network's own dB."""
     return [v for k, v in entry.items() if k.endswith("_db") and k != "valid_db"]

@@ -41,7 +41,7 @@ def patch_distances(output: Tensor, target: Tensor, weight: Tensor) -> Tensor:
 
 
 def _gap(output: Tensor, target: Tensor, weight: Tensor) -> tuple[Tensor, Tensor]:
-    """Return what is judged, and give its difference in the square-root domain, 0 elsewhere."""
+    """Return the judged mask, and the difference in the square-root domain, 0 elsewhere."""
     judged = target >= 0
     return judged, torch.where(judged, output - target, 0.0) * weight[:, :, None, None]
 

@@ -1,4 +1,4 @@
-"""Where sharp training crops come from: a folder of pictures and procedural scenes.
+"""Sources of sharp training crops: a folder of pictures, and procedural scenes.
 
 Pictures are decoded once, brought to sRGB by their profiles and held with 8 bits, scenes as
 float16; a crop is decoded to linear Rec.709 when it is cut.
@@ -19,6 +19,7 @@ from PIL import Image, ImageCms
 from camkit.colorimetry import decode_srgb
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError, DecodeError
+from camkit.models_def.training.recipe import SceneRecipe
 from camkit.scenes import procedural_scene
 from camkit.scenes.clean import edges, night, patches, with_lamps
 
@@ -196,6 +197,25 @@ def open_source(
         scenes=scenes,
         scene_px=scene_px,
         _held={},
+        drawn=drawn,
+        first_scene=first_scene,
+    )
+
+
+def open_scenes(
+    data: SceneRecipe,
+    folder: Path | None,
+    *,
+    picture_share: float | None = None,
+    drawn: DrawnShares = DrawnShares(),
+    first_scene: int = 0,
+) -> SceneSource:
+    """Open the scenes of a recipe, see `open_source`; None takes the recipe's share of pictures."""
+    return open_source(
+        folder,
+        picture_share=data.picture_share if picture_share is None else picture_share,
+        scenes=data.procedural_scenes,
+        scene_px=data.scene_px,
         drawn=drawn,
         first_scene=first_scene,
     )

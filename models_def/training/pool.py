@@ -109,7 +109,7 @@ class PoolFiles:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PoolJob:
-    """What the samples of a pool are.
+    """The description of a pool's samples.
 
     Attributes:
         folder: Where the pool lies.
@@ -128,7 +128,7 @@ class PoolJob:
     seed: int
 
     def open(self) -> tuple[PoolFiles, SampleMaker]:
-        """Open the files, and what fills them."""
+        """Open the files, and the maker that fills them."""
         kind, recipe = training_kind(self.recipe.kind), self.recipe
         layout = kind.layout(recipe, self.role)
         maker = kind.maker(recipe, self.role, self.material, self.pictures, self.seed)
@@ -158,7 +158,7 @@ class SamplePool:
         self.close()
 
     def start_workers(self, count: int) -> None:
-        """Start processes that make samples beside the training; with none it makes its own.
+        """Start processes that make samples beside the training; without any it makes its own.
 
         Raises:
             ContractError: If there are too many.
@@ -221,7 +221,7 @@ class SamplePool:
         )
 
     def _ensure(self, low: int, end: int) -> None:
-        """Have the samples made, and allow the worker to work ahead."""
+        """Make sure that the samples exist, and allow the worker to work ahead."""
         self._files.goal[0] = end + AHEAD
         if self._files.are_ready(low, end):
             return
@@ -289,7 +289,7 @@ def pool_folder(
     *,
     seed: int,
 ) -> Path:
-    """Return where the pool of these samples lies."""
+    """Return the folder of the pool of these samples."""
     names = "" if pictures is None else ",".join(sorted(p.name for p in pictures.iterdir()))
     digest = training_kind(recipe.kind).samples_digest(recipe, role, seed)
     return folder / f"pool-{_short_hash(''.join((digest, material.digest(), names)))}"

@@ -16,7 +16,7 @@ REPORT_S: Final = 0.2
 
 
 def work(folder: Path, share: tuple[int, int]) -> None:
-    """Make samples up to the goal until the trainer says stop or is gone."""
+    """Make samples up to the goal until the trainer stops the worker or is gone."""
     torch.set_num_threads(1)
     files, maker = read_job(folder).open()
     threading.Thread(target=_report, args=(files, share[0]), daemon=True).start()

@@ -45,21 +45,32 @@ def check_share(where: str, value: float) -> None:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DataRecipe:
-    """Where samples come from and how many are held; a kind may add keys of its own.
+class SceneRecipe:
+    """Where sharp crops come from.
 
     Attributes:
-        picture_share: Share of samples cut from pictures, the rest is procedural; without a
-            folder of pictures every sample is procedural.
+        picture_share: Share of crops of pictures, the rest is procedural; without a folder of
+            pictures every crop is procedural.
         procedural_scenes: Different procedural scenes of `scene_px` a side.
         scene_px: Side of a procedural scene.
+    """
+
+    picture_share: float = 0.8
+    procedural_scenes: int = 24
+    scene_px: int = 512
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DataRecipe(SceneRecipe):
+    """How many samples are made and held; a kind may add keys of its own.
+
+    Attributes:
         sample_px: Side of a finished sample; training patches are cut from it.
         pool_samples: Samples held on disk at one time; more than `AHEAD`.
         first_samples: Samples that must exist before the first step.
         steps_per_sample: Training steps after which one more sample replaces the oldest.
     """
 
-    picture_share: float = 0.8
     procedural_scenes: int = 48
     scene_px: int = 1024
     sample_px: int = 256
@@ -82,7 +93,7 @@ class DataRecipe:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContentRecipe:
-    """What output and truth are compared by.
+    """The comparison of output and truth.
 
     Attributes:
         l1_weight: On the mean |difference| in the square-root domain.
@@ -102,7 +113,7 @@ class ContentRecipe:
 
     @property
     def looks(self) -> bool:
-        """Whether pictures are looked at through features."""
+        """Return whether pictures are compared by features."""
         return self.gram_weight + self.feature_weight > 0
 
 
@@ -147,7 +158,7 @@ class CriticRecipe:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ScheduleRecipe:
-    """How the network is fitted.
+    """The schedule of a fit.
 
     Attributes:
         steps: Steps of the whole schedule; `--max-minutes` may end it sooner, decay included.
@@ -335,7 +346,7 @@ def with_new_names(table: Mapping[str, Any], older: Mapping[str, str]) -> Mappin
 
 
 def differing_part(one: Recipe, other: Recipe, parts: Iterable[str]) -> str | None:
-    """Name the first part by which two recipes describe different cameras, None if none does.
+    """Return the first part in which two recipes describe different cameras, None for none.
 
     How networks are trained, and on which samples, may differ from size to size.
     """

@@ -6,12 +6,12 @@ The part of such a kind defines `REFINING` beside its `PART`, which fulfils `Ref
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, cast
+from typing import Any, Protocol
 
 from camkit.errors import UnsupportedError
-from camkit.kinds import find_kind
 from camkit.models_def.training.first_weights import FirstWeights
-from camkit.models_def.training.fitter import Fits
+from camkit.models_def.training.fitter import Fitter
+from camkit.models_def.training.kind import special_part
 from camkit.models_def.training.recipe import NetworkRecipe, ScheduleRecipe
 
 
@@ -29,14 +29,14 @@ class Refinement:
 
     name: str
     schedule: ScheduleRecipe
-    make_fitter: Callable[[NetworkRecipe, Any], Fits]
+    make_fitter: Callable[[NetworkRecipe, Any], Fitter]
     first: FirstWeights | None = None
     credit: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FineTuningOptions:
-    """What fine-tuning is given.
+    """The options of fine-tuning.
 
     Attributes:
         start: Checkpoint or bundle to start from.
@@ -69,7 +69,7 @@ def refining_kind(name: str) -> RefiningKind:
     Raises:
         UnsupportedError: If its networks are not fine-tuned.
     """
-    part = find_kind(name).part("models_def")
-    if not hasattr(part, "REFINING"):
+    part: RefiningKind | None = special_part(name, "REFINING")
+    if part is None:
         raise UnsupportedError(f"networks of the kind {name!r} are not fine-tuned")
-    return cast("RefiningKind", part.REFINING)
+    return part

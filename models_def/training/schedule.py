@@ -10,7 +10,7 @@ from camkit.models_def.training.recipe import ScheduleRecipe
 
 
 def progress_of(step: int, steps: int, by_time: float = 0.0) -> float:
-    """Return how much of the schedule lies behind, 0..1.
+    """Return the finished share of the schedule, 0..1.
 
     By steps alone it is exact and repeatable. With a time budget, of which a share is spent, it is
     whichever of the two is further, so that the decay ends in time on a machine that is slower than

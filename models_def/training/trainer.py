@@ -28,7 +28,7 @@ from camkit.models_def.training.first_weights import (
     read_first_weights,
     take_first_weights,
 )
-from camkit.models_def.training.fitter import Fits, Fitter
+from camkit.models_def.training.fitter import Fitter, patch_objective
 from camkit.models_def.training.fitting import FitRequest, OwnFitting, own_fitting
 from camkit.models_def.training.kind import (
     Judge,
@@ -54,7 +54,7 @@ Made = TypeVar("Made")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrainOptions:
-    """What a run is given besides its recipe.
+    """The options of a run besides its recipe.
 
     Attributes:
         out_dir: Checkpoint, log and sample pool are kept here.
@@ -125,7 +125,7 @@ class TrainOptions:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrainResult:
-    """How a run ended.
+    """The result of a run.
 
     Attributes:
         checkpoint: The last checkpoint.
@@ -297,11 +297,11 @@ class _Run:
         self.data = data + ("" if first is None else first.credit(data))
         if own is not None:
             self.data += own.credit
-            self.fitter: Fits = own.make(material)
+            self.fitter = own.make(material)
         elif refinement is None:
-            finish = kind.finish(self.recipe, self.role)
+            objective = patch_objective(kind.finish(self.recipe, self.role))
             self.fitter = Fitter(
-                self.entry, kind.build_network, options.device, first, finish=finish
+                self.entry, kind.build_network, options.device, first, objective=objective
             )
         else:
             self.data += refinement.credit
@@ -346,7 +346,7 @@ class _Run:
         return self.cpu_before_s + self.stopwatch.cpu_s() + pool.workers_cpu_s()
 
     def _closing(self, name: str, work: Callable[[], Made]) -> Made:
-        """Do what the end of the run will do again, and keep (wall, CPU) seconds of it."""
+        """Run the work of the end of a run once, and record its (wall, CPU) seconds."""
         begin = self.stopwatch.wall_s(), self.stopwatch.cpu_s()
         made = work()
         wall_s, cpu_s = self.stopwatch.wall_s(), self.stopwatch.cpu_s()
@@ -403,11 +403,11 @@ class _Run:
         return wall, cpu
 
     def _progress(self, pool: SamplePool) -> float:
-        """Return how much of the run lies behind, 0..1."""
+        """Return the finished share of the run, 0..1."""
         return progress_of(self.step, self.steps, max(self._shares(pool)))
 
     def _decay(self, pool: SamplePool) -> float:
-        """Return how much of the schedule lies behind: what came before the first step is none."""
+        """Return the finished share of the schedule; 0 before the first step."""
         pairs = zip(self._shares(pool), self.setup_shares, strict=True)
         of_steps = max((now - setup) / (1 - setup) for now, setup in pairs if setup < 1)
         return progress_of(self.step, self.steps, of_steps)
@@ -436,7 +436,7 @@ class _Run:
         note(self._line(pool, task, self.valid.mean_db))
 
     def _plan_line(self) -> str:
-        """Return what ends the run."""
+        """Return the line about the end of the run."""
         ends = [f"{self.steps} steps"]
         budgets = {"minutes": self.options.max_minutes, "CPU-minutes": self.options.max_cpu_minutes}
         ends += [f"{most:g} {unit}" for unit, most in budgets.items() if most is not None]

@@ -43,7 +43,7 @@ BORDER_SHARE: Final = 7 / 16
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Block:
-    """What a block filter gets.
+    """The inputs of a block filter.
 
     Attributes:
         samples: (c, b, b) float32, the blurred picture, made periodic by `taper_edges`.
@@ -178,7 +178,7 @@ def cut_block_px(block_px: int, overlap_px: int, size_px: tuple[int, int]) -> in
 
 
 def _rise(overlap_px: int) -> FloatArray:
-    """Zero over a quarter of the overlap, sin^2 over its half, one over the last quarter."""
+    """Return a rise: zero over a quarter of the overlap, sin^2 over its half, then one."""
     t = (np.arange(overlap_px) + 0.5 - overlap_px / 4) / max(overlap_px / 2, 1)
     return np.asarray(np.sin(np.pi / 2 * np.clip(t, 0, 1)) ** 2, dtype=np.float32)
 
@@ -405,7 +405,7 @@ class BlockBank:
     def _restore(
         self, strip: "_Strip", pool: ThreadPoolExecutor, cancel: Cancel | None
     ) -> Iterator[FloatArray]:
-        """Return the windowed blocks of one block row, from left to right."""
+        """Yield the windowed blocks of one block row, from left to right."""
         psf, y_px = self._psf, strip.span.centre
         places = [
             (psf.number_at(c.centre, y_px), psf.position_mm(c.centre, y_px)) for c in self._columns
@@ -505,7 +505,7 @@ class _Strip:
 
 
 def _taken(planes: NDArray[Any], index: NDArray[np.intp], *, axis: int) -> NDArray[Any]:
-    """Take some rows or columns: a view where they follow each other."""
+    """Select some rows or columns: a view where they follow each other."""
     first, last = int(index[0]), int(index[-1])
     if last - first == index.size - 1 and (np.diff(index) == 1).all():
         return planes[(slice(None),) * axis + (slice(first, last + 1),)]

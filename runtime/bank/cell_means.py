@@ -60,7 +60,7 @@ def cell_means(
 
 
 def _sites(cfa: CfaPattern | None, channels: int) -> Iterator[list[tuple[int, slice, slice]]]:
-    """Return the (plane, rows, columns) that hold the samples of every channel."""
+    """Yield the (plane, rows, columns) that hold the samples of every channel."""
     if cfa is None:
         yield from ([(plane, slice(None), slice(None))] for plane in range(channels))
         return

@@ -76,7 +76,7 @@ class Other:
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Return what the square of W x weighs of |D x|^2 and |x|^2 at most."""
+        """Return the weights by which |D x|^2 and |x|^2 bound the square of W x."""
         steps = float(np.square(self.steps).sum(axis=0).max())
         return 2 * float(np.square(self.light).max()), 2 * steps
 

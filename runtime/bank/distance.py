@@ -123,7 +123,7 @@ def find_nearness(
 
 
 def search_blocks(size_px: tuple[int, int]) -> int:
-    """Return how many blocks of a capture of (height, width) are asked."""
+    """Return the number of blocks of a capture of (height, width) that are searched."""
     rows, columns = (len(_laid(cell_count(side, CELL_PX))) for side in size_px)
     return rows * columns
 
@@ -171,7 +171,7 @@ class _Spectrum:
     samples: FloatArray
 
     def of(self, planes: Complex) -> Complex:
-        """Take these frequencies of (..., c, b, b // 2 + 1) transfers, phases included."""
+        """Select these frequencies of (..., c, b, b // 2 + 1) transfers, phases included."""
         flat = planes.reshape(*planes.shape[:-2], -1)
         return np.asarray(flat[..., self.places] * self.moved)
 
@@ -213,7 +213,7 @@ def _block_window() -> FloatArray:
 
 
 def _laid(cells: int) -> NDArray[np.intp]:
-    """Return where the blocks begin along a side, evenly; the last ends where the cells end."""
+    """Return the first cells of blocks along a side, evenly; the last block ends with the cells."""
     last = max(cells - BLOCK_CELLS, 0)
     return np.linspace(0, last, 1 + -(-last // BLOCK_CELLS)).round().astype(np.intp)
 

@@ -116,7 +116,7 @@ class Lit:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CoarseBand:
-    """What a capture is multiplied by and what is added, by cell: z = gain y + veil.
+    """The factor and the veil of a capture, by cell: z = gain y + veil.
 
     Attributes:
         gain: (c, h, w) float32, H1 / E1.
@@ -132,12 +132,12 @@ class CoarseBand:
 
     @property
     def noise_rise(self) -> tuple[float, ...]:
-        """Return what the variance of the noise of every colour is multiplied by, on average."""
+        """Return the factor on the variance of the noise of every colour, on average."""
         square = np.square(self.gain, dtype=np.float64).mean(axis=(-2, -1))
         return tuple(float(v) for v in square)
 
     def clear(self, rows: FloatArray, top: int) -> None:
-        """Take the haze out of rows (c, n, w) of the capture, in place.
+        """Remove the haze from rows (c, n, w) of the capture, in place.
 
         Args:
             rows: From row `top` on.
@@ -275,7 +275,7 @@ def _lit(kernels: FloatGrid, like: FieldKernels) -> Lit:
 
 
 def cell_window(window: SensorWindow, cell_px: int, margin: int) -> SensorWindow:
-    """Return where the cells of a capture lie on the sensor, and some around them."""
+    """Return the window of a capture's cells on the sensor, with some around them."""
     width, height = (cell_count(side, cell_px) for side in window.size_px)
     return window.resampled(cell_px, (width, height)).widened(margin)
 
@@ -362,7 +362,7 @@ def _mirrored(cells: FloatArray) -> FloatArray:
 
 
 def coarse_work(entry: Dehaze, channels: int) -> float:
-    """Return how often a pixel is transformed, the margins of the cells left aside.
+    """Return the transforms per pixel, without the margins of the cells.
 
     Filters for every place add less than as much again.
     """

@@ -93,7 +93,7 @@ class KernelsByDistance:
     """
 
     def __init__(self, depths_mm: FloatGrid, kernels: Sequence[FieldKernels]) -> None:
-        """Take what is known.
+        """Store the kernels of every depth.
 
         Args:
             depths_mm: (depth,), increasing; inf is allowed.

@@ -31,7 +31,7 @@ Cells = tuple[tuple[int, int], ...]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WindowRule:
-    """Which windows explain lights.
+    """The rule for windows that explain lights.
 
     Attributes:
         margin_px: Surroundings that a window sees around the samples it explains.

@@ -52,7 +52,7 @@ class Nodes:
 
 
 def node_places(kernels: FieldKernels) -> FloatGrid:
-    """Return where kernels of optics are stored, on every azimuth where they turn: (node, 2)."""
+    """Return the places of the kernels of optics, on every azimuth where they turn: (node, 2)."""
     if kernels.grid_x_mm is not None and kernels.grid_y_mm is not None:
         return np.stack(np.meshgrid(kernels.grid_x_mm, kernels.grid_y_mm), axis=-1).reshape(-1, 2)
     if not kernels.turns:
@@ -64,7 +64,7 @@ def node_places(kernels: FieldKernels) -> FloatGrid:
 
 
 def lay_nodes(kernels: FieldKernels, window: SensorWindow) -> Nodes:
-    """Lay the nodes of kernels, see `node_places`.
+    """Compute the nodes of kernels, see `node_places`.
 
     Args:
         kernels: Their places and symmetry.
@@ -135,7 +135,7 @@ class NodeKernels:
     """The kernels of nodes, with the light that each holds; immutable."""
 
     def __init__(self, kernels: FieldKernels, light: FloatGrid) -> None:
-        """Turn the kernels of one quadrant; the others mirror them.
+        """Rotate the kernels of one quadrant; the others mirror them.
 
         Args:
             kernels: Of sum 1, (field, c, n, n).
@@ -187,7 +187,7 @@ class PlaceBlur:
     """The blur of one colour of a coarse picture; immutable."""
 
     def __init__(self, few: FewKernels, nodes: Nodes, *, threads: int = 1) -> None:
-        """Lay the weights of the few kernels over the picture.
+        """Interpolate the weights of the few kernels over the picture.
 
         Args:
             few: By `few_kernels`.
@@ -239,7 +239,7 @@ class PlaceBlur:
         return self._inverse(total)
 
     def solver(self, damping: float) -> Callable[[FloatArray], FloatArray]:
-        """Return what nearly undoes the blur: the Wiener filter of its mean kernel.
+        """Return an approximate inverse of the blur: the Wiener filter of its mean kernel.
 
         Args:
             damping: Added to the kernel's power.
@@ -298,7 +298,7 @@ def few_kernels(kernels: FloatArray, terms: int) -> FewKernels:
 
 
 def _whole_pairs(lengths: FloatGrid, most: int) -> int:
-    """Return how many directions to keep, of the longest: equal ones are kept or left together.
+    """Return the number of directions to keep, the longest; equal ones stay together.
 
     Two equally long directions, as sine and cosine of the azimuth are, may be any two of their
     plane: which of them the last bits of the kernels would decide.

@@ -308,7 +308,7 @@ def _blend(kernels: FloatArray | FloatGrid, heights_mm: FloatGrid, height_mm: fl
 
 
 def _turn(kernel: FloatArray, out_x: float, out_y: float) -> FloatArray:
-    """Turn a (3, h, w) kernel so that its +y points along the unit vector (out_x, out_y).
+    """Rotate a (3, h, w) kernel so that its +y points along the unit vector (out_x, out_y).
 
     Only samples with a tap where the kernel has light are computed; most kernels are zero almost
     everywhere.
@@ -343,7 +343,7 @@ def _turn(kernel: FloatArray, out_x: float, out_y: float) -> FloatArray:
 
 
 def _reached(places: FloatGrid, kernel: FloatArray, *, axis: int) -> NDArray[np.bool_]:
-    """Tell which positions along an axis of a kernel have taps between its first and last light."""
+    """Return a mask of a kernel's axis: positions with taps between its first and last light."""
     light = np.flatnonzero(kernel.any(axis=(0, 3 - axis)))
     below, above = (light[0], light[-1]) if light.size else (0, kernel.shape[axis] - 1)
     reached = (places >= below - 2) & (places < above + 2)

@@ -114,7 +114,7 @@ def packed_power(packed: FloatArray) -> FloatArray:
 
 
 def _sum_pairs(lines: FloatArray) -> None:
-    """Put the sum of re and im in the place of both; lines as in `_unpack_column`."""
+    """Replace both re and im by their sum; lines as in `_unpack_column`."""
     count = (lines.shape[-1] - 1) // 2
     re, im = (lines[..., first : first + 2 * count : 2] for first in (1, 2))
     both = re + im
@@ -138,7 +138,7 @@ def spread_weights(half: FloatArray, width: int) -> FloatArray:
 def packed_places(
     rows: NDArray[np.intp], columns: NDArray[np.intp], size: tuple[int, int]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return where real and imaginary parts of frequencies lie in a packed plane, flattened.
+    """Return the indices of real and imaginary parts in a packed plane, flattened.
 
     Args:
         rows: Of the half spectrum.

@@ -55,7 +55,7 @@ Places = NDArray[np.intp]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shapes:
-    """What depends on the size of a block alone; float32.
+    """The terms that depend on the size of a block alone; float32.
 
     Attributes:
         fall: (b, b) F, times the samples of a block; for packed planes.
@@ -81,7 +81,7 @@ class Shapes:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Transfer:
-    """What depends on the place of a block too; (c, b, b) float32, packed planes.
+    """The terms that depend on the place of a block too; (c, b, b) float32, packed planes.
 
     Attributes:
         otf: H.
@@ -132,7 +132,7 @@ def shapes_of(together: Together, block_px: int) -> Shapes:
 
 
 def transfer_of(otf: ComplexArray, height_mm: float, together: Together) -> Transfer:
-    """Return what the filter needs to know of a place.
+    """Return the terms of the filter for a place.
 
     Args:
         otf: (c, b, b // 2 + 1) complex64.

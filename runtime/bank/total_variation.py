@@ -45,7 +45,7 @@ def admm_tv_filter(
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class BlockLight:
-    """What least squares needs to know of a block; clipped samples are filled.
+    """The terms of least squares for a block; clipped samples are filled.
 
     Attributes:
         samples: (c, b, b) float32.
@@ -68,7 +68,7 @@ class BlockLight:
 
 
 def light_of_block(noise: NoiseModel) -> Callable[[Block], BlockLight]:
-    """Return what finds the light of blocks in a noise."""
+    """Return the function that computes the light of blocks in a noise."""
     shot, read_variance = np.array(noise.shot), np.array(noise.read_variance)
     background = background_of(noise)
 
@@ -86,7 +86,7 @@ def light_of_block(noise: NoiseModel) -> Callable[[Block], BlockLight]:
 
 
 def _fill_clipped(block: Block, background: FloatArray) -> tuple[FloatArray, NDArray[np.float64]]:
-    """Fill clipped samples with what Richardson-Lucy predicts, and give what it cannot explain."""
+    """Fill clipped samples with what Richardson-Lucy predicts, and return the rest."""
     assert block.unknown is not None
     clipped = spread_clipped(block.unknown)
     lights = richardson_lucy(block.samples, block.otf, background, FILL_ITERATIONS, clipped)

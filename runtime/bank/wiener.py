@@ -79,7 +79,7 @@ def wiener_filter(settings: Wiener, noise: NoiseModel, kernel_px: int | None = N
 
 
 def place_knowledge(settings: Wiener) -> PlaceKnowledge | None:
-    """Return what the filter knows of a place for all blocks there; None if that is nothing."""
+    """Return the terms of the filter for all blocks of a place; None if there are none."""
     if (together := settings.together) is None:
         return None
     return lambda otf, height_mm: transfer_of(otf, height_mm, together)

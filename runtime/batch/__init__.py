@@ -3,7 +3,7 @@
 sources     files, folders, globs -> captures
 tasks       bundle, name of the picture, clashes: errors before any work
 making      one capture claimed, made, told as a result
-counting    how many are done, and how much of those under way
+batch_progress    how many are done, and how much of those under way
 processing  all of them, `jobs` at once
 
 Pictures and sidecars are claimed, written to part files and renamed. One file's failure never stops

@@ -28,7 +28,7 @@ ELSEWHERE: Final = "another process makes this picture"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Common:
-    """What all tasks of a run share."""
+    """The settings that all tasks of a run share."""
 
     write: WriteOptions
     mosaic: MosaicOptions | None
@@ -67,7 +67,7 @@ class Pipelines:
 
 
 def run_task(task: Task, pipelines: Pipelines, common: Common) -> FileResult:
-    """Make the picture of one task; whatever stops it is told as its result.
+    """Make the picture of one task; an error becomes its result.
 
     Raises:
         Cancelled: If the caller wished so.
@@ -80,7 +80,7 @@ def run_task(task: Task, pipelines: Pipelines, common: Common) -> FileResult:
 
 
 def try_task(task: Task, pipelines: Pipelines, common: Common) -> FileResult | None:
-    """Make the picture of one task unless another process is at it now: then give None.
+    """Make the picture of one task; return None if another process makes it now.
 
     Raises:
         Cancelled: If the caller wished so.

@@ -13,7 +13,7 @@ from camkit.errors import ContractError
 from camkit.field_types import check_value
 from camkit.kinds import Kind
 from camkit.progress import working
-from camkit.runtime.batch.counting import PictureCount
+from camkit.runtime.batch.batch_progress import PictureCount
 from camkit.runtime.batch.making import Common, FileProgress, Pipelines, run_task
 from camkit.runtime.batch.sources import expand
 from camkit.runtime.batch.tasks import NO_BUNDLE, Task, list_tasks
@@ -54,7 +54,7 @@ def process(  # noqa: PLR0913 - each says one thing to its caller
     on_notice: Callable[[str], None] | None = None,
     **choices: Unpack[ProcessKeywords],
 ) -> list[FileResult]:
-    """Turn captures into pictures, each with its sidecar.
+    """Process captures to pictures, each with its sidecar.
 
     Args:
         files: Captures, folders or globs.
@@ -174,7 +174,7 @@ def kind_of_run(bundle: str | None, options: Options, pipelines: Pipelines) -> K
 
 
 def _shared(options: Options, jobs: int) -> Options:
-    """Share threads and memory among the jobs, so that together they keep to the caller's.
+    """Divide threads and memory among the jobs, so that together they keep the caller's limits.
 
     What the process holds anyway counts once; without a cap every job takes the default.
     """

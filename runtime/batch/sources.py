@@ -1,4 +1,4 @@
-"""Which captures are meant: files, folders and globs, each capture once."""
+"""Captures named by files, folders and globs, each capture once."""
 
 import glob
 from collections.abc import Sequence
@@ -55,7 +55,7 @@ def _suffixes(kind: Kind | None) -> frozenset[str]:
 
 
 def _is_unreachable(path: Path) -> bool:
-    """Tell a path that no file can have: a name that is too long, a byte 0, a loop of links."""
+    """Return whether no file can have a path: a long name, a byte 0, a loop of links."""
     try:
         path.stat()
     except FileNotFoundError:

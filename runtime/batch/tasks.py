@@ -1,4 +1,4 @@
-"""What is decided for every input before any work: its bundle, its picture, why it cannot be."""
+"""Decisions about every input before any work: its bundle, its picture, why it cannot be made."""
 
 import logging
 import os
@@ -62,7 +62,7 @@ def list_tasks(
     kind: Kind | None = None,
     writes: bool = True,
 ) -> list[Task]:
-    """Decide bundle and outputs of every input, and refuse what cannot be before any work.
+    """Decide bundle and outputs of every input, and refuse impossible ones before any work.
 
     Args:
         sources: The captures.
@@ -123,7 +123,7 @@ def _folders(sources: Sequence[Path], write: WriteOptions) -> list[Path]:
 def _outputs(
     source: Path, part: RuntimePart, options: Options, write: WriteOptions
 ) -> tuple[str, ...] | ContractError:
-    """Name the files of an input, the main one first; or return why it cannot be written so."""
+    """Return the files of an input, the main one first; or the reason why it has none."""
     try:
         return part.outputs.names(source, options, write)
     except ContractError as error:
@@ -162,7 +162,7 @@ def _make_task(
 
 
 def state_of(path: Path) -> tuple[int, int] | None:
-    """Return what changes when a file is written anew; None without a file.
+    """Return the values that change when a file is written anew; None without a file.
 
     Its inode does too, but every machine may see another one.
     """

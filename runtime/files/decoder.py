@@ -38,7 +38,7 @@ class Decoder:
     complaints: IO[bytes]
 
     def take(self, order: Sequence[str]) -> bool:
-        """Hand a waiting child its order; return whether it still waited."""
+        """Send a waiting child its order; return whether it still waited."""
         pipe = self.child.stdin
         if pipe is None or self.child.poll() is not None:
             return False
@@ -50,7 +50,7 @@ class Decoder:
         return True
 
     def end(self) -> None:
-        """End the child and let go of its pipes."""
+        """Stop the child and close its pipes."""
         self.child.kill()
         with contextlib.suppress(OSError), self.child:
             pass
@@ -63,7 +63,7 @@ _AHEAD: Final[deque[Decoder]] = deque()
 
 @contextmanager
 def decoder_ahead() -> Iterator[None]:
-    """Start a child that makes itself ready; the first order of any thread is given to it."""
+    """Start a child that prepares itself; it gets the first order of any thread."""
     decoder = _started([str(os.getpid())], stdin=subprocess.PIPE)
     _AHEAD.append(decoder)
     try:

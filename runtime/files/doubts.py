@@ -68,7 +68,7 @@ def find_doubts(
     masked: Sequence[Samples] = (),
     grid: TileGrid | None = None,
 ) -> list[str]:
-    """Return what makes a decode hard to believe; nothing for a sound photograph.
+    """Return the reasons to doubt a decode; none for a sound photograph.
 
     Args:
         samples: (h, w) mosaic or (c, h, w) planes, unsigned integers.

@@ -60,7 +60,7 @@ def orientation_of(tags: TiffTags) -> int:
 
 
 def metadata_of(tags: TiffTags) -> Metadata:
-    """Return what tags say of a photograph."""
+    """Return the metadata in the tags of a photograph."""
     told: dict[str, object] = {name: tags.text(tag) for name, tag in TEXT_TAGS.items()}
     told |= {name: (tags.numbers(tag) or (None,))[0] for name, tag in NUMBER_TAGS.items()}
     if told["iso"] == ISO_IN_OTHER_TAG:

@@ -45,7 +45,7 @@ def exr_attributes(metadata: Metadata) -> dict[str, bytes | float]:
 
 
 def metadata_of_exr(header: Mapping[str, Any]) -> Metadata:
-    """Return what a header says of the photograph."""
+    """Return the metadata of the photograph in a header."""
     told: dict[str, Any] = {key: header.get(name) for key, name in TEXTS.items()}
     told |= {key: _short(header.get(name)) for key, name in NUMBERS.items()}
     return Metadata.believable(**told, utc_offset=_offset(header.get(UTC_OFFSET)))

@@ -32,7 +32,7 @@ DEVELOPED: Final = "not a Bayer mosaic: LibRaw demosaicked it and cut the values
 def decode_with_libraw(
     raw: Any, tags: TiffTags, picture: DngPicture | None, said: MosaicOptions
 ) -> RawDecode:
-    """Return what LibRaw made of a file, tags of a DNG applied that it leaves out.
+    """Decode a file with LibRaw, and apply the tags of a DNG that it leaves out.
 
     Args:
         raw: The file as rawpy opened it.

@@ -315,7 +315,7 @@ def read_orientation(path: Path) -> int:
 
 
 def mosaic_advice() -> str:
-    """Return what to say of a picture that may be a headerless mosaic."""
+    """Return the advice about a picture that may be a headerless mosaic."""
     return (
         f"if it is a Bayer mosaic, add {option_text('cfa', 'RGGB')} with "
         f"{option_text('black_level')} and {option_text('white_level')} (RGGB, BGGR, GRBG or GBRG "

@@ -185,7 +185,7 @@ def share_over_white(samples: Samples, white: float) -> float:
 
 
 def _check_unread(samples: Samples, levels: Levels) -> None:
-    """Look for zeros that LibRaw left where the file ended."""
+    """Check for zeros that LibRaw left where the file ended."""
     live_rows = np.asarray(samples.reshape(-1, *samples.shape[-2:]).any(axis=(0, 2)))
     tail = int(np.argmax(live_rows[::-1]))
     if levels.black.min() > 0:

@@ -16,7 +16,7 @@ _EPOCH_YEAR: Final = 1970
 
 
 def raw_metadata(raw: Any, tags: TiffTags) -> Metadata:
-    """Return what a RAW file says of its photograph.
+    """Return the metadata of a RAW file's photograph.
 
     A tag that is there and empty or zero means that the camera did not know, so that LibRaw, which
     then assumes something, is asked only for what the file has no tag of.

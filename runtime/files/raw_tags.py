@@ -86,7 +86,7 @@ def _pairs_by_color(
 
 
 def sensor_place(tags: TiffTags) -> SensorPlace:
-    """Return what camkit wrote into ImageDescription, else the bundle of UniqueCameraModel."""
+    """Return camkit's record in ImageDescription, else the bundle of UniqueCameraModel."""
     match = _BUNDLE_IN_MODEL.fullmatch(tags.text(UNIQUE_CAMERA_MODEL) or "")
     named = match.group(1) if match else None
     try:

@@ -1,9 +1,9 @@
-"""Where things lie: on the sensor, through the lens, and back.
+"""Geometry: places on the sensor, through the lens, and back.
 
 sensor_window   pixels of a capture to millimetres from the axis
 placement       where a capture lies on a bundle's sensor
 shrink          planes made smaller by whole numbers
-scatter         spatially varying blur, for the digital twin
+field_blur         spatially varying blur, for the digital twin
 illumination    vignetting, and its division
 distortion      the radial model, its inverse and its fit
 resampling      samples between pixels, without rings around lamps

@@ -33,7 +33,7 @@ def reference_channel(distortion: RadialDistortion) -> int:
 def distort_points(
     points_mm: FloatGrid, distortion: RadialDistortion, *, channel: int = 1
 ) -> FloatGrid:
-    """Return where ideal image points fall on the sensor.
+    """Return the places of ideal image points on the sensor.
 
     Args:
         points_mm: (..., 2) x, y from the axis.

@@ -80,7 +80,7 @@ class IlluminationGain:
     """
 
     def __init__(self, optics: FrozenPsf | RadialIllumination, window: SensorWindow) -> None:
-        """Make the table.
+        """Compute the table.
 
         Args:
             optics: Frozen PSF, whose relative illumination is 1 on the axis, or that alone.

@@ -1,8 +1,9 @@
-"""Where a capture lies on a bundle's sensor, or why it does not.
+"""The place of a capture on a bundle's sensor, or the reason why it has none.
 
 Size, and pitch where the file states it, must match the sensor; a crop that records its origin is
-honoured; anything else needs the caller's word: `assume="centre"` (same pitch, picture centre on
-the axis) or `assume="scale"` (the picture spans the sensor, kernels scaled by the width ratio).
+honoured; anything else needs a statement of the caller: `assume="centre"` (same pitch, picture
+centre on the axis) or `assume="scale"` (the picture spans the sensor, kernels scaled by the width
+ratio).
 """
 
 from dataclasses import dataclass

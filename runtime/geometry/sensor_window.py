@@ -1,4 +1,4 @@
-"""Where a capture lies on its sensor: pixel positions to millimetres from the optical axis."""
+"""The window of a capture on its sensor: pixel positions to millimetres from the optical axis."""
 
 from dataclasses import dataclass, replace
 from typing import Any

@@ -9,7 +9,7 @@ _BACK: Final = {6: 8, 8: 6}
 
 
 def turn(planes: NDArray[Any], orientation: int) -> NDArray[Any]:
-    """Turn a stored picture as a viewer would.
+    """Rotate a stored picture as a viewer would.
 
     Args:
         planes: (..., h, w) as stored by the sensor.
@@ -29,5 +29,5 @@ def turn(planes: NDArray[Any], orientation: int) -> NDArray[Any]:
 
 
 def turn_back(planes: NDArray[Any], orientation: int) -> NDArray[Any]:
-    """Turn an upright (..., h, w) picture as it was stored; undoes `turn`."""
+    """Rotate an upright (..., h, w) picture as it was stored; undoes `turn`."""
     return turn(planes, _BACK.get(orientation, orientation))

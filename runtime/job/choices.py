@@ -28,7 +28,7 @@ OF_CAPTURE: Final = ON_A_SENSOR | WITH_A_BUNDLE | ALWAYS
 
 
 def known_options(stages: Sequence[StageEntry]) -> frozenset[str]:
-    """Name the options that mean something to some stages."""
+    """Return the names of the options that some stages use."""
     return GENERAL.union(*(module_of(stage).OPTIONS for stage in stages))
 
 

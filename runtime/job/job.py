@@ -36,7 +36,7 @@ Gains = tuple[float, ...]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Job:
-    """What is known of one capture.
+    """The facts of one capture.
 
     Attributes:
         setup: What it shares with others.

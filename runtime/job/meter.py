@@ -1,4 +1,4 @@
-"""How far a capture is: the rows that every stage has given, together; and the wish to stop."""
+"""Progress of a capture: the rows that every stage has given, together; and cancellation."""
 
 from collections.abc import Iterator, Sequence
 from typing import Final
@@ -21,12 +21,12 @@ class Meter:
         self._told = -1
 
     def expect(self, keys: Sequence[str]) -> None:
-        """Begin anew; these are the stages that will give rows."""
+        """Start anew; these are the stages that will give rows."""
         self._reached = dict.fromkeys(keys, 0.0)
         self._told = -1
 
     def reach(self, key: str, share: float) -> None:
-        """Note that a stage has given a share of its rows.
+        """Record that a stage has given a share of its rows.
 
         Raises:
             Cancelled: If the caller asked to stop.
@@ -37,7 +37,7 @@ class Meter:
             self._tell()
 
     def finish(self) -> None:
-        """Note that all is done, rows that nobody asked for included."""
+        """Record that all is done, rows that nobody asked for included."""
         self._reached = dict.fromkeys(self._reached, 1.0)
         self._tell()
 
@@ -48,7 +48,7 @@ class Meter:
             self._progress(done, STEPS * len(self._reached))
 
     def bands(self, key: str, bands: Iterator[Rows], height: int) -> Iterator[Rows]:
-        """Pass bands on, each counted."""
+        """Yield bands, each counted."""
         self.reach(key, 0.0)
         bottom = 0
         for band in bands:

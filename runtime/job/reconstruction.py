@@ -288,7 +288,7 @@ class Reconstruction:
         return out
 
     def explain(self) -> Estimate | None:
-        """Complete the plan by what every decision saves, and give what the work will take.
+        """Complete the plan by the savings of every decision, and return the cost of the work.
 
         Times the machine for a moment when first asked. None without a bundle.
         """

@@ -1,4 +1,4 @@
-"""What all captures of a pipeline share."""
+"""The setup that all captures of a pipeline share."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ from camkit.bundle.stages import (
 from camkit.errors import ContractError
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.options import Options
-from camkit.runtime.plan.laws import bounded_stages
+from camkit.runtime.plan.bounded_networks import bounded_stages
 from camkit.runtime.plan.speed import Speed
 
 DEVELOPMENT: Final[tuple[StageEntry, ...]] = (
@@ -34,7 +34,7 @@ DEVELOPED: Final[Mapping[str, str]] = {IMAGE: DEVELOPMENT[-1].gives[0]}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setup:
-    """What all captures of a pipeline share.
+    """The setup that all captures of a pipeline share.
 
     Attributes:
         bundle: The camera; None develops only.

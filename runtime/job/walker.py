@@ -165,7 +165,7 @@ class Walk:
         return needed[::-1]
 
     def _taken(self, number: int) -> tuple[str, ...]:
-        """Name the planes that a stage takes; those that stand in for what is left out."""
+        """Return the names of the planes that a stage takes; stand-ins for what is left out."""
         return tuple(self._instead.get(name, name) for name in self.stages[number].takes)
 
 

@@ -1,4 +1,4 @@
-"""What a bundle may ask of a machine at most, and how who wants more says so.
+"""The most that a bundle may ask of a machine, and the variables that raise these limits.
 
 A limit is a number in the environment; without it the default here. It is read when it is needed,
 so a program may set it for itself. Memory while a picture is made is capped by `max_mem_bytes`.

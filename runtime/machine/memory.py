@@ -35,7 +35,7 @@ def _max_rss_mb() -> float:
 
 
 def trim_heap(limit_bytes: int) -> None:
-    """Return freed memory back to the system where the process takes more than a limit.
+    """Release freed memory to the system where the process takes more than a limit.
 
     The C library keeps what was freed between two blocks in use: up to a quarter of the memory of
     a large picture. Giving it back costs milliseconds, so it is done near the limit only. Nothing
@@ -124,7 +124,7 @@ def mapping_of(samples: NDArray[Any]) -> mmap.mmap | None:
 
 
 def release_pages(samples: NDArray[Any]) -> None:
-    """Return back what was read of a mapped array; it is read again when it is asked for."""
+    """Release the pages of a mapped array; they are read again when they are asked for."""
     mapping = mapping_of(samples)
     if mapping is not None and hasattr(mmap, "MADV_DONTNEED"):
         mapping.madvise(mmap.MADV_DONTNEED)

@@ -3,7 +3,7 @@
 times       the exposure times, as people or files state them
 survey      every frame looked at once: size, levels, times, noise, a sample of codes
 response    what light a code stands for: linear, sRGB
-estimate    the same from the bracket itself
+response_estimate    the same from the bracket itself
 average     the weighted mean over frames, each sample as long as it did not clip
 merge       frames one after the other into that mean
 result      the mean as an EXR, developed where it is RAW

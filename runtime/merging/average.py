@@ -18,7 +18,7 @@ BoolArray = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Exposed:
-    """What one frame says of some rows.
+    """The samples of one frame in some rows.
 
     Attributes:
         value: (channel, rows, w) float32, in what is averaged: light, or its logarithm.
@@ -54,7 +54,7 @@ class Average:
         )
 
     def add(self, top: int, bottom: int, seen: Exposed) -> None:
-        """Take rows top..bottom of the next shorter frame in."""
+        """Add rows top..bottom of the next shorter frame."""
         value, precision = self.value[:, top:bottom], self.precision[:, top:bottom]
         settled = precision > 0
         first = seen.usable & ~settled

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from camkit.runtime.merging.estimate import CODES, MIDDLE_CODE, residuals_codes
 from camkit.runtime.merging.response import Response, response_of, srgb_response
+from camkit.runtime.merging.response_estimate import CODES, MIDDLE_CODE, residuals_codes
 
 GAMMAS: Final = (1.0, 3.0)
 MOST_MISFIT_CODES: Final = 0.75

@@ -19,10 +19,10 @@ from camkit.contracts import FloatArray, NoiseModel, cfa_channels
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.capture import SATURATION_SHARE, Capture
 from camkit.runtime.merging.average import Average, BoolArray, Exposed
-from camkit.runtime.merging.estimate import disagreement, estimate_response
 from camkit.runtime.merging.exposures import exposure_factors
 from camkit.runtime.merging.known_curves import known_curve
 from camkit.runtime.merging.response import Response, ResponseName, srgb_response
+from camkit.runtime.merging.response_estimate import disagreement, estimate_response
 from camkit.runtime.merging.survey import Frame, Survey, cropped, read_frame
 from camkit.runtime.signal.noise import fallback_noise, measure_noise
 

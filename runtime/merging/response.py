@@ -1,4 +1,4 @@
-"""What light a code stands for, and how exactly it tells it.
+"""The light of a code, and its standard error.
 
 Codes of pictures are averaged as logarithms of light: what is wrong with a response, a shutter or
 a veil is a share of the light and not an amount. The spread of such a logarithm is that of the

@@ -38,7 +38,7 @@ _ROWS: Final = 256
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Report:
-    """What was merged.
+    """The facts about a merge.
 
     Attributes:
         frames: Names of the files, from the longest to the shortest.
@@ -159,7 +159,7 @@ def _write_picture(path: Path, survey: Survey, merged: Merged, frame: Frame, see
 def _develop(
     path: Path, survey: Survey, merged: Merged, frame: Frame, seen: "_Seen"
 ) -> tuple[str, ...]:
-    """Develop light of a sensor; give the warnings."""
+    """Develop light of a sensor; return the warnings."""
     longest_s, shortest_s = survey.frames[0].time_s, survey.frames[-1].time_s
     light = merged.light
     light *= np.float32(shortest_s / longest_s)
@@ -211,7 +211,7 @@ class _Seen:
         self._counts = np.zeros(_STOPS * _STEPS_PER_STOP, dtype=np.int64)
 
     def add(self, band: FloatArray) -> None:
-        """Take a (3, rows, w) band."""
+        """Add a (3, rows, w) band."""
         if self.preview is not None:
             self.preview.add(band)
         luminance = np.tensordot(_LUMINANCE, band, 1)

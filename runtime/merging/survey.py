@@ -49,7 +49,7 @@ class Frame:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Survey:
-    """What is known of a bracket.
+    """The facts about a bracket.
 
     Attributes:
         frames: From the longest to the shortest.
@@ -83,7 +83,7 @@ def survey(
     mosaic: MosaicOptions | None = None,
     alike: bool = False,
 ) -> Survey:
-    """Look at every frame once.
+    """Read every frame once.
 
     Args:
         files: Two or more, in any order.
@@ -272,7 +272,7 @@ def cropped(capture: Capture, window: PictureWindow | None) -> Capture:
 
 
 def _notes(told: Sequence[tuple[Path, tuple[str, ...]]]) -> tuple[str, ...]:
-    """Say each note once, with the frame or the number of frames that it is about."""
+    """Return each note once, with the frame or the number of frames that it is about."""
     by_note: dict[str, list[str]] = {}
     for path, notes in told:
         for note in notes:
@@ -284,7 +284,7 @@ def _notes(told: Sequence[tuple[Path, tuple[str, ...]]]) -> tuple[str, ...]:
 
 
 def without_pixels(capture: Capture) -> Capture:
-    """Keep what a capture says of itself: its samples become views of one number."""
+    """Return a capture without pixels: its samples become views of one number."""
     one: NDArray[Any] = np.zeros((), dtype=capture.samples.dtype)
     return replace(capture, samples=np.broadcast_to(one, capture.samples.shape))
 

@@ -128,7 +128,7 @@ def activation_memory(
 
 
 def _lay(block: _Block, made: Mapping[str, float], dying: Sequence[str], room: float) -> None:
-    """Place what a node makes, over a dying tensor of its size, and the room that it needs."""
+    """Place the outputs of a node, over a dying tensor of their size, and its work memory."""
     for name, size in made.items():
         over = [one for one in dying if one in block.places and block.places[one][1] >= size]
         if over:

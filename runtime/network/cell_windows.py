@@ -70,7 +70,7 @@ class CellNetwork:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CellLimits:
-    """What a layout must respect.
+    """The limits of a layout.
 
     Attributes:
         cell_px: Side of a lattice cell.
@@ -128,7 +128,7 @@ class CellLayout:
 
     @property
     def window_count(self) -> int:
-        """How often networks run."""
+        """Number of runs of networks."""
         return sum(len(windows) for windows in self.strips)
 
     @property
@@ -164,7 +164,7 @@ def lay_cells(
     networks: Sequence[CellNetwork],
     limits: CellLimits,
 ) -> CellLayout:
-    """Lay the windows for the chosen cells, the least computation that fits in the cap.
+    """Plan the windows for the chosen cells, the least computation that fits in the cap.
 
     Args:
         size_px: (height, width) of the picture.
@@ -297,7 +297,7 @@ def _describe(window: CellWindow) -> str:
 def _place(
     made: FloatArray, window: CellWindow, layout: CellLayout, band: FloatArray, band_top: int
 ) -> None:
-    """Put the cells of a window into the band, with a ramp where a neighbour has no network."""
+    """Copy the cells of a window into the band, with a ramp where a neighbour has no network."""
     top, left, bottom, right = window.cells
     cell, (height, width) = layout.cell_px, layout.size_px
     origin_y, origin_x = window.pixels[:2]

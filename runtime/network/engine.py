@@ -89,12 +89,12 @@ def _quota_cpus(root: Path) -> int | None:
 
 
 def providers() -> tuple[str, ...]:
-    """Name what the installed onnxruntime can compute on, best first."""
+    """Return the providers of the installed onnxruntime, best first."""
     return tuple(ort.get_available_providers())
 
 
 def usable_providers() -> tuple[str, ...]:
-    """Name those of `PROVIDER_NAMES` that the installed onnxruntime was built with, cpu first."""
+    """Return those of `PROVIDER_NAMES` that the installed onnxruntime was built with, cpu first."""
     built = providers()
     return tuple(name for name, full in PROVIDER_NAMES.items() if full in built)
 

@@ -235,7 +235,7 @@ def _constant(attributes: dict[str, Any], label: str) -> NDArray[Any]:
 
 
 def _channels(value: Any, *, what: str) -> int | None:
-    """Check that a tensor is float32 (1, channels, open, open); give its channels."""
+    """Check that a tensor is float32 (1, channels, open, open); return its channels."""
     kind = value.type.tensor_type
     if kind.elem_type != onnx.TensorProto.FLOAT:
         names = {number: name for name, number in onnx.TensorProto.DataType.items()}

@@ -53,7 +53,7 @@ _FREE: Final = frozenset({"Add", "Sub", "Mul", "Div", "Max", "Min", "Concat"})
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GraphFacts:
-    """What the graph of a network says about itself.
+    """The facts that follow from the graph of a network.
 
     Attributes:
         output_scale: Samples along a side of the output for one pixel of the input.
@@ -136,7 +136,7 @@ def walk_graph(
     source: tuple[str, int],
     target: tuple[str, int | None],
 ) -> GraphFacts:
-    """Walk the nodes in order and give the facts.
+    """Walk the nodes in order and return the facts.
 
     Args:
         nodes: In the order of computation.
@@ -226,7 +226,7 @@ def _final(extents: Mapping[str, Extent], target: tuple[str, int | None]) -> tup
 def _reach(
     nodes: Sequence[Node], walk: _Walk, *, ends: tuple[str, str], samples: tuple[int, int]
 ) -> int:
-    """Carry the runs that the kept pixels 0 .. n - 1 read from the output back to the input.
+    """Trace the runs that the kept pixels 0 .. n - 1 read from the output back to the input.
 
     Args:
         nodes: In the order of computation.

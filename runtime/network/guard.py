@@ -133,7 +133,7 @@ def light_bound(most_light: float, noise: NoiseModel, *, scale: float) -> Bound:
 
 
 def _trouble(output: FloatArray, given: FloatArray, bound: Bound) -> str | None:
-    """Return what is wrong with a tile; None if nothing is."""
+    """Return the fault of a tile; None if there is none."""
     low, high = float(output.min()), float(output.max())
     if not (math.isfinite(low) and math.isfinite(high)):
         return "NaN or inf"

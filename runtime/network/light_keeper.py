@@ -13,7 +13,7 @@ import numpy as np
 
 from camkit.bundle.light_bound import CELL_PX, USUAL_BOUND, LightBound
 from camkit.contracts import FloatArray
-from camkit.runtime.network.light import AddedLight, added_light, keep_bright, take_back
+from camkit.runtime.network.light_bound import AddedLight, added_light, keep_bright, take_back
 from camkit.runtime.network.white_keeper import WhiteKeeper
 
 LOOK_ROWS: Final = 32

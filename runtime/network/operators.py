@@ -73,7 +73,7 @@ class Node:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Window:
-    """How an operator works along one axis.
+    """The window of an operator along one axis.
 
     Attributes:
         stride: Input samples per output sample.

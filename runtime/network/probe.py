@@ -1,4 +1,4 @@
-"""What a network does, found by running it: how far a pixel reaches, what a short halo costs.
+"""Facts about a network, found by running it: the reach of a pixel, the cost of a short halo.
 
 A probe gives a lower bound of the reach (a path may be dead for the probe's input); the walk along
 the graph in `reach` gives an upper one. Export records both and tiling takes the larger.
@@ -22,7 +22,7 @@ _KICK: Final = 1e3  # far beyond the base, so that it survives rounding after ma
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProbedReach:
-    """How far an input pixel was seen to act.
+    """The reach of an input pixel, as seen.
 
     Attributes:
         radius_px: Largest distance, along an axis, between an input pixel and an output pixel
@@ -37,7 +37,7 @@ class ProbedReach:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HaloCost:
-    """What a halo costs against the untiled run.
+    """The cost of a halo against the untiled run.
 
     Attributes:
         halo_px: The halo.
@@ -59,7 +59,7 @@ def perturbation_reach(
     channels: int,
     scale: int = 1,
 ) -> ProbedReach:
-    """Kick one input pixel at the phases of the stride and see where the output changes.
+    """Change one input pixel at the phases of the stride and measure where the output changes.
 
     Of a stride beyond 32 px so many phases are tried, the first and the last among them.
 
@@ -111,7 +111,7 @@ def _phases(stride_px: int) -> list[int]:
 
 
 def probe_runs(stride_px: int) -> int:
-    """Return how often a network runs to be probed."""
+    """Return the number of runs of a network for a probe."""
     return 1 + 2 * len(_phases(stride_px))
 
 

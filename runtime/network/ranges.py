@@ -1,4 +1,4 @@
-"""How large the numbers inside a network become, and whether half precision can hold them."""
+"""The range of the numbers inside a network, and whether half precision can represent them."""
 
 from collections.abc import Iterable, Mapping
 from typing import Final

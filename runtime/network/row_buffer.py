@@ -15,7 +15,7 @@ class RowBuffer:
     """So many rows of a picture padded at its far sides by repeating its edge."""
 
     def __init__(self, source: RowSource, rows: int, padded: tuple[int, int]) -> None:
-        """Make room.
+        """Allocate the buffer.
 
         Args:
             source: (c, h, w) picture.

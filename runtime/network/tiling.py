@@ -101,7 +101,7 @@ class TileLayout:
 
     @property
     def window_count(self) -> int:
-        """How often the network runs."""
+        """Number of runs of the network."""
         return len(self.rows) * len(self.columns)
 
     @property
@@ -118,7 +118,7 @@ class TileLayout:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PixelCost:
-    """What a network holds per pixel of its input.
+    """The memory of a network per pixel of its input.
 
     Attributes:
         arena_bytes: Peak of its live activations.
@@ -183,7 +183,7 @@ def _equal_window(size: int, count: int, halo: int, stride: int) -> int:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TileLimits:
-    """What a layout must respect.
+    """The limits of a layout.
 
     Attributes:
         stride_px: Total stride of the network, >= 1.
@@ -212,7 +212,7 @@ class TileLimits:
 
 
 def lay_windows(height_px: int, width_px: int, limits: TileLimits) -> TileLayout:
-    """Lay the windows of a picture: the least computation that fits in the memory cap.
+    """Plan the windows of a picture: the least computation that fits in the memory cap.
 
     Args:
         height_px: Rows of the picture, >= 1.

@@ -66,7 +66,7 @@ class WhiteKeeper:
 
 
 def white_keeper(noise: NoiseModel, scale: float, to_output: Matrix) -> WhiteKeeper:
-    """Return what keeps lamps white.
+    """Return the function that keeps lamps white.
 
     Args:
         noise: By which planes are stabilised.

@@ -73,7 +73,7 @@ class SizedNetwork:
 
     @property
     def cost(self) -> PixelCost:
-        """Return what the network holds per pixel."""
+        """Return the memory of the network per pixel."""
         behind = STEP_BYTES if self.extra_reach_px else 0.0
         return PixelCost(
             arena_bytes=max(self.facts.bytes_per_pixel, self.block_bytes) + behind,
@@ -99,7 +99,7 @@ class SizedNetwork:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WindowLimits:
-    """What the windows must respect.
+    """The limits of the windows.
 
     Attributes:
         cap_bytes: Memory that the process may take.
@@ -117,7 +117,7 @@ class WindowLimits:
 
     @property
     def max_bytes(self) -> int:
-        """Return what is left for the windows."""
+        """Return the memory left for the windows."""
         return max(self.cap_bytes - self.spent_bytes, 1)
 
 
@@ -177,7 +177,7 @@ class NetworkWindows:
         )
 
     def notes(self) -> tuple[str, ...]:
-        """Return what people should know of windows of a network that looks at whole pictures."""
+        """Return notes on windows of a network that looks at whole pictures."""
         count = self.to_json().get("windows", 0)
         seen = next((one.facts.global_text for one in self.networks if one.is_global), "")
         if count < 2 or not seen:
@@ -239,7 +239,7 @@ def lay_network(
     limits: WindowLimits,
     labels: Labels | None = None,
 ) -> NetworkWindows:
-    """Lay the windows of a capture.
+    """Plan the windows of a capture.
 
     A network that looks at the whole picture gets it in one window, in mode exact as in mode whole.
 

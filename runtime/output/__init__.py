@@ -5,10 +5,10 @@ Map:
     writer: opens the writer of a format.
     band_queue: a writer on a thread of its own.
     exr: OpenEXR, half, or float where half would overflow.
-    tiff, png: 16 bits with an ICC profile.
+    tiff_writer, png: 16 bits with an ICC profile.
     jpeg: 8 bits with one.
     linear_dng, dng: LinearRaw in camera space; Bayer DNG for simulated captures.
-    preview: the small JPEG in every DNG.
+    dng_preview: the small JPEG in every DNG.
     icc: ICC profiles from primaries, white and tone.
     origin: what travels beside the planes.
     exif, directory: the metadata of a photograph as EXIF; directories of TIFF files.

@@ -1,7 +1,7 @@
-"""Who makes an output: of several processes on one folder exactly one, whatever becomes of it.
+"""Claims of outputs: of several processes on one folder exactly one makes an output.
 
 A claim is a lock of the system on `NAME.ext.claim`. It ends with the process that holds it, even
-when that is killed; then the next one that claims the output sweeps up what was left half made.
+when that is killed; the next process that claims the output removes what was left half made.
 """
 
 import os
@@ -22,7 +22,7 @@ CLAIM_SUFFIX: Final = ".claim"
 
 @contextmanager
 def claimed(output: Path) -> Iterator[bool]:
-    """Claim an output; tell whether it is ours to make.
+    """Claim an output; yield whether this process may make it.
 
     Where the system has no locks (or the file system none), every claim is granted.
 

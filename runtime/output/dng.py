@@ -29,8 +29,8 @@ from camkit.runtime.output.directory import (
     directory_length,
     header_bytes,
 )
+from camkit.runtime.output.dng_preview import Averages, preview_jpeg
 from camkit.runtime.output.exif import main_tags, sub_directories
-from camkit.runtime.output.preview import Averages, preview_jpeg
 
 PHOTOMETRIC_CFA: Final = 32803
 PHOTOMETRIC_LINEAR_RAW: Final = 34892
@@ -48,7 +48,7 @@ _BITS: Final = 16
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DngTags:
-    """What a DNG says beside its samples.
+    """The metadata of a DNG beside its samples.
 
     Attributes:
         cfa: Letters of the 2x2 cell; None for linear planes.
@@ -275,7 +275,7 @@ def _preview_of_mosaic(mosaic: NDArray[np.uint16], cfa: CfaPattern, tags: DngTag
 
 
 def _main(tags: DngTags) -> dict[int, tuple[Kind, Any]]:
-    """Return what is said of the photograph as a whole."""
+    """Return the tags about the photograph as a whole."""
     make, _, model = tags.camera_model.partition(" ")
     found: dict[int, tuple[Kind, Any]] = {
         271: (Kind.ASCII, make.encode()),  # Make

@@ -61,7 +61,7 @@ def color_tags(picture: PictureFormat) -> Tags:
 
 
 def main_tags(metadata: Metadata) -> Tags:
-    """Return what stands in the first directory of a file."""
+    """Return the tags of the first directory of a file."""
     return _texts(metadata, _IN_MAIN)
 
 

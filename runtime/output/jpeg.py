@@ -27,7 +27,7 @@ MAX_SIDE_PX: Final = 65500
 def encode_jpeg(
     picture: Image.Image, *, quality: int, icc: bytes = b"", exif: bytes = b""
 ) -> bytes:
-    """Code an RGB picture.
+    """Encode an RGB picture.
 
     Args:
         picture: 8 bits per channel.
@@ -71,7 +71,7 @@ class JpegWriter(PictureWriter):
         return encode_uint8(band, tone=self.picture.tone)
 
     def store(self, rows: Codes) -> None:
-        """Keep rows, interleaved."""
+        """Store rows, interleaved."""
         interleaved = np.ascontiguousarray(rows.transpose(1, 2, 0))
         self._image.paste(Image.fromarray(interleaved), (0, self._stored))
         self._stored += rows.shape[1]
@@ -87,7 +87,7 @@ class JpegWriter(PictureWriter):
         self.path.write_bytes(coded)
 
     def release(self) -> None:
-        """Nothing is open before the end."""
+        """Release nothing: nothing is open before the end."""
 
     def _exif(self) -> bytes:
         width, height = self.picture.file_size

@@ -9,8 +9,8 @@ from camkit.caller import option_text
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.output.dng import DngTags, open_linear_dng
+from camkit.runtime.output.dng_preview import Averages
 from camkit.runtime.output.picture_writer import Codes, PictureFormat, PictureWriter
-from camkit.runtime.output.preview import Averages
 
 # Black is 0, though it cuts the negative half of the noise: darktable (4.2.1) subtracts no black
 # level from linear DNGs, and any other makes its pictures magenta. 1.0 of the raw signal is white.

@@ -1,4 +1,4 @@
-"""What belongs to one capture or one camera body, and travels beside the planes to every writer."""
+"""Facts of one capture or one camera body that travel beside the planes to every writer."""
 
 from dataclasses import dataclass, field, replace
 from typing import Self
@@ -13,7 +13,7 @@ from camkit.runtime.unit import Unit
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Origin:
-    """Where a product comes from.
+    """The origin of a product.
 
     Attributes:
         camera: Make and model as people read it; empty if not stated.

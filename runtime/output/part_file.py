@@ -47,14 +47,14 @@ def _part_prefix(path: Path) -> str:
 
 @contextmanager
 def atomic_output(path: Path) -> Iterator[Path]:
-    """Return the path to write one file to; see `atomic_outputs`."""
+    """Yield the path to write one file to; see `atomic_outputs`."""
     with atomic_outputs(path) as (part,):
         yield part
 
 
 @contextmanager
 def atomic_outputs(*paths: Path) -> Iterator[tuple[Path, ...]]:
-    """Return the paths to write to; the files take their real names when the block ends well.
+    """Yield the paths to write to; the files take their real names when the block ends well.
 
     The content is on the disk before the names are, so that even after a power cut no name stands
     for half a file. When the block raises, or one of the files cannot take its name, nothing new
@@ -79,7 +79,7 @@ def atomic_outputs(*paths: Path) -> Iterator[tuple[Path, ...]]:
 
 
 def _rename(parts: Sequence[Path], paths: Sequence[Path]) -> None:
-    """Return every part its name, or none."""
+    """Rename every part, or none."""
     older: list[tuple[Path, Path | None]] = []
     try:
         for part, path in zip(parts, paths, strict=True):
@@ -102,7 +102,7 @@ def _rename(parts: Sequence[Path], paths: Sequence[Path]) -> None:
 
 
 def _kept(path: Path) -> Path | None:
-    """Keep an older file under a second name; None if there is none to replace."""
+    """Link an older file under a second name; None if there is none to replace."""
     if not path.is_file():
         return None
     kept = part_path(path)

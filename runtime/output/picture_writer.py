@@ -1,7 +1,7 @@
-"""What all picture writers share: the format, and bands that arrive from top to bottom.
+"""The base of all picture writers: the format, and bands that arrive from top to bottom.
 
-A writer codes a band (`encode`) and appends coded rows (`store`); between the two a picture that
-must be turned is held until it is whole.
+A writer codes a band (`encode`) and appends coded rows (`store`). A picture that must be turned is
+collected whole between the two.
 """
 
 from abc import ABC, abstractmethod
@@ -29,7 +29,7 @@ DEFAULT_JPEG_QUALITY: Final = 92
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PictureFormat:
-    """What is written, and what its numbers mean.
+    """The format of a picture, and the meaning of its numbers.
 
     Attributes:
         width: Columns in sensor orientation.
@@ -150,7 +150,7 @@ class PictureWriter(ABC):
             self._keep(coded, top)
 
     def _keep(self, coded: Codes, top: int) -> None:
-        """Put rows where they belong in the picture as it will be turned."""
+        """Copy rows to their place in the picture as it will be turned."""
         width, height = self.picture.file_size
         if self._turned is None:
             self._turned = np.empty((3, height, width), dtype=coded.dtype)

@@ -10,5 +10,5 @@ PREVIEW_BYTES: Final = 5 * 12 * LONGEST_PREVIEW_PX**2
 
 
 def preview_path(path: Path) -> Path:
-    """Return where the preview of a picture lies."""
+    """Return the path of the preview of a picture."""
     return path.with_suffix(PREVIEW_SUFFIX)

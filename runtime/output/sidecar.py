@@ -34,7 +34,7 @@ def sidecar_path(output: Path) -> Path:
 
 
 def sidecar_text(record: Mapping[str, Any], sections: Mapping[str, Any] | None = None) -> str:
-    """Return what the sidecar of a picture holds.
+    """Return the text of a picture's sidecar.
 
     Args:
         record: Plain JSON values, with at least the keys of `REQUIRED`.

@@ -18,10 +18,10 @@ from camkit.colorimetry import apply_matrix
 from camkit.contracts import FloatArray
 from camkit.runtime.color import ColorStage, color_stage, encode_uint8, to_rec709
 from camkit.runtime.geometry.turning import turn_back
+from camkit.runtime.output.dng_preview import Averages
 from camkit.runtime.output.icc import icc_profile
 from camkit.runtime.output.jpeg import encode_jpeg
 from camkit.runtime.output.picture_writer import DEFAULT_JPEG_QUALITY
-from camkit.runtime.output.preview import Averages
 from camkit.runtime.output.preview_file import LONGEST_PREVIEW_PX
 
 _FAINTEST: Final = 1e-7
@@ -38,7 +38,7 @@ class ToneMappedPreview:
         self._averages = Averages(height, width, longest_px=LONGEST_PREVIEW_PX)
 
     def add(self, band: FloatArray) -> None:
-        """Take the next (3, rows, w) float32 rows, linear; what is no number counts as black."""
+        """Add the next (3, rows, w) float32 rows, linear; NaN counts as black."""
         self._averages.add(np.nan_to_num(band, nan=0.0, posinf=0.0, neginf=0.0))
 
     def write(self, path: Path, color: ColorStage, orientation: int) -> None:

@@ -26,7 +26,7 @@ def _exr(path: Path, picture: PictureFormat) -> PictureWriter:
 
 
 def _tiff(path: Path, picture: PictureFormat) -> PictureWriter:
-    from camkit.runtime.output.tiff import TiffWriter
+    from camkit.runtime.output.tiff_writer import TiffWriter
 
     return TiffWriter(path, picture)
 

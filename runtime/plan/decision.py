@@ -1,4 +1,4 @@
-"""What one rule decided, the work that results, and what rules may look at."""
+"""The decision of one rule, the work that results, and the facts that rules may use."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from camkit.errors import ContractError
 from camkit.runtime.content import Content
 from camkit.runtime.geometry.placement import Placement
 from camkit.runtime.options import Mode, Options
-from camkit.runtime.plan.laws import bounded_stages
+from camkit.runtime.plan.bounded_networks import bounded_stages
 
 Labels = NDArray[np.int8]
 
@@ -31,7 +31,7 @@ TIER_NAMES: Final = ("plain", "wiener", "small", "full")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Subject:
-    """What a plan is made for, and what its rules may look at.
+    """The subject of a plan, and the facts that its rules may use.
 
     Attributes:
         bundle: The camera.
@@ -65,7 +65,7 @@ class Subject:
         return self.bundle.network_facts(next(iter(self.bundle.manifest.networks)), size)
 
     def reach_px(self, size: str) -> int:
-        """Return how far the first network of the camera looks, with what is done behind it."""
+        """Return the reach of the first network of the camera, with that of the stage behind it."""
         stages = bounded_stages(self.bundle.manifest, self.options.laws)
         extra_px = [stage.extra_reach_px for stage in stages if isinstance(stage, Network)]
         return self.facts(size).reach_px + max(extra_px, default=0)
@@ -84,7 +84,7 @@ class Subject:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Work:
-    """What will be done to a capture.
+    """The work on a capture.
 
     Attributes:
         method: Way of a stage, as `--method` names it: the network, a classical method alone, or
@@ -114,7 +114,7 @@ class Work:
             raise ContractError("cells of tier SMALL need a smaller size of network")
 
     def sizes(self) -> tuple[str, ...]:
-        """Name the networks that will run."""
+        """Return the sizes of the networks that will run."""
         if not self.networks:
             return ()
         if self.labels is None:
@@ -135,7 +135,7 @@ class Work:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Decision:
-    """What one rule decided.
+    """The decision of one rule.
 
     Attributes:
         what: Name of the rule.

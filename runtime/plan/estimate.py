@@ -19,7 +19,7 @@ FILE_SHARE: Final = 0.15
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Estimate:
-    """What a piece of work will take.
+    """The predicted seconds and memory of a piece of work.
 
     Attributes:
         seconds: From reading the file to its picture.
@@ -123,7 +123,7 @@ def role_window_mp(role: str, subject: Subject, work: Work) -> dict[str, float]:
 
 
 def tier_work_of(subject: Subject, work: Work) -> TierWork:
-    """Return what the tiers of a piece of work cost, from the bundle's facts."""
+    """Return the costs of the tiers of a piece of work, from the bundle's facts."""
     full = subject.facts(work.size)
     small = None if work.small is None else subject.facts(work.small)
     return TierWork(

@@ -1,4 +1,4 @@
-"""What a lattice cell would lose, predicted from its content by the bundle's calibration.
+"""The predicted loss of a lattice cell, from its content by the bundle's calibration.
 
     error = exp(level + detail * log(content.blurred_detail) + noise * log(content.noise)
                 + field * content.field)

@@ -34,7 +34,7 @@ LADDER: Final = (0.0, 1.0, 3.0, 10.0, 30.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plan:
-    """What will be done to a capture, and why.
+    """The work on a capture, and the reasons for it.
 
     Attributes:
         subject: What the rules looked at.
@@ -54,7 +54,7 @@ class Plan:
         return sum(decision.cost_db for _, decision, _ in self.steps)
 
     def sizes(self) -> list[str]:
-        """Name the networks whose speed the savings need."""
+        """Return the sizes of the networks whose speed the savings need."""
         works = [self.work, *(w for before, _, after in self.steps for w in (before, after))]
         named = {size for work in works for size in (work.size, work.small)}
         return [s for s in self.subject.bundle.manifest.sizes if s in named | {REFERENCE}]
@@ -112,7 +112,7 @@ def needs_content(options: Options) -> bool:
 
 
 def make_plan(subject: Subject, speed: Callable[[], Speed]) -> Plan:
-    """Decide what to do.
+    """Decide the work on a capture.
 
     Args:
         subject: The capture; its content must be measured where `needs_content`.
@@ -136,7 +136,7 @@ def make_plan(subject: Subject, speed: Callable[[], Speed]) -> Plan:
 
 
 def asked_work(bundle: Bundle, options: Options) -> Work:
-    """Return what a caller asked for, before any capture is known.
+    """Return the work that a caller asked for, before any capture is known.
 
     Raises:
         ContractError: If no stage has the method, or what it leaves out cannot be.

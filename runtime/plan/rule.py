@@ -47,7 +47,7 @@ def find_rules() -> tuple[Rule, ...]:
 
 
 def apply_rules(subject: Subject, work: Work) -> list[tuple[Work, Decision, Work]]:
-    """Apply all rules; give (work before, decision, work after) of those that apply."""
+    """Apply all rules; return (work before, decision, work after) of those that apply."""
     steps = []
     for rule in find_rules():
         after, decision = rule.decide(subject, work)

@@ -1,4 +1,4 @@
-"""How fast this machine is: one window of each network and one block of the bank, timed."""
+"""The speed of this machine: one window of each network and one block of the bank, timed."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -62,7 +62,7 @@ def measure_speed(
     *,
     threads: int,
 ) -> Speed:
-    """Time one window of every network and one block, the best of ROUNDS each.
+    """Measure the time of one window of every network and one block, the best of ROUNDS each.
 
     Args:
         networks: By role and size.

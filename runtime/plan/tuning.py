@@ -1,4 +1,4 @@
-"""How a method of a stage was tuned, as far as bundle and code state it; nothing is guessed."""
+"""The tuning of a stage's methods, as far as bundle and code state it; nothing is guessed."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ NOT_RECORDED = "not recorded"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tuning:
-    """How a method was tuned.
+    """The tuning of a method.
 
     Attributes:
         values: Its parameters by name, units behind; empty if it has none.
@@ -29,7 +29,7 @@ class Tuning:
 
 
 def stage_tuning(stages: Sequence[Stage], method: str) -> Tuning | None:
-    """Return how a method was tuned by the last stage that has it; None where no stage has it.
+    """Return the tuning of a method by the last stage that has it; None where no stage has it.
 
     A stage whose module defines `tuning(entry, method)` says it itself; of any other the numbers
     that the bundle states for it are told.

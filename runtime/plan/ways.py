@@ -1,10 +1,10 @@
-"""Which way every stage of a capture takes: its own, that of the method asked for, or none.
+"""The way of every stage of a capture: its own, that of the method asked for, or none.
 
     stages, work -> one way per stage: a name, or LEFT_OUT
 
-A method is the name of a way of one stage. What lies before that stage takes its usual way; what
-restores behind it is left out. A stage may be left out only where a plane that it takes stands for
-what it gives: the same samples on the same grid, in the same domain.
+A method is the name of a way of one stage. Stages before it take their usual way; stages behind it
+that restore are left out. A stage may be left out only where a plane that it takes can stand for
+the plane that it gives: the same samples on the same grid, in the same domain.
 """
 
 from collections.abc import Mapping, Sequence
@@ -73,7 +73,7 @@ def without_networks(manifest: Manifest, work: Work) -> Work | None:
 
 
 def offered_methods(stages: Sequence[StageEntry], planes: Mapping[str, Plane]) -> tuple[str, ...]:
-    """Name the methods by which the stages can be walked, the best first.
+    """Return the methods by which the stages can be walked, the best first.
 
     Args:
         stages: In order.
@@ -106,7 +106,7 @@ def _last_with(stages: Sequence[StageEntry], method: str) -> int:
 def stand_ins(
     stages: Sequence[StageEntry], ways: Sequence[str], planes: Mapping[str, Plane]
 ) -> dict[str, str]:
-    """Return what the stages that are left out would give -> the plane that stands for it.
+    """Return the replacement of every plane that left-out stages would give.
 
     Args:
         stages: In order.
@@ -125,7 +125,7 @@ def stand_ins(
 
 
 def stand_in(stage: StageEntry, planes: Mapping[str, Plane]) -> str:
-    """Name the plane that stands for what a stage gives where it is left out.
+    """Return the plane that replaces the output of a stage that is left out.
 
     Args:
         stage: Any.
@@ -144,7 +144,7 @@ def stand_in(stage: StageEntry, planes: Mapping[str, Plane]) -> str:
 
 
 def known_stand_in(stage: StageEntry, planes: Mapping[str, Plane]) -> str | None:
-    """Name the plane that stands for what a stage gives; None if none does."""
+    """Return the plane that replaces the output of a stage; None if there is none."""
     given = planes[stage.gives[0]]
     if len(stage.gives) == 1:
         for name in reversed(stage.takes):

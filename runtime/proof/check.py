@@ -59,7 +59,7 @@ class CheckReport:
 
     @property
     def passed(self) -> bool:
-        """Whether no layer failed."""
+        """Return whether no layer failed."""
         return all(layer.status != "fail" for layer in self.layers)
 
     def lines(self) -> list[str]:

@@ -17,7 +17,7 @@ GoldenRun = Callable[[Bundle, GoldenCase, GoldenArrays, str | None], Reconstruct
 def case_work(
     bundle: Bundle, case: GoldenCase, arrays: GoldenArrays, size: str | None
 ) -> Reconstruction:
-    """Make ready what becomes of a golden capture, on one thread.
+    """Prepare the processing of a golden capture, on one thread.
 
     Args:
         bundle: The bundle; its graphs are checked when the pipeline is made.

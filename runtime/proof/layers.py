@@ -28,7 +28,7 @@ from camkit.runtime.network.probe import perturbation_reach, probe_runs
 from camkit.runtime.network.ranges import FP16_LIMIT, fits_fp16, node_activations
 from camkit.runtime.network.tiling import TileLayout, TileLimits, infer_bands, lay_windows
 from camkit.runtime.proof.golden_run import GoldenRun
-from camkit.runtime.proof.haze import prove_haze
+from camkit.runtime.proof.haze_band import prove_haze
 from camkit.runtime.proof.one_window import prove_one_window
 from camkit.runtime.rows import ArrayRows
 
@@ -86,7 +86,7 @@ def _prove_cases(bundle: Bundle, run: GoldenRun | None) -> Result:
 def _compared(
     bundle: Bundle, case: GoldenCase, arrays: GoldenArrays, size: str | None, run: GoldenRun
 ) -> Iterator[float]:
-    """Compute every product that is stored for a size; give how it compares."""
+    """Compute every stored product of a size, and yield its error."""
     for product in arrays.outputs:
         stored = arrays.output(product, size or NO_SIZE)
         if stored is None:
@@ -112,7 +112,7 @@ def _compare(got: FloatArray, stored: FloatArray, case: GoldenCase, where: str) 
 
 
 def prove_tiling(bundle: Bundle, *, run: GoldenRun | None, threads: int) -> Result:
-    """Show for every network that tiled equals whole and that its reach is what it says.
+    """Check for every network that tiled equals whole and that its reach is as stated.
 
     Raises:
         ParityError: If a single bit differs, a pixel acts further than stated, or a network that
@@ -188,7 +188,7 @@ def _picture_px(facts: NetworkFacts, tile: int) -> tuple[int, int]:
 
 
 def _layouts(facts: NetworkFacts) -> Iterator[tuple[TileLayout, TileLayout]]:
-    """Lay the windows that are compared: tiled and whole, at every side of a tile."""
+    """Plan the compared windows: tiled and whole, at every side of a tile."""
     limits = TileLimits(
         stride_px=facts.stride_px, halo_px=facts.reach_px, max_bytes=sys.maxsize, whole=True
     )
@@ -214,7 +214,7 @@ def _admit_tiling(found: GraphFacts, facts: NetworkFacts, what: str) -> None:
 
 
 def _prove_equal(engine: NetworkEngine, facts: NetworkFacts, sample: FloatArray, what: str) -> int:
-    """Compare tiled with whole at every side of a tile; give the windows compared."""
+    """Compare tiled with whole at every side of a tile; return the compared windows."""
     count = 0
     for tiled, whole in _layouts(facts):
         height, width = whole.height_px, whole.width_px

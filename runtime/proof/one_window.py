@@ -13,7 +13,7 @@ from camkit.runtime.pipeline import Pipeline
 
 
 def prove_one_window(bundle: Bundle, role: str, size: str) -> str:
-    """Show that a whole picture of the sensor is planned in one window within the usual memory cap.
+    """Check that a whole picture of the sensor takes one window within the usual memory cap.
 
     Args:
         bundle: The bundle.

@@ -180,7 +180,7 @@ def _malvar(mosaic: FloatArray, cfa: CfaPattern) -> FloatArray:
 
 
 def _kernel_name(own: int, wanted: int, row: tuple[int, int]) -> str | None:
-    """Name the kernel for a pixel of colour `own` in a row of the colours `row`."""
+    """Return the name of the kernel for a pixel of colour `own` in a row of the colours `row`."""
     if own == wanted:
         return None
     if wanted == 1:

@@ -1,4 +1,4 @@
-"""Whether a sample that stands out is light: through a lens, light never reaches one alone.
+"""The test whether a sample that stands out is light: a lens spreads light over its neighbours.
 
 x . o . x      o: the other colours beside a sample, which rise with it when it is light
 . . o . .      x: their own neighbours, two rows or columns away
@@ -43,7 +43,7 @@ def neighbours(padded: NDArray[Any], rows: Places, cols: Places, step: int) -> F
 
 
 def glows(padded: FloatArray, rows: Places, cols: Places) -> NDArray[np.bool_]:
-    """Tell where the other colours beside a sample of a mosaic rise with it, as they do for light.
+    """Return where the other colours beside a sample of a mosaic rise with it, as for light.
 
     Args:
         padded: As for `neighbours`, float.

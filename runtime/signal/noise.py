@@ -205,7 +205,7 @@ def measure_noise(capture: Capture) -> NoiseModel:
 
 
 def _sample_planes(capture: Capture) -> Iterator[FloatArray]:
-    """Return same-colour planes of bands spread over the picture; clipped samples are NaN."""
+    """Yield same-colour planes of bands spread over the picture; clipped samples are NaN."""
     step = max(_BAND_ROWS, capture.height // _MAX_BANDS // 2 * 2)
     for top in range(0, capture.height, step):
         bottom = min(top + _BAND_ROWS, capture.height)

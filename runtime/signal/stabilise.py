@@ -111,7 +111,7 @@ def familiar_noise(noise: NoiseModel, trained_reads_e: Sequence[float]) -> Noise
 
 
 class StackedRows:
-    """What a network is given: its planes below one another, stabilised unless they come as needed.
+    """The input of a network: its planes below one another, stabilised unless used as they are.
 
     Equal to stacking the sources and mapping them, with two copies of every sample fewer.
     """
@@ -125,7 +125,7 @@ class StackedRows:
         threads: int = 1,
         masks: Sequence[RowSource] = (),
     ) -> None:
-        """Name the sources.
+        """Store the sources.
 
         Args:
             sources: (c, h, w) each, of one size.

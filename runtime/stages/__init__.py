@@ -1,4 +1,4 @@
-"""What the stages of a bundle do: one module each, found by the name of the stage.
+"""The stages of a bundle: one module each, found by the name of the stage.
 
 See `camkit.runtime.job.stage_work` for what a module defines, and `camkit.bundle.stages` for what a
 manifest says of a stage.

@@ -23,7 +23,7 @@ from camkit.runtime.bank.haze import (
     solving_bytes,
 )
 from camkit.runtime.cancel import cancellable
-from camkit.runtime.job.cells import cells_of
+from camkit.runtime.job.coarse_cells import cells_of
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
@@ -67,7 +67,7 @@ def check(entry: Dehaze, manifest: Manifest, _max_bytes: int) -> None:
 
 
 def prepare(entry: Dehaze, job: Job) -> StageWork:
-    """Return what the coarse picture takes."""
+    """Return the coarse picture of the haze."""
 
     def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
         picture = taken[0]

@@ -25,7 +25,7 @@ def is_left_out(options: Options) -> bool:
 
 
 def prepare(_entry: Illumination, job: Job) -> StageWork:
-    """Make ready; nothing is decided here."""
+    """Prepare the gain; nothing is decided here."""
 
     def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
         (light,) = taken

@@ -24,7 +24,7 @@ REST_SHARE: Final = 0.06
 
 
 def prepare(entry: Linearise, job: Job) -> StageWork:
-    """Make ready; nothing is decided here."""
+    """Prepare the scaling; nothing is decided here."""
 
     def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
         (capture,) = taken
@@ -91,7 +91,7 @@ class LinearRows:
 
 
 class MaskRows:
-    """What of a capture is clipped; a mosaic is one channel."""
+    """The clipped samples of a capture; a mosaic is one channel."""
 
     def __init__(self, capture: Capture) -> None:
         self._capture = capture

@@ -23,7 +23,7 @@ from camkit.runtime.job.walker import USUAL_BYTES
 from camkit.runtime.machine.memory import trim_heap
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.guard import TileGuard, light_bound, plain_bound
-from camkit.runtime.network.light import FAR, KeptRows
+from camkit.runtime.network.light_bound import FAR, KeptRows
 from camkit.runtime.network.light_keeper import LightKeeper
 from camkit.runtime.network.tiling import Run
 from camkit.runtime.network.white_keeper import white_keeper
@@ -33,9 +33,9 @@ from camkit.runtime.network.windows import (
     WindowLimits,
     lay_network,
 )
+from camkit.runtime.plan.bounded_networks import broken_laws, front_end
 from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.estimate import network_seconds, role_window_mp
-from camkit.runtime.plan.laws import broken_laws, front_end
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.plan.ways import planned
 from camkit.runtime.rows import RowSource, changed_bands
@@ -207,7 +207,7 @@ class _NetworkStage:
         return 0 if self._windows is None else self._weight_bytes + self._windows.needed_bytes()
 
     def warnings(self) -> tuple[str, ...]:
-        """Name the tiles that were not believed, and say where the network moved light."""
+        """Return warnings about rejected tiles, and about light that the network moved."""
         replaced = () if self._guard is None else self._guard.replaced
         tiles = tuple(
             f"the network's result was rejected and its input used in {tile}" for tile in replaced
@@ -274,7 +274,7 @@ class _NetworkStage:
     def _light_keeper(
         self, stand_in: slice | None, *, masked: bool, noise: NoiseModel | None
     ) -> LightKeeper | None:
-        """Return what is done behind the network; None for nothing.
+        """Return the stage behind the network; None for none.
 
         Raises:
             ContractError: If its output cannot be mixed with what it improves on.
@@ -325,7 +325,7 @@ class _NetworkStage:
         return NoiseModel(shot=one.shot * ports, read_variance=one.read_variance * ports)
 
     def _linear(self, bands: Iterator[FloatArray], noise: NoiseModel) -> Iterator[FloatArray]:
-        """Take stabilised bands back to light, in place."""
+        """Convert stabilised bands to light, in place."""
         scale = self._entry.scale
 
         def undo(rows: FloatArray, _: int) -> None:
@@ -348,7 +348,7 @@ class _NetworkStage:
     def _split(
         self, bands: Iterator[FloatArray], last: Stream, channels: Sequence[int]
     ) -> tuple[Stream, ...]:
-        """Share the channels of the bands among the planes that the stage gives."""
+        """Split the channels of the bands into the planes that the stage gives."""
         entry, planes = self._entry, self._job.known_bundle.manifest.planes
         height, width = (side * self._scale() for side in last.shape[1:])
         shape = sum(channels), height, width
@@ -373,7 +373,7 @@ class _NetworkStage:
         return self._facts().output_scale
 
     def _facts(self) -> NetworkFacts:
-        """Return what is known of the network; also where all cells of a picture go without it."""
+        """Return the facts of the network; also where all cells of a picture go without it."""
         return self._job.known_bundle.network_facts(self._entry.role, self._job.work.size)
 
 

@@ -19,7 +19,7 @@ REST_SHARE: Final = 0.03
 
 
 def prepare(_entry: RaiseClipped, job: Job) -> StageWork:
-    """Make ready; planes that come as such have no known level at which they clip."""
+    """Prepare the work; planes that come as such have no known level at which they clip."""
 
     def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
         (light,) = taken

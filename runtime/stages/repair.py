@@ -36,7 +36,7 @@ Places = tuple[NDArray[np.intp], ...]
 
 
 def prepare(entry: Repair, job: Job) -> StageWork:
-    """Make ready; nothing is decided here."""
+    """Prepare the repair; nothing is decided here."""
     made: list[SoundRows] = []
     mended = job.kept.setdefault(("repair", entry.takes), Mended())
 
@@ -77,7 +77,7 @@ class Mended:
         return self._span[0] <= top <= bottom <= self._span[1] and bottom > self._span[0]
 
     def add(self, top: int, bottom: int, places: Places, values: FloatArray) -> None:
-        """Take up what was replaced in rows top..bottom; more than `MOST_KEPT` are not kept."""
+        """Record the replaced samples of rows top..bottom; more than `MOST_KEPT` are not kept."""
         begin, end = self._span
         if begin == end:
             begin = end = top
@@ -133,7 +133,7 @@ class SoundRows:
         return sound
 
     def places(self, top: int, bottom: int) -> Places:
-        """Return which samples of rows top..bottom were replaced."""
+        """Return the replaced samples of rows top..bottom."""
         if self._mended.hold(top, bottom):
             return self._mended.within(top, bottom)[0]
         return self._mend(top, bottom)[1]

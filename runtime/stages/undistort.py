@@ -30,7 +30,7 @@ def is_left_out(options: Options) -> bool:
 
 
 def prepare(entry: Undistort, job: Job) -> StageWork:
-    """Make ready; nothing is decided here."""
+    """Prepare the warp; nothing is decided here."""
 
     def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
         (light,) = taken

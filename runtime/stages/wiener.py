@@ -34,15 +34,15 @@ from camkit.runtime.bank.kernels_by_distance import (
 from camkit.runtime.bank.lights import fitted_px, light_share
 from camkit.runtime.bank.psf import FieldKernels, color_kernels
 from camkit.runtime.content import LIGHT_PX
-from camkit.runtime.job.cells import cells_of
+from camkit.runtime.job.coarse_cells import cells_of
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
 from camkit.runtime.job.walker import FIXED_BYTES
 from camkit.runtime.machine.limits import BANK_WORK
 from camkit.runtime.options import Options
-from camkit.runtime.plan.blocks import plain_blocks
 from camkit.runtime.plan.decision import Subject, Work
+from camkit.runtime.plan.idle_blocks import plain_blocks
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.plan.tuning import Tuning, stated_numbers
 from camkit.runtime.rows import Rows
@@ -93,7 +93,7 @@ def check(entry: Wiener, manifest: Manifest, max_bytes: int) -> None:
 
 
 def bank_work(entry: Wiener, channels: int) -> float:
-    """Return how often a pixel is transformed at most: overlaps, channels, rounds of clipping.
+    """Return the most transforms per pixel: overlaps, channels, rounds of clipping.
 
     A block takes a transform for its kernel and two for its filter; where samples are clipped,
     four for every round of Richardson-Lucy and two each for what it explains and leaves.
@@ -114,7 +114,7 @@ def look(_entry: Wiener, job: Job) -> Job:
 
 
 def prepare(entry: Wiener, job: Job) -> StageWork:
-    """Return which kernels are taken, where there is a choice."""
+    """Return the bank: the kernels, where there is a choice, and the noise."""
     bundle, depth_mm = job.known_bundle, job.options.depth_mm
     depths_mm = bundle.psf.depths_mm
     if depths_mm.size > 1:
@@ -156,7 +156,7 @@ def _restored(entry: Wiener, job: Job, taken: Sequence[Stream]) -> Iterator[Rows
 
 
 def tuning(entry: Wiener, method: str) -> Tuning:
-    """Return how a method was tuned: the bank by what its bundle states, the others by camkit."""
+    """Return the tuning of a method: of the bank by its bundle, of the others by camkit."""
     if method == METHODS[0]:
         values = stated_numbers(entry)
         if entry.together is not None:

@@ -21,7 +21,7 @@ MOST_BITS: Final = 16
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setting:
-    """How the camera records the light.
+    """The camera settings of an exposure.
 
     Attributes:
         iso: Sensitivity; sets the gain and the noise.
@@ -146,7 +146,7 @@ def sample_mosaic(planes: FloatArray, cfa: CfaPattern, gains: Gains) -> FloatArr
 
 
 def sample_planes(planes: FloatArray, sensor: ColorSensor, gains: Gains) -> FloatArray:
-    """Return what the pixels see of (c, h, w) white-balanced planes: (h, w) behind a mosaic."""
+    """Return the samples of (c, h, w) white-balanced planes: (h, w) behind a mosaic."""
     if isinstance(sensor, BayerSensor):
         return sample_mosaic(planes, sensor.cfa, gains)
     return planes / np.array(gains, dtype=np.float32)[:, None, None]

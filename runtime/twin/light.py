@@ -18,7 +18,7 @@ from camkit.errors import ContractError
 from camkit.haze import Haze
 from camkit.runtime.bank.haze import hazy_kernels
 from camkit.runtime.bank.psf import color_kernels
-from camkit.runtime.geometry.scatter import (
+from camkit.runtime.geometry.field_blur import (
     KernelLookup,
     scatter,
     scatter_light,
@@ -27,7 +27,7 @@ from camkit.runtime.geometry.scatter import (
 from camkit.runtime.geometry.sensor_window import SensorWindow, centred_origin
 from camkit.runtime.geometry.shrink import shrunk
 from camkit.runtime.geometry.warp import distort_array
-from camkit.runtime.twin.haze import HazeLens, hazed, margin_px
+from camkit.runtime.twin.haze_spread import HazeLens, hazed, margin_px
 
 Gains = tuple[float, ...]
 KernelChange = Callable[[FloatArray], FloatArray]
@@ -42,7 +42,7 @@ LUMINANCE = (0.2126, 0.7152, 0.0722)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lens:
-    """What the light goes through.
+    """The optics that the light goes through.
 
     Attributes:
         psf: Distortion and illumination.
@@ -63,7 +63,7 @@ class Lens:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Light:
-    """What falls on the sensor.
+    """The light on the sensor.
 
     Attributes:
         planes: (c, h, w) float32 blurred, white-balanced camera space, without vignetting.
@@ -83,7 +83,7 @@ class Light:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LightOptions:
-    """How a scene becomes light.
+    """The settings from a scene to its light.
 
     Attributes:
         exposure: Factor on the scene.
@@ -113,7 +113,7 @@ def lens_of(
     haze: Haze | None = None,
     response: Response | None = None,
 ) -> Lens:
-    """Return what the light goes through for one object distance.
+    """Return the lens for one object distance.
 
     Args:
         psf: Of the optics.
@@ -264,7 +264,7 @@ def lit_core(lens: Lens) -> KernelLookup:
 def _spread_hazy(
     wide: FloatArray, extended: FloatArray, lens: Lens, window: SensorWindow, options: LightOptions
 ) -> FloatArray:
-    """Spread core and haze, and divide by what they make of a scene of ones."""
+    """Blur by core and haze, and divide by the blur of a scene of ones."""
     haze = lens.haze
     assert haze is not None
     core, ones = scatter_light(
@@ -305,7 +305,7 @@ def scene_window(
     scale: int = 1,
     surround_px: int = 0,
 ) -> SensorWindow:
-    """Return where the picture of a scene lies on the sensor; centred without an origin.
+    """Return the window of a scene's picture on the sensor; centred without an origin.
 
     Args:
         scene: (3, h, w) linear Rec.709.

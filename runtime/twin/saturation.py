@@ -26,7 +26,7 @@ def exposure_for_share(
 def saturation_of(
     scene: FloatArray, sensor: ColorSensor, exposure: float, *, ceiling: float | None = None
 ) -> Saturation:
-    """Return what of a scene an exposure saturates.
+    """Return the shares of a scene that an exposure saturates.
 
     Args:
         scene: (3, h, w) float32 linear Rec.709, 1.0 = white.

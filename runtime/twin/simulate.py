@@ -29,7 +29,7 @@ LEAST_DNG_SIDE_PX: Final = 22
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulationOptions:
-    """What is simulated and how.
+    """The settings of a simulation.
 
     Attributes:
         iso: Sensitivity; sets the gain and the noise.

@@ -1,4 +1,4 @@
-"""What a perfect camera would have shown: the truth beside a capture, as a bundle's picture is.
+"""The truth beside a capture: the picture of a perfect camera, as a bundle's picture is.
 
 clean planes of the twin -> ideal geometry, if the picture has it -> linear Rec.709 -> EXR
 """
@@ -73,7 +73,7 @@ def true_picture(clean: FloatArray, sensor: ColorSensor) -> FloatArray:
 
 
 def ideal_picture(simulation: Simulation, bundle: Bundle) -> FloatArray:
-    """Return what the product `image` would show of a scene if nothing were lost.
+    """Return the ideal product `image` of a scene, without any loss.
 
     Args:
         simulation: Photographed with `picture_scale` samples of the scene along a side of a pixel.

@@ -1,6 +1,5 @@
 """Kinds of cameras are found by name: camkit's own, and those of installed packages."""
 
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -8,9 +7,10 @@ import pytest
 
 from camkit import kinds
 from camkit.bundle.sensor import Sensor
-from camkit.bundle.stages import Stage
+from camkit.bundle.stages.register import BUILT_IN, type_of
 from camkit.errors import ContractError, UnsupportedError
 from camkit.kinds import BAYER, KINDS, find_kind
+from tests import installed_package
 
 PACKAGE = "camkit_kind_for_this_test"
 SOURCE = f"""
@@ -24,32 +24,28 @@ NO_KIND = "a word"
 """
 
 
-@pytest.fixture
-def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+@pytest.fixture(name="installed")
+def installed_kinds(tmp_path: Path) -> Iterator[Path]:
     """A package of somebody else with entry points, some of them wrong."""
     package = tmp_path / PACKAGE
     package.mkdir()
     (package / "__init__.py").write_text(SOURCE, encoding="utf-8")
     (package / "models_def.py").write_text("FLOOR = 'design'\n", encoding="utf-8")
     (package / "report.py").write_text("import nothing_of_this_name\n", encoding="utf-8")
-    facts = tmp_path / f"{PACKAGE}-1.0.dist-info"
-    facts.mkdir()
-    (facts / "METADATA").write_text(f"Name: {PACKAGE}\nVersion: 1.0\n", encoding="utf-8")
-    points = {"mine": "MINE", "yours": "MINE", "homeless": "HOMELESS", "word": "NO_KIND"}
-    lines = [f"{name} = {PACKAGE}:{value}" for name, value in points.items()]
-    lines += [f"missing = {PACKAGE}:GONE", "absent = package_that_is_not_there:KIND"]
-    text = "\n".join([f"[{kinds.GROUP}]", *lines, ""])
-    (facts / "entry_points.txt").write_text(text, encoding="utf-8")
-    monkeypatch.syspath_prepend(str(tmp_path))
-    kinds._installed.cache_clear()
-    yield package
-    kinds._installed.cache_clear()
-    for name in [name for name in sys.modules if name.split(".")[0] == PACKAGE]:
-        del sys.modules[name]
+    points = {
+        "mine": f"{PACKAGE}:MINE",
+        "yours": f"{PACKAGE}:MINE",
+        "homeless": f"{PACKAGE}:HOMELESS",
+        "word": f"{PACKAGE}:NO_KIND",
+        "missing": f"{PACKAGE}:GONE",
+        "absent": "package_that_is_not_there:KIND",
+    }
+    with installed_package.installed(tmp_path, PACKAGE, {kinds.GROUP: points}):
+        yield package
 
 
 def test_kinds_of_camkit_name_sensors_and_stages_that_there_are() -> None:
-    known = {member.model_fields["type"].default for member in _members(Stage)}
+    known = set(map(type_of, BUILT_IN))
     types = {member.model_fields["type"].default for member in _members(Sensor)}
     for name, kind in KINDS.items():
         assert kind.name == name
@@ -103,7 +99,6 @@ def test_entry_point_that_is_no_kind_is_refused(name: str, message: str, install
 
 
 def test_nobody_takes_the_name_of_a_kind_of_camkit(installed: Path) -> None:
-    facts = next(installed.parent.glob("*.dist-info")) / "entry_points.txt"
-    facts.write_text(f"[{kinds.GROUP}]\nbayer = {PACKAGE}:MINE\n", encoding="utf-8")
-    kinds._installed.cache_clear()
-    assert find_kind("bayer") is BAYER
+    points = {kinds.GROUP: {"bayer": f"{PACKAGE}:MINE"}}
+    with installed_package.installed(installed.parent, PACKAGE, points):
+        assert find_kind("bayer") is BAYER

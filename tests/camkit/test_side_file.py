@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 
 from camkit.bundle.psf_file import read_psf
+from camkit.calibration.lensfun.xml import read_xml
 from camkit.errors import CamkitError, ContractError
 from camkit.models_def.optics.diffraction.plate import read_plate
 from camkit.models_def.optics.glass.encoding import read_text
 from camkit.models_def.optics.prescription import read_prescription
 from camkit.models_def.toml_table import read_table
-from camkit.runtime.calibration.lensfun.xml import read_xml
 from camkit.runtime.kinds.spad.containers.stored_array import read_columns, read_map
 from camkit.runtime.kinds.spad.files.npz import read_npz
 from camkit.runtime.kinds.spad.timing import read_timing

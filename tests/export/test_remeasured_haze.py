@@ -10,13 +10,13 @@ from camkit.bundle.haze_golden import haze_golden_from_bytes
 from camkit.bundle.psf_file import psf_to_bytes
 from camkit.bundle.reader import HAZE_GOLDEN, STRESS_HAZE, STRESS_PSF, open_bundle
 from camkit.bundle.writer import write_bundle
+from camkit.calibration.measured_files import FlatFile, GeometryFile
 from camkit.errors import DecodeError
 from camkit.export.golden_cases import HAZE_SCENE
 from camkit.export.remeasured import Measured, remeasured
-from camkit.runtime.calibration.measured_files import FlatFile, GeometryFile
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work
-from camkit.runtime.proof.haze import make_haze_golden
+from camkit.runtime.proof.haze_band import make_haze_golden
 from tests.bundle_factory import tiny_psf
 from tests.haze_bundle import hazy_manifest, hazy_optics, write_hazy_bundle
 from tests.haze_factory import tiny_haze

@@ -12,10 +12,10 @@ from typing import Any, Final
 from camkit.errors import CamkitError
 from camkit.runtime.batch import process
 from camkit.runtime.network import engine, graph  # loaded before anything is counted
-from camkit.runtime.output import dng, exr, linear_dng, png, tiff, writer
+from camkit.runtime.output import dng, exr, linear_dng, png, tiff_writer, writer
 from tests.faults.injection import Faults
 
-LOADED: Final = (engine, graph, dng, exr, linear_dng, png, tiff, writer)
+LOADED: Final = (engine, graph, dng, exr, linear_dng, png, tiff_writer, writer)
 MOST_S: Final = 120
 
 

@@ -17,7 +17,8 @@ from pathlib import Path
 from camkit.runtime.machine.memory import peak_rss_mb
 from tests.hostile.generator import hostile_bundle, seeded_decisions
 from tests.hostile.trial import try_bundle
-from tests.toy_camera.install import write_entry_point
+from tests.installed_package import write_entry_points
+from tests.toy_camera.install import PACKAGE, POINTS
 
 TIGHT = {
     "CAMKIT_MAX_NETWORK_WORK": "2e5",
@@ -36,7 +37,7 @@ def main(first: int, count: int) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (ADDRESS_BYTES, ADDRESS_BYTES))
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        write_entry_point(folder)
+        write_entry_points(folder, PACKAGE, POINTS)
         sys.path.insert(0, str(folder))
         for seed in range(first, first + count):
             _tell(seed=seed)

@@ -22,7 +22,8 @@ with atheris.instrument_imports(include=["camkit"]):
     from tests.hostile.child import TIGHT
     from tests.hostile.generator import DECISION_BYTES, hostile_bundle, seeded_decisions
     from tests.hostile.trial import try_bundle
-    from tests.toy_camera.install import write_entry_point
+    from tests.installed_package import write_entry_points
+    from tests.toy_camera.install import PACKAGE, POINTS
 
 
 def main() -> None:
@@ -33,7 +34,7 @@ def main() -> None:
     out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        write_entry_point(folder)
+        write_entry_points(folder, PACKAGE, POINTS)
         sys.path.insert(0, str(folder))
         seeds = folder / "seeds"
         seeds.mkdir()

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from camkit.calibration.dots import ACTIVE_UM, SPACING_UM, see_dots
 from camkit.models_def.kinds.spad.sampling import gaussian_psf
 from camkit.models_def.optics.diffraction.wave import PixelGrid
 from camkit.models_def.optics.dots.camera import DotCamera
@@ -11,7 +12,6 @@ from camkit.models_def.optics.dots.match import match_dots
 from camkit.models_def.optics.dots.pattern import View, dot_picture
 from camkit.models_def.optics.dots.target import likeness, to_target
 from camkit.models_def.optics.dots.unit import DotPlate
-from camkit.runtime.calibration.dots import ACTIVE_UM, SPACING_UM, see_dots
 
 CAMERA = DotCamera(cells=32, tiles=8)
 # of the thesis: 3.45 um behind 50 mm; the point at 1.35 m is in focus

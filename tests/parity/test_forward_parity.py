@@ -12,9 +12,9 @@ from camkit.contracts import FrozenPsf
 from camkit.models_def.sensors.demosaic import mosaic
 from camkit.models_def.sensors.exposure import expose as record
 from camkit.models_def.sensors.forward import block_centres_px, scatter
-from camkit.models_def.sensors.psf import color_kernels
 from camkit.models_def.training.kind import read_recipe
-from camkit.runtime.geometry.scatter import scatter as runtime_scatter
+from camkit.runtime.bank.psf import color_kernels
+from camkit.runtime.geometry.field_blur import scatter as runtime_scatter
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.twin.exposure import Setting, expose
 from camkit.runtime.twin.light import Light, lens_of
@@ -40,7 +40,7 @@ def block_kernels(
     y_px, x_px = torch.meshgrid(rows, columns, indexing="ij")
     x_mm, y_mm = window.to_mm(x_px.numpy().ravel(), y_px.numpy().ravel())
     fields = color_kernels(psf, *sensor.response_arrays())
-    kernels = fields.at(torch.from_numpy(x_mm), torch.from_numpy(y_mm))
+    kernels = torch.from_numpy(np.stack([fields.at(x, y) for x, y in zip(x_mm, y_mm, strict=True)]))
     return kernels.reshape(len(rows), len(columns), len(sensor.channels), side, side)
 
 

@@ -6,7 +6,7 @@ import torch
 
 from camkit.bundle.light_bound import LightBound
 from camkit.models_def.networks import light as trained
-from camkit.runtime.network import light as run
+from camkit.runtime.network import light_bound as run
 
 SCALE = 64.0
 TOLERANCE = 2e-6

@@ -10,7 +10,7 @@ from camkit.models_def.kinds.bayer.fine_tuning.homography import map_points
 from camkit.models_def.kinds.bayer.fine_tuning.pairs import read_pairs
 from camkit.scenes import procedural_scene
 from tests.bayer_recipe import *  # noqa: F403
-from tests.runtime.calibration.display.screen_factory import Booth
+from tests.camkit.calibration.display.screen_factory import Booth
 
 PLACED_PX = 0.1
 """Between the homography of training and the place that the reference was cut from."""

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import torch
 
-from camkit.bundle.stages import SuperResolve
 from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray
 from camkit.models_def.kinds.spad import sampling as trained
@@ -22,7 +21,6 @@ from camkit.report.kinds.spad.scenes import coded_luminance
 from camkit.report.kinds.spad.score import psnr_db, ssim
 from camkit.report.kinds.spad.ways import Method, Way
 from camkit.runtime.kinds.spad.finer.linear import Grid
-from camkit.runtime.kinds.spad.finer.sampling import light_of, sampling_kernel
 from camkit.scenes import procedural_scene
 from tests.spad_bundle import leaning_kernel
 
@@ -57,22 +55,6 @@ def test_bicubic_interpolation_is_that_of_training(phase: int) -> None:
     found = bicubic(light, Grid(scale=SCALE, phase=phase))
     wanted = Bicubic(SCALE, phase)(torch.from_numpy(light)[None, None])[0, 0].numpy()
     assert found == pytest.approx(wanted, abs=FLOAT32)
-
-
-@pytest.mark.parametrize(
-    ("stated", "mode"),
-    [
-        ({}, "learned"),
-        ({"sampling": "low_fill"}, "low_fill"),
-        ({"sampling": "full_fill"}, "full_fill"),
-        ({"sampling": "gaussian", "sigma": trained.GAUSSIAN_SIGMA}, "gaussian"),
-    ],
-)
-def test_samplings_of_a_stage_are_those_of_training(stated: dict[str, object], mode: str) -> None:
-    stage = SuperResolve.model_validate(stated)
-    wanted = _sampling(mode)
-    assert (sampling_kernel(stage, leaning_kernel(), GRID) == wanted.kernel).all()
-    assert light_of(stage, GRID) == wanted.light
 
 
 def test_scores_are_those_of_training() -> None:

@@ -1,6 +1,5 @@
 """What the runtime knows of a kind of camera is found by its name, and must be a part."""
 
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,6 +10,7 @@ from camkit.errors import BundleError, ContractError, UnsupportedError
 from camkit.kinds import KINDS
 from camkit.runtime.kind import RuntimePart, part_of, runtime_part
 from tests.bundle_factory import tiny_manifest
+from tests.installed_package import installed
 
 PACKAGE = "camkit_kind_of_runtime_test"
 
@@ -32,7 +32,7 @@ def test_a_kind_that_is_not_there_is_refused() -> None:
 
 
 @pytest.fixture
-def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def package(tmp_path: Path) -> Iterator[Path]:
     """Give the folder of an installed kind, whose part of the runtime a test writes."""
     folder = tmp_path / PACKAGE
     folder.mkdir()
@@ -42,18 +42,8 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
         f"home='{PACKAGE}')\n",
         encoding="utf-8",
     )
-    facts = tmp_path / f"{PACKAGE}-1.0.dist-info"
-    facts.mkdir()
-    (facts / "METADATA").write_text(f"Name: {PACKAGE}\nVersion: 1.0\n", encoding="utf-8")
-    (facts / "entry_points.txt").write_text(
-        f"[{kinds.GROUP}]\nmine = {PACKAGE}:MINE\n", encoding="utf-8"
-    )
-    monkeypatch.syspath_prepend(str(tmp_path))
-    kinds._installed.cache_clear()
-    yield folder
-    kinds._installed.cache_clear()
-    for name in [name for name in sys.modules if name.split(".")[0] == PACKAGE]:
-        del sys.modules[name]
+    with installed(tmp_path, PACKAGE, {kinds.GROUP: {"mine": f"{PACKAGE}:MINE"}}):
+        yield folder
 
 
 def test_an_installed_kind_brings_its_own_part(package: Path) -> None:

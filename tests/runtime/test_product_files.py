@@ -4,7 +4,6 @@ The kind is `tests/counting_camera`, installed as somebody else's package would 
 """
 
 import json
-import os
 import pickle
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,27 +19,14 @@ from camkit.kinds import BAYER, find_kind, kind_of_file
 from camkit.runtime.batch import expand
 from camkit.runtime.kind import kind_without_bundle
 from camkit.runtime.options import Options, with_absolute_files, with_choices
-
-ROOT = Path(__file__).resolve().parents[2]
+from tests.installed_package import ROOT, installed
 
 
 @pytest.fixture(autouse=True, scope="module")
-def installed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    folder = tmp_path_factory.mktemp("site")
-    facts = folder / "counting_camera-1.0.dist-info"
-    facts.mkdir()
-    (facts / "METADATA").write_text("Name: counting-camera\nVersion: 1.0\n", encoding="utf-8")
-    (facts / "entry_points.txt").write_text(
-        f"[{kinds.GROUP}]\ncounting = tests.counting_camera:KIND\nbroken = nowhere:KIND\n",
-        encoding="utf-8",
-    )
-    known = os.environ.get("PYTHONPATH", "")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(folder))
-        patch.setenv("PYTHONPATH", os.pathsep.join([str(folder), str(ROOT), known]))
-        kinds._installed.cache_clear()
+def counting_installed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    points = {kinds.GROUP: {"counting": "tests.counting_camera:KIND", "broken": "nowhere:KIND"}}
+    with installed(tmp_path_factory.mktemp("site"), "counting-camera", points):
         yield
-    kinds._installed.cache_clear()
 
 
 @pytest.fixture

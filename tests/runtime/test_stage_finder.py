@@ -2,29 +2,28 @@
 
 import inspect
 from pathlib import Path
-from typing import get_args
 
 import pytest
 
 from camkit.bundle import stages as entries
-from camkit.bundle.stages import Linearise, Network, Stage, Wiener
+from camkit.bundle.stages import Linearise, Network, Wiener
+from camkit.bundle.stages.register import BUILT_IN, type_of
 from camkit.errors import UnsupportedError
 from camkit.runtime import stages
 from camkit.runtime.options import Options
 from camkit.runtime.stage_finder import methods_of, stage_keys, stage_module
 from tests.bundle_factory import tiny_stages
 
-UNION = get_args(Stage)[0]
-TYPES = sorted(entry.model_fields["type"].default for entry in get_args(UNION))
-OWN = {entry.model_fields["type"].default for entry in get_args(UNION) if entry.runtime}
-"""Stages that name their module: it lies in the folder of a kind, whose plan estimates nothing."""
+TYPES = sorted(type_of(entry) for entry in BUILT_IN)
+OF_PHOTONS = {"correct", "super_resolve", "sharpen", "lifetime"}
+"""Stages of which no plan estimates the seconds."""
 
 
 @pytest.mark.parametrize("name", TYPES)
 def test_every_stage_that_a_bundle_may_list_has_a_module_that_says_all(name: str) -> None:
     module = stage_module(name)
     wanted = {"prepare": "entry job", "seconds": "entry subject work speed"}
-    if name in OWN:
+    if name in OF_PHOTONS:
         del wanted["seconds"]
     for function, named in wanted.items():
         takes = inspect.signature(getattr(module, function)).parameters
@@ -36,26 +35,25 @@ def test_every_stage_that_a_bundle_may_list_has_a_module_that_says_all(name: str
 
 
 def test_there_are_no_modules_that_no_bundle_can_list() -> None:
-    there = {path.stem for path in Path(stages.__path__[0]).glob("*.py")} - {"__init__"}
-    assert there == set(TYPES) - OWN
-    assert set(entries.__all__) >= {entry.__name__ for entry in get_args(UNION)}
+    runtime = Path(stages.__path__[0]).parent
+    rooms = [runtime / "stages", *runtime.glob("kinds/*/stages")]
+    there = {path.stem for room in rooms for path in room.glob("*.py")} - {"__init__"}
+    assert there == set(TYPES)
+    assert set(entries.__all__) >= {entry.__name__ for entry in BUILT_IN}
 
 
 def test_no_two_stages_have_a_method_of_one_name_and_few_options_are_shared() -> None:
     for what, shared in (("METHODS", set()), ("OPTIONS", {"depth_m", "demosaic", "size"})):
-        types = set(TYPES) - OWN if what == "METHODS" else TYPES
+        types = [name for name in TYPES if what == "OPTIONS" or name not in OF_PHOTONS]
         named = [name for type_ in types for name in getattr(stage_module(type_), what)]
         assert {name for name in named if named.count(name) > 1} == shared, what
 
 
 def test_a_stage_without_a_module_is_refused_with_those_there_are() -> None:
-    with pytest.raises(UnsupportedError, match=r"no stage 'dream'; it has color, correct, deglare"):
+    with pytest.raises(
+        UnsupportedError, match=r"brings the stage 'dream'; there are: color, correct, deglare"
+    ):
         stage_module("dream")
-
-
-def test_a_stage_may_name_its_module() -> None:
-    assert stage_module("sharpen").__name__ == "camkit.runtime.kinds.spad.stages.sharpen"
-    assert stage_module("repair").__name__ == "camkit.runtime.stages.repair"
 
 
 def test_stages_are_named_by_type_and_twins_by_role_or_number() -> None:

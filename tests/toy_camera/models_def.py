@@ -21,11 +21,11 @@ from camkit.bundle.psf_file import psf_to_bytes, read_psf, write_psf
 from camkit.bundle.stages import Color, Linearise, Network, Repair
 from camkit.contracts import FloatArray, FrozenPsf
 from camkit.models_def.sensors.forward import blur
-from camkit.models_def.sensors.psf import FieldKernels, color_kernels
 from camkit.models_def.sensors.stabilise import stabilise
 from camkit.models_def.training.kind import Design, Restorer, Score
 from camkit.models_def.training.pictures import SCENE_SEED, open_source
 from camkit.models_def.training.sample import Sample, SampleLayout
+from camkit.runtime.bank.psf import FieldKernels, color_kernels
 from camkit.scenes import procedural_scene
 from tests.toy_camera.networks import build_toy_network
 from tests.toy_camera.recipe import ROLES, ToyRecipe, to_toy_recipe
@@ -83,10 +83,11 @@ class Photographer:
         """Photograph a (3, side, side) scene at a place (x, y) in -1..1 of the half sensor."""
         sensor, sample_px = self.recipe.sensor, self.recipe.data.sample_px
         half_mm = np.array([sensor.width_px, sensor.height_px]) * sensor.pixel_pitch_um / 2000
-        x_mm, y_mm = (torch.tensor([v]) for v in np.array(place) * half_mm)
+        x_mm, y_mm = (float(v) for v in np.array(place) * half_mm)
         fine = torch.from_numpy(scene).mean(0)[None, None].clamp(0, 0.95)
         coarse = nn.functional.avg_pool2d(fine, FACTOR)
-        light = blur(coarse, self.kernels.at(x_mm, y_mm)).clamp(min=0)
+        kernels = torch.from_numpy(self.kernels.at(x_mm, y_mm))[None]
+        light = blur(coarse, kernels).clamp(min=0)
         noise = sensor.noise_at(iso)
         shot, read = torch.tensor(noise.shot), torch.tensor(noise.read_variance)
         grain = torch.from_numpy(rng.standard_normal(light.shape, dtype=np.float32))

@@ -23,11 +23,12 @@ from pathlib import Path
 from typing import Any, Final
 
 from camkit.bundle.frozen_optics import FrozenOptics
-from camkit.bundle.manifest import LIGHT_VERSION, format_of
+from camkit.bundle.manifest import format_of
 from camkit.bundle.optics import PSF
 from camkit.bundle.psf_file import psf_to_bytes
 from camkit.bundle.reader import PRESCRIPTION, Bundle, bundle_from_bytes, find_bundle, open_bundle
 from camkit.bundle.writer import bundle_to_bytes
+from camkit.calibration.focus import EdgeCamera, MeasuredFocus, measure_focus
 from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import ContractError
 from camkit.models_def.optics.frozen import with_focus
@@ -48,7 +49,6 @@ from camkit.report.quality import (
     read_picture,
 )
 from camkit.runtime.bank.psf import color_kernels
-from camkit.runtime.calibration.focus import EdgeCamera, MeasuredFocus, measure_focus
 from camkit.runtime.capture import Capture
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
@@ -151,7 +151,7 @@ def refocusable(bundle: Bundle, range_um: float | None) -> tuple[Bundle, float]:
     psf, _ = with_focus(bundle.psf, (-reach_um, reach_um), lens.refocused, color_sensor(bundle))
     members = {name: bundle.member(name) for name in bundle.names} | {PSF: psf_to_bytes(psf)}
     stated = bundle.manifest
-    version = format_of(psf, bounded=stated.version_pair >= LIGHT_VERSION)
+    version = format_of(psf, (), least=stated.version_pair)
     manifest = stated.model_copy(update={"format_version": version})
     return bundle_from_bytes(bundle_to_bytes(manifest, members), path=bundle.path), reach_um
 

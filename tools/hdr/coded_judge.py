@@ -6,17 +6,17 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.calibration.peak import light_within
 from camkit.contracts import FloatArray
 from camkit.report.hdr_score import Reference, hdr_scores
-from camkit.runtime.calibration.peak import light_within
+from camkit.runtime.kinds.hdr.streaks.cells import cells_of, coarser, sample_sites
+from camkit.runtime.kinds.hdr.streaks.convolution import Convolution
+from camkit.runtime.kinds.hdr.streaks.descent import COARSE_STEPS, seek_lights
+from camkit.runtime.kinds.hdr.streaks.kernels import streak_kernels
+from camkit.runtime.kinds.hdr.streaks.painting import Painter
+from camkit.runtime.kinds.hdr.streaks.recovery import GUESS, Recovery, recover, veil_of
+from camkit.runtime.kinds.hdr.streaks.shapes import pooled, rim_distance_px
 from camkit.scenes.saturation import CEILING
-from camkit.streaks.cells import cells_of, coarser, sample_sites
-from camkit.streaks.convolution import Convolution
-from camkit.streaks.descent import COARSE_STEPS, seek_lights
-from camkit.streaks.kernels import streak_kernels
-from camkit.streaks.painting import Painter
-from camkit.streaks.recovery import GUESS, Recovery, recover, veil_of
-from camkit.streaks.shapes import pooled, rim_distance_px
 from tools.hdr.coded_optics import parts_of, seen_through
 from tools.hdr.coded_scene import CODES, clipped_samples
 

@@ -16,11 +16,11 @@ import scipy.ndimage
 import scipy.optimize
 from numpy.typing import NDArray
 
+from camkit.calibration.lattice import Lattice
+from camkit.calibration.light import background, fit_core
 from camkit.contracts import FloatArray
 from camkit.errors import DecodeError
-from camkit.runtime.calibration.lattice import Lattice
-from camkit.runtime.calibration.light import background, fit_core
-from camkit.streaks.convolution import Convolution
+from camkit.runtime.kinds.hdr.streaks.convolution import Convolution
 
 CORE_PX: Final = 12.0
 PEAK_PX: Final = 14.0

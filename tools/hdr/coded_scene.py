@@ -30,9 +30,9 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.errors import DecodeError
-from camkit.runtime.merging.estimate import disagreement, estimate_response
 from camkit.runtime.merging.merge import merge
 from camkit.runtime.merging.response import Response, response_of, srgb_response
+from camkit.runtime.merging.response_estimate import disagreement, estimate_response
 from camkit.runtime.merging.survey import SAMPLED_PIXELS, survey
 
 CODED: Final = "wPSF_*_stop.png"

@@ -30,9 +30,9 @@ from camkit.models_def.optics.diffraction.plate_streaks import SIDE_PX, plate_st
 from camkit.report.kinds.hdr.judge import HdrJudge, hdr_judge_of
 from camkit.report.quality import read_picture
 from camkit.report.stress.scene import Scene
+from camkit.runtime.kinds.hdr.night import night_scene
 from camkit.runtime.twin.light import lens_of
-from camkit.scenes import night_scene
-from camkit.streaks.optics import StreakOptics
+from camkit.streaks import StreakOptics
 from camkit.units import MM_PER_M
 from tools.hdr.record import in_one_line, new_parser, open_camera, origin_of, table, write_record
 

@@ -18,8 +18,8 @@ import numpy as np
 from camkit.bundle.stages import Deglare
 from camkit.contracts import FloatArray
 from camkit.runtime.files.picture import read_light
+from camkit.runtime.kinds.hdr.deglare.removal import Glare, GlareSettings, find_glare
 from camkit.scenes.saturation import saturating_exposure, with_exposure
-from camkit.streaks.glare.removal import Glare, GlareSettings, find_glare
 from tools.hdr.glare_twin import (
     SATURATED,
     Fading,

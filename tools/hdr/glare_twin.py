@@ -21,7 +21,7 @@ from camkit.errors import CamkitError, ContractError
 from camkit.runtime.twin.truth import write_truth
 from camkit.scenes import named_scene
 from camkit.scenes.saturation import saturating_exposure, with_exposure
-from camkit.streaks.optics import SECTION_STEP_PX, StreakOptics
+from camkit.streaks import SECTION_STEP_PX, StreakOptics
 
 REACH_PX: Final = 160
 SHARE: Final = 0.06

@@ -30,6 +30,7 @@ from camkit.report.kinds.hdr.lights import dimmed, with_lamp
 from camkit.report.quality import BORDER_PX
 from camkit.report.sensor_geometry import in_sensor_geometry
 from camkit.runtime.files.picture import read_light
+from camkit.runtime.kinds.hdr.night import night_scene
 from camkit.runtime.merging.result import merge_to_exr
 from camkit.runtime.merging.survey import survey
 from camkit.runtime.options import Options
@@ -37,7 +38,6 @@ from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.twin.saturation import exposure_for_share
 from camkit.runtime.twin.simulate import Simulation, SimulationOptions, photograph, write_capture
 from camkit.runtime.twin.truth import true_picture
-from camkit.scenes import night_scene
 from camkit.scenes.saturation import CEILING, with_exposure
 from tools.hdr.record import in_one_line, new_parser, open_camera, origin_of, table, write_record
 

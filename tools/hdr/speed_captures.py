@@ -19,9 +19,9 @@ from camkit.errors import UnsupportedError
 from camkit.report.kinds.hdr.lights import dimmed, with_lamp
 from camkit.runtime.capture import SATURATION_SHARE
 from camkit.runtime.geometry.sensor_window import centred_origin
+from camkit.runtime.kinds.hdr.night import night_scene
 from camkit.runtime.twin.saturation import exposure_for_share
 from camkit.runtime.twin.simulate import Simulation, SimulationOptions, photograph, write_capture
-from camkit.scenes import night_scene
 from camkit.scenes.saturation import with_exposure
 
 GRID: Final = 5

@@ -19,10 +19,10 @@ import cv2
 import numpy as np
 
 from camkit.bundle.optics import RadialEntry
+from camkit.calibration.lensfun.database import Database, Lens, lens_of
+from camkit.calibration.lensfun.models import FULL_FRAME_MM, Distortion, unit_mm
+from camkit.calibration.lensfun.profile import Frame, missed_px
 from camkit.errors import ContractError
-from camkit.runtime.calibration.lensfun.database import Database, Lens, lens_of
-from camkit.runtime.calibration.lensfun.models import FULL_FRAME_MM, Distortion, unit_mm
-from camkit.runtime.calibration.lensfun.profile import Frame, missed_px
 from camkit.runtime.geometry.distortion import check_distortion
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.geometry.warp import LATTICE_PX, Warp

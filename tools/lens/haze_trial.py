@@ -23,7 +23,7 @@ from camkit.bundle.psf_file import read_psf
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Dehaze
 from camkit.colorimetry import encode_srgb
-from camkit.export.frames import physics_bundle
+from camkit.models_def.kinds.bayer.frames.photographs import physics_bundle
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.training.kind import read_recipe
 from camkit.report.analysis.recovery import filled, restored

@@ -12,7 +12,7 @@ from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.haze_file import read_haze
 from camkit.bundle.psf_file import read_psf
 from camkit.errors import ContractError
-from camkit.export.frames import physics_bundle
+from camkit.models_def.kinds.bayer.frames.photographs import physics_bundle
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.training.kind import read_recipe
 from tools.hdr.record import in_one_line

@@ -16,8 +16,8 @@ from camkit.runtime.bank.blocks import lay_spans
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.options import Options, Quality
 from camkit.runtime.pipeline import Pipeline
-from camkit.runtime.plan.blocks import plain_share
 from camkit.runtime.plan.estimate import network_seconds
+from camkit.runtime.plan.idle_blocks import plain_share
 from camkit.runtime.plan.rules.size import REFERENCE
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.twin.simulate import Simulation

@@ -1,23 +1,20 @@
-"""The stages that a bundle may list: one file each, and one line here.
+"""The stages that a bundle may list: one file each, and one line in `register`.
 
 A stage names the planes that it takes and gives, and says by `join` what it makes of them. What it
-does stands in the module of the same name in `camkit.runtime.stages`.
+does stands in the module of the same name in `camkit.runtime.stages`, or in the one that it names.
 
 linearise, repair, white_balance, demosaic    the front
 haze, wiener, highlights, deglare, network    the restoration
 raise_clipped, illumination, undistort, color what every picture needs behind it
 correct, super_resolve, sharpen, lifetime     single photons
+register                                      all of them by type, and those of packages
 """
-
-from typing import Annotated
-
-from pydantic import Field
 
 from camkit.bundle.stages.color import Color
 from camkit.bundle.stages.correct import Correct
 from camkit.bundle.stages.deglare import Deglare
 from camkit.bundle.stages.demosaic import Demosaic
-from camkit.bundle.stages.entry import JoinError, Parts, StageEntry
+from camkit.bundle.stages.entry import JoinError, PackageStage, Parts, StageEntry
 from camkit.bundle.stages.haze import Dehaze
 from camkit.bundle.stages.highlights import Highlights
 from camkit.bundle.stages.illumination import Illumination
@@ -25,6 +22,7 @@ from camkit.bundle.stages.lifetime import Lifetime
 from camkit.bundle.stages.linearise import Linearise
 from camkit.bundle.stages.network import Network
 from camkit.bundle.stages.raise_clipped import RaiseClipped
+from camkit.bundle.stages.register import Stage, all_stages, find_stage, type_of
 from camkit.bundle.stages.repair import Repair
 from camkit.bundle.stages.sharpen import Sharpen
 from camkit.bundle.stages.super_resolve import SuperResolve
@@ -45,6 +43,7 @@ __all__ = [
     "Lifetime",
     "Linearise",
     "Network",
+    "PackageStage",
     "Parts",
     "RaiseClipped",
     "Repair",
@@ -56,25 +55,7 @@ __all__ = [
     "Undistort",
     "WhiteBalance",
     "Wiener",
-]
-
-Stage = Annotated[
-    Linearise
-    | Repair
-    | WhiteBalance
-    | Demosaic
-    | Highlights
-    | Deglare
-    | Dehaze
-    | Wiener
-    | Network
-    | RaiseClipped
-    | Illumination
-    | Undistort
-    | Color
-    | Correct
-    | SuperResolve
-    | Sharpen
-    | Lifetime,
-    Field(discriminator="type"),
+    "all_stages",
+    "find_stage",
+    "type_of",
 ]

@@ -9,7 +9,7 @@ from camkit.bundle.stages.entry import Parts, StageEntry, need_counts_of_pixels
 
 
 class Correct(StageEntry):
-    """What an array counted, as one without dark counts and blind times would have (format 2.3)."""
+    """Counts as those of an array without dark counts and dead time (format 2.3)."""
 
     runtime: ClassVar[str] = "camkit.runtime.kinds.spad.stages.correct"
     type: Literal["correct"] = "correct"

@@ -1,7 +1,7 @@
 """Streaks of glare taken away, as a wiped windshield writes them; lights stay as they are."""
 
 from collections.abc import Sequence
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -23,6 +23,7 @@ class Deglare(StageEntry):
         level: Light is what reaches this share of where a colour clips.
     """
 
+    runtime: ClassVar[str] = "camkit.runtime.kinds.hdr.stages.deglare"
     type: Literal["deglare"] = "deglare"
     takes: tuple[Word, ...] = ("rgb",)
     gives: tuple[Word, ...] = ("clear",)

@@ -1,14 +1,18 @@
-"""What every stage of a bundle has in common: the planes that it takes and gives."""
+"""The base class of every stage of a bundle: the planes that it takes and gives."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar, Final
 
-from camkit.bundle.entry import Entry, Word
+from pydantic import Field
+
+from camkit.bundle.entry import Entry, Since, Word
 from camkit.bundle.facts import NetworkFacts
 from camkit.bundle.optics import Optics
 from camkit.bundle.plane import Domain, Plane
 from camkit.bundle.sensor import Sensor
+
+BOUNDED: Final = Since((2, 8), "the light that a stage makes is bounded")
 
 
 class JoinError(ValueError):
@@ -17,7 +21,7 @@ class JoinError(ValueError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parts:
-    """What stages may look at to say what they give.
+    """The parts of a bundle from which stages derive their planes.
 
     Attributes:
         sensor: Of the camera.
@@ -59,12 +63,24 @@ class StageEntry(Entry):
     type: Word
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
-        """Return what the stage makes of the planes it takes; one plane for each name in `gives`.
+        """Return the planes that the stage makes of those it takes; one for each name in `gives`.
 
         Raises:
             JoinError: If it cannot take them.
         """
         raise NotImplementedError
+
+
+class PackageStage(StageEntry):
+    """A stage that a package of its own brings, by an entry point in the group `camkit.stages`.
+
+    Attributes:
+        package: Name of the distribution that brings it, for readers that do not have it; a
+            `Literal` of each stage.
+    """
+
+    since: ClassVar[Since | None] = Since((2, 9), "it lists a stage of a package of its own")
+    package: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")]
 
 
 def need_count(taken: Sequence[Plane], least: int, most: int | None = None) -> None:

@@ -1,9 +1,9 @@
 """Lights that the sensor clipped, read back from the streaks that the optics wrote of them."""
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import ClassVar, Final, Literal
 
-from camkit.bundle.entry import Word
+from camkit.bundle.entry import Since, Word
 from camkit.bundle.plane import Plane
 from camkit.bundle.sensor import MOSAIC, RGB
 from camkit.bundle.stages.entry import (
@@ -14,6 +14,8 @@ from camkit.bundle.stages.entry import (
     need_domain,
     one_linear,
 )
+
+_FROM_SAMPLES: Final = Since((2, 8), "streaks are taken from the samples of the mosaic")
 
 
 class Highlights(StageEntry):
@@ -26,6 +28,7 @@ class Highlights(StageEntry):
         method: Of that demosaic.
     """
 
+    runtime: ClassVar[str] = "camkit.runtime.kinds.hdr.stages.highlights"
     type: Literal["highlights"] = "highlights"
     takes: tuple[Word, ...] = ("rgb",)
     gives: tuple[Word, ...] = ("lit",)
@@ -35,6 +38,10 @@ class Highlights(StageEntry):
     def from_samples(self) -> bool:
         """Return whether streaks are taken from the samples of the mosaic."""
         return len(self.takes) > 1
+
+    def needs(self) -> list[Since]:
+        """Return what of this stage readers of older formats do not know."""
+        return super().needs() + ([_FROM_SAMPLES] if self.from_samples else [])
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Return the plane as taken; its lights may lie far above white."""

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import ClassVar, Literal
 
-from camkit.bundle.entry import Word
+from camkit.bundle.entry import Since, Word
 from camkit.bundle.plane import Plane
 from camkit.bundle.stages.entry import JoinError, Parts, StageEntry, need_counts_of_pixels
 
@@ -11,6 +11,7 @@ from camkit.bundle.stages.entry import JoinError, Parts, StageEntry, need_counts
 class Lifetime(StageEntry):
     """How long fluorescence takes to fade, of every pixel of an array (format 2.9)."""
 
+    since: ClassVar[Since | None] = Since((2, 9), "it lists the stage lifetime")
     runtime: ClassVar[str] = "camkit.runtime.kinds.spad.stages.lifetime"
     type: Literal["lifetime"] = "lifetime"
     takes: tuple[Word, ...] = ("photons",)

@@ -10,6 +10,7 @@ from camkit.bundle.facts import NetworkFacts, Port
 from camkit.bundle.light_bound import BOUND_REACH_PX, LightBound
 from camkit.bundle.plane import Plane
 from camkit.bundle.stages.entry import (
+    BOUNDED,
     JoinError,
     Parts,
     StageEntry,
@@ -55,8 +56,8 @@ class Network(StageEntry):
     scale: Positive = 64.0
     most_light: Positive = 16.0
     lights_px: Annotated[int, Field(ge=1, le=1024)] | None = None
-    light: LightBound | None = None
-    keeps_white: bool = False
+    light: Annotated[LightBound | None, BOUNDED] = None
+    keeps_white: Annotated[bool, BOUNDED] = False
 
     @property
     def extra_reach_px(self) -> int:
@@ -164,7 +165,7 @@ def _outputs(sizes: Mapping[str, NetworkFacts]) -> tuple[Port, ...]:
 
 
 def _names(port: Port, taken: Sequence[Plane], parts: Parts) -> tuple[str, ...]:
-    """Name the channels of an output: as those of the last plane of that many, else by number."""
+    """Return the channel names of an output: those of the last plane of that many, or numbers."""
     for plane in reversed(taken):
         if len(plane.channels) == port.channels:
             return plane.channels

@@ -8,7 +8,13 @@ from pydantic import Field, model_validator
 from camkit.bundle.entry import Positive, Word
 from camkit.bundle.plane import Plane
 from camkit.bundle.sensor import SpadSensor
-from camkit.bundle.stages.entry import JoinError, Parts, StageEntry, need_counts_of_pixels
+from camkit.bundle.stages.entry import (
+    BOUNDED,
+    JoinError,
+    Parts,
+    StageEntry,
+    need_counts_of_pixels,
+)
 
 PORTS = (1, 1)
 """Channels of a network: light, and what is told of its noise."""
@@ -46,7 +52,7 @@ class SuperResolve(StageEntry):
     network_from_photons: Positive = 80.0
     sampling: Sampled = "plate"
     sigma: Positive | None = None
-    floor: Annotated[float, Field(ge=0, le=1)] = 0.0
+    floor: Annotated[float, Field(ge=0, le=1), BOUNDED] = 0.0
 
     @model_validator(mode="after")
     def _check_sigma(self) -> Self:

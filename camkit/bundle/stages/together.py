@@ -17,7 +17,7 @@ Logarithm = Annotated[float, Field(ge=-20, le=20)]
 
 
 class Spread(Entry):
-    """How much the transfer of fabricated copies scatters around the frozen one.
+    """The scatter of the transfer of fabricated copies around the frozen one.
 
     Attributes:
         heights_mm: Field heights, increasing from 0.
@@ -45,7 +45,7 @@ class Spread(Entry):
 
 
 class Together(Entry):
-    """What the bank takes the colours of a scene, and their noise, for.
+    """The prior of the bank for the colours of a scene, and for their noise.
 
     Attributes:
         noise: Of every colour, logarithm of its noise over the sensor's at low frequencies, where

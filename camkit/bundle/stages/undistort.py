@@ -1,12 +1,19 @@
 """Removal of the radial distortion of the optics."""
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import Annotated, Literal
 
 from camkit.bundle.entry import Word
 from camkit.bundle.plane import Plane
 from camkit.bundle.sensor import MOSAIC
-from camkit.bundle.stages.entry import JoinError, Parts, StageEntry, need_rows, one_linear
+from camkit.bundle.stages.entry import (
+    BOUNDED,
+    JoinError,
+    Parts,
+    StageEntry,
+    need_rows,
+    one_linear,
+)
 
 Interpolation = Literal["lanczos", "cubic"]
 Overshoot = Literal["limited", "kept"]
@@ -27,7 +34,7 @@ class Undistort(StageEntry):
     takes: tuple[Word, ...] = ("even",)
     gives: tuple[Word, ...] = ("straight",)
     interpolation: Interpolation = "lanczos"
-    overshoot: Overshoot = "kept"
+    overshoot: Annotated[Overshoot, BOUNDED] = "kept"
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Return the plane in ideal geometry."""

@@ -5,7 +5,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field, model_validator
 
-from camkit.bundle.entry import NonNegative, Positive, Word
+from camkit.bundle.entry import NonNegative, Positive, Since, Word
 from camkit.bundle.plane import Plane
 from camkit.bundle.stages.entry import (
     JoinError,
@@ -56,7 +56,9 @@ class Wiener(StageEntry):
     clip_power: Annotated[float, Field(ge=1.0, lt=3.0)] = 1.0
     clip_windows: Literal["half_kernel", "whole_kernel"] = "half_kernel"
     together: Together | None = None
-    depth: Literal["mean", "estimated"] = "mean"
+    depth: Annotated[
+        Literal["mean", "estimated"], Since((2, 8), "a bank finds the distance of the scene")
+    ] = "mean"
 
     @model_validator(mode="after")
     def _check(self) -> "Wiener":

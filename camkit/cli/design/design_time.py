@@ -1,4 +1,4 @@
-"""What the design-time commands share: asking for torch, keeping files, printing a report."""
+"""Functions that the design-time commands share: the need of torch, existing files, reports."""
 
 import json
 from collections.abc import Iterable, Mapping

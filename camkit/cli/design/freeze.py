@@ -5,23 +5,17 @@ With `--unit` it measures one camera body instead (unit.py).
 
 import json
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.errors import ContractError, UnsupportedError
-from camkit.progress import note, working
 
 if TYPE_CHECKING:
-    from camkit.bundle.frozen_optics import FrozenOptics
     from camkit.bundle.sensor import ColorSensor
     from camkit.bundle.stages import Wiener
-    from camkit.models_def.optics.diffraction.freezing import PlateReport
-    from camkit.models_def.optics.freeze import FreezeGrid, FreezeReport
-    from camkit.models_def.optics.optics import Optics
 
 LIMIT_DB: Final = 0.05
 
@@ -137,131 +131,36 @@ def freeze(
         print_report(measure_unit(optics, captures or [], out, recipe, depths, focus_um), json_)
         return
     require_torch("camkit freeze")
-    from camkit.bundle.psf_file import write_psf
+    from camkit.bundle.frozen_optics import write_optics_files
     from camkit.cli.design.unit import focus_range_um
-    from camkit.models_def.optics.diffraction.freezing import WINDOW
-    from camkit.models_def.optics.diffraction.plate_optics import PlateOptics
-    from camkit.models_def.optics.freeze import FreezeGrid, freeze_stress
+    from camkit.models_def.optics.freezer import FreezeRequest, freeze_optics
     from camkit.models_def.optics.optics_file import read_optics
 
-    sensor, bank = _camera_of(recipe)
-    found = read_optics(optics)
     if (stress_haze is None) != (haze is None or stress_out is None):
         raise ContractError(
             "with --haze, --stress-out and --stress-haze go together; else omit --stress-haze"
         )
-    if haze is not None:
-        chosen = {
-            "--depths-mm": depths_mm is not None,
-            "--limit-db": limit_db != LIMIT_DB,
-            "--energy": energy is not None,
-            "--max-side-px": max_side_px is not None,
-            "--focus-um": focus_um is not None,
-        }
-        if named := [name for name, said in chosen.items() if said]:
-            raise ContractError(f"--haze conflicts with {', '.join(named)}")
-        stress = None if stress_out is None or stress_haze is None else (stress_out, stress_haze)
-        told = _freeze_hazy(found, (out, haze), stress, sensor)
-        _report(told, report, json_)
-        return
-    moved_um = focus_range_um(found, focus_um)
-    base = WINDOW if isinstance(found, PlateOptics) else FreezeGrid()
-    grid = replace(
-        base,
+    sensor, bank = _camera_of(recipe)
+    found = read_optics(optics)
+    request = FreezeRequest(
+        sensor=sensor,
+        bank=bank,
         depths_mm=depths,
-        energy=base.energy if energy is None else energy,
-        max_side_px=base.max_side_px if max_side_px is None else max_side_px,
-        # who says how much is wanted gets no less
-        least_energy=base.least_energy if energy is None else None,
+        limit_db=None if limit_db == LIMIT_DB else limit_db,
+        energy=energy,
+        max_side_px=max_side_px,
+        focus_um=focus_range_um(found, focus_um),
+        haze=haze is not None,
+        stress=stress_out is not None,
     )
-    out.parent.mkdir(parents=True, exist_ok=True)
-    facts = _freeze(found, out, _Wanted(sensor, bank, grid, limit_db, moved_um))
-    if stress_out is not None:
-        stress_out.parent.mkdir(parents=True, exist_ok=True)
-        write_psf(stress_out, freeze_stress(found, sensor, grid).psf)
-    _report(facts.to_json(), report, json_)
-
-
-def _report(told: dict[str, int | float | str], report: Path | None, json_: bool) -> None:
-    """Write the report where it is wanted, and say it."""
-    from camkit.cli.design.design_time import print_report
-
+    frozen = freeze_optics(found, request)
+    write_optics_files(frozen.optics, out, haze)
+    if stress_out is not None and frozen.stress is not None:
+        write_optics_files(frozen.stress, stress_out, stress_haze)
     if report is not None:
         report.parent.mkdir(parents=True, exist_ok=True)
-        report.write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
-    print_report(told, json_)
-
-
-@working("freezing peaks and haze of the lens")
-def _freeze_hazy(
-    optics: "Optics",
-    paths: tuple[Path, Path],
-    stress: tuple[Path, Path] | None,
-    sensor: "ColorSensor",
-) -> dict[str, int | float | str]:
-    """Freeze the peaks of a lens and the haze beside them, at other distances too if wanted.
-
-    Nothing is written before all is known.
-    """
-    from camkit.contracts import depth_name
-    from camkit.models_def.optics.lens_optics import LensOptics
-    from camkit.models_def.optics.thin.freezing import freeze_hazy
-    from camkit.models_def.optics.thin.nearer import freeze_distances
-
-    if not isinstance(optics, LensOptics):
-        raise UnsupportedError("--haze is for lenses only; leave it out")
-    frozen, report = freeze_hazy(optics.lens, sensor, tell=note)
-    told = report.to_json()
-    if stress is not None:
-        nearer = freeze_distances(optics.lens, sensor, tell=note)
-        _write_optics(nearer, *stress)
-        told["distances"] = ", ".join(map(depth_name, nearer.psf.depths_mm))
-    _write_optics(frozen, *paths)
-    return told
-
-
-def _write_optics(frozen: "FrozenOptics", out: Path, haze_out: Path) -> None:
-    """Write kernels and haze to two files."""
-    from camkit.bundle.haze_file import write_haze
-    from camkit.bundle.psf_file import write_psf
-
-    assert frozen.haze is not None
-    for path in (out, haze_out):
-        path.parent.mkdir(parents=True, exist_ok=True)
-    write_psf(out, frozen.psf)
-    write_haze(haze_out, frozen.haze)
-
-
-class _Wanted(NamedTuple):
-    """How optics are frozen."""
-
-    sensor: "ColorSensor"
-    bank: "Wiener | None"
-    grid: "FreezeGrid"
-    limit_db: float
-    focus_um: float
-
-
-@working("freezing the optics")
-def _freeze(optics: "Optics", out: Path, wanted: _Wanted) -> "FreezeReport | PlateReport":
-    from camkit.models_def.optics.diffraction.freezing import freeze_plate
-    from camkit.models_def.optics.diffraction.plate_optics import PlateOptics
-    from camkit.models_def.optics.freeze import freeze_optics
-
-    if isinstance(optics, PlateOptics):
-        if wanted.focus_um:
-            raise UnsupportedError("a plate is frozen at its nominal focus; leave --focus-um out")
-        return freeze_plate(optics, out, sensor=wanted.sensor, grid=wanted.grid, tell=note)
-    return freeze_optics(
-        optics,
-        out,
-        sensor=wanted.sensor,
-        settings=wanted.bank,
-        limit_db=wanted.limit_db,
-        grid=wanted.grid,
-        focus_um=wanted.focus_um,
-        tell=note,
-    )
+        report.write_text(json.dumps(frozen.facts, indent=2) + "\n", encoding="utf-8")
+    print_report(frozen.facts, json_)
 
 
 def _camera_of(recipe: Path) -> "tuple[ColorSensor, Wiener | None]":

@@ -40,8 +40,8 @@ def prepare(
     from camkit.cli.design.design_time import print_report, refuse_existing, require_torch
 
     require_torch("camkit prepare")
-    from camkit.export.preparing import PrepareOptions, preparing_kind
     from camkit.models_def.training.kind import read_recipe
+    from camkit.models_def.training.preparing import PrepareOptions, preparing_kind
 
     plan = read_recipe(recipe)
     kind = preparing_kind(plan.kind)

@@ -131,7 +131,7 @@ def train(
 
 
 def _tell_substitute(recipe: Path, size: str, role: str | None) -> None:
-    """Say on stderr that features are a substitute, where a loss looks at any."""
+    """Report on stderr that features are a substitute, where a loss uses any."""
     from camkit.models_def.training.kind import read_recipe
     from camkit.models_def.training.recipe import PICTURE_LOSSES
 

@@ -13,8 +13,8 @@ from camkit.errors import ContractError, UnsupportedError
 from camkit.progress import working
 
 if TYPE_CHECKING:
+    from camkit.calibration.focus import EdgeCamera
     from camkit.models_def.optics.optics import Optics
-    from camkit.runtime.calibration.focus import EdgeCamera
 
 AUTO: Final = "auto"
 STEPS: Final = (-1.0, -0.5, 0.5, 1.0)
@@ -32,7 +32,7 @@ def measure_unit(
     depths_mm: tuple[float, ...],
     focus_um: str | None,
 ) -> dict[str, Any]:
-    """Measure a unit and write it; give what was found.
+    """Measure a camera body and write its file; return the measured focus.
 
     Raises:
         ContractError: If there is no capture, the names are wrong, or nothing can be measured.
@@ -44,7 +44,7 @@ def measure_unit(
     if len(depths_mm) > 1:
         raise ContractError("the target lies at one distance: give one with --depths-mm")
     from camkit.bundle.reader import SUFFIX
-    from camkit.runtime.calibration.focus import measure_focus
+    from camkit.calibration.focus import measure_focus
     from camkit.runtime.output.part_file import atomic_output
     from camkit.runtime.raw import read_capture
     from camkit.runtime.unit import format_unit
@@ -64,7 +64,7 @@ def measure_unit(
 
 
 def focus_range_um(optics: "Optics", text: str | None) -> float:
-    """Read --focus-um: a number > 0, or `auto` for what the copies of a lens need; 0 for none.
+    """Read --focus-um: a number > 0, or `auto` for the range of a lens's copies; 0 for none.
 
     Raises:
         ContractError: If it is neither.
@@ -88,9 +88,9 @@ def focus_range_um(optics: "Optics", text: str | None) -> float:
 
 
 def _of_bundle(path: Path, depths_mm: tuple[float, ...]) -> "tuple[EdgeCamera, dict[str, str]]":
-    """Return the camera of a bundle, and how a unit names it: by its lens where it says that."""
+    """Return the camera of a bundle, and its name in a unit file: that of its lens where stated."""
     from camkit.bundle.reader import PRESCRIPTION, open_bundle
-    from camkit.runtime.calibration.focus import EdgeCamera
+    from camkit.calibration.focus import EdgeCamera
     from camkit.runtime.unit import lens_hash
 
     bundle = open_bundle(path)
@@ -112,12 +112,12 @@ def _of_lens(
 
     require_torch("camkit freeze")
     from camkit.bundle.sensor import ColorSensor
+    from camkit.calibration.focus import EdgeCamera
     from camkit.models_def.optics.frozen import FreezeGrid, freeze, with_focus
     from camkit.models_def.optics.lens_optics import LensOptics
     from camkit.models_def.optics.optics_file import read_optics
     from camkit.models_def.optics.prescription import format_prescription
     from camkit.models_def.training.kind import read_recipe
-    from camkit.runtime.calibration.focus import EdgeCamera
     from camkit.runtime.unit import lens_hash
 
     lens = read_optics(path)

@@ -150,7 +150,7 @@ def bench(
 
 
 def _cameras() -> list[str]:
-    """Name the built-in bundles that photograph and state a sensor's size."""
+    """Return the names of the built-in bundles that photograph and state a sensor's size."""
     from camkit.bundle.reader import built_in_bundles, open_bundle
     from camkit.report.bench.part import BenchPart
     from camkit.report.kind_finder import find_part

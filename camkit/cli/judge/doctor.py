@@ -55,6 +55,7 @@ def examine() -> dict[str, Any]:
     """Collect the facts that `doctor` prints."""
     from camkit import __version__
     from camkit.bundle.reader import built_in_bundles
+    from camkit.bundle.stages.register import stages_of_packages
     from camkit.report.bench.machine import memory_mb, package_version, processor_name
     from camkit.runtime.network.engine import available_threads, providers
 
@@ -72,6 +73,7 @@ def examine() -> dict[str, Any]:
         "raw_decoder": _try_decoder(),
         "design_time": ("ready" if util.find_spec("torch") else f"not installed: {INSTALLED_BY}"),
         "bundles": {name: str(path) for name, path in sorted(built_in_bundles().items())},
+        "stages_of_packages": stages_of_packages(),
         "packages": {name: package_version(name) or "not installed" for name in PACKAGES},
     }
 

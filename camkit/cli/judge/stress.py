@@ -94,7 +94,7 @@ def stress(
 
 
 def _line(row: dict[str, object]) -> str:
-    """Return where one scenario broke."""
+    """Return the line of one scenario: where it broke."""
     head = f"{row['scenario']:20} "
     if row["skipped"]:
         return f"{head}left out: {row['skipped']}"

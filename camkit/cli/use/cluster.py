@@ -36,6 +36,6 @@ def cluster_client(
 
 
 def _quiet() -> None:
-    """Keep dask's own messages from the terminal: what matters is told in camkit's words."""
+    """Keep dask's own messages from the terminal: camkit prints its own."""
     for name in ("distributed", "tornado.application"):
         logging.getLogger(name).setLevel(logging.CRITICAL)

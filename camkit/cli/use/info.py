@@ -82,7 +82,7 @@ def _describe_bundle(file: str) -> dict[str, Any]:
 
 
 def _laws_text(laws: dict[str, dict[str, Any]]) -> dict[str, dict[str, str]]:
-    """Return each law as one line: its worst number, what is admitted, whether it is kept."""
+    """Return each law as one line: its worst number, its limit, whether it is kept."""
     from camkit.bundle.facts import StatedLaw
     from camkit.runtime.proof.laws.law import number_text
 
@@ -141,7 +141,7 @@ def _lines(value: Any, indent: str) -> list[str]:
 
 
 def _shortened(value: Any) -> str:
-    """Return a value as text; of one that fills lines the beginning, --json has it all."""
+    """Return a value as text, shortened if it fills lines; --json has it all."""
     text = str(value)
     if len(text) <= LONGEST:
         return text

@@ -10,7 +10,7 @@ from camkit.kinds import KindOption, all_kinds
 
 
 def with_kind_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Return a command the options of every kind; they reach it as further keywords.
+    """Add the options of every kind to a command; they reach it as further keywords.
 
     Args:
         command: Its last parameter is **of_kind.

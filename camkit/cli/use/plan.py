@@ -15,7 +15,7 @@ def plan(**choices: Any) -> None:
 
 
 def _as_process() -> inspect.Signature:
-    """Return the signature of `process` without the options that say nothing about a plan."""
+    """Return the signature of `process` without the options that do not change a plan."""
     whole = inspect.signature(process)
     kept = [p for name, p in whole.parameters.items() if name not in NOT_PLANNED]
     return whole.replace(parameters=kept)

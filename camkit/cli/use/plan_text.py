@@ -30,7 +30,7 @@ def print_plans(
     *,
     as_json: bool,
 ) -> bool | None:
-    """Return what would be done with every input.
+    """Print the plans of all inputs.
 
     Returns:
         Whether all of it could be done; None where nothing matches.

@@ -1,4 +1,4 @@
-"""What `camkit simulate` does for cameras whose captures are no photographs."""
+"""`camkit simulate` for cameras whose captures are no photographs."""
 
 import json
 import math
@@ -70,7 +70,7 @@ def simulate_recorded(
 
 
 def light_of(photons: float | None, sbr: float | None, seed: int, bundle: "Bundle") -> Any:
-    """Return how much light there is, for cameras whose captures are no photographs; else None.
+    """Return the amount of light, for cameras whose captures are no photographs; else None.
 
     Raises:
         ContractError: If photons are stated of a camera that counts none.

@@ -194,7 +194,7 @@ def _check_truth(truth: Path | None, out: Path, bundle: "Bundle") -> None:
 def _exposed(
     scene: "FloatArray", sensor: "Sensor", options: "SimulationOptions", share: float | None
 ) -> "tuple[FloatArray, Saturation | None]":
-    """Return the scene to photograph with the options, and what of its picture saturates."""
+    """Return the scene with its exposure, and the share of its picture that saturates."""
     from camkit.runtime.twin.saturation import exposure_for_share, saturation_of
     from camkit.scenes.saturation import with_exposure
 
@@ -213,7 +213,7 @@ def _exposed(
 def _facts(
     out: Path, truth: Path | None, simulation: "Simulation", saturation: "Saturation | None"
 ) -> dict[str, Any]:
-    """Return what `--json` prints."""
+    """Return the object that `--json` prints."""
     height, width = simulation.samples.shape[-2:]
     facts = {
         "path": str(out),
@@ -234,7 +234,7 @@ def _metres(depth_mm: float | None) -> float | str | None:
 
 
 def _line(out: Path, simulation: "Simulation", saturation: "Saturation | None") -> str:
-    """Return what is printed for people; a saturation only where it was asked for."""
+    """Return the line for people; a saturation only where it was asked for."""
     from camkit.contracts import depth_name
 
     height, width = simulation.samples.shape[-2:]

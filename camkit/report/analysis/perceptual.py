@@ -46,9 +46,9 @@ def vgg_measure(weights: Path) -> Measure:
     """
     import torch
 
-    from camkit.models_def.kinds.bayer.fine_tuning.vgg import read_vgg
+    from camkit.models_def.training.adversarial.content import Conv33
 
-    network = read_vgg(weights)
+    network = Conv33(weights)
 
     def measure(first: FloatArray, second: FloatArray) -> Array:
         with torch.no_grad():

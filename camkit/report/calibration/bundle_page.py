@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import BayerSensor, PlanesSensor
+from camkit.calibration.peak import light_within
 from camkit.contracts import FrozenPsf
 from camkit.report.calibration.lensfun_page import POINTS, half_diagonal_mm, placed_along
 from camkit.report.calibration.page import Section, Table, sentences, to_html
 from camkit.report.figure import GRID_COLOR, channel_color, new_figure, to_png
 from camkit.runtime.bank.psf import color_kernels
-from camkit.runtime.calibration.peak import light_within
 from camkit.runtime.geometry.distortion import reference_channel
 from camkit.units import to_mm
 

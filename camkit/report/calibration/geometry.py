@@ -1,5 +1,7 @@
 """The sections of the page of a camera's geometry."""
 
+from camkit.calibration.geometry.adjustment import rms
+from camkit.calibration.geometry.geometry import Geometry
 from camkit.report.calibration.geometry_charts import (
     draw_coverage,
     draw_distortion,
@@ -8,8 +10,6 @@ from camkit.report.calibration.geometry_charts import (
     enlargement,
 )
 from camkit.report.calibration.page import Section, Table, sentences
-from camkit.runtime.calibration.geometry.adjustment import rms
-from camkit.runtime.calibration.geometry.geometry import Geometry
 
 
 def geometry_sections(found: Geometry) -> list[Section]:

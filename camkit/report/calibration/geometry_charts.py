@@ -4,11 +4,11 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from camkit.calibration.geometry.adjustment import rms
+from camkit.calibration.geometry.camera_model import FloatGrid
+from camkit.calibration.geometry.coverage import seen_cells
+from camkit.calibration.geometry.geometry import Geometry
 from camkit.report.figure import GRID_COLOR, new_figure, to_png
-from camkit.runtime.calibration.geometry.adjustment import rms
-from camkit.runtime.calibration.geometry.camera import FloatGrid
-from camkit.runtime.calibration.geometry.coverage import seen_cells
-from camkit.runtime.calibration.geometry.geometry import Geometry
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.bundle.sensor import Extent
+from camkit.calibration.lensfun.entry import Entry
+from camkit.calibration.lensfun.ordinary import LensBundle
 from camkit.contracts import RadialDistortion
 from camkit.report.calibration.page import Section, Table, sentences, to_html
 from camkit.report.figure import GRID_COLOR, new_figure, to_png
-from camkit.runtime.calibration.lensfun.entry import Entry
-from camkit.runtime.calibration.lensfun.ordinary import LensBundle
 from camkit.runtime.geometry.distortion import distort_points
 from camkit.units import to_mm
 

@@ -4,9 +4,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from camkit.calibration.noise.sensor_noise import IsoFacts, NoiseFacts
 from camkit.report.calibration.page import Section, Table, sentences, to_html
 from camkit.report.figure import CHANNEL_COLORS, GRID_COLOR, field_color, new_figure, to_png
-from camkit.runtime.calibration.noise.measure import IsoFacts, NoiseFacts
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -4,10 +4,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from camkit.calibration.display.pairs import Pairs
+from camkit.calibration.display.primaries import Primaries
 from camkit.report.calibration.page import Section, Table, sentences, to_html
 from camkit.report.figure import GRID_COLOR, new_figure, to_png
-from camkit.runtime.calibration.display.pairs import Pairs
-from camkit.runtime.calibration.display.primaries import Primaries
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -4,10 +4,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from camkit.calibration.measured import ColourFacts, MeasuredPsf
+from camkit.calibration.peak import PEAK_PX, light_within
 from camkit.report.calibration.page import Section, Table, sentences, to_html
 from camkit.report.figure import CHANNEL_COLORS, GRID_COLOR, new_figure, to_png
-from camkit.runtime.calibration.measured import ColourFacts, MeasuredPsf
-from camkit.runtime.calibration.peak import PEAK_PX, light_within
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Final
 import cv2
 import numpy as np
 
+from camkit.calibration.display.targets import Codes, Target, Targets
 from camkit.report.calibration.page import Section, Table, to_html
 from camkit.report.figure import new_figure, to_png
-from camkit.runtime.calibration.display.targets import Codes, Target, Targets
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -4,9 +4,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from camkit.calibration.tone import ToneFacts
 from camkit.report.calibration.page import Section, Table, sentences, to_html
 from camkit.report.figure import GRID_COLOR, new_figure, to_png
-from camkit.runtime.calibration.tone import ToneFacts
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -20,7 +20,7 @@ from camkit.models_def.optics.diffraction.shares import (
     with_reach,
 )
 from camkit.models_def.optics.diffraction.wave import strehl
-from camkit.models_def.sensors.psf import wavelength_weights
+from camkit.runtime.bank.psf import wavelength_weights
 from camkit.units import MM_PER_M
 
 WAVELENGTHS: Final = 13

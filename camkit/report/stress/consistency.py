@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.report.stress.shot import Shot
-from camkit.runtime.geometry.scatter import scatter, scatter_light
+from camkit.runtime.geometry.field_blur import scatter, scatter_light
 from camkit.runtime.geometry.shrink import shrunk
 from camkit.runtime.twin.exposure import sample_planes, variance_of
-from camkit.runtime.twin.haze import hazed, margin_px
+from camkit.runtime.twin.haze_spread import hazed, margin_px
 from camkit.runtime.twin.light import Lens, lit_core
 
 LIMIT: Final = 1.3

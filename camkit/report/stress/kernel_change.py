@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from camkit.contracts import FloatArray
-from camkit.runtime.twin.haze import HazeLens
+from camkit.runtime.twin.haze_spread import HazeLens
 from camkit.runtime.twin.light import KernelChange, Lens, with_kernels
 
 

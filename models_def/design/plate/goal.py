@@ -1,10 +1,10 @@
-"""Where the light of a plate should go: a share to the core, a share to the streaks.
+"""The goal of a plate: the shares of the light that should go to the core and to the streaks.
 
 The thesis wants 94 % of the light in the core and 6 % in the streaks. No lens has 100 % of its
-light in the core, and its own halo lies in the streaks' place too: shares are counted against the
-bare lens, colour by colour. A plate that leaves the light where the bare lens has it, but for
-6 % written to the streaks, meets the goal; but phases turn faster in blue than in red, so no plate
-meets it in every colour.
+light in the core, and its own halo overlaps the streaks: so shares are counted against the bare
+lens, colour by colour. A plate meets the goal if it moves 6 % of the bare lens's light to the
+streaks and leaves the rest in place. Phases turn faster in blue than in red, so no plate meets the
+goal in every colour.
 """
 
 import itertools
@@ -51,7 +51,7 @@ class Goal:
     lengths: int = 1
 
     def __post_init__(self) -> None:
-        """Refuse a goal that is none.
+        """Refuse values that are no goal.
 
         Raises:
             ContractError: If so.
@@ -90,7 +90,7 @@ class Masks:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reached:
-    """What a PSF has of the goal, by colour.
+    """The shares of the goal that a PSF reaches, by colour.
 
     Attributes:
         core_share: Of the bare lens's core, left.
@@ -143,7 +143,7 @@ def masks_of(goal: Goal, side_px: int) -> Masks:
 
 
 def goal_loss(light: Tensor, bare: Tensor, masks: Masks, goal: Goal) -> Tensor:
-    """Return how far the PSF of a colour is from the goal.
+    """Return the distance of a colour's PSF from the goal.
 
     Args:
         light: (side, side), shares of the light.
@@ -163,7 +163,7 @@ def goal_loss(light: Tensor, bare: Tensor, masks: Masks, goal: Goal) -> Tensor:
 
 
 def reached(light: Tensor, bare: Tensor, masks: Masks) -> Reached:
-    """Return what PSFs (colour, side, side) have of the goal.
+    """Return the shares of the goal that PSFs (colour, side, side) reach.
 
     What is written is what lies in the streaks beyond the bare lens's light there, which sinks as
     its core does.

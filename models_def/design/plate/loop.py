@@ -56,7 +56,7 @@ class PlateLoop:
     def __init__(
         self, recipe: PlateRecipe, made: HeightMap, reader: PlateReader | None = None
     ) -> None:
-        """Make ready.
+        """Prepare the loop.
 
         Args:
             recipe: What is wanted.
@@ -81,7 +81,7 @@ class PlateLoop:
         self._optimizer = torch.optim.Adam(self.made.parameters(), lr=recipe.schedule.rate)
 
     def run(self, until: int | None = None, seconds: float = math.inf) -> Iterator[Moment]:
-        """Go on to a step (the last by default) or for a time, giving every logged moment.
+        """Run up to a step (the last by default) or for a time, yielding every logged moment.
 
         The step that is under way when the time ends is finished, and logged.
         """
@@ -105,7 +105,7 @@ class PlateLoop:
         self.step += 1
 
     def _read(self, made: Tensor) -> Tensor | None:
-        """Let the network take its steps; give the slopes (colour, side, side) of its loss."""
+        """Train the network for its steps; return the slopes (colour, side, side) of its loss."""
         if self.reader is None:
             return None
         progress = self.step / self.recipe.schedule.steps
@@ -134,7 +134,7 @@ class PlateLoop:
         self._optimizer.step()
 
     def judge(self, seconds: float = 0.0) -> Moment:
-        """Look at the present map, made without errors; the best are kept."""
+        """Evaluate the present map, made without errors; the best are kept."""
         with torch.no_grad():
             made = self._etched(self.made(), ())
             light = self._lights(made)
@@ -191,7 +191,7 @@ class PlateLoop:
         return tuple((schedule.depth_error * drawn).tolist())
 
     def take_best(self) -> None:
-        """Put the best map in place, and the network that read it then."""
+        """Restore the best map, and the network that read it then."""
         self.made.load_state_dict(self.best)
         if self.reader is not None:
             self.reader.take_average(self.best_network)
@@ -210,7 +210,7 @@ class PlateLoop:
         return state
 
     def load(self, state: State) -> None:
-        """Go on from a state."""
+        """Restore a saved state."""
         self.step, self.best_loss = state["step"], state["best_loss"]
         self.best = state["best"]
         self.made.load_state_dict(state["map"])

@@ -85,7 +85,7 @@ def _map_of_plate(recipe: PlateRecipe, folder: Path | None) -> HeightMap:
 
 
 def _own_map(plate: Plate) -> HeightMap | None:
-    """Return the map that a plate is made by, if it is by few numbers."""
+    """Return the map by which a plate is made, if it has few numbers."""
     if plate.numbers is not None:
         return map_of(plate.numbers)
     if isinstance(plate.pattern, CrossPattern):

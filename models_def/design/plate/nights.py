@@ -17,7 +17,7 @@ from camkit.models_def.design.plate.recording import Pixels
 from camkit.models_def.kinds.hdr.recipe import HdrRecipe
 from camkit.models_def.kinds.hdr.samples import draw_corner
 from camkit.models_def.kinds.hdr.scenes import NIGHT_SEED, exposed
-from camkit.scenes.night import night_scene
+from camkit.runtime.kinds.hdr.night import night_scene
 
 TRAIN_SEED: Final = NIGHT_SEED
 VALID_SEED: Final = 4_000_000
@@ -31,7 +31,7 @@ Generator = np.random.Generator
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Patches:
-    """What is photographed in a step.
+    """The photographed patches of a step.
 
     Attributes:
         sharp: (b, 3, p + n - 1, p + n - 1) white-balanced camera space, for a PSF of n pixels.
@@ -62,7 +62,7 @@ class Night:
 
     @property
     def sharp(self) -> FloatArray:
-        """Return what may be a patch."""
+        """Return the part of the scene that patches are cut from."""
         inner = slice(self.margin_px, self.light.shape[1] - self.margin_px)
         return self.light[:, inner, inner].astype(np.float32)
 
@@ -73,7 +73,7 @@ class Nights:
     def __init__(
         self, camera: HdrRecipe, *, first_seed: int, count: int, scene_px: int, psf_px: int
     ) -> None:
-        """Make ready.
+        """Prepare the scenes.
 
         Args:
             camera: Its sensor, how much saturates, its ISO; `data.sample_px` is a patch's side.

@@ -44,7 +44,7 @@ State = dict[str, Any]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Picture:
-    """How fixed patches are read.
+    """The result of reading fixed patches.
 
     Attributes:
         loss: Eq. (5.11).
@@ -69,7 +69,7 @@ class PlateReader:
         seed: int,
         first: FirstWeights | None = None,
     ) -> None:
-        """Make ready.
+        """Prepare network, captures and fitter.
 
         Args:
             chosen: Of the recipe of the plate.
@@ -101,7 +101,7 @@ class PlateReader:
         self.fitter = Fitter(self._entry, build_network, "cpu", first)
 
     def follow(self, light: Tensor, step: int, progress: float) -> tuple[Tensor, float]:
-        """Take the network's steps behind the present plate.
+        """Train the network for its steps behind the present plate.
 
         Args:
             light: (3, n, n) PSFs, shares of the light.
@@ -157,7 +157,7 @@ class PlateReader:
         return self.fitter.average()
 
     def take_average(self, state: State) -> None:
-        """Put averaged weights in place."""
+        """Load averaged weights."""
         self.fitter.averaged.load_state_dict(state)
 
     def state(self) -> State:
@@ -169,7 +169,7 @@ class PlateReader:
         }
 
     def load(self, state: State) -> None:
-        """Go on from a state."""
+        """Restore a saved state."""
         self.fitter.load(state["weights"], state["average"], state["optimizer"])
 
 

@@ -1,4 +1,4 @@
-"""What a recipe of a plate says of the network that reads its pictures: the table [reader]."""
+"""The table [reader] of a plate's recipe: the network that reads the pictures of the plate."""
 
 from dataclasses import dataclass
 

@@ -21,7 +21,7 @@ _KEYS: Final = {"name", "glass", "cells", *_TABLES}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MapRecipe:
-    """What is free, and where it begins.
+    """The free numbers of a map, and their start.
 
     Attributes:
         kind: full (every cell), rank, gratings, zernike or radial.
@@ -62,7 +62,7 @@ class MapRecipe:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlatePixels:
-    """Where light is judged.
+    """The pixels on which light is judged.
 
     Attributes:
         pitch_um: Of the pixels.
@@ -78,7 +78,7 @@ class PlatePixels:
     samples: int = 3
 
     def __post_init__(self) -> None:
-        """Refuse pixels that are none.
+        """Refuse values that are no pixels.
 
         Raises:
             ContractError: If so.
@@ -92,7 +92,7 @@ class PlatePixels:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlateSchedule:
-    """How a design runs.
+    """The schedule of a design.
 
     Attributes:
         steps: In all.
@@ -152,7 +152,7 @@ def read_plate_recipe(path: Path) -> PlateRecipe:
 
 
 def to_plate_recipe(table: Mapping[str, Any]) -> PlateRecipe:
-    """Turn a parsed TOML table into a recipe; raises ContractError as `read_plate_recipe` does."""
+    """Convert a parsed TOML table to a recipe; raises ContractError as `read_plate_recipe` does."""
     check_keys("plate recipe", table, _KEYS)
     for key in ("name", "cells", "bench", "map"):
         if key not in table:
@@ -179,7 +179,7 @@ def to_plate_recipe(table: Mapping[str, Any]) -> PlateRecipe:
 def with_plate_choices(
     recipe: PlateRecipe, *, steps: int | None = None, seed: int | None = None
 ) -> PlateRecipe:
-    """Return the recipe with what a caller chose instead; None keeps what it says."""
+    """Return the recipe with a caller's choices; None keeps the value of the recipe."""
     changes = {"steps": steps, "seed": seed}
     chosen = {key: value for key, value in changes.items() if value is not None}
     return replace(recipe, schedule=replace(recipe.schedule, **chosen))  # type: ignore[arg-type]

@@ -1,7 +1,8 @@
-"""What a sensor with a mosaic makes of light, with gradients: eq. (5.2) of the thesis.
+"""Exposure of a sensor with a mosaic, with gradients: eq. (5.2) of the thesis.
 
 Twin of `camkit.models_def.sensors.exposure.expose`, with photons as Gaussian noise and without
-rounding. What is clipped passes no gradient on: a plate must not be told that it could still see.
+rounding. Clipped samples pass no gradient on: a design must not learn from light that the sensor
+cannot see.
 """
 
 from dataclasses import dataclass

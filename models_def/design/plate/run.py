@@ -26,7 +26,7 @@ FORMAT: Final = 1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlateRunOptions:
-    """Where and how a design runs.
+    """The files and the options of a design.
 
     Attributes:
         out: The plate (.toml); its heights, checkpoint (.pt) and log (.jsonl) lie beside it.
@@ -49,7 +49,7 @@ class PlateRun:
     """A design with its files."""
 
     def __init__(self, recipe: PlateRecipe, options: PlateRunOptions) -> None:
-        """Make ready; nothing is written before the first logged moment.
+        """Prepare the run; nothing is written before the first logged moment.
 
         Raises:
             ContractError: If there is an earlier run and neither resume nor overwrite is asked
@@ -89,7 +89,7 @@ class PlateRun:
         )
 
     def go(self) -> Iterator[Moment]:
-        """Run, giving every logged moment, the beginning included, after it is on disk."""
+        """Run, yielding every logged moment, the beginning included, after it is on disk."""
         begin, cpu = time.monotonic(), time.process_time()
         before_s, before_cpu_s = self._spent_s, self._spent_cpu_s
         self.options.out.parent.mkdir(parents=True, exist_ok=True)
@@ -147,7 +147,7 @@ class PlateRun:
         self.loop.load(table)
 
     def finish(self) -> dict[str, Any]:
-        """Put the best map in place, write the plate, and tell what became of the run."""
+        """Restore the best map, write the plate, and return a report on the run."""
         self.loop.take_best()
         made = self.loop.made
         with torch.no_grad():
@@ -189,7 +189,7 @@ class PlateRun:
 
 
 def _told(moment: Moment) -> dict[str, float]:
-    """Return what the reader makes of fixed patches; nothing without one."""
+    """Return the reader's results on fixed patches; nothing without one."""
     if moment.picture is None:
         return {}
     found = moment.picture

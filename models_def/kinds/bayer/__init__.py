@@ -5,7 +5,7 @@ recipe                 what a person edits beside the common tables
 psf_bank, lens_bank    kernels of the frozen PSF and of fabricated copies
 material               both, as samples need them
 samples                scenes photographed, filtered and stabilised
-frames/                the same of a lens with a haze, cut from whole frames
+frames/                the same of a lens with a haze, cut from whole frames: PREPARING
 validation             what a run is chosen by
 training               all of it as the trainer asks for it: PART
 bank_fit               the numbers of a bank that restores colours together: BANK_FITTING
@@ -16,6 +16,7 @@ fitting                by what a picture looks like, and against a critic: FITTI
 from camkit.models_def.kinds.bayer.bank_fit import BANK_FITTING
 from camkit.models_def.kinds.bayer.fine_tuning.refinement import REFINING
 from camkit.models_def.kinds.bayer.fitting import FITTING
+from camkit.models_def.kinds.bayer.frames.preparation import PREPARING
 from camkit.models_def.kinds.bayer.training import PART
 
-__all__ = ["BANK_FITTING", "FITTING", "PART", "REFINING"]
+__all__ = ["BANK_FITTING", "FITTING", "PART", "PREPARING", "REFINING"]

@@ -42,7 +42,7 @@ from camkit.models_def.sensors.stabilise import stabilise
 from camkit.models_def.sensors.together import Numbers, restore_together
 from camkit.models_def.sensors.wiener import block_facts, to_otf, wiener_restore
 from camkit.models_def.training.bank_fitting import BankFit, BankFitOptions
-from camkit.models_def.training.pictures import open_source
+from camkit.models_def.training.pictures import open_scenes
 from camkit.progress import counted
 
 FREQUENCIES: Final = (0.0, 0.015, 0.03, 0.05, 0.075, 0.1, 0.14, 0.18, 0.23, 0.3, 0.4, 0.75)
@@ -77,7 +77,7 @@ Tell = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Case:
-    """A sample as the bank meets it."""
+    """A sample as the input of the bank."""
 
     planes: Tensor
     otf: Tensor
@@ -130,7 +130,7 @@ def _known(
 
 
 def transfer_errors(bank: PsfBank, recipe: BayerRecipe) -> tuple[float, ...]:
-    """Return how far the transfer of every copy lies off the frozen one, those to train on first.
+    """Return the error of every copy's transfer against the frozen one, training copies first.
 
     Root of the mean |H_copy - H|^2 over that of |H_copy|^2, below 0.3 cycles per pixel, over all
     fields and colours (and depths of a copy); tools/comparison/copies.py has it of frozen PSFs.
@@ -220,12 +220,7 @@ def _told(errors: Sequence[float]) -> str:
 def _photographed(
     recipe: BayerRecipe, bank: PsfBank, pictures: Path | None, count: int, seed: int
 ) -> Sequence[Developed]:
-    source = open_source(
-        pictures,
-        picture_share=recipe.data.picture_share,
-        scenes=recipe.data.procedural_scenes,
-        scene_px=recipe.data.scene_px,
-    )
+    source = open_scenes(recipe.data, pictures)
     shots = []
     for index in counted(range(count), "photographing", "samples"):
         rng = np.random.default_rng((seed, index))
@@ -343,7 +338,7 @@ def _rounded(first: Together, values: Tensor) -> Together:
 
 
 def _check_folder(prescription: str, options: BankFitOptions) -> None:
-    """Refuse to part a recipe from a lens file that it names by a path relative to itself."""
+    """Refuse a folder in which a relative path of the recipe to its lens would break."""
     own, other = options.recipe_folder.resolve(), options.output_folder
     if other is None or other.resolve() == own or Path(prescription).is_absolute():
         return

@@ -8,8 +8,8 @@ from camkit.models_def.kinds.bayer.fine_tuning.refinement import trace_recipe_di
 from camkit.models_def.kinds.bayer.material import BayerMaterial
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.networks.catalog import build_network
+from camkit.models_def.training.adversarial.fitter import Mix
 from camkit.models_def.training.adversarial.fitting import picture_fitting
-from camkit.models_def.training.adversarial.judged import Mix
 from camkit.models_def.training.fitting import FitRequest, OwnFitting
 
 

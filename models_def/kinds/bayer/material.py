@@ -1,4 +1,4 @@
-"""What the samples of a camera behind a mosaic are made with: the kernels of its lens."""
+"""The material for samples of a camera behind a mosaic: the kernels of its lens."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -36,7 +36,7 @@ class BayerMaterial:
         return self.bank.digest() if self.frames is None else self.frames.digest()
 
     def write(self, folder: Path) -> None:
-        """Write for another process the kernels, or where the frames lie."""
+        """Write the kernels for another process, or the path of the frames."""
         if self.frames is None:
             write_bank(folder / BANK, self.bank)
         else:
@@ -45,7 +45,7 @@ class BayerMaterial:
 
 
 def read_material(folder: Path) -> BayerMaterial:
-    """Read what `BayerMaterial.write` wrote."""
+    """Read a file of `BayerMaterial.write`."""
     place = folder / PLACE
     if not place.is_file():
         return BayerMaterial(bank=read_bank(folder / BANK))
@@ -58,7 +58,7 @@ def _of_frames(folder: Path, recipe: BayerRecipe | None = None) -> BayerMaterial
 
 
 def trace_material(recipe: BayerRecipe, recipe_folder: Path, cache_folder: Path) -> BayerMaterial:
-    """Trace the lens that a recipe names (about a minute), or read what was traced before.
+    """Trace the lens that a recipe names (about a minute), or read an earlier trace.
 
     Of a lens with a haze the frames are read, which `camkit prepare` photographed.
 

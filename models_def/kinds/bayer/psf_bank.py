@@ -17,7 +17,7 @@ from torch import Tensor
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.models_def.sensors.psf import FieldKernels
+from camkit.models_def.sensors.psf import turned_at
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,12 +62,12 @@ class PsfBank:
 
     @property
     def radius_px(self) -> int:
-        """How far the kernels of the copies reach."""
+        """Return the radius of the copies' kernels."""
         return int(max(self.copies.shape[-2:])) // 2
 
     @property
     def training_copies(self) -> int:
-        """How many copies may be trained on, each depth of a copy counted."""
+        """Return the number of copies for training, each depth of a copy counted."""
         return int(self.copies.shape[0]) - self.depths * self.validation_copies
 
     def blur_kernels(self, copy: int, x_mm: float, y_mm: float) -> Tensor:
@@ -133,7 +133,7 @@ def write_bank(path: Path, bank: PsfBank) -> None:
 
 
 def read_bank(path: Path) -> PsfBank:
-    """Read what `write_bank` wrote."""
+    """Read a file of `write_bank`."""
     with np.load(path, allow_pickle=False) as arrays:
         depths = int(arrays["depths"]) if "depths" in arrays else 1
         unseen = int(arrays["validation_copies"]) if "validation_copies" in arrays else 1
@@ -144,7 +144,4 @@ def read_bank(path: Path) -> PsfBank:
 
 def _at(kernels: FloatArray, heights_mm: NDArray[np.float64], x_mm: float, y_mm: float) -> Tensor:
     place = (torch.tensor([x_mm], dtype=torch.float64), torch.tensor([y_mm], dtype=torch.float64))
-    fields = FieldKernels(
-        kernels=torch.from_numpy(kernels), field_heights_mm=torch.from_numpy(heights_mm)
-    )
-    return fields.at(*place)
+    return turned_at(torch.from_numpy(kernels), torch.from_numpy(heights_mm), *place)

@@ -45,7 +45,7 @@ _OLDER: Final = {"final": "fine_tuning"}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LensRecipe:
-    """The lens and how far its copies vary.
+    """The lens and the variation of its copies.
 
     Attributes:
         prescription: Name of a built-in lens, or path of a file (.toml, .zmx) relative to the
@@ -93,14 +93,14 @@ class LensRecipe:
         return self.depths_mm[turn % len(self.depths_mm)] if self.depths_mm else None
 
     def to_json(self) -> dict[str, Any]:
-        """Return what decides the kernels, to name files by; what is as usual is left out."""
+        """Return the values that decide the kernels, to name files by, without defaults."""
         usual = {"depths_mm": (), "validation_copies": 1, "bank_in_focus": False}
         return {name: value for name, value in asdict(self).items() if value != usual.get(name)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BayerDataRecipe(DataRecipe):
-    """How training samples are made.
+    """The settings of training samples.
 
     Attributes:
         margin_px: Simulated surroundings of a sample that the Wiener filter sees.
@@ -185,7 +185,7 @@ class BayerDataRecipe(DataRecipe):
             raise ContractError("scenes are shown by data.display or lit by data.wild, not both")
 
     def to_json(self) -> dict[str, Any]:
-        """Return what decides samples, to name files by; what is not asked for is left out."""
+        """Return the values that decide samples, to name files by, without unused ones."""
         later = ("display", "wild", "patch_share", "designed_share", "light_share")
         absent = {name for name in later if not getattr(self, name)}
         return {name: value for name, value in asdict(self).items() if name not in absent}
@@ -201,7 +201,7 @@ class BayerDataRecipe(DataRecipe):
         )
 
     def lit(self, rng: np.random.Generator, scene: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the light of a (3, h, w) scene, and what it should become.
+        """Return the light of a (3, h, w) scene, and its target.
 
         Draws only where a recipe asks for it: others keep their samples.
         """
@@ -213,7 +213,7 @@ class BayerDataRecipe(DataRecipe):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FramesRecipe:
-    """How whole frames are photographed, which tiles are cut from.
+    """The settings of whole frames, which tiles are cut from.
 
     A frame is a scene of the whole sensor, put together from crops of pictures and drawn scenes;
     every shot of it has an ISO of its own.
@@ -348,7 +348,7 @@ class BayerRecipe(Recipe):
 
     @property
     def tells_depth(self) -> bool:
-        """Return whether filters of samples have the kernels of one depth, at least of some."""
+        """Return whether the filters of some samples have the kernels of one depth."""
         return self.estimates_depth or self.data.known_depth_share > 0
 
     def _check_hazy_depths(self) -> None:
@@ -376,7 +376,7 @@ class BayerRecipe(Recipe):
 
 
 def to_bayer_recipe(table: Mapping[str, Any]) -> BayerRecipe:
-    """Turn a parsed TOML table into a recipe.
+    """Convert a parsed TOML table to a recipe.
 
     Raises:
         ContractError: If a key is unknown, missing or wrong, the sensor has no mosaic, or there are

@@ -55,7 +55,7 @@ Sides = tuple[bool, bool, bool, bool]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Exposure:
-    """Where, how and with which copy of the camera a sample is taken.
+    """The settings of a sample: the place, the light, and the copy of the camera.
 
     Attributes:
         x_mm: Position on the sensor, to the right of the axis.
@@ -91,7 +91,7 @@ class Exposure:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shot:
-    """A finished sample and what its front end knew.
+    """A finished sample and the facts that its front end used.
 
     Attributes:
         sample: Stabilised capture, Wiener planes and sharp planes, (3, s, s) each.
@@ -106,7 +106,7 @@ class Shot:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Circumstances:
-    """What the front end knows of a sample.
+    """The facts of a sample that the front end uses.
 
     Attributes:
         noise: After white balance.
@@ -197,7 +197,7 @@ def draw_exposure(rng: Generator, recipe: BayerRecipe, bank: PsfBank) -> Exposur
 
 
 def told_depth(recipe: BayerRecipe, copy: int, error: float = 0.0) -> float:
-    """Return the number of the depth that a filter is told of a copy.
+    """Return the number of the depth that a filter assumes for a copy.
 
     Args:
         recipe: Its lens has several depths.
@@ -211,12 +211,12 @@ def told_depth(recipe: BayerRecipe, copy: int, error: float = 0.0) -> float:
 
 
 def layout_of(recipe: BayerRecipe) -> SampleLayout:
-    """Return what the samples of a recipe hold."""
+    """Return the layout of a recipe's samples."""
     return LAYOUT if recipe.light is None else replace(LAYOUT, masks=(KEPT,))
 
 
 def finish_of(recipe: BayerRecipe) -> Finish | None:
-    """Return what the runtime does behind the network; None where its light is not bounded."""
+    """Return the stage that follows the network; None where its light is not bounded."""
     bound = recipe.light
     if bound is None:
         return None
@@ -404,7 +404,7 @@ def finish_shot(developed: Developed, recipe: BayerRecipe, restored: Tensor | No
 
 
 def target_of(developed: Developed, recipe: BayerRecipe) -> Tensor:
-    """Return (1, 3, s, s) what a sample should become, stabilised; NOT_JUDGED if unknown."""
+    """Return (1, 3, s, s) the target of a sample, stabilised; NOT_JUDGED if unknown."""
     data, given = recipe.data, developed.given
     shot, read = torch.tensor(given.noise.shot), torch.tensor(given.noise.read_variance)
     bright = developed.true.clamp(max=data.target_max)
@@ -426,7 +426,7 @@ def _drifted(kernels: Tensor, size: float, turn: float) -> Tensor:
 
 
 def _lost(true: Tensor, unknown: Tensor, gains: tuple[float, float, float]) -> Tensor:
-    """Mark (1, 1, s, s) highlights that clipped: nobody can tell how bright they were."""
+    """Mark (1, 1, s, s) highlights that clipped: their light is unknown."""
     if not bool(unknown.any()):
         return unknown
     raw_peak = (true / torch.tensor(gains).reshape(1, 3, 1, 1)).amax(1, keepdim=True)
@@ -436,7 +436,7 @@ def _lost(true: Tensor, unknown: Tensor, gains: tuple[float, float, float]) -> T
 
 
 def _blur(sharp: Tensor, kernels: Tensor, radius_px: int) -> Tensor:
-    """Spread each pixel with its colour's kernel; keep what the crop fully determines."""
+    """Blur each pixel with its colour's kernel; keep what the crop fully determines."""
     size = (sharp.shape[-2], sharp.shape[-1])
     spread = torch.fft.irfft2(torch.fft.rfft2(sharp) * to_otf(kernels, size), s=size)
     r = radius_px
@@ -451,7 +451,7 @@ def _develop(
     recipe: BayerRecipe,
     borders: Sides,
 ) -> tuple[Tensor, Tensor]:
-    """White-balance and demosaic; give (1, 3, h, w) planes and (1, 1, h, w) clipped pixels.
+    """White-balance and demosaic; return (1, 3, h, w) planes and (1, 1, h, w) clipped pixels.
 
     Where the picture ends, what lies beyond is cut before the demosaic and mirrored afterwards.
     """

@@ -1,4 +1,4 @@
-"""What scenes are lit by: a display that shows them, or daylight and lights beyond white.
+"""The light of scenes: a display that shows them, or daylight and lights beyond white.
 
     picture -> codes of a display -> its light            a laboratory: `DisplayRecipe`
     scene -> daylight of another colour -> a wider range  outside of it: `WildRecipe`
@@ -85,12 +85,12 @@ class DisplayRecipe:
         return np.asarray(np.linalg.inv(rgb_to_xyz(REC709_PRIMARIES, D65)) @ own)
 
     def codes(self, picture: FloatArray) -> FloatArray:
-        """Return what the display is told, 0..1 in steps, of linear Rec.709."""
+        """Return the input of the display, 0..1 in steps, of linear Rec.709."""
         top = np.float32(2**self.bits - 1)
         return np.asarray(np.rint(encode_srgb(picture) * top) / top, dtype=np.float32)
 
     def shown(self, picture: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Show a picture.
+        """Compute the light of a shown picture.
 
         Args:
             picture: (3, h, w) linear Rec.709; what lies outside 0..1 is cut.
@@ -171,7 +171,7 @@ def daylight(kelvin: float) -> Matrix:
 
 
 def with_range(scene: FloatArray, times: float) -> FloatArray:
-    """Make the white of a (3, h, w) scene so many times as bright; colours stay."""
+    """Scale the white of a (3, h, w) scene by a factor; colours stay."""
     bright = np.clip(np.einsum("c,cij->ij", LUMINANCE.astype(np.float32), scene), 0, 1)
     return np.asarray(scene * (1 + np.float32(times - 1) * bright ** np.float32(RANGE_POWER)))
 

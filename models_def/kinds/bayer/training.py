@@ -42,7 +42,7 @@ from camkit.models_def.kinds.bayer.samples import (
 from camkit.models_def.kinds.bayer.validation import BayerJudge, make_validation_captures
 from camkit.models_def.networks.catalog import build_network
 from camkit.models_def.training.kind import Design, SampleMaker
-from camkit.models_def.training.pictures import SceneSource, open_source
+from camkit.models_def.training.pictures import open_scenes
 from camkit.models_def.training.sample import Finish, Sample, SampleLayout
 
 FAILS_ON: Final = (
@@ -62,13 +62,7 @@ class BayerMaker:
         self, recipe: BayerRecipe, bank: PsfBank, pictures: Path | None, seed: int
     ) -> None:
         self._recipe, self._bank, self._seed = recipe, bank, seed
-        self._source: SceneSource = open_source(
-            pictures,
-            picture_share=recipe.data.picture_share,
-            scenes=recipe.data.procedural_scenes,
-            scene_px=recipe.data.scene_px,
-            drawn=recipe.data.drawn,
-        )
+        self._source = open_scenes(recipe.data, pictures, drawn=recipe.data.drawn)
 
     def developed(self, index: int) -> Developed:
         """Photograph a crop of a scene, and develop it."""
@@ -86,15 +80,8 @@ class BayerMaker:
 class BayerTraining:
     """Fulfils `camkit.models_def.training.kind.TrainingKind`."""
 
-    @property
-    def roles(self) -> tuple[str, ...]:
-        """One network, behind the Wiener bank."""
-        return ROLES
-
-    @property
-    def camera_parts(self) -> tuple[str, ...]:
-        """What says which camera a recipe describes."""
-        return CAMERA_PARTS
+    roles: Final = ROLES
+    camera_parts: Final = CAMERA_PARTS
 
     def to_recipe(self, table: Mapping[str, Any]) -> BayerRecipe:
         """Check the tables of a recipe."""
@@ -133,12 +120,12 @@ class BayerTraining:
         return build_network(name, **config)
 
     def layout(self, recipe: BayerRecipe, role: str) -> SampleLayout:
-        """Capture and Wiener planes in, clean planes out."""
+        """Return the layout: capture and Wiener planes in, clean planes out."""
         del role
         return layout_of(recipe)
 
     def finish(self, recipe: BayerRecipe, role: str) -> Finish | None:
-        """Take back the light that a network may not move."""
+        """Return the stage that removes light that a network may not move."""
         del role
         return finish_of(recipe)
 
@@ -153,7 +140,7 @@ class BayerTraining:
         return read_material(folder)
 
     def samples_digest(self, recipe: BayerRecipe, role: str, seed: int) -> str:
-        """Hash what decides the samples."""
+        """Hash the values that decide the samples."""
         del role
         return samples_digest(recipe, seed)
 

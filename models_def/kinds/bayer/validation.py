@@ -25,7 +25,7 @@ from camkit.models_def.kinds.bayer.samples import (
     told_depth,
 )
 from camkit.models_def.sensors.stabilise import unstabilise
-from camkit.models_def.training.kind import Restorer, Score
+from camkit.models_def.training.kind import Restorer, Score, mean_score
 from camkit.models_def.training.pictures import SCENE_SEED, list_pictures, read_picture, to_linear
 from camkit.scenes import procedural_scene
 
@@ -68,7 +68,7 @@ class BayerJudge:
         }
 
     def score(self, restore: Restorer) -> Score:
-        """Judge a restoration by its mean PSNR in dB on sRGB values, by ISO and field height."""
+        """Compute the mean PSNR of a restoration in dB on sRGB values, by ISO and field height."""
         return score(self.captures, self.recipe, restore)
 
 
@@ -139,7 +139,7 @@ def _exposure(recipe: BayerRecipe, bank: PsfBank, share: float, iso: float, turn
 
 
 def score(captures: Sequence[ValidationCapture], recipe: BayerRecipe, restore: Restorer) -> Score:
-    """Judge a restoration.
+    """Compute the scores of a restoration.
 
     Args:
         captures: From `make_validation_captures`.
@@ -154,14 +154,14 @@ def score(captures: Sequence[ValidationCapture], recipe: BayerRecipe, restore: R
         values = [
             _psnr(capture, recipe, _restored(capture, recipe, restore)) for capture in captures
         ]
-    isos, shares = sorted({c.iso for c in captures}), sorted({c.field_share for c in captures})
-    by_iso = {f"{iso:g}": _mean(values, [c.iso == iso for c in captures]) for iso in isos}
-    by_field = {f"{f:g}": _mean(values, [c.field_share == f for c in captures]) for f in shares}
-    parts = {"by_iso": by_iso, "by_field": by_field}
-    copies = sorted({c.copy for c in captures})
-    if len(copies) > 1:
-        parts["by_copy"] = {f"{n}": _mean(values, [c.copy == n for c in captures]) for n in copies}
-    return Score(mean_db=float(np.mean(values)), parts=parts)
+    labels = {
+        "by_iso": [f"{capture.iso:g}" for capture in captures],
+        "by_field": [f"{capture.field_share:g}" for capture in captures],
+    }
+    copies = [f"{capture.copy}" for capture in captures]
+    if len(set(copies)) > 1:
+        labels["by_copy"] = copies
+    return mean_score(values, **labels)
 
 
 def _restored(capture: ValidationCapture, recipe: BayerRecipe, restore: Restorer) -> Tensor:
@@ -173,7 +173,7 @@ def _restored(capture: ValidationCapture, recipe: BayerRecipe, restore: Restorer
 
 
 def to_srgb(stable: Tensor, capture: ValidationCapture, recipe: BayerRecipe) -> FloatArray:
-    """Take stabilised (3, s, s) planes to sRGB values, vignetting divided out."""
+    """Convert stabilised (3, s, s) planes to sRGB values, vignetting divided out."""
     noise = capture.shot.noise
     shot, read = torch.tensor(noise.shot), torch.tensor(noise.read_variance)
     linear = unstabilise(stable[None].float(), shot, read, scale=recipe.scale)[0]
@@ -186,7 +186,3 @@ def to_srgb(stable: Tensor, capture: ValidationCapture, recipe: BayerRecipe) -> 
 def _psnr(capture: ValidationCapture, recipe: BayerRecipe, stable: Tensor) -> float:
     gap = to_srgb(stable, capture, recipe) - capture.sharp
     return float(-10 * np.log10(np.mean(np.square(gap, dtype=np.float64)) + 1e-12))
-
-
-def _mean(values: list[float], chosen: list[bool]) -> float:
-    return float(np.mean([v for v, c in zip(values, chosen, strict=True) if c]))

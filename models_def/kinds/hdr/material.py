@@ -1,4 +1,4 @@
-"""What the samples of a snapshot HDR camera are made with: the streaks of its plate."""
+"""The material for samples of a snapshot HDR camera: the streaks of its plate."""
 
 import hashlib
 from collections.abc import Mapping
@@ -14,8 +14,8 @@ from camkit.contracts import FloatArray
 from camkit.models_def.kinds.hdr.recipe import HdrRecipe
 from camkit.models_def.optics.diffraction.plate import plate_members, read_plate
 from camkit.models_def.optics.diffraction.plate_streaks import plate_streaks
-from camkit.models_def.sensors.psf import wavelength_weights
-from camkit.streaks.optics import StreakOptics
+from camkit.runtime.bank.psf import wavelength_weights
+from camkit.streaks import StreakOptics
 
 FILE: Final = "streaks.safetensors"
 
@@ -49,12 +49,12 @@ class HdrMaterial:
 
 
 def read_material(folder: Path) -> HdrMaterial:
-    """Read what `HdrMaterial.write` wrote: samples need no more than the streaks."""
+    """Read a file of `HdrMaterial.write`: samples need no more than the streaks."""
     return HdrMaterial(streaks=read_streaks(folder / FILE))
 
 
 def compute_material(recipe: HdrRecipe, recipe_folder: Path, cache_folder: Path) -> HdrMaterial:
-    """Compute what the plate of a recipe writes (seconds), or read what was computed before.
+    """Compute the streaks of a recipe's plate (seconds), or read an earlier result.
 
     Raises:
         ContractError: If there is no such plate, or it writes no streaks.

@@ -45,7 +45,7 @@ class PlateRecipe:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HdrDataRecipe(DataRecipe):
-    """How training samples are made.
+    """The settings of training samples.
 
     Attributes:
         capture_px: Side of the simulated capture in which lights are sought; a sample is cut
@@ -108,7 +108,7 @@ class HdrRecipe(Recipe):
 
 
 def to_hdr_recipe(table: Mapping[str, Any]) -> HdrRecipe:
-    """Turn a parsed TOML table into a recipe.
+    """Convert a parsed TOML table to a recipe.
 
     Raises:
         ContractError: If a key is unknown, missing or wrong, or the sensor has no mosaic.

@@ -1,7 +1,7 @@
 """One training sample: a scene photographed, its lights found from their streaks, and the truth.
 
 scene -> exposure, camera space -> blur of the plate -> CFA, noise, clip
-      -> cells -> lights (camkit.streaks: what runs at use time) -> painted planes -> Sample
+      -> cells -> lights (kinds.hdr.streaks: what runs at use time) -> painted planes -> Sample
 """
 
 from dataclasses import dataclass
@@ -22,11 +22,11 @@ from camkit.models_def.sensors.exposure import expose
 from camkit.models_def.sensors.stabilise import stabilise
 from camkit.models_def.sensors.wiener import to_otf
 from camkit.models_def.training.sample import Sample, SampleLayout
-from camkit.streaks.cells import cells_of, sample_sites
-from camkit.streaks.kernels import StreakKernels, streak_kernels
-from camkit.streaks.painting import Painter
-from camkit.streaks.recovery import Recovery, recover
-from camkit.streaks.rims import near_clipped, no_brighter
+from camkit.runtime.kinds.hdr.streaks.cells import cells_of, sample_sites
+from camkit.runtime.kinds.hdr.streaks.kernels import StreakKernels, streak_kernels
+from camkit.runtime.kinds.hdr.streaks.painting import Painter
+from camkit.runtime.kinds.hdr.streaks.recovery import Recovery, recover
+from camkit.runtime.kinds.hdr.streaks.rims import near_clipped, no_brighter
 
 LAYOUT: Final = SampleLayout(
     inputs=(Port(name="rgb", channels=3), Port(name="lit", channels=3)),
@@ -133,7 +133,7 @@ class HdrCamera:
 
 
 def spread_light(sharp: Tensor, kernels: FloatArray) -> Tensor:
-    """Spread (b, 3, h, w) light by (3, n, n) kernels over a scene that goes on at its border."""
+    """Convolve (b, 3, h, w) light with (3, n, n) kernels; the scene goes on at its border."""
     half = kernels.shape[-1] // 2
     wide = torch.nn.functional.pad(sharp, (half,) * 4, mode="replicate")
     size = wide.shape[-2], wide.shape[-1]

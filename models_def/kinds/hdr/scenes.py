@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.models_def.training.pictures import SceneSource, open_source
-from camkit.scenes.night import night_scene
+from camkit.models_def.training.pictures import SceneSource, open_scenes
+from camkit.models_def.training.recipe import SceneRecipe
+from camkit.runtime.kinds.hdr.night import night_scene
 from camkit.scenes.saturation import CEILING, saturating_exposure
 
 NIGHT_SEED: Final = 5_000_000
@@ -43,13 +44,11 @@ class LightSource:
         return np.where((night > 1).any(axis=0), night, picture * dusk).astype(np.float32)
 
 
-def open_lights(
-    pictures: Path | None, *, picture_share: float, scenes: int, scene_px: int
-) -> LightSource:
+def open_lights(data: SceneRecipe, pictures: Path | None) -> LightSource:
     """Open a source of scenes with lights; without a folder of nights alone."""
     return LightSource(
-        source=open_source(pictures, picture_share=1.0, scenes=scenes, scene_px=scene_px),
-        picture_share=picture_share if pictures is not None else 0.0,
+        source=open_scenes(data, pictures, picture_share=1.0),
+        picture_share=data.picture_share if pictures is not None else 0.0,
     )
 
 

@@ -1,4 +1,4 @@
-"""What a recipe says of the thesis's networks, their losses, and of glare."""
+"""The tables of a recipe for the thesis's networks, their losses, and glare."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -13,7 +13,7 @@ MOST_ANGLE_DEG = 45.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ThesisRecipe:
-    """How the networks of the thesis are trained.
+    """The settings of training of the thesis's networks.
 
     The thesis gives none of the weights; the exclusion loss counts in its fine-tuning only.
 

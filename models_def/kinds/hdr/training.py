@@ -78,15 +78,8 @@ class HdrMaker:
 class HdrTraining:
     """Fulfils `camkit.models_def.training.kind.TrainingKind`."""
 
-    @property
-    def roles(self) -> tuple[str, ...]:
-        """One network, behind the lights found by physics."""
-        return ROLES
-
-    @property
-    def camera_parts(self) -> tuple[str, ...]:
-        """What says which camera a recipe describes."""
-        return CAMERA_PARTS
+    roles: Final = ROLES
+    camera_parts: Final = CAMERA_PARTS
 
     def to_recipe(self, table: Mapping[str, Any]) -> HdrRecipe:
         """Check the tables of a recipe."""
@@ -123,15 +116,15 @@ class HdrTraining:
         return build_network(name, **config)
 
     def layout(self, recipe: HdrRecipe, role: str) -> SampleLayout:
-        """Captured and lit planes in, clean planes out; see `thesis.samples` for its roles."""
+        """Return the layout of a role's samples: captured and lit planes in, clean planes out."""
         return layout_of(recipe, role) if role in REFERENCE_ROLES else LAYOUT
 
     def finish(self, recipe: HdrRecipe, role: str) -> None:
-        """Nothing is done behind a network."""
+        """Return None: no stage follows a network."""
         del recipe, role
 
     def prepare(self, recipe: HdrRecipe, recipe_folder: Path, cache_folder: Path) -> HdrMaterial:
-        """Compute what the plate writes."""
+        """Compute the streaks of the plate."""
         return compute_material(recipe, recipe_folder, cache_folder)
 
     def read_material(self, folder: Path) -> HdrMaterial:
@@ -139,7 +132,7 @@ class HdrTraining:
         return read_material(folder)
 
     def samples_digest(self, recipe: HdrRecipe, role: str, seed: int) -> str:
-        """Hash what decides the samples."""
+        """Hash the values that decide the samples."""
         if role in REFERENCE_ROLES:
             return reference_digest(recipe, role, seed)
         return samples_digest(recipe, seed)
@@ -153,7 +146,7 @@ class HdrTraining:
         seed: int,
     ) -> HdrMaker | CodedMaker:
         """Open the scenes."""
-        source = _open_lights(recipe, pictures)
+        source = open_lights(recipe.data, pictures)
         if role in REFERENCE_ROLES:
             return CodedMaker(recipe, role, CodedCamera(recipe, material), source, seed)
         return HdrMaker(recipe, HdrCamera(recipe, material), source, seed)
@@ -163,27 +156,17 @@ class HdrTraining:
     ) -> HdrJudge | CodedJudge:
         """Photograph scenes that are never trained on."""
         if role in REFERENCE_ROLES:
-            source = _open_lights(recipe, pictures)
+            source = open_lights(recipe.data, pictures)
             return make_coded_judge(recipe, role, CodedCamera(recipe, material), source)
         shots = make_shots(recipe, HdrCamera(recipe, material), pictures)
         return HdrJudge(shots=shots, recipe=recipe)
 
 
 def _lights_px(recipe: HdrRecipe) -> int | None:
-    """Return how far from lights the networks act; None if any acts everywhere."""
+    """Return the distance from lights up to which networks act; None if any acts everywhere."""
     sizes = recipe.networks.get(ROLES[0], {}).values()
     reaches_px = [px for size in sizes if (px := lights_px(size.network)) is not None]
     return max(reaches_px) if reaches_px and len(reaches_px) == len(sizes) else None
-
-
-def _open_lights(recipe: HdrRecipe, pictures: Path | None) -> LightSource:
-    data = recipe.data
-    return open_lights(
-        pictures,
-        picture_share=data.picture_share,
-        scenes=data.procedural_scenes,
-        scene_px=data.scene_px,
-    )
 
 
 PART: Final = HdrTraining()

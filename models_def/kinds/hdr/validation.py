@@ -12,7 +12,7 @@ from camkit.models_def.kinds.hdr.recipe import HdrRecipe
 from camkit.models_def.kinds.hdr.samples import HdrCamera, Shot, sample_of
 from camkit.models_def.kinds.hdr.scenes import exposed, open_lights
 from camkit.models_def.sensors.stabilise import unstabilise
-from camkit.models_def.training.kind import Restorer, Score
+from camkit.models_def.training.kind import Restorer, Score, mean_score
 from camkit.scenes.saturation import CEILING
 
 CAPTURES: Final = 10
@@ -43,28 +43,17 @@ class HdrJudge:
 
     def score(self, restore: Restorer) -> Score:
         """Judge a restoration by its mean PSNR in dB, by ISO."""
-        by_iso: dict[str, list[float]] = {}
         with torch.no_grad():
-            for iso, shot in self.shots:
-                by_iso.setdefault(f"{iso:g}", []).append(_psnr_db(shot, restore, self.recipe))
-        every = [db for found in by_iso.values() for db in found]
-        return Score(
-            mean_db=float(np.mean(every)),
-            parts={"by_iso": {iso: float(np.mean(found)) for iso, found in by_iso.items()}},
-        )
+            every = [_psnr_db(shot, restore, self.recipe) for _, shot in self.shots]
+        return mean_score(every, by_iso=[f"{iso:g}" for iso, _ in self.shots])
 
 
 def make_shots(
     recipe: HdrRecipe, camera: HdrCamera, pictures: Path | None
 ) -> tuple[tuple[float, Shot], ...]:
-    """Photograph scenes, cut to a sample about a light each."""
+    """Photograph scenes; the shots are in the order of their ISOs."""
     data = recipe.data
-    source = open_lights(
-        pictures,
-        picture_share=data.picture_share,
-        scenes=data.procedural_scenes,
-        scene_px=data.scene_px,
-    )
+    source = open_lights(data, pictures)
     made = []
     for number in range(CAPTURES):
         rng = np.random.default_rng((SEED, number))
@@ -73,7 +62,7 @@ def make_shots(
         scene = exposed(scene, camera.matrix, camera.gains, share)
         iso = ISOS[number % len(ISOS)]
         made.append((iso, camera.photograph(scene, iso, rng, data.surround_px)))
-    return tuple(made)
+    return tuple(sorted(made, key=lambda pair: pair[0]))
 
 
 def _psnr_db(shot: Shot, restore: Restorer, recipe: HdrRecipe) -> float:

@@ -27,7 +27,7 @@ Generator = np.random.Generator
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Exposure:
-    """How many photons there are.
+    """The number of photons of an exposure.
 
     Attributes:
         photons: That reach a pixel which sees white; inf for no noise.
@@ -81,7 +81,7 @@ def told_planes(counts: Tensor, exposure: Exposure) -> Tensor:
 
 
 def expose(light: Tensor, exposure: Exposure, rng: Generator) -> Tensor:
-    """Count light (b, 1, h, w) and give it back with its noise, (b, 2, h, w).
+    """Count light (b, 1, h, w) and return it with its noise, (b, 2, h, w).
 
     With infinitely many photons light comes back as it is, and its noise is 0.
     """

@@ -6,7 +6,7 @@ pixels at its right and lower border, seen at the true phase, counted once, rest
 protocol, so they stand beside these as printed.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -32,7 +32,7 @@ MOST_DB: Final = 100.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PictureScore:
-    """How near pictures come to the truth.
+    """The likeness of pictures to the truth.
 
     Attributes:
         psnr_db: White = 1; mean over the pictures.
@@ -109,21 +109,6 @@ def evaluate_each(
         _compare(torch.from_numpy(picture)[None, None], sampling, exposure, restore, (seed, i))
         for i, picture in enumerate(pictures)
     )
-
-
-def evaluate_sets(
-    sets: Mapping[str, Sequence[FloatArray]],
-    sampling: Sampling,
-    exposure: Exposure,
-    methods: Mapping[str, Restorer],
-) -> dict[str, dict[str, PictureScore]]:
-    """Evaluate methods on sets of pictures: method -> set -> score."""
-    return {
-        method: {
-            name: evaluate(pictures, sampling, exposure, restore) for name, pictures in sets.items()
-        }
-        for method, restore in methods.items()
-    }
 
 
 @torch.no_grad()

@@ -25,7 +25,7 @@ CAMERA_PARTS: Final = ("name", "sensor", "sampling", "times")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SamplingRecipe:
-    """How the array samples, see `sampling`.
+    """The sampling by the array, see `sampling`.
 
     Attributes:
         mode: low_fill, full_fill, gaussian or learned.
@@ -53,7 +53,7 @@ class SamplingRecipe:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpadDataRecipe(DataRecipe):
-    """How training samples are made.
+    """The settings of training samples.
 
     `sample_px` and the schedule's `patch_px` count pixels of the array; of the role plate, whose
     samples are pictures, sub-pixels.
@@ -104,7 +104,7 @@ class SpadRecipe(Recipe):
 
 
 def to_spad_recipe(table: Mapping[str, Any]) -> SpadRecipe:
-    """Turn a parsed TOML table into a recipe.
+    """Convert a parsed TOML table to a recipe.
 
     Raises:
         ContractError: If a key is unknown, missing or wrong, or the sensor counts no photons.

@@ -35,7 +35,7 @@ def luminance(coded: FloatArray) -> FloatArray:
 
 
 def layout_of(recipe: SpadRecipe, role: str) -> SampleLayout:
-    """Return what the samples of a role hold."""
+    """Return the layout of a role's samples."""
     if role == PLATE:
         return SampleLayout(
             inputs=(Port(name="sharp", channels=1), Port(name="deviation", channels=1)),

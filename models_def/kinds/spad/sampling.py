@@ -1,4 +1,4 @@
-"""How an array of small pixels samples light: through a kernel, at one sub-pixel of every pixel.
+"""Sampling of light by an array of small pixels: a kernel, and one sub-pixel of every pixel.
 
     fine picture (4 h, 4 w) -- kernel 11x11 -- sub-pixel `phase` of every 4x4 -- samples (h, w)
 
@@ -11,7 +11,6 @@ All four are a kernel and a phase, so one sum simulates them. The fine picture g
 border as its outermost sub-pixels do.
 """
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final, Literal, get_args
@@ -24,6 +23,13 @@ from torch.nn import functional
 from camkit.contracts import PSF_SUM_TOLERANCE, FloatArray
 from camkit.errors import ContractError
 from camkit.models_def.networks.bicubic import PHASE, SCALE
+from camkit.runtime.kinds.spad.finer.linear import Grid
+from camkit.runtime.kinds.spad.finer.sampling import (
+    GAUSSIAN_PIXELS,
+    box_kernel,
+    gaussian_kernel,
+    point_kernel,
+)
 
 Mode = Literal["low_fill", "full_fill", "gaussian", "learned"]
 
@@ -33,17 +39,10 @@ ACTIVE_UM: Final = 30.0
 FINE_PITCH_UM: Final = PITCH_UM / SCALE
 PSF_SIDE: Final = 11
 HALF: Final = PSF_SIDE // 2
-GAUSSIAN_SIGMA: Final = SCALE * math.sqrt(3 * math.log(2)) / math.pi
-"""Sub-pixels: 0.459 pixels, the least-squares fit to the ideal low pass (thesis 4.4)."""
+GAUSSIAN_SIGMA: Final = SCALE * GAUSSIAN_PIXELS
+"""Sub-pixels."""
 FULL_LIGHT: Final = float(SCALE**2)
 """A pixel of 4x4 sub-pixels collects so many times the light of one of a sub-pixel."""
-
-
-def point_psf() -> FloatArray:
-    """Return the (11, 11) kernel of no plate at all."""
-    kernel = np.zeros((PSF_SIDE, PSF_SIDE), np.float32)
-    kernel[HALF, HALF] = 1
-    return kernel
 
 
 def gaussian_psf(sigma: float = GAUSSIAN_SIGMA) -> FloatArray:
@@ -52,19 +51,7 @@ def gaussian_psf(sigma: float = GAUSSIAN_SIGMA) -> FloatArray:
     Raises:
         ContractError: If sigma is not a number > 0.
     """
-    if not (math.isfinite(sigma) and sigma > 0):
-        raise ContractError(f"the sigma of a Gaussian must be a number > 0; got {sigma}")
-    line = np.exp(-0.5 * (np.arange(-HALF, HALF + 1) / sigma) ** 2)
-    kernel = np.outer(line, line)
-    return np.asarray(kernel / kernel.sum(), dtype=np.float32)
-
-
-def box_psf(phase: int = PHASE) -> FloatArray:
-    """Return the (11, 11) kernel whose sample at a phase is the mean of the pixel."""
-    kernel = np.zeros((PSF_SIDE, PSF_SIDE), np.float32)
-    first = HALF + phase - (SCALE - 1)
-    kernel[first : first + SCALE, first : first + SCALE] = 1 / SCALE**2
-    return kernel
+    return gaussian_kernel(PSF_SIDE, sigma)
 
 
 def see_through(fine: Tensor, kernel: Tensor, phase: int = PHASE) -> Tensor:
@@ -123,7 +110,7 @@ class Sampling:
 
     @property
     def light(self) -> float:
-        """How many times the light of one sub-pixel a pixel collects."""
+        """Return the light of a pixel in units of that of one sub-pixel."""
         return FULL_LIGHT if self.mode == "full_fill" else 1.0
 
     def see(self, fine: Tensor) -> Tensor:
@@ -132,8 +119,8 @@ class Sampling:
 
 
 _KERNELS: Final[Mapping[str, Callable[[int], FloatArray]]] = {
-    "low_fill": lambda _: point_psf(),
-    "full_fill": box_psf,
+    "low_fill": lambda _: point_kernel(PSF_SIDE),
+    "full_fill": lambda phase: box_kernel(PSF_SIDE, Grid(scale=SCALE, phase=phase)),
     "gaussian": lambda _: gaussian_psf(),
 }
 

@@ -1,4 +1,4 @@
-"""What the best linear estimate could know: Wiener theory on the covariance of natural pictures.
+"""The error of the best linear estimate: Wiener theory on the covariance of natural pictures.
 
 covariance C of pictures, kernel p, noise of N photons
     A   covariance of 7x7 samples    (p * p' * C)(4 (k - l)) + noise
@@ -110,11 +110,6 @@ def wiener_error(
     told = (cross * torch.linalg.solve(matrix, cross.T).T).sum(1)
     centre = values.shape[0] // 2
     return torch.as_tensor((values[centre, centre] - told).mean())
-
-
-def wiener_psnr_db(kernel: Tensor, covariance: Covariance, photons: float) -> float:
-    """Return the error of `wiener_error` as PSNR in dB, white = 1."""
-    return float(-10 * torch.log10(wiener_error(kernel, covariance, photons)))
 
 
 def best_gaussian(covariance: Covariance, photons: float) -> float:

@@ -27,7 +27,7 @@ from camkit.models_def.kinds.spad.samples import SpadMaker, layout_of
 from camkit.models_def.kinds.spad.sampling import Sampling, make_sampling
 from camkit.models_def.kinds.spad.validation import SpadJudge, make_judge
 from camkit.models_def.training.kind import Design
-from camkit.models_def.training.pictures import open_source
+from camkit.models_def.training.pictures import open_scenes
 from camkit.models_def.training.sample import SampleLayout
 
 PSF_FILE: Final = "psf.safetensors"
@@ -63,15 +63,8 @@ class SpadMaterial:
 class SpadTraining:
     """Fulfils `camkit.models_def.training.kind.TrainingKind`."""
 
-    @property
-    def roles(self) -> tuple[str, ...]:
-        """One network: four times as fine."""
-        return ROLES
-
-    @property
-    def camera_parts(self) -> tuple[str, ...]:
-        """What says which camera a recipe describes."""
-        return CAMERA_PARTS
+    roles: Final = ROLES
+    camera_parts: Final = CAMERA_PARTS
 
     def to_recipe(self, table: Mapping[str, Any]) -> SpadRecipe:
         """Check the tables of a recipe."""
@@ -100,11 +93,11 @@ class SpadTraining:
         return build_spad_network(name, **config)
 
     def layout(self, recipe: SpadRecipe, role: str) -> SampleLayout:
-        """Light and its noise in, a picture four times as fine out."""
+        """Return the layout: light and its noise in, a picture four times as fine out."""
         return layout_of(recipe, role)
 
     def finish(self, recipe: SpadRecipe, role: str) -> None:
-        """Nothing is done behind a network."""
+        """Return None: no stage follows a network."""
         del recipe, role
 
     def prepare(self, recipe: SpadRecipe, recipe_folder: Path, cache_folder: Path) -> SpadMaterial:
@@ -120,7 +113,7 @@ class SpadTraining:
         return SpadMaterial(kernel=read_plate_psf(folder / PSF_FILE))
 
     def samples_digest(self, recipe: SpadRecipe, role: str, seed: int) -> str:
-        """Hash what decides the samples."""
+        """Hash the values that decide the samples."""
         return samples_digest(recipe, role, seed)
 
     def maker(
@@ -132,13 +125,7 @@ class SpadTraining:
         seed: int,
     ) -> SpadMaker:
         """Open the scenes."""
-        data = recipe.data
-        source = open_source(
-            pictures,
-            picture_share=data.picture_share,
-            scenes=data.procedural_scenes,
-            scene_px=data.scene_px,
-        )
+        source = open_scenes(recipe.data, pictures)
         return SpadMaker(recipe, role, sampling_of(recipe, material), source, seed)
 
     def judge(
@@ -149,7 +136,7 @@ class SpadTraining:
 
 
 def sampling_of(recipe: SpadRecipe, material: SpadMaterial) -> Sampling:
-    """Return how the array of a recipe samples, with the kernel of its material."""
+    """Return the sampling by the array of a recipe, with the kernel of its material."""
     plan = recipe.sampling
     return Sampling(
         mode=plan.mode,  # type: ignore[arg-type]

@@ -14,8 +14,8 @@ from camkit.models_def.kinds.spad.recipe import PLATE, SpadRecipe
 from camkit.models_def.kinds.spad.samples import draw_luminance, photograph
 from camkit.models_def.kinds.spad.sampling import Sampling
 from camkit.models_def.networks.bicubic import SCALE
-from camkit.models_def.training.kind import Restorer, Score
-from camkit.models_def.training.pictures import SceneSource, open_source
+from camkit.models_def.training.kind import Restorer, Score, mean_score
+from camkit.models_def.training.pictures import SceneSource, open_scenes
 
 CROPS: Final = 8
 CROP_PX: Final = 192
@@ -59,18 +59,14 @@ class SpadJudge:
         return {"bicubic": self._mean([finer(shot.light) for shot in self.shots]).mean_db}
 
     def score(self, restore: Restorer) -> Score:
-        """Judge a restoration by its mean PSNR in dB, by photons."""
+        """Compute the mean PSNR of a restoration in dB, by photons."""
         with torch.no_grad():
             return self._mean([restore(shot.planes) for shot in self.shots])
 
     def _mean(self, found: Sequence[Tensor]) -> Score:
-        by_photons: dict[str, list[float]] = {}
-        for shot, picture in zip(self.shots, found, strict=True):
-            db = psnr_db(picture.clamp(0, 1), shot.fine)
-            by_photons.setdefault(f"{shot.photons:.0f}", []).append(db)
-        every = [db for several in by_photons.values() for db in several]
-        parts = {level: float(np.mean(several)) for level, several in by_photons.items()}
-        return Score(mean_db=float(np.mean(every)), parts={"by_photons": parts})
+        pairs = zip(self.shots, found, strict=True)
+        every = [psnr_db(picture.clamp(0, 1), shot.fine) for shot, picture in pairs]
+        return mean_score(every, by_photons=[f"{shot.photons:.0f}" for shot in self.shots])
 
 
 def make_judge(
@@ -78,9 +74,7 @@ def make_judge(
 ) -> SpadJudge:
     """Photograph crops at the ends and in the middle of the trained range of light."""
     data = recipe.data
-    source = open_source(
-        pictures, picture_share=1.0, scenes=data.procedural_scenes, scene_px=data.scene_px
-    )
+    source = open_scenes(data, pictures, picture_share=1.0)
     levels = np.unique(np.geomspace(data.photons_min, data.photons_max, LEVELS).round(3))
     shots = [
         _take(recipe, role, sampling, source, (number, float(level)))

@@ -15,7 +15,7 @@ SATURATED: Final = 0.99
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChainOutput:
-    """What the networks give; each (b, 3, h, w) linear.
+    """The outputs of the networks; each (b, 3, h, w) linear.
 
     Attributes:
         clean: I_U, 0..1.

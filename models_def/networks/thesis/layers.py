@@ -1,4 +1,4 @@
-"""What the thesis's networks are made of. References: Sun 2021, tables 5.1 to 5.3."""
+"""Layers of the thesis's networks. References: Sun 2021, tables 5.1 to 5.3."""
 
 from typing import Any, Final
 

@@ -1,4 +1,4 @@
-"""What a lens does, in the numbers and curves of lens design.
+"""The numbers and curves of lens design.
 
 In the order in which data flows (every result states its pupil, see `camkit...optics.pupil`):
 

@@ -11,7 +11,12 @@ import torch
 from torch import Tensor
 
 from camkit.models_def.optics.analysis.first_order import ideal_heights
-from camkit.models_def.optics.analysis.spots import analysis_tensors, chief_landings, launch_beams
+from camkit.models_def.optics.analysis.spots import (
+    analysis_tensors,
+    chief_landings,
+    launch_beams,
+    launch_near_chief,
+)
 from camkit.models_def.optics.paraxial import focal_lengths
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import PupilDefinition, PupilSamples
@@ -45,13 +50,12 @@ def field_curvature(
         wavelengths_um: (wavelength,).
         definition: Of the pupil; it says which ray is the chief ray.
     """
-    near: PupilDefinition = "paraxial" if definition == "paraxial" else "chief"
     zero = torch.zeros(1, dtype=torch.float64)
     step = torch.full_like(zero, _CLOSE)
     samples = PupilSamples(
         x=torch.cat([zero, step, zero, zero]), y=torch.cat([zero, zero, step, -step])
     )
-    beams = launch_beams(lens, slopes, wavelengths_um, samples, near, open_apertures=True)
+    beams = launch_near_chief(lens, slopes, wavelengths_um, samples, definition)
     landed = trace(beams.tensors, beams.rays)
     alive = landed.valid.all(-1)
     x, y = landed.x, landed.y
@@ -82,7 +86,7 @@ def distortion(
 def lateral_colour_mm(
     lens: Lens, slopes: Tensor, wavelengths_um: Tensor, definition: PupilDefinition
 ) -> Tensor:
-    """Return how far (field, wavelength) chief rays land beyond the reference wavelength."""
+    """Return the distances (field, wavelength) of chief rays from the reference wavelength's."""
     reference = torch.tensor([lens.reference_wavelength_um], dtype=torch.float64)
     heights = chief_landings(lens, slopes, torch.cat([wavelengths_um, reference]), definition)
     return heights[:, :-1] - heights[:, -1:]
@@ -104,7 +108,7 @@ def _paraxial_foci(lens: Lens, wavelengths_um: Tensor) -> Tensor:
 
 
 def longitudinal_mm(lens: Lens, pupil: Tensor, wavelengths_um: Tensor) -> Tensor:
-    """Return where (wavelength, pupil) axial rays cross the axis, from the sensor; NaN if lost.
+    """Return the crossings (wavelength, pupil) of axial rays, from the sensor; NaN if lost.
 
     Args:
         lens: The prescription.

@@ -1,9 +1,9 @@
-"""How much light of an even scene reaches the sensor.
+"""Relative illumination of the sensor by an even scene.
 
 Rays run backwards, from a point of the sensor to points of the stop. Each brings the radiance of
-the scene through its own share of the solid angle, wherever in the scene it ends: right for
-blurred images too, where it would not do to let the whole beam of a field land where its chief ray
-does (0.875 for 0.897 at the corner of `duet`, seen from 1 m).
+the scene through its own share of the solid angle, wherever in the scene it ends. This is right
+for blurred images too; landing the whole beam of a field at its chief ray is not (0.875 instead of
+0.897 at the corner of `duet`, seen from 1 m).
 """
 
 from dataclasses import replace

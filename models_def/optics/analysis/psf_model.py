@@ -1,4 +1,4 @@
-"""Which PSF a lens needs: rays where blur is wide against the Airy disc, waves where it is not."""
+"""The PSF model of a lens: rays where the blur is wide against the Airy disc, waves where not."""
 
 from dataclasses import dataclass
 from typing import Final, Literal
@@ -24,7 +24,7 @@ _BLUR_SAMPLING: Final = "gauss:6x16"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PsfModel:
-    """Which model a lens needs, and why.
+    """The PSF model that a lens needs, and the reason.
 
     Attributes:
         regime: The cheaper one that is right for every field and wavelength.
@@ -40,7 +40,7 @@ class PsfModel:
 
 
 def psf_model(lens: Lens, slopes: Tensor, wavelengths_um: Tensor) -> PsfModel:
-    """Return which PSF model a lens needs.
+    """Return the PSF model that a lens needs.
 
     Args:
         lens: The prescription.

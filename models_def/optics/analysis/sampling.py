@@ -16,6 +16,7 @@ from camkit.models_def.optics.pupil import (
     PUPIL_DEFINITIONS,
     PupilDefinition,
     PupilSamples,
+    both_halves,
     half_disc,
     hexapolar,
 )
@@ -70,7 +71,7 @@ def pupil_samples(name: str) -> PupilSamples:
         "gauss": (2, lambda rings, arms: _rings_and_arms(*_gauss(rings), arms)),
         "radau": (2, lambda rings, arms: _rings_and_arms(*_radau(rings), arms)),
         "grid": (1, uniform_grid),
-        "fibonacci": (1, _fibonacci),
+        "fibonacci": (1, lambda rays: both_halves(half_disc(max(1, rays // 2)))),
     }
     numbers = text.split("x")
     if kind not in makers or len(numbers) != makers[kind][0] or not all(map(_is_count, numbers)):
@@ -130,11 +131,6 @@ def _rings_and_arms(
         y=(radius * torch.sin(angle)).reshape(-1),
         weight=torch.from_numpy(share / arms)[:, None].expand(-1, arms).reshape(-1),
     )
-
-
-def _fibonacci(rays: int) -> PupilSamples:
-    half = half_disc(max(1, rays // 2))
-    return PupilSamples(x=torch.cat([half.x, -half.x]), y=torch.cat([half.y, half.y]))
 
 
 def sample_weights(samples: PupilSamples) -> Tensor:

@@ -40,7 +40,7 @@ class Seidel:
 
     @property
     def sums_mm(self) -> Tensor:
-        """(5,), S_I..S_V of the lens."""
+        """Sums S_I..S_V of the lens, (5,)."""
         return self.surfaces_mm.sum(0)
 
     def transverse_mm(self) -> dict[str, float]:

@@ -17,6 +17,7 @@ from camkit.models_def.optics.pupil import (
     PupilDefinition,
     PupilSamples,
     beam_radius_mm,
+    pupil_centre,
     pupil_rays,
     real_stop_radius_mm,
     with_open_apertures,
@@ -89,18 +90,28 @@ def launch_beams(
     return Beams(tensors=tensors, rays=rays, area_mm2=weight * share_mm2)
 
 
-def chief_landings(
-    lens: Lens, slopes: Tensor, wavelengths_um: Tensor, definition: PupilDefinition
-) -> Tensor:
-    """Return the heights (field, wavelength) in mm of chief rays on the sensor; NaN if lost.
+def launch_near_chief(
+    lens: Lens,
+    slopes: Tensor,
+    wavelengths_um: Tensor,
+    samples: PupilSamples,
+    definition: PupilDefinition,
+) -> Beams:
+    """Start chief rays, or rays close to them; arguments as of `launch_beams`.
 
     The chief ray passes the middle of the stop, or of the paraxial entrance pupil by that
     definition. Rims do not stop it: it is a reference even where the beam is vignetted.
     """
-    middle = PupilSamples(x=torch.zeros_like(slopes[:1]), y=torch.zeros_like(slopes[:1]))
     # any radius does for the middle, so that of the stop need not be traced
     aimed: PupilDefinition = "paraxial" if definition == "paraxial" else "chief"
-    beams = launch_beams(lens, slopes, wavelengths_um, middle, aimed, open_apertures=True)
+    return launch_beams(lens, slopes, wavelengths_um, samples, aimed, open_apertures=True)
+
+
+def chief_landings(
+    lens: Lens, slopes: Tensor, wavelengths_um: Tensor, definition: PupilDefinition
+) -> Tensor:
+    """Return the heights (field, wavelength) in mm of chief rays on the sensor; NaN if lost."""
+    beams = launch_near_chief(lens, slopes, wavelengths_um, pupil_centre(), definition)
     landed = trace(beams.tensors, beams.rays)
     return torch.where(landed.valid, landed.y, math.nan)[..., 0]
 

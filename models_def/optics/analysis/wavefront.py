@@ -13,10 +13,15 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.analysis.spots import Beams, chief_landings, launch_beams
+from camkit.models_def.optics.analysis.spots import (
+    Beams,
+    chief_landings,
+    launch_beams,
+    launch_near_chief,
+)
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.pupil import PupilDefinition, PupilSamples, launch
+from camkit.models_def.optics.pupil import PupilDefinition, PupilSamples, launch, pupil_centre
 from camkit.models_def.optics.trace import Rays, SurfaceTensors, trace
 from camkit.units import UM_PER_MM
 
@@ -54,7 +59,7 @@ class Wavefront:
 def path_lengths(
     tensors: SurfaceTensors, rays: Rays, slope: Tensor, distance_mm: float
 ) -> tuple[Rays, Tensor]:
-    """Trace rays to the sensor and give their optical path lengths in mm.
+    """Trace rays to the sensor and return their optical path lengths in mm.
 
     Args:
         tensors: The lens.
@@ -178,9 +183,7 @@ def _chief_path(
     centre_mm: Tensor,
     definition: PupilDefinition,
 ) -> Tensor:
-    middle = PupilSamples(x=torch.zeros_like(slopes[:1]), y=torch.zeros_like(slopes[:1]))
-    aimed: PupilDefinition = "paraxial" if definition == "paraxial" else "chief"
-    beams = launch_beams(lens, slopes, wavelengths_um, middle, aimed, open_apertures=True)
+    beams = launch_near_chief(lens, slopes, wavelengths_um, pupil_centre(), definition)
     return _at_sphere(lens, beams, slopes, centre_mm).path
 
 

@@ -58,7 +58,7 @@ def _chirp(place: Tensor, step: float, like: Tensor) -> Tensor:
 
 
 def _wrapped(lags: Tensor, given: int, length: int) -> Tensor:
-    """Lay lags 1 - given .. count - 1 into a circle: negative ones at its end."""
+    """Return lags 1 - given .. count - 1 on a circle: negative ones at its end."""
     circle = torch.zeros(length, dtype=lags.dtype)
     circle[: lags.numel() - given + 1] = lags[given - 1 :]
     circle[length - given + 1 :] = lags[: given - 1]

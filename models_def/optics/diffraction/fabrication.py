@@ -1,4 +1,4 @@
-"""What etching makes of a height map: levels, wrapping, errors of depth, masks.
+"""Fabrication of a height map by etching: levels, wrapping, errors of depth, masks.
 
 A plate of 2^n levels is etched n times, through one binary mask each, to depths of 1, 2, 4, ...
 steps. Where a mask etches too deep, all its cells do.
@@ -16,7 +16,7 @@ from camkit.errors import ContractError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Etching:
-    """How a plate is etched.
+    """The etching of a plate.
 
     Attributes:
         range_um: Height range of the levels.
@@ -43,7 +43,7 @@ class Etching:
 
     @property
     def masks(self) -> int:
-        """Return how many masks there are."""
+        """Return the number of masks."""
         return self.levels.bit_length() - 1
 
     @property

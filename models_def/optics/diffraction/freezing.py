@@ -1,33 +1,30 @@
 """The PSF of a plate, frozen: by core, arms and haze where it writes streaks, else by its kernels.
 
 Its kernels are hundreds of pixels wide and meet no Wiener bank, so they are not judged by one, as
-those of a lens are (`freeze_optics`). What is stated is light: how much of it the window holds, and
-how much lies in another place than in the kernels of the camera's colours.
+those of a lens are (`freeze_samples`). What is stated is light: how much of it the window holds,
+and how much lies in another place than in the kernels of the camera's colours.
 """
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Final, Literal
+from dataclasses import replace
+from typing import Final
 
 import numpy as np
 import torch
 
-from camkit.bundle.psf_file import write_psf
+from camkit.bundle.frozen_optics import FrozenOptics, psf_of_streaks
 from camkit.bundle.sensor import ColorSensor
-from camkit.bundle.streak_file import write_streaks
 from camkit.caller import option_text
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.models_def.optics.diffraction.plate_optics import PlateOptics
 from camkit.models_def.optics.diffraction.plate_streaks import plate_streaks
 from camkit.models_def.optics.diffraction.streak_fit import NoStreaksError
+from camkit.models_def.optics.freeze import Facts, Tell, depths_text, rounded_facts
 from camkit.models_def.optics.frozen import FINE_WAVELENGTHS, FreezeGrid, freeze
 from camkit.models_def.optics.optics import FloatGrid
-from camkit.models_def.sensors.psf import wavelength_weights
+from camkit.runtime.bank.psf import wavelength_weights
 
-Tell = Callable[[str], None]
 WAVELENGTH_COUNTS: Final = (3, 4, 5, 7, 9, 13)
 MISPLACED_LIMIT: Final = 0.002
 STREAKS_LIMIT: Final = 0.015
@@ -36,81 +33,44 @@ WINDOW: Final = FreezeGrid(energy=0.999, max_side_px=401, least_energy=0.9)
 """The window of a plate, unless another is asked for: streaks end long before."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PlateReport:
-    """What freezing a plate kept.
-
-    Attributes:
-        plate: Name of the plate.
-        form: streaks (core, arms and haze) or kernels.
-        wavelengths: Kept.
-        side_px: Of the kernels.
-        energy_kept: Least share of the light of a colour inside the kernels.
-        misplaced: Largest share of the light of a colour that lies elsewhere than in the kernel
-            of that colour computed from 49 wavelengths.
-        depths_mm: Depths kept.
-        of_optics: What else the optics say of themselves.
-    """
-
-    plate: str
-    form: Literal["streaks", "kernels"]
-    wavelengths: int
-    side_px: int
-    energy_kept: float
-    misplaced: float
-    depths_mm: tuple[float, ...]
-    of_optics: Mapping[str, float]
-
-    def to_json(self) -> dict[str, int | float | str]:
-        """Return the report as a flat mapping."""
-        return {
-            "plate": self.plate,
-            "form": self.form,
-            "fields": 1,
-            "wavelengths": self.wavelengths,
-            "side_px": self.side_px,
-            "energy_kept": round(self.energy_kept, 5),
-            "misplaced": round(self.misplaced, 5),
-            "depths_mm": ", ".join(f"{depth_mm:g}" for depth_mm in self.depths_mm),
-            **{name: round(value, 5) for name, value in self.of_optics.items()},
-        }
-
-
 def freeze_plate(
     optics: PlateOptics,
-    out_path: Path,
     *,
     sensor: ColorSensor,
     grid: FreezeGrid = WINDOW,
     tell: Tell = lambda _: None,
-) -> PlateReport:
-    """Freeze the PSF of a plate and write it.
+) -> tuple[FrozenOptics, Facts]:
+    """Freeze the PSF of a plate.
 
     Args:
         optics: The plate, or its bare lens.
-        out_path: Receives the frozen PSF (safetensors).
         sensor: Pitch and response.
         grid: Energy, largest side, depths; wavelengths are chosen here.
         tell: Takes a line for everything that was tried.
+
+    Returns:
+        Streaks, or kernels where they do not hold its light, and what was kept: `energy_kept` is
+        the least share of the light of a colour inside the window, `misplaced` the largest share
+        that lies elsewhere than in the kernel of that colour computed from 49 wavelengths.
 
     Raises:
         ContractError: If the window does not hold the wanted light, or no number of wavelengths
             keeps it in its place.
     """
     try:
-        found = _freeze_streaks(optics, out_path, sensor, grid, tell)
+        found = _freeze_streaks(optics, sensor, grid, tell)
     except NoStreaksError as error:
         tell(f"{error}; frozen as kernels")
         found = None
-    return found or _freeze_kernels(optics, out_path, sensor, grid, tell)
+    return found or _freeze_kernels(optics, sensor, grid, tell)
 
 
 def _freeze_streaks(
-    optics: PlateOptics, path: Path, sensor: ColorSensor, grid: FreezeGrid, tell: Tell
-) -> PlateReport | None:
-    """Write a plate by its core, arms and haze, with the wavelengths that training sees.
+    optics: PlateOptics, sensor: ColorSensor, grid: FreezeGrid, tell: Tell
+) -> tuple[FrozenOptics, Facts] | None:
+    """Return a plate by its core, arms and haze, with the wavelengths that training sees.
 
-    None, and nothing is written, where these do not hold its light: it writes something else.
+    None where these do not hold its light: it writes something else.
     """
     streaks = plate_streaks(
         optics.plate,
@@ -130,23 +90,15 @@ def _freeze_streaks(
             f"core, arms and haze hold {kept:.4f} of the light, wanted {least}; raise "
             f"{option_text('max_side_px')} or lower the energy"
         )
-    write_streaks(path, streaks)
-    return PlateReport(
-        plate=optics.name,
-        form="streaks",
-        wavelengths=streaks.wavelengths_um.size,
-        side_px=light.shape[-1],
-        energy_kept=kept,
-        misplaced=misplaced,
-        depths_mm=tuple(streaks.depths_mm.tolist()),
-        of_optics=optics.facts,
-    )
+    psf = psf_of_streaks(streaks, len(sensor.channels))
+    found = FrozenOptics(psf=psf, streaks=streaks)
+    return found, _facts(optics, found, kept, misplaced)
 
 
 def _freeze_kernels(
-    optics: PlateOptics, path: Path, sensor: ColorSensor, grid: FreezeGrid, tell: Tell
-) -> PlateReport:
-    """Write a plate by its kernels, with as few wavelengths as keep colours in their place."""
+    optics: PlateOptics, sensor: ColorSensor, grid: FreezeGrid, tell: Tell
+) -> tuple[FrozenOptics, Facts]:
+    """Return a plate by its kernels, with as few wavelengths as keep colours in their place."""
     for count in WAVELENGTH_COUNTS:
         frozen = freeze(optics, sensor, replace(grid, wavelengths=count))
         psf = frozen.psf
@@ -159,17 +111,23 @@ def _freeze_kernels(
             f"{count} wavelengths misplace {misplaced:.4f} of the light of a colour, more than "
             f"{MISPLACED_LIMIT}; freeze for a sensor with smoother responses"
         )
-    write_psf(path, psf)
-    return PlateReport(
-        plate=optics.name,
-        form="kernels",
-        wavelengths=count,
-        side_px=psf.kernels.shape[-1],
-        energy_kept=frozen.energy_kept,
-        misplaced=misplaced,
-        depths_mm=tuple(psf.depths_mm.tolist()),
-        of_optics=optics.facts,
-    )
+    found = FrozenOptics(psf=psf)
+    return found, _facts(optics, found, frozen.energy_kept, misplaced)
+
+
+def _facts(optics: PlateOptics, found: FrozenOptics, kept: float, misplaced: float) -> Facts:
+    psf = found.psf
+    facts: Facts = {
+        "plate": optics.name,
+        "form": "kernels" if found.streaks is None else "streaks",
+        "fields": 1,
+        "wavelengths": psf.wavelengths_um.size,
+        "side_px": psf.kernels.shape[-1],
+        "energy_kept": kept,
+        "misplaced": misplaced,
+        "depths_mm": depths_text(psf),
+    }
+    return rounded_facts(facts | dict(optics.facts))
 
 
 def compared(

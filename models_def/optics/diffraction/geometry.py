@@ -21,7 +21,7 @@ PHASES: Final[tuple[Phase, ...]] = get_args(Phase)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bench:
-    """What stands where. Lengths in mm.
+    """The arrangement of plate, lens and sensor. Lengths in mm.
 
     Attributes:
         diameter_mm: Of the aperture, in which the plate lies; the side of a square one.
@@ -103,7 +103,7 @@ class Bench:
 
 
 def _longer(r2_mm: Tensor, distance_mm: float, phase: Phase) -> Tensor:
-    """Return how much longer the way to a point is from a place off the axis."""
+    """Return the extra length of the way to a point from a place off the axis."""
     if math.isinf(distance_mm):
         return r2_mm * 0
     if phase == "parabolic":

@@ -19,7 +19,7 @@ from camkit.units import UM_PER_MM
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Streaks:
-    """What streaks a plate should write, at its design wavelength.
+    """The streaks that a plate should write, at its design wavelength.
 
     Attributes:
         angles_rad: (line,), from +x (right) towards +y (down); every line has two arms.

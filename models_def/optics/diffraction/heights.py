@@ -23,7 +23,7 @@ class FullMap(nn.Module):
     """Every cell for itself."""
 
     def __init__(self, height_um: Tensor) -> None:
-        """Begin at a map (cells, cells)."""
+        """Start at a map (cells, cells)."""
         super().__init__()
         self.height_um = nn.Parameter(height_um.clone())
 
@@ -52,7 +52,7 @@ class RankMap(nn.Module):
         start: float = 0.1,
         seed: int = 0,
     ) -> None:
-        """Begin at random.
+        """Start at random numbers.
 
         Args:
             cells: Along a side.
@@ -80,7 +80,7 @@ class GratingMap(nn.Module):
     """A sum of profiles, each of which changes along one direction alone: it makes one streak."""
 
     def __init__(self, cells: int, angles_rad: Sequence[float], profiles_um: Tensor) -> None:
-        """Begin at profiles.
+        """Start at profiles.
 
         Args:
             cells: Along a side.
@@ -117,7 +117,7 @@ class ZernikeMap(nn.Module):
     """Zernike polynomials over the circle, in Noll's order and normalisation (rms of 1)."""
 
     def __init__(self, cells: int, coefficients_um: Tensor) -> None:
-        """Begin at coefficients (term,); the first term is piston."""
+        """Start at coefficients (term,); the first term is piston."""
         super().__init__()
         if coefficients_um.ndim != 1 or coefficients_um.numel() < 1:
             raise ContractError("coefficients are a list")
@@ -135,7 +135,7 @@ class RadialMap(nn.Module):
     """A profile over the distance from the middle."""
 
     def __init__(self, cells: int, profile_um: Tensor) -> None:
-        """Begin at a profile (sample,), from the middle to the corner's distance, evenly."""
+        """Start at a profile (sample,), from the middle to the corner's distance, evenly."""
         super().__init__()
         if profile_um.ndim != 1 or profile_um.numel() < 2:
             raise ContractError("a profile has two samples at least")

@@ -28,7 +28,7 @@ _SIGMOID_1: Final = 1 / (1 + math.exp(-1.0))
 
 
 class Pattern(Protocol):
-    """What gives heights for a bench."""
+    """A function that returns heights for a bench."""
 
     def height_um(self, bench: Bench, index_at: IndexAt, cells: int) -> Tensor:
         """Return the heights (cells, cells), float32."""

@@ -59,7 +59,7 @@ class Pinhole:
 
     @property
     def facts(self) -> Mapping[str, float]:
-        """Its focal length."""
+        """The focal length."""
         return {"efl_mm": self.distance_mm}
 
     @property
@@ -79,7 +79,7 @@ class Pinhole:
 
     @property
     def wavelengths_um(self) -> FloatGrid:
-        """Those of visible light."""
+        """The wavelengths of visible light."""
         return np.array(WAVELENGTHS_UM)
 
     def layout(self, corner_mm: float, fields: int) -> FieldLayout:

@@ -188,7 +188,7 @@ def _built_in(path: Path) -> Path:
 
 
 def is_plate(path: Path) -> bool:
-    """Tell whether optics are a plate: TOML that speaks of a bench, a plate's name, or a bundle."""
+    """Return whether optics are a plate: TOML that has a bench, a plate's name, or a bundle."""
     path = _built_in(path)
     if path.suffix == SUFFIX:
         return True

@@ -9,7 +9,7 @@ from camkit.bundle.sensor import ColorSensor
 from camkit.models_def.optics.diffraction.plate import Plate
 from camkit.models_def.optics.diffraction.plate_optics import plate_kernels
 from camkit.models_def.optics.diffraction.streak_fit import fit_streaks
-from camkit.streaks.optics import StreakOptics
+from camkit.streaks import StreakOptics
 from camkit.units import MM_PER_M
 
 SIDE_PX: Final = 401
@@ -24,7 +24,7 @@ def plate_streaks(
     wavelengths_um: NDArray[np.float64] | None = None,
     side_px: int = SIDE_PX,
 ) -> StreakOptics:
-    """Compute what a plate writes and give it by its parts.
+    """Compute the streaks of a plate, by their parts.
 
     Args:
         plate: Before its lens.

@@ -1,4 +1,4 @@
-"""Where the light of a plate goes: core, streaks, haze; and where the streaks lie."""
+"""Shares of a plate's light in core, streaks and haze, and the place of the streaks."""
 
 import math
 from dataclasses import dataclass, replace
@@ -108,7 +108,7 @@ def side_for(psf: Tensor, share: float) -> int:
 
 
 def shares(psf: Tensor, streaks: tuple[Streak, ...]) -> Shares:
-    """Share the light of a PSF (side, side) out among core, streaks and haze."""
+    """Compute the shares of a PSF (side, side) in core, streaks and haze."""
     distance = _distance(psf)
     core = distance <= CORE_PX
     on_streak = torch.zeros_like(core)

@@ -17,7 +17,7 @@ from scipy.linalg import solve_banded
 
 from camkit.errors import ContractError
 from camkit.models_def.optics.diffraction.shares import find_streaks
-from camkit.streaks.optics import (
+from camkit.streaks import (
     HAZE_STEP_PX,
     MAX_CORE_PX,
     SECTION_STEP_PX,

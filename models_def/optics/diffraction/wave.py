@@ -22,7 +22,7 @@ from camkit.units import UM_PER_MM
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PixelGrid:
-    """Where the PSF is asked for.
+    """The samples at which the PSF is computed.
 
     Attributes:
         side_px: Odd; the middle pixel lies on the axis.

@@ -1,7 +1,8 @@
-"""Where in its period the unit begins: of no matter to the dots, but to what lies between them.
+"""Choice of the phase at which the period of a dot pattern begins.
 
-A plate of few units has wide dots. Their feet overlap in the active areas, brighter or darker by
-their phases, and where the period begins turns these. So it is chosen, at no cost.
+The phase does not change the dots, only the light between them. A plate of few units has wide dots.
+Their feet overlap in the active areas, brighter or darker by their phases, and the place where the
+period begins turns these. So the place is chosen, at no cost.
 """
 
 from typing import Final

@@ -1,8 +1,9 @@
-"""Which level is etched deepest: of no matter to a plate as designed, but to one that is not.
+"""Choice of the level that is etched deepest.
 
-Phases go round, so any level may be the bottom: all cells move on by as many levels, and the dots
-stay as they are. Masks that etch too deep by a share make other errors then. They send light
-straight on, above all, and this light meets that of the middle dot, for it or against it.
+The choice does not change a plate as designed, only one with errors of fabrication. Phases repeat,
+so any level may be the bottom: all cells move on by as many levels, and the dots stay as they are.
+Masks that etch too deep by a share then make other errors. Above all they send light straight on,
+and this light meets that of the middle dot, in phase or against it.
 """
 
 from typing import Final

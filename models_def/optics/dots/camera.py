@@ -22,7 +22,7 @@ SILICA: Final = "fused-silica-Malitson1965"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DotCamera:
-    """What a plate of dots stands in; the defaults are the prototype of the thesis.
+    """The camera of a plate of dots; the defaults are the prototype of the thesis.
 
     Attributes:
         wavelength_um: Of the laser.
@@ -84,7 +84,7 @@ class DotCamera:
         return float(refractive_index(find_glass(self.glass), wave))
 
     def etching(self, levels: int) -> Etching:
-        """Return how a plate of so many levels is etched: over one cycle of phase.
+        """Return the etching of a plate of so many levels: over one cycle of phase.
 
         Raises:
             ContractError: If levels are not 2, 4, 8, ...

@@ -1,7 +1,7 @@
-"""What small pixels see of a pattern of dots: the effective PSF, that training is given.
+"""The effective PSF of a pattern of dots as small pixels see it, which training is given.
 
-A pixel sees a round area. How much of a point's light falls into it, for a point that lies so many
-sub-pixels away, is the value of the PSF there: the pattern summed over circles on its lattice.
+A pixel sees a round area. The value of the PSF at an offset of so many sub-pixels is the share of a
+point's light that falls into this area: the pattern summed over circles on its lattice.
 
     dots, tens of samples a sub-pixel -> circles on the lattice, turned if need be -> (side, side)
 

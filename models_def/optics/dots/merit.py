@@ -1,8 +1,8 @@
-"""What a plate of dots is judged by: light outside the dots, and light at the wrong ones.
+"""The merit of a plate of dots: light outside the dots, and light at the wrong ones.
 
     merit = 1 - E + weight * mean((I / E - target)^2) / peak^2,    E = sum of I over the dots
 
-Both fall together for a while; then light is bought with likeness, at a price that `weight` says.
+Both terms fall together for a while; then more light costs likeness, and `weight` sets the price.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ _TINY: Final = 1e-300
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Merit:
-    """How wrong the light of dots is, 0 at best.
+    """The error of the light of dots, 0 at best.
 
     Attributes:
         target: (n, n) of unit sum.

@@ -29,7 +29,7 @@ from camkit.units import UM_PER_MM
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class View:
-    """How a plate stands before its sensor.
+    """The place of a plate before its sensor.
 
     Attributes:
         tiles: Units along a side of the aperture; None for the camera's.

@@ -43,7 +43,7 @@ def to_target(values: NDArray[Any]) -> FloatGrid:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Likeness:
-    """How a light is like the one that was wanted.
+    """The likeness of a light to the wanted one.
 
     Attributes:
         correlation: Pearson's, over the dots.

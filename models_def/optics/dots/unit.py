@@ -44,7 +44,7 @@ class DotPlate:
 
     @property
     def etching(self) -> Etching:
-        """Return how it is etched."""
+        """Return its etching."""
         return self.camera.etching(self.levels)
 
     @property

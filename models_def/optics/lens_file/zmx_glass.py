@@ -40,7 +40,7 @@ _OLDER: Final = {OLD_SCHOTT.casefold(): "schott"}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GlassOrder:
-    """Where a .zmx file's glasses are looked for.
+    """The order in which the catalogues of a .zmx file are searched for glasses.
 
     Attributes:
         own: The user's catalogues; asked first.

@@ -244,7 +244,7 @@ def _notes(records: ZmxRecords, surfaces: tuple[Surface, ...]) -> tuple[str, ...
 def _glass_notes(
     records: ZmxRecords, surfaces: tuple[Surface, ...], order: GlassOrder
 ) -> tuple[str, ...]:
-    """Return which glasses are not those of a catalogue that GCAT names: once for each."""
+    """Return notes on glasses that are not of a catalogue that GCAT names: once for each."""
     named = {c.name for c in (*order.own, *order.listed)} - {OLD_SCHOTT}
     notes: dict[str, str] = {}
     for block, surface in zip(records.surfaces[1:-1], surfaces, strict=True):

@@ -26,7 +26,7 @@ _OBSTACLES: Final = ("SQAP", "SQOB", "ELAP", "ELOB", "USAP", "USOB", "OBSC", "SP
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SurfaceContext:
-    """What a surface needs to know of its file.
+    """The facts of its file that a surface needs.
 
     Attributes:
         number: Of the surface, from the object (0).
@@ -128,7 +128,7 @@ def _glass(records: Records, context: SurfaceContext) -> Glass:
 
 
 def _model_hint(glass: Record) -> str:
-    """Say what the line itself knows of the glass; programs fill it with 1.5 and 40 if nothing."""
+    """Return the glass model of the line; programs write 1.5 and 40 if they know none."""
     words = glass.words[3:5]
     try:
         index_d, number = map(float, words)

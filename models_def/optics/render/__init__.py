@@ -1,4 +1,4 @@
-"""What a lens makes of a textured plane, by rays or by a map of PSFs.
+"""Pictures of a textured plane through a lens, by rays or by a map of PSFs.
 
 - `texture`: a picture on a plane in front of the camera, looked up with gradients
 - `window`: the part of a sensor that is rendered

@@ -1,4 +1,4 @@
-"""Which directions leave a pixel and pass the stop, and how much light they bring.
+"""Directions that leave a pixel and pass the stop, and the light that they bring.
 
 Rays are labelled by the point s of the stop, in units of its radius R, that a paraxial ray of
 their direction would meet: from a sensor point x with the slope u it is s = (A x + B u) / R. That
@@ -40,7 +40,7 @@ _LIGHT_RAYS: Final = 8192
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Labels:
-    """How labels of the stop become slopes: u = (R s - A x) / B.
+    """The map from labels of the stop to slopes: u = (R s - A x) / B.
 
     Attributes:
         a: A, a scalar that carries gradients.

@@ -56,7 +56,7 @@ _LEAST_LIGHT: Final = 1e-12
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sampling:
-    """How many rays, and which.
+    """The number and the choice of rays.
 
     Attributes:
         spp: Rays per pixel and colour in a pass.
@@ -94,7 +94,7 @@ class Sampling:
 
 @dataclass(frozen=True, slots=True)
 class _Job:
-    """What a pass needs that is not a tensor with a gradient."""
+    """The inputs of a pass that are no tensors with a gradient."""
 
     texture: Texture
     optics: Optics
@@ -104,7 +104,7 @@ class _Job:
     shapes: Shapes
 
     def chunks(self) -> Iterator[range]:
-        """Return the rows of each chunk."""
+        """Yield the rows of each chunk."""
         row_rays = 3 * self.window.width_px * self.sampling.spp
         rows = max(1, self.sampling.chunk_rays // row_rays)
         for first in range(0, self.window.height_px, rows):

@@ -28,7 +28,8 @@ from camkit.models_def.optics.render.optics import lens_optics
 from camkit.models_def.optics.render.texture import Texture
 from camkit.models_def.optics.render.window import Window
 from camkit.models_def.sensors.forward import BLOCK_STEP_PX, block_centres_px, scatter
-from camkit.models_def.sensors.psf import FieldKernels, wavelength_weights
+from camkit.models_def.sensors.psf import turned_at
+from camkit.runtime.bank.psf import wavelength_weights
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,7 +66,7 @@ class PsfMap:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MapGrid:
-    """Where the PSFs of a map are traced, and how finely.
+    """The places and the density of the PSFs of a map.
 
     Attributes:
         depths_mm: Object distances, increasing.
@@ -192,5 +193,5 @@ def _block_kernels(psf_map: PsfMap, fine: Window, step_px: int) -> Tensor:
     )
     y, x = (v.flatten() for v in torch.meshgrid(ys, xs, indexing="ij"))
     heights = torch.from_numpy(psf_map.field_heights_mm)
-    made = FieldKernels(kernels=psf_map.kernels[0], field_heights_mm=heights).at(x, y)
+    made = turned_at(psf_map.kernels[0], heights, x, y)
     return made.reshape(len(ys), len(xs), *made.shape[1:])

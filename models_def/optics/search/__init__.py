@@ -1,9 +1,10 @@
-"""How a lens is found and improved: free numbers, merits of spots, damped least squares.
+"""Search and improvement of lenses: free numbers, merits of spots, damped least squares.
 
 - `variables`: which numbers of a lens are free; batches of lenses as tensors
 - `beam`: rays of a batch of lenses, by the paraxial entrance pupil
 - `merit`: residuals of spots, three merits
 - `limits`: residuals of what a lens must not be: too thin, too steep, losing rays
+- `penalty`: what keeps a design where rays pass
 - `problem`: merit and limits of a batch of lenses, as one residual function
 - `least_squares`: damped least squares on a batch of starts
 - `finish`: a found lens made into a prescription

@@ -26,7 +26,7 @@ _ASPHERE_SAG_MM: Final = 0.2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Improvement:
-    """What a search from a given lens found.
+    """The result of a search from a given lens.
 
     Attributes:
         scaled: (variable,), the best.

@@ -21,7 +21,7 @@ _DAMPING_RANGE: Final = (1e-6, 1e6)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Descent:
-    """Where starts have come to.
+    """The present state of the starts.
 
     Attributes:
         scaled: (start, variable), best first.
@@ -70,7 +70,7 @@ def descend(residuals: Residuals, scaled: Tensor, steps: int, held: Tensor) -> D
 
 
 def evaluations(starts: int, steps: int, variables: int) -> int:
-    """Return how many lenses `descend` traces."""
+    """Return the number of lenses that `descend` traces."""
     return starts * (steps * (variables + 2) + 1)
 
 

@@ -1,4 +1,4 @@
-"""What a lens must not be, as residuals that vanish inside the limits."""
+"""Limits of a lens, as residuals that vanish inside them."""
 
 import math
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.penalty import edge_gaps, ray_penalty, reach_rho
+from camkit.models_def.optics.search.penalty import edge_gaps, ray_penalty, reach_rho
 from camkit.models_def.optics.trace import Rays, SurfaceTensors
 
 _PENALTY_PER_MM: Final = 3.0

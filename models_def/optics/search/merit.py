@@ -49,7 +49,7 @@ def spot_residuals(
 
 
 def _scale(square: Tensor, core_mm: float, merit: Merit) -> Tensor:
-    """Return what turns (x, y) into residuals; finite with its gradient at the centroid."""
+    """Return the factor from (x, y) to residuals; finite with its gradient at the centroid."""
     if merit == "rms":
         return torch.ones_like(square)
     if merit == "sum_abs":

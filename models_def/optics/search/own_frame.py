@@ -12,8 +12,8 @@ from typing import Final
 import torch
 from torch import Tensor
 
-from camkit.models_def.optics.penalty import edge_gaps, reach_rho
 from camkit.models_def.optics.pupil import PupilSamples
+from camkit.models_def.optics.search.penalty import edge_gaps, reach_rho
 from camkit.models_def.optics.search.problem import Problem, trace_batch
 
 _LINE: Final = 161
@@ -58,7 +58,7 @@ def too_small_rims(problem: Problem, scaled: Tensor) -> list[tuple[int, float, f
 
 
 def _reaches(problem: Problem, scaled: Tensor) -> list[float]:
-    """Return how far from the axis the beam meets every surface, in mm."""
+    """Return the largest height of the beam on every surface, in mm."""
     rim = torch.linspace(-1, 1, _LINE, dtype=torch.float64)
     samples = PupilSamples(x=torch.zeros_like(rim), y=rim)
     with torch.no_grad():

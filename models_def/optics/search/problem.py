@@ -26,7 +26,7 @@ Change = Callable[[SurfaceTensors, SurfaceTensors], SurfaceTensors]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Problem:
-    """What a search minimises.
+    """The merit and the limits that a search minimises.
 
     Attributes:
         free: The lens and its free numbers.

@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.psf import tent
+from camkit.models_def.optics.psf import spread_tents
 from camkit.models_def.optics.search.beam import LEAD
 from camkit.models_def.optics.trace import Rays
 from camkit.units import UM_PER_MM
@@ -45,12 +45,6 @@ def splat_batch(landed: Rays, pixels: Pixels) -> Tensor:
     # where the window lies is not a matter of the lens: no gradient through it
     middle = ((y * alive).sum((-2, -1), keepdim=True) / total).detach()
     row, column = y - middle + (size - 1) / 2, x + (size - 1) / 2
-    flat = torch.zeros(*row.shape[:3], size * size, dtype=row.dtype)
-    share = alive / alive.shape[-1] / 2
-    for corner in range(4):
-        down, right = divmod(corner, 2)
-        place, weight = tent(row, column, (down, right), size)
-        flat = flat.scatter_add(-1, place, weight * share)
-    half = flat.reshape(*row.shape[:3], size, size)
+    half = spread_tents(row, column, alive / alive.shape[-1] / 2, size)
     both = half + half.flip(-1)
     return torch.einsum("cw,sfwyx->sfcyx", pixels.color_weights.to(both.dtype), both)

@@ -1,4 +1,4 @@
-"""Which numbers of a lens are free, and batches of lenses made from them.
+"""The free numbers of a lens, and batches of lenses made from them.
 
 A batch is (start, variable) in scaled units: 0 is the lower bound of a variable, 1 the upper. What
 is not free keeps the value of the lens. One curvature may be solved for the focal length, and the

@@ -10,8 +10,8 @@ angle, through walls and off the frame, over the area that its peaks cover.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -22,6 +22,8 @@ from camkit.bundle.sensor import ColorSensor
 from camkit.contracts import FrozenPsf, RadialDistortion
 from camkit.errors import ContractError
 from camkit.haze import MOST_CELLS, Haze
+from camkit.models_def.optics.distortion import refuse_other_lens
+from camkit.models_def.optics.freeze import Facts, Tell, rounded_facts
 from camkit.models_def.optics.frozen import corner_height_mm, rounded, wavelength_bands
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
@@ -31,7 +33,6 @@ from camkit.progress import counted
 from camkit.units import to_mm
 
 Array = NDArray[np.float64]
-Tell = Callable[[str], None]
 
 CORE_PX: Final = 64
 FADE_PX: Final = 40
@@ -44,6 +45,9 @@ COPY_RAYS: Final = 8000
 ENERGY: Final = 0.995
 LEAST_HAZE: Final = 1e-6
 """Of the light: less beside a core is none."""
+SAME_PEAKS_PX: Final = 4.0
+"""Peaks are found to a pixel or so and fitted to within one or two; those of other plates lie tens
+of pixels off."""
 _ANGLES: Final = 120
 _RINGS: Final = 24
 _TERMS: Final = 4
@@ -51,7 +55,7 @@ _TERMS: Final = 4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HazyGrid:
-    """How finely a lens is sampled.
+    """The sampling of a lens.
 
     Attributes:
         fields: Places from the axis to the corner.
@@ -78,41 +82,6 @@ FINE: Final = HazyGrid()
 """For a bundle."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class HazyReport:
-    """What was frozen.
-
-    Attributes:
-        about: What light is gathered about.
-        fields: Places from the axis to the corner, `LEAST_FIELDS` at least.
-        wavelengths: Samples of the response.
-        core_px: Reach of the core.
-        cell_px: Side of a cell.
-        cells: Side of a kernel of the haze in cells.
-        core_share: Least share in the core of the light that arrives of a field and wavelength.
-        haze_kept: Least share in the cells of the haze that lands within the corner's radius.
-        corner_illumination: Relative illumination at the corner.
-    """
-
-    about: Middle
-    fields: int
-    wavelengths: int
-    core_px: int
-    cell_px: int
-    cells: int
-    core_share: float
-    haze_kept: float
-    corner_illumination: float
-
-    def to_json(self) -> dict[str, int | float | str]:
-        """Return the report as a flat mapping."""
-        return {
-            name: round(value, 5) if isinstance(value, float) else value
-            for name in self.__slots__
-            for value in [getattr(self, name)]
-        }
-
-
 def freeze_hazy(
     lens: Lens,
     sensor: ColorSensor,
@@ -120,7 +89,7 @@ def freeze_hazy(
     *,
     about: Middle | None = None,
     tell: Tell = lambda _: None,
-) -> tuple[FrozenOptics, HazyReport]:
+) -> tuple[FrozenOptics, Facts]:
     """Freeze a lens that makes peaks and haze.
 
     Args:
@@ -129,6 +98,11 @@ def freeze_hazy(
         grid: How finely.
         about: What light is gathered about; None to choose, see `find_middles`.
         tell: Takes a line for every field.
+
+    Returns:
+        Core and haze, and what they hold: `core_share` is the least share in the core of the light
+        that arrives of a field and wavelength, `haze_kept` the least share in the cells of the haze
+        that lands within the corner's radius.
 
     Raises:
         ContractError: If neither a peak nor a chief ray reaches the corner, or the haze is wider
@@ -187,18 +161,18 @@ def freeze_hazy(
         pixel_pitch_um=pitch_um,
     )
     near = share / (share + haze.sum(axis=(-2, -1)))
-    report = HazyReport(
-        about=middles.about,
-        fields=fields,
-        wavelengths=wavelengths,
-        core_px=core_px,
-        cell_px=cell_px,
-        cells=cells,
-        core_share=float(near.min()),
-        haze_kept=float(_kept(haze / light[:, None, None, None], wanted).min()),
-        corner_illumination=float(illumination[-1]),
-    )
-    return FrozenOptics(psf=psf, haze=found), report
+    facts: Facts = {
+        "about": middles.about,
+        "fields": fields,
+        "wavelengths": wavelengths,
+        "core_px": core_px,
+        "cell_px": cell_px,
+        "cells": cells,
+        "core_share": float(near.min()),
+        "haze_kept": float(_kept(haze / light[:, None, None, None], wanted).min()),
+        "corner_illumination": float(illumination[-1]),
+    }
+    return FrozenOptics(psf=psf, haze=found), rounded_facts(facts)
 
 
 def arriving(angles_rad: Array, heights_px: Array) -> Array:
@@ -218,7 +192,7 @@ def arriving(angles_rad: Array, heights_px: Array) -> Array:
 
 
 def peaks_off_px(lens: Lens, psf: FrozenPsf, *, rays: int = RAYS) -> float:
-    """Return how far the peaks (or chief rays) of a lens lie from where a PSF has them, at most.
+    """Return the largest distance of a lens's peaks (or chief rays) from those of a PSF.
 
     Args:
         lens: The lens.
@@ -238,6 +212,15 @@ def peaks_off_px(lens: Lens, psf: FrozenPsf, *, rays: int = RAYS) -> float:
     return float(np.abs(found - frozen_px).max())
 
 
+def check_peaks(lens: Lens, psf: FrozenPsf, path: Path) -> None:
+    """Refuse core kernels that were frozen from another lens with a haze.
+
+    Raises:
+        ContractError: If their peaks lie elsewhere.
+    """
+    refuse_other_lens(lens, path, peaks_off_px(lens, psf), SAME_PEAKS_PX)
+
+
 def flat_light(
     lens: Lens,
     heights_px: Array,
@@ -246,7 +229,7 @@ def flat_light(
     rays: int,
     corner_rad: float | None = None,
 ) -> Array:
-    """Return how an even scene lights the sensor, haze and walls counted, 1 on the axis.
+    """Return the illumination by an even scene, haze and walls counted, 1 on the axis.
 
     Args:
         lens: The lens.

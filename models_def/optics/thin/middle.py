@@ -33,7 +33,7 @@ MOST_RAD: Final = math.radians(80.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Middles:
-    """What the light of a lens is gathered about.
+    """The places about which the light of a lens is gathered.
 
     Attributes:
         about: What it is.
@@ -118,7 +118,7 @@ def corner_angle_rad(lens: Lens, corner_px: float, pitch_um: float, rays: int) -
 
 
 def height_px(lens: Lens, angle_rad: float, wave_um: float, pitch_um: float, rays: int) -> float:
-    """Return where the peak of a field lies.
+    """Return the height of the peak of a field.
 
     Raises:
         ContractError: If no light arrives.

@@ -14,13 +14,12 @@ from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.sensor import ColorSensor
 from camkit.contracts import FloatArray, depth_name
 from camkit.errors import ContractError
+from camkit.models_def.optics.freeze import Facts, Tell
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.thin.freezing import (
     COPY_RAYS,
     LEAST_FIELDS,
     HazyGrid,
-    HazyReport,
-    Tell,
     freeze_hazy,
 )
 
@@ -56,7 +55,7 @@ def freeze_distances(
         ContractError: As `freeze_hazy` of its own distance, or if no other is left.
     """
 
-    def frozen(distance_mm: float) -> tuple[FrozenOptics, HazyReport]:
+    def frozen(distance_mm: float) -> tuple[FrozenOptics, Facts]:
         return freeze_hazy(replace(lens, object_distance_mm=distance_mm), sensor, grid)
 
     own_mm = lens.object_distance_mm
@@ -68,8 +67,9 @@ def freeze_distances(
         except ContractError as error:
             said = f"left out, {error}"
         else:
-            said = "kept" if report.about == of_own.about else f"left out, by its {report.about}"
-            if report.about == of_own.about:
+            about = report["about"]
+            said = "kept" if about == of_own["about"] else f"left out, by its {about}"
+            if about == of_own["about"]:
                 found[distance_mm] = optics
         tell(f"object at {depth_name(distance_mm)}: {said}")
     if len(found) == 1:
@@ -78,7 +78,7 @@ def freeze_distances(
 
 
 def _stacked(found: dict[float, FrozenOptics], own: FrozenOptics) -> FrozenOptics:
-    """Lay distances side by side, with the places of one of them."""
+    """Stack distances side by side, with the places of one of them."""
     hazes = [optics.haze for optics in found.values() if optics.haze is not None]
     assert own.haze is not None
     side = max(haze.kernels.shape[-1] for haze in hazes)

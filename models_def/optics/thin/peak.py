@@ -1,4 +1,4 @@
-"""How much of a point's light lies near the peak of its image, and how far the haze reaches.
+"""The share of a point's light near the peak of its image, and the reach of the haze.
 
 The peak is the densest place of the meridian: the middle of the disc of 5 px radius that holds
 most light. Shares are of all light that enters the stop, so what grooves take counts as missing.

@@ -1,4 +1,4 @@
-"""What is wanted of a thin plate: the recipe of `camkit lens thin`."""
+"""The recipe of a thin plate, for `camkit lens thin`."""
 
 import math
 from dataclasses import dataclass, field
@@ -69,7 +69,7 @@ class PlateTable:
 
     @property
     def index(self) -> float:
-        """Of the glass at the wavelength."""
+        """Index of the glass at the wavelength."""
         wave = torch.tensor([self.wavelength_um], dtype=torch.float64)
         return float(refractive_index(find_glass(self.glass), wave))
 
@@ -115,7 +115,7 @@ class PartitionTable:
 
     @property
     def field_angles_rad(self) -> tuple[float, ...]:
-        """(direction,)."""
+        """Field angles, (direction,)."""
         last = self.directions - 1
         return tuple(to_radians(self.corner_deg * i / last) for i in range(self.directions))
 
@@ -139,7 +139,7 @@ class StopTable:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SolverTable:
-    """How it is solved.
+    """The settings of the solver.
 
     Attributes:
         steps: Of damped least squares.

@@ -1,4 +1,4 @@
-"""What the image of a point is over the field: peak, haze, grooves, rays against waves."""
+"""Report on the image of a point over the field: peak, haze, grooves, rays against waves."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

@@ -34,7 +34,7 @@ class PlateNumbers:
 def trace_plate(
     plate: PlateNumbers, index: float, gap_mm: float, start: tuple[Tensor, Tensor], slope: Tensor
 ) -> tuple[Tensor, Tensor]:
-    """Return where rays of a distant scene land.
+    """Return the landing points of rays of a distant scene.
 
     Args:
         plate: The plates.

@@ -35,7 +35,7 @@ _LEAST_ROOM_MM: Final = 1e-9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SolvedPlate:
-    """What came out.
+    """The result of the solver.
 
     Attributes:
         front: Terms r^2, r^4, ... of the front profile; empty for a plane.
@@ -55,7 +55,7 @@ class SolvedPlate:
 
 
 def back_radius_mm(plate: PlateTable, corner_rad: float) -> float:
-    """Return how far out unbent light of the corner meets the back face."""
+    """Return the radius at which unbent light of the corner meets the back face."""
     inside = math.tan(math.asin(math.sin(corner_rad) / plate.index))
     return plate.aperture_mm / 2 + plate.thickness_mm * inside
 
@@ -68,12 +68,12 @@ class _Search:
 
     @property
     def bends(self) -> int:
-        """How many terms beyond r^2 a face has."""
+        """Number of terms beyond r^2 of a face."""
         return self.recipe.plate.terms - 1
 
     @property
     def count(self) -> int:
-        """How many numbers there are: a curvature, two profiles, centres, the sensor."""
+        """Number of unknowns: a curvature, two profiles, centres, the sensor."""
         return 1 + 2 * self.bends + self.recipe.partition.directions
 
     @property
@@ -87,7 +87,7 @@ class _Search:
         return held
 
     def scales(self) -> Tensor:
-        """Return what 1/2 of each number is, from the middle."""
+        """Return the step of each number that a scaled 1/2 stands for."""
         plate, partition = self.recipe.plate, self.recipe.partition
         rims = (plate.aperture_mm / 2, back_radius_mm(plate, partition.field_angles_rad[-1]))
         powers = range(2, plate.terms + 1)

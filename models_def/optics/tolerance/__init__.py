@@ -1,4 +1,4 @@
-"""What fabrication does to a lens: errors of surfaces and elements, and how light goes then.
+"""Fabrication errors of a lens: errors of surfaces and elements, and the light through them.
 
 In the order in which data flows:
 

@@ -58,11 +58,11 @@ class Deviations:
 
     @property
     def copies(self) -> int:
-        """How many there are."""
+        """Number of copies."""
         return len(self.focus_mm)
 
     def of_copy(self, number: int) -> "Deviations":
-        """Return those of one copy alone."""
+        """Return the deviations of one copy."""
         one = slice(number, number + 1)
         return Deviations(**{f.name: getattr(self, f.name)[one] for f in fields(self)})
 

@@ -1,4 +1,4 @@
-"""Which surfaces are one piece of glass: cemented ones move as one."""
+"""Elements of a lens: the surfaces that are one piece of glass; cemented ones move as one."""
 
 from camkit.models_def.optics.prescription import Lens
 

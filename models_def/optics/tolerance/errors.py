@@ -41,7 +41,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ErrorWidth:
-    """How an error is spread.
+    """The distribution of an error.
 
     Attributes:
         half_width: Largest error, in the unit of its class; of a decentre or tilt its length.
@@ -61,7 +61,7 @@ class ErrorWidth:
             )
 
     def signed(self, uniform: Array) -> Array:
-        """Turn uniform draws of 0..1 into errors of both signs."""
+        """Convert uniform draws of 0..1 to errors of both signs."""
         if self.distribution == "uniform":
             return self.half_width * (2 * uniform - 1)
         low = ndtr(-NORMAL_SIGMAS)
@@ -69,7 +69,7 @@ class ErrorWidth:
         return np.asarray(sigma * ndtri(low + uniform * (1 - 2 * low)))
 
     def length(self, uniform: Array) -> Array:
-        """Turn uniform draws of 0..1 into lengths of vectors of any direction."""
+        """Convert uniform draws of 0..1 to lengths of vectors of any direction."""
         if self.distribution == "uniform":
             return self.half_width * np.sqrt(uniform)
         cut = 1 - math.exp(-(NORMAL_SIGMAS**2) / 2)

@@ -15,7 +15,9 @@ from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import (
     PupilSamples,
     launch,
+    marked,
     newton_aim,
+    pupil_centre,
     pupil_rays,
     with_fixed_stop,
     with_open_apertures,
@@ -26,7 +28,6 @@ from camkit.models_def.optics.tolerance.errors import Array, Compensator
 from camkit.models_def.optics.tolerance.misaligned_trace import meet, trace_misaligned
 from camkit.models_def.optics.tolerance.pose import Pose, poses
 from camkit.models_def.optics.trace import (
-    Fate,
     Rays,
     SurfaceTensors,
     surface_tensors,
@@ -40,7 +41,7 @@ _AIM_FRESH: Final = 1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class View:
-    """What is looked at.
+    """The fields, wavelengths and rays of an analysis.
 
     Attributes:
         slopes: (field,), tan of the field angles.
@@ -61,7 +62,7 @@ class View:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Landing:
-    """Where the light of copies falls; each field turned to +y.
+    """The landing points of the light of copies; each field turned to +y.
 
     Attributes:
         rays: (copy, field, wave, ray) on the sensor.
@@ -155,11 +156,8 @@ def land(lens: Lens, deviations: Deviations, view: View, compensator: Compensato
     with torch.no_grad():
         rays, weight = _trace(fixed, deviations, view)
         shift = _refocus(fixed, deviations, view, compensator, (rays, weight))
-        centre = PupilSamples(
-            x=torch.zeros(1, dtype=torch.float64), y=torch.zeros(1, dtype=torch.float64)
-        )
         wave = torch.tensor([lens.reference_wavelength_um], dtype=torch.float64)
-        middle = replace(view, wavelengths_um=wave, samples=centre)
+        middle = replace(view, wavelengths_um=wave, samples=pupil_centre())
         chief, alive = _trace(fixed, deviations, middle, walls=False)
         if not bool((alive > 0).all()) or not bool((weight > 0).any(-1).all()):
             raise ContractError("the light of a copy is lost; use smaller errors or fields")
@@ -174,7 +172,7 @@ def land(lens: Lens, deviations: Deviations, view: View, compensator: Compensato
 
 
 def _joined(parts: list[Landing]) -> Landing:
-    """Put the landings of single copies together."""
+    """Join the landings of single copies."""
 
     def cat(values: Iterable[Tensor]) -> Tensor:
         return torch.cat(list(values))
@@ -234,8 +232,7 @@ def _aimed(
     found = newton_aim(at_stop, wanted, begin, steps=_AIM_STEPS, fresh=_AIM_FRESH)
     share = 1.0 if view.samples.weight is None else view.samples.weight * len(view.samples.x)
     again = launch(found.x, found.y, slope, lens.object_distance_mm)
-    lost = torch.where(found.weight > 0, int(Fate.VALID), int(Fate.MISSED)).to(torch.int8)
-    return replace(again, fate=lost), found.weight * share
+    return marked(again, found.weight), found.weight * share
 
 
 def _refocus(
@@ -245,7 +242,7 @@ def _refocus(
     compensator: Compensator,
     traced: tuple[Rays, Tensor],
 ) -> Tensor:
-    """Return how far the compensator moves the sensors (copy,)."""
+    """Return the movement of the sensors by the compensator (copy,)."""
     if compensator == "none":
         return torch.zeros(deviations.copies, dtype=torch.float64)
     nothing = no_deviations(lens)

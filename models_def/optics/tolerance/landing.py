@@ -4,7 +4,7 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.psf import tent
+from camkit.models_def.optics.psf import spread_tents
 from camkit.models_def.optics.tolerance.fabricated import Landing
 from camkit.units import UM_PER_MM
 
@@ -42,10 +42,7 @@ def copy_kernels(
     column = (landing.rays.x - landing.chief_x_mm[..., None, None]) * scale + centre
     row = (landing.rays.y - landing.chief_y_mm[..., None, None]) * scale + centre
     share = landing.weight / landing.weight.sum(-1, keepdim=True).clamp_min(1e-300)
-    flat = torch.zeros(*row.shape[:3], size_px * size_px, dtype=row.dtype)
-    for corner in range(4):
-        place, weight = tent(row, column, divmod(corner, 2), size_px)
-        flat = flat.scatter_add(-1, place, weight * share)
+    flat = spread_tents(row, column, share, size_px).flatten(-2)
     colored = torch.einsum("cw,sfwp->sfcp", color_weights.to(flat.dtype), flat)
     kept = colored.sum(-1, keepdim=True)
     if bool((kept <= 0).any()):

@@ -17,7 +17,7 @@ _MIN_COSINE = 1e-6
 
 
 def meet(tensors: SurfaceTensors, pose: Pose | None, rays: Rays, i: int) -> Rays:
-    """Carry rays onto surface i and bend them; give them in the frame of the surface."""
+    """Trace rays onto surface i and refract them; return them in the frame of the surface."""
     return refract(tensors, rays if pose is None else to_surface(pose, rays), i)
 
 
@@ -68,7 +68,7 @@ def _turned(turn: Tensor, vector: tuple[Tensor, Tensor, Tensor]) -> list[Tensor]
 
 
 def _to_plane(rays: Rays) -> Rays:
-    """Carry rays to z = 0; one that a strong tilt sent backwards is lost."""
+    """Trace rays to z = 0; one that a strong tilt sent backwards is lost."""
     onward = rays.n > _MIN_COSINE
     way = torch.where(onward, -rays.z / torch.where(onward, rays.n, 1.0), 0.0)
     lost = (rays.fate == Fate.VALID) & ~onward

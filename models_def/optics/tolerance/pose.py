@@ -1,4 +1,4 @@
-"""Where decentred and tilted surfaces stand.
+"""Poses of decentred and tilted surfaces.
 
 A surface is first turned about its vertex and shifted, then its piece of glass is turned about
 the piece's front vertex and shifted: p = R q + o, with q in the frame of the surface and p in the
@@ -15,7 +15,7 @@ from camkit.models_def.optics.tolerance.deviation import Deviations
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pose:
-    """Of one surface.
+    """The pose of one surface.
 
     Attributes:
         turn: R, (..., 3, 3); the dimensions before broadcast against the rays.

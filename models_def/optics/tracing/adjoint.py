@@ -24,7 +24,7 @@ from camkit.models_def.optics.tracing.profile import TINY, polynomial
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wanted:
-    """Which gradients are asked for; semi-diameters have none."""
+    """The gradients that are asked for; semi-diameters have none."""
 
     rays: bool
     curvature: bool
@@ -35,7 +35,7 @@ class Wanted:
 
 
 class Slopes(NamedTuple):
-    """What flows back: derivatives of the loss by a result; None is zero."""
+    """The values that flow back: derivatives of the loss by a result; None is zero."""
 
     end: State
     path: Tensor | None
@@ -43,7 +43,7 @@ class Slopes(NamedTuple):
 
 
 class Gradients(NamedTuple):
-    """Of the launched rays and the lens; a list has an entry per surface (indices: one more)."""
+    """The gradients of rays and lens; a list has an entry per surface (indices: one more)."""
 
     rays: State | None
     curvature: list[Tensor]
@@ -143,7 +143,7 @@ def pull_back(
 def _tamed(
     shape: _Shape, bent: _Bent, push: Tensor, g: State
 ) -> tuple[_Shape, _Bent, Tensor, State]:
-    """Let rays go whose derivatives leave what their numbers can hold; they point nowhere.
+    """Drop rays whose derivatives exceed the range of their numbers.
 
     A lens far from any that forms an image can multiply a derivative by 1e9 at every surface; in
     single precision it becomes infinite, and infinity minus infinity is no number.

@@ -109,7 +109,7 @@ class Fused:
 
 
 def _joined(parts: Sequence[Tensor], rows: Sequence["_Row"], shape: torch.Size) -> Tensor:
-    """Put what rows of rays gave in its place."""
+    """Join the results of rows of rays."""
     if len(parts) == 1:
         return parts[0].reshape(shape)
     whole = parts[0].new_empty(shape)

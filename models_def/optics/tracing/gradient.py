@@ -38,10 +38,10 @@ class Task(NamedTuple):
 
 
 class Engine(Protocol):
-    """What computes a block: eager here, compiled in `compilation`."""
+    """The engine that computes a block: eager here, compiled in `compilation`."""
 
     def block_rays(self, *, gradient: bool) -> int:
-        """Return how many rays a block has at most; `gradient` if it will be pulled back."""
+        """Return the most rays of a block; `gradient` if it will be pulled back."""
         ...
 
     def run(self, settings: TraceSettings, lens: LensTensors, rays: State, fate: Tensor) -> Result:
@@ -57,7 +57,7 @@ class Eager:
     """One torch operation after the other."""
 
     def block_rays(self, *, gradient: bool) -> int:  # noqa: ARG002
-        """Return what fits the cache: every operation writes its result."""
+        """Return the rays that fit the cache: every operation writes its result."""
         return BLOCK_RAYS
 
     def run(self, settings: TraceSettings, lens: LensTensors, rays: State, fate: Tensor) -> Result:
@@ -110,7 +110,7 @@ def _blocks(shape: torch.Size, device: torch.device, limit: int) -> list[_Block]
 
 
 class _Spec(NamedTuple):
-    """What is no tensor: the settings, the engine, whether rays on each surface are given out."""
+    """The inputs that are no tensors: settings, engine, whether rays on surfaces are returned."""
 
     settings: TraceSettings
     engine: Engine

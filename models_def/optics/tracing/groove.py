@@ -1,4 +1,4 @@
-"""Where rays meet a surface that is cut into grooves, and what its walls take.
+"""Intersection of rays with a surface that is cut into grooves, and the loss at its walls.
 
 The continuous profile h(r) is laid down in rings: wherever |h| has grown by the groove depth d it
 begins anew at the vertex plane, so that z = h - k d with k the whole part of h / d, counted
@@ -67,7 +67,7 @@ def ring_number(p: Numbers, rho: Tensor, groove: Groove) -> Tensor:
 
 
 def meet_grooves(p: Numbers, at: State, groove: Groove, *, adaptive: bool) -> GrooveMeeting:
-    """Return where rays from the vertex plane meet a grooved surface."""
+    """Return the points at which rays from the vertex plane meet a grooved surface."""
     depth = groove.depth_mm
     above = heights(p, torch.addcmul(at.x * at.x, at.y, at.y)).height
     if not groove.walls:
@@ -98,7 +98,7 @@ def _rho(at: State, way: Tensor) -> Tensor:
 
 
 def _in_fillet(hit: Meeting, ring: Tensor, groove: Groove) -> Tensor:
-    """Return which rays meet the rounding at the foot of a wall."""
+    """Return a mask of the rays that meet the rounding at the foot of a wall."""
     deep = hit.z.abs()
     # the foot is where the relief is deepest in the solid
     at_full_depth = (hit.z >= 0) == groove.solid_after
@@ -113,7 +113,7 @@ def _in_fillet(hit: Meeting, ring: Tensor, groove: Groove) -> Tensor:
 def meets_again(
     p: Numbers, met: GrooveMeeting, bent: State, groove: Groove, *, adaptive: bool
 ) -> Tensor:
-    """Return which bent rays run into the next groove before they have left the relief."""
+    """Return a mask of the bent rays that meet the next groove before they leave the relief."""
     onward = bent.n.clamp_min(MIN_COSINE)
     back = torch.where(met.hit.z + met.ring * groove.depth_mm < 0, 0.0, groove.depth_mm)
     # the line of the bent ray, from the vertex plane

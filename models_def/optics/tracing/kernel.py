@@ -35,7 +35,7 @@ SECOND_HIT: Final = 6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TraceSettings:
-    """What is static about a trace.
+    """The static settings of a trace.
 
     Attributes:
         aspheric: Which surfaces have a polynomial part or grooves.
@@ -83,7 +83,7 @@ def numbers(lens: LensTensors) -> list[Numbers]:
 
 
 class Kept(NamedTuple):
-    """What the adjoint needs of a trace: the last fate, rays on each surface and their fates."""
+    """The inputs of the adjoint: the last fate, rays on each surface and their fates."""
 
     fate: Tensor
     seen: list[State]
@@ -91,7 +91,7 @@ class Kept(NamedTuple):
 
 
 class Result(NamedTuple):
-    """What a trace gives."""
+    """The result of a trace."""
 
     end: State
     path: Tensor | None
@@ -127,7 +127,7 @@ def run(settings: TraceSettings, lens: Sequence[Numbers], rays: State, fate: Ten
 
 
 def rest(state: State, fate: Tensor, *, adaptive: bool, n: float = 1.0) -> State:
-    """Put lost rays on the axis, at the vertex (or their gradients to zero, with `n` = 0)."""
+    """Move lost rays to the axis, at the vertex (or their gradients to zero, with `n` = 0)."""
     if adaptive and not bool(fate.any()):
         return state
     alive = fate == 0
@@ -138,7 +138,7 @@ def rest(state: State, fate: Tensor, *, adaptive: bool, n: float = 1.0) -> State
 def cross(
     p: Numbers, rays: State, fate: Tensor, shape: tuple[bool, Groove | None], *, adaptive: bool
 ) -> tuple[State, Tensor, Tensor]:
-    """Carry rays onto a surface and refract them.
+    """Trace rays onto a surface and refract them.
 
     Args:
         p: The surface.
@@ -186,7 +186,7 @@ def cross(
 
 
 class _Lost(NamedTuple):
-    """Which rays a groove took: at its wall, or by being met again; None for none."""
+    """The rays that a groove took: at its wall, or by being met again; None for none."""
 
     wall: Tensor | None = None
     again: Tensor | None = None

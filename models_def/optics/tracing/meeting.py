@@ -1,4 +1,4 @@
-"""Where rays meet a surface: the conic in closed form, the asphere by Newton's method.
+"""Intersection of rays with a surface: the conic in closed form, the asphere by Newton's method.
 
 Positions are relative to the vertex of the surface. Nothing here branches on a ray, so that
 `torch.compile` can fuse a whole lens into one loop; only the number of Newton steps follows the
@@ -55,7 +55,7 @@ class Numbers(NamedTuple):
 
 
 def to_plane(state: State) -> tuple[State, Tensor]:
-    """Carry rays to the plane z = 0; give them and the way."""
+    """Trace rays to the plane z = 0; return them and the way."""
     back = state.z / state.n
     x = torch.addcmul(state.x, back, state.l, value=-1)
     y = torch.addcmul(state.y, back, state.m, value=-1)
@@ -96,7 +96,7 @@ class Meeting(NamedTuple):
 
 
 def meet_conic(p: Numbers, at: State) -> Meeting:
-    """Return where rays from the vertex plane meet a surface without a polynomial part."""
+    """Return the points at which rays meet a surface without a polynomial part."""
     way, exists, root, square = _conic_way(p, at)
     x, y = torch.addcmul(at.x, way, at.l), torch.addcmul(at.y, way, at.m)
     z = way * at.n
@@ -150,7 +150,7 @@ def heights(p: Numbers, rho: Tensor) -> Heights:
 
 
 def meet_asphere(p: Numbers, at: State, *, adaptive: bool, drop: Tensor | None = None) -> Meeting:
-    """Return where rays from the vertex plane meet a surface, by Newton's method.
+    """Return the points at which rays meet a surface, by Newton's method.
 
     It starts from the conic (Sun 2021, eq. (6.6)), from the plane where that is missed.
 

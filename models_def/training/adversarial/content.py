@@ -1,8 +1,11 @@
-"""Output and truth compared by |difference|, Gram matrices and features, eqs. (3.6), (3.7).
+"""Output and truth compared by |difference|, Gram matrices and features.
 
-Features are those behind the ReLU of conv3_2 of VGG-19. Without a file of its weights the same
-layers stand in for it, four times narrower, with random weights that are the same each time: their
-Gram matrices see texture and colour, but nothing that was learned from photographs.
+References: Sun 2021, eqs. (3.6), (3.7), (6.12).
+
+Features are those behind the ReLU of conv3_2 of VGG-19; fine-tuning has those before the ReLU of
+conv3_3. Without a file of its weights the layers up to conv3_2 stand in for it, four times
+narrower, with random weights that are the same each time: their Gram matrices see texture and
+colour, but nothing that was learned from photographs.
 
 References: Sun 2021, section 3.5.2; Gatys, Ecker and Bethge 2016; Johnson et al. 2016.
 """
@@ -15,6 +18,7 @@ import torch
 from torch import Tensor
 
 from camkit.models_def.networks.vgg import WIDTHS, VggLevels, take_vgg
+from camkit.models_def.training.adversarial.game import Terms
 from camkit.models_def.training.adversarial.views import Views, pixel_loss
 from camkit.models_def.training.recipe import ContentRecipe
 
@@ -46,6 +50,25 @@ class Relu32(torch.nn.Module):
         return features
 
 
+class Conv33(torch.nn.Module):
+    """Features before the ReLU of conv3_3, a quarter of the size of a picture."""
+
+    def __init__(self, vgg: Path) -> None:
+        """Read the weights of VGG-19.
+
+        Raises:
+            ContractError: If the file is no VGG-19 of torchvision.
+        """
+        super().__init__()
+        self.levels = VggLevels(blocks=BLOCKS, pooling="max", next_one=True)
+        take_vgg(self.levels, vgg)
+
+    def forward(self, picture: Tensor) -> Tensor:
+        """Return (b, 256, h / 4, w / 4) from (b, 3, h, w) sRGB in 0..1."""
+        features: Tensor = self.levels(picture)[-1]
+        return features
+
+
 def gram(features: Tensor) -> Tensor:
     """Return the (b, c, c) Gram matrices of (b, c, h, w) features, eq. (3.6)."""
     flat = features.flatten(2)
@@ -57,10 +80,8 @@ def gram_loss(found: Tensor, wanted: Tensor) -> Tensor:
     return (gram(found) - gram(wanted)).abs().sum((1, 2)).mean()
 
 
-def content_terms(
-    views: Views, recipe: ContentRecipe, features: Features | None
-) -> dict[str, tuple[float, Tensor]]:
-    """Return name -> weight and value of each term that counts.
+def content_terms(views: Views, recipe: ContentRecipe, features: Features | None) -> Terms:
+    """Return the terms that count.
 
     Args:
         views: Output and truth.

@@ -5,7 +5,7 @@ Such a kind defines `FITTING` beside its `PART`, whose `fitting` gives `picture_
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import torch
@@ -15,12 +15,16 @@ from camkit.colorimetry import rec709_from_camera
 from camkit.errors import ContractError
 from camkit.models_def.networks.vgg import file_digest
 from camkit.models_def.training.adversarial.content import Relu32
-from camkit.models_def.training.adversarial.fitter import PictureFitter, PictureParts
-from camkit.models_def.training.adversarial.judged import Mix
+from camkit.models_def.training.adversarial.fitter import Mix, PictureParts, picture_fitter
+from camkit.models_def.training.adversarial.opponents import OpponentPlan
 from camkit.models_def.training.adversarial.sharp import SharpCrops
-from camkit.models_def.training.fitter import Fits, NetworkBuilder
+from camkit.models_def.training.adversarial.wasserstein import Wasserstein
+from camkit.models_def.training.fitter import BETAS, Fitter, NetworkBuilder
 from camkit.models_def.training.fitting import FitRequest, OwnFitting
 from camkit.models_def.training.recipe import PICTURE_LOSSES, ScheduleRecipe
+
+CRITIC: Final = "critic"
+CRITIC_SEED: Final = 3
 
 PairReader = Callable[[Path, Any], Mix]
 """From a folder of real pairs, and the material of the samples."""
@@ -52,23 +56,43 @@ def picture_fitting(
         )
     features = Relu32(request.vgg) if schedule.content.looks else None
     sharp = None if request.sharp is None else SharpCrops(request.sharp)
+    judged = schedule.loss == "adversarial"
     to_rec709 = torch.from_numpy(rec709_from_camera(np.array(matrix)))
 
-    def make(material: Any) -> Fits:
+    def make(material: Any) -> Fitter:
         mix = None
         if request.pairs is not None and read_pairs is not None:
             mix = read_pairs(request.pairs, material)
         parts = PictureParts(
+            content=schedule.content,
             to_rec709=to_rec709,
             features=features,
-            sharp=sharp,
+            opponents=critic_plan(schedule, sharp) if judged else None,
             mix=mix,
             first=request.first,
             device=request.device,
+            betas=(schedule.critic.beta1 if judged else BETAS[0], BETAS[1]),
         )
-        return PictureFitter(request.entry, build, parts)
+        return picture_fitter(request.entry, build, parts)
 
     return OwnFitting(make=make, credit=_credit(request, schedule))
+
+
+def critic_plan(schedule: ScheduleRecipe, sharp: SharpCrops | None = None) -> OpponentPlan:
+    """Return the critic of a schedule. References: eqs. (3.8), (3.9)."""
+    critic = schedule.critic
+    return OpponentPlan(
+        game=Wasserstein(penalty=critic.penalty),
+        weights={CRITIC: critic.weight},
+        layers={CRITIC: critic.layers},
+        width=critic.width,
+        learning_rate=critic.learning_rate,
+        beta1=critic.beta1,
+        steps=critic.steps,
+        seed=schedule.seed + CRITIC_SEED,
+        sharp=sharp,
+        sharp_share=critic.sharp_share,
+    )
 
 
 def _check_files(request: FitRequest, schedule: ScheduleRecipe) -> None:
@@ -84,7 +108,7 @@ def _check_files(request: FitRequest, schedule: ScheduleRecipe) -> None:
 
 
 def _credit(request: FitRequest, schedule: ScheduleRecipe) -> str:
-    """Return what else the weights learned from, for the card."""
+    """Return the further training data of the weights, for the card."""
     said = [f"; by the loss {schedule.loss}"]
     if schedule.content.looks and request.vgg is None:
         said.append("random features in place of VGG-19")

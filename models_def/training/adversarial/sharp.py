@@ -24,7 +24,7 @@ class SharpCrops:
         self._source = open_source(folder, picture_share=1.0, scenes=1, scene_px=1)
 
     def put_among(self, rng: np.random.Generator, real: Tensor, share: float) -> Tensor:
-        """Put crops in the places of some true pictures.
+        """Replace some true pictures by crops.
 
         A crop is as bright as the picture that it replaces, so that exposure tells nothing.
 

@@ -12,10 +12,13 @@ code of the authors takes it over the colours of each pixel.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final
 
 import torch
 from torch import Tensor
+
+from camkit.models_def.training.adversarial.game import Judge, Terms
 
 LEAST_SQUARE: Final = 1e-24
 """The root of an exact zero has no gradient."""
@@ -25,7 +28,7 @@ Critic = Callable[[Tensor], Tensor]
 
 
 def critic_loss(real: Tensor, fake: Tensor) -> Tensor:
-    """Return what a critic minimises beside its penalty, from scores of any shape.
+    """Return the loss of a critic without its penalty, from scores of any shape.
 
     Its negative estimates how far the two distributions lie apart.
     """
@@ -33,7 +36,7 @@ def critic_loss(real: Tensor, fake: Tensor) -> Tensor:
 
 
 def generator_loss(fake: Tensor) -> Tensor:
-    """Return what a generator minimises: the scores of its pictures, negative."""
+    """Return the loss of a generator: the scores of its pictures, negative."""
     return -fake.mean()
 
 
@@ -51,3 +54,32 @@ def gradient_penalty(critic: Critic, real: Tensor, fake: Tensor, draw: torch.Gen
     (gradient,) = torch.autograd.grad(critic(between).sum(), between, create_graph=True)
     steepness = gradient.flatten(1).square().sum(1).clamp(min=LEAST_SQUARE).sqrt()
     return (steepness - 1).square().mean()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wasserstein:
+    """WGAN with a gradient penalty; fulfils `camkit.models_def.training.adversarial.game.Game`.
+
+    Attributes:
+        penalty: lambda of the penalty.
+    """
+
+    penalty: float
+
+    def lesson(self, judge: Judge, real: Tensor, fake: Tensor, draw: torch.Generator) -> Terms:
+        """Return the loss of a critic, and its penalty."""
+        scores = _means_of(judge)
+        return {
+            "critic": (1.0, critic_loss(scores(real), scores(fake))),
+            "penalty": (self.penalty, gradient_penalty(scores, real, fake, draw)),
+        }
+
+    def opinion(self, judge: Judge, real: Tensor, fake: Tensor) -> Tensor:
+        """Return what the generator minimises."""
+        del real
+        return generator_loss(_means_of(judge)(fake))
+
+
+def _means_of(judge: Judge) -> Critic:
+    """Return one score a picture: the mean over all places."""
+    return lambda pictures: judge(pictures).mean((1, 2, 3))

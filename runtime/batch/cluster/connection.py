@@ -27,11 +27,11 @@ logger = logging.getLogger(__name__)
 
 
 class NoAnswer(CamkitError):  # noqa: N818 - says what it is
-    """What was asked did not answer in time."""
+    """No answer came in time."""
 
 
 def within(seconds: float, ask: Callable[[], T]) -> T:
-    """Return what a call gives; it is left alone if it takes longer.
+    """Return the result of a call; a call that takes longer is abandoned.
 
     Raises:
         NoAnswer: If it does.
@@ -57,7 +57,7 @@ def within(seconds: float, ask: Callable[[], T]) -> T:
 
 @contextmanager
 def connected(address: str) -> Iterator["Client"]:
-    """Return a client of a running scheduler; it is closed at the end.
+    """Yield a client of a running scheduler; it is closed at the end.
 
     Certificates and keys of tls:// are those of dask's own configuration.
 
@@ -77,7 +77,7 @@ def connected(address: str) -> Iterator["Client"]:
 
 @contextmanager
 def own_workers(count: int) -> Iterator["Client"]:
-    """Return a client of `count` worker processes on this machine, which end with the block.
+    """Yield a client of `count` worker processes on this machine, which end with the block.
 
     Raises:
         UnsupportedError: If dask.distributed is not installed.
@@ -177,7 +177,7 @@ def _trouble(address: str, security: "Security") -> str | None:
 
 
 async def _kind(address: str, security: "Security") -> str:
-    """Ask who serves an address."""
+    """Return the kind of server at an address."""
     from distributed.comm.core import connect
 
     async def ask() -> str:

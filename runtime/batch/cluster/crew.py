@@ -39,7 +39,7 @@ class Crew:
         bundles: Mapping[str, Callable[[], bytes]],
         notice: Callable[[str], None],
     ) -> None:
-        """Return what workers must have.
+        """Store the needs of workers.
 
         Args:
             needs: Of the run.
@@ -64,17 +64,17 @@ class Crew:
         return self._needs.flag
 
     def forget(self) -> None:
-        """Look at every worker anew: the scheduler is another one."""
+        """Forget every worker: the scheduler is another one."""
         self.slots.clear()
         self.has_losses = True
         self._looked_s = float("-inf")
 
     def room(self) -> int:
-        """Return how many files may be under way: those in the making, one waiting per worker."""
+        """Return the number of files that may be under way, one waiting for each worker."""
         return sum(self.slots.values()) + len(self.slots)
 
     def look(self, client: "Client", *, now: bool = False) -> bool:
-        """Take in workers that are new and drop those that are gone, once in a while.
+        """Add workers that are new and drop those that are gone, once in a while.
 
         Args:
             client: A connected one.
@@ -122,7 +122,7 @@ class Crew:
         return {address: frozenset(map(str, keys)) for address, keys in found.items()}
 
     def _take_in(self, client: "Client", new: Sequence[str]) -> None:
-        """Ask new workers in turn what they are; each question goes to those that are left."""
+        """Query new workers in turn; each question goes to those that are left."""
         from camkit import __version__
 
         # asked with what every worker has: it may hold no camkit to ask with
@@ -155,7 +155,7 @@ class Crew:
         *args: Any,
         seconds: float = REPLY_S,
     ) -> dict[str, Any]:
-        """Run a function on workers; give what it gave, leave out those on which it failed."""
+        """Run a function on workers; return its results, without those of workers that failed."""
         if not workers:
             return {}
         ready = [arg() if callable(arg) else arg for arg in args]
@@ -200,7 +200,7 @@ class Crew:
             self._notice(f"worker {address} is left out: {reason}")
 
     def dismiss(self, client: "Client") -> None:
-        """Let the workers forget the run."""
+        """End the run on all workers."""
         workers = list(self.slots)
         within(
             REPLY_S,
@@ -208,7 +208,7 @@ class Crew:
         )
 
     def busy(self, client: "Client") -> int:
-        """Return how many files of the run are in the making."""
+        """Return the number of files of the run that are in the making."""
         workers = list(self.slots)
         answers = within(
             REPLY_S,
@@ -218,7 +218,7 @@ class Crew:
 
 
 def _workers(client: "Client") -> dict[str, dict[str, Any]]:
-    """Return what the scheduler knows of every worker, by its address.
+    """Return the scheduler's facts about every worker, by its address.
 
     Asked of it directly: `client.scheduler_info` answers for five workers if the client has looked
     after itself meanwhile.
@@ -229,7 +229,7 @@ def _workers(client: "Client") -> dict[str, dict[str, Any]]:
 
 
 def _trouble(error: BaseException) -> str:
-    """Say in words what a worker answered with."""
+    """Return the answer of a worker in words."""
     if isinstance(error, ModuleNotFoundError | importlib.metadata.PackageNotFoundError):
         return f"lacks {error.name}"
     return " ".join(str(error).split()) or type(error).__name__

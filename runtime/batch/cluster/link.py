@@ -22,7 +22,7 @@ class Link:
     def __init__(
         self, client: "Client", topic: str | None, hear: Callable[[tuple[float, Any]], None]
     ) -> None:
-        """Take a client, which stays its owner's, and hear what workers tell on a topic."""
+        """Store a client, which stays its owner's, and subscribe to a topic of the workers."""
         self.client = client
         self.address = str(getattr(client.scheduler, "address", ""))
         self._security = client.security
@@ -48,7 +48,7 @@ class Link:
             self._subscribe()
 
     def find_again(self) -> bool:
-        """Connect anew; give whether that worked."""
+        """Connect anew; return whether that worked."""
         try:
             client = open_client(self.address, self._security)
         except (CamkitError, OSError):
@@ -59,7 +59,7 @@ class Link:
         return True
 
     def end(self) -> None:
-        """Leave the caller's client as it was, close one of our own."""
+        """Restore the caller's client, or close one of our own."""
         self._ears.clear()
         if self._topic is not None:
             with contextlib.suppress(Exception):
@@ -71,7 +71,7 @@ class Link:
             close_client(self.client)
 
     def _subscribe(self) -> None:
-        """Ask the scheduler for what is told; one that was started again knows nothing of it."""
+        """Subscribe with the scheduler; one that was started again knows no subscribers."""
         self._comm, ears = self.client.scheduler_comm, self._ears
 
         def hear(event: tuple[float, Any]) -> None:

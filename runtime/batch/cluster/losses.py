@@ -1,4 +1,4 @@
-"""Whose fault a worker's death was: files are followed from worker to worker."""
+"""Classify worker deaths (memory, crash, lost host): files are followed from worker to worker."""
 
 from collections.abc import Mapping, Sequence
 from typing import Final, Literal
@@ -25,7 +25,7 @@ class Losses:
     def follow(
         self, placed: Mapping[str, frozenset[str]], under_way: Mapping[str, int]
     ) -> list[str]:
-        """See where files are, and count what they lost since the last time.
+        """Update the places of files, and count their losses since the last time.
 
         The scheduler looks for a worker when a task comes and when a worker comes; what a worker
         is given later (`remote.offer`) makes it look no more. So a task may be left with nobody.
@@ -56,7 +56,7 @@ class Losses:
         self._counts[number] = HOPELESS if was_alone else max(self._counts[number], SUSPECT)
 
     def fate(self, number: int) -> Fate:
-        """Return what becomes of a file that lost its worker."""
+        """Return the fate of a file that lost its worker."""
         if self._counts[number] >= HOPELESS:
             return "failed"
         return "alone" if self._counts[number] >= SUSPECT else "again"

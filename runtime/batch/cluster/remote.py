@@ -1,4 +1,4 @@
-"""What runs on a worker: it says whether it fits, takes bundles, makes one picture per call."""
+"""Code that runs on a worker: it checks whether it fits, takes bundles, makes pictures."""
 
 import hashlib
 import os
@@ -37,7 +37,7 @@ _pipelines: OrderedDict[str, Pipelines] = OrderedDict()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Needs:
-    """What a worker must have for a run.
+    """The needs of a run: what a worker must have.
 
     Attributes:
         run: Name of the run.
@@ -63,7 +63,7 @@ class Needs:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Order:
-    """What is asked of a worker: one capture, under absolute names.
+    """An order to a worker: one capture, under absolute names.
 
     Attributes:
         task: The capture and its picture; its bundle is NO_BUNDLE or a SHA-256.
@@ -117,7 +117,7 @@ def _unfit(needs: Needs, dask_worker: "Worker") -> str | None:
 
 
 def take_bundle(sha256: str, data: bytes, dask_worker: "Worker") -> None:
-    """Keep a bundle for as long as this worker lives.
+    """Store a bundle for as long as this worker lives.
 
     Raises:
         OSError: If it cannot be written.
@@ -133,7 +133,7 @@ def take_bundle(sha256: str, data: bytes, dask_worker: "Worker") -> None:
 
 
 async def offer(needs: Needs, dask_worker: "Worker") -> int:
-    """Offer this worker to a run; give how many files it makes at once."""
+    """Offer this worker to a run; return how many files it makes at once."""
     keep_freed_memory()
     memory = _memory_bytes(dask_worker)
     wanted = {MEMORY: float(memory), needs.flag: 1e9}
@@ -149,7 +149,7 @@ def forget(run: str) -> None:
 
 
 def busy(run: str) -> int:
-    """Return how many files of a run are in the making here."""
+    """Return the number of files of a run that are in the making here."""
     with _lock:
         return _busy.get(run, 0)
 
@@ -208,7 +208,7 @@ def _pipelines_of(order: Order, worker: "Worker") -> Pipelines:
 
 
 def _is_given_up(worker: "Worker", key: Any) -> bool:
-    """Tell whether nobody waits for a task any more: cancelled, or worker or scheduler are lost."""
+    """Return whether nobody waits for a task any more: it, the worker or the scheduler is lost."""
     if worker.status.name not in ("running", "paused"):
         return True
     task = worker.state.tasks.get(key)
@@ -230,7 +230,7 @@ def _teller(worker: "Worker", topic: str, number: int) -> Callable[[Path, int, i
 
 
 def _slots(file_bytes: int, worker: "Worker") -> int:
-    """Return how many files of a size fit a worker at once."""
+    """Return the number of files of a size that fit a worker at once."""
     return max(1, min(worker.state.nthreads, _memory_bytes(worker) // file_bytes))
 
 

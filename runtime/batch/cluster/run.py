@@ -57,7 +57,7 @@ Notice = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wishes:
-    """What a caller wants of a run.
+    """The caller's wishes for a run.
 
     Attributes:
         options: What changes the pixels.
@@ -99,7 +99,7 @@ def process_on_cluster(client: "Client", tasks: Sequence[Task], wishes: Wishes) 
 
 @contextlib.contextmanager
 def _token(folder: Path, run: str) -> Iterator[Path]:
-    """Lay a file beside the pictures by which workers know that they see the same folder.
+    """Write a file beside the pictures by which workers recognise the same folder.
 
     It is a claim, so that those of callers that were killed are told from those of callers at work.
     """
@@ -235,7 +235,7 @@ class _Run:
     # ------------------------------------------------------------------------------- files
 
     def _submit(self) -> None:
-        """Hand out files, as many as there is room for."""
+        """Submit files, as many as there is room for."""
         now = time.monotonic()
         while self._later and self._later[0][0] <= now:
             self._waiting.append(self._later.popleft()[1])
@@ -280,7 +280,7 @@ class _Run:
         future.add_done_callback(self._done.put)
 
     def _collect(self) -> None:
-        """Take what is ready; wait a moment if nothing is."""
+        """Collect finished files; wait a moment if there are none."""
         try:
             ready = [self._done.get(timeout=POLL_S)]
         except queue.Empty:
@@ -294,7 +294,7 @@ class _Run:
                 self._take(number, future)
 
     def _take(self, number: int, future: "Future[FileResult | None]") -> None:
-        """Settle a file, or put it back."""
+        """Finish a file, or queue it again."""
         from distributed import KilledWorker
 
         if future.status == "finished":
@@ -319,13 +319,13 @@ class _Run:
             self._after_error(number, error)
 
     def _again(self, number: int) -> None:
-        """Put a file back that was lost for no reason of its own."""
+        """Queue a file again that was lost for no reason of its own."""
         self._crew.has_losses = True
         self._claimed_s.pop(number, None)
         self._waiting.append(number)
 
     def _wait_for_claim(self, number: int) -> None:
-        """Try a file again that somebody else is making: he may be a worker that was lost."""
+        """Try a file again that another process makes: it may be a worker that was lost."""
         task, now = self._tasks[number], time.monotonic()
         since = self._claimed_s.setdefault(number, now)
         if now - since < (LEASE_S if self._crew.has_losses else CLAIMED_S):
@@ -391,7 +391,7 @@ class _Run:
     # ------------------------------------------------------------------------------ losses
 
     def _follow(self) -> None:
-        """Take back files that nobody has got, or that want to be tried alone."""
+        """Withdraw files that no worker has, or that should be tried alone."""
         pending = {str(f.key): f for f in self._open if f.status == "pending"}
         under_way = {key: self._open[future] for key, future in pending.items()}
         for key in self._losses.follow(self._crew.placed(self._link.client), under_way):
@@ -400,7 +400,7 @@ class _Run:
             self._send_again(number)
 
     def _send_again(self, number: int) -> None:
-        """Put a file back that lost its worker; one that lost several is tried alone."""
+        """Queue a file again that lost its worker; one that lost several is tried alone."""
         self._claimed_s.pop(number, None)
         fate = self._losses.fate(number)
         if fate == "failed":
@@ -456,7 +456,7 @@ class _Run:
             )
 
     def _give_up(self) -> None:
-        """Return up what is under way; wait until the workers have let go of it."""
+        """Cancel all files under way; wait until the workers have released them."""
         with contextlib.suppress(Exception):
             self._link.client.cancel(list(self._open), force=True)
             end = time.monotonic() + STOP_S

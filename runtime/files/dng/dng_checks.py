@@ -93,7 +93,7 @@ def unapplied(picture: DngPicture) -> list[str]:
 
 
 def find_doubts(tags: TiffTags) -> list[str]:
-    """Return where the sensor picture of a DNG contradicts itself, or of any file has no data."""
+    """Return the contradictions in the sensor picture of a DNG, and the parts without data."""
     directories = [d for d in sensor_directories(tags.directories) if numbers_of(d, _WIDTH)]
     found = [
         "the header does not say where the pixels of the mosaic lie"

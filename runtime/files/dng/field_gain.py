@@ -112,7 +112,7 @@ class GainMap:
         return found
 
     def _points(self, places: Places, axis: int) -> NDArray[np.float64]:
-        """Return where pixels lie between the points of the grid."""
+        """Return the positions of pixels between the points of the grid."""
         last, step = self.gains.shape[axis] - 1, self.spacing[axis]
         if not last or not step:
             return np.zeros(places.size)

@@ -19,7 +19,7 @@ _SIZES: Final = struct.Struct(">BHHB")
 
 
 def frame_doubt(path: Path, picture: DngPicture) -> str:
-    """Return which strip or tile holds another number of samples than it should; empty for none.
+    """Return the strip or tile with a wrong number of samples; empty for none.
 
     Args:
         path: The file.

@@ -80,7 +80,7 @@ def field_gains(picture: DngPicture) -> tuple[FieldGains, list[str]]:
 
 
 def _opcodes(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """Return number and data of each opcode.
+    """Yield number and data of each opcode.
 
     Raises:
         DecodeError: If the list ends early or claims more than can be.

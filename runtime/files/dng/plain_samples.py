@@ -56,7 +56,7 @@ def read_plain(path: Path, picture: DngPicture) -> NDArray[Any]:
 
 
 def _chunks(picture: DngPicture) -> Iterator[_Chunk]:
-    """Return the strips or tiles of a picture, each plane after the other if they lie apart."""
+    """Yield the strips or tiles of a picture, each plane after the other if they lie apart."""
     tags, (height, width) = picture.directory, (picture.height, picture.width)
     tiled = 324 in tags
     offsets = numbers_of(tags, 324 if tiled else 273)

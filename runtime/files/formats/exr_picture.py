@@ -220,7 +220,7 @@ def _rgb_of_chroma(planes: Sequence[FloatArray], chromaticities: Any) -> FloatAr
 def _notes(
     headers: Sequence[Mapping[str, Any]], part: _Part, window: PictureWindow
 ) -> tuple[str, ...]:
-    """Return what is not read, and where the pixels lie."""
+    """Return notes on unread parts, and on the place of the pixels."""
     plain = [name for name in part.left if name.upper() == "A"]
     rest = [name for name in part.left if name not in plain]
     notes = ["alpha channel dropped"] if plain else []

@@ -55,7 +55,7 @@ class Segment:
 
 
 def header_segments(data: bytes) -> Iterator[Segment]:
-    """Return the segments before the first scan, as far as they can be followed."""
+    """Yield the segments before the first scan, as far as they can be followed."""
     at = len(MAGIC)
     for _ in range(_MOST_SEGMENTS):
         segment = _segment(data, at)

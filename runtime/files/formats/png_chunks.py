@@ -16,7 +16,7 @@ _MOST_PX_PER_BYTE: Final = 8192
 
 
 def png_chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """Return name and content of each chunk but those of pixels, as far as they can be followed."""
+    """Yield name and content of each chunk but those of pixels, as far as they can be followed."""
     at = len(MAGIC)
     for _ in range(_MOST_CHUNKS):
         length, name = int.from_bytes(data[at : at + 4]), data[at + 4 : at + 8]

@@ -85,7 +85,7 @@ class TiffPage:
 
     @property
     def kind(self) -> int:
-        """Return what kind of number a sample is: UNSIGNED, SIGNED, FLOAT."""
+        """Return the kind of a sample's number: UNSIGNED, SIGNED, FLOAT."""
         stated = self.number_of(339, UNSIGNED)
         return UNSIGNED if stated == UNDEFINED else stated
 
@@ -101,12 +101,12 @@ class TiffPage:
 
     @property
     def photometric(self) -> int:
-        """Return what samples stand for; where it is not stated, what their number tells."""
+        """Return the meaning of the samples; derived from their number where it is not stated."""
         return self.number_of(262, RGB if self.samples >= 3 else MIN_IS_BLACK)
 
     @property
     def extra(self) -> tuple[int, ...]:
-        """Return what samples beyond the colours are."""
+        """Return the kinds of samples beyond the colours."""
         return self.numbers(338)
 
     @property
@@ -116,7 +116,7 @@ class TiffPage:
 
     @property
     def empty_chunks(self) -> int:
-        """Return how many strips or tiles have no place in the file, as sparse ones have."""
+        """Return the number of strips or tiles without a place in the file, as sparse ones have."""
         places = ((273, 279), (324, 325))
         pairs = [
             pair

@@ -217,7 +217,7 @@ def _read_by_tifffile(path: Path, page: TiffPage) -> NDArray[Any]:
 
 
 def _codec(page: TiffPage) -> Codec | None:
-    """Return what takes off a compression that `packed_bits` does not."""
+    """Return the decoder of a compression that `packed_bits` has not."""
     import tifffile
 
     if page.compression in (tiff_page.PLAIN, tiff_page.DEFLATE, tiff_page.OLD_DEFLATE):

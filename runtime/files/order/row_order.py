@@ -49,7 +49,7 @@ _SEAM_GUARD: Final = 3
 
 
 def order_doubt(cells: Cells, wraps: Cells) -> str:
-    """Return what says that rows lie at another place or in another order; empty for nothing.
+    """Return the evidence that rows lie at another place or in another order; empty for none.
 
     Args:
         cells: (h, w) light of one colour; white is 1.
@@ -91,7 +91,7 @@ def _moves_border(above: NDArray[np.float32], below: NDArray[np.float32], shift:
 
 
 def _least_rows(height: int) -> int:
-    """Return how many rows above and below a break tell it from a part of the picture."""
+    """Return the rows above and below by which a break differs from a part of the picture."""
     return max(_LEAST_ROWS, round(_LEAST_HEIGHT * height))
 
 

@@ -51,7 +51,7 @@ class TileGrid:
 
 
 def tile_doubt(cells: NDArray[np.float32], grid: TileGrid, step: tuple[int, int]) -> str:
-    """Return which tile has an edge along its border; empty for none.
+    """Return the tile that has an edge along its border; empty for none.
 
     Args:
         cells: (h, w) light of one colour.

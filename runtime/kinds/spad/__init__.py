@@ -1,4 +1,4 @@
-"""What counts of single photons tell: pulses, banks of them, fits and their bounds; products.
+"""Captures of single photons: pulses, banks of them, fits and their bounds; products.
 
 photon_capture an open capture with all that is known of its times
 files          readers of captures

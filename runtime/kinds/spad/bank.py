@@ -68,7 +68,7 @@ class Bank:
 
 
 def make_bank(axis: TimeAxis, pulse: Pulse) -> Bank:
-    """Lay templates over an axis, wherever half of a pulse or more is seen.
+    """Compute templates over an axis, wherever half of a pulse or more is seen.
 
     Raises:
         ContractError: If it would take too many.
@@ -117,7 +117,7 @@ class Banded:
     """Values of templates in their bands of bins, made ready for products with counts."""
 
     def __init__(self, bank: Bank, rows: NDArray[np.int64], values: NDArray[np.float64]) -> None:
-        """Make the narrow matrices.
+        """Compute the narrow matrices.
 
         Args:
             bank: The templates.
@@ -148,7 +148,7 @@ class Scorer:
     """A bank at one ratio of background to signal, made ready for products with counts."""
 
     def __init__(self, bank: Bank, ratio: float, every: int = 1) -> None:
-        """Make the narrow matrices.
+        """Compute the narrow matrices.
 
         Args:
             bank: The templates.

@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 
 
 class Between:
-    """What cubics between the templates of a bank need, side by side."""
+    """The coefficients of cubics between the templates of a bank, side by side."""
 
     def __init__(self, bank: Bank) -> None:
         self._bank = bank

@@ -39,7 +39,7 @@ LEAST_SIGNAL: Final = 0.1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fit:
-    """What was found of some pixels; all arrays (p,).
+    """The fits of some pixels; all arrays (p,).
 
     Attributes:
         time_of_flight_ps: mu.
@@ -76,12 +76,12 @@ class Fitter:
 
     @cached_property
     def _information(self) -> NDArray[np.float64]:
-        """(ratios, m) J of every ratio."""
+        """Information J of every ratio, (ratios, m)."""
         return np.stack([information(self.bank, ratio) for ratio in RATIOS])
 
     @cached_property
     def _summed_shares(self) -> NDArray[np.float64]:
-        """(m, b + 1) share of each template before each bin of its band."""
+        """Shares (m, b + 1) of each template before each bin of its band."""
         shares = self.bank.shares
         return np.concatenate([np.zeros((len(shares), 1)), np.cumsum(shares, axis=1)], axis=1)
 
@@ -136,7 +136,7 @@ class Fitter:
     def split(
         self, sums: NDArray[np.float64], template: NDArray[np.int64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Share photons out to signal and background, by those near the pulse and away from it.
+        """Divide photons among signal and background, by those near the pulse and away from it.
 
         What a template puts outside its near bins is signal there too.
 

@@ -41,7 +41,7 @@ ISO: Final = 100.0
 
 
 def golden_cases(bundle: Bundle) -> Cases:
-    """Take the golden captures with the array of a bundle."""
+    """Record the golden captures with the array of a bundle."""
     camera = FineCamera.of(bundle)
     cases = {
         name: _counted(camera, name, photons, seed) for name, (photons, seed) in LIGHTS.items()

@@ -45,7 +45,7 @@ REFUTED: Final = 0.05
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pooled:
-    """What was found of every pixel, of the smallest square that sufficed.
+    """The fits of every pixel, of the smallest square that sufficed.
 
     Attributes:
         fit: All arrays (h w,); amplitude and background are those of one pixel.
@@ -129,7 +129,7 @@ class Squares:
     """
 
     def __init__(self, cube: FloatArray, side: int, sound: NDArray[np.bool_] | None = None) -> None:
-        """Look at squares.
+        """Sum the counts of squares.
 
         Args:
             cube: (h, w, bins) counts.

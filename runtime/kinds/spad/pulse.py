@@ -1,4 +1,4 @@
-"""What one detected photon's time looks like: density and distribution of a pulse in closed form.
+"""The distribution of one detected photon's time: density and integral of a pulse, closed form.
 
 A pulse that left for a target at time of flight mu is seen at mu + u; u has the density and the
 distribution given here. In a histogram that is what lies in a bin. A gate that opens at t sees

@@ -1,4 +1,4 @@
-"""How much more counts scatter that pile-up was taken out of: by pixel, where its pulse lies.
+"""The growth of the scatter of counts by pile-up correction: by pixel, where its pulse lies.
 
 A rate that a bin had only some cycles left to show, or that is read off a gate which is nearly
 always full, scatters more than the Poisson counts it stands for:

@@ -107,7 +107,7 @@ def _put(
     members: NDArray[np.float64],
     proved: NDArray[np.bool_],
 ) -> None:
-    """Put proved pairs in place; of the others only how much spoke for a second return."""
+    """Store proved pairs; of the others only the evidence for a second return."""
     flat = {name: values.reshape(2, -1) for name, values in layers.items()}
     flat["evidence"][1, rows] = two.evidence
     rows, members = rows[proved], members[proved]

@@ -1,4 +1,4 @@
-"""What the caller chose for a capture of single photons, with the timing file it names."""
+"""The caller's settings for a capture of single photons, with the timing file that they name."""
 
 import hashlib
 from collections.abc import Mapping
@@ -23,7 +23,7 @@ PRODUCTS: Final[tuple[Product, ...]] = get_args(Product)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """What is to be made, and how.
+    """The product and the settings of its making.
 
     Attributes:
         product: None for what the capture is: depth of histograms, intensity of counts.

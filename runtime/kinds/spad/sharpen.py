@@ -34,7 +34,7 @@ METHODS: Final[tuple[Method, ...]] = ("log", "lsq")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Way:
-    """How pixels are fitted.
+    """The way in which pixels are fitted.
 
     Attributes:
         method: log: the log-matched bank. lsq: least squares, as the dissertation does.
@@ -59,7 +59,7 @@ class Way:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sharpened:
-    """What was found of every pixel; all arrays (returns, h, w), the nearest surface first.
+    """The fits of every pixel; all arrays (returns, h, w), the nearest surface first.
 
     Attributes:
         time_of_flight_ps: mu.
@@ -107,7 +107,7 @@ class Sharpener:
     """
 
     def __init__(self, axis: TimeAxis, pulse: Pulse, way: Way) -> None:
-        """Make the bank.
+        """Compute the bank.
 
         Raises:
             ContractError: If it would take too many templates.

@@ -1,4 +1,4 @@
-"""Whether pixels lie inside the surface that their square of neighbours shows, or beside it.
+"""The test whether pixels lie inside the surface of their square of neighbours, or beside it.
 
 Beside an edge every square holds a return, and the chance that a pixel's own few photons happen to
 agree with it is large. A pixel is inside where its own photons agree, and where every block of its

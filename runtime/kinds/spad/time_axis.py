@@ -16,7 +16,7 @@ Shares = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TimeAxis:
-    """Where the bins lie.
+    """The bins of a time axis.
 
     Attributes:
         orientation: histogram: a bin holds the photons that came in it, p(t - mu). gate: a bin is a

@@ -1,4 +1,4 @@
-"""What is known of the times of a capture: a strict TOML file, and what the capture itself states.
+"""The times of a capture: a strict TOML file, and what the capture itself states.
 
 [timing]      orientation = "gate" | "histogram"
               time_bin_ps or bin_edges_ps, first_ps (centre of bin 0; delay of the first gate),
@@ -76,7 +76,7 @@ class Irf(_Table):
 
 
 class Array(_Table):
-    """How the capture's array is to be read, and where its pixels look."""
+    """The layout of the capture's array, and the directions of its pixels."""
 
     axes: str | None = None
     key: str | None = None
@@ -87,7 +87,7 @@ class Array(_Table):
 
 
 class Lifetime(_Table):
-    """What fits of lifetimes may know."""
+    """The known facts for fits of lifetimes."""
 
     period_ps: Positive | None = None
     from_ps: float | None = None
@@ -95,7 +95,7 @@ class Lifetime(_Table):
 
 
 class Correction(_Table):
-    """What is taken off or left out."""
+    """The corrections of counts, and the pixels that are left out."""
 
     offset_ps: float = 0.0
     dark: NotNegative | str = 0.0
@@ -250,7 +250,7 @@ WHOLE: Final = frozenset({"bins", "cycles"})
 
 
 def timing_beside(capture: Path) -> Path:
-    """Name the timing file that may lie beside a capture: NAME.TYPE.toml."""
+    """Return the path of the timing file that may lie beside a capture: NAME.TYPE.toml."""
     return capture.with_name(capture.name + ".toml")
 
 

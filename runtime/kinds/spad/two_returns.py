@@ -39,7 +39,7 @@ LEAST_BACKGROUND: Final = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TwoReturns:
-    """What was found of some pixels; the nearer surface comes first.
+    """The fits of some pixels; the nearer surface comes first.
 
     Attributes:
         times_of_flight_ps: (2, p).
@@ -177,7 +177,7 @@ class TwoFitter:
     def _ascend(
         self, counts: Floats, start: Floats, steps: int, *, is_one: bool = False
     ) -> tuple[Floats, Floats]:
-        """Climb the likelihood; with `is_one` both pulses stay the same one."""
+        """Maximise the likelihood; with `is_one` both pulses stay the same one."""
         values = start.copy()
         mean, gradients = self._model(values)
         height = _height(counts, mean)
@@ -207,7 +207,7 @@ class TwoFitter:
     def _highest(
         self, counts: Floats, values: Floats, step: Floats, height: Floats
     ) -> tuple[Floats, Floats]:
-        """Go a step, else a third of it and so on until it rises; give its end, and the rise."""
+        """Try a step, else a third of it and so on until it rises; return its end, and the rise."""
         found, risen = values.copy(), np.zeros(len(height))
         left = np.arange(len(height))
         for cut in range(CUTS):

@@ -1,11 +1,11 @@
-"""Which blocks of the bank are filtered."""
+"""The rule for the blocks of the bank that are filtered."""
 
 from typing import Final
 
 from camkit.bundle.stages import Wiener
 from camkit.runtime.bank.blocks import cut_block_px, lay_spans
-from camkit.runtime.plan.blocks import plain_share
 from camkit.runtime.plan.decision import Decision, Subject, Work
+from camkit.runtime.plan.idle_blocks import plain_share
 from camkit.runtime.plan.ways import runs
 
 ORDER: Final = 30

@@ -1,4 +1,4 @@
-"""Which lattice cells get the network, a smaller one, the bank alone, or only development."""
+"""The rule for lattice cells: the network, a smaller one, the bank alone, or only development."""
 
 from dataclasses import replace
 from typing import Final
@@ -25,7 +25,7 @@ ORDER: Final = 20
 
 
 def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
-    """Share the cells among the tiers within the loss that may be spent."""
+    """Divide the cells among the tiers within the loss that may be spent."""
     if not work.networks or subject.role is None:
         return work, None
     model = read_loss_model(subject.bundle.manifest.plan)

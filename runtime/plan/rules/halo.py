@@ -1,4 +1,4 @@
-"""How far windows look beyond what they keep."""
+"""The rule for the halo of windows."""
 
 from typing import Final
 

@@ -1,4 +1,4 @@
-"""Whether the haze of the optics is undone."""
+"""The rule for removing the haze of the optics."""
 
 from typing import Final
 

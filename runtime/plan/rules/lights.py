@@ -1,4 +1,4 @@
-"""Where a network runs that acts near lights alone: elsewhere its input is its output."""
+"""The rule for a network that acts near lights alone: elsewhere its input is its output."""
 
 from dataclasses import replace
 from typing import Final
@@ -21,7 +21,7 @@ def needs_lights(bundle: Bundle) -> bool:
 
 
 def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
-    """Leave the network out of cells that no light reaches.
+    """Exclude cells that no light reaches from the network.
 
     Where it runs in some cells no bit depends on it; a picture without lights is spared the way to
     equal noise and back as well, which rounds.

@@ -1,4 +1,4 @@
-"""Which size of network."""
+"""The rule for the size of network."""
 
 from typing import Final
 

@@ -1,4 +1,4 @@
-"""Whether the picture is warped."""
+"""The rule for warping the picture."""
 
 from dataclasses import replace
 from typing import Final
@@ -40,7 +40,7 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
 
 
 def largest_shift_px(subject: Subject) -> float:
-    """Return how far undistortion moves a pixel of the capture at most."""
+    """Return the largest shift of a pixel of the capture by undistortion."""
     warp = Warp(subject.bundle.distortion, subject.placement.window, to_sensor=False)
     x, y = np.meshgrid(
         np.linspace(0, subject.width_px - 1, _NODES), np.linspace(0, subject.height_px - 1, _NODES)

@@ -1,4 +1,4 @@
-"""How many wavelengths the bank uses."""
+"""The rule for the number of wavelengths of the bank."""
 
 from typing import Final
 

@@ -2,6 +2,6 @@
 
 law       a law and its worst number
 darkroom  scenes photographed by the twin, made pictures by networks and by their front end
-pictures  the laws of photographs: white, flat, double, better, range, borders
+photographs  the laws of photographs: white, flat, double, better, range, borders
 proof     laws measured, compared with what a bundle states
 """

@@ -86,7 +86,7 @@ class Darkroom:
         return {"undistort": False} if "undistort" in known else {}
 
     def origin_px(self, place: str, size_px: tuple[int, int]) -> tuple[int, int] | None:
-        """Return where a crop of (height, width) lies; None for a sensor of any size."""
+        """Return the place of a crop of (height, width); None for a sensor of any size."""
         extent = self.bundle.manifest.sensor.extent
         if extent is None:
             return None

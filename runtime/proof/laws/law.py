@@ -34,12 +34,12 @@ class Law:
 
     @property
     def kept(self) -> bool:
-        """Whether the law is kept; what is no number breaks it."""
+        """Return whether the law is kept; NaN breaks it."""
         return self.worst <= self.limit
 
     @property
     def excess(self) -> float:
-        """By how much more than is admitted; below 0 where the law is kept."""
+        """Return the excess over the limit; below 0 where the law is kept."""
         return self.worst - self.limit
 
     def describe(self) -> str:
@@ -54,7 +54,7 @@ class Law:
         return f"{self.name.replace('_', ' ')} {number_text(self.worst, self.unit)}{said}"
 
     def stated(self) -> StatedLaw:
-        """Return what a manifest states of it."""
+        """Return the manifest's entry of the law."""
         return StatedLaw(
             worst=round(self.worst, 6),
             limit=round(self.limit, 6),

@@ -21,7 +21,7 @@ from camkit.bundle.streak_file import (
     write_streaks,
 )
 from camkit.errors import BundleError
-from camkit.streaks.optics import StreakOptics
+from camkit.streaks import StreakOptics
 from tests.streak_factory import small_streaks
 
 Tensors = dict[str, NDArray[Any]]

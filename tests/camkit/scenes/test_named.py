@@ -3,14 +3,14 @@ import pytest
 
 from camkit.errors import ContractError
 from camkit.scenes import is_scene_name, named_scene, procedural_scene
-from camkit.scenes.named import SOURCES
+from camkit.scenes.named import scene_sources
 
 
 def test_a_name_gives_the_scene_of_its_source_and_seed():
     assert np.array_equal(named_scene("procedural:7", 24, 40), procedural_scene(7, 24, 40))
 
 
-@pytest.mark.parametrize("source", SOURCES)
+@pytest.mark.parametrize("source", scene_sources())
 def test_every_source_of_the_register_draws_what_is_asked_for(source):
     scene = named_scene(f"{source}:3", 30, 44)
     assert (scene.shape, scene.dtype) == ((3, 30, 44), np.float32)

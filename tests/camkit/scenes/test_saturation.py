@@ -5,7 +5,7 @@ import pytest
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.scenes import night_scene
+from camkit.runtime.kinds.hdr.night import night_scene
 from camkit.scenes.saturation import (
     fill_of,
     saturating_exposure,

@@ -18,7 +18,8 @@ from camkit.models_def.training.log import plot_logs, read_log
 from camkit.models_def.training.pool import open_pool
 from camkit.models_def.training.refinement import refining_kind
 from camkit.models_def.training.trainer import TrainOptions, train
-from tests.toy_camera.install import ROOT, toy_installed  # noqa: F401
+from tests.installed_package import ROOT
+from tests.toy_camera.install import toy_installed  # noqa: F401
 from tests.toy_camera.models_def import PART
 from tests.toy_camera.recipe import ROLES, STREAKS, TURN_DEG, write_toy
 

@@ -68,6 +68,16 @@ def test_fewer_blocks_give_the_same_levels():
     assert len(part(picture)) == 3
 
 
+def test_the_next_convolution_is_a_level_before_its_relu():
+    picture = torch.rand(1, 3, 16, 16)
+    network = VggLevels(blocks=3, widths=NARROW, pooling="max", next_one=True)
+    *levels, raw = network(picture)
+    weight, bias = (network.state_dict()[f"features.14.{name}"] for name in ("weight", "bias"))
+    assert torch.equal(raw, functional.conv2d(levels[-1], weight, bias, padding=1))
+    assert raw.min() < 0
+    assert len(levels) == 3
+
+
 def test_weights_are_frozen_but_gradients_reach_the_picture():
     network = VggLevels(blocks=2, widths=NARROW)
     picture = torch.rand(1, 3, 8, 8, requires_grad=True)
@@ -91,6 +101,17 @@ def test_a_file_without_a_layer_is_refused(tmp_path):
     torch.save(table, tmp_path / "vgg.pth")
     with pytest.raises(ContractError, match=r"expected features.23.weight of shape .*got nothing"):
         take_vgg(VggLevels(widths=NARROW), tmp_path / "vgg.pth")
+
+
+def test_broken_files_are_refused(tmp_path):
+    table, path = VggLevels(blocks=1).state_dict(), tmp_path / "vgg.pth"
+    torch.save(table | {"features.0.bias": torch.full((64,), float("nan"))}, path)
+    with pytest.raises(ContractError, match="holds NaN or inf"):
+        take_vgg(VggLevels(blocks=1), path)
+    broken = tmp_path / "vgg.safetensors"
+    broken.write_bytes(b"\x10\0\0\0\0\0\0\0junk")
+    with pytest.raises(ContractError, match="no plain tensors"):
+        take_vgg(VggLevels(blocks=1), broken)
 
 
 def test_a_file_that_holds_no_table_is_refused(tmp_path):

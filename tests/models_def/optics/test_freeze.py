@@ -7,16 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from camkit.bundle.psf_file import read_psf
 from camkit.bundle.sensor import BayerSensor, nested_sensor
 from camkit.bundle.stages import Wiener
-from camkit.errors import ContractError, UnsupportedError
+from camkit.errors import ContractError
 from camkit.models_def.optics import freeze as freeze_module
 from camkit.models_def.optics import sampling
 from camkit.models_def.optics.freeze import between_mm, choose_depths
 from camkit.models_def.optics.frozen import FreezeGrid, freeze
 from camkit.models_def.optics.lens_optics import LensOptics
-from camkit.models_def.optics.measured import MeasuredOptics
 from camkit.models_def.optics.prescription import read_prescription
 from camkit.models_def.optics.sampling import (
     Bench,
@@ -25,7 +23,6 @@ from camkit.models_def.optics.sampling import (
     make_bench,
     mean_kernel_loss,
 )
-from tests.bundle_factory import tiny_psf
 from tests.together_factory import TOGETHER
 
 MODELS = Path(__file__).resolve().parents[3] / "models_def"
@@ -97,11 +94,9 @@ def test_freezing_writes_the_psf_and_reports_what_it_cost(
     monkeypatch.setattr(freeze_module, "FIELD_COUNTS", (5, 9))
     monkeypatch.setattr(freeze_module, "WAVELENGTH_COUNTS", (3,))
     monkeypatch.setattr(freeze_module, "BLOCKS", ((384, 160),))
-    out = tmp_path / "psf.safetensors"
     said: list[str] = []
-    report = freeze_module.freeze_optics(
+    frozen, told = freeze_module.freeze_samples(
         duet(),
-        out,
         sensor=sensor,
         settings=SETTINGS.model_copy(update={"block_px": 384, "together": TOGETHER}),
         limit_db=20.0,
@@ -112,12 +107,12 @@ def test_freezing_writes_the_psf_and_reports_what_it_cost(
     assert said[1].startswith("3 wavelengths, 9 fields: ")
     assert said[2].startswith("3 wavelengths, 5 fields: ")
     assert said[3].startswith("blocks of 384 px, overlap 160: ")
-    psf = read_psf(out)
-    assert psf.kernels.shape[0] == report.fields == 5
-    assert psf.kernels.shape[-1] == report.side_px
-    assert report.energy_kept >= 0.995
-    assert report.loss_db <= 20.0
-    told = json.loads(json.dumps(report.to_json()))
+    psf = frozen.psf
+    assert psf.kernels.shape[0] == told["fields"] == 5
+    assert psf.kernels.shape[-1] == told["side_px"]
+    assert told["energy_kept"] >= 0.995
+    assert told["loss_db"] <= 20.0
+    assert json.loads(json.dumps(told)) == told
     assert (told["block_px"], told["efl_mm"]) == (384, pytest.approx(50, abs=0.1))
     assert said[4].endswith("with its sensor moved by 40 um to both sides")
     assert psf.focus_um is not None
@@ -227,21 +222,19 @@ def test_freezing_at_several_depths_reports_those_kept_and_the_loss_between(
     monkeypatch.setattr(freeze_module, "FIELD_COUNTS", (5,))
     monkeypatch.setattr(freeze_module, "WAVELENGTH_COUNTS", (3,))
     monkeypatch.setattr(freeze_module, "BLOCKS", ((384, 160),))
-    out = tmp_path / "psf.safetensors"
-    report = freeze_module.freeze_optics(
+    frozen, told = freeze_module.freeze_samples(
         duet(200),
-        out,
         sensor=sensor,
         limit_db=20.0,
         grid=FreezeGrid(depths_mm=(2e4, 4e4, math.inf)),
     )
-    psf = read_psf(out)
-    assert psf.depths_mm.tolist() == list(report.depths_mm) == [2e4, math.inf]
+    psf = frozen.psf
+    assert psf.depths_mm.tolist() == [2e4, math.inf]
     assert psf.kernels.shape[:3] == (5, 2, 3)
-    assert report.to_json()["depths_mm"] == "20000, inf"
-    assert report.between_loss_db > 0
+    assert told["depths_mm"] == "20000, inf"
+    assert told["between_loss_db"] > 0
     assert psf.focus_um is None
-    assert "focus_um" not in report.to_json()
+    assert "focus_um" not in told
 
 
 def test_without_depths_a_lens_is_frozen_at_its_own_distance(
@@ -267,9 +260,3 @@ def test_blocks_are_judged_by_the_bank_of_the_recipe(bench: Bench) -> None:
             _shrink(patch)
             losses.append(block_loss(bench.nominal, bench, grid).mean_db)
     assert losses[0] != losses[1]
-
-
-def test_only_a_lens_has_kernels_of_a_moved_sensor(sensor: BayerSensor, tmp_path: Path) -> None:
-    optics = MeasuredOptics(psf=tiny_psf(), name="measured")
-    with pytest.raises(UnsupportedError, match="only a lens is traced with its sensor moved"):
-        freeze_module.freeze_optics(optics, tmp_path / "p", sensor=sensor, focus_um=10.0)

@@ -25,7 +25,7 @@ from camkit.models_def.optics.kernel_bank import colour_kernels, gaussian_respon
 from camkit.models_def.optics.lens_optics import LensOptics
 from camkit.models_def.optics.optics import grid_layout, radial_layout
 from camkit.models_def.optics.prescription import read_prescription
-from camkit.models_def.sensors.psf import color_kernels, wavelength_weights
+from camkit.runtime.bank.psf import color_kernels, wavelength_weights
 
 DUET = Path(__file__).resolve().parents[3] / "models_def" / "prescriptions" / "duet.toml"
 WAVES = np.linspace(0.42, 0.68, 14)
@@ -104,7 +104,7 @@ def test_frozen_colours_equal_a_dense_trace(sensor: BayerSensor) -> None:
     heights = np.array([0.0, 12.0])
     fields = radial_layout(heights)
     psf = freeze_at(duet(), sensor, replace(SMALL, energy=0.9995), fields).psf
-    found = color_kernels(psf, *sensor.response_arrays()).kernels.numpy()
+    found = color_kernels(psf, *sensor.response_arrays()).kernels
     waves = np.linspace(0.42, 0.68, 27)
     weights = wavelength_weights(waves, *sensor.response_arrays())
     dense = ChannelShares(wavelengths_um=waves, response=weights, source="camera")
@@ -196,12 +196,12 @@ def test_kernels_of_a_moved_sensor_join_those_that_stay(sensor: BayerSensor) -> 
     other = color_kernels(traced, *response).kernels
     side = min(other.shape[-1], psf.kernels.shape[-1])
 
-    def cut(kernels: torch.Tensor) -> torch.Tensor:
+    def cut(kernels: np.ndarray) -> np.ndarray:
         rim = (kernels.shape[-1] - side) // 2
         return kernels[..., rim : rim + side, rim : rim + side]
 
     away = [
-        float((cut(color_kernels(psf, *response, focus_um=f).kernels) - cut(other)).square().sum())
+        float(((cut(color_kernels(psf, *response, focus_um=f).kernels) - cut(other)) ** 2).sum())
         for f in (0.0, 30.0)
     ]
     assert away[1] < away[0] / 4, "half-way between two shifts the blend is near what is traced"

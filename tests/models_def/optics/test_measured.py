@@ -8,15 +8,15 @@ import pytest
 import scipy.signal
 import torch
 
-from camkit.bundle.psf_file import read_psf, write_psf
+from camkit.bundle.psf_file import write_psf
 from camkit.bundle.sensor import ChannelResponse, Extent, IsoNoise, PlanesSensor
 from camkit.bundle.stages import Wiener
 from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError
 from camkit.models_def.optics import freeze as freeze_module
 from camkit.models_def.optics import sampling
-from camkit.models_def.optics.freeze import freeze_optics, freeze_stress
-from camkit.models_def.optics.frozen import FreezeGrid, freeze
+from camkit.models_def.optics.freeze import freeze_samples
+from camkit.models_def.optics.frozen import FreezeGrid, freeze, freeze_stress
 from camkit.models_def.optics.lens_optics import LensOptics
 from camkit.models_def.optics.measured import (
     MeasuredOptics,
@@ -27,7 +27,7 @@ from camkit.models_def.optics.measured import (
 from camkit.models_def.optics.optics import Optics, radial_layout
 from camkit.models_def.optics.optics_file import read_optics
 from camkit.models_def.sensors.forward import blur
-from camkit.models_def.sensors.psf import color_kernels
+from camkit.runtime.bank.psf import color_kernels
 from tests.psf_factory import coma_kernels, frozen_psf, streak_kernel
 
 DUET = Path(__file__).resolve().parents[3] / "models_def" / "prescriptions" / "duet.toml"
@@ -96,7 +96,7 @@ def test_streaks_of_a_grid_fall_where_direct_convolution_puts_them(sensor: Plane
     fields = color_kernels(psf, *sensor.response_arrays())
     for row, y_mm in enumerate(Y_MM):
         for column, x_mm in enumerate(X_MM):
-            kernels = fields.at(torch.tensor([x_mm]), torch.tensor([y_mm]))
+            kernels = torch.from_numpy(fields.at(x_mm, y_mm))[None]
             found = blur(torch.from_numpy(scene)[None, None], kernels)[0, 0].numpy()
             streak = middle(STREAKS[row, column], kernels.shape[-1])
             expected = scipy.signal.convolve2d(scene, streak, "valid")
@@ -114,19 +114,18 @@ def test_a_file_is_frozen_with_its_losses(
     assert optics.name == "streaks"
     settings = Wiener(prior_scale=3e-4, prior_exponent=2.5, block_px=256, overlap_px=64)
     said: list[str] = []
-    report = freeze_optics(
+    frozen, told = freeze_samples(
         optics,
-        tmp_path / "psf.safetensors",
         sensor=sensor,
         settings=settings,
         grid=GRID,
         tell=said.append,
     )
     assert [line.split(":")[0] for line in said[1:3]] == ["2 wavelengths, 6 fields"] * 2
-    assert (report.fields, report.wavelengths) == (6, 2)
-    assert report.loss_db <= 0.05
-    assert "efl_mm" not in report.to_json()
-    assert read_psf(tmp_path / "psf.safetensors").grid_x_mm.tolist() == X_MM.tolist()
+    assert (told["fields"], told["wavelengths"]) == (6, 2)
+    assert told["loss_db"] <= 0.05
+    assert "efl_mm" not in told
+    assert frozen.psf.grid_x_mm.tolist() == X_MM.tolist()
 
 
 def test_a_lens_and_a_measurement_are_told_apart_by_the_suffix(tmp_path: Path) -> None:

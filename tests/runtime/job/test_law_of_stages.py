@@ -48,6 +48,11 @@ from camkit.runtime.geometry.illumination import divide_illumination
 from camkit.runtime.geometry.placement import place
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.geometry.warp import undistort_bands
+from camkit.runtime.kinds.hdr.deglare.removal import GlareSettings, find_glare
+from camkit.runtime.kinds.hdr.streaks.cells import cells_of, sample_sites
+from camkit.runtime.kinds.hdr.streaks.kernels import streak_kernels
+from camkit.runtime.kinds.hdr.streaks.painting import Painter
+from camkit.runtime.kinds.hdr.streaks.recovery import recover
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
@@ -56,11 +61,6 @@ from camkit.runtime.signal.demosaic import apply_gains, demosaic
 from camkit.runtime.signal.noise import repair_mosaic
 from camkit.runtime.signal.stabilise import stabilise, unstabilise
 from camkit.runtime.stage_finder import stage_module
-from camkit.streaks.cells import cells_of, sample_sites
-from camkit.streaks.glare.removal import GlareSettings, find_glare
-from camkit.streaks.kernels import streak_kernels
-from camkit.streaks.painting import Painter
-from camkit.streaks.recovery import recover
 from tests.bundle_factory import tiny_manifest, tiny_members, tiny_psf, tiny_stages
 from tests.haze_bundle import hazy_optics, hazy_stages
 from tests.haze_factory import CELL_PX

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray
-from camkit.runtime.merging.estimate import estimate_response
 from camkit.runtime.merging.known_curves import known_curve, misfit_codes, power_response
 from camkit.runtime.merging.merge import choose_response, merge
 from camkit.runtime.merging.response import srgb_response
+from camkit.runtime.merging.response_estimate import estimate_response
 from camkit.runtime.merging.survey import survey
-from tests.runtime.merging.test_estimate import film_curve
+from tests.runtime.merging.test_response_estimate import film_curve
 
 TIMES = {"three": (4.0, 1.0, 0.25), "five": (1.0, 0.5, 0.25, 0.125, 0.0625), "two": (1.0, 0.0625)}
 

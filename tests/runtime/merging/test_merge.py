@@ -13,7 +13,7 @@ from camkit.runtime.merging.response import srgb_response
 from camkit.runtime.merging.survey import Survey, read_frame, survey
 from camkit.runtime.signal.noise import fallback_noise
 from tests.runtime.merging.bracket_factory import NOISE, TIMES_S, scene, write_coded, write_dng
-from tests.runtime.merging.test_estimate import film_curve
+from tests.runtime.merging.test_response_estimate import film_curve
 
 
 def _raw_bracket(folder: Path, light: FloatArray) -> list[Path]:

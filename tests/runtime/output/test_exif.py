@@ -18,7 +18,7 @@ from camkit.runtime.color import color_stage
 from camkit.runtime.files.exif_tags import metadata_of
 from camkit.runtime.files.tiff_tags import read_tiff_tags, tags_of_block
 from camkit.runtime.metadata import Metadata
-from camkit.runtime.output import tiff
+from camkit.runtime.output import tiff_writer
 from camkit.runtime.output.exif import NOTHING, exif_block, nearest_ratio
 from camkit.runtime.output.origin import Origin
 from camkit.runtime.output.picture_writer import PictureFormat
@@ -159,7 +159,7 @@ def test_where_nothing_is_stated_nothing_is_written(tmp_path: Path, kind: str) -
 def test_a_bigtiff_holds_it_too(tmp_path: Path) -> None:
     origin = Origin(metadata=FULL)
     picture = PictureFormat(width=30_000, height=30_000, color=color_stage(None), origin=origin)
-    (tmp_path / "a.tif").write_bytes(tiff._front(picture))
+    (tmp_path / "a.tif").write_bytes(tiff_writer._front(picture))
     assert_like(metadata_of(read_tiff_tags(tmp_path / "a.tif")), FULL)
     with tifffile.TiffFile(tmp_path / "a.tif") as file:
         page = file.pages[0]

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from camkit.errors import ContractError
+from camkit.runtime.kinds.hdr.night import night_scene
 from camkit.runtime.twin.saturation import exposure_for_share, saturation_of
 from camkit.runtime.twin.simulate import SimulationOptions, simulate
-from camkit.scenes import night_scene
 from camkit.scenes.saturation import with_exposure
 from tests.camera_factory import delta_psf, make_sensor
 from tests.planes_bundle import planes_sensor

@@ -12,7 +12,7 @@ from camkit.bundle.frozen_optics import psf_of_streaks
 from camkit.bundle.reader import Bundle
 from camkit.models_def.optics.diffraction.plate import Plate, plate_members, read_plate
 from camkit.report.kinds.hdr.lights import stretched
-from camkit.scenes import night_scene
+from camkit.runtime.kinds.hdr.night import night_scene
 from tests.hdr_bundle import write_hdr_bundle
 from tests.tiny_design import run_tool
 from tools.hdr import depths

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.runtime.merging.bracket_factory import scene, write_coded
-from tests.runtime.merging.test_estimate import film_curve
+from tests.runtime.merging.test_response_estimate import film_curve
 from tools.hdr import leave_one_out
 
 TIMES_S = (1.0, 0.5, 0.25, 0.125, 0.0625)

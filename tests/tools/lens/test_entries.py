@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from camkit.runtime.calibration.lensfun.database import Database
+from camkit.calibration.lensfun.database import Database
 from tests.data_folder import data_path
 from tests.lensfun_factory import write_database
 from tools.lens.entries import summarise

@@ -23,7 +23,7 @@ from camkit.bundle.writer import write_physics
 from camkit.models_def.kinds.hdr.material import HdrMaterial, compute_material
 from camkit.models_def.kinds.hdr.recipe import HdrRecipe
 from camkit.models_def.training.kind import read_recipe, training_kind
-from camkit.streaks.optics import StreakOptics
+from camkit.streaks import StreakOptics
 from tools.hdr.table.rows import BARE, CROSS, OURS
 
 RECIPES: Final = Path(str(resources.files("camkit.models_def.recipes")))

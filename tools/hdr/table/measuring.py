@@ -12,14 +12,14 @@ from itertools import islice
 from pathlib import Path
 from typing import Final
 
-import camkit.streaks
+import camkit.runtime.kinds.hdr.streaks
 from camkit.contracts import FloatArray
 from camkit.errors import CamkitError
 from camkit.report.bench.metrics.hdr import METRIC
 from camkit.report.journal import append_journal, read_journal
 from camkit.report.kinds.hdr.capture import photograph
 from camkit.report.quality import Exposed
-from camkit.runtime.stages import highlights
+from camkit.runtime.kinds.hdr.stages import highlights
 from tools.hdr.table.cameras import write_camera
 from tools.hdr.table.restoring import Camera, Restorer, make_restorer, timed
 from tools.hdr.table.rows import LDR, Row, Run
@@ -228,6 +228,6 @@ def _file_digest(path: Path) -> str:
 @lru_cache
 def _source_digest() -> str:
     """Return a hash of the solve as it stands: lines of another one are measured again."""
-    (folder,) = camkit.streaks.__path__
+    (folder,) = camkit.runtime.kinds.hdr.streaks.__path__
     files = [*sorted(Path(folder).glob("*.py")), Path(highlights.__file__)]
     return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()

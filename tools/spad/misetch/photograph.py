@@ -14,6 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.bundle.psf_file import psf_to_bytes
+from camkit.calibration.dots import SeenDots, dots_psf
+from camkit.calibration.measured import PsfOptions
+from camkit.calibration.psf import measure_psf
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.models_def.kinds.spad.plate_psf import frozen_psf
@@ -21,9 +24,6 @@ from camkit.models_def.optics.diffraction.wave import PixelGrid
 from camkit.models_def.optics.dots.camera import DotCamera
 from camkit.models_def.optics.dots.pattern import dot_picture
 from camkit.models_def.optics.dots.target import FloatGrid
-from camkit.runtime.calibration.dots import SeenDots, dots_psf
-from camkit.runtime.calibration.measured import PsfOptions
-from camkit.runtime.calibration.psf import measure_psf
 from camkit.runtime.merging.survey import survey
 from camkit.runtime.output.part_file import atomic_output
 

@@ -41,7 +41,7 @@ def hallucination(
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Judge restored pictures patch by patch, against the truth and against their captures.
+    """Check restored pictures patch by patch, against the truth and against their captures.
 
     A control adds detail that no capture contains; the report states whether it was detected.
     """

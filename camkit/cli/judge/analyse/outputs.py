@@ -1,4 +1,4 @@
-"""What a command of `camkit analyse` leaves: a page if one is asked for, and what is said."""
+"""The outputs of a command of `camkit analyse`: a page if asked for, and the printed text."""
 
 import json
 from collections.abc import Callable
@@ -16,7 +16,7 @@ def deliver(
     *,
     as_json: bool,
 ) -> None:
-    """Write the page and say what was found.
+    """Write the page and print the results.
 
     Args:
         told: What was found, as plain JSON values.

@@ -45,8 +45,8 @@ def bundle(
         raise ContractError("give what was measured: --geometry, --flat, --noise, --psf")
     from camkit.bundle.psf_file import read_psf
     from camkit.bundle.reader import find_bundle, open_bundle
+    from camkit.calibration.measured_files import read_flat, read_geometry, read_noise
     from camkit.export.remeasured import Measured, remeasured
-    from camkit.runtime.calibration.measured_files import read_flat, read_geometry, read_noise
 
     before = open_bundle(find_bundle(source))
     try:

@@ -52,7 +52,7 @@ def flat(
     --shift-px and --turn-deg are given once for each picture, in the order of FILES.
     """
     outputs = Outputs.asked(out, page, overwrite=overwrite, as_json=json_)
-    from camkit.runtime.calibration.flat.measure import measure_flat
+    from camkit.calibration.flat.illumination_fit import measure_flat
 
     found = measure_flat(
         files,

@@ -27,7 +27,7 @@ class Folder:
     def asked(
         cls, path: Path, marks: Sequence[str], within: Sequence[str], *, overwrite: bool
     ) -> Self:
-        """Take the wish of a command.
+        """Check the folder that a caller asks for.
 
         Args:
             path: The folder.
@@ -54,7 +54,7 @@ class Folder:
 
     @contextmanager
     def writing(self, names: Sequence[str]) -> Iterator[tuple[Path, ...]]:
-        """Return the paths to write to; files appear when the block ends well, all or none.
+        """Yield the paths to write to; files appear when the block ends well, all or none.
 
         Args:
             names: Paths in the folder; an absolute one may lie elsewhere.

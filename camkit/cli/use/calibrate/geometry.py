@@ -11,7 +11,7 @@ from camkit.cli.use.calibrate.outputs import Out, Outputs, Page
 from camkit.errors import ContractError
 
 if TYPE_CHECKING:
-    from camkit.runtime.calibration.geometry.geometry import Geometry
+    from camkit.calibration.geometry.geometry import Geometry
 
 
 def geometry(
@@ -50,9 +50,9 @@ def geometry(
 def _found(
     pictures: list[Path], board: str | None, square_mm: float | None, focal_px: float | None
 ) -> "Geometry":
-    from camkit.runtime.calibration.geometry.board import Board
-    from camkit.runtime.calibration.geometry.corner_file import is_corner_file, read_corners
-    from camkit.runtime.calibration.geometry.geometry import calibrate_corners, calibrate_geometry
+    from camkit.calibration.geometry.board import Board
+    from camkit.calibration.geometry.corner_file import is_corner_file, read_corners
+    from camkit.calibration.geometry.geometry import calibrate_corners, calibrate_geometry
 
     if not is_corner_file(pictures):
         if board is None:

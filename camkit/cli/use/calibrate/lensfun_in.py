@@ -11,7 +11,7 @@ from camkit.cli.use.calibrate.outputs import Page, check_out, check_page, tell
 from camkit.cli.use.mosaic import BlackLevel, MosaicCfa, WhiteLevel, mosaic_options
 
 if TYPE_CHECKING:
-    from camkit.runtime.calibration.lensfun.profile import Found
+    from camkit.calibration.lensfun.profile import Found
 
 
 def lensfun_in(
@@ -56,7 +56,7 @@ def lensfun_in(
     check_out(out, ".camkit", "a bundle", overwrite=overwrite)
     check_page(page, overwrite=overwrite)
     from camkit.bundle.writer import write_bundle
-    from camkit.runtime.calibration.lensfun.ordinary import CameraOptions, lensfun_bundle
+    from camkit.calibration.lensfun.ordinary import CameraOptions, lensfun_bundle
     from camkit.runtime.output.part_file import atomic_output
 
     options = CameraOptions(

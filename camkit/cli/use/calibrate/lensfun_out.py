@@ -53,7 +53,7 @@ def lensfun_out(
     """Write distortion and vignetting of a bundle or a measured geometry for lensfun."""
     check_out(out, ".xml", "an entry of lensfun", overwrite=overwrite)
     check_page(page, overwrite=overwrite)
-    from camkit.runtime.calibration.lensfun.entry import EntryOptions, lensfun_entry
+    from camkit.calibration.lensfun.entry import EntryOptions, lensfun_entry
     from camkit.runtime.output.part_file import atomic_outputs
 
     options = EntryOptions(

@@ -11,7 +11,7 @@ from camkit.cli.use.mosaic import BlackLevel, MosaicCfa, WhiteLevel, mosaic_opti
 from camkit.errors import ContractError
 
 if TYPE_CHECKING:
-    from camkit.runtime.calibration.noise.measure import IsoFacts
+    from camkit.calibration.noise.sensor_noise import IsoFacts
 
 
 def noise(
@@ -42,7 +42,7 @@ def noise(
     outputs = Outputs.asked(out, page, overwrite=overwrite, as_json=json_)
     if iso is not None and not 0 < iso < float("inf"):
         raise ContractError(f"--iso must be > 0; got {iso:g}")
-    from camkit.runtime.calibration.noise.measure import measure_sensor
+    from camkit.calibration.noise.sensor_noise import measure_sensor
 
     found = measure_sensor(dark, flat, mosaic_options(mosaic, black_level, white_level), iso)
 

@@ -1,4 +1,4 @@
-"""What a command of `camkit calibrate` leaves: a TOML, a page if one is asked for, what is said."""
+"""The outputs of a command of `camkit calibrate`: a TOML, a page if asked for, the printed text."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -17,7 +17,7 @@ Page = Annotated[Path | None, typer.Option(help="Also write a self-contained pag
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outputs:
-    """Where the results go; made by `asked`, before any work.
+    """The files of the results; made by `asked`, before any work.
 
     Attributes:
         out: The TOML.
@@ -31,7 +31,7 @@ class Outputs:
 
     @classmethod
     def asked(cls, out: Path, page: Path | None, *, overwrite: bool, as_json: bool) -> Self:
-        """Take the wishes of a command.
+        """Check the outputs that a caller asks for.
 
         Raises:
             ContractError: If a name is of another kind, or a file is there and may not be replaced.
@@ -45,7 +45,7 @@ class Outputs:
     def write(
         self, record: Mapping[str, Any], lines: Sequence[str], page: Callable[[], str]
     ) -> None:
-        """Write the files, all or none, and say what was found.
+        """Write the files, all or none, and print the results.
 
         Args:
             record: What goes into the TOML and, with the names of the files, into the JSON; its
@@ -56,7 +56,7 @@ class Outputs:
         Raises:
             ContractError: If the record holds what TOML cannot.
         """
-        from camkit.runtime.calibration.record import to_toml
+        from camkit.calibration.record import to_toml
         from camkit.runtime.output.part_file import atomic_outputs
 
         texts = {self.out: to_toml(record)}
@@ -109,7 +109,7 @@ def check_out(path: Path, suffix: str, what: str, *, overwrite: bool) -> None:
 
 
 def tell(record: Mapping[str, Any], lines: Sequence[str], *, as_json: bool) -> None:
-    """Return what was done: one object, or notes on stderr and lines."""
+    """Print the results: one object, or notes on stderr and lines."""
     if as_json:
         say(json.dumps(record, allow_nan=False))
         return
@@ -120,7 +120,7 @@ def tell(record: Mapping[str, Any], lines: Sequence[str], *, as_json: bool) -> N
 
 
 def named(out: Path | str, page: Path | str | None) -> str:
-    """Return the names of what was written."""
+    """Return the names of the written files."""
     return ", ".join(str(path) for path in (out, page) if path is not None)
 
 

@@ -13,7 +13,7 @@ from camkit.cli.use.calibrate.outputs import Page, check_page, named
 from camkit.errors import ContractError
 
 if TYPE_CHECKING:
-    from camkit.runtime.calibration.display.pairs import Pairs
+    from camkit.calibration.display.pairs import Pairs
 
 SETTINGS = "pairs.toml"
 REGISTRATION = "registration.toml"
@@ -59,10 +59,10 @@ def pairs(
     within = (".", "capture", "reference")
     folder = Folder.asked(out, (SETTINGS,), within, overwrite=overwrite)
     shots, shown_in = _apart(captures, targets)
-    from camkit.runtime.calibration.display.camera_file import Illumination, Lens, Tone
-    from camkit.runtime.calibration.display.pairs import Given, draw_pairs, find_pairs
-    from camkit.runtime.calibration.display.targets import Targets
-    from camkit.runtime.calibration.record import to_toml
+    from camkit.calibration.display.camera_file import Illumination, Lens, Tone
+    from camkit.calibration.display.pairs import Given, draw_pairs, find_pairs
+    from camkit.calibration.display.targets import Targets
+    from camkit.calibration.record import to_toml
     from camkit.runtime.output.pixels import png_bytes, tiff_bytes
 
     lens = Lens.read(geometry)
@@ -90,7 +90,7 @@ def pairs(
 
 
 def _apart(named: list[Path], targets: Path | None) -> tuple[list[Path], Path]:
-    """Return the captures, those of folders too, and the folder of what was shown.
+    """Return the captures, those of folders too, and the folder of the targets.
 
     Raises:
         ContractError: If nothing says what was shown.

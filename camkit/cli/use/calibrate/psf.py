@@ -15,8 +15,8 @@ from camkit.cli.use.mosaic import BlackLevel, MosaicCfa, WhiteLevel, mosaic_opti
 from camkit.errors import ContractError
 
 if TYPE_CHECKING:
-    from camkit.runtime.calibration.dots import SeenDots
-    from camkit.runtime.calibration.measured import MeasuredPsf
+    from camkit.calibration.dots import SeenDots
+    from camkit.calibration.measured import MeasuredPsf
     from camkit.runtime.merging.survey import Survey
 
 
@@ -77,11 +77,11 @@ def psf(
     check_page(page, overwrite=overwrite)
     _check_target(disc_px, dots, edge=edge)
     from camkit.bundle.psf_file import psf_to_bytes, read_psf
-    from camkit.runtime.calibration.darks import Darks
-    from camkit.runtime.calibration.dots import dots_psf
-    from camkit.runtime.calibration.edge_psf import measure_edge
-    from camkit.runtime.calibration.measured import PsfOptions
-    from camkit.runtime.calibration.psf import measure_psf
+    from camkit.calibration.darks import Darks
+    from camkit.calibration.dots import dots_psf
+    from camkit.calibration.edge_psf import measure_edge
+    from camkit.calibration.measured import PsfOptions
+    from camkit.calibration.psf import measure_psf
     from camkit.runtime.merging.survey import survey
     from camkit.runtime.output.part_file import atomic_outputs
 
@@ -109,7 +109,7 @@ def psf(
 
 
 def _check_target(disc_px: float | None, dots: Path | None, *, edge: bool) -> None:
-    """Refuse a light that is two things.
+    """Refuse options of two kinds of light at once.
 
     Raises:
         ContractError: If it is.
@@ -123,7 +123,7 @@ def _check_target(disc_px: float | None, dots: Path | None, *, edge: bool) -> No
 def _times(
     text: str | None, files: list[Path], darks: list[Path]
 ) -> tuple[tuple[float, ...] | None, tuple[float, ...] | None]:
-    """Return the times of frames and dark frames, which a list may leave to their files."""
+    """Return the times of frames and dark frames; a list may omit those that files state."""
     if text is None:
         return None, None
     from camkit.runtime.merging.times import stated_times

@@ -33,16 +33,16 @@ def targets(
 ) -> None:
     """Write pictures for a display: checkerboard, grey steps, colours, pictures with marks."""
     check_page(page, overwrite=overwrite)
-    from camkit.report.calibration.targets_page import shrunk, targets_html
-    from camkit.runtime.calibration.display.screen import Screen
-    from camkit.runtime.calibration.display.targets import (
+    from camkit.calibration.display.screen import Screen
+    from camkit.calibration.display.targets import (
         LIST,
         draw_targets,
         levels_of_steps,
         plan_targets,
     )
-    from camkit.runtime.calibration.geometry.board import Board
-    from camkit.runtime.calibration.record import to_toml
+    from camkit.calibration.geometry.board import Board
+    from camkit.calibration.record import to_toml
+    from camkit.report.calibration.targets_page import shrunk, targets_html
     from camkit.runtime.output.pixels import png_bytes
 
     given = pictures or []

@@ -29,7 +29,7 @@ def tone(
 ) -> None:
     """Measure the luminance of a display at each of its levels."""
     outputs = Outputs.asked(out, page, overwrite=overwrite, as_json=json_)
-    from camkit.runtime.calibration.tone import levels_of, measure_tone
+    from camkit.calibration.tone import levels_of, measure_tone
 
     said = mosaic_options(mosaic, black_level, white_level)
     found = measure_tone(files, levels_of(levels, len(files)), said)

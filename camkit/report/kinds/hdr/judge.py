@@ -30,7 +30,7 @@ from camkit.runtime.twin.light import Lens, Light, LightOptions, lens_of, light_
 from camkit.runtime.twin.simulate import bare_psf
 from camkit.runtime.twin.truth import true_picture
 from camkit.scenes.saturation import CEILING
-from camkit.streaks.optics import StreakOptics
+from camkit.streaks import StreakOptics
 
 SATURATED: Final = 0.015
 """Share of a scene that saturates unless a scenario says otherwise."""

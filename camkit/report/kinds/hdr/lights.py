@@ -10,10 +10,10 @@ from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import ColorSensor
 from camkit.contracts import FloatArray
 from camkit.report.stress.scene import SCENE_SEED, WHITE, Scene
+from camkit.runtime.kinds.hdr.night import night_scene
 from camkit.runtime.twin.saturation import exposure_for_share
-from camkit.scenes import night_scene
 from camkit.scenes.saturation import with_exposure
-from camkit.streaks.optics import StreakOptics
+from camkit.streaks import StreakOptics
 
 DIM: Final = 0.5
 """Lights end here in scenes to which a scenario brings its own."""

@@ -27,6 +27,7 @@ from camkit.models_def.kinds.bayer.fine_tuning.homography import (
     warp_to,
 )
 from camkit.models_def.kinds.bayer.psf_bank import PsfBank
+from camkit.runtime.geometry.distortion import distort_points, undistort_points
 from camkit.units import to_mm
 
 Points = NDArray[np.float64]
@@ -34,8 +35,6 @@ Points = NDArray[np.float64]
 CLIPPED_ABOVE: Final = 0.999
 COLOUR_STEP_PX: Final = 8
 LEAST_COLOUR_POINTS: Final = 64
-RADII: Final = 2048
-RANGE_MARGIN: Final = 1.05
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,7 +60,7 @@ class Aligner:
     def __init__(
         self, sensor: BayerSensor, bank: PsfBank, distortion: RadialDistortion | None
     ) -> None:
-        """Take the sensor; without a distortion the lens is taken to have none."""
+        """Store the sensor; without a distortion the lens counts as free of it."""
         self._sensor, self._bank, self._distortion = sensor, bank, distortion
         self._centre = np.array([sensor.width_px - 1, sensor.height_px - 1]) / 2
         self._pitch_mm = to_mm(sensor.pixel_pitch_um)
@@ -96,7 +95,7 @@ class Aligner:
     def _pair(
         self, capture: FloatArray, reference: FloatArray, found: Homography, step: int
     ) -> AlignedPair:
-        """Make a pair of a homography to every step-th pixel."""
+        """Return a pair by a homography to every step-th pixel."""
         matrix = np.diag([step, step, 1.0]) @ found.matrix
         matrix = matrix / matrix[2, 2]
         back = np.linalg.inv(matrix)
@@ -132,22 +131,18 @@ class Aligner:
 
     def _distorted(self, points_px: Points) -> Points:
         """Return where ideal positions fall on the sensor, both in pixels of the capture."""
-        if self._distortion is None:
-            return points_px
-        offset = points_px - self._centre
-        radius = np.hypot(*offset.T) * self._pitch_mm / self._distortion.radius_mm
-        return self._centre + offset * _growth(self._distortion, radius)[:, None]
+        return self._moved(distort_points, points_px)
 
     def _undistorted(self, points_px: Points) -> Points:
-        """Undo `_distorted`, by a table of radii."""
+        """Undo `_distorted`."""
+        return self._moved(undistort_points, points_px)
+
+    def _moved(
+        self, move: Callable[[Points, RadialDistortion], Points], points_px: Points
+    ) -> Points:
         if self._distortion is None:
             return points_px
-        offset = points_px - self._centre
-        radius = np.hypot(*offset.T) * self._pitch_mm / self._distortion.radius_mm
-        ideal = np.linspace(0, RANGE_MARGIN * max(1.0, float(radius.max())), RADII)
-        growth = _growth(self._distortion, ideal)
-        share = np.interp(radius, ideal * growth, 1 / growth)
-        return np.asarray(self._centre + offset * share[:, None], dtype=np.float64)
+        return self._centre + move(self.to_sensor_mm(points_px), self._distortion) / self._pitch_mm
 
     def _fit_colours(self, pair: AlignedPair) -> NDArray[np.float64]:
         """Fit the (3, 3) matrix from the reference's Rec.709 to camera colours as captured."""
@@ -175,17 +170,6 @@ class Aligner:
 def _smooth(picture: FloatArray, side: int) -> FloatArray:
     """Average (3, h, w) over squares of at least `side`, odd: an even one would shift by half."""
     return np.stack([cv2.blur(plane, (side | 1, side | 1)) for plane in picture])
-
-
-def _growth(distortion: RadialDistortion, radius: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return r_d / r of eq. (6.10) for the green colour."""
-    square = radius * radius
-    c0, c1, c2, c3 = distortion.coefficients[1]
-    growth = c0 + square * (c1 + square * (c2 + square * c3))
-    if distortion.even_coefficients is not None:
-        b0, b1, b2 = distortion.even_coefficients[1]
-        growth = growth + radius * (b0 + square * (b1 + square * b2))
-    return np.asarray(growth)
 
 
 def _encoded(grey: FloatArray) -> FloatArray:

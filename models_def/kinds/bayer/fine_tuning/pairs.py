@@ -33,7 +33,7 @@ from camkit.models_def.kinds.bayer.samples import (
     Developed,
     finish_shot,
 )
-from camkit.models_def.training.adversarial.judged import Mix
+from camkit.models_def.training.adversarial.fitter import Mix
 from camkit.models_def.training.pictures import list_pictures, read_picture, to_linear
 from camkit.models_def.training.pool import cut_patch
 from camkit.models_def.training.sample import Batch, Sample
@@ -75,7 +75,7 @@ class PairSamples:
         return Batch(inputs=LAYOUT.named(planes), target=targets, weight=weight)
 
     def mixer(self, share: float, seed: int) -> Mix:
-        """Return what replaces the first patches of a batch by patches of real pairs.
+        """Return a function that replaces the first patches of a batch by patches of real pairs.
 
         Args:
             share: How many of them are replaced; a part of a patch is one in as many steps.
@@ -103,7 +103,7 @@ class PairSamples:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairSettings:
-    """How the captures of a folder were taken: ISO and the white balance they contain."""
+    """The settings of a folder's captures: ISO and the white balance they contain."""
 
     iso: float
     gains: tuple[float, float, float]

@@ -9,22 +9,25 @@ import torch
 
 from camkit.colorimetry import rec709_from_camera
 from camkit.contracts import RadialDistortion
-from camkit.models_def.kinds.bayer.fine_tuning.fitter import FineTuningFitter, FineTuningParts
 from camkit.models_def.kinds.bayer.fine_tuning.pairs import read_pairs
-from camkit.models_def.kinds.bayer.fine_tuning.vgg import read_vgg
 from camkit.models_def.kinds.bayer.material import BayerMaterial
-from camkit.models_def.kinds.bayer.recipe import BayerRecipe
+from camkit.models_def.kinds.bayer.recipe import BayerRecipe, FineTuningRecipe
 from camkit.models_def.kinds.bayer.samples import corner_height_mm
+from camkit.models_def.networks.catalog import build_network
 from camkit.models_def.networks.vgg import file_digest
 from camkit.models_def.optics.distortion import trace_distortion
 from camkit.models_def.optics.lens_file.lens_file import find_lens
-from camkit.models_def.training.adversarial.judged import Mix
+from camkit.models_def.training.adversarial.content import Conv33, Features
+from camkit.models_def.training.adversarial.fitter import Mix, PictureParts, picture_fitter
+from camkit.models_def.training.adversarial.opponents import OpponentPlan
+from camkit.models_def.training.adversarial.relativistic import Relativistic
 from camkit.models_def.training.first_weights import read_first_weights
-from camkit.models_def.training.fitter import Fits
-from camkit.models_def.training.recipe import NetworkRecipe
+from camkit.models_def.training.fitter import BETAS, Fitter
+from camkit.models_def.training.recipe import ContentRecipe, NetworkRecipe
 from camkit.models_def.training.refinement import FineTuningOptions, Refinement
 
 NAME: Final = "fine_tuned"
+OPPONENT_SEED: Final = 2
 Distort = Callable[[BayerRecipe, Path], RadialDistortion | None]
 
 
@@ -48,23 +51,29 @@ def make_refinement(
         ContractError: If a file is not what it should be.
     """
     first = read_first_weights(options.start, options.size)
-    features = None if options.vgg is None else read_vgg(options.vgg)
+    # without VGG-19 the sRGB values themselves are compared
+    features: Features = torch.Tensor.contiguous if options.vgg is None else Conv33(options.vgg)
     matrix = rec709_from_camera(np.array(recipe.sensor.color_matrix))
 
-    def make_fitter(entry: NetworkRecipe, material: BayerMaterial) -> Fits:
+    def make_fitter(entry: NetworkRecipe, material: BayerMaterial) -> Fitter:
         mix: Mix | None = None
         if options.pairs is not None:
             seed, distortion = entry.schedule.seed, distort(recipe, options.recipe_folder)
             pairs = read_pairs(options.pairs, recipe, material.bank, distortion, seed=seed)
             mix = pairs.mixer(recipe.fine_tuning.pair_share, seed)
-        parts = FineTuningParts(
-            first=first,
+        tuning = recipe.fine_tuning
+        parts = PictureParts(
+            content=ContentRecipe(
+                l1_weight=tuning.pixel_weight, feature_weight=tuning.perceptual_weight
+            ),
             to_rec709=torch.from_numpy(matrix),
             features=features,
+            opponents=discriminators(tuning, entry.schedule.seed),
             mix=mix,
+            first=first,
             device=options.device,
         )
-        return FineTuningFitter(entry, recipe.fine_tuning, parts)
+        return picture_fitter(entry, build_network, parts)
 
     return Refinement(
         name=NAME,
@@ -75,8 +84,22 @@ def make_refinement(
     )
 
 
+def discriminators(recipe: FineTuningRecipe, seed: int) -> OpponentPlan:
+    """Return the global and the local discriminator of a recipe. References: eq. (6.14)."""
+    return OpponentPlan(
+        game=Relativistic(),
+        weights={"global": recipe.global_weight, "local": recipe.local_weight},
+        layers={"global": recipe.global_layers, "local": recipe.local_layers},
+        width=recipe.discriminator_width,
+        learning_rate=recipe.discriminator_rate,
+        beta1=BETAS[0],
+        steps=1,
+        seed=seed + OPPONENT_SEED,
+    )
+
+
 def _credit(options: FineTuningOptions) -> str:
-    """Return what else the weights learned from, for the card."""
+    """Return the further training data of the weights, for the card."""
     features = "without VGG-19"
     if options.vgg is not None:
         digest = file_digest(options.vgg)[:16]

@@ -28,7 +28,7 @@ Generator = np.random.Generator
 def developed(
     tile: Tile, recipe: BayerRecipe, bank: PsfBank, offset_mm: tuple[float, float] = (0.0, 0.0)
 ) -> Developed:
-    """Return a tile as the bank meets it.
+    """Return a tile as the input of the bank.
 
     Args:
         tile: A tile.
@@ -54,7 +54,7 @@ def developed(
 
 
 def draw_developed(rng: Generator, tile: Tile, recipe: BayerRecipe, bank: PsfBank) -> Developed:
-    """Return a tile as a block beside it meets it."""
+    """Return a tile as the input of a block beside it."""
     most_mm = recipe.data.block_jitter_px * to_mm(recipe.sensor.pixel_pitch_um)
     x_mm, y_mm = (float(v) for v in rng.uniform(-most_mm, most_mm, 2))
     return developed(tile, recipe, bank, (x_mm, y_mm))
@@ -67,7 +67,7 @@ class TileMaker:
         self._recipe, self._bank, self._tiles, self._seed = recipe, bank, tiles, seed
 
     def developed(self, index: int) -> Developed:
-        """Return a tile as the bank meets it."""
+        """Return a tile as the input of the bank."""
         rng = np.random.default_rng((self._seed, 1, index))
         tile = self._tiles.read(self._tile_of(index))
         return draw_developed(rng, tile, self._recipe, self._bank)
@@ -77,7 +77,7 @@ class TileMaker:
         return self._tile_of(index) // (self._recipe.frames.shots * self._recipe.frames.tiles)
 
     def distance_mm(self, index: int) -> float | None:
-        """Return how far off the scene of a sample is; None where that is not said."""
+        """Return the distance of a sample's scene; None where it is not stated."""
         copy = self._tiles.facts("copy")[self._tile_of(index)]
         return self._recipe.lens.distance_of(int(copy))
 
@@ -87,14 +87,14 @@ class TileMaker:
         return int(order[place])
 
     def make(self, index: int) -> Sample:
-        """Take a tile through the bank."""
+        """Restore a tile by the bank."""
         return finish_shot(self.developed(index), self._recipe).sample
 
 
 def validation_captures(
     recipe: BayerRecipe, bank: PsfBank, tiles: Tiles
 ) -> list[ValidationCapture]:
-    """Take tiles that are never trained on through the bank, blocks off them as in a bank."""
+    """Restore tiles that are never trained on, blocks off them as in a bank."""
     matrix, _ = camera_from_rec709(np.array(recipe.sensor.color_matrix))
     to_rec709 = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
     corner_mm = corner_height_mm(recipe)

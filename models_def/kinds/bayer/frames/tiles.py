@@ -114,7 +114,7 @@ class Tiles:
 
 
 def create_tiles(folder: Path, part: str, count: int, recipe: BayerRecipe) -> Tiles:
-    """Make the files of a part, to be filled; a header that is there goes."""
+    """Create the files of a part, to be filled; an existing header is deleted."""
     (folder / HEADER).unlink(missing_ok=True)
     side, inner = tile_side_px(recipe), recipe.data.sample_px
     shapes: dict[str, tuple[tuple[int, ...], Any]] = {
@@ -135,7 +135,7 @@ def tile_side_px(recipe: BayerRecipe) -> int:
 
 
 def frames_folder(folder: Path, recipe: BayerRecipe) -> Path:
-    """Return where the frames of a recipe lie below the folder of its runs."""
+    """Return the folder of a recipe's frames below the folder of its runs."""
     return folder / f"{recipe.name}_frames"
 
 
@@ -146,7 +146,7 @@ def write_header(
     pictures: Mapping[str, Path | None],
     designed: Mapping[str, bytes],
 ) -> None:
-    """Write the kernels, and last of all what the tiles are.
+    """Write the kernels, and last of all the description of the tiles.
 
     Args:
         folder: Of the tiles.
@@ -169,7 +169,7 @@ def write_header(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Frames:
-    """Where the tiles of a camera lie, and what its lens does.
+    """The tiles of a camera, and the distances and kernels of its lens.
 
     Attributes:
         folder: Of the tiles.
@@ -184,7 +184,7 @@ class Frames:
     designed: Mapping[str, bytes]
 
     def digest(self) -> str:
-        """Return the sha256 of what they were photographed with."""
+        """Return the sha256 of the camera that photographed them."""
         return hashlib.sha256((self.folder / HEADER).read_bytes()).hexdigest()
 
     def tiles(self, part: str, pictures: Path | None) -> Tiles:
@@ -206,7 +206,7 @@ class Frames:
 
 
 def read_frames(folder: Path, recipe: BayerRecipe | None = None) -> Frames:
-    """Read what `camkit prepare` left for a recipe.
+    """Read the frames that `camkit prepare` made for a recipe.
 
     Args:
         folder: Of the tiles.

@@ -8,7 +8,7 @@ whole       L_total, all three in a row
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Final, cast
 
 import torch
 from torch import Tensor
@@ -32,8 +32,7 @@ from camkit.models_def.kinds.hdr.thesis.networks import (
 from camkit.models_def.kinds.hdr.thesis_recipe import ThesisRecipe
 from camkit.models_def.networks.thesis.chain import ThesisChain
 from camkit.models_def.networks.vgg import VggLevels, file_digest, take_vgg
-from camkit.models_def.training.checkpoint import State
-from camkit.models_def.training.fitter import Fits, Fitter
+from camkit.models_def.training.fitter import Fitter, Objective
 from camkit.models_def.training.fitting import FitRequest, OwnFitting
 from camkit.models_def.training.sample import Batch
 from camkit.scenes.saturation import CEILING
@@ -50,34 +49,28 @@ OF_ROLE: Final = {
 Terms = dict[str, Tensor]
 
 
-class ThesisFitter:
-    """Fits one of the thesis's networks, or all three."""
+class ThesisLoss:
+    """The losses of one of the thesis's networks, or of all three."""
 
     def __init__(self, request: FitRequest) -> None:
-        recipe: ThesisRecipe = request.recipe.thesis
-        self.recipe, self.role = recipe, request.role
-        self.inner = Fitter(request.entry, build_thesis_network, request.device, request.first)
-        self._features = VggLevels(blocks=LOSS_BLOCKS, widths=recipe.vgg_widths)
+        self.recipe: ThesisRecipe = request.recipe.thesis
+        self._terms = _TERMS[request.role]
+        self.features = VggLevels(blocks=LOSS_BLOCKS, widths=self.recipe.vgg_widths)
         if request.vgg is not None:
-            give_vgg(self._features, request.vgg)
-            give_vgg(self.inner.network, request.vgg)
-            give_vgg(self.inner.averaged, request.vgg)
-        self._features.to(self.inner.device)
-        self._notes: dict[str, list[float]] = {}
+            give_vgg(self.features, request.vgg)
+        self.features.to(request.device)
 
-    def fit(self, batch: Batch, step: int, progress: float) -> float:
-        """Make one step and give its loss."""
-        device = self.inner.device
-        given, target = (to_light(x.to(device)) for x in (batch.planes, batch.target))
-        terms = _TERMS[self.role](self, given, target)
+    def of(self, fitter: Fitter, batch: Batch, step: int, progress: float) -> Tensor:
+        """Return the loss of a batch."""
+        del step
+        given, target = (to_light(x.to(fitter.device)) for x in (batch.planes, batch.target))
+        terms = self._terms(self, cast("BetweenRoots", fitter.network), given, target)
         for name, value in terms.items():
-            self._notes.setdefault(name, []).append(float(value.detach()))
-        loss = self._total(terms, progress)
-        self.inner.descend(loss, step, progress)
-        return float(loss.detach())
+            fitter.note(name, value)
+        return self._total(terms, progress, torch.zeros((), device=fitter.device))
 
-    def _total(self, terms: Mapping[str, Tensor], progress: float) -> Tensor:
-        recipe, zero = self.recipe, torch.zeros((), device=self.inner.device)
+    def _total(self, terms: Mapping[str, Tensor], progress: float, zero: Tensor) -> Tensor:
+        recipe = self.recipe
         excludes = progress >= recipe.exclusion_from
         unsaturated = unsaturated_loss(
             terms.get("clean", zero),
@@ -92,70 +85,55 @@ class ThesisFitter:
     def perceptual(self, found: Tensor, wanted: Tensor) -> Tensor:
         """Return the perceptual loss of (b, 3, h, w) linear pictures."""
         with torch.no_grad():
-            truth = self._features(wanted)
-        return perceptual_loss(self._features(found)[1:], truth[1:])
-
-    def network(self) -> BetweenRoots:
-        """Return the network that is being trained."""
-        return cast("BetweenRoots", self.inner.network)
-
-    def notes(self) -> dict[str, float]:
-        """Return the mean of each term since the last call."""
-        means = {name: sum(values) / len(values) for name, values in self._notes.items()}
-        self._notes.clear()
-        return means
-
-    def restore(self, planes: Tensor) -> Tensor:
-        """Run the averaged network on (1, c, h, w) roots."""
-        return self.inner.restore(planes)
-
-    def weights(self) -> State:
-        """Return the weights being trained, VGG-19 among them."""
-        return self.inner.weights()
-
-    def average(self) -> State:
-        """Return the averaged weights."""
-        return self.inner.average()
-
-    def optimizer_state(self) -> dict[str, Any]:
-        """Return the optimiser's state."""
-        return self.inner.optimizer_state()
-
-    def load(self, weights: State, average: State, optimizer: dict[str, Any]) -> None:
-        """Go back to a saved state."""
-        self.inner.load(weights, average, optimizer)
+            truth = self.features(wanted)
+        return perceptual_loss(self.features(found)[1:], truth[1:])
 
 
-def _split_terms(fitter: ThesisFitter, given: Tensor, target: Tensor) -> Terms:
-    clean, streaks = torch.split(fitter.network().linear(given), 3, dim=1)
+def thesis_fitter(request: FitRequest) -> Fitter:
+    """Return the fitter of one of the thesis's networks, or of all three."""
+    objective = Objective(loss=ThesisLoss(request).of)
+    fitter = Fitter(
+        request.entry, build_thesis_network, request.device, request.first, objective=objective
+    )
+    if request.vgg is not None:
+        give_vgg(fitter.network, request.vgg)
+        give_vgg(fitter.averaged, request.vgg)
+    return fitter
+
+
+def _split_terms(loss: ThesisLoss, network: BetweenRoots, given: Tensor, target: Tensor) -> Terms:
+    clean, streaks = torch.split(network.linear(given), 3, dim=1)
     terms = {
-        "clean": fitter.perceptual(clean, target[:, :3]),
+        "clean": loss.perceptual(clean, target[:, :3]),
         "exclusion": exclusion_loss(clean, streaks),
     }
-    if fitter.recipe.streak_weight > 0:
-        terms["streaks"] = fitter.perceptual(streaks, target[:, 3:])
+    if loss.recipe.streak_weight > 0:
+        terms["streaks"] = loss.perceptual(streaks, target[:, 3:])
     return terms
 
 
-def _highlight_terms(fitter: ThesisFitter, given: Tensor, target: Tensor) -> Terms:
-    return {"lights": fitter.perceptual(fitter.network().linear(given), target)}
+def _highlight_terms(
+    loss: ThesisLoss, network: BetweenRoots, given: Tensor, target: Tensor
+) -> Terms:
+    return {"lights": loss.perceptual(network.linear(given), target)}
 
 
-def _fusion_terms(fitter: ThesisFitter, given: Tensor, target: Tensor) -> Terms:
-    return {"fused": fused_loss(fitter.network().linear(given), target)}
+def _fusion_terms(loss: ThesisLoss, network: BetweenRoots, given: Tensor, target: Tensor) -> Terms:
+    del loss
+    return {"fused": fused_loss(network.linear(given), target)}
 
 
-def _whole_terms(fitter: ThesisFitter, given: Tensor, target: Tensor) -> Terms:
-    found = cast("ThesisChain", fitter.network().body).outputs(given)
+def _whole_terms(loss: ThesisLoss, network: BetweenRoots, given: Tensor, target: Tensor) -> Terms:
+    found = cast("ThesisChain", network.body).outputs(given)
     return {
-        "clean": fitter.perceptual(found.clean, target.clamp(max=1)),
+        "clean": loss.perceptual(found.clean, target.clamp(max=1)),
         "exclusion": exclusion_loss(found.clean, found.streaks),
-        "lights": fitter.perceptual(found.lights, target.clamp(1, CEILING)),
+        "lights": loss.perceptual(found.lights, target.clamp(1, CEILING)),
         "fused": fused_loss(found.fused, target),
     }
 
 
-_TERMS: Final[Mapping[str, Callable[[ThesisFitter, Tensor, Tensor], Terms]]] = {
+_TERMS: Final[Mapping[str, Callable[[ThesisLoss, BetweenRoots, Tensor, Tensor], Terms]]] = {
     "split": _split_terms,
     "highlight": _highlight_terms,
     "fusion": _fusion_terms,
@@ -164,7 +142,7 @@ _TERMS: Final[Mapping[str, Callable[[ThesisFitter, Tensor, Tensor], Terms]]] = {
 
 
 def give_vgg(network: torch.nn.Module, path: Path) -> None:
-    """Return every VGG-19 within a network the weights of a file; see `take_vgg`."""
+    """Load the weights of a file into every VGG-19 within a network; see `take_vgg`."""
     for part in network.modules():
         if isinstance(part, VggLevels):
             take_vgg(part, path)
@@ -174,7 +152,7 @@ class ThesisFitting:
     """Fulfils `camkit.models_def.training.fitting.FittingKind`."""
 
     def fitting(self, request: FitRequest) -> OwnFitting | None:
-        """Return the fitter of the thesis's networks; all others have the house's.
+        """Return the fitter of the thesis's networks; None for all others.
 
         Raises:
             ContractError: If the network is not that of the role, weights of VGG-19 are missing,
@@ -185,10 +163,7 @@ class ThesisFitting:
             return None
         _check(request)
 
-        def make(_material: Any) -> Fits:
-            return ThesisFitter(request)
-
-        return OwnFitting(make=make, credit=_credit(request))
+        return OwnFitting(make=lambda _: thesis_fitter(request), credit=_credit(request))
 
 
 def _check(request: FitRequest) -> None:

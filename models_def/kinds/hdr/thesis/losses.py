@@ -49,7 +49,7 @@ def perceptual_loss(
 
 
 def exclusion_loss(clean: Tensor, streaks: Tensor) -> Tensor:
-    """Return how far edges of two layers of a picture coincide, eq. (5.8).
+    """Return the overlap of the edges of two layers of a picture, eq. (5.8).
 
     Gradients are differences to the next pixel, along x and y each. The Frobenius norm is taken
     over both and divided by the root of their number; the mean over the batch comes back.

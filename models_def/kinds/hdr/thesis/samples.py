@@ -46,7 +46,7 @@ PORTS: Final = {
 
 
 def layout_of(recipe: HdrRecipe, role: str) -> SampleLayout:
-    """Say what samples of a role hold; arms of a windshield stand upright, so it is not turned."""
+    """Return the layout of a role's samples; the arms of a windshield stand upright."""
     takes, gives = (tuple(Port(name=n, channels=3) for n in names) for names in PORTS[role])
     return SampleLayout(inputs=takes, outputs=gives, turned=recipe.thesis.optics != "glare")
 

@@ -14,7 +14,7 @@ from camkit.models_def.kinds.hdr.scenes import LightSource, exposed
 from camkit.models_def.kinds.hdr.thesis.networks import to_light
 from camkit.models_def.kinds.hdr.thesis.samples import CodedCamera, coded_sample, layout_of
 from camkit.models_def.kinds.hdr.validation import ISOS, MOST_DB, SEED
-from camkit.models_def.training.kind import Restorer, Score
+from camkit.models_def.training.kind import Restorer, Score, mean_score
 from camkit.scenes.saturation import CEILING
 
 SAMPLES: Final = 6
@@ -51,31 +51,26 @@ class CodedJudge:
     samples: Sequence[tuple[float, Tensor, Tensor]]
 
     def baselines(self) -> Mapping[str, float]:
-        """Return the mean dB of what is to be beaten."""
+        """Return the mean dB of the baselines."""
         name, make = BASELINES[self.role]
         return {name: self.score(make).mean_db}
 
     def score(self, restore: Restorer) -> Score:
-        """Judge by the mean PSNR in dB, by ISO; the peak is 1 for layers, 2^8 with lights."""
+        """Compute the mean PSNR in dB, by ISO; the peak is 1 for layers, 2^8 with lights."""
         peak = 1.0 if self.role == "split" else CEILING
-        by_iso: dict[str, list[float]] = {}
+        every = []
         with torch.no_grad():
-            for iso, given, truth in self.samples:
+            for _, given, truth in self.samples:
                 gap = to_light(restore(given)).clamp(max=peak) - to_light(truth).clamp(max=peak)
                 mean = max(float(gap.double().square().mean()), 1e-30)
-                db = min(float(10 * np.log10(peak**2 / mean)), MOST_DB)
-                by_iso.setdefault(f"{iso:g}", []).append(db)
-        every = [db for found in by_iso.values() for db in found]
-        return Score(
-            mean_db=float(np.mean(every)),
-            parts={"by_iso": {iso: float(np.mean(found)) for iso, found in by_iso.items()}},
-        )
+                every.append(min(float(10 * np.log10(peak**2 / mean)), MOST_DB))
+        return mean_score(every, by_iso=[f"{iso:g}" for iso, *_ in self.samples])
 
 
 def make_coded_judge(
     recipe: HdrRecipe, role: str, camera: CodedCamera, source: LightSource
 ) -> CodedJudge:
-    """Photograph scenes, cut to a sample about a light each."""
+    """Photograph scenes, cut to a sample about a light each; in the order of their ISOs."""
     made, layout, data = [], layout_of(recipe, role), recipe.data
     for number in range(SAMPLES):
         rng = np.random.default_rng((SEED, number))
@@ -85,4 +80,4 @@ def make_coded_judge(
         shot = camera.photograph(scene, iso, rng)
         sample = coded_sample(shot, draw_corner(rng, shot, recipe), recipe, role)
         made.append((iso, sample.stacked(layout)[None], sample.target[None]))
-    return CodedJudge(role=role, samples=tuple(made))
+    return CodedJudge(role=role, samples=tuple(sorted(made, key=lambda sample: sample[0])))

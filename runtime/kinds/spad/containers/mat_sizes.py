@@ -158,7 +158,7 @@ class _Walk:
         return struct.unpack(f"{self.end}II", self._read(8))
 
     def matrix(self, size: int, depth: int, names: Collection[str] | None) -> int:
-        """Pass an array by; return what it takes, 0 for a variable that is not meant."""
+        """Skip an array; return its bytes, 0 for a variable that is not meant."""
         if depth > MOST_DEPTH:
             raise _DeepError
         if size == 0:
@@ -188,7 +188,7 @@ class _Walk:
         return own
 
     def _inner(self, kind: int, count: int, depth: int) -> int:
-        """Pass the arrays in a cell or a structure by."""
+        """Skip the arrays in a cell or a structure."""
         total = self._counted(OBJECT_BYTES)
         if kind == OBJECT:
             self._element()  # the class of an object
@@ -230,6 +230,6 @@ class _Walk:
         return found
 
     def _skip(self, count: int) -> None:
-        """Pass bytes by; beyond the memory there is no need to go on."""
+        """Skip bytes; beyond the memory there is no need to go on."""
         while count > 0 and self.left >= 0:
             count -= len(self._read(min(count, PIECE)))

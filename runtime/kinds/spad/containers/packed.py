@@ -34,7 +34,7 @@ BROKEN: Final = (
 
 @contextmanager
 def opened_zip(path: Path) -> Iterator[zipfile.ZipFile]:
-    """Open a zip; what is wrong with it inside the block is told as a `DecodeError`."""
+    """Open a zip; errors in it inside the block become a `DecodeError`."""
     try:
         check_regular(path)
         with zipfile.ZipFile(path) as archive:

@@ -21,7 +21,7 @@ from camkit.runtime.kinds.spad.files.counts_file import (
 
 
 class Sliced(Protocol):
-    """What can be sliced as an array can: an array, a mapped file, a data set."""
+    """Anything that can be sliced as an array: an array, a mapped file, a data set."""
 
     @property
     def shape(self) -> tuple[int, ...]: ...  # noqa: D102
@@ -45,7 +45,7 @@ class ArrayFile(CountsFile):
         assumed: Mapping[str, object] | None = None,
         close: Callable[[], None] | None = None,
     ) -> None:
-        """Look at an array.
+        """Find the axes of an array.
 
         Args:
             path: Where it came from.

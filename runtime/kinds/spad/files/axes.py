@@ -1,4 +1,4 @@
-"""Which axis of an array is time, rows and columns, and which place of every further axis is taken.
+"""Axes of an array: which are time, rows and columns, and the place to take on any further axis.
 
 Written as a caller states them, in the order of the array: letters t, y and x, and for any other
 axis a letter of its own with the place to take. "tc0yx" is time, place 0 of c, rows, columns.

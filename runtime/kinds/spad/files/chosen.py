@@ -1,4 +1,4 @@
-"""Which of the variables of a file is meant, and what the others say of times."""
+"""Choice of the variable of a file that holds the counts, and the times that others state."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path

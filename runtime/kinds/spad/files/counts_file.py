@@ -30,7 +30,7 @@ ARRIVALS: Final[Mapping[str, object]] = MappingProxyType({"orientation": "histog
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hints:
-    """What the caller knows of a file.
+    """The caller's facts about a file.
 
     Attributes:
         axes: Of the file's array in its order, such as "yxt"; see `Axes`.

@@ -1,4 +1,4 @@
-"""What a capture is and states of itself, for `camkit info`."""
+"""Description of a capture and of its own statements, for `camkit info`."""
 
 from collections.abc import Mapping
 from pathlib import Path

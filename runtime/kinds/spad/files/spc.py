@@ -100,7 +100,7 @@ def photons_of_routing(records: NDArray[np.uint32]) -> NDArray[np.int64]:
 
 
 def micro_times(records: NDArray[np.uint32], routing: int) -> Iterator[NDArray[np.uint16]]:
-    """Return the times within the cycle of a detector's photons, part by part."""
+    """Yield the times within the cycle of a detector's photons, part by part."""
     for part in _parts(records):
         own = part[_are_photons(part)]
         yield _micro(own[_routing(own) == routing])

@@ -28,7 +28,7 @@ class StampsFile(CountsFile):
         stated: Mapping[str, object] | None = None,
         close: Callable[[], None] | None = None,
     ) -> None:
-        """Look at stamps.
+        """Store the stamps of all pixels.
 
         Args:
             path: Where they came from.
@@ -62,7 +62,7 @@ class StampsFile(CountsFile):
         return found
 
     def _pieces(self, y: int) -> Iterator[tuple[NDArray[np.int64], NDArray[np.float64]]]:
-        """Return the stamps of a row with their pixels, so many at once as memory is no matter."""
+        """Yield the stamps of a row with their pixels, as many at once as need little memory."""
         cells = [np.ravel(cell) for cell in self._cells(y)]
         ends = np.cumsum([cell.size for cell in cells])
         begins = ends - [cell.size for cell in cells]

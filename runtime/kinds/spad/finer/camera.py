@@ -74,7 +74,7 @@ class FineCamera:
 
     @classmethod
     def of(cls, bundle: Bundle, threads: int = 1, *, role: str | None = None) -> "FineCamera":
-        """Look at a bundle.
+        """Return the fine camera of a bundle.
 
         Args:
             bundle: The camera.

@@ -1,4 +1,4 @@
-"""What is taken for granted of pictures: how alike two sub-pixels are at a distance.
+"""The assumed covariance of pictures: the likeness of two sub-pixels at a distance.
 
 C(d) = contrast^2 exp(-(d / reach)^exponent), in units of the squared mean.
 

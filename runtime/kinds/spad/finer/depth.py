@@ -74,7 +74,7 @@ class FineSharpener:
         size: str | None = None,
         always: bool = False,
     ) -> None:
-        """Make the bank; errors as of `Sharpener`.
+        """Compute the bank; errors as of `Sharpener`.
 
         Args:
             camera: The array.

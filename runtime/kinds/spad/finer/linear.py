@@ -35,7 +35,7 @@ AT_ONCE: Final = 262_144
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grid:
-    """Where a pixel sees.
+    """The sampling of a pixel on the fine grid.
 
     Attributes:
         scale: Sub-pixels along a side of a pixel.

@@ -1,4 +1,4 @@
-"""What a pixel sees through, as a kernel on the fine grid.
+"""The kernel of a pixel on the fine grid.
 
 plate      the kernel of the bundle's optics
 low_fill   nothing: a point

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SigmaShares:
-    """What goes into sigma.
+    """The shares of sigma.
 
     Attributes:
         noise: Of the linear estimate's sigma, in bright captures.

@@ -33,7 +33,7 @@ SLACK: Final = 0.02
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shapes:
-    """What bins see of a decay, (p, bins) each.
+    """The shares of a decay in bins, (p, bins) each.
 
     Attributes:
         shares: Of its photons.

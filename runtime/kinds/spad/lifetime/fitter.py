@@ -42,7 +42,7 @@ LEAST_KNOWN: Final = 0.5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lifetimes:
-    """What was found of some pixels; all arrays (p,).
+    """The fitted lifetimes of some pixels; all arrays (p,).
 
     Attributes:
         lifetime_ps: tau.
@@ -72,7 +72,7 @@ class LifetimeFitter:
     """
 
     def __init__(self, decay: Decay, limits_ps: tuple[float, float] | None = None) -> None:
-        """Look at a decay.
+        """Store a decay and its limits.
 
         Raises:
             ContractError: If the limits are none.
@@ -151,7 +151,7 @@ class LifetimeFitter:
         return a * shapes.shares + b, gradients
 
     def _ascend(self, counts: Floats, start: Floats) -> tuple[Floats, Floats]:
-        """Climb the likelihood from (4, p) parameters; give its end and its height."""
+        """Maximise the likelihood from (4, p) parameters; return the maximum and its value."""
         values = start.copy()
         mean, gradients = self._model(values)
         height = _height(counts, mean)

@@ -1,4 +1,4 @@
-"""Where fits of lifetimes begin: the best of a coarse bank over lifetimes and times.
+"""Starts for fits of lifetimes: the best of a coarse bank over lifetimes and times.
 
 A look that assumes too little background takes it for a slow decay, so there are several looks.
 """
@@ -35,7 +35,7 @@ class Starts:
     """
 
     def __init__(self, decay: Decay, least_ps: float, most_ps: float) -> None:
-        """Lay templates over an axis, for lifetimes between two limits."""
+        """Compute templates over an axis, for lifetimes between two limits."""
         axis, self._decay = decay.axis, decay
         group = -(-axis.bins // MOST_BINS)
         self._first = np.arange(0, axis.bins, group)

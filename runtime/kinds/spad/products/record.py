@@ -1,4 +1,4 @@
-"""What a sidecar and a plan say of how a capture is worked through."""
+"""Facts for a sidecar and a plan about the processing of a capture."""
 
 from collections.abc import Mapping
 from typing import Any

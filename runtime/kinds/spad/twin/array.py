@@ -1,4 +1,4 @@
-"""What the pixels of an array see of a fine picture: through a kernel, at one sub-pixel each.
+"""The light on the pixels of an array: a fine picture through a kernel, one sub-pixel each.
 
     fine (n, m h, m w) -- kernel -- sub-pixel `phase` of every m x m -- light (n, h, w)
 

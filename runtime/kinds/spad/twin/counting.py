@@ -27,7 +27,7 @@ HOT_TIMES: Final = 50.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Disturbances:
-    """What an array counts besides light, and what it misses.
+    """The counts of an array without light, and the photons that it misses.
 
     Attributes:
         dark: Dark counts of a pixel and bin, or of a pixel that only counts.

@@ -9,7 +9,7 @@ from typing import Final
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorkingPoint:
-    """How long the array counts.
+    """The duration and the light of a count.
 
     Attributes:
         frames: Put together to one picture, or to one step of the gate.

@@ -47,7 +47,7 @@ def write_recorded(path: Path, recorded: Recorded, _bundle: Bundle | None = None
 
 
 def files_of(path: Path) -> tuple[Path, ...]:
-    """Name the files that make up a capture: itself, and its timing file where it needs one."""
+    """Return the files of a capture: itself, and its timing file where it needs one."""
     if path.suffix.lower() in _SAY_ALL:
         return (path,)
     return path, timing_beside(path)

@@ -156,36 +156,21 @@ def test_a_missing_recipe_is_a_usage_error(camkit_command, tmp_path) -> None:
 
 
 def test_freeze_writes_psf_stress_psf_and_report(camkit_command, tmp_path, monkeypatch) -> None:
-    from camkit.models_def.optics import freeze as module
+    from camkit.bundle.frozen_optics import FrozenOptics
+    from camkit.models_def.optics import freezer as module
     from camkit.models_def.optics import optics_file
+    from camkit.models_def.optics.frozen import Frozen
     from tests.bundle_factory import tiny_psf
 
-    report = module.FreezeReport(
-        fields=9,
-        wavelengths=5,
-        side_px=97,
-        energy_kept=0.995,
-        loss_db=0.04,
-        worst_loss_db=0.1,
-        loss_limit_db=0.05,
-        block_px=512,
-        overlap_px=160,
-        block_loss_db=0.03,
-        of_optics={"efl_mm": 50.0},
-        corner_illumination=0.83,
-    )
     seen = {}
 
-    def fake(optics: object, out: Path, **options: object) -> module.FreezeReport:
+    def fake(optics: object, **options: object) -> tuple[FrozenOptics, dict[str, int]]:
         assert optics == Path("lens.toml")
         seen.update(options)
-        out.write_bytes(b"psf")
-        return report
+        return FrozenOptics(psf=tiny_psf()), {"block_px": 512}
 
-    monkeypatch.setattr(module, "freeze_optics", fake)
-    monkeypatch.setattr(
-        module, "freeze_stress", lambda *_: module.Frozen(psf=tiny_psf(), energy_kept=1.0)
-    )
+    monkeypatch.setattr(module, "freeze_samples", fake)
+    monkeypatch.setattr(module, "freeze_stress", lambda *_: Frozen(psf=tiny_psf(), energy_kept=1.0))
     monkeypatch.setattr(optics_file, "read_optics", lambda path: path)
     folder = tmp_path / "new"
     outcome = camkit_command(
@@ -197,8 +182,8 @@ def test_freeze_writes_psf_stress_psf_and_report(camkit_command, tmp_path, monke
     assert seen["grid"].depths_mm == (500.0, 1000.0, math.inf)
     assert (seen["grid"].max_side_px, seen["limit_db"]) == (201, 0.1)
     assert json.loads(outcome.out) == json.loads((folder / "freeze.json").read_text())
-    assert json.loads(outcome.out)["block_px"] == 512
-    assert (folder / "stress.safetensors").stat().st_size > 100
+    assert json.loads(outcome.out) == {"block_px": 512}
+    assert (folder / "psf.safetensors").read_bytes() == (folder / "stress.safetensors").read_bytes()
     assert seen["sensor"].width_px == 6000, "the camera of the default recipe"
     assert seen["settings"].clip_iterations == 3, "its Wiener bank measures the loss"
 

@@ -10,8 +10,8 @@ from camkit.bundle.haze_file import write_haze
 from camkit.bundle.psf_file import write_psf
 from camkit.cli.exit_code import ExitCode
 from camkit.errors import UnsupportedError
-from camkit.export.kinds import bayer
-from camkit.export.preparing import preparing_kind
+from camkit.models_def.kinds.bayer.frames import preparation
+from camkit.models_def.training.preparing import preparing_kind
 from tests.bayer_recipe import RECIPE as PLAIN
 from tests.hazy_recipe import RECIPE, hazy_optics
 
@@ -39,7 +39,7 @@ def test_frames_are_prepared_once(
 ) -> None:
     _write_optics(tmp_path)
     frozen = (hazy_optics(0.48), hazy_optics(0.5), hazy_optics(0.52))
-    monkeypatch.setattr(bayer, "freeze_copies", lambda *_: frozen)
+    monkeypatch.setattr(preparation, "freeze_copies", lambda *_: frozen)
     monkeypatch.setattr("camkit.cli.progress.SILENT_S", 0.0)
     words = ("prepare", _recipe(tmp_path, SMALL), "--out-dir", tmp_path, "--json")
     outcome = camkit_command(*words)
@@ -67,7 +67,7 @@ def test_a_recipe_without_a_haze_and_missing_optics_are_refused(
 def test_what_would_fail_later_is_refused_before_copies_are_frozen(
     camkit_command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(bayer, "freeze_copies", lambda *_: pytest.fail("frozen in vain"))
+    monkeypatch.setattr(preparation, "freeze_copies", lambda *_: pytest.fail("frozen in vain"))
     _write_optics(tmp_path)
     words = ("prepare", _recipe(tmp_path, RECIPE), "--out-dir", tmp_path)
     outcome = camkit_command(*words, "--valid", tmp_path / "none")

@@ -17,15 +17,15 @@ from camkit.models_def.optics.dots.match import match_dots
 from camkit.models_def.optics.dots.pattern import dot_picture
 from camkit.models_def.optics.dots.target import likeness, to_target
 from camkit.models_def.optics.dots.unit import DotPlate
-from tests.runtime.calibration.haze_factory import Hazy
-from tests.runtime.calibration.point_factory import (
+from tests.camkit.calibration.haze_factory import Hazy
+from tests.camkit.calibration.point_factory import (
     Point,
     exposed,
     write_bracket,
     write_pictures,
     write_planes,
 )
-from tests.runtime.calibration.point_factory import write_mosaic as write_dark
+from tests.camkit.calibration.point_factory import write_mosaic as write_dark
 
 SMALL = Point(side=96, x=47.7, y=46.2, reach=20, streak=1e-3)
 TIMES_S = (1.0, 1 / 8, 1 / 64)

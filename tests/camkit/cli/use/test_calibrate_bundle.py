@@ -10,9 +10,9 @@ import pytest
 from camkit.bundle.psf_file import write_psf
 from camkit.bundle.reader import Bundle, open_bundle
 from camkit.bundle.writer import write_bundle
+from camkit.calibration.record import to_toml
 from camkit.cli.exit_code import ExitCode
 from camkit.contracts import FrozenPsf, RadialDistortion
-from camkit.runtime.calibration.record import to_toml
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work
 from tests.bundle_factory import write_tiny_bundle

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from camkit.cli.exit_code import ExitCode
-from tests.runtime.calibration.display_factory import GOOD, Flats, Shift
+from tests.camkit.calibration.display_factory import GOOD, Flats, Shift
 
 TOLERANCE = 0.01
 LENS = Flats()

@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 import pytest
 
+from camkit.calibration.geometry.camera_model import MODELS, project
 from camkit.cli.exit_code import ExitCode
-from camkit.runtime.calibration.geometry.camera import MODELS, project
-from tests.runtime.calibration.geometry.board_factory import (
+from tests.camkit.calibration.geometry.board_factory import (
     BOARD,
     Shot,
     camera_of,

@@ -9,16 +9,16 @@ import pytest
 
 from camkit.bundle.reader import open_bundle
 from camkit.bundle.writer import write_bundle
+from camkit.calibration.lensfun.ordinary import CameraOptions, lensfun_bundle
+from camkit.calibration.record import to_toml
 from camkit.cli.exit_code import ExitCode
 from camkit.report.kind_finder import check_photographs
-from camkit.runtime.calibration.lensfun.ordinary import CameraOptions, lensfun_bundle
-from camkit.runtime.calibration.record import to_toml
 from camkit.runtime.geometry.distortion import distort_points
 from camkit.runtime.proof.check import check_bundle
 from tests.bundle_factory import write_tiny_bundle
+from tests.camkit.calibration.lensfun.test_entry import GEOMETRY
 from tests.data_folder import data_path
 from tests.lensfun_factory import ZOOM, write_database, write_shot
-from tests.runtime.calibration.lensfun.test_entry import GEOMETRY
 
 AGREES_PX = 1e-3
 SIZE = (240, 160)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from camkit.cli.exit_code import ExitCode
-from tests.runtime.calibration.sensor_factory import Sensor
+from tests.camkit.calibration.sensor_factory import Sensor
 
 KEYS = {
     *("iso", "gain_e_per_dn", "gain_error_percent", "read_noise_e", "read_noise_resolved"),

@@ -8,11 +8,11 @@ import cv2
 import numpy as np
 import pytest
 
+from camkit.calibration.display.alignment import map_places
 from camkit.cli.exit_code import ExitCode
 from camkit.colorimetry import encode_srgb
-from camkit.runtime.calibration.display.alignment import map_places
 from camkit.scenes import procedural_scene
-from tests.runtime.calibration.display.screen_factory import COLOURS, DARK, Booth
+from tests.camkit.calibration.display.screen_factory import COLOURS, DARK, Booth
 
 PLACED_PX = 0.1
 COLOUR = 0.01

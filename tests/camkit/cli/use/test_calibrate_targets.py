@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from camkit.calibration.display.marks import find_marks
+from camkit.calibration.display.targets import Targets
 from camkit.cli.exit_code import ExitCode
 from camkit.cli.use.calibrate.folder import Folder
-from camkit.runtime.calibration.display.marks import find_marks
-from camkit.runtime.calibration.display.targets import Targets
 
 
 @pytest.fixture(name="picture")

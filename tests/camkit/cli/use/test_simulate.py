@@ -14,9 +14,9 @@ from camkit.cli.exit_code import ExitCode
 from camkit.cli.use.simulate import _check_truth, _exposed, _metres
 from camkit.errors import ContractError
 from camkit.runtime.files.picture import read_scene
+from camkit.runtime.kinds.hdr.night import night_scene
 from camkit.runtime.raw import read_capture
 from camkit.runtime.twin.simulate import SimulationOptions
-from camkit.scenes import night_scene
 from tests.deep_bundle import write_deep_bundle
 from tests.hdr_bundle import STREAK_SHARE, write_hdr_bundle
 

@@ -8,6 +8,7 @@ import pytest
 from camkit.bundle.chain import rewired
 from camkit.bundle.reader import Bundle, open_bundle
 from camkit.bundle.writer import write_bundle
+from camkit.calibration.measured_files import read_flat, read_geometry, read_noise
 from camkit.export.remeasured import Measured, remeasured
 from camkit.report.calibration.bundle_page import (
     Curve,
@@ -18,7 +19,6 @@ from camkit.report.calibration.bundle_page import (
     moved,
 )
 from camkit.report.figure import CHANNEL_COLORS
-from camkit.runtime.calibration.measured_files import read_flat, read_geometry, read_noise
 from tests.bundle_factory import write_tiny_bundle
 from tests.camkit.cli.use.test_calibrate_bundle import (
     FLAT,

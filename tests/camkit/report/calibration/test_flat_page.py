@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from camkit.calibration.flat.illumination_fit import FlatFacts
+from camkit.calibration.flat.pose import Pose
 from camkit.report.calibration.flat_page import draw_maps, draw_profile, flat_html
-from camkit.runtime.calibration.flat.measure import FlatFacts
-from camkit.runtime.calibration.flat.pose import Pose
 
 
 def _facts(count: int, *, separated: bool) -> FlatFacts:

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from camkit.calibration.geometry.camera_model import MODELS
+from camkit.calibration.geometry.geometry import Geometry, calibrate_geometry
 from camkit.report.calibration.geometry import geometry_sections
 from camkit.report.calibration.geometry_charts import LONGEST, enlargement
 from camkit.report.calibration.page import to_html
-from camkit.runtime.calibration.geometry.camera import MODELS
-from camkit.runtime.calibration.geometry.geometry import Geometry, calibrate_geometry
-from tests.runtime.calibration.geometry.board_factory import (
+from tests.camkit.calibration.geometry.board_factory import (
     BOARD,
     Shot,
     camera_of,

@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from camkit.calibration.lensfun.entry import EntryOptions, lensfun_entry
+from camkit.calibration.lensfun.ordinary import CameraOptions, lensfun_bundle
+from camkit.calibration.record import to_toml
 from camkit.report.calibration.lensfun_page import curves_of_bundle, curves_of_entry, draw
-from camkit.runtime.calibration.lensfun.entry import EntryOptions, lensfun_entry
-from camkit.runtime.calibration.lensfun.ordinary import CameraOptions, lensfun_bundle
-from camkit.runtime.calibration.record import to_toml
+from tests.camkit.calibration.lensfun.test_entry import GEOMETRY
 from tests.lensfun_factory import ZOOM, write_database, write_shot
-from tests.runtime.calibration.lensfun.test_entry import GEOMETRY
 
 
 def test_the_largest_miss_of_an_entry_is_the_one_it_states(tmp_path: Path) -> None:

@@ -1,9 +1,9 @@
 """The page of a sensor's noise."""
 
+from camkit.calibration.noise.rounding import Spread
+from camkit.calibration.noise.sensor_noise import IsoFacts, NoiseFacts
+from camkit.calibration.noise.transfer import Point, fit_transfer
 from camkit.report.calibration.noise_page import draw_transfer, noise_html
-from camkit.runtime.calibration.noise.measure import IsoFacts, NoiseFacts
-from camkit.runtime.calibration.noise.rounding import Spread
-from camkit.runtime.calibration.noise.transfer import Point, fit_transfer
 
 DARK = Point(signal=0.0, variance=0.3, samples=10_000)
 POINTS = [Point(signal=s, variance=0.3 + s / 4, samples=10_000) for s in (100.0, 400.0, 2000.0)]

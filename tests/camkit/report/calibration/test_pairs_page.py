@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from camkit.calibration.display.pairs import Pair, Pairs
+from camkit.calibration.display.primaries import fit_primaries
+from camkit.calibration.display.targets import COLOURS, Target
 from camkit.report.calibration.pairs_page import pairs_html
-from camkit.runtime.calibration.display.pairs import Pair, Pairs
-from camkit.runtime.calibration.display.primaries import fit_primaries
-from camkit.runtime.calibration.display.targets import COLOURS, Target
 
 LIGHT = np.array(list(COLOURS.values())) / 255
 

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from camkit.report.calibration.psf_page import draw_reblurred, draw_shares, psf_html
-from camkit.runtime.calibration.measured import (
+from camkit.calibration.measured import (
     COLOURS,
     WAVELENGTHS_UM,
     ColourFacts,
@@ -12,7 +11,8 @@ from camkit.runtime.calibration.measured import (
     Reblurred,
     frozen,
 )
-from camkit.runtime.calibration.peak import Field
+from camkit.calibration.peak import Field
+from camkit.report.calibration.psf_page import draw_reblurred, draw_shares, psf_html
 
 HALF = 20
 

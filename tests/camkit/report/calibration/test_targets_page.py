@@ -5,6 +5,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from camkit.calibration.display.screen import Screen
+from camkit.calibration.display.targets import Targets, draw_targets, plan_targets
+from camkit.calibration.geometry.board import Board
 from camkit.report.calibration.targets_page import (
     COLUMNS,
     PER_SHEET,
@@ -13,9 +16,6 @@ from camkit.report.calibration.targets_page import (
     shrunk,
     targets_html,
 )
-from camkit.runtime.calibration.display.screen import Screen
-from camkit.runtime.calibration.display.targets import Targets, draw_targets, plan_targets
-from camkit.runtime.calibration.geometry.board import Board
 
 SCREEN = Screen(width_px=640, height_px=400)
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from camkit.calibration.tone import PowerCurve, ToneFacts
 from camkit.report.calibration.tone_page import draw_tone, tone_html
-from camkit.runtime.calibration.tone import PowerCurve, ToneFacts
 
 LIGHT = np.array([0.0, 0.2, 0.5, 1.0])
 

@@ -23,7 +23,7 @@ from camkit.report.stress.score import Judge
 from camkit.runtime.bank.haze import hazy_kernels
 from camkit.runtime.geometry.illumination import illumination_band
 from camkit.runtime.twin.exposure import Setting
-from camkit.runtime.twin.haze import HazeLens
+from camkit.runtime.twin.haze_spread import HazeLens
 from tests.bundle_factory import tiny_sensor
 from tests.deep_bundle import deep_psf
 from tests.haze_bundle import hazy_manifest, hazy_optics, write_hazy_bundle

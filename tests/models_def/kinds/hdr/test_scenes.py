@@ -8,7 +8,8 @@ import pytest
 
 from camkit.models_def.kinds.hdr.samples import HdrCamera
 from camkit.models_def.kinds.hdr.scenes import DUSK_EV, NIGHT_SEED, exposed, open_lights
-from camkit.scenes.night import night_scene
+from camkit.models_def.training.recipe import SceneRecipe
+from camkit.runtime.kinds.hdr.night import night_scene
 from camkit.scenes.saturation import CEILING
 
 SIDE = 96
@@ -21,14 +22,16 @@ def pictures(tmp_path: Path) -> Path:
 
 
 def test_without_pictures_every_scene_is_a_night_that_is_never_measured_on() -> None:
-    source = open_lights(None, picture_share=1.0, scenes=1, scene_px=160)
+    source = open_lights(SceneRecipe(picture_share=1.0, procedural_scenes=1, scene_px=160), None)
     rng, again = np.random.default_rng(3), np.random.default_rng(3)
     night = NIGHT_SEED + int(again.integers(2**31))
     np.testing.assert_array_equal(source.draw(rng, SIDE), night_scene(night, SIDE, SIDE))
 
 
 def test_a_picture_is_darkened_and_holds_the_lights_of_a_night(pictures: Path) -> None:
-    source = open_lights(pictures, picture_share=1.0, scenes=1, scene_px=160)
+    source = open_lights(
+        SceneRecipe(picture_share=1.0, procedural_scenes=1, scene_px=160), pictures
+    )
     seen = 0
     for seed in range(4):
         rng, again = np.random.default_rng(seed), np.random.default_rng(seed)
@@ -45,7 +48,9 @@ def test_a_picture_is_darkened_and_holds_the_lights_of_a_night(pictures: Path) -
 
 
 def test_the_share_of_pictures_is_kept(pictures: Path) -> None:
-    source = open_lights(pictures, picture_share=0.0, scenes=1, scene_px=160)
+    source = open_lights(
+        SceneRecipe(picture_share=0.0, procedural_scenes=1, scene_px=160), pictures
+    )
     rng, again = np.random.default_rng(3), np.random.default_rng(3)
     night = NIGHT_SEED + int(again.integers(2**31))
     np.testing.assert_array_equal(source.draw(rng, SIDE), night_scene(night, SIDE, SIDE))

@@ -1,6 +1,5 @@
 """The protocol of tables 4.1 and 4.2; its bicubic figures on the real sets."""
 
-from collections.abc import Mapping
 from pathlib import Path
 
 import cv2
@@ -16,7 +15,6 @@ from camkit.models_def.kinds.spad.evaluation import (
     SETS,
     bicubic,
     evaluate,
-    evaluate_sets,
     read_luminance,
     read_set,
 )
@@ -101,15 +99,6 @@ def test_equal_pictures_have_the_most_and_what_leaves_the_range_is_cut() -> None
     score = evaluate([picture], sampling, NO_NOISE, lambda p: 3 + p.new_zeros(1, 1, 16, 16))
     assert score.psnr_db == MOST_DB
     assert score.ssim == pytest.approx(1)
-
-
-def test_sets_and_methods_are_told_apart() -> None:
-    sets: Mapping[str, tuple[FloatArray, ...]] = {"one": _pictures(1), "two": _pictures(2)}
-    sampling = make_sampling("low_fill")
-    methods = {"bicubic": bicubic(sampling), "grey": lambda _: torch.full((1, 1, 64, 96), 0.5)}
-    found = evaluate_sets(sets, sampling, NO_NOISE, methods)
-    assert found["bicubic"]["two"] == evaluate(sets["two"], sampling, NO_NOISE, methods["bicubic"])
-    assert found["grey"]["one"].psnr_db < found["bicubic"]["one"].psnr_db
 
 
 def test_pictures_are_read_as_luminance_of_whole_pixels(tmp_path: Path) -> None:

@@ -12,14 +12,13 @@ from camkit.models_def.kinds.spad.sampling import (
     MODES,
     PITCH_UM,
     Sampling,
-    box_psf,
     gaussian_psf,
     make_sampling,
-    point_psf,
     see_through,
 )
 
 RNG = np.random.default_rng(7)
+POINT, BOX = (make_sampling(mode).kernel for mode in ("low_fill", "full_fill"))
 
 
 def _kernel(seed: int) -> np.ndarray:
@@ -82,7 +81,7 @@ def test_the_gaussian_has_the_width_of_the_thesis_and_unit_sum() -> None:
 
 
 def test_an_even_scene_is_seen_even_through_any_kernel() -> None:
-    for kernel in (point_psf(), box_psf(2), gaussian_psf(), _kernel(5)):
+    for kernel in (POINT, BOX, gaussian_psf(), _kernel(5)):
         seen = see_through(torch.full((1, 1, 8, 8), 0.7), torch.from_numpy(kernel))
         assert torch.allclose(seen, torch.full((1, 1, 2, 2), 0.7), atol=1e-6)
 
@@ -98,12 +97,12 @@ def test_gradients_reach_the_kernel() -> None:
     [
         ({"mode": "round"}, "must be one of low_fill"),
         ({"mode": "learned"}, "kernel belongs to the sampling learned"),
-        ({"mode": "low_fill", "kernel": point_psf()}, "kernel belongs to the sampling learned"),
+        ({"mode": "low_fill", "kernel": POINT}, "kernel belongs to the sampling learned"),
         ({"mode": "low_fill", "sigma": 1.0}, "sigma belongs to the sampling gaussian"),
         ({"mode": "gaussian", "sigma": -1.0}, "must be a number > 0"),
         ({"mode": "low_fill", "phase": 4}, "phase must be one of 0..3"),
         ({"mode": "learned", "kernel": np.ones((11, 11), np.float32)}, "of unit sum"),
-        ({"mode": "learned", "kernel": -point_psf()}, ">= 0"),
+        ({"mode": "learned", "kernel": -POINT}, ">= 0"),
         ({"mode": "learned", "kernel": np.ones((9, 9), np.float32) / 81}, r"\(11, 11\)"),
         ({"mode": "learned", "kernel": np.full((11, 11), np.nan, np.float32)}, "finite"),
     ],
@@ -115,7 +114,7 @@ def test_what_cannot_be_is_refused(arguments: dict[str, object], message: str) -
 
 def test_a_mode_that_nobody_made_is_refused_too() -> None:
     with pytest.raises(ContractError, match="must be one of low_fill"):
-        Sampling(mode="round", kernel=point_psf())  # type: ignore[arg-type]
+        Sampling(mode="round", kernel=POINT)  # type: ignore[arg-type]
 
 
 def test_a_picture_of_broken_pixels_is_refused() -> None:

@@ -13,7 +13,6 @@ from typer.testing import CliRunner
 
 from camkit.bundle.psf_file import read_psf
 from camkit.bundle.sensor import PlanesSensor
-from camkit.bundle.streak_file import read_streaks
 from camkit.cli.app import app
 from camkit.errors import ContractError
 from camkit.models_def.optics.diffraction import freezing
@@ -28,7 +27,7 @@ from camkit.models_def.optics.diffraction.gratings import Streaks, chirped_grati
 from camkit.models_def.optics.diffraction.patterns import FlatPattern, Pattern, PeakPattern
 from camkit.models_def.optics.diffraction.plate import Plate, pattern_plate, write_plate
 from camkit.models_def.optics.diffraction.plate_optics import PlateOptics, plate_kernels
-from camkit.models_def.sensors.psf import wavelength_weights
+from camkit.runtime.bank.psf import wavelength_weights
 from tests.two_colours import red_and_blue_sensor
 
 BENCH = Bench(diameter_mm=2.0, focal_length_mm=20.0, focus_mm=2000.0)
@@ -82,21 +81,20 @@ def test_what_writes_no_streaks_is_frozen_as_kernels_of_the_right_colours(
     monkeypatch.setattr(freezing, "STREAKS_LIMIT", 1e-4)
     plate = pattern_plate("no-streaks", pattern, cells=128, bench=BENCH)
     lines: list[str] = []
-    out = tmp_path / "psf.safetensors"
     grid = replace(SMALL, depths_mm=(1000.0, 2000.0))
     optics = PlateOptics(plate=plate)
-    report = freeze_plate(optics, out, sensor=sensor, grid=grid, tell=lines.append)
-    psf = read_psf(out)
+    frozen, told = freeze_plate(optics, sensor=sensor, grid=grid, tell=lines.append)
+    psf = frozen.psf
+    assert frozen.streaks is None
     assert psf.symmetry == "uniform"
     assert psf.depths_mm.tolist() == [1000.0, 2000.0]
-    assert report.form == "kernels"
+    assert told["form"] == "kernels"
     assert "frozen as kernels" in "".join(lines)
-    assert report.wavelengths == psf.wavelengths_um.size
+    assert told["wavelengths"] == psf.wavelengths_um.size
     off = _off(optics, sensor, psf.kernels[0, 1], psf.wavelengths_um)
     assert off <= 1.2 * MISPLACED_LIMIT
-    assert report.misplaced <= MISPLACED_LIMIT
-    assert 0.95 < report.energy_kept < 1
-    told = report.to_json()
+    assert told["misplaced"] <= MISPLACED_LIMIT
+    assert 0.95 < told["energy_kept"] < 1
     assert told["depths_mm"] == "1000, 2000"
     assert told["efl_mm"] == 20.0
 
@@ -104,36 +102,30 @@ def test_what_writes_no_streaks_is_frozen_as_kernels_of_the_right_colours(
 def test_streaks_are_frozen_by_their_parts_and_what_that_costs_is_told(
     optics: PlateOptics, sensor: PlanesSensor, tmp_path: Path
 ) -> None:
-    out = tmp_path / "psf.safetensors"
-    report = freeze_plate(optics, out, sensor=sensor, grid=replace(SMALL, max_side_px=81))
-    streaks = read_streaks(out)
-    assert report.form == "streaks"
-    assert report.to_json()["plate"] == "cross"
+    frozen, told = freeze_plate(optics, sensor=sensor, grid=replace(SMALL, max_side_px=81))
+    streaks = frozen.streaks
+    assert streaks is not None
+    assert (told["form"], told["plate"]) == ("streaks", "cross")
     assert sorted(np.degrees(streaks.angles_rad).round() % 360) == [0, 90, 180, 270]
-    assert report.misplaced <= STREAKS_LIMIT
+    assert told["misplaced"] <= STREAKS_LIMIT
     light = streaks.dense()[0]
     off = _off(optics, sensor, light, streaks.wavelengths_um)
-    assert report.misplaced == pytest.approx(off, rel=0.1)
-    assert report.side_px == light.shape[-1]
-    assert report.energy_kept == pytest.approx(light.sum((-2, -1)).min(), abs=3e-3)
+    assert told["misplaced"] == pytest.approx(off, rel=0.1)
+    assert told["side_px"] == light.shape[-1]
+    assert told["energy_kept"] == pytest.approx(light.sum((-2, -1)).min(), abs=3e-3)
     with pytest.raises(ContractError, match=r"wanted 0\.9999"):
         freeze_plate(
             optics,
-            out,
             sensor=sensor,
             grid=replace(SMALL, max_side_px=81, energy=0.9999, least_energy=None),
         )
 
 
-def test_a_window_that_holds_too_little_is_refused_before_anything_is_written(
+def test_a_window_that_holds_too_little_is_refused(
     optics: PlateOptics, sensor: PlanesSensor, tmp_path: Path
 ) -> None:
-    out = tmp_path / "psf.safetensors"
     with pytest.raises(ContractError, match=r"hold 0\.9"):
-        freeze_plate(
-            optics, out, sensor=sensor, grid=replace(SMALL, max_side_px=21, least_energy=None)
-        )
-    assert not out.exists()
+        freeze_plate(optics, sensor=sensor, grid=replace(SMALL, max_side_px=21, least_energy=None))
 
 
 def test_colours_that_no_number_of_wavelengths_places_are_refused(
@@ -144,10 +136,8 @@ def test_colours_that_no_number_of_wavelengths_places_are_refused(
 ) -> None:
     monkeypatch.setattr(freezing, "WAVELENGTH_COUNTS", (1,))
     monkeypatch.setattr(freezing, "STREAKS_LIMIT", 0.0)
-    out = tmp_path / "psf.safetensors"
     with pytest.raises(ContractError, match="1 wavelengths misplace 0"):
-        freeze_plate(optics, out, sensor=sensor, grid=SMALL)
-    assert not out.exists()
+        freeze_plate(optics, sensor=sensor, grid=SMALL)
 
 
 def test_the_command_freezes_a_plate(optics: PlateOptics, tmp_path: Path) -> None:

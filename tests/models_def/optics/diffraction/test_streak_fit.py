@@ -14,7 +14,7 @@ from camkit.models_def.optics.diffraction.streak_fit import (
     _reach,
     fit_streaks,
 )
-from camkit.streaks.optics import HAZE_STEP_PX, SECTION_STEP_PX, StreakOptics
+from camkit.streaks import HAZE_STEP_PX, SECTION_STEP_PX, StreakOptics
 from tests.hdr_bundle import CORE_PX, HAZE_SHARE, LAST_PX, WAVELENGTHS_UM, four_lines
 
 MISPLACED = 4e-3

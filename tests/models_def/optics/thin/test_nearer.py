@@ -79,7 +79,7 @@ def test_no_other_distance_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def other(*given, **chosen):  # type: ignore[no-untyped-def]
         optics, report = real(*given, **chosen)
-        return optics, replace(report, about=next(abouts))
+        return optics, report | {"about": next(abouts)}
 
     def refused(lens, *given, **chosen):  # type: ignore[no-untyped-def]
         if lens.object_distance_mm == 500:

@@ -6,6 +6,7 @@ import torch
 from camkit.errors import ContractError
 from camkit.models_def.networks.vgg import VggLevels
 from camkit.models_def.training.adversarial.content import (
+    Conv33,
     Relu32,
     content_terms,
     gram,
@@ -67,6 +68,25 @@ def test_weights_of_vgg_are_read_where_a_file_is_given(tmp_path):
     assert torch.equal(network.levels.state_dict()["features.12.bias"], state["features.12.bias"])
     with pytest.raises(ContractError, match="cannot read"):
         Relu32(tmp_path / "none.pth")
+
+
+def test_fine_tuning_looks_at_conv3_3_before_its_relu(tmp_path):
+    torch.manual_seed(5)
+    levels = VggLevels(blocks=3, next_one=True)
+    torch.save(levels.state_dict(), tmp_path / "vgg19.pth")
+    network, picture = Conv33(tmp_path / "vgg19.pth"), features(3, (1, 3, 16, 24))
+    assert network(picture).shape == (1, 256, 4, 6)
+    assert network(picture).min() < 0
+
+
+def test_unknown_pixels_have_no_gradient():
+    output, target = features(1, (1, 3, 8, 8)).requires_grad_(), features(2, (1, 3, 8, 8))
+    target[..., :4] = -1
+    recipe = ContentRecipe(l1_weight=1.0, feature_weight=1.0)
+    terms = content_terms(views(output, target), recipe, torch.Tensor.contiguous)
+    sum(value for _, value in terms.values()).backward()
+    assert (output.grad[..., :4] == 0).all()
+    assert (output.grad[..., 4:] != 0).any()
 
 
 def test_only_terms_that_count_are_computed():

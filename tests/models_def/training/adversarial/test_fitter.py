@@ -14,9 +14,11 @@ from camkit.models_def.kinds.bayer import fitting
 from camkit.models_def.kinds.bayer.fine_tuning.pairs import PairSamples
 from camkit.models_def.kinds.bayer.samples import LAYOUT
 from camkit.models_def.networks.catalog import build_network
-from camkit.models_def.training.adversarial.fitter import PictureFitter, PictureParts
+from camkit.models_def.training.adversarial.fitter import PictureParts, picture_fitter
+from camkit.models_def.training.adversarial.fitting import critic_plan
 from camkit.models_def.training.adversarial.sharp import SharpCrops
 from camkit.models_def.training.checkpoint import read_checkpoint
+from camkit.models_def.training.fitter import patch_objective
 from camkit.models_def.training.fitting import FitRequest, own_fitting
 from camkit.models_def.training.kind import read_recipe, to_recipe
 from camkit.models_def.training.log import read_log
@@ -31,8 +33,14 @@ def make(recipe_path):
         entry = read_recipe(recipe_path).network(size)
         schedule = entry.schedule
         schedule = replace(schedule, critic=replace(schedule.critic, **critic or {}), **changes)
-        parts = PictureParts(to_rec709=torch.eye(3), sharp=sharp)
-        return PictureFitter(replace(entry, schedule=schedule), build_network, parts)
+        judged = schedule.loss == "adversarial"
+        parts = PictureParts(
+            content=schedule.content,
+            to_rec709=torch.eye(3),
+            opponents=critic_plan(schedule, sharp) if judged else None,
+            betas=(schedule.critic.beta1 if judged else 0.9, 0.999),
+        )
+        return picture_fitter(replace(entry, schedule=schedule), build_network, parts)
 
     return build
 
@@ -73,11 +81,10 @@ def test_without_weight_the_critic_leaves_the_generator_to_its_content(make):
 
 def test_scores_of_the_generator_do_not_move_the_critic(make):
     fitter = make(critic={"learning_rate": 1e-30})
-    before = {n: p.clone() for n, p in fitter.critic.network.named_parameters()}
+    critic = fitter.objective.states["opponents"].networks
+    before = {n: p.clone() for n, p in critic.named_parameters()}
     fitter.fit(batch(), 0, 0.0)
-    assert all(
-        torch.allclose(p, before[n], atol=1e-9) for n, p in fitter.critic.network.named_parameters()
-    )
+    assert all(torch.allclose(p, before[n], atol=1e-9) for n, p in critic.named_parameters())
 
 
 def test_notes_tell_every_term_once(make, sharp_folder):
@@ -101,7 +108,7 @@ def test_resumed_training_equals_uninterrupted_training_to_the_last_bit(
     assert (one.step, two.step) == (6, 6)
     assert equal(one.weights, two.weights)
     assert equal(one.average, two.average)
-    critics = [c.optimizer["critic"] for c in (one, two)]
+    critics = [c.optimizer["opponents"] for c in (one, two)]
     assert equal(*(c["weights"] for c in critics))
     assert equal(*(c["optimizer"]["state"][0] for c in critics))
     assert one.training_data.endswith("by the loss adversarial, sharp pictures of sharp0")
@@ -122,7 +129,8 @@ def test_a_checkpoint_of_another_loss_is_not_resumed(make):
     judged, alone = make(), make(loss="content")
     with pytest.raises(ContractError, match="trained by another loss"):
         alone.load(judged.weights(), judged.average(), judged.optimizer_state())
-    plain = alone.generator
+    plain = make(loss="l1")
+    plain.objective = patch_objective()
     with pytest.raises(ContractError, match="trained by another loss"):
         alone.load(plain.weights(), plain.average(), plain.optimizer_state())
     with pytest.raises(ContractError, match="trained by another loss"):
@@ -147,11 +155,15 @@ def test_real_pairs_take_the_places_that_the_recipe_gives_them(recipe_path, mate
     own = own_fitting("bayer", request(recipe, "gram", pairs=Path("monitor")))
     assert own.credit.endswith(", real pairs of monitor")
     fitter = own.make(material)
-    mixed = fitter._mix(batch(), 7)
+    given = []
+    run = fitter.run
+    monkeypatch.setattr(
+        fitter, "run", lambda planes, progress: given.append(planes) or run(planes, progress)
+    )
+    assert fitter.fit(batch(), 7, 0.0) > 0
     assert asked == [(Path("monitor"), recipe, material.bank, None)]
-    assert (mixed.planes[0] == 0.25).all()
-    assert torch.equal(mixed.planes[1], batch().planes[1])
-    assert fitter.fit(batch(), 0, 0.0) > 0
+    assert (given[0][0] == 0.25).all()
+    assert torch.equal(given[0][1], batch().planes[1])
 
 
 def request(recipe, size, **given):

@@ -8,7 +8,7 @@ import pytest
 from camkit.bundle.reader import find_bundle, open_bundle
 from camkit.bundle.writer import write_bundle
 from camkit.runtime.proof.laws.darkroom import PLACES, Darkroom, reason_not_judged
-from camkit.runtime.proof.laws.pictures import picture_laws
+from camkit.runtime.proof.laws.photographs import picture_laws
 from camkit.scenes.procedural import procedural_scene
 from tests.bundle_factory import tiny_manifest, tiny_members, write_tiny_bundle
 

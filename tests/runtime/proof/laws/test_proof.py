@@ -9,7 +9,7 @@ from camkit.bundle.manifest import LIGHT_VERSION
 from camkit.bundle.reader import open_bundle
 from camkit.bundle.writer import write_bundle
 from camkit.errors import BundleError
-from camkit.runtime.plan.laws import broken_laws
+from camkit.runtime.plan.bounded_networks import broken_laws
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.laws import proof
 from camkit.runtime.proof.laws.law import Law

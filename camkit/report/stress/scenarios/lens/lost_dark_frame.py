@@ -8,7 +8,7 @@ from camkit.report.stress.scenario import Scenario, has_haze
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
 from camkit.report.stress.shot import Shot
-from camkit.runtime.twin.haze import HazeLens
+from camkit.runtime.twin.haze_spread import HazeLens
 
 
 def black_taken_off(haze: HazeLens, share: float) -> HazeLens:

@@ -36,7 +36,7 @@ def test_resumed_run_equals_an_uninterrupted_one_to_the_last_bit(
     for a, b in (
         (one.weights, two.weights),
         (one.average, two.average),
-        (one.optimizer["opponent_weights"], two.optimizer["opponent_weights"]),
+        tuple(saved.optimizer["opponents"]["weights"] for saved in (one, two)),
     ):
         assert all(torch.equal(a[name], b[name]) for name in a)
 

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from camkit.errors import ContractError
-from camkit.models_def.kinds.hdr.thesis.fitter import FITTING, ThesisFitter
+from camkit.models_def.kinds.hdr.thesis.fitter import FITTING, ThesisLoss, thesis_fitter
 from camkit.models_def.kinds.hdr.thesis.samples import PORTS, layout_of
 from camkit.models_def.networks.vgg import VggLevels
 from camkit.models_def.training.checkpoint import load_network, read_checkpoint
@@ -51,7 +51,7 @@ def batch_of(recipe, role):
 )
 def test_a_role_has_its_terms_and_its_loss_falls(small_recipe, role, terms):
     recipe = small_recipe(exclusion_from=0.0)
-    fitter, batch = ThesisFitter(request_of(recipe, role)), batch_of(recipe, role)
+    fitter, batch = thesis_fitter(request_of(recipe, role)), batch_of(recipe, role)
     losses = [fitter.fit(batch, step, 0.0) for step in range(12)]
     assert losses[-1] < losses[0]
     assert set(fitter.notes()) == terms
@@ -63,7 +63,7 @@ def test_the_loss_is_the_sum_of_its_weighted_terms(small_recipe):
         perceptual_weight=2.0, exclusion_weight=3.0, exclusion_from=0.5, streak_weight=0.25
     )
     for progress, factor in ((0.0, 0.0), (0.6, 3.0)):
-        fitter = ThesisFitter(request_of(recipe, "split"))
+        fitter = thesis_fitter(request_of(recipe, "split"))
         loss = fitter.fit(batch_of(recipe, "split"), 0, progress)
         terms = fitter.notes()
         wanted = 2 * terms["clean"] + factor * terms["exclusion"] + 0.25 * terms["streaks"]
@@ -72,14 +72,14 @@ def test_the_loss_is_the_sum_of_its_weighted_terms(small_recipe):
 
 def test_against_glare_eq_5_9_stands_alone(small_recipe):
     recipe = small_recipe(optics="glare", streak_weight=0.0)
-    fitter = ThesisFitter(request_of(recipe, "split"))
+    fitter = thesis_fitter(request_of(recipe, "split"))
     fitter.fit(batch_of(recipe, "split"), 0, 1.0)
     assert set(fitter.notes()) == {"clean", "exclusion"}
 
 
 def test_vgg_is_not_moved_by_training(small_recipe):
     recipe = small_recipe()
-    fitter = ThesisFitter(request_of(recipe, "whole"))
+    fitter = thesis_fitter(request_of(recipe, "whole"))
     before = {k: v.clone() for k, v in fitter.weights().items()}
     fitter.fit(batch_of(recipe, "whole"), 0, 0.0)
     moved = {k for k, v in fitter.weights().items() if not torch.equal(v, before[k])}
@@ -115,10 +115,10 @@ def test_weights_of_a_file_go_into_network_average_and_losses(small_recipe, tmp_
     fitting = FITTING.fitting(request)
     assert "with VGG-19 of vgg.pth (sha256 " in fitting.credit
     fitter = fitting.make(None)
-    for network in (fitter.inner.network, fitter.inner.averaged):
+    for network in (fitter.network, fitter.averaged):
         found = network.body.vgg.state_dict()
         assert all(torch.equal(found[name], tensor + 1) for name, tensor in state.items())
-    features = fitter._features.state_dict()
+    features = ThesisLoss(request).features.state_dict()
     assert all(torch.equal(features[name], state[name] + 1) for name in features)
 
 

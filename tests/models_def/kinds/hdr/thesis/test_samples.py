@@ -15,6 +15,7 @@ from camkit.models_def.kinds.hdr.thesis.samples import (
     coded_sample,
     layout_of,
 )
+from camkit.models_def.training.recipe import SceneRecipe
 
 SIDE, SURROUND = 96, 8
 
@@ -108,7 +109,9 @@ def test_a_sample_is_a_function_of_seed_and_number(small_recipe, streaks):
     recipe = small_recipe()
 
     def make(seed, index):
-        source = open_lights(None, picture_share=0.0, scenes=1, scene_px=128)
+        source = open_lights(
+            SceneRecipe(picture_share=0.0, procedural_scenes=1, scene_px=128), None
+        )
         maker = CodedMaker(recipe, "whole", CodedCamera(recipe, streaks), source, seed)
         return maker.make(index).stacked(layout_of(recipe, "whole"))
 
@@ -120,6 +123,6 @@ def test_a_sample_is_a_function_of_seed_and_number(small_recipe, streaks):
 
 def test_an_unknown_role_is_refused(small_recipe, streaks):
     recipe = small_recipe()
-    source = open_lights(None, picture_share=0.0, scenes=1, scene_px=128)
+    source = open_lights(SceneRecipe(picture_share=0.0, procedural_scenes=1, scene_px=128), None)
     with pytest.raises(ContractError, match="one of split, highlight, fusion, whole; got 'all'"):
         CodedMaker(recipe, "all", CodedCamera(recipe, streaks), source, 1)

@@ -1,0 +1,163 @@
+"""Camera and poses that explain corners best: least squares by Levenberg and Marquardt.
+
+Every view has a pose of its own and all share the camera. The numbers of poses are eliminated first
+(Schur's complement), so that a step costs little however many views there are.
+
+References: Marquardt 1963; Triggs 2000, "Bundle adjustment: a modern synthesis", section 6.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from camkit.calibration.geometry.camera_model import (
+    POSE_NUMBERS,
+    Camera,
+    FloatGrid,
+    project,
+)
+
+MOST_STEPS: Final = 200
+LEAST_GAIN: Final = 1e-9
+"""Of the squares, below which a step ends the search."""
+_FIRST_DAMPING: Final = 1e-3
+_MOST_DAMPING: Final = 1e12
+_TINY: Final = 1e-12
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Fit:
+    """A camera and what it saw.
+
+    Attributes:
+        camera: The camera.
+        poses: (view, 6) rotation vector and translation, in squares.
+        residuals: (view, corner, 2) seen less computed, px.
+        spread: (intrinsics, intrinsics) covariance of the intrinsics for corners of 1 px error.
+    """
+
+    camera: Camera
+    poses: FloatGrid
+    residuals: FloatGrid
+    spread: FloatGrid
+
+    @property
+    def rms_px(self) -> float:
+        """Return the root of the mean square distance of corners from where they were computed."""
+        return rms(self.residuals)
+
+
+def rms(residuals: FloatGrid) -> float:
+    """Return the root of the mean square distance of (..., 2) residuals."""
+    return float(np.sqrt(np.square(residuals).sum(axis=-1).mean()))
+
+
+def adjust(
+    camera: Camera, poses: FloatGrid, corners: FloatGrid, points: FloatGrid, *, lens: bool = True
+) -> Fit:
+    """Fit camera and poses.
+
+    Args:
+        camera: To start from.
+        poses: (view, 6) to start from.
+        corners: (view, corner, 2) as seen, px.
+        points: (corner, 3) on the board.
+        lens: Fit the camera too, not the poses alone.
+    """
+    damping = _FIRST_DAMPING
+    at = _Linear.at(camera, poses, corners, points)
+    for _ in range(MOST_STEPS):
+        step = at.step(damping, lens=lens)
+        tried = replace(camera, intrinsics=camera.intrinsics + step[0])
+        moved = poses + step[1]
+        found = _Linear.at(tried, moved, corners, points)
+        if not found.square < at.square:
+            damping *= 10
+            if damping > _MOST_DAMPING:
+                break
+            continue
+        gain = 1 - found.square / at.square
+        camera, poses, at, damping = tried, moved, found, max(damping / 5, _TINY)
+        if gain < LEAST_GAIN:
+            break
+    return Fit(camera=camera, poses=poses, residuals=at.rest, spread=at.spread())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Linear:
+    """The linearised problem around one place.
+
+    Attributes:
+        rest: (view, corner, 2) residuals.
+        square: Their sum of squares; infinite where a corner lies nowhere.
+        own: (view, 6, 6) normal matrices of the poses.
+        mixed: (view, 6, intrinsics) of both.
+        shared: (intrinsics, intrinsics) of the camera.
+        own_side: (view, 6) right-hand sides.
+        shared_side: (intrinsics,)
+    """
+
+    rest: FloatGrid
+    square: float
+    own: FloatGrid
+    mixed: FloatGrid
+    shared: FloatGrid
+    own_side: FloatGrid
+    shared_side: FloatGrid
+
+    @classmethod
+    def at(
+        cls, camera: Camera, poses: FloatGrid, corners: FloatGrid, points: FloatGrid
+    ) -> "_Linear":
+        seen = [project(camera, pose, points) for pose in poses]
+        rest = corners - np.stack([at for at, _ in seen])
+        slopes = np.stack([slope.reshape(2 * len(points), -1) for _, slope in seen])
+        flat = rest.reshape(len(poses), -1)
+        square = float(np.square(flat).sum())
+        usable = np.isfinite(square) and bool(np.isfinite(slopes).all())
+        by_pose, by_lens = slopes[..., :POSE_NUMBERS], slopes[..., POSE_NUMBERS:]
+        by_lens[..., list(camera.held)] = 0
+        return cls(
+            rest=rest,
+            square=square if usable else np.inf,
+            own=np.einsum("vni,vnj->vij", by_pose, by_pose),
+            mixed=np.einsum("vni,vnj->vij", by_pose, by_lens),
+            shared=np.einsum("vni,vnj->ij", by_lens, by_lens),
+            own_side=np.einsum("vni,vn->vi", by_pose, flat),
+            shared_side=np.einsum("vni,vn->i", by_lens, flat),
+        )
+
+    def step(self, damping: float, *, lens: bool) -> tuple[FloatGrid, FloatGrid]:
+        """Return the steps of intrinsics and of poses."""
+        own = self.own + damping * _diagonals(self.own)
+        own_step = _solve(own, self.own_side[..., None])[..., 0]
+        if not lens:
+            return np.zeros_like(self.shared_side), own_step
+        own_mixed = _solve(own, self.mixed)
+        shared = self.shared + damping * _diagonals(self.shared)
+        left = shared - np.einsum("vki,vkj->ij", self.mixed, own_mixed)
+        right = self.shared_side - np.einsum("vki,vk->i", self.mixed, own_step)
+        lens_step = _solve(left, right[:, None])[:, 0]
+        return lens_step, own_step - np.einsum("vki,i->vk", own_mixed, lens_step)
+
+    def spread(self) -> FloatGrid:
+        """Return the covariance of the intrinsics, poses being unknown too."""
+        if not np.isfinite(self.square):
+            return np.full_like(self.shared, np.inf)
+        own_mixed = _solve(self.own, self.mixed)
+        left = self.shared - np.einsum("vki,vkj->ij", self.mixed, own_mixed)
+        return _solve(left, np.eye(len(left)))
+
+
+def _diagonals(squares: FloatGrid) -> FloatGrid:
+    lines = np.einsum("...ii->...i", squares)
+    return np.asarray(np.maximum(lines, _TINY)[..., None] * np.eye(squares.shape[-1]))
+
+
+def _solve(left: FloatGrid, right: FloatGrid) -> FloatGrid:
+    """Solve; where numbers cannot be separated, take the least change."""
+    scale = 1 / np.sqrt(np.maximum(np.einsum("...ii->...i", left), _TINY))
+    even = left * scale[..., :, None] * scale[..., None, :]
+    inverse = np.linalg.pinv(even, rcond=1e-15, hermitian=True)
+    return np.asarray(scale[..., :, None] * (inverse @ (scale[..., :, None] * right)))

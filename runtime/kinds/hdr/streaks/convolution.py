@@ -1,0 +1,161 @@
+"""Light spread by a kernel over a window, and the transpose of that.
+
+many lights -> `Convolution`, by Fourier transforms: what it costs hangs on the window
+few lights  -> `FewLights`, the kernel laid about each: what it costs hangs on their number
+"""
+
+from functools import cached_property
+from typing import Final, Protocol
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError
+
+Mask = NDArray[np.bool_]
+MOST_LIGHTS: Final = 128
+"""More are spread by transforms, which cost as much as this many (measured)."""
+MOST_VALUES: Final = 2**22
+"""Kernels laid about lights, in values of 4 bytes."""
+
+
+class Spread(Protocol):
+    """A function that convolves the light of a window with a kernel."""
+
+    def spread(self, light: FloatArray) -> FloatArray:
+        """Return the convolution of light (h, w) with the kernel."""
+        ...
+
+    def gathered(self, image: FloatArray) -> FloatArray:
+        """Return the transpose: for every place, what its light would meet in an image (h, w)."""
+        ...
+
+
+def spreading(kernel: FloatArray, lit: Mask) -> Spread:
+    """Return the cheaper way to spread light that lies on some cells of a window alone.
+
+    Args:
+        kernel: (n, n) float32, n odd.
+        lit: (h, w): where light may be; elsewhere `gathered` need not be right.
+    """
+    count = int(lit.sum())
+    if count <= MOST_LIGHTS and count * lit.size <= MOST_VALUES:
+        return FewLights(kernel, lit)
+    return Convolution(kernel, lit.shape)
+
+
+class FewLights:
+    """A kernel laid about each of a few lights; what leaves the window is lost."""
+
+    def __init__(self, kernel: FloatArray, lit: Mask) -> None:
+        """Prepare the kernel about every light.
+
+        Args:
+            kernel: (n, n) float32, n odd.
+            lit: (h, w): where light may be.
+
+        Raises:
+            ContractError: If the kernel has no middle.
+        """
+        _check_kernel(kernel)
+        self._at = np.nonzero(lit)
+        height, width = self._shape = lit.shape
+        half = max(height, width) - 1
+        middle = kernel.shape[0] // 2
+        reach = min(half, middle)
+        self._wide = np.zeros((2 * half + 1, 2 * half + 1), np.float32)
+        self._wide[half - reach : half + reach + 1, half - reach : half + reach + 1] = kernel[
+            middle - reach : middle + reach + 1, middle - reach : middle + reach + 1
+        ]
+
+    @cached_property
+    def _laid(self) -> FloatArray:
+        """Kernels about every light: (lights, h w)."""
+        height, width = self._shape
+        laid = np.empty((len(self._at[0]), height * width), np.float32)
+        for row, y, x in zip(laid, *self._at, strict=True):
+            row[:] = self._about(y, x).ravel()
+        return laid
+
+    def _about(self, y: int, x: int) -> FloatArray:
+        """Return the kernel about a place (h, w)."""
+        half, (height, width) = self._wide.shape[0] // 2, self._shape
+        return self._wide[half - y : half - y + height, half - x : half - x + width]
+
+    def spread(self, light: FloatArray) -> FloatArray:
+        """Return the convolution of light (h, w); only allowed places count."""
+        if "_laid" in self.__dict__:
+            # a sum over rows of fixed order: products of matrices hang on threads and processors
+            whole = np.einsum("ji,j->i", self._laid, light[self._at])
+            return np.asarray(whole, np.float32).reshape(self._shape)
+        once = np.zeros(self._shape, np.float32)
+        for y, x in zip(*self._at, strict=True):
+            once += light[y, x] * self._about(y, x)
+        return once
+
+    def gathered(self, image: FloatArray) -> FloatArray:
+        """Return the transpose at the places of lights; 0 elsewhere."""
+        out = np.zeros(self._shape, np.float32)
+        out[self._at] = np.einsum("ji,i->j", self._laid, image.ravel())
+        return out
+
+
+class Convolution:
+    """A kernel made ready for windows of one size; what leaves a window is lost."""
+
+    def __init__(self, kernel: FloatArray, shape: tuple[int, int]) -> None:
+        """Prepare the transform of the kernel.
+
+        Args:
+            kernel: (n, n) float32, n odd.
+            shape: (h, w) of the windows.
+
+        Raises:
+            ContractError: If the kernel has no middle.
+        """
+        _check_kernel(kernel)
+        self._shape = shape
+        # farther than a window is wide nothing in it is lit
+        half = min(kernel.shape[0] // 2, max(shape) - 1)
+        middle = kernel.shape[0] // 2
+        inside = slice(middle - half, middle + half + 1)
+        self._size = tuple(scipy.fft.next_fast_len(side + half, real=True) for side in shape)
+        place = np.arange(-half, half + 1)
+        wrapped = np.zeros(self._size, np.float32)
+        # where a window is shorter than the kernel, both ends meet in the padding
+        np.add.at(
+            wrapped,
+            (place[:, None] % self._size[0], place[None, :] % self._size[1]),
+            kernel[inside, inside],
+        )
+        self._transform = scipy.fft.rfft2(wrapped)
+
+    def spread(self, light: FloatArray) -> FloatArray:
+        """Return the convolution of light (h, w) with the kernel."""
+        return self._filtered(light, self._transform)
+
+    def gathered(self, image: FloatArray) -> FloatArray:
+        """Return the transpose: for every place, what its light would meet in an image (h, w)."""
+        return self._filtered(image, self._turned)
+
+    @cached_property
+    def _turned(self) -> NDArray[np.complex64]:
+        """Return the transform of the kernel turned by half a turn."""
+        return self._transform.conj()
+
+    def _filtered(self, image: FloatArray, transform: NDArray[np.complex64]) -> FloatArray:
+        """Multiply the transform of an image; rows that are empty or not looked at are left out."""
+        (height, width), (rows, columns) = self._shape, self._size
+        across = scipy.fft.rfft(image, columns, axis=1)
+        whole = scipy.fft.fft(across, rows, axis=0, overwrite_x=True)
+        whole *= transform
+        there = scipy.fft.ifft(whole, axis=0, norm="forward", overwrite_x=True)[:height]
+        made = scipy.fft.irfft(there, columns, axis=1, norm="forward")
+        return np.asarray(made[:, :width] * np.float32(1 / (rows * columns)), np.float32)
+
+
+def _check_kernel(kernel: FloatArray) -> None:
+    if kernel.ndim != 2 or kernel.shape[0] != kernel.shape[1] or kernel.shape[0] % 2 == 0:
+        raise ContractError(f"a kernel is square with an odd side; got {kernel.shape}")

@@ -1,0 +1,237 @@
+"""The laws of photographs: what holds for any scene, camera and network.
+
+white    what is white stays white: lamps of four sizes and strengths
+flat     an even area keeps its light, in 27 colours, three levels, two ISOs, three places
+double   twice the exposure gives twice the light, in 19 of 20 blocks
+better   no network is worse than its front end, in any zone
+range    no light below black or beyond the bound
+borders  the rim of a picture is like its middle
+"""
+
+from collections.abc import Iterable
+from typing import Final
+
+import numpy as np
+
+from camkit.bundle.reader import Bundle
+from camkit.bundle.stages import Network
+from camkit.colorimetry import encode_srgb
+from camkit.contracts import FloatArray
+from camkit.runtime.proof.laws.darkroom import PLACES, Darkroom, Exposed, reason_not_judged
+from camkit.runtime.proof.laws.law import SHARE, Law
+from camkit.scenes.charts import lamp_chart, patch_chart
+from camkit.scenes.procedural import procedural_scene
+
+LEAST_SIDE_PX: Final = 640
+"""A sensor that no chart lies on is not judged."""
+DARK: Final = {"white_below_half": (0.5, 0.02), "white_below_fifth": (0.2, 0.005)}
+"""Law -> share of white, and how many white pixels may lie below it."""
+FLAT: Final = 0.01
+LEVELS: Final = (0.4, 0.1, 0.03)
+DOUBLE: Final = 0.01
+BLOCK_PX: Final = 32
+SURE: Final = 0.95
+LOWEST: Final = -0.05
+BORDERS: Final = 1.5
+RIM_PX: Final = 24
+SCENES: Final = range(5_300_000, 5_300_004)
+"""Seeds of procedural scenes that nothing is trained on."""
+SIDE_PX: Final = 320
+
+
+def picture_laws(bundle: Bundle, size: str | None, threads: int) -> tuple[Law, ...] | str:
+    """Measure the laws of photographs for one size of a bundle's networks.
+
+    Args:
+        bundle: The camera.
+        size: Of its networks.
+        threads: To compute with.
+
+    Returns:
+        The laws, or why none can be held.
+    """
+    reason = reason_not_judged(bundle)
+    extent = bundle.manifest.sensor.extent
+    if extent is not None and min(extent.width_px, extent.height_px) < LEAST_SIDE_PX:
+        reason = reason or f"the sensor is smaller than the charts ({LEAST_SIDE_PX} px)"
+    if reason is not None or size is None:
+        return reason or "no network"
+    room = Darkroom(bundle=bundle, size=size, threads=threads)
+    ranges = _Ranges(bundle)
+    scenes = list(_scenes(room))
+    ranges.add(exposed for _, exposed in scenes)
+    laws = (
+        *_white(room, ranges),
+        _flat(room, ranges),
+        _double(room),
+        _better(scenes),
+        _borders(exposed for _, exposed in scenes),
+    )
+    return (*laws, *ranges.laws())
+
+
+class _Ranges:
+    """The least and largest light of all pictures."""
+
+    def __init__(self, bundle: Bundle) -> None:
+        stages = bundle.manifest.stages_of(Network)
+        self._most_light = max(stage.most_light for stage in stages)
+        self._low = self._front_low = self._times = 0.0
+
+    def add(self, pictures: Iterable[Exposed]) -> None:
+        """Add pictures."""
+        for picture in pictures:
+            self._low = min(self._low, float(picture.light.min()))
+            self._front_low = min(self._front_low, float(picture.front_light.min()))
+            largest = max(1.0, float(picture.front_light.max()))
+            self._times = max(self._times, float(picture.light.max()) / largest)
+
+    def laws(self) -> tuple[Law, Law]:
+        """Return the laws."""
+        return (
+            Law(
+                name="below_black", worst=-self._low, limit=-LOWEST, unit="", front=-self._front_low
+            ),
+            Law(name="above_front_end", worst=self._times, limit=self._most_light, unit="times"),
+        )
+
+
+def _white(room: Darkroom, ranges: _Ranges) -> tuple[Law, ...]:
+    """Count what is white in the truth and dark in the picture, by size of lamps.
+
+    As much as the front end has is admitted, and one pixel: of a small lamp that is more than 2 %.
+    """
+    chart = lamp_chart()
+    worst: dict[str, Law] = {}
+    for place in ("middle", "corner"):
+        seen = room.expose(chart.scene, place, iso=room.isos[0])
+        ranges.add([seen])
+        white = seen.truth.min(axis=0) >= 1
+        for number, name in enumerate(chart.names, start=1):
+            lit = white & (chart.labels == number)
+            if not lit.any():
+                continue
+            for law, (below, admitted) in DARK.items():
+                dark, front = (
+                    int(np.count_nonzero(picture.min(axis=0)[lit] < below))
+                    for picture in (seen.network, seen.front)
+                )
+                pixels = int(np.count_nonzero(lit))
+                found = Law(
+                    name=law,
+                    worst=dark / pixels,
+                    limit=max(admitted, (front + 1) / pixels),
+                    unit=SHARE,
+                    front=front / pixels,
+                    where=f"{name}, {place}",
+                )
+                if law not in worst or found.excess > worst[law].excess:
+                    worst[law] = found
+    return tuple(worst.values())
+
+
+def _flat(room: Darkroom, ranges: _Ranges) -> Law:
+    """Measure how much farther from the truth even areas are than those of the front end."""
+    worst = (-1.0, 0.0, "")
+    for level in LEVELS:
+        chart = patch_chart(level)
+        inside = [chart.labels == number for number in range(1, len(chart.names) + 1)]
+        for place in PLACES:
+            for iso in room.isos:
+                seen = room.expose(chart.scene, place, iso=iso)
+                ranges.add([seen])
+                for where, name in zip(inside, chart.names, strict=True):
+                    true, made, front = (
+                        picture[:, where].mean(axis=1)
+                        for picture in (seen.truth, seen.network, seen.front)
+                    )
+                    off, before = (np.abs(x - true).max() / true.max() for x in (made, front))
+                    found = float(off - before), float(before), f"{name}, {place}, ISO {iso:g}"
+                    worst = max(worst, found)
+    more, before, where = worst
+    return Law(name="flat", worst=max(more, 0.0), limit=FLAT, unit=SHARE, front=before, where=where)
+
+
+def _double(room: Darkroom) -> Law:
+    """Compare the light of blocks at two exposures, without noise."""
+    scene = np.clip(procedural_scene(SCENES[0], SIDE_PX, SIDE_PX), 0, 1)
+    pair = [
+        room.expose(scene * np.float32(share), "middle", iso=room.isos[0], noise=False)
+        for share in (0.2, 0.4)
+    ]
+    made, front = (
+        _most_unlike(*(_blocks(getattr(seen, name)) for seen in pair))
+        for name in ("light", "front_light")
+    )
+    return Law(name="double", worst=made, limit=max(DOUBLE, front), unit=SHARE, front=front)
+
+
+def _most_unlike(once: FloatArray, twice: FloatArray) -> float:
+    """Return by how much, of a block's brightest colour, light is not doubled in 19 of 20 blocks.
+
+    The worst block is the darkest, where a filter that follows the power of its block is off by as
+    much as a network.
+    """
+    level = 2 * once.max(axis=0)
+    off = np.abs(twice - 2 * once).max(axis=0)
+    lit = level > 0.02
+    return float(np.quantile(off[lit] / level[lit], SURE))
+
+
+def _blocks(light: FloatArray) -> FloatArray:
+    channels, height, width = light.shape
+    rows, columns = height // BLOCK_PX, width // BLOCK_PX
+    whole = light[:, : rows * BLOCK_PX, : columns * BLOCK_PX]
+    cut = whole.reshape(channels, rows, BLOCK_PX, columns, BLOCK_PX)
+    return np.asarray(cut.mean(axis=(2, 4)))
+
+
+def _scenes(room: Darkroom) -> Iterable[tuple[str, Exposed]]:
+    """Yield drawn scenes in every zone, at the lowest ISO and four stops above."""
+    for place in PLACES:
+        for seed in SCENES:
+            scene = procedural_scene(seed, SIDE_PX, SIDE_PX)
+            for iso in (room.isos[0], min(16 * room.isos[0], room.isos[1])):
+                yield place, room.expose(scene, place, iso=iso, seed=seed)
+
+
+def _better(scenes: list[tuple[str, Exposed]]) -> Law:
+    """Compare PSNR with that of the front end, by zone; within a standard error is no loss."""
+    worst = (-np.inf, 0.0, "")
+    for place in PLACES:
+        gains = np.array(
+            [
+                _psnr(seen.network, seen.truth) - _psnr(seen.front, seen.truth)
+                for zone, seen in scenes
+                if zone == place
+            ]
+        )
+        error = float(gains.std(ddof=1) / np.sqrt(gains.size))
+        worst = max(worst, (float(-gains.mean()), error, place))
+    loss, error, where = worst
+    return Law(name="better", worst=loss, limit=error, unit="dB", where=where)
+
+
+def _psnr(picture: FloatArray, truth: FloatArray) -> float:
+    return float(-10 * np.log10(np.mean(np.square(_gap(picture, truth))) + 1e-12))
+
+
+def _gap(picture: FloatArray, truth: FloatArray) -> FloatArray:
+    shown, wanted = (encode_srgb(np.clip(x, 0, 1)) for x in (picture, truth))
+    return np.asarray(shown - wanted, np.float64)
+
+
+def _borders(pictures: Iterable[Exposed]) -> Law:
+    """Compare the error of the rim with that of the middle."""
+    sums = np.zeros((2, 2))
+    for seen in pictures:
+        for row, picture in enumerate((seen.network, seen.front)):
+            squared = np.square(_gap(picture, seen.truth)).mean(axis=0)
+            middle = squared[RIM_PX:-RIM_PX, RIM_PX:-RIM_PX]
+            rim = (squared.sum() - middle.sum()) / (squared.size - middle.size)
+            sums[row] += rim, middle.mean()
+    made, front = (float(np.sqrt(rim / max(middle, 1e-12))) for rim, middle in sums)
+    return Law(name="borders", worst=made, limit=max(BORDERS, front), unit="times", front=front)
+
+
+LAWS: Final = picture_laws

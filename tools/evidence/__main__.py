@@ -1,0 +1,53 @@
+"""Record, compare or time; see `tools.evidence`."""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+import tools.evidence
+from tools.evidence.checkout import HERE
+from tools.evidence.comparison import compare
+from tools.evidence.record import make_record
+from tools.evidence.seconds import compare_seconds
+
+
+def main(words: list[str] | None = None) -> int:
+    """Run one of the three commands; return its exit code."""
+    arguments = _parser().parse_args(words)
+    if arguments.command == "record":
+        record = make_record(arguments.checkout, arguments.bundle)
+        text = json.dumps(record, indent=1, sort_keys=True, allow_nan=False)
+        arguments.out.write_text(text + "\n", encoding="utf-8")
+        return 0
+    if arguments.command == "seconds":
+        compare_seconds((arguments.a, arguments.b), arguments.bundle, arguments.rounds)
+        return 0
+    records = [json.loads(path.read_text("utf-8")) for path in (arguments.before, arguments.after)]
+    comparison = compare(*records)
+    print(*comparison.lines(), sep="\n")
+    return int(bool(comparison.changed))
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        description=tools.evidence.__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    commands = parser.add_subparsers(required=True, dest="command")
+    record = commands.add_parser("record", help="hash what a checkout computes")
+    record.add_argument("out", type=Path)
+    record.add_argument("--checkout", type=Path, default=HERE, help="default: this one")
+    two = commands.add_parser("compare", help="compare two records; exit code 1 if they differ")
+    two.add_argument("before", type=Path)
+    two.add_argument("after", type=Path)
+    seconds = commands.add_parser("seconds", help="time two checkouts in turn")
+    seconds.add_argument("a", type=Path)
+    seconds.add_argument("b", type=Path)
+    seconds.add_argument("--rounds", type=int, default=5)
+    for command in (record, seconds):
+        command.add_argument("--bundle", nargs="+", help="names of built-in bundles; default: all")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,53 @@
+"""Two checkouts timed in turn on the same captures: noise of a machine meets both alike."""
+
+import statistics
+import tempfile
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Final
+
+from tools.evidence.captures import simulate_captures
+from tools.evidence.checkout import Checkout, Worker
+from tools.evidence.record import job
+
+START: Final = ("info", "duet", "--json")
+"""The command that stands for starting the command line."""
+
+
+def compare_seconds(roots: tuple[Path, Path], bundles: list[str] | None, rounds: int) -> None:
+    """Print the seconds of two checkouts, by bundle, and their ratios.
+
+    Args:
+        roots: The checkouts; the first one simulates the captures.
+        bundles: Names of built-in bundles; None for those that both have.
+        rounds: How often each capture is processed by each checkout.
+    """
+    with tempfile.TemporaryDirectory() as work, ExitStack() as stack:
+        folder = Path(work).resolve()
+        first, second = (Checkout(root=root.resolve(), work=folder) for root in roots)
+        workers = [stack.enter_context(Worker(checkout)) for checkout in (first, second)]
+        print(f"median seconds of {rounds} rounds: A {first.commit}, B {second.commit}")
+        print(f"{'':<28}{'A':>9}{'B':>9}{'B / A':>9}")
+        ratios = []
+        starts = [[c.command(list(START))[1] for c in (first, second)] for _ in range(rounds)]
+        ratios.append(_told("camkit " + " ".join(START), starts))
+        for bundle in bundles or sorted({*first.bundles} & {*second.bundles}):
+            for capture in simulate_captures(first, bundle)[0]:
+                words = {**job(bundle, capture, {}), "planned": False}
+                pairs = []
+                for number in range(rounds + 1):
+                    order = workers[:: 1 if number % 2 else -1]
+                    told = {id(worker): worker.ask(words).get("seconds") for worker in order}
+                    if number and None not in told.values():  # the first round warms up
+                        pairs.append([told[id(worker)] for worker in workers])
+                if pairs:
+                    ratios.append(_told(f"{bundle} {capture.name}", pairs))
+        print(f"median ratio B / A: {statistics.median(ratios):.3f}")
+
+
+def _told(name: str, pairs: list[list[float]]) -> float:
+    """Print the medians of pairs of seconds; return the median of their ratios."""
+    first, second = (statistics.median(some) for some in zip(*pairs, strict=True))
+    ratio = statistics.median(b / a for a, b in pairs)
+    print(f"{name:<28}{first:>9.3f}{second:>9.3f}{ratio:>9.3f}", flush=True)
+    return ratio
