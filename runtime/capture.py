@@ -19,10 +19,9 @@ from camkit.contracts import CFA_PATTERNS, CfaPattern, FloatArray, InputContract
 from camkit.errors import ContractError
 from camkit.field_types import check_fields
 from camkit.picture_window import PictureWindow
-from camkit.runtime.job.stream import Stream
 from camkit.runtime.machine.memory import mapping_of
 from camkit.runtime.metadata import Metadata
-from camkit.runtime.rows import Rows
+from camkit.runtime.rows import Rows, RowSource
 
 SATURATION_SHARE: Final = 0.99
 """A sample at this share of the white level is taken as clipped.
@@ -186,6 +185,11 @@ class Capture:
             raise ContractError(f"color matrix must be finite (3, 3); got {matrix.shape}")
 
     @property
+    def gives_own_rows(self) -> bool:
+        """Return whether what `rows` reads is the reader's own: it is a view of the samples."""
+        return False
+
+    @property
     def contract(self) -> InputContract:
         """Name the input of bundles that this capture is."""
         if self.cfa is not None:
@@ -202,27 +206,23 @@ class Capture:
         """Return (channel, h, w) of the samples; a mosaic is one channel."""
         return 1 if self.cfa is not None else self.channels, self.height, self.width
 
-    @property
-    def plane(self) -> Plane:
-        """Return what the samples are where no bundle states it."""
-        channels = MOSAIC if self.cfa is not None else RGB
-        return Plane(type="uint16", channels=channels, domain="dn")
-
-    def stream(self, plane: Plane) -> Stream:
-        """Return the samples as the file holds them.
+    def plane(self, stated: Plane | None) -> Plane:
+        """Return what the samples are.
 
         Args:
-            plane: As it is stated; planes that come in place of a mosaic have their own channels.
+            stated: The plane of a bundle's sensor; planes that come in place of a mosaic have their
+                own channels.
         """
-        if self.cfa is None and plane.channels == MOSAIC:
-            plane = plane.model_copy(update={"channels": RGB})
-        return Stream(
-            plane=plane,
-            shape=self.plane_shape,
-            gains=(1.0,) * self.channels,
-            source=_Samples(self),
-            owned=False,
-        )
+        channels = MOSAIC if self.cfa is not None else RGB
+        if stated is None:
+            return Plane(type="uint16", channels=channels, domain="dn")
+        if self.cfa is None and stated.channels == MOSAIC:
+            return stated.model_copy(update={"channels": RGB})
+        return stated
+
+    def rows(self) -> RowSource:
+        """Return the samples as the file holds them."""
+        return _Samples(self)
 
     def gives(self, _plane: Plane) -> bool:
         """Return whether a plane can be a product of this capture: any can."""

@@ -23,6 +23,7 @@ from camkit.runtime.job.job import Job
 from camkit.runtime.job.photograph import know_photograph
 from camkit.runtime.job.setup import DEVELOPED, DEVELOPMENT
 from camkit.runtime.kind_parts.golden import GoldenCaptures
+from camkit.runtime.job.kind_capture import KindCapture
 from camkit.runtime.kind_parts.outputs import Outputs
 from camkit.runtime.options import Options
 from camkit.runtime.photograph_facts import describe_photograph
@@ -46,9 +47,9 @@ class FromArray(Protocol):
         iso: float | None = None,
         white_balance: tuple[float, float, float] | None = None,
         origin_px: tuple[int, int] | None = None,
-        options: Options,
+        options: Options | None = None,
     ) -> Any:
-        """Return the capture."""
+        """Return the capture, a `KindCapture`."""
         ...
 
 
@@ -87,7 +88,7 @@ class RuntimePart:
         laws: Name of the module whose `LAWS` holds the laws of its pictures against a bundle.
     """
 
-    read: Callable[[Path, MosaicOptions | None, Manifest | None, Options], Any] = _no_files
+    read: Callable[[Path, MosaicOptions | None, Manifest | None, Options], KindCapture] = _no_files
     from_array: FromArray = capture_of_array
     stages: Sequence[StageEntry] = DEVELOPMENT
     products: Mapping[str, str] = field(default_factory=lambda: DEVELOPED)

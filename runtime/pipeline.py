@@ -171,7 +171,7 @@ class Pipeline:
         check_value("mosaic", mosaic, MosaicOptions | None)
         manifest = None if self.bundle is None else self.bundle.manifest
         with cancellable(cancel), stored(file) as path:
-            capture = self.part.read(path, mosaic, manifest, self.options)
+            capture: Any = self.part.read(path, mosaic, manifest, self.options)
         origin = self.options.origin_px if origin_px is None else checked_origin(origin_px)
         if origin is None:
             return capture

@@ -24,6 +24,7 @@ from camkit.runtime.job.photograph import content_of, know_photograph
 from camkit.runtime.job.setup import Setup
 from camkit.runtime.job.stream import Stream
 from camkit.runtime.job.walker import Walk, probed
+from camkit.runtime.job.kind_capture import KindCapture
 from camkit.runtime.network.tiling import Progress
 from camkit.runtime.network.windows import NetworkWindows
 from camkit.runtime.output.origin import Origin
@@ -48,7 +49,7 @@ class Reconstruction:
     def __init__(
         self,
         setup: Setup,
-        capture: Any,
+        capture: KindCapture,
         *,
         know: Callable[[Job], Job] = know_photograph,
         progress: Progress | None = None,
@@ -70,7 +71,7 @@ class Reconstruction:
         Raises:
             ContractError: If capture, bundle and options do not fit each other.
         """
-        self.capture = capture
+        self.capture: Any = capture
         self._setup = setup
         self.job = know(
             Job(

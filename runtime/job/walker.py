@@ -95,7 +95,8 @@ class Walk:
         held = sum(work.held_bytes for work in running)
         job = self._job
         stored = 0 if job.bundle is None else max(job.bundle.stored_bytes - USUAL_BYTES, 0)
-        return FIXED_BYTES + stored + job.capture.resident_bytes + job.reserved_bytes + held
+        resident: int = job.capture.resident_bytes
+        return FIXED_BYTES + stored + resident + job.reserved_bytes + held
 
     def warnings(self) -> tuple[str, ...]:
         """Return what the stages have to say once the last row is out."""
@@ -127,7 +128,7 @@ class Walk:
         job, lasts = self._job, [self._instead.get(name, name) for name in wanted]
         needed = self._needed(lasts)
         takers = Counter([*lasts, *(name for number in needed for name in self._taken(number))])
-        there = {CAPTURE: job.capture.stream(self._planes[CAPTURE]), **job.known}
+        there = {CAPTURE: _capture_stream(job, self._planes[CAPTURE]), **job.known}
         ready = {name: stream.shared(takers[name]) for name, stream in there.items()}
         job.log.meter.expect([name for number in needed for name in self.stages[number].gives])
         for number in needed:
@@ -202,5 +203,18 @@ def _planes_of(job: Job) -> dict[str, Plane]:
     """Return the planes that are stated; without a bundle that of the capture alone."""
     if job.bundle is not None:
         return job.bundle.manifest.all_planes
-    plane: Plane = job.capture.plane
+    plane: Plane = job.capture.plane(None)
     return {CAPTURE: plane}
+
+
+def _capture_stream(job: Job, stated: Plane) -> Stream:
+    """Return the capture as it is."""
+    capture = job.capture
+    rows = capture.rows()
+    return Stream(
+        plane=capture.plane(stated),
+        shape=rows.shape,
+        gains=(1.0,) * capture.channels,
+        source=rows,
+        owned=capture.gives_own_rows,
+    )

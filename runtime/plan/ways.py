@@ -83,10 +83,17 @@ def offered_methods(stages: Sequence[StageEntry], planes: Mapping[str, Plane]) -
         method
         for method in (*methods_of(stages), DEVELOP)
         if all(
-            way != LEFT_OUT or known_stand_in(stage, planes) is not None
+            _is_possible(stage, way, method, planes)
             for stage, way in zip(stages, ways_of(stages, Work(method=method)), strict=True)
         )
     )
+
+
+def _is_possible(stage: StageEntry, way: str, method: str, planes: Mapping[str, Plane]) -> bool:
+    """Return whether a stage can take a way; where nothing is restored, no stage restores."""
+    if way == LEFT_OUT:
+        return known_stand_in(stage, planes) is not None
+    return method != DEVELOP or way == WHOLE
 
 
 def _last_with(stages: Sequence[StageEntry], method: str) -> int:

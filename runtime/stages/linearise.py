@@ -64,7 +64,8 @@ class LinearRows:
     @property
     def shape(self) -> tuple[int, int, int]:
         """Return (channel, h, w)."""
-        return self._job.capture.plane_shape
+        shape: tuple[int, int, int] = self._job.capture.plane_shape
+        return shape
 
     def read(self, top: int, bottom: int) -> Rows:
         """Return rows top..bottom as (channel, rows, w) float32, a new array."""

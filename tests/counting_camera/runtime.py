@@ -16,11 +16,10 @@ from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.capture_result import Result
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.reconstruction import Reconstruction
-from camkit.runtime.job.stream import Stream
 from camkit.runtime.kind import RuntimePart
 from camkit.runtime.options import Options
 from camkit.runtime.product_files import product_outputs
-from camkit.runtime.rows import ArrayRows
+from camkit.runtime.rows import ArrayRows, RowSource
 
 
 class Weigh(StageEntry):
@@ -39,20 +38,33 @@ class Counts:
     counts: np.ndarray
     size: int
 
+    height = 1
+    channels = 1
+    gives_own_rows = False
     resident_bytes = 0
     decoder_peak_mb = 0.0
     sha256 = None
-    plane = Plane(channels=("counts",), domain="counts")
 
-    def stream(self, plane: Plane) -> Stream:
+    @property
+    def width(self) -> int:
+        """Give the number of counts."""
+        return self.counts.shape[2]
+
+    def plane(self, stated: Plane | None) -> Plane:
+        """Give what the counts are."""
+        return stated or Plane(channels=("counts",), domain="counts")
+
+    def rows(self) -> RowSource:
         """Give the counts as one row."""
-        return Stream(
-            plane=plane,
-            shape=self.counts.shape,
-            gains=(1.0,),
-            source=ArrayRows(self.counts),
-            owned=False,
-        )
+        return ArrayRows(self.counts)
+
+    def gives(self, _plane: Plane) -> bool:
+        """Give whether a plane can be a product: any can."""
+        return True
+
+    def shares_memory(self, array: np.ndarray) -> bool:
+        """Give whether an array may lie where the counts do."""
+        return np.may_share_memory(array, self.counts)
 
     def close(self) -> None:
         """Let go of the file, which was read whole."""

@@ -37,9 +37,10 @@ def captured(pipeline: Pipeline, simulation: Simulation) -> Capture:
     """Return the simulation as a capture that the pipeline of its camera takes."""
     red, green, blue = simulation.white_balance
     x, y = (int(v) for v in simulation.window.origin_px)
-    return pipeline.capture_of(
+    capture: Capture = pipeline.capture_of(
         simulation.samples,
         iso=simulation.iso,
         white_balance=(red, green, blue),
         origin_px=(x, y),
     )
+    return capture

@@ -21,8 +21,9 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from camkit.bundle.reader import find_bundle, open_bundle
+from camkit.runtime.kinds.spad.finer.bins import SHARPER
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
-from camkit.runtime.kinds.spad.finer.depth import SHARPER, FineSharpener
+from camkit.runtime.kinds.spad.finer.depth import FineSharpener
 from camkit.runtime.kinds.spad.finer.sigma import OF_LINEAR, OF_NETWORK, SigmaShares, slopes
 from camkit.runtime.kinds.spad.sharpen import Way
 from camkit.runtime.kinds.spad.timing import LIGHT_M_PER_PS

@@ -39,6 +39,7 @@ from camkit.report.kind_finder import camera_of, check_photographs, find_part
 from camkit.report.quality import LIGHT_SUFFIXES, list_set, read_picture
 from camkit.runtime.kind import part_of
 from camkit.runtime.network.engine import available_threads, usable_providers
+from camkit.runtime.options import Options
 from camkit.runtime.plan.ways import offered_methods
 
 REPORT_VERSION: Final = 1
@@ -190,7 +191,7 @@ def open_entrants(bundles: Sequence[str], references: Sequence[str]) -> list[Ent
 def _camera(entrant: Entrant, settings: Settings, folder: Path) -> Camera:
     if settings.capture is not None:
         manifest = entrant.bundle.manifest
-        shot = part_of(manifest).read(settings.capture, None, manifest)
+        shot = part_of(manifest).read(settings.capture, None, manifest, Options())
         return Camera(
             entrant=entrant,
             capture=settings.capture,

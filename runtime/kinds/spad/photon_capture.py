@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from itertools import permutations
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,6 @@ from camkit.caller import option_text
 from camkit.errors import ContractError, UnsupportedError
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.job.job import Job
-from camkit.runtime.job.stream import Stream
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
 from camkit.runtime.kinds.spad.files.counts_file import CountsFile, Hints
 from camkit.runtime.kinds.spad.files.open_counts import open_counts
@@ -30,7 +29,7 @@ from camkit.runtime.kinds.spad.settings import Product, Settings
 from camkit.runtime.kinds.spad.time_axis import TimeAxis
 from camkit.runtime.kinds.spad.timing import Timing, timing_beside
 from camkit.runtime.options import Options
-from camkit.runtime.rows import Rows
+from camkit.runtime.rows import Rows, RowSource
 
 PULSE: Final = frozenset({"width_ps", "rc_ps", "jitter_ps", "fwhm_ps"})
 WHAT: Final = {"gate": "a scan with a gate", "histogram": "a histogram of arrivals"}
@@ -58,10 +57,12 @@ class PhotonCapture:
     settings: Settings
     notes: tuple[str, ...] = ()
 
-    resident_bytes = 0
-    """Of its rows: those on their way are counted by what works through them."""
-    decoder_peak_mb = 0.0
-    sha256 = None
+    channels: ClassVar[int] = 1
+    gives_own_rows: ClassVar[bool] = True
+    resident_bytes: ClassVar[int] = 0
+    """Those of rows on their way are counted by what works through them."""
+    decoder_peak_mb: ClassVar[float] = 0.0
+    sha256: ClassVar[str | None] = None
 
     @property
     def height(self) -> int:
@@ -94,14 +95,14 @@ class PhotonCapture:
             raise ContractError(f"{self.file.path.name} holds no times of photons")
         return self.axis
 
-    @property
-    def plane(self) -> Plane:
-        """Return what the counts are where no bundle states it."""
-        return Plane(axes="t y x", type="uint32", channels=("photons",), domain="counts")
+    def plane(self, stated: Plane | None) -> Plane:
+        """Return what the counts are; those of any array run over time."""
+        own = Plane(axes="t y x", type="uint32", channels=("photons",), domain="counts")
+        return own if stated is None else stated
 
-    def stream(self, plane: Plane) -> Stream:
+    def rows(self) -> RowSource:
         """Return the counts as the file holds them, time first."""
-        return Stream(plane=plane, shape=(self.bins, *self.shape), gains=(1.0,), source=_Rows(self))
+        return _Rows(self)
 
     def gives(self, plane: Plane) -> bool:
         """Return whether a plane can be a product of what is to be made."""
@@ -179,7 +180,7 @@ def read_photons(
 
 
 def photons_of_array(
-    image: NDArray[Any], manifest: Manifest, *, options: Options, **_: object
+    image: NDArray[Any], manifest: Manifest, *, options: Options | None = None, **_: object
 ) -> PhotonCapture:
     """Return counts (h, w) or a histogram (t, h, w) as a capture of a bundle's array.
 
@@ -187,7 +188,7 @@ def photons_of_array(
         DecodeError: If they are no counts.
         ContractError: If they are of another array.
     """
-    settings = Settings.of(options, None)
+    settings = Settings.of(options or Options(), None)
     _check_finer(settings, manifest)
     return _understood(ArrayFile(IN_MEMORY, image, Hints()), settings, manifest)
 

@@ -22,7 +22,7 @@ from camkit.runtime.bank.haze import few_of
 from camkit.runtime.cancel import Cancelled
 from camkit.runtime.capture import Capture
 from camkit.runtime.files.doubts import NOTHING_DARK
-from camkit.runtime.job import cells
+from camkit.runtime.job import coarse_cells
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.plan.decision import PLAIN, Subject, Work
@@ -69,7 +69,7 @@ def test_the_mosaic_is_summed_not_what_was_made_of_it(
         shapes.append(samples.shape)
         return cell_means(samples, *rest)
 
-    monkeypatch.setattr(cells, "cell_means", watched)
+    monkeypatch.setattr(coarse_cells, "cell_means", watched)
     _filled(bundle, _capture())
     _filled(bundle, made_planes())
     assert shapes == [(1, 64, 96), (3, 64, 96)]

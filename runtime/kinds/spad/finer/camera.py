@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from camkit.bundle.manifest import Manifest
 from camkit.bundle.reader import Bundle, is_built_in
@@ -37,7 +38,9 @@ LEAST_WHITE: Final = 4.0
 DEFAULT_SIZE: Final = "M"
 
 
-def network_planes(photons: FloatArray, white: float, dark: FloatArray | float = 0.0) -> FloatArray:
+def network_planes(
+    photons: FloatArray, white: float, dark: NDArray[np.floating] | float = 0.0
+) -> FloatArray:
     """Return what a network is given of a picture, (2, h, w): light, and 3 sigma of it.
 
     Args:
@@ -171,7 +174,7 @@ class FineCamera:
         size: str,
         *,
         white: float,
-        dark: FloatArray | float = 0.0,
+        dark: NDArray[np.floating] | float = 0.0,
         cancel: Cancel | None = None,
     ) -> FloatArray:
         """Return pictures (n, m h, m w) of photons (n, h, w) by the network of a size.

@@ -45,7 +45,7 @@ def make_transient(work: Reconstruction, capture: PhotonCapture, product: str) -
     """Return the photons of every pixel and bin; arguments and errors as of `make_depth`."""
     axis = capture.an_axis
     frames, warnings = _photons(work, capture, product)
-    arrays = {"transient": frames, "time_ps": axis.centres_ps}
+    arrays: dict[str, NDArray[Any]] = {"transient": frames, "time_ps": axis.centres_ps}
     record = {"product": "transient", **told_axis(axis), **told_finer(work.job)}
     white = white_of_flight(frames)
     return _result(work, frames, arrays, frames.sum(axis=0), white, record, warnings)

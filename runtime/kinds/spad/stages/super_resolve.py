@@ -4,6 +4,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from camkit.bundle.stages import SuperResolve
 from camkit.contracts import FloatArray
 from camkit.runtime.job.job import Job
@@ -118,7 +121,9 @@ def _frames(entry: SuperResolve, job: Job, photons: Stream) -> FloatArray:
     )
 
 
-def _frames_and_dark(photons: Stream, capture: PhotonCapture) -> tuple[FloatArray, FloatArray]:
+def _frames_and_dark(
+    photons: Stream, capture: PhotonCapture
+) -> tuple[FloatArray, NDArray[np.float64]]:
     """Return photons (n, h, w) without dark counts, and how many those of a frame were, (h, w)."""
     of_frame = capture.bins if is_summed(capture) else 1
     return frames_of(photons, capture), Pixels.of(photons).dark * of_frame
