@@ -392,8 +392,8 @@ def focus_weights(shifts_um: NDArray[np.float64] | None, focus_um: float) -> NDA
         return np.concatenate([np.ones(1), np.zeros(shifts.size)])
     if not shifts.size:
         raise ContractError(
-            "the PSF knows the nominal focus alone, not that of a unit: freeze it with "
-            f"{option_text('focus_um')} and export the bundle again, or leave the unit out"
+            "the PSF has the nominal focus alone, not that of the camera body: freeze it with "
+            f"{option_text('focus_um')} and export the bundle again, or omit {option_text('unit')}"
         )
     if not shifts[0] <= focus_um <= shifts[-1]:
         raise ContractError(

@@ -99,6 +99,10 @@ class Kind:
             )
         return importlib.import_module(name)
 
+    def has_part(self, floor: Floor) -> bool:
+        """Return whether a floor knows something of this kind."""
+        return has_module(self._module(floor))
+
     def _module(self, floor: Floor) -> str:
         return f"{self.home}.{floor}" if self.home else f"camkit.{floor}.kinds.{self.name}"
 

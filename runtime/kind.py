@@ -20,10 +20,10 @@ from camkit.runtime.array_capture import capture_of_array
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.job.choices import OF_CAPTURE
 from camkit.runtime.job.job import Job
+from camkit.runtime.job.kind_capture import KindCapture
 from camkit.runtime.job.photograph import know_photograph
 from camkit.runtime.job.setup import DEVELOPED, DEVELOPMENT
 from camkit.runtime.kind_parts.golden import GoldenCaptures
-from camkit.runtime.job.kind_capture import KindCapture
 from camkit.runtime.kind_parts.outputs import Outputs
 from camkit.runtime.options import Options
 from camkit.runtime.photograph_facts import describe_photograph

@@ -1,4 +1,4 @@
-"""One camera body: what was found of it beyond its bundle, read from a TOML file.
+"""One camera body: the facts about it beyond its bundle, from a TOML file.
 
 lens_sha256 = "..."       of the prescription that it was measured with, as its bundles hold it; or
 bundle_sha256 = "..."     of the one bundle that it was measured with, and is valid for
@@ -52,7 +52,8 @@ class Unit:
     def __post_init__(self) -> None:
         if (self.bundle_sha256 is None) == (self.lens_sha256 is None):
             raise ContractError(
-                f"the unit {self.name} must state the hash of its bundle or of its lens: one"
+                f"camera body {self.name} must state the hash of its bundle or that of its lens, "
+                "and not both"
             )
 
     @property
@@ -61,21 +62,21 @@ class Unit:
         return self.facts.get(FOCUS, 0.0)
 
     def check(self, bundle: Bundle | None) -> None:
-        """Refuse a unit of another bundle, or one of which facts would be passed over.
+        """Refuse a camera body of another bundle, or one with facts that no stage uses.
 
         Raises:
             ContractError: If there is no bundle, its hash or that of its lens is another, no stage
                 of it knows a fact (near names are suggested), or its PSF does not reach the focus.
         """
         if bundle is None:
-            raise ContractError(f"the unit {self.name} belongs to a bundle, and there is none")
+            raise ContractError(f"camera body {self.name} belongs to a bundle, and there is none")
         self._check_identity(bundle)
         known = known_facts(bundle.manifest.stages)
         if foreign := [name for name in self.facts if name not in known]:
             near = {n for name in foreign for n in difflib.get_close_matches(name, known, n=2)}
             hint = f"did you mean {' or '.join(sorted(near))}?" if near else "leave them out;"
             raise ContractError(
-                f"the unit {self.name} states {', '.join(foreign)}, which no stage of bundle "
+                f"camera body {self.name} states {', '.join(foreign)}, which no stage of bundle "
                 f"{bundle.manifest.name} knows; {hint} known are: {', '.join(known) or 'none'}"
             )
         if self.focus_um:
@@ -85,27 +86,27 @@ class Unit:
     def _check_identity(self, bundle: Bundle) -> None:
         if self.bundle_sha256 is not None and bundle.sha256 != self.bundle_sha256:
             raise ContractError(
-                f"the unit {self.name} was measured with the bundle of sha256 "
+                f"camera body {self.name} was measured with the bundle of sha256 "
                 f"{self.bundle_sha256[:16]}, this is {bundle.sha256[:16]}; measure it again"
             )
         if self.lens_sha256 is None:
             return
         if PRESCRIPTION not in bundle.names:
             raise ContractError(
-                f"the unit {self.name} is of a lens, and bundle {bundle.manifest.name} does not "
-                "state which lens it has; measure the unit with the bundle itself"
+                f"camera body {self.name} is of a lens, and bundle {bundle.manifest.name} does not "
+                "state which lens it has; measure it with the bundle itself"
             )
         found = lens_hash(bundle.member(PRESCRIPTION))
         if found != self.lens_sha256:
             raise ContractError(
-                f"the unit {self.name} has the lens of sha256 {self.lens_sha256[:16]}, bundle "
+                f"camera body {self.name} has the lens of sha256 {self.lens_sha256[:16]}, bundle "
                 f"{bundle.manifest.name} that of {found[:16]}: it is another camera's, or the lens "
-                "was designed anew; measure the unit again"
+                "was designed anew; measure it again"
             )
 
 
 def lens_hash(prescription: bytes) -> str:
-    """Return the hash by which a unit names its lens.
+    """Return the hash by which a camera body names its lens.
 
     Args:
         prescription: The text that a bundle holds of its lens.
@@ -114,12 +115,12 @@ def lens_hash(prescription: bytes) -> str:
 
 
 def read_unit(path: Path) -> Unit:
-    """Read a unit.
+    """Read a camera body.
 
     Raises:
         ContractError: If the file cannot be read, or holds anything else.
     """
-    table = read_side_toml(path, "the unit")
+    table = read_side_toml(path, "the camera body")
     if unknown := table.keys() - _KEYS:
         raise ContractError(f"{path}: unknown key(s) {', '.join(sorted(unknown))}")
     name, facts = table.get("name", path.stem), table.get("facts", {})
@@ -144,11 +145,11 @@ def _is_finite(value: float) -> bool:
 
 
 def _identity(table: Mapping[str, Any], path: Path) -> dict[str, str]:
-    """Return the one hash that says what a unit belongs to."""
+    """Return the one hash of the bundle or the lens that a camera body belongs to."""
     given = {key: table[key] for key in _HASHES if key in table}
     if len(given) != 1:
         raise ContractError(
-            f"{path}: one of {' and '.join(_HASHES)} must state what the unit belongs to; got "
+            f"{path}: one of {' and '.join(_HASHES)} must state where the body belongs; got "
             f"{' and '.join(given) or 'none'}"
         )
     for key, digest in given.items():
@@ -159,7 +160,7 @@ def _identity(table: Mapping[str, Any], path: Path) -> dict[str, str]:
 
 
 def format_unit(name: str, identity: Mapping[str, str], measured: Mapping[str, float]) -> str:
-    """Return the TOML text of a unit.
+    """Return the TOML text of a camera body.
 
     Args:
         name: For people.

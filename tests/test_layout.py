@@ -17,7 +17,6 @@ ASK = (
 )
 SHIPPED = ("camkit", "runtime", "export", "models_def")
 FOUND_BY_PLACE = (
-    "camkit.report.bench.rows",
     "camkit.report.bench.metrics",
     "camkit.report.stress.scenarios",
     "camkit.report.kinds",

@@ -1,26 +1,22 @@
 """Measure what docs/results/measurements.md states, and print the tables as Markdown.
 
 python -m tools.measure speed CAPTURE.dng [--runs 3] [--sizes S,M]
-python -m tools.measure trees CAPTURE.dng --other CHECKOUT [--runs 9] [--sizes S,M]
 python -m tools.measure tiling [--bundle duet]
 python -m tools.measure raws FOLDER --out-dir out/raws
 """
 
 import argparse
 import json
-import os
 import platform
 import statistics
 import subprocess
 import sys
 import tempfile
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-import camkit
 from camkit.bundle.reader import built_in_bundles, find_bundle, open_bundle
 from camkit.cli.judge.doctor import examine
 from camkit.runtime.network.engine import NetworkEngine, available_threads
@@ -42,12 +38,6 @@ def main() -> None:
     speed.add_argument("--bundle", default="duet")
     speed.add_argument("--runs", type=int, default=3)
     speed.add_argument("--sizes", default="S,M")
-    trees = commands.add_parser("trees")
-    trees.add_argument("capture", type=Path)
-    trees.add_argument("--other", type=Path, required=True)
-    trees.add_argument("--bundle", default="duet")
-    trees.add_argument("--runs", type=int, default=9)
-    trees.add_argument("--sizes", default="S,M")
     tiling = commands.add_parser("tiling")
     tiling.add_argument("--bundle", default=None)
     tiling.add_argument("--width", type=int, default=6000)
@@ -60,7 +50,6 @@ def main() -> None:
     print(f"Machine: {machine['processor']}, {machine['threads']} threads, {platform.system()}\n")
     {
         "speed": measure_speed,
-        "trees": measure_trees,
         "tiling": measure_tiling,
         "raws": measure_raws,
     }[arguments.command](arguments)
@@ -73,7 +62,8 @@ def measure_speed(arguments: argparse.Namespace) -> None:
     with tempfile.TemporaryDirectory() as folder:
         for _ in range(arguments.runs):
             for size in sizes:
-                result = _process(arguments, size, folder)
+                words = ("--bundle", arguments.bundle, "--size", size, "--out-dir", folder)
+                result = _camkit("process", str(arguments.capture), "--json", "--overwrite", *words)
                 found[size].append({**result["seconds"], "peak_mb": result["peak_rss_mb"]})
     stages = [name for name in found[sizes[0]][0] if name != "peak_mb"]
     print("| size | " + " | ".join(stages) + " | all | neither network nor bank | peak MB |")
@@ -85,71 +75,6 @@ def measure_speed(arguments: argparse.Namespace) -> None:
         cells = [f"{median[name]:.2f}" for name in stages]
         cells += [f"{statistics.median(totals):.1f}", f"{statistics.median(rest):.1f}"]
         print(f"| {size} | " + " | ".join(cells) + f" | {median['peak_mb']:.0f} |")
-
-
-def _process(
-    arguments: argparse.Namespace, size: str, folder: str, tree: Path | None = None
-) -> dict[str, Any]:
-    """Develop the capture in a fresh process; `tree` names another checkout than this one."""
-    command = [
-        *(sys.executable, "-m", "camkit", "process", str(arguments.capture.resolve())),
-        *("--bundle", arguments.bundle, "--size", size, "--json", "--overwrite"),
-        *("--out-dir", folder),
-    ]
-    environment = None if tree is None else {**os.environ, "PYTHONPATH": str(tree.resolve())}
-    done = subprocess.run(
-        command, capture_output=True, text=True, check=True, cwd=tree, env=environment
-    )
-    result: dict[str, Any] = json.loads(done.stdout)
-    return result
-
-
-def measure_trees(arguments: argparse.Namespace) -> None:
-    """Compare `camkit process` of this checkout and another, each with its own bundle, in turn."""
-    trees = {"other": arguments.other, "this": Path(camkit.__file__).parents[1]}
-    heads = [f"{what}, other | this | ratio" for what in ("CPU s", "seconds", "in neither")]
-    print(f"| size | {' | '.join(heads)} | peak MB, other | this |")
-    print("|" + "---|" * (3 * len(heads) + 3))
-    with tempfile.TemporaryDirectory() as folder:
-        for size in arguments.sizes.split(","):
-            found: dict[str, list[_Cost]] = {name: [] for name in trees}
-            for run in range(arguments.runs):
-                for name in list(trees)[:: -1 if run % 2 else 1]:
-                    found[name].append(_cost(arguments, size, folder, trees[name]))
-            cells = []
-            for what in ("cpu_s", "seconds", "neither_s"):
-                old, new = ([getattr(cost, what) for cost in found[name]] for name in trees)
-                ratios = [b / a for a, b in zip(old, new, strict=True)]
-                cells += [f"{statistics.median(values):.1f}" for values in (old, new)]
-                cells += [f"{statistics.median(ratios):.3f}"]
-            for name in trees:
-                cells += [f"{statistics.median(cost.peak_mb for cost in found[name]):.0f}"]
-            print(f"| {size} | {' | '.join(cells)} |", flush=True)
-
-
-@dataclass(frozen=True)
-class _Cost:
-    """What one process took: of all its threads, by the clock, in neither network nor bank."""
-
-    cpu_s: float
-    seconds: float
-    neither_s: float
-    peak_mb: float
-
-
-def _cost(arguments: argparse.Namespace, size: str, folder: str, tree: Path) -> _Cost:
-    before = os.times()
-    result = _process(arguments, size, folder, tree)
-    after = os.times()
-    user_s = after.children_user - before.children_user
-    system_s = after.children_system - before.children_system
-    stages: dict[str, float] = result["seconds"]
-    return _Cost(
-        cpu_s=user_s + system_s,
-        seconds=after.elapsed - before.elapsed,
-        neither_s=sum(taken for name, taken in stages.items() if name not in TRANSFORMS),
-        peak_mb=result["peak_rss_mb"],
-    )
 
 
 def measure_tiling(arguments: argparse.Namespace) -> None:

@@ -1,10 +1,10 @@
-"""Peak memory of `camkit process` against its cap: cameras, sizes, formats, megapixels, jobs.
+"""Peak memory of `camkit process` against its cap, and seconds: sizes, formats, megapixels, jobs.
 
     python -m tools.memory --bundles duet,trio-edof --sizes S,M --formats exr --megapixels 24,100
 
 The peak is the largest sum of proportional set sizes (PSS, so shared pages count once) over the
-process and its children, sampled. Captures are mosaics of a small simulated one, bundles are
-stretched to the sensor that they need.
+process and its children, sampled; seconds are those of the whole process. Captures are mosaics of
+a small simulated one, bundles are stretched to the sensor that they need.
 """
 
 import argparse
@@ -14,19 +14,23 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
-from camkit.bundle.reader import find_bundle, open_bundle
+from camkit.bundle.haze_file import haze_from_bytes, haze_to_bytes
+from camkit.bundle.optics import HAZE, PSF
+from camkit.bundle.psf_file import psf_from_bytes, psf_to_bytes
+from camkit.bundle.reader import STRESS_HAZE, STRESS_PSF, Bundle, find_bundle, open_bundle
+from camkit.bundle.writer import write_bundle
 from camkit.report.bench.timed.process_run import child_environment
 from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES, parse_memory
 from camkit.runtime.twin.simulate import SimulationOptions, photograph, write_capture
 from camkit.scenes import procedural_scene
-from tools.stage_profile import write_stretched
 
 POLL_S: Final = 0.03
 CELL_PX: Final = (320, 480)
@@ -43,8 +47,8 @@ def main() -> None:
     parser.add_argument("--max-mem", help="cap; the default cap of every job without")
     parser.add_argument("options", nargs="*", help="further words for camkit process, behind --")
     arguments = parser.parse_args()
-    print("| bundle | size | format | MP | jobs | cap MB | peak MB | peak / cap |")
-    print("|---|---|---|---|---|---|---|---|")
+    print("| bundle | size | format | MP | jobs | s per file | cap MB | peak MB | peak / cap |")
+    print("|---|---|---|---|---|---|---|---|---|")
     shares = []
     listed = (arguments.bundles, arguments.megapixels)
     for name, megapixels in itertools.product(*(text.split(",") for text in listed)):
@@ -59,9 +63,13 @@ def main() -> None:
                 if arguments.max_mem:
                     words += ["--max-mem", arguments.max_mem]
                     cap = parse_memory(arguments.max_mem) / 1e6
-                peak = captures.peak_mb(words, files=1 if jobs == "1" else 2 * int(jobs))
+                files = 1 if jobs == "1" else 2 * int(jobs)
+                began = time.perf_counter()
+                peak = captures.peak_mb(words, files=files)
+                each_s = (time.perf_counter() - began) / files
                 shares.append(peak / cap)
-                cells = (name, size, format_, megapixels, jobs, f"{cap:.0f}", f"{peak:.0f}")
+                told = (f"{each_s:.1f}", f"{cap:.0f}", f"{peak:.0f}")
+                cells = (name, size, format_, megapixels, jobs, *told)
                 print(f"| {' | '.join(cells)} | {shares[-1]:.3f} |", flush=True)
     above = sum(share > 1 for share in shares)
     print(
@@ -172,6 +180,36 @@ def _pss_mb(pid: int) -> float:
         return 0.0
     found = text.partition("\nPss:")[2].split(maxsplit=1)
     return int(found[0]) * 1024 / 1e6 if found else 0.0
+
+
+def write_stretched(bundle: Bundle, path: Path, width: int, height: int) -> None:
+    """Write a bundle whose sensor has as many pixels over the same width in millimetres."""
+    manifest = bundle.manifest
+    extent = manifest.sensor.known_extent
+    ratio = width / extent.width_px
+    pitch_um = extent.pixel_pitch_um / ratio
+    centre = extent.optical_centre_px
+    stretched = extent.model_copy(
+        update={
+            "width_px": width,
+            "height_px": height,
+            "pixel_pitch_um": pitch_um,
+            "optical_centre_px": centre and (centre[0] * ratio, centre[1] * ratio),
+        }
+    )
+    changes: dict[str, Any] = {
+        "sensor": manifest.sensor.model_copy(update={"extent": stretched}),
+    }
+    if manifest.optics is not None:
+        changes["optics"] = manifest.optics.model_copy(update={"pixel_pitch_um": pitch_um})
+    members = {name: bundle.member(name) for name in bundle.names}
+    for name in members.keys() & {PSF, STRESS_PSF}:
+        psf = psf_from_bytes(members[name])
+        members[name] = psf_to_bytes(replace(psf, pixel_pitch_um=pitch_um))
+    for name in members.keys() & {HAZE, STRESS_HAZE}:
+        haze = haze_from_bytes(members[name])
+        members[name] = haze_to_bytes(replace(haze, pixel_pitch_um=pitch_um))
+    write_bundle(path, manifest.model_copy(update=changes), members)
 
 
 if __name__ == "__main__":

@@ -3,14 +3,11 @@
     python -m tools.plan_report calibrate --bundle duet --data DATA/train_open --out plan.json
     python -m tools.plan_report calibrate ... --write camkit/bundles/duet.camkit
     python -m tools.plan_report report --bundle duet --data DATA --out-dir out/plan
-    python -m tools.plan_report overhead --bundle duet
-    python -m tools.plan_report work --bundle duet
 
 `calibrate` simulates captures of pictures and procedural scenes, measures per lattice cell what
 less than the exact result loses, fits the loss model and writes it as the manifest's `plan`:
 into a JSON file, which `camkit export --plan` takes, and with --write into a bundle.
-`report` measures saving and loss on the scenes of tools/plan/scenes.py; `work` the constants by
-which the plan weighs bank and network against one another.
+`report` measures saving and loss on the scenes of tools/plan/scenes.py.
 """
 
 import argparse
@@ -29,15 +26,13 @@ from camkit.bundle.writer import write_bundle
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.report.quality import list_set, read_picture
-from camkit.runtime.options import Options
-from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.plan.loss import EXACT, plan_entries
 from camkit.runtime.plan.rules.size import REFERENCE
 from camkit.runtime.plan.tiers import TierWork
-from tools.plan.cells import CaptureCells, measure_cells, photograph, pipelines, start
-from tools.plan.fit import Calibration, fit_model, saving_of_the_all_knowing
+from tools.plan.cells import CaptureCells, measure_cells, photograph, pipelines
+from tools.plan.fit import Calibration, fit_model
+from tools.plan.proof import prove, write_report
 from tools.plan.scenes import GENERATORS, proof_scenes
-from tools.plan.work import measure_work
 
 ISOS = (100.0, 400.0, 1600.0)
 SIDE_PX = 1280
@@ -70,18 +65,8 @@ def main() -> int:
     report.add_argument("--limit", type=int, default=0, help="only so many scenes")
     report.add_argument("--kinds", default="", help="only these kinds, with commas")
     report.add_argument("--runs", type=int, default=1, help="timed runs per capture and quality")
-    for name, told, runs in (
-        ("overhead", "CPU seconds where nothing can be skipped", 20),
-        ("work", "work of bank and network, in multiplications of a network", 7),
-    ):
-        timed = commands.add_parser(name, help=told)
-        timed.add_argument("--bundle", default="duet", help="name or path")
-        timed.add_argument("--runs", type=int, default=runs, help="in turn")
-        timed.add_argument("--width", type=int, default=1536)
-        timed.add_argument("--height", type=int, default=1024)
     options = parser.parse_args()
-    run = {"calibrate": _calibrate, "report": _report, "overhead": _overhead, "work": _measure_work}
-    return run[options.command](options)
+    return _calibrate(options) if options.command == "calibrate" else _report(options)
 
 
 def _calibrate(options: argparse.Namespace) -> int:
@@ -101,8 +86,6 @@ def _calibrate(options: argparse.Namespace) -> int:
         made.model, adaptive_cost_db=made.adaptive[0], draft_cost_db=made.draft[0]
     )
     _print_calibration(made, captures)
-    known = [saving_of_the_all_knowing(c, work, small, 0.1) for c in captures]
-    print(f"were all losses known, 0.1 dB a capture would save {np.mean(known):.1%} of the work")
     for target in made.model.lines:
         sums = [c.errors[target].sum() / c.errors[EXACT].sum() for c in captures]
         print(f"{target} everywhere loses {np.mean(10 * np.log10(sums)):.2f} dB")
@@ -179,8 +162,6 @@ def _print_calibration(made: Calibration, captures: list[CaptureCells]) -> None:
 
 
 def _report(options: argparse.Namespace) -> int:
-    from tools.plan.proof import prove, write_report
-
     bundle = open_bundle(find_bundle(options.bundle))
     subjects = tuple(name for name in options.kinds.split(",") if name)
     rows = []
@@ -193,54 +174,6 @@ def _report(options: argparse.Namespace) -> int:
     for line in write_report(rows, bundle, options.out_dir):
         print(line)
     return 0
-
-
-def _overhead(options: argparse.Namespace) -> int:
-    """Compare the CPU seconds of adaptive and exact, in turn, where all is texture."""
-    bundle = open_bundle(find_bundle(options.bundle))
-    simulation = photograph(bundle, _texture(options, 0.9), number=0, iso=100.0)
-    made = {
-        quality: Pipeline(bundle, Options(quality=quality, undistort=False, threads=1))
-        for quality in ("exact", "adaptive")
-    }
-    seconds: dict[str, list[float]] = {quality: [] for quality in made}
-    for _ in range(options.runs):
-        for quality, pipeline in made.items():
-            began = time.process_time()
-            work = start(pipeline, simulation)
-            work.fill(None)
-            seconds[quality].append(time.process_time() - began)
-            if work.labels is not None:
-                print("something was skipped here: not a case for this command", file=sys.stderr)
-                return 1
-    ratios = np.array(seconds["adaptive"]) / np.array(seconds["exact"])
-    print(
-        f"{options.runs} runs in turn: exact {np.median(seconds['exact']):.2f} CPU s, adaptive "
-        f"{np.median(seconds['adaptive']):.2f} CPU s, median ratio {np.median(ratios):.4f}"
-    )
-    return 0
-
-
-def _measure_work(options: argparse.Namespace) -> int:
-    """Print what the tiers cost where no sample is clipped."""
-    bundle = open_bundle(find_bundle(options.bundle))
-    work, small = _work(bundle)
-    if small is None or work.small_mac is None:
-        raise ContractError(f"{bundle.manifest.name} has one size; two tell the work of a network")
-    simulation = photograph(bundle, _texture(options, 0.5), number=0, iso=100.0)
-    macs = (work.full_mac, work.small_mac)
-    made = measure_work(bundle, simulation, small, macs, runs=options.runs)
-    print(
-        f"bank {made.bank:,.0f} and network {made.fixed:,.0f} per pixel besides its own, in "
-        f"multiplications of {made.ns:.4f} CPU ns"
-    )
-    return 0
-
-
-def _texture(options: argparse.Namespace, brightest: float) -> FloatArray:
-    rng = np.random.default_rng(PROCEDURAL_SEED)
-    shape = (3, options.height, options.width)
-    return rng.uniform(0.05, brightest, shape).astype(np.float32)
 
 
 if __name__ == "__main__":

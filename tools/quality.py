@@ -9,7 +9,6 @@ or what has changed, so rows, captures and sources of PSFs may be measured in se
 """
 
 import argparse
-import csv
 import json
 import shlex
 import sys
@@ -17,7 +16,6 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import astuple
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -32,11 +30,9 @@ from camkit.report.fabricated_optics import fabricated_optics, lens_text
 from camkit.report.quality import FABRICATION_SEEDS, FIELD_SHARES, Shot, list_set, read_picture
 from camkit.runtime.network.engine import available_threads
 from tools.capture.simulated import color_sensor
-from tools.comparison.compact_json import to_compact_json
 from tools.comparison.copies import transfer_error
 from tools.comparison.measurement import (
     CAPTURE_COLUMNS,
-    COLUMNS,
     VALUE_COLUMNS,
     Measurement,
     Row,
@@ -53,6 +49,7 @@ from tools.comparison.photograph import TUNING_SEED, Photograph, photograph
 from tools.comparison.quality_table import seconds_per_megapixel, summarise, to_markdown
 from tools.comparison.rows import DEFAULT_METHODS, Rival, make_rows, protocol_text
 from tools.comparison.tuning import at_edge, choose, try_peers, tuned_from_json, tuned_to_json
+from tools.tables.records import to_compact_json
 
 TUNING_SIDE_PX = 272
 SIZES = ("S", "M", "L")
@@ -89,7 +86,6 @@ def parse_arguments() -> argparse.Namespace:
     add("--tuned", type=Path, help="report that holds the tuned parameters; default: --out")
     add("--prescription", type=Path, help="the lens, if the bundle does not hold it")
     add("--out", type=Path, default=Path("docs/results/quality.json"))
-    add("--csv", type=Path, help="also write the measurements as a table")
     add("--work-dir", type=Path, default=Path("runs/quality"), help="journal and traced PSFs")
     add("--jobs", type=int, default=1, help="captures at a time")
     add("--limit-seconds", type=float, help="begin no capture after this time")
@@ -229,8 +225,6 @@ def compare(arguments: argparse.Namespace, bundle: Bundle) -> None:
     }
     write_report(arguments.out, report)
     arguments.out.with_suffix(".md").write_text(to_markdown(report), encoding="utf-8")
-    if arguments.csv is not None:
-        write_csv(arguments.csv, measurements)
     show_result(report)
 
 
@@ -331,14 +325,6 @@ def write_report(path: Path, report: dict[str, Any]) -> None:
     part = path.with_suffix(".json.part")
     part.write_text(f"{{{text}}}\n", encoding="utf-8")
     part.replace(path)
-
-
-def write_csv(path: Path, measurements: Sequence[Measurement]) -> None:
-    """Write the measurements as a table."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(COLUMNS)
-        writer.writerows(astuple(m) for m in measurements)
 
 
 if __name__ == "__main__":

@@ -2,14 +2,11 @@
 
 python -m tools.stage_profile stages CAPTURE.dng [--size M] [--method physics] [--runs 3]
 python -m tools.stage_profile layers [--bundle duet] [--size M] [--threads 2]
-python -m tools.stage_profile jobs CAPTURE.dng [--files 20] [--jobs 2] [--size M]
-python -m tools.stage_profile sizes [--megapixels 24,100,400] [--max-mem 2G] [--size M]
 """
 
 import argparse
 import json
 import os
-import shutil
 import statistics
 import subprocess
 import sys
@@ -19,19 +16,14 @@ import time
 from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from camkit.bundle.facts import NetworkFacts
-from camkit.bundle.haze_file import haze_from_bytes, haze_to_bytes
-from camkit.bundle.optics import HAZE, PSF
-from camkit.bundle.psf_file import psf_from_bytes, psf_to_bytes
-from camkit.bundle.reader import STRESS_HAZE, STRESS_PSF, Bundle, find_bundle, open_bundle
-from camkit.bundle.sensor import BayerSensor
-from camkit.bundle.writer import write_bundle
+from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.report.bench.gemm import gemm_peak_gmac_per_s
 from camkit.runtime.clock import StageClock
 from camkit.runtime.job.reconstruction import Reconstruction
@@ -60,24 +52,15 @@ def main() -> None:
     stages.add_argument("--runs", type=int, default=3)
     stages.add_argument("--method", help="way of a stage, as of camkit process")
     layers = commands.add_parser("layers")
-    jobs = commands.add_parser("jobs")
-    jobs.add_argument("capture", type=Path)
-    jobs.add_argument("--files", type=int, default=20)
-    jobs.add_argument("--jobs", type=int, default=2)
-    sizes = commands.add_parser("sizes")
-    sizes.add_argument("--megapixels", default="24,100,400")
-    sizes.add_argument("--max-mem", default="2G")
-    for command in (stages, layers, jobs, sizes):
+    for command in (stages, layers):
         command.add_argument("--bundle", default="duet")
         command.add_argument("--size", default=None if command is stages else "M")
         command.add_argument("--threads", type=int, default=None)
     arguments = parser.parse_args()
-    {
-        "stages": profile_stages,
-        "layers": profile_layers,
-        "jobs": profile_jobs,
-        "sizes": profile_sizes,
-    }[arguments.command](arguments)
+    if arguments.command == "stages":
+        profile_stages(arguments)
+    else:
+        profile_layers(arguments)
 
 
 @dataclass
@@ -324,108 +307,6 @@ def _count_macs(data: bytes, side: int) -> tuple[float, dict[str, float]]:
         elif node.op_type in ACTIVATIONS and node.input[0] in made:
             named[node.name or node.output[0]] = made[node.input[0]]
     return sum(made.values()), named
-
-
-def profile_jobs(arguments: argparse.Namespace) -> None:
-    """Process copies of a capture one at a time and several at a time."""
-    print("| jobs | files | wall s | s per file | peak MB |\n|---|---|---|---|---|")
-    with tempfile.TemporaryDirectory() as folder:
-        inside = Path(folder) / "in"
-        inside.mkdir()
-        for i in range(arguments.files):
-            # Links, since copies would measure the disk.
-            (inside / f"photo_{i:02d}{arguments.capture.suffix}").symlink_to(
-                arguments.capture.resolve()
-            )
-        for jobs in (1, arguments.jobs):
-            target = Path(folder) / f"out_{jobs}"
-            command = [sys.executable, "-m", "camkit", "process", str(inside)]
-            command += ["--bundle", arguments.bundle, "--size", arguments.size]
-            command += ["--jobs", str(jobs), "--out-dir", str(target)]
-            began = time.perf_counter()
-            subprocess.run(command, capture_output=True, check=True)
-            seconds = time.perf_counter() - began
-            peaks = [
-                json.loads(path.read_text(encoding="utf-8"))["peak_rss_mb"]
-                for path in target.glob("*.camkit.json")
-            ]
-            print(
-                f"| {jobs} | {arguments.files} | {seconds:.1f} | "
-                f"{seconds / arguments.files:.2f} | {max(peaks):.0f} |"
-            )
-            shutil.rmtree(target)
-
-
-def profile_sizes(arguments: argparse.Namespace) -> None:
-    """Process TIFF mosaics of growing size with a bundle stretched to that sensor, to TIFF."""
-    import tifffile
-
-    bundle = open_bundle(find_bundle(arguments.bundle))
-    sensor = bundle.manifest.sensor
-    if not isinstance(sensor, BayerSensor):
-        raise SystemExit(f"{bundle.manifest.name} has no mosaic, and this profile makes mosaics")
-    print("| megapixels | picture | s | s per megapixel | peak MB |\n|---|---|---|---|---|")
-    for megapixels in (float(n) for n in arguments.megapixels.split(",")):
-        height = round((megapixels * 1e6 / 1.5) ** 0.5 / 16) * 16
-        width = height * 3 // 2
-        with tempfile.TemporaryDirectory() as folder:
-            large, mosaic = Path(folder) / "large.camkit", Path(folder) / "mosaic.tif"
-            write_stretched(bundle, large, width, height)
-            samples = tifffile.memmap(mosaic, shape=(height, width), dtype=np.uint16)
-            rng = np.random.default_rng(0)
-            middle = (sensor.black_level + sensor.white_level) / 3
-            for top in range(0, height, 256):
-                shape = samples[top : top + 256].shape
-                samples[top : top + 256] = rng.normal(middle, 20, shape).astype(np.uint16)
-            samples.flush()
-            del samples
-            command = [sys.executable, "-m", "camkit", "process", str(mosaic), "--json"]
-            command += ["--bundle", str(large), "--size", arguments.size, "--format", "tiff"]
-            command += ["--out-dir", str(Path(folder) / "out"), "--max-mem", arguments.max_mem]
-            command += ["--mosaic", sensor.cfa, "--black-level", f"{sensor.black_level:g}"]
-            command += ["--white-level", f"{sensor.white_level:g}"]
-            done = subprocess.run(command, capture_output=True, text=True, check=False)
-            result: dict[str, Any] = {"error": done.stderr}
-            if done.stdout.strip():
-                result = json.loads(done.stdout)
-            if result.get("status") != "ok":
-                print(f"| {megapixels:g} | {width}x{height} | {result.get('error')} | | |")
-                continue
-            seconds = sum(result["seconds"].values())
-            print(
-                f"| {megapixels:g} | {width}x{height} | {seconds:.1f} | "
-                f"{seconds / (width * height / 1e6):.2f} | {result['peak_rss_mb']:.0f} |"
-            )
-
-
-def write_stretched(bundle: Bundle, path: Path, width: int, height: int) -> None:
-    """Write a bundle whose sensor has as many pixels over the same width in millimetres."""
-    manifest = bundle.manifest
-    extent = manifest.sensor.known_extent
-    ratio = width / extent.width_px
-    pitch_um = extent.pixel_pitch_um / ratio
-    centre = extent.optical_centre_px
-    stretched = extent.model_copy(
-        update={
-            "width_px": width,
-            "height_px": height,
-            "pixel_pitch_um": pitch_um,
-            "optical_centre_px": centre and (centre[0] * ratio, centre[1] * ratio),
-        }
-    )
-    changes: dict[str, Any] = {
-        "sensor": manifest.sensor.model_copy(update={"extent": stretched}),
-    }
-    if manifest.optics is not None:
-        changes["optics"] = manifest.optics.model_copy(update={"pixel_pitch_um": pitch_um})
-    members = {name: bundle.member(name) for name in bundle.names}
-    for name in members.keys() & {PSF, STRESS_PSF}:
-        psf = psf_from_bytes(members[name])
-        members[name] = psf_to_bytes(replace(psf, pixel_pitch_um=pitch_um))
-    for name in members.keys() & {HAZE, STRESS_HAZE}:
-        haze = haze_from_bytes(members[name])
-        members[name] = haze_to_bytes(replace(haze, pixel_pitch_um=pitch_um))
-    write_bundle(path, manifest.model_copy(update=changes), members)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""A unit's own focus: one number, out of captures of edges.
+"""The focus of a camera body: one number, out of captures of edges.
 
     captures -> straight edges, anywhere in the field            (edges.py)
     kernels of every shift of focus, at the place of an edge -> how light rises across it
@@ -129,7 +129,7 @@ def measure_focus(captures: Sequence[tuple[str, Capture]], camera: EdgeCamera) -
 def _known_shifts(psf: FrozenPsf) -> NDArray[np.float64]:
     if psf.focus_um is None:
         raise ContractError(
-            f"the PSF knows the nominal focus alone: freeze it with {option_text('focus_um')} and "
+            f"the PSF has the nominal focus alone: freeze it with {option_text('focus_um')} and "
             "export the bundle again, or give the lens"
         )
     return psf.focus_um
@@ -282,7 +282,7 @@ def _best(squares: FloatGrid, tried_um: FloatLine, captures: int) -> MeasuredFoc
     if abs(focus_um) <= LEAST_ERRORS * error_um or least > (1 - LEAST_FALL) * nominal:
         raise ContractError(
             f"the focus is {focus_um:.1f} +- {error_um:.1f} um, which these captures do not tell "
-            "from the nominal one: leave the unit out, or show more edges over the whole field"
+            f"from the nominal one: omit {option_text('unit')}, or show more edges over the field"
         )
     return MeasuredFocus(
         focus_um=focus_um,

@@ -1,17 +1,45 @@
-"""A chart as SVG and PNG, the same from run to run."""
+"""Charts: their style and colours, and how they become SVG and PNG, the same from run to run.
+
+A function that draws is marked with `chart`: while it runs, matplotlib's settings are `STYLE`.
+"""
 
 import io
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable
+from functools import wraps
+from typing import TYPE_CHECKING, Any, Final, ParamSpec
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib import axes, figure
+
+    Panel = axes.Axes
+    Figure = figure.Figure
+else:  # matplotlib is imported by what draws
+    Panel = Figure = object
 
 FIELD_COLORS: Final = ("#1f6fb4", "#2e8b57", "#c8452f", "#8855aa", "#b8860b", "#008b8b")
 CHANNEL_COLORS: Final = {"R": "#c8452f", "G": "#2e8b57", "B": "#1f6fb4"}
 MARKS: Final = ("o", "+", "x", "s", "^", "d")
 GRID_COLOR: Final = "#dddddd"
+TICK_PT: Final = 7
+STYLE: Final[Any] = {
+    "axes.axisbelow": True,
+    "axes.grid": True,
+    "axes.labelsize": 8,
+    "axes.titlesize": 9,
+    "figure.labelsize": 8,
+    "grid.color": GRID_COLOR,
+    "grid.linewidth": 0.5,
+    "legend.fontsize": 7,
+    "legend.frameon": False,
+    "lines.linewidth": 1,
+    "lines.markersize": 4,
+}
+PNG_START: Final = b"\x89PNG\r\n\x1a\n"
+BLUE: Final = FIELD_COLORS[0]
 _WAVE_COLORS: Final = (
     (0.40, (0x5B, 0x2A, 0x9D)),
     (0.47, (0x2F, 0x5F, 0xD0)),
@@ -21,6 +49,7 @@ _WAVE_COLORS: Final = (
     (0.65, (0xC8, 0x2F, 0x2F)),
     (0.75, (0x6B, 0x1F, 0x1A)),
 )
+_P = ParamSpec("_P")
 
 
 def wave_color(wavelength_um: float) -> str:
@@ -41,7 +70,25 @@ def channel_color(name: str, number: int) -> str:
     return CHANNEL_COLORS.get(name, field_color(number))
 
 
-def new_figure(width_in: float, height_in: float) -> "Figure":
+def chart(draw: Callable[_P, Figure]) -> Callable[_P, Figure]:
+    """Return a function that draws in the style of all charts; pictures within have no grid."""
+
+    @wraps(draw)
+    def drawn(*args: _P.args, **kwargs: _P.kwargs) -> Figure:
+        from matplotlib import rc_context
+
+        with rc_context(STYLE):
+            figure = draw(*args, **kwargs)
+            for panel in figure.axes:
+                panel.tick_params(labelsize=TICK_PT, which="both")
+                if panel.images:
+                    panel.grid(visible=False)
+        return figure
+
+    return drawn
+
+
+def new_figure(width_in: float, height_in: float) -> Figure:
     """Return an empty figure that belongs to no window."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -51,7 +98,13 @@ def new_figure(width_in: float, height_in: float) -> "Figure":
     return figure
 
 
-def to_svg(figure: "Figure") -> str:
+def hide_ticks(panel: Panel) -> None:
+    """Leave out the numbers beside a picture."""
+    panel.set_xticks([])
+    panel.set_yticks([])
+
+
+def to_svg(figure: Figure) -> str:
     """Return the SVG text of a figure; its text stays text."""
     from matplotlib import rc_context
 
@@ -61,8 +114,21 @@ def to_svg(figure: "Figure") -> str:
     return stream.getvalue()
 
 
-def to_png(figure: "Figure") -> bytes:
+def to_png(figure: Figure) -> bytes:
     """Return the PNG of a figure."""
     stream = io.BytesIO()
     figure.savefig(stream, format="png", metadata={"Software": None})
     return stream.getvalue()
+
+
+def levels_of(picture: NDArray[Any], enlarged: int = 1) -> NDArray[np.uint8]:
+    """Return 8-bit levels (n h, n w, 3), blue first, of sRGB values (3, h, w), not smoothed."""
+    codes = np.rint(np.clip(picture, 0, 1) * 255).astype(np.uint8)[::-1].transpose(1, 2, 0)
+    return np.ascontiguousarray(codes.repeat(enlarged, axis=0).repeat(enlarged, axis=1))
+
+
+def encode_png(levels: NDArray[np.uint8]) -> bytes:
+    """Return the PNG of 8-bit levels (h, w, 3), blue first."""
+    done, data = cv2.imencode(".png", levels)
+    assert done  # an 8-bit picture of three channels always encodes
+    return data.tobytes()

@@ -1,10 +1,11 @@
 """What reports know of a kind of camera.
 
-A kind's part of the reports (`camkit.report.kinds.NAME`, or the `report` of its own package)
-defines `PART`, a `ReportPart`. The tools find it by `camkit.report.kind_finder`.
+A kind whose captures are photographs needs no part of the reports. Another's part
+(`camkit.report.kinds.NAME`, or the `report` of its own package) defines `PART`, a `ReportPart`.
+The tools find it by `camkit.report.kind_finder`.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from camkit.report.bench.part import BenchPart
 from camkit.report.stress.part import StressPart
@@ -19,5 +20,5 @@ class ReportPart:
         stress: For `camkit stress`: scenes, how captures are judged, scenarios of its own.
     """
 
-    bench: BenchPart
-    stress: StressPart
+    bench: BenchPart = field(default_factory=BenchPart)
+    stress: StressPart = field(default_factory=StressPart)

@@ -1,4 +1,4 @@
-"""Where reports find what they ask of a kind of camera, without knowing any."""
+"""What reports ask of a kind of camera, found without knowing any."""
 
 from typing import TypeVar
 
@@ -12,16 +12,21 @@ _T = TypeVar("_T")
 def find_part(kind: str, tool: str, expected: type[_T]) -> _T:
     """Return what one tool asks of a kind: a field of the `ReportPart` called PART of its module.
 
+    A kind without such a module takes photographs as any: its part is the plain one.
+
     Args:
         kind: Name of the kind.
         tool: Name of the field.
         expected: Type of the field.
 
     Raises:
-        UnsupportedError: If there is no such kind, or reports know nothing of it.
+        UnsupportedError: If there is no such kind.
         ContractError: If its module defines no such part.
     """
-    module = find_kind(kind).part("report")
+    known = find_kind(kind)
+    if not known.has_part("report"):
+        return expected()
+    module = known.part("report")
     part = getattr(getattr(module, "PART", None), tool, None)
     if not isinstance(part, expected):
         raise ContractError(

@@ -9,7 +9,8 @@
                                catalog        their names, for recipes and checkpoints
     restored and true picture -> discriminator   opponents in training, never exported
                               -> vgg             features of VGG-19, weights from the user
-    capture of highlights     -> thesis          the networks of chapter 5, references
+    photons of an array       -> sub_pixel       the CPU-first network, four times as fine
+                              -> back_projection, bicubic_first   references; on `bicubic`
 
 Every network of the catalogue takes (batch, 6 or 3, h, w) float32 stabilised planes, h and w
 multiples of its total stride, and gives (batch, 3, h, w). The last three input planes are the ones

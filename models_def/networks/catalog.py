@@ -1,8 +1,7 @@
 """The names under which recipes and checkpoints know the networks."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import partial
 from typing import Any, Final
 
 from torch import nn
@@ -23,44 +22,37 @@ from camkit.models_def.networks.near_lights import REACH_PX, NearLights
 from camkit.models_def.networks.normed_unet import NormedConfig, NormedUnet
 from camkit.models_def.networks.trimmed_unet import TrimmedConfig, TrimmedUnet
 
-
-def _lean(base: LeanConfig, **config: Any) -> LeanUnet:
-    return LeanUnet(replace(base, **config))
-
-
-def _near_lights(base: LeanConfig, **config: Any) -> nn.Module:
-    return NearLights(_lean(base, **config))
+Builders = Mapping[str, Callable[..., nn.Module]]
+"""Name -> what builds a network of the fields of its config."""
 
 
-def _trimmed(**config: Any) -> nn.Module:
-    return TrimmedUnet(TrimmedConfig(**config))
+def configured(network: Callable[..., nn.Module], config: Callable[..., Any]) -> Any:
+    """Return what builds a network of the fields of its config."""
+    return lambda **fields: network(config(**fields))
 
 
-def _full(**config: Any) -> nn.Module:
-    return FullUnet(FullConfig(**config))
+def changed(network: Callable[..., nn.Module], base: Any) -> Any:
+    """Return what builds a network of a config with some fields changed."""
+    return lambda **fields: network(replace(base, **fields))
 
 
-def _constant(**config: Any) -> nn.Module:
-    return ConstantUnet(ConstantConfig(**config))
+def _near_lights(config: LeanConfig) -> nn.Module:
+    return NearLights(LeanUnet(config))
 
 
-def _normed(**config: Any) -> nn.Module:
-    return NormedUnet(NormedConfig(**config))
-
-
-_NEAR_LIGHTS: Final[dict[str, Callable[..., nn.Module]]] = {
-    "lights_s": partial(_near_lights, LIGHTS_S),
-    "lights_m": partial(_near_lights, LIGHTS_M),
+_NEAR_LIGHTS: Final[Builders] = {
+    "lights_s": changed(_near_lights, LIGHTS_S),
+    "lights_m": changed(_near_lights, LIGHTS_M),
 }
-_BUILDERS: Final[dict[str, Callable[..., nn.Module]]] = {
-    "lean_s": partial(_lean, LEAN_S),
-    "lean_m": partial(_lean, LEAN_M),
-    "lean_l": partial(_lean, LEAN_L),
+_BUILDERS: Final[Builders] = {
+    "lean_s": changed(LeanUnet, LEAN_S),
+    "lean_m": changed(LeanUnet, LEAN_M),
+    "lean_l": changed(LeanUnet, LEAN_L),
     **_NEAR_LIGHTS,
-    "trimmed_unet": _trimmed,
-    "full_unet": _full,
-    "constant_unet": _constant,
-    "normed_unet": _normed,
+    "trimmed_unet": configured(TrimmedUnet, TrimmedConfig),
+    "full_unet": configured(FullUnet, FullConfig),
+    "constant_unet": configured(ConstantUnet, ConstantConfig),
+    "normed_unet": configured(NormedUnet, NormedConfig),
 }
 
 NETWORK_NAMES: Final = tuple(_BUILDERS)
@@ -99,11 +91,25 @@ def build_network(name: str, **config: Any) -> nn.Module:
     Raises:
         ContractError: If the name or a field is unknown or a value is out of range.
     """
-    if name not in _BUILDERS:
-        raise ContractError(f"network must be one of {', '.join(NETWORK_NAMES)}; got {name!r}")
+    return build_one(_BUILDERS, name, config)
+
+
+def build_one(builders: Builders, name: str, config: Mapping[str, Any]) -> nn.Module:
+    """Build an untrained network of a list.
+
+    Args:
+        builders: The list.
+        name: In it.
+        config: Fields that differ from the defaults; lists are taken for tuples.
+
+    Raises:
+        ContractError: If the name or a field is unknown, or a value out of range.
+    """
+    if name not in builders:
+        raise ContractError(f"network must be one of {', '.join(builders)}; got {name!r}")
     frozen = {k: tuple(v) if isinstance(v, list) else v for k, v in config.items()}
     try:
-        return _BUILDERS[name](**frozen)
+        return builders[name](**frozen)
     except ContractError:
         raise
     except (TypeError, ValueError) as error:

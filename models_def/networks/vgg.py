@@ -86,7 +86,8 @@ class VggLevels(nn.Module):
     def forward(self, picture: Tensor) -> tuple[Tensor, ...]:
         """Return the features, (b, widths[i], h / 2^i, w / 2^i)."""
         x = (picture - self.mean) / self.deviation
-        raw, levels = x, []
+        raw = x
+        levels: list[Tensor] = []
         for names in self.blocks:
             if levels:
                 x = self.pool(x)

@@ -27,7 +27,7 @@ from camkit.progress import note, working
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FreezeRequest:
-    """How optics are frozen.
+    """Settings of freezing optics.
 
     Attributes:
         sensor: Size, pitch, response and noise.

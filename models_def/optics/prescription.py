@@ -5,10 +5,10 @@ Thickness and glass are those after a surface; the last thickness leads to the s
 """
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Final, Literal, get_args
+from typing import Any, Final, Literal, cast, get_args
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from camkit.models_def.optics.glass.catalogue import GlassCatalogue, find_glass,
 from camkit.models_def.optics.glass.material import Glass
 from camkit.models_def.optics.glass.table import glass_table, parse_glass_table
 from camkit.models_def.optics.grooves import Grooves, Profile, check_grooves, groove_facts
-from camkit.models_def.toml_table import key_line
+from camkit.models_def.toml_table import key_line, section
 from camkit.side_file import parse_toml, read_side_text
 from camkit.units import to_degrees, to_radians
 
@@ -27,32 +27,41 @@ Vary = Literal["curvature", "conic", "thickness", "even_asphere"]
 VARY: Final[tuple[Vary, ...]] = get_args(Vary)
 APERTURE_KINDS: Final[tuple[ApertureKind, ...]] = get_args(ApertureKind)
 
-_SURFACE_KEYS: Final = {
-    "radius_mm",
-    "thickness_mm",
-    "glass",
-    "semi_diameter_mm",
-    "conic",
-    "even_asphere",
-    "groove_depth_um",
-    "groove_walls",
-    "tool_radius_um",
-    "vary",
-}
-_LENS_KEYS: Final = {
-    "name",
-    "note",
-    "stop",
-    "object_distance_mm",
-    "field_angles_deg",
-    "wavelengths_um",
-    "reference_wavelength_um",
-    "glass_catalogues",
-    "glass",
-    "surface",
-    "tolerance",
-    *APERTURE_KINDS,
-}
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _SurfaceTable:
+    """The keys of [[surface]], as people write them."""
+
+    radius_mm: float
+    thickness_mm: float
+    glass: str = "air"
+    semi_diameter_mm: float = math.inf
+    conic: float = 0.0
+    even_asphere: tuple[float, ...] = ()
+    vary: tuple[str, ...] = ()
+    groove_depth_um: float | None = None
+    groove_walls: bool | None = None
+    tool_radius_um: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _LensTable:
+    """The keys of a prescription; exactly one of `APERTURE_KINDS` is needed."""
+
+    name: str
+    stop: int
+    surface: list[dict[str, Any]]
+    note: str = ""
+    object_distance_mm: float | None = None
+    field_angles_deg: tuple[float, ...] | None = None
+    wavelengths_um: tuple[float, ...] | None = None
+    reference_wavelength_um: float | None = None
+    f_number: float | None = None
+    entrance_pupil_diameter_mm: float | None = None
+    stop_semi_diameter_mm: float | None = None
+    glass: list[dict[str, Any]] = field(default_factory=list)
+    glass_catalogues: tuple[str, ...] = ()
+    tolerance: dict[str, Any] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -256,44 +265,36 @@ def parse_prescription(
     text: str, catalogues: Sequence[GlassCatalogue] = (), *, folder: Path | None = None
 ) -> Lens:
     """Read a lens from TOML text; see `read_prescription`."""
-    table = parse_toml(text.encode(), "the prescription")
-    _check_keys(table, allowed=_LENS_KEYS, needed={"name", "stop", "surface"}, where="the lens")
-    kinds = [kind for kind in APERTURE_KINDS if kind in table]
+    table = section("the lens", _LensTable, parse_toml(text.encode(), "the prescription"))
+    given = {kind: getattr(table, kind) for kind in APERTURE_KINDS}
+    kinds = [kind for kind, value in given.items() if value is not None]
     if len(kinds) != 1:
         raise ContractError(f"give exactly one of {', '.join(APERTURE_KINDS)}; got {kinds}")
-    stop = table["stop"]
-    if not isinstance(stop, int) or isinstance(stop, bool):
-        raise ContractError(f"stop must be the index of a surface (from 0); got {stop!r}")
-    optional: dict[str, Any] = {}
-    if "field_angles_deg" in table:
-        angles = _numbers(table["field_angles_deg"], "field_angles_deg")
-        optional["field_angles_rad"] = tuple(map(to_radians, angles))
-    if "wavelengths_um" in table:
-        optional["wavelengths_um"] = _numbers(table["wavelengths_um"], "wavelengths_um")
-    for key in ("object_distance_mm", "reference_wavelength_um"):
-        if key in table:
-            optional[key] = _number(table[key], key)
+    stated = ("object_distance_mm", "wavelengths_um", "reference_wavelength_um")
+    optional = {name: getattr(table, name) for name in stated}
+    if table.field_angles_deg is not None:
+        optional["field_angles_rad"] = tuple(map(to_radians, table.field_angles_deg))
+    glasses = (*_own_catalogues(table, folder), *catalogues)
     return Lens(
-        name=_text(table["name"], "name"),
-        note=_text(table.get("note", ""), "note"),
-        surfaces=_parse_surfaces(table["surface"], (*_own_catalogues(table, folder), *catalogues)),
-        stop=stop,
+        name=table.name,
+        note=table.note,
+        surfaces=tuple(
+            _parse_surface(section(f"surface {i}", _SurfaceTable, one), f"surface {i}", glasses)
+            for i, one in enumerate(table.surface)
+        ),
+        stop=table.stop,
         aperture_kind=kinds[0],
-        aperture_value=_number(table[kinds[0]], kinds[0]),
-        **optional,
+        aperture_value=given[kinds[0]],
+        **{name: value for name, value in optional.items() if value is not None},
     )
 
 
-def _own_catalogues(table: Mapping[str, Any], folder: Path | None) -> list[GlassCatalogue]:
+def _own_catalogues(table: _LensTable, folder: Path | None) -> list[GlassCatalogue]:
     """Return the glasses that a prescription brings along: its own tables, then its .agf files."""
-    tables = _tables(table.get("glass", []), "[[glass]]")
-    own = GlassCatalogue(name=table["name"], glasses=tuple(map(parse_glass_table, tables)))
-    names = table.get("glass_catalogues", [])
-    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise ContractError(f"glass_catalogues must be a list of .agf files; got {names!r}")
-    if names and folder is None:
+    own = GlassCatalogue(name=table.name, glasses=tuple(map(parse_glass_table, table.glass)))
+    if table.glass_catalogues and folder is None:
         raise ContractError("glass_catalogues are relative to a file; this prescription is none")
-    return [own, *(read_agf((folder or Path()) / name) for name in names)]
+    return [own, *(read_agf((folder or Path()) / name) for name in table.glass_catalogues)]
 
 
 def write_prescription(lens: Lens, path: Path) -> None:
@@ -385,93 +386,37 @@ def _radius_text(curvature_per_mm: float) -> str:
     return repr(radius_mm)
 
 
-def _parse_surfaces(value: object, catalogues: Sequence[GlassCatalogue]) -> tuple[Surface, ...]:
-    tables = _tables(value, "[[surface]]")
-    return tuple(_parse_surface(table, i, catalogues) for i, table in enumerate(tables))
-
-
-def _tables(value: object, kind: str) -> list[dict[str, Any]]:
-    if not isinstance(value, list) or not all(isinstance(t, dict) for t in value):
-        raise ContractError(f"write {kind} tables; got {value!r:.80}")
-    return value
-
-
 def _parse_surface(
-    table: Mapping[str, Any], number: int, catalogues: Sequence[GlassCatalogue]
+    table: _SurfaceTable, where: str, catalogues: Sequence[GlassCatalogue]
 ) -> Surface:
-    where = f"surface {number}"
-    _check_keys(table, allowed=_SURFACE_KEYS, needed={"radius_mm", "thickness_mm"}, where=where)
-    radius_mm = _number(table["radius_mm"], f"{where}: radius_mm")
-    if radius_mm == 0 or math.isnan(radius_mm):
+    if table.radius_mm == 0:
         raise ContractError(f"{where}: radius_mm must not be 0 (a plane is inf)")
     try:
-        glass = find_glass(_text(table.get("glass", "air"), "glass"), catalogues)
-    except ContractError as error:
-        raise ContractError(f"{where}: {error}") from error
-    made = Surface(
-        curvature_per_mm=1 / radius_mm,
-        thickness_mm=_number(table["thickness_mm"], f"{where}: thickness_mm"),
-        glass=glass.name,
-        material=own_glass(glass, catalogues),
-        semi_diameter_mm=_number(
-            table.get("semi_diameter_mm", math.inf), f"{where}: semi_diameter_mm"
-        ),
-        conic=_number(table.get("conic", 0.0), f"{where}: conic"),
-        even_asphere=_numbers(table.get("even_asphere", []), f"{where}: even_asphere"),
-        vary=_names(table.get("vary", []), f"{where}: vary"),
-    )
-    try:
+        glass = find_glass(table.glass, catalogues)
+        made = Surface(
+            curvature_per_mm=1 / table.radius_mm,
+            thickness_mm=table.thickness_mm,
+            glass=glass.name,
+            material=own_glass(glass, catalogues),
+            semi_diameter_mm=table.semi_diameter_mm,
+            conic=table.conic,
+            even_asphere=table.even_asphere,
+            vary=cast("tuple[Vary, ...]", table.vary),
+        )
         return replace(made, grooves=_parse_grooves(table))
     except (ContractError, UnsupportedError) as error:
         raise type(error)(f"{where}: {error}") from error
 
 
-def _parse_grooves(table: Mapping[str, Any]) -> Grooves | None:
-    if "groove_depth_um" not in table:
-        astray = sorted({"groove_walls", "tool_radius_um"} & set(table))
+def _parse_grooves(table: _SurfaceTable) -> Grooves | None:
+    if table.groove_depth_um is None:
+        further = {name: getattr(table, name) for name in ("groove_walls", "tool_radius_um")}
+        astray = [name for name, value in further.items() if value is not None]
         if astray:
             raise ContractError(f"{', '.join(astray)} without groove_depth_um")
         return None
-    walls = table.get("groove_walls", True)
-    if not isinstance(walls, bool):
-        raise ContractError(f"groove_walls must be true or false; got {walls!r}")
     return Grooves(
-        depth_um=_number(table["groove_depth_um"], "groove_depth_um"),
-        walls=walls,
-        tool_radius_um=_number(table.get("tool_radius_um", 0.0), "tool_radius_um"),
+        depth_um=table.groove_depth_um,
+        walls=table.groove_walls is not False,
+        tool_radius_um=table.tool_radius_um or 0.0,
     )
-
-
-def _names(value: object, where: str) -> Any:
-    if not isinstance(value, list) or not all(isinstance(v, str) for v in value):
-        raise ContractError(f"{where} must be a list of names; got {value!r:.80}")
-    return tuple(value)
-
-
-def _check_keys(
-    table: Mapping[str, Any], *, allowed: set[str], needed: set[str], where: str
-) -> None:
-    unknown, missing = sorted(set(table) - allowed), sorted(needed - set(table))
-    if unknown or missing:
-        raise ContractError(
-            f"{where}: unknown keys {unknown}, missing keys {missing}; "
-            f"known are {', '.join(sorted(allowed))}"
-        )
-
-
-def _number(value: object, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ContractError(f"{where} must be a number; got {value!r}")
-    return float(value)
-
-
-def _numbers(value: object, where: str) -> tuple[float, ...]:
-    if not isinstance(value, list):
-        raise ContractError(f"{where} must be a list of numbers; got {value!r}")
-    return tuple(_number(v, where) for v in value)
-
-
-def _text(value: object, where: str) -> str:
-    if not isinstance(value, str):
-        raise ContractError(f"{where} must be text; got {value!r}")
-    return value

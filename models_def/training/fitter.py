@@ -38,13 +38,13 @@ class Stateful(Protocol):
         ...
 
     def load_state_dict(self, state: Any) -> Any:
-        """Go back to a saved state."""
+        """Restore a saved state."""
         ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Objective:
-    """What a network is fitted to, in place of the errors of its patches.
+    """The loss that a network is fitted to, in place of the errors of its patches.
 
     Attributes:
         loss: The fitter, a batch, the steps done before and the share of the schedule that lies

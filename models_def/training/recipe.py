@@ -46,7 +46,7 @@ def check_share(where: str, value: float) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SceneRecipe:
-    """Where sharp crops come from.
+    """Sources of sharp crops.
 
     Attributes:
         picture_share: Share of crops of pictures, the rest is procedural; without a folder of
@@ -62,7 +62,7 @@ class SceneRecipe:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DataRecipe(SceneRecipe):
-    """How many samples are made and held; a kind may add keys of its own.
+    """Numbers of samples that are made and held; a kind may add keys of its own.
 
     Attributes:
         sample_px: Side of a finished sample; training patches are cut from it.

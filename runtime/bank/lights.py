@@ -3,7 +3,7 @@
     clipped samples -> windows around them -> rounds of Richardson-Lucy -> faded away from them
 
 Farther from the lights nothing is gained by an explanation, and detail is lost: Richardson-Lucy in
-few rounds leaves more unexplained than the noise (measured by tools/lights/clipped.py).
+few rounds leaves more unexplained than the noise (measured by tools/lights/clipped.py at 2a55aa66).
 Where few samples are clipped, small windows do: most of the kernel must fit one, and its OTF there
 is the block's at every second, third or fourth frequency.
 """
@@ -52,7 +52,7 @@ class WindowRule:
 
 RULES: Final = {
     # The rest, some hundredths of its light, wraps around to where the explanation no longer
-    # counts; half as much was no better (tools/lights/clipped.py).
+    # counts; half as much was no better (tools/lights/clipped.py at 2a55aa66).
     "half_kernel": WindowRule(
         margin_px=20,
         ring_px=8,

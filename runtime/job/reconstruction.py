@@ -18,13 +18,13 @@ from camkit.runtime.cancel import Cancel, cancellable
 from camkit.runtime.clock import StageClock
 from camkit.runtime.color import ColorStage
 from camkit.runtime.job.job import Job
+from camkit.runtime.job.kind_capture import KindCapture
 from camkit.runtime.job.log import Log
 from camkit.runtime.job.meter import Meter
 from camkit.runtime.job.photograph import content_of, know_photograph
 from camkit.runtime.job.setup import Setup
 from camkit.runtime.job.stream import Stream
 from camkit.runtime.job.walker import Walk, probed
-from camkit.runtime.job.kind_capture import KindCapture
 from camkit.runtime.network.tiling import Progress
 from camkit.runtime.network.windows import NetworkWindows
 from camkit.runtime.output.origin import Origin

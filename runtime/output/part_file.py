@@ -6,7 +6,7 @@ Every writer has a part file of its own, so two processes never write into one a
 import hashlib
 import os
 import secrets
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
@@ -76,6 +76,22 @@ def atomic_outputs(*paths: Path) -> Iterator[tuple[Path, ...]]:
     finally:
         for part in parts:
             part.unlink(missing_ok=True)
+
+
+def write_together(files: Mapping[Path, bytes]) -> None:
+    """Write files into folders that are made if they are not there; all of them or none.
+
+    Args:
+        files: Path -> content, in the order in which they appear.
+
+    Raises:
+        OSError: If one cannot be written.
+    """
+    for path in files:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_outputs(*files) as parts:
+        for part, data in zip(parts, files.values(), strict=True):
+            part.write_bytes(data)
 
 
 def _rename(parts: Sequence[Path], paths: Sequence[Path]) -> None:

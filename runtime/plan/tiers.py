@@ -22,7 +22,7 @@ from camkit.runtime.plan.decision import FULL, PLAIN, SMALL, WIENER, Labels
 
 BANK_MAC: Final = 17_000.0
 """Work of the bank per pixel, in multiplications of a network that take as long
-(measured: `python -m tools.plan_report work`).
+(measured: `tools/plan/work.py` at 2a55aa66).
 """
 NETWORK_FIXED_MAC: Final = 4_500.0
 """What a network costs per pixel besides its multiplications, in the same unit (measured)."""

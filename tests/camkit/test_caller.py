@@ -33,8 +33,11 @@ from tests.dng_factory import dng_tags, scene_mosaic
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = (
     *(ROOT / "runtime", ROOT / "export", ROOT / "models_def"),
-    *(ROOT / "camkit" / name for name in ("bundle", "scenes", "streaks")),
-    *(ROOT / "camkit" / f"{name}.py" for name in ("contracts", "haze", "kinds", "colorimetry")),
+    *(ROOT / "camkit" / name for name in ("bundle", "scenes", "calibration")),
+    *(
+        ROOT / "camkit" / f"{name}.py"
+        for name in ("contracts", "haze", "kinds", "colorimetry", "streaks")
+    ),
 )
 """All that programs may call; `camkit.cli` and `camkit.report` speak to the command line alone."""
 FLAG = re.compile(r"(?<![\w-])--[a-z][a-z0-9-]+")

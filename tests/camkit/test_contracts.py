@@ -92,7 +92,7 @@ def test_kernels_between_shifts_are_shared_by_their_neighbours() -> None:
 
 
 def test_a_focus_that_is_not_known_is_refused() -> None:
-    with pytest.raises(ContractError, match="knows the nominal focus alone"):
+    with pytest.raises(ContractError, match="has the nominal focus alone"):
         focus_weights(None, 1.0)
     for focus_um in (-41.0, 20.1, np.nan):
         with pytest.raises(ContractError, match="reaches from a focus of -40 to 20 um; got"):

@@ -3,6 +3,7 @@
 import json
 import re
 import shlex
+import subprocess
 from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
@@ -22,12 +23,16 @@ from tests.capture_factory import write_tiny_captures
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 CURRENT = [path for path in DOCUMENTS if path.parent.name != "background"]
-"""History names commands and options as they were."""
+"""History names commands, options and files as they were."""
 MADE_BY_EXPORT = "camkit/bundles/duet.camkit"
+TOOL = re.compile(r"(?<![A-Za-z_])(?:tests/)?tools(?:[./][a-z_0-9]+)+")
+"""A module of the tools, as `python -m` takes it or as a path."""
+COMMIT = re.compile(r"\bat ([0-9a-f]{8})\b")
 EVERYWHERE = {"--help", "-h", "--debug"}
 KEPT = {".md", ".json", ".jsonl", ".csv", ".png"}
 MADE_ANEW = {".html", ".svg"}  # of results, which git ignores
 MOST_BYTES = 600_000
+RESULTS = ROOT / "docs" / "results"
 
 
 @cache
@@ -110,11 +115,11 @@ def test_every_link_leads_somewhere(document: Path) -> None:
             assert (document.parent / target).exists(), target
 
 
-@pytest.mark.parametrize("document", DOCUMENTS, ids=_id)
+@pytest.mark.parametrize("document", CURRENT, ids=_id)
 def test_every_file_and_module_named_exists(document: Path) -> None:
     text = document.read_text(encoding="utf-8")
     tops = "camkit|runtime|export|models_def|tests|tools|docs"
-    for name in re.findall(rf"`((?:{tops})/[A-Za-z0-9_./-]+)`", text):
+    for name in re.findall(rf"`((?:{tops})/[A-Za-z0-9_./-]+)`(?! at [0-9a-f]{{8}})", text):
         assert name == MADE_BY_EXPORT or (ROOT / name).exists(), name
     for module in re.findall(r"`camkit((?:\.[a-z_]+)+)\b[^`]*`", text):
         parts = module.strip(".").split(".")
@@ -124,8 +129,42 @@ def test_every_file_and_module_named_exists(document: Path) -> None:
         assert here or any(f.exists() for f in files), module
 
 
+@pytest.mark.parametrize("document", CURRENT, ids=_id)
+def test_every_tool_that_is_named_is_there_or_stands_beside_the_commit_that_has_it(
+    document: Path,
+) -> None:
+    text = document.read_text(encoding="utf-8").replace("\\\n", " ")
+    for line in text.splitlines():
+        for tool in TOOL.finditer(line):
+            place = tool.group().removesuffix(".py").replace(".", "/")
+            if (ROOT / f"{place}.py").is_file() or (ROOT / place).is_dir():
+                continue
+            commit = COMMIT.search(line[tool.end() :])
+            assert commit is not None, f"{tool.group()} is not there: {line}"
+            assert f"{place}.py" in (_tools_at(commit[1]) or (f"{place}.py",)), line
+
+
+@cache
+def _tools_at(commit: str) -> tuple[str, ...]:
+    """Return the files of the tools of a commit; none where there is no history to ask."""
+    asked = ("git", "ls-tree", "-r", "--name-only", commit, "tools/", "tests/tools/")
+    answer = subprocess.run(asked, cwd=ROOT, capture_output=True, text=True, check=False)
+    return tuple(answer.stdout.split())
+
+
+def test_every_result_is_named_beside_what_made_it() -> None:
+    table = (RESULTS / "README.md").read_text(encoding="utf-8").partition("## What made them")[2]
+    places = re.findall(r"^\| `([^`]+)` \| [^|]+ \|$", table, re.MULTILINE)
+    for path in RESULTS.rglob("*"):
+        name = path.relative_to(RESULTS).as_posix()
+        if path.suffix in KEPT - {".md"}:
+            assert any(name == place or name.startswith(place) for place in places), name
+    for place in places:
+        assert [*RESULTS.glob(f"{place}*")], place
+
+
 def test_results_are_data_and_pictures_of_no_great_size() -> None:
-    files = [path for path in (ROOT / "docs" / "results").rglob("*") if path.is_file()]
+    files = [path for path in RESULTS.rglob("*") if path.is_file()]
     kept = [path for path in files if path.suffix not in MADE_ANEW]
     assert kept
     assert {path.suffix for path in kept} <= KEPT

@@ -39,7 +39,7 @@ def test_a_unit_without_a_name_has_that_of_its_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "one of bundle_sha256 and lens_sha256 must state what the unit belongs to; got none"),
+        ("", "one of bundle_sha256 and lens_sha256 must state where the body belongs; got none"),
         (f'bundle_sha256 = "{HASH}"\nlens_sha256 = "{HASH}"', "got bundle_sha256 and lens_sha256"),
         ("lens_sha256 = 3", "lens_sha256 must be the hash of a lens; got 3"),
         (f'lens_sha256 = "{HASH}"\nmeasured = 1', "measured must be a table"),
@@ -61,7 +61,7 @@ def test_what_is_no_unit_is_refused(tmp_path: Path, text: str, message: str) -> 
 
 
 def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ContractError, match="cannot read the unit"):
+    with pytest.raises(ContractError, match="cannot read the camera body"):
         read_unit(tmp_path / "absent.toml")
 
 
@@ -109,7 +109,7 @@ def test_a_unit_of_a_lens_holds_for_every_bundle_with_that_lens(tmp_path: Path) 
 def test_a_focus_needs_kernels_that_reach_it(tmp_path: Path) -> None:
     plain = write_focus_bundle(tmp_path, "plain", moved=False)
     for bundle, focus_um, message in (
-        (plain, 2.0, "knows the nominal focus alone, not that of a unit"),
+        (plain, 2.0, "has the nominal focus alone, not that of the camera body"),
         (write_focus_bundle(tmp_path), 41.0, "reaches from a focus of -40 to 40 um; got 41 um"),
     ):
         unit = Unit(name="b", bundle_sha256=bundle.sha256, facts={"focus_um": focus_um})
@@ -121,7 +121,7 @@ def test_a_focus_needs_kernels_that_reach_it(tmp_path: Path) -> None:
 
 def test_a_unit_says_one_hash() -> None:
     for hashes in ({}, {"bundle_sha256": HASH, "lens_sha256": HASH}):
-        with pytest.raises(ContractError, match="of its bundle or of its lens: one"):
+        with pytest.raises(ContractError, match="of its bundle or that of its lens"):
             Unit(name="body", **hashes)
 
 

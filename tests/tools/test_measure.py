@@ -4,7 +4,6 @@ from pathlib import Path
 
 import pytest
 
-import camkit
 from tests.bundle_factory import write_tiny_bundle
 from tests.capture_factory import write_tiny_captures
 from tests.tiny_design import run_tool
@@ -30,20 +29,6 @@ def test_speed_gives_a_row_of_seconds_for_every_size(
     assert {"decode", "wiener", "network", "write"} <= set(head)
     assert len(row) == len(head)
     assert float(row[-1]) > 10
-
-
-def test_another_checkout_takes_its_turn(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    bundle = write_tiny_captures(tmp_path, ["a"])
-    size = ("--bundle", bundle, "--runs", 1, "--sizes", "M")
-    other = ("--other", Path(camkit.__file__).parents[1])
-    run_tool(monkeypatch, "measure", "trees", tmp_path / "a.dng", *other, *size)
-    head, _, row = rows(capsys.readouterr().out)
-    assert (len(row), row[0]) == (len(head), "M")
-    assert [i for i, name in enumerate(head) if name == "ratio"] == [3, 6, 9]
-    assert all(0.2 < float(row[i]) < 5 for i in (3, 6, 9))
-    assert all(float(row[i]) > 0.1 for i in (1, 2, 4, 5, 10, 11))
 
 
 def test_tiling_differs_from_the_whole_by_nothing(

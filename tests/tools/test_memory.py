@@ -21,6 +21,7 @@ def test_peaks_are_told_as_shares_of_the_cap(
     assert last.startswith("4 runs, 0 above the cap")
     shares = [float(row.split("|")[-2]) for row in rows[2:]]
     assert all(0.02 < share < 1 for share in shares)
+    assert all(float(row.split("|")[6]) > 0.1 for row in rows[2:])
 
 
 def test_a_run_that_fails_ends_the_measurement(

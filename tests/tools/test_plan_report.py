@@ -1,4 +1,4 @@
-"""tools/plan_report.py on a tiny bundle: calibration, proof and overhead, each by its command."""
+"""tools/plan_report.py on a tiny bundle: calibration and proof, each by its command."""
 
 import json
 import shutil
@@ -13,12 +13,10 @@ import pytest
 from camkit.bundle.reader import Bundle, open_bundle
 from camkit.bundle.writer import write_bundle
 from camkit.errors import ContractError
-from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.plan.loss import read_loss_model
 from tests.bundle_factory import tiny_manifest, tiny_members, tiny_stages
-from tests.plan_factory import HEIGHT_PX, WIDTH_PX, half_textured_mosaic, write_planned_bundle
+from tests.plan_factory import half_textured_mosaic, write_planned_bundle
 from tests.tiny_design import run_tool
-from tools.plan import work
 
 
 @pytest.fixture(scope="module")
@@ -86,48 +84,3 @@ def test_report_proves_the_scenes_asked_for(
     assert [line.split("|")[1].strip() for line in table[2:]] == ["text", "all"]
     record = json.loads((tmp_path / "plan.json").read_text(encoding="utf-8"))
     assert [row["kind"] for row in record["rows"]] == ["text"]
-
-
-def test_overhead_compares_both_qualities_where_nothing_is_skipped(
-    bundle: Bundle, tool: Callable[..., int], capsys: pytest.CaptureFixture[str]
-) -> None:
-    size = ("--width", WIDTH_PX // 2, "--height", HEIGHT_PX // 2)
-    assert tool("overhead", "--bundle", bundle.path, "--runs", 2, *size) == 0
-    out = capsys.readouterr().out
-    assert out.startswith("2 runs in turn: exact ")
-    assert float(out.split("median ratio ")[1]) > 0
-
-
-@pytest.mark.parametrize("growth_s", [1.0, -1.0])
-def test_work_tells_what_a_clock_that_knows_it_says(
-    growth_s: float,
-    bundle: Bundle,
-    tool: Callable[..., int],
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    """Developed in 2 s, the bank takes 3, a network 5 and its multiplications."""
-    facts = {size: bundle.network_facts("restore", size).mac_per_pixel for size in ("S", "M")}
-    per_mac_s = growth_s / (facts["M"] - facts["S"])
-    now = [0.0]
-
-    class Work:
-        def __init__(self, pipeline: Pipeline) -> None:
-            self._options = pipeline.options
-
-        def fill(self, _: None) -> None:
-            method, size = self._options.method, self._options.size
-            now[0] += 2.0 if method == "develop" else 5.0
-            if method is None:
-                now[0] += 5.0 + per_mac_s * facts[str(size)]
-
-    monkeypatch.setattr(work, "start", lambda pipeline, _: Work(pipeline))
-    monkeypatch.setattr(work.time, "process_time", lambda: now[0])
-    command = ("work", "--bundle", bundle.path, "--runs", 3, "--width", 256, "--height", 256)
-    if growth_s < 0:
-        with pytest.raises(ContractError, match="no slower"):
-            tool(*command)
-        return
-    assert tool(*command) == 0
-    wanted = f"bank {3 / per_mac_s:,.0f} and network {5 / per_mac_s:,.0f} per pixel"
-    assert capsys.readouterr().out.startswith(wanted)

@@ -47,26 +47,3 @@ def test_layers_are_told_with_their_multiplications(
     assert head[:3] == ["node", "kind", "ms"]
     assert sum(float(row[2]) for row in nodes) == pytest.approx(float(everything[2]), abs=1)
     assert sum(bool(row[4]) for row in nodes) == 3
-
-
-@pytest.mark.usefixtures("camkit_in_process")
-def test_jobs_are_compared_on_as_many_links(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    bundle = write_tiny_captures(tmp_path, ["a"])
-    count = ("--files", 1, "--jobs", 2)
-    run_tool(monkeypatch, "stage_profile", "jobs", tmp_path / "a.dng", "--bundle", bundle, *count)
-    _, *found = rows(capsys.readouterr().out)
-    assert [row[:2] for row in found] == [["1", "1"], ["2", "1"]]
-
-
-@pytest.mark.usefixtures("camkit_in_process")
-def test_sizes_stretch_the_sensor(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    bundle = write_tiny_bundle(tmp_path)
-    size = ("--megapixels", "0.02", "--max-mem", "1G")
-    run_tool(monkeypatch, "stage_profile", "sizes", "--bundle", bundle, *size)
-    _, row = rows(capsys.readouterr().out)
-    assert row[:2] == ["0.02", "168x112"]
-    assert float(row[2]) >= 0

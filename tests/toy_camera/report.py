@@ -9,11 +9,10 @@ from camkit.report.bench.part import BenchPart
 from camkit.report.bench.row_maker import RowMaker
 from camkit.report.bench.trial import Axes, Entrant, Ground, Skip, Trial
 from camkit.report.kind import ReportPart
-from camkit.report.quality import expose
 from camkit.report.stress.part import StressPart
 from camkit.report.stress.scenario import Scenario
-from camkit.report.stress.scene import Scene, stress_scenes
-from camkit.report.stress.score import Judge, judge_of
+from camkit.report.stress.scene import Scene
+from camkit.report.stress.score import Judge
 from camkit.report.stress.shot import Shot
 from camkit.runtime.twin.exposure import Setting
 
@@ -58,6 +57,6 @@ def make_trials(entrant: Entrant, axes: Axes, ground: Ground) -> tuple[list[Tria
 ROWS: Final = RowMaker(name="brighter", methods=("brighter",), trials=make_trials)
 
 PART: Final = ReportPart(
-    bench=BenchPart(photograph=expose, rows=(ROWS,)),
-    stress=StressPart(scenes=stress_scenes, examiner=judge_of, scenarios=(STUCK_ROWS,)),
+    bench=BenchPart(rows=(ROWS,)),
+    stress=StressPart(scenarios=(STUCK_ROWS,)),
 )

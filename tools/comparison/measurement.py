@@ -14,21 +14,6 @@ from camkit.report.journal import append_journal, read_journal
 from camkit.report.quality import PsfSource, Shot, judge
 from tools.comparison.photograph import Photograph, Restorer
 
-COLUMNS: Final = (
-    "psf",
-    "set_name",
-    "picture",
-    "position",
-    "height_mm",
-    "iso",
-    "seed",
-    "method",
-    "psnr_db",
-    "ssim",
-    "seconds",
-    "megapixels",
-    "identity",
-)
 CAPTURE_COLUMNS: Final = (
     "psf",
     "set_name",

@@ -12,6 +12,7 @@ import numpy as np
 
 from tools.comparison.measurement import Measurement
 from tools.comparison.names import BEFORE, CLASSICAL, TITLES, title_of
+from tools.tables.records import markdown_table
 
 OURS: Final = ("bank", "S", "M", "L")
 CLASSIC: Final = "best classical"
@@ -74,13 +75,18 @@ def to_lines(gains: Sequence[Mapping[str, Any]]) -> list[str]:
     if not gains:
         return []
     isos, places = list(gains[0]["by_iso"]), list(gains[0]["by_position"])
-    heads = ["all", "aim", *(f"ISO {iso}" for iso in isos), *(f"position {p}" for p in places)]
-    lines = ["| gain in dB, paired | " + " | ".join(heads) + " |", "|---" * (len(heads) + 1) + "|"]
-    for gain in gains:
-        parts = [*gain["by_iso"].values(), *gain["by_position"].values()]
-        cells = " | ".join([_cell(gain["all"]), _aim_cell(gain), *map(_cell, parts)])
-        lines.append(f"| {title_of(gain['method'])} over {title_of(gain['over'])} | {cells} |")
-    return ["### Gains on the same captures", "", *lines, ""]
+    heads = ["gain in dB, paired", "all", "aim", *(f"ISO {iso}" for iso in isos)]
+    cells = [
+        [
+            f"{title_of(gain['method'])} over {title_of(gain['over'])}",
+            _cell(gain["all"]),
+            _aim_cell(gain),
+            *map(_cell, (*gain["by_iso"].values(), *gain["by_position"].values())),
+        ]
+        for gain in gains
+    ]
+    table = markdown_table([*heads, *(f"position {place}" for place in places)], cells)
+    return ["### Gains on the same captures", "", table, ""]
 
 
 def _aim_cell(gain: Mapping[str, Any]) -> str:

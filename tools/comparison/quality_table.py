@@ -9,6 +9,7 @@ import numpy as np
 from tools.comparison.measurement import Measurement
 from tools.comparison.names import CLASSICAL, title_of
 from tools.comparison.paired import best_classical, paired_gains, pairs_of, to_lines
+from tools.tables.records import markdown_table
 
 PSF_TITLES: Final = {
     "fresh": "fabricated lenses, PSF traced afresh",
@@ -126,7 +127,7 @@ def to_markdown(report: Mapping[str, Any]) -> str:
     methods = list(report["methods"])
     for psf, summary in report["summary"].items():
         lines += [f"## Captures through {PSF_TITLES[psf]}", ""]
-        lines += _table("", {"all": summary["by_iso"]}, summary["overall"], methods)
+        lines += _table(summary["by_iso"], summary["overall"], methods)
         lines += to_lines(summary["gains"])
         lines += _copy_lines(summary["by_copy"], report.get("copies", {}), methods)
         lines += ["### By picture set", ""]
@@ -177,22 +178,16 @@ def _protocol_lines(report: Mapping[str, Any]) -> list[str]:
 
 
 def _table(
-    title: str,
-    groups: Mapping[str, Mapping[str, Mapping[str, Any]]],
-    overall: Mapping[str, Any],
-    methods: Sequence[str],
+    by_iso: Mapping[str, Mapping[str, Any]], overall: Mapping[str, Any], methods: Sequence[str]
 ) -> list[str]:
     """Return a table with a line per method and PSNR / SSIM per ISO and over all."""
-    (by_iso,) = groups.values()
-    isos = list(by_iso)
+    heads = ["PSNR in dB / SSIM", *(f"ISO {iso}" for iso in by_iso), "all"]
+    cells = [
+        [title_of(n), *(_cell(found[n]) for found in by_iso.values()), _cell(overall[n])]
+        for n in methods
+    ]
     count = overall[methods[0]]["n"]
-    lines = [title, ""] if title else []
-    lines.append("| PSNR in dB / SSIM | " + " | ".join(f"ISO {i}" for i in isos) + " | all |")
-    lines.append("|---" * (len(isos) + 2) + "|")
-    for name in methods:
-        cells = [_cell(by_iso[iso][name]) for iso in isos] + [_cell(overall[name])]
-        lines.append(f"| {title_of(name)} | " + " | ".join(cells) + " |")
-    return [*lines, "", f"Means over {count} captures.", ""]
+    return [markdown_table(heads, cells), "", f"Means over {count} captures.", ""]
 
 
 def _copy_lines(
@@ -202,28 +197,19 @@ def _copy_lines(
     if not by_copy:
         return []
     heads = [f"{seed}, off by {errors.get(seed, float('nan')):.2f}" for seed in by_copy]
-    lines = ["### By copy of the lens", ""]
-    lines.append("| seed, relative error of the transfer | " + " | ".join(heads) + " |")
-    lines.append("|---" * (len(heads) + 1) + "|")
-    for name in methods:
-        cells = " | ".join(_cell(found[name]) for found in by_copy.values())
-        lines.append(f"| {title_of(name)} | {cells} |")
-    return [*lines, ""]
+    cells = [[title_of(n), *(_cell(found[n]) for found in by_copy.values())] for n in methods]
+    table = markdown_table(["seed, relative error of the transfer", *heads], cells)
+    return ["### By copy of the lens", "", table, ""]
 
 
 def _groups(groups: Mapping[str, Any], methods: Sequence[str], what: str) -> list[str]:
     """Return a table per ISO with a column per group."""
-    isos = list(next(iter(groups.values())))
     lines = []
-    for iso in isos:
-        counts = {g: found[iso][methods[0]]["n"] for g, found in groups.items() if iso in found}
-        heads = [f"{g}, n = {n}" for g, n in counts.items()]
-        lines.append(f"| ISO {iso}, {what} | " + " | ".join(heads) + " |")
-        lines.append("|---" * (len(heads) + 1) + "|")
-        for name in methods:
-            cells = [_cell(groups[g][iso][name]) for g in counts]
-            lines.append(f"| {title_of(name)} | " + " | ".join(cells) + " |")
-        lines.append("")
+    for iso in next(iter(groups.values())):
+        there = {name: found[iso] for name, found in groups.items() if iso in found}
+        heads = [f"{name}, n = {found[methods[0]]['n']}" for name, found in there.items()]
+        cells = [[title_of(n), *(_cell(found[n]) for found in there.values())] for n in methods]
+        lines += [markdown_table([f"ISO {iso}, {what}", *heads], cells), ""]
     return lines
 
 

@@ -4,7 +4,7 @@ import statistics
 import tempfile
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from tools.evidence.captures import simulate_captures
 from tools.evidence.checkout import Checkout, Worker
@@ -37,7 +37,9 @@ def compare_seconds(roots: tuple[Path, Path], bundles: list[str] | None, rounds:
                 pairs = []
                 for number in range(rounds + 1):
                     order = workers[:: 1 if number % 2 else -1]
-                    told = {id(worker): worker.ask(words).get("seconds") for worker in order}
+                    told: dict[int, Any] = {
+                        id(worker): worker.ask(words).get("seconds") for worker in order
+                    }
                     if number and None not in told.values():  # the first round warms up
                         pairs.append([told[id(worker)] for worker in workers])
                 if pairs:

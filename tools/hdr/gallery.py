@@ -31,6 +31,7 @@ from camkit.runtime.twin.truth import ideal_picture
 from camkit.scenes import named_scene
 from camkit.scenes.saturation import CEILING, with_exposure
 from tools.pictures.captions import write_captioned
+from tools.pictures.crops import around_brightest
 
 SCENE: Final = "night:8"
 SIDES_PX: Final = (512, 768)
@@ -140,10 +141,7 @@ def night_rows(columns: dict[str, FloatArray]) -> dict[str, dict[str, FloatArray
     """Return the frame at `STOPS`, then its brightest light at `STOPS_OF_DETAIL`."""
     truth = columns["truth"]
     _, height, width = truth.shape
-    y, x = np.unravel_index(np.argmax(truth.sum(axis=0)), (height, width))
-    top = int(np.clip(y - height // DETAIL // 2, 0, height - height // DETAIL))
-    left = int(np.clip(x - width // DETAIL // 2, 0, width - width // DETAIL))
-    part = np.s_[:, top : top + height // DETAIL, left : left + width // DETAIL]
+    part = around_brightest(truth, height // DETAIL, width // DETAIL)
     details = {
         name.partition(":")[0]: picture[part].repeat(DETAIL, axis=1).repeat(DETAIL, axis=2)
         for name, picture in columns.items()

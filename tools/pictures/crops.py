@@ -134,3 +134,12 @@ def _as_taken(
     planes *= np.array(simulation.white_balance, np.float32)[:, None, None]
     planes = divide_illumination(planes, 0, bundle.psf, window)
     return apply_matrix(rec709_of(sensor), planes)
+
+
+def around_brightest(picture: FloatArray, height_px: int, width_px: int) -> tuple[slice, ...]:
+    """Return the rectangle of (3, h, w) around its brightest pixel, inside the picture."""
+    _, height, width = picture.shape
+    y, x = np.unravel_index(np.argmax(picture.sum(axis=0)), (height, width))
+    top = int(np.clip(y - height_px // 2, 0, height - height_px))
+    left = int(np.clip(x - width_px // 2, 0, width - width_px))
+    return np.s_[:, top : top + height_px, left : left + width_px]

@@ -5,6 +5,7 @@
 A new camera is a line of `VIEWS`.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,18 +17,19 @@ import numpy as np
 
 import camkit
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
+from camkit.bundle.stages import Deglare
 from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray
 from camkit.runtime.files.picture import read_light
+from camkit.runtime.kinds.hdr.deglare.removal import Glare, GlareSettings, find_glare
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from camkit.runtime.kinds.spad.twin.recording import PhotonOptions
 from camkit.runtime.kinds.spad.twin.simulate import fitted, luminance, record
 from camkit.runtime.kinds.spad.twin.write import write_recorded
 from tools.hdr.gallery import night_pictures
-from tools.hdr.glare_table import deglared
 from tools.hdr.glare_twin import exposed_scene, photographed, two_point_star
 from tools.hdr.glare_twin import psnr_db as streaks_psnr_db
-from tools.pictures.crops import Place, crop_pictures, psnr_db, take
+from tools.pictures.crops import Place, around_brightest, crop_pictures, psnr_db, take
 
 SCENES: Final = Path(__file__).parent.parent / "scenes"
 SIDE_PX: Final = 272
@@ -112,7 +114,7 @@ class Night:
             pictures = night_pictures(bundle, Path(folder) / "night.dng")
         light, decibels = zip(*(pictures[way] for way in ("developed", "network")), strict=True)
         truth, _ = pictures["truth"]
-        part = _around_brightest(truth)
+        part = around_brightest(truth, SIDE_PX, SIDE_PX)
         rows = {
             f"A synthetic night, shown {_exposure(stop)}": [
                 encode_srgb(picture[part] * np.float32(2.0**stop)) for picture in (*light, truth)
@@ -139,10 +141,10 @@ class Windshield:
         bundle = open_bundle(find_bundle(name))
         scene = exposed_scene(f"night:{self.seed}", 384, 512)
         shot = photographed(scene, two_point_star(np.deg2rad(self.angle_deg)), self.seed)
-        glare, cleared = deglared(shot.seen)
+        glare, cleared = _deglared(shot.seen)
         level = glare.settings.level
         decibels = [streaks_psnr_db(picture, shot, level) for picture in (shot.seen, cleared)]
-        part = _around_brightest(shot.seen)
+        part = around_brightest(shot.seen, SIDE_PX, SIDE_PX)
         shown = [encode_srgb(picture[part]) for picture in (shot.seen, cleared, shot.wanted)]
         row = {"A synthetic night behind a wiped windshield": shown}
         return _view(bundle, row, (decibels[0], decibels[1]))
@@ -216,10 +218,17 @@ def _exposure(stop: int) -> str:
     return f"{-stop} stops darker" if stop else "as exposed"
 
 
-def _around_brightest(picture: FloatArray) -> tuple[slice, slice, slice]:
-    """Return the square of `SIDE_PX` around the brightest pixel of (3, h, w)."""
-    _, height, width = picture.shape
-    y, x = np.unravel_index(np.argmax(picture.sum(axis=0)), (height, width))
-    top = int(np.clip(y - SIDE_PX // 2, 0, height - SIDE_PX))
-    left = int(np.clip(x - SIDE_PX // 2, 0, width - SIDE_PX))
-    return np.s_[:, top : top + SIDE_PX, left : left + SIDE_PX]
+def _deglared(seen: FloatArray) -> tuple[Glare, FloatArray]:
+    """Take the streaks out of a picture (3, h, w) that clips at 1, as the bundle does."""
+    entry = Deglare()
+    settings = GlareSettings(
+        least_rad=math.radians(entry.least_angle_deg),
+        most_rad=math.radians(entry.most_angle_deg),
+        reach=entry.reach,
+        level=entry.level,
+    )
+    _, height, width = seen.shape
+    glare = find_glare(lambda: lambda top, bottom: seen[:, top:bottom], height, width, settings)
+    cleared = seen.copy()
+    glare.paint(cleared, 0, (1.0, 1.0, 1.0))
+    return glare, cleared

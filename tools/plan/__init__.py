@@ -4,5 +4,4 @@
 - `fit`: the loss model fitted to them
 - `scenes`: scenes of the proof: night, bokeh, texture, sky, text
 - `proof`: what is saved and lost on them
-- `undistortion`: what cubic undistortion saves and loses, stated in plans (a command)
 """

@@ -16,7 +16,7 @@ import numpy as np
 from camkit.errors import ContractError
 from camkit.runtime.plan.decision import FULL, PLAIN, SMALL, WIENER
 from camkit.runtime.plan.loss import EXACT, CellLosses, LossModel
-from camkit.runtime.plan.tiers import BANK_MAC, TierWork, choose_tiers, work_shares
+from camkit.runtime.plan.tiers import TierWork, choose_tiers
 from tools.plan.cells import CaptureCells
 
 MEAN_DB: Final = 0.07
@@ -155,31 +155,6 @@ def true_loss_db(
     )
     got = np.take_along_axis(measured, labels[None].astype(np.intp), axis=0).sum()
     return float(10 * np.log10(got / capture.errors[EXACT].sum()))
-
-
-def saving_of_the_all_knowing(
-    capture: CaptureCells, work: TierWork, small: str | None, loss_db: float
-) -> float:
-    """Return the share of work that could be saved if every cell's loss were known beforehand.
-
-    Args:
-        capture: Measured.
-        work: What the tiers cost, borders included.
-        small: The target that tier SMALL takes; None without one.
-        loss_db: What may be lost.
-    """
-    exact = capture.errors[EXACT]
-    known = CellLosses(
-        exact=exact,
-        extra={name: np.maximum(error - exact, 0) for name, error in capture.errors.items()},
-    )
-    area = capture.content.cell_px
-    labels = choose_tiers(area, _grid(known, small), known.allowed(loss_db), work)
-    if labels is None:
-        return 0.0
-    bank, network = work_shares(labels, area, work)
-    everything = work.per_px()[FULL]
-    return float(1 - (bank * BANK_MAC + network * (everything - BANK_MAC)) / everything)
 
 
 def _grid(losses: CellLosses, small: str | None) -> np.ndarray:

@@ -12,6 +12,7 @@ import numpy as np
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Wiener
 from camkit.contracts import FloatArray
+from camkit.report.figure import new_figure, to_png, to_svg
 from camkit.runtime.bank.blocks import lay_spans
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.options import Options, Quality
@@ -23,6 +24,7 @@ from camkit.runtime.plan.speed import Speed
 from camkit.runtime.twin.simulate import Simulation
 from tools.plan.cells import cell_errors, photograph, sharp_of, start
 from tools.plan.scenes import ProofScene
+from tools.tables.records import markdown_table
 
 ISOS: Final = (100.0, 800.0)
 STAGES: Final = ("wiener", "network")
@@ -176,24 +178,24 @@ def write_report(rows: Sequence[ProofRow], bundle: Bundle, folder: Path) -> list
     }
     (folder / "plan.json").write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
     _chart(rows, folder)
-    lines = [
-        "| kind | captures | mean loss | worst loss | network + FFT saved | by the clock |",
-        "|---|---|---|---|---|---|",
+    heads = ["kind", "captures", "mean loss", "worst loss", "network + FFT saved", "by the clock"]
+    cells = [
+        [
+            name,
+            f"{means['captures']:.0f}",
+            f"{means['mean_loss_db']:.3f} dB",
+            f"{means['worst_loss_db']:.3f} dB",
+            f"{means['saved_work']:.0%}",
+            f"{means['saved_seconds']:.0%}",
+        ]
+        for name, means in summary.items()
     ]
-    for name, means in summary.items():
-        lines.append(
-            f"| {name} | {means['captures']:.0f} | {means['mean_loss_db']:.3f} dB | "
-            f"{means['worst_loss_db']:.3f} dB | {means['saved_work']:.0%} | "
-            f"{means['saved_seconds']:.0%} |"
-        )
-    return lines
+    return markdown_table(heads, cells).splitlines()
 
 
 def _chart(rows: Sequence[ProofRow], folder: Path) -> None:
     """Draw saving against loss, a colour per subject, with the limits of the loss."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7, 4.5), layout="constrained")
+    figure = new_figure(7, 4.5)
     axes = figure.subplots()
     for subject in dict.fromkeys(row.kind for row in rows):
         group = [row for row in rows if row.kind == subject]
@@ -205,5 +207,5 @@ def _chart(rows: Sequence[ProofRow], folder: Path) -> None:
     axes.set_ylabel("network + FFT time saved in %")
     axes.set_title("adaptive against exact, one point per capture")
     axes.legend(fontsize="small")
-    for ending in ("png", "svg"):
-        figure.savefig(folder / f"plan.{ending}", dpi=120)
+    (folder / "plan.png").write_bytes(to_png(figure))
+    (folder / "plan.svg").write_text(to_svg(figure), encoding="utf-8")

@@ -126,7 +126,7 @@ def stages_of_packages() -> dict[str, str]:
 
 
 def _validated(value: Any, built_in: core_schema.ValidatorFunctionWrapHandler) -> StageEntry:
-    """Validate a stage as its type wants it."""
+    """Return a stage, checked as its type demands."""
     table = value if isinstance(value, Mapping) else {}
     name = table.get("type", getattr(value, "type", None))
     if not isinstance(name, str) or not _TYPE.fullmatch(name) or name in _BY_TYPE:

@@ -126,7 +126,7 @@ def _line(moment: "Progress") -> str:
 
 
 def _draw(run: "DesignRun", moment: "Progress") -> None:
-    from camkit.report.lens.design_picture import draw_design
+    from camkit.report.pages.lens.design_picture import draw_design
 
     draw_design(run.view(), run.options.out_dir / f"{run.recipe.name}_{moment.step:06}.png")
 

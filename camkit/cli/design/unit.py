@@ -1,4 +1,4 @@
-"""`camkit freeze --unit`: captures of a target to what is known of the camera body that took them.
+"""`camkit freeze --unit`: captures of a target to the facts about the camera body that took them.
 
 OPTICS a bundle: its kernels, of its nominal and its moved sensor
 OPTICS a lens:   traced with the sensor moved (needs torch)
@@ -23,7 +23,7 @@ LEAST_ENERGY: Final = 0.9
 UNIT_SUFFIX: Final = ".toml"
 
 
-@working("measuring the focus of a unit")
+@working("measuring the focus of a camera body")
 def measure_unit(
     optics: Path,
     captures: list[Path],
@@ -38,7 +38,7 @@ def measure_unit(
         ContractError: If there is no capture, the names are wrong, or nothing can be measured.
     """
     if out.suffix.lower() != UNIT_SUFFIX:
-        raise ContractError(f"a unit is TOML; expected a name in {UNIT_SUFFIX}, got {out}")
+        raise ContractError(f"a camera body is TOML; expected a name in {UNIT_SUFFIX}, got {out}")
     if not captures:
         raise ContractError("--unit needs captures of a target: camkit freeze OPTICS --unit FILES")
     if len(depths_mm) > 1:
@@ -76,7 +76,9 @@ def focus_range_um(optics: "Optics", text: str | None) -> float:
         from camkit.models_def.optics.lens_optics import LensOptics
 
         if not isinstance(optics, LensOptics):
-            raise UnsupportedError("only of a lens it is known how its copies differ in focus")
+            raise UnsupportedError(
+                "auto needs a lens, whose fabricated samples differ in focus; give a number in um"
+            )
         return optics.focus_range_um()
     try:
         found = float(text)
@@ -123,7 +125,7 @@ def _of_lens(
     lens = read_optics(path)
     if not isinstance(lens, LensOptics):
         raise UnsupportedError(
-            f"a unit is measured with a lens or a bundle; {path.name} is neither"
+            f"a camera body is measured with a lens or a bundle; {path.name} is neither"
         )
     sensor = read_recipe(recipe).sensor
     if not isinstance(sensor, ColorSensor):

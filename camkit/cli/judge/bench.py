@@ -166,7 +166,7 @@ def _cameras() -> list[str]:
 
 def _run(settings: "Settings", out_dir: Path, *, as_json: bool) -> None:
     from camkit.report.bench.output import write_bench
-    from camkit.report.bench.own.table import own_lines
+    from camkit.report.bench.own_rows import own_lines
     from camkit.report.bench.run import run_bench
 
     with working("preparing") as task:

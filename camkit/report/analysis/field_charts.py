@@ -1,17 +1,13 @@
 """Charts of lenses over the field: light, detection, CDP, contrast, MTF, recovery."""
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from camkit.report.analysis.field import THESIS_WIDTHS, FieldPoint, LensField
 from camkit.report.analysis.point_image import DIRECTIONS, PATCH_PX
-from camkit.report.figure import FIELD_COLORS, GRID_COLOR, MARKS, new_figure
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from camkit.report.figure import MARKS, Figure, Panel, chart, field_color, hide_ticks, new_figure
 
 Value = Callable[[FieldPoint], float]
 LEAST_SHARE: Final = 1e-3
@@ -19,25 +15,27 @@ _MOST_PEAKS: Final = 5
 _FREQUENCIES: Final = np.linspace(0.0, 0.5, 101)
 
 
-def draw_light(found: Sequence[LensField]) -> "Figure":
+@chart
+def draw_light(found: Sequence[LensField]) -> Figure:
     """Draw the shares near the peak and within 900 px, and the width of the peak."""
     figure = new_figure(9.0, 3.0)
     near, far, width = figure.subplots(1, 3)
     _lines(near, found, lambda p: p.image.near_share)
     near.set_yscale("log")
     near.set_ylim(LEAST_SHARE, 1.3)
-    near.set_ylabel("light within 10 px", fontsize=8)
+    near.set_ylabel("light within 10 px")
     _lines(far, found, lambda p: p.image.far_share)
     far.set_ylim(0, 1.05)
-    far.set_ylabel("light within 900 px", fontsize=8)
+    far.set_ylabel("light within 900 px")
     _lines(width, found, lambda p: p.image.fwhm_px)
     width.set_yscale("log")
-    width.set_ylabel("width of the peak, px", fontsize=8)
-    _legend(near)
+    width.set_ylabel("width of the peak, px")
+    near.legend()
     return figure
 
 
-def draw_detection(found: Sequence[LensField], bars_px: int) -> "Figure":
+@chart
+def draw_detection(found: Sequence[LensField], bars_px: int) -> Figure:
     """Draw contrast, detection and CDP of bars; the thesis's below."""
     figure = new_figure(9.0, 5.6)
     rows = figure.subplots(2, 3, sharex=True)
@@ -46,72 +44,69 @@ def draw_detection(found: Sequence[LensField], bars_px: int) -> "Figure":
         contrast, detection, cdp = panels
         _lines(contrast, found, _of_bars(row, "contrast"))
         contrast.axhline(0, color="black", linewidth=0.6)
-        contrast.set_ylabel("contrast", fontsize=8)
-        contrast.set_title(title, fontsize=8)
+        contrast.set_ylabel("contrast")
+        contrast.set_title(title)
         _lines(detection, found, _of_bars(row, "detection"), interval=_interval(row))
         detection.axhline(0.95, color="black", linewidth=0.6, linestyle=":")
         detection.axhline(0.05, color="black", linewidth=0.6, linestyle=":")
         detection.set_ylim(-0.03, 1.03)
-        detection.set_ylabel("told apart at 95 %", fontsize=8)
+        detection.set_ylabel("told apart at 95 %")
         _lines(cdp, found, _of_bars(row, "cdp"))
         cdp.set_ylim(-0.03, 1.03)
-        cdp.set_ylabel("CDP, within half of nominal", fontsize=8)
-    _legend(rows[0][0])
+        cdp.set_ylabel("CDP, within half of nominal")
+    rows[0][0].legend()
     return figure
 
 
-def draw_mtf(found: Sequence[LensField]) -> "Figure":
+@chart
+def draw_mtf(found: Sequence[LensField]) -> Figure:
     """Draw the MTF on the axis, in the middle of the field and at its end; across dashed."""
     figure = new_figure(9.0, 3.0)
     for panel, share in zip(figure.subplots(1, 3, sharey=True), (0.0, 0.5, 1.0), strict=True):
         for number, lens in enumerate(found):
             image = lens.points[round(share * (len(lens.points) - 1))].image
-            color = FIELD_COLORS[number % len(FIELD_COLORS)]
+            color = field_color(number)
             for direction, style in zip(DIRECTIONS, ("-", "--"), strict=True):
                 mtf = image.mtf(direction, _FREQUENCIES)
                 label = lens.subject.name if style == "-" else None
-                panel.plot(_FREQUENCIES, mtf, style, color=color, linewidth=1, label=label)
-        panel.set_title(f"{share:g} of the field", fontsize=8)
-        panel.set_xlabel("cycles/px", fontsize=8)
+                panel.plot(_FREQUENCIES, mtf, style, color=color, label=label)
+        panel.set_title(f"{share:g} of the field")
+        panel.set_xlabel("cycles/px")
         panel.set_ylim(0, 1.02)
-        _plain(panel)
         if share == 0:
-            panel.set_ylabel("MTF", fontsize=8)
-            _legend(panel)
+            panel.set_ylabel("MTF")
+            panel.legend()
     return figure
 
 
-def draw_recovery(found: Sequence[LensField]) -> "Figure | None":
-    """Draw dB before (dashed) and after recovery; None where nothing was photographed."""
-    shown = [(number, lens) for number, lens in enumerate(found) if lens.recovered is not None]
-    if not shown:
-        return None
+@chart
+def draw_recovery(found: Sequence[LensField]) -> Figure:
+    """Draw dB before (dashed) and after recovery, of lenses that were photographed with."""
     figure = new_figure(6.0, 3.4)
     panel = figure.subplots()
-    for number, lens in shown:
-        color = FIELD_COLORS[number % len(FIELD_COLORS)]
+    for number, lens in enumerate(found):
+        if lens.recovered is None:
+            continue
+        color = field_color(number)
         points = [p for p in lens.points if p.psnr_db is not None]
         at = [p.image.height_mm for p in points]
         triples = [p.psnr_db for p in points if p.psnr_db is not None]
-        assert lens.recovered is not None
-        panel.plot(at, [t[0] for t in triples], "--", color=color, linewidth=1)
+        panel.plot(at, [t[0] for t in triples], "--", color=color)
         panel.plot(
             at,
             [t[2] for t in triples],
             marker=MARKS[number % len(MARKS)],
             color=color,
-            linewidth=1,
-            markersize=4,
             label=f"{lens.subject.name}, {lens.recovered.method}",
         )
-    panel.set_xlabel("mm from the axis", fontsize=8)
-    panel.set_ylabel("PSNR, dB of sRGB", fontsize=8)
-    _plain(panel)
-    _legend(panel)
+    panel.set_xlabel("mm from the axis")
+    panel.set_ylabel("PSNR, dB of sRGB")
+    panel.legend()
     return figure
 
 
-def draw_peaks(found: Sequence[LensField]) -> "Figure":
+@chart
+def draw_peaks(found: Sequence[LensField]) -> Figure:
     """Draw the peaks of every lens over the field, square root of the light."""
     columns = min(_MOST_PEAKS, max(len(lens.points) for lens in found))
     figure = new_figure(1.5 * columns, 1.6 * len(found))
@@ -124,9 +119,8 @@ def draw_peaks(found: Sequence[LensField]) -> "Figure":
             reach = PATCH_PX
             panel.imshow(light, cmap="magma", vmin=0, vmax=1, extent=(-reach, reach, reach, -reach))
             panel.set_title(f"{image.height_mm:.1f} mm", fontsize=7)
-            panel.set_xticks([])
-            panel.set_yticks([])
-        panels[0].set_ylabel(lens.subject.name, fontsize=7)
+            hide_ticks(panel)
+        panels[0].set_ylabel(lens.subject.name)
     return figure
 
 
@@ -139,35 +133,23 @@ def _interval(row: int) -> Callable[[FieldPoint], tuple[float, float]]:
 
 
 def _lines(
-    panel: "Axes",
+    panel: Panel,
     found: Sequence[LensField],
     value: Value,
     *,
     interval: Callable[[FieldPoint], tuple[float, float]] | None = None,
 ) -> None:
     for number, lens in enumerate(found):
-        color = FIELD_COLORS[number % len(FIELD_COLORS)]
+        color = field_color(number)
         at = [p.image.height_mm for p in lens.points]
         panel.plot(
             at,
             [value(p) for p in lens.points],
             marker=MARKS[number % len(MARKS)],
             color=color,
-            linewidth=1,
-            markersize=4,
             label=lens.subject.name,
         )
         if interval is not None:
             low, high = zip(*(interval(p) for p in lens.points), strict=True)
             panel.fill_between(at, low, high, color=color, alpha=0.2, linewidth=0)
-    panel.set_xlabel("mm from the axis", fontsize=8)
-    _plain(panel)
-
-
-def _legend(panel: "Axes") -> None:
-    panel.legend(fontsize=6, frameon=False)
-
-
-def _plain(panel: "Axes") -> None:
-    panel.grid(visible=True, color=GRID_COLOR, linewidth=0.5)
-    panel.tick_params(labelsize=7, which="both")
+    panel.set_xlabel("mm from the axis")

@@ -1,6 +1,7 @@
 """The page of lenses over the field."""
 
 from collections.abc import Sequence
+from typing import Final
 
 from camkit.report.analysis.bars import PAIRS, WHITE
 from camkit.report.analysis.field import THESIS_WIDTHS, FieldOptions, FieldPoint, LensField
@@ -11,9 +12,14 @@ from camkit.report.analysis.field_charts import (
     draw_peaks,
     draw_recovery,
 )
-from camkit.report.calibration.page import Section, Table, to_html
 from camkit.report.figure import to_png
+from camkit.report.pages.page import Page, Picture, Section, Table, to_html
 from camkit.units import to_degrees
+
+_HEADER: Final = (
+    *("mm", "degrees", "10 px", "900 px", "lost", "width, px", "like the axis", "contrast"),
+    *("told apart", "95 %", "CDP", "dB before", "filter", "after"),
+)
 
 
 def field_html(found: Sequence[LensField], options: FieldOptions) -> str:
@@ -23,44 +29,32 @@ def field_html(found: Sequence[LensField], options: FieldOptions) -> str:
         if options.wavelength_um is None
         else f"{options.wavelength_um:g} um"
     )
+    light = (
+        f"In {colour}, all light that arrives is 1. The peak is the densest disc of 5 px; its "
+        "width is that of a disc of the area above half its height.",
+        Picture("Light and width over the field.", to_png(draw_light(found))),
+        Picture("Peaks, 129 px wide; square root of the light.", to_png(draw_peaks(found))),
+    )
+    bars = (
+        f"Bars of full contrast at ISO {options.iso:g}, white on the axis at "
+        f"{WHITE:g} of the white level for every lens, {PAIRS} pairs of pixels each. Told "
+        "apart means: the bright pixel exceeds the dark one by more than two equal pixels "
+        "differ in 19 of 20 pairs; 0.05 is chance. CDP is the share of pairs whose contrast "
+        f"lies within half of the nominal one. Below: bars {THESIS_WIDTHS} widths of the peak "
+        "wide. Of two directions the one with less contrast at the bars above is shown.",
+        Picture("Bars over the field.", to_png(draw_detection(found, options.bars_px))),
+    )
+    detail = "Detail along the radius (line) and across it (dashed)."
     sections = [
-        Section(
-            title="Light of a point",
-            paragraph=f"In {colour}, all light that arrives is 1. The peak is the densest disc of "
-            "5 px; its width is that of a disc of the area above half its height.",
-            pictures={
-                "Light and width over the field.": to_png(draw_light(found)),
-                "Peaks, 129 px wide; square root of the light.": to_png(draw_peaks(found)),
-            },
-        ),
-        Section(
-            title="Bars",
-            paragraph=f"Bars of full contrast at ISO {options.iso:g}, white on the axis at "
-            f"{WHITE:g} of the white level for every lens, {PAIRS} pairs of pixels each. Told "
-            "apart means: the bright pixel exceeds the dark one by more than two equal pixels "
-            "differ in 19 of 20 pairs; 0.05 is chance. CDP is the share of pairs whose contrast "
-            f"lies within half of the nominal one. Below: bars {THESIS_WIDTHS} widths of the peak "
-            "wide. Of two directions the one with less contrast at the bars above is shown.",
-            pictures={"Bars over the field.": to_png(draw_detection(found, options.bars_px))},
-        ),
-        Section(
-            title="MTF",
-            pictures={
-                "Detail along the radius (line) and across it (dashed).": to_png(draw_mtf(found))
-            },
-        ),
+        Section("Light of a point", light),
+        Section("Bars", bars),
+        Section("MTF", (Picture(detail, to_png(draw_mtf(found))),)),
     ]
-    recovery = draw_recovery(found)
-    if recovery is not None:
-        sections.append(
-            Section(
-                title="Recovery",
-                paragraph=_photographed(options),
-                pictures={"Capture (dashed) and what was made of it.": to_png(recovery)},
-            )
-        )
+    if any(lens.recovered is not None for lens in found):
+        drawn = Picture("Capture (dashed) and what was made of it.", to_png(draw_recovery(found)))
+        sections.append(Section("Recovery", (_photographed(options), drawn)))
     sections += [_table(lens) for lens in found]
-    return to_html("Over the field", sections)
+    return to_html(Page(title="Over the field", sections=sections))
 
 
 def _photographed(options: FieldOptions) -> str:
@@ -73,27 +67,8 @@ def _photographed(options: FieldOptions) -> str:
 
 
 def _table(lens: LensField) -> Section:
-    header = (
-        "mm",
-        "degrees",
-        "10 px",
-        "900 px",
-        "lost",
-        "width, px",
-        "like the axis",
-        "contrast",
-        "told apart",
-        "95 %",
-        "CDP",
-        "dB before",
-        "filter",
-        "after",
-    )
-    return Section(
-        title=lens.subject.name,
-        paragraph=lens.note,
-        table=Table(header=header, rows=tuple(_row(point) for point in lens.points)),
-    )
+    table = Table(header=_HEADER, rows=[_row(point) for point in lens.points])
+    return Section(lens.subject.name, (lens.note, table))
 
 
 def _row(point: FieldPoint) -> tuple[str, ...]:

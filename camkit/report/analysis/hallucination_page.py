@@ -1,9 +1,8 @@
 """The page of what pictures show and captures do not hold: histograms, maps, worst patches."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,12 +10,18 @@ from camkit.report.analysis.hallucination import PLANTED, TRUTH, Crop, Method, R
 from camkit.report.analysis.patches import MEASURES, summary
 from camkit.report.analysis.point_image import Array
 from camkit.report.analysis.unexplained import LEVEL_PX
-from camkit.report.calibration.page import Section, Table, to_html
-from camkit.report.figure import FIELD_COLORS, GRID_COLOR, new_figure, to_png
+from camkit.report.figure import (
+    Figure,
+    chart,
+    encode_png,
+    field_color,
+    hide_ticks,
+    levels_of,
+    new_figure,
+    to_png,
+)
+from camkit.report.pages.page import Page, Picture, Section, Table, to_html
 from camkit.report.stress.rig import INPUT
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 LEAST: Final = 1e-5
 """Of what is drawn by its logarithm."""
@@ -33,44 +38,41 @@ def hallucination_html(report: Report) -> str:
     shown = [m for m in report.methods if m.name not in {TRUTH, INPUT}]
     primary = report.method(control.method)
     planted = report.method(control.method + PLANTED)
-    sections = [
+    patches = (
+        f"{len(primary.patches)} patches of {report.options.side_px} px at ISO "
+        f"{report.options.iso:g}. l1, l2 and overshoot in sRGB values against the truth; "
+        f"perceptual: {report.options.perceptual_name}. chi2: mean square of |PSF * x - y| / "
+        "sigma, 1 for the truth; detail: the same less the mean over "
+        f"{LEVEL_PX} px; excess: detail less that of the filter alone; above 0 the capture "
+        "denies what a method added.",
+        _table(report),
+        Picture("Patches by measure.", to_png(draw_histograms(shown))),
+    )
+    below = f"detail of patches: {control.method}, below with what was planted."
+    found = (
+        f"Bars planted into {control.planted} patches of {control.method}: "
+        f"{control.found} have a larger excess than 99 of 100 patches without, {control.first} "
+        f"of the {control.planted} largest are theirs. detail rose by {control.rise:.2f} at "
+        "least.",
+        Picture(below, to_png(draw_maps(primary, planted))),
+    )
+    each, order = (
+        "By excess. Each: truth, capture, restored.",
+        "The first is the worst; row by row.",
+    )
+    worst = [
         Section(
-            title="Patches",
-            paragraph=f"{len(primary.patches)} patches of {report.options.side_px} px at ISO "
-            f"{report.options.iso:g}. l1, l2 and overshoot in sRGB values against the truth; "
-            f"perceptual: {report.options.perceptual_name}. chi2: mean square of |PSF * x - y| / "
-            "sigma, 1 for the truth; detail: the same less the mean over "
-            f"{LEVEL_PX} px; excess: detail less that of the filter alone; above 0 the capture "
-            "denies what a method added.",
-            table=_table(report),
-            pictures={"Patches by measure.": to_png(draw_histograms(shown))},
-        ),
-        Section(
-            title="Control",
-            paragraph=f"Bars planted into {control.planted} patches of {control.method}: "
-            f"{control.found} have a larger excess than 99 of 100 patches without, {control.first} "
-            f"of the {control.planted} largest are theirs. detail rose by {control.rise:.2f} at "
-            "least.",
-            pictures={
-                f"detail of patches: {control.method}, below with what was planted.": to_png(
-                    draw_maps(primary, planted)
-                )
-            },
-        ),
-        *(
-            Section(
-                title=f"The worst patches of {method.name}",
-                paragraph="By excess. Each: truth, capture, restored.",
-                pictures={"The first is the worst; row by row.": crops_png(method.worst)},
-            )
-            for method in shown
-            if method.worst
-        ),
+            f"The worst patches of {method.name}", (each, Picture(order, crops_png(method.worst)))
+        )
+        for method in shown
+        if method.worst
     ]
-    return to_html("What the capture does not hold", sections)
+    sections = [Section("Patches", patches), Section("Control", found), *worst]
+    return to_html(Page(title="What the capture does not hold", sections=sections))
 
 
-def draw_histograms(methods: Sequence[Method]) -> "Figure":
+@chart
+def draw_histograms(methods: Sequence[Method]) -> Figure:
     """Draw how many patches have which value, of every measure; both axes logarithmic.
 
     Values below 1e-5 are drawn as that. The excess has a sign and keeps it: its logarithm is that
@@ -84,17 +86,14 @@ def draw_histograms(methods: Sequence[Method]) -> "Figure":
             values = _logarithm(values[np.isfinite(values)], signed=measure == "excess")
             if not values.any():
                 continue
-            color = FIELD_COLORS[number % len(FIELD_COLORS)]
-            panel.hist(values, _BINS, histtype="step", color=color, label=method.name, linewidth=1)
+            color = field_color(number)
+            panel.hist(values, _BINS, histtype="step", color=color, label=method.name)
         panel.set_yscale("log")
-        panel.set_xlabel(_label(measure), fontsize=8)
-        panel.grid(visible=True, color=GRID_COLOR, linewidth=0.5)
-        panel.tick_params(labelsize=7, which="both")
+        panel.set_xlabel(_label(measure))
         if measure == MEASURES[0]:
-            panel.set_ylabel("patches", fontsize=8)
-    figure.legend(
-        *panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=9, fontsize=7
-    )
+            panel.set_ylabel("patches")
+    names = panels[0].get_legend_handles_labels()
+    figure.legend(*names, loc="outside upper center", ncols=9)
     return figure
 
 
@@ -108,37 +107,32 @@ def _label(measure: str) -> str:
     return "± log10 (1 + |excess|)" if measure == "excess" else f"log10 {measure}"
 
 
-def draw_maps(plain: Method, planted: Method) -> "Figure":
+@chart
+def draw_maps(plain: Method, planted: Method) -> Figure:
     """Draw `detail` of the patches of some pictures, logarithm, without and with bars planted."""
     maps = [method.maps("detail") for method in (plain, planted)]
     names = list(maps[0])[:_MOST_MAPS]
     figure = new_figure(1.9 * len(names) + 0.6, 3.6)
     panels = figure.subplots(2, len(names), squeeze=False)
-    image = None
     for row, found in zip(panels, maps, strict=True):
         for panel, name in zip(row, names, strict=True):
             light = np.log10(np.maximum(found[name], 1e-2))
             image = panel.imshow(light, cmap="magma", vmin=-0.3, vmax=1.5)
             panel.set_title(name[:24], fontsize=6)
-            panel.set_xticks([])
-            panel.set_yticks([])
-    if image is not None:
-        figure.colorbar(image, ax=panels.ravel().tolist(), fraction=0.03, label="log10 detail")
+            hide_ticks(panel)
+    figure.colorbar(image, ax=panels.ravel().tolist(), fraction=0.03, label="log10 detail")
     return figure
 
 
 def crop_picture(crop: Crop) -> NDArray[np.uint8]:
     """Return truth, capture and restored side by side, (h, w, 3) BGR, twice as large."""
     parts = (crop.truth, crop.capture, crop.restored)
-    wide = np.concatenate([np.clip(part, 0, 1) for part in parts], axis=2)
-    levels = np.rint(255 * wide[::-1].transpose(1, 2, 0)).astype(np.uint8)
-    enlarged = levels.repeat(_ENLARGED, axis=0).repeat(_ENLARGED, axis=1)
-    return np.ascontiguousarray(enlarged)
+    return levels_of(np.concatenate(parts, axis=2), _ENLARGED)
 
 
 def crop_png(crop: Crop) -> bytes:
     """Return the PNG of `crop_picture`."""
-    return _png(crop_picture(crop))
+    return encode_png(crop_picture(crop))
 
 
 def crops_png(crops: Sequence[Crop]) -> bytes:
@@ -153,13 +147,7 @@ def crops_png(crops: Sequence[Crop]) -> bytes:
         np.concatenate(pictures[i : i + _COLUMNS], axis=1)
         for i in range(0, len(pictures), _COLUMNS)
     ]
-    return _png(np.concatenate(rows, axis=0))
-
-
-def _png(picture: NDArray[np.uint8]) -> bytes:
-    done, data = cv2.imencode(".png", picture)
-    assert done
-    return bytes(data)
+    return encode_png(np.concatenate(rows, axis=0))
 
 
 def _table(report: Report) -> Table:
@@ -171,4 +159,4 @@ def _table(report: Report) -> Table:
             found = summary(method.values(name))
             cells += ["-" if found[k] is None else f"{found[k]:.4g}" for k in ("median", "p99")]
         rows.append(tuple(cells))
-    return Table(header=header, rows=tuple(rows))
+    return Table(header=header, rows=rows)

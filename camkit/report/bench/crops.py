@@ -1,11 +1,9 @@
 """The same patch of every method, as small PNGs that a page can hold."""
 
-import base64
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
-import cv2
 import numpy as np
 
 from camkit.bundle.golden import IMAGE
@@ -13,6 +11,7 @@ from camkit.colorimetry import decode_srgb, encode_srgb
 from camkit.contracts import FloatArray
 from camkit.report.bench.accuracy import INPUT, Key
 from camkit.report.bench.known_captures import KnownCapture
+from camkit.report.figure import encode_png, levels_of
 from camkit.report.quality import BORDER_PX
 
 SIDE_PX: Final = 128
@@ -29,12 +28,12 @@ class Patch:
 
     Attributes:
         caption: What the capture is.
-        pictures: Method -> PNG, base64; `SHARP` and `INPUT` among them.
+        pictures: Method -> PNG; `SHARP` and `INPUT` among them.
         psnr_db: Method -> PSNR inside the patch; the sharp one has none.
     """
 
     caption: str
-    pictures: dict[Key, str] = field(default_factory=dict)
+    pictures: dict[Key, bytes] = field(default_factory=dict)
     psnr_db: dict[Key, float] = field(default_factory=dict)
 
 
@@ -70,7 +69,7 @@ class CropCollector:
         linear = np.ascontiguousarray(restored[:, *self._place])
         error = encode_srgb(linear) - known.truths[IMAGE][:, *self._place]
         mean_square = float(np.mean(np.square(error), dtype=np.float64))
-        self.patches[-1].pictures[key] = png_base64(encode_srgb(linear * self._gain))
+        self.patches[-1].pictures[key] = encode_png(levels_of(encode_srgb(linear * self._gain)))
         self.patches[-1].psnr_db[key] = -10 * float(np.log10(max(mean_square, 1e-12)))
 
     def _begin(self, known: KnownCapture, sharp: FloatArray) -> None:
@@ -78,7 +77,7 @@ class CropCollector:
         self._gain = display_gain(linear)
         shown = f", shown {self._gain:.0f} times brighter" if self._gain > 1 else ""
         patch = Patch(caption=known.caption + shown)
-        patch.pictures[SHARP] = png_base64(encode_srgb(linear * self._gain))
+        patch.pictures[SHARP] = encode_png(levels_of(encode_srgb(linear * self._gain)))
         self.patches.append(patch)
 
 
@@ -112,11 +111,3 @@ def busiest_place(sharp: FloatArray, side_px: int = SIDE_PX) -> tuple[slice, sli
         places, key=lambda p: float(detail[p[0] : p[0] + side, p[1] : p[1] + side].sum())
     )
     return slice(top, top + side), slice(left, left + side)
-
-
-def png_base64(values: FloatArray) -> str:
-    """Encode sRGB values (3, h, w) as a PNG of 8 bits, in base64."""
-    levels = np.clip(np.rint(values * 255), 0, 255).astype(np.uint8)
-    done, data = cv2.imencode(".png", np.ascontiguousarray(levels[::-1].transpose(1, 2, 0)))
-    assert done  # an 8-bit picture of three channels always encodes
-    return base64.b64encode(data.tobytes()).decode("ascii")

@@ -6,9 +6,10 @@ from dataclasses import replace
 from camkit.bundle.manifest import Manifest
 from camkit.errors import ContractError, UnsupportedError
 from camkit.kinds import find_kind
+from camkit.report.bench.common_rows import COMMON
 from camkit.report.bench.metric import Metric, registered_metrics
 from camkit.report.bench.part import BenchPart
-from camkit.report.bench.row_maker import RowMaker, row_makers
+from camkit.report.bench.row_maker import RowMaker
 from camkit.report.bench.trial import Axes, Entrant, Ground, Skip, Trial
 from camkit.report.kind_finder import find_part
 from camkit.runtime.plan.ways import offered_methods
@@ -17,7 +18,7 @@ from camkit.runtime.plan.ways import offered_methods
 def makers_of(manifest: Manifest) -> tuple[RowMaker, ...]:
     """Return the row makers of a camera, by name; one of its kind goes before a common one."""
     own = find_part(manifest.kind, "bench", BenchPart).rows
-    known = {maker.name: maker for maker in (*row_makers(), *own)}
+    known = {maker.name: maker for maker in (*COMMON, *own)}
     return tuple(known[name] for name in sorted(known))
 
 

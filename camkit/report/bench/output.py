@@ -1,6 +1,5 @@
 """A bench on the disk: bench.json, bench.csv, bench.svg, bench.png and bench.html."""
 
-import base64
 import csv
 import json
 from pathlib import Path
@@ -8,8 +7,10 @@ from typing import Any
 
 from camkit.report.bench.row import Row
 from camkit.report.bench.run import Result
-from camkit.report.bench.shown.chart import draw_chart
-from camkit.report.bench.shown.page import to_html
+from camkit.report.bench.shown.bench_chart import draw_chart
+from camkit.report.bench.shown.bench_page import bench_page
+from camkit.report.figure import to_png, to_svg
+from camkit.report.pages.page import to_html
 
 NAME = "bench"
 
@@ -28,16 +29,18 @@ def write_bench(result: Result, folder: Path) -> list[Path]:
     text = json.dumps(result.report, indent=1, allow_nan=False)
     paths["json"].write_text(text + "\n", encoding="utf-8")
     write_csv(paths["csv"], result.report["rows"])
-    if result.own:
-        for suffix in ("svg", "png", "html"):
+    shown: dict[str, bytes] = {}
+    if not result.own:
+        figure = draw_chart(result.report)
+        svg = None if figure is None else to_svg(figure)
+        if figure is not None and svg is not None:
+            shown = {"svg": svg.encode(), "png": to_png(figure)}
+        shown["html"] = to_html(bench_page(result, svg)).encode()
+    for suffix in ("svg", "png", "html"):
+        if suffix in shown:
+            paths[suffix].write_bytes(shown[suffix])
+        else:
             paths.pop(suffix).unlink(missing_ok=True)
-        return list(paths.values())
-    drawn = draw_chart(result.report, svg=paths["svg"], png=paths["png"])
-    if not drawn:
-        for suffix in ("svg", "png"):
-            paths.pop(suffix).unlink(missing_ok=True)
-    chart = base64.b64encode(paths["svg"].read_bytes()).decode("ascii") if drawn else None
-    paths["html"].write_text(to_html(result, chart), encoding="utf-8")
     return list(paths.values())
 
 

@@ -7,16 +7,15 @@ photographs, and it measures itself.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.reader import Bundle
 from camkit.contracts import FloatArray
-from camkit.errors import UnsupportedError
 from camkit.report.bench.metric import Metric
 from camkit.report.bench.row_maker import RowMaker
 from camkit.report.bench.trial import Skip
-from camkit.report.quality import FIELD_SHARES, Exposed, Shot
+from camkit.report.quality import FIELD_SHARES, Exposed, Shot, expose
 
 Tell = Callable[[str], None]
 
@@ -58,13 +57,9 @@ class OwnRows:
 Measure = Callable[[Bundle, OwnSettings, Tell], OwnRows]
 
 
-def _no_photograph(*_: object) -> NoReturn:
-    raise UnsupportedError("captures of this kind are no photographs; it measures itself")
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BenchPart:
-    """A kind of camera in the bench.
+    """A kind of camera in the bench; as it is, one whose captures are photographs.
 
     Attributes:
         photograph: (place and noise, sharp picture (3, h, w), bundle, lens) -> capture and truth.
@@ -77,7 +72,7 @@ class BenchPart:
         measure: Measures a bundle in place of all that; None for photographs.
     """
 
-    photograph: Callable[[Shot, FloatArray, Bundle, FrozenOptics], Exposed] = _no_photograph
+    photograph: Callable[[Shot, FloatArray, Bundle, FrozenOptics], Exposed] = expose
     positions: tuple[int, ...] = tuple(range(len(FIELD_SHARES)))
     isos: tuple[float, ...] = (100.0, 1600.0)
     rows: tuple[RowMaker, ...] = ()

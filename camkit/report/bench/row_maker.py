@@ -1,10 +1,9 @@
-"""What makes the rows of one sort, and the makers that serve every camera."""
+"""What makes the rows of one sort."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from camkit.report.bench.trial import Axes, Entrant, Ground, Skip, Trial
-from camkit.report.discovery import discover
 
 MakeTrials = Callable[[Entrant, Axes, Ground], tuple[list[Trial], list[Skip]]]
 
@@ -23,8 +22,3 @@ class RowMaker:
     name: str
     methods: tuple[str, ...]
     trials: MakeTrials
-
-
-def row_makers() -> tuple[RowMaker, ...]:
-    """Return the makers that serve every camera."""
-    return discover("camkit.report.bench.rows", "ROWS", RowMaker)

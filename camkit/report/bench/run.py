@@ -5,7 +5,7 @@ import tempfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from camkit.bundle.manifest import NOT_TRAINED
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
@@ -26,9 +26,9 @@ from camkit.report.bench.known_captures import (
 from camkit.report.bench.line_up import make_trials, metrics_of
 from camkit.report.bench.machine import describe_machine, free_memory_bytes
 from camkit.report.bench.metric import Metric
-from camkit.report.bench.own.measuring import measure_own, measures_of
+from camkit.report.bench.own_rows import measure_own, measures_of
 from camkit.report.bench.part import BenchPart, Tell
-from camkit.report.bench.row import Facts, Row, make_row
+from camkit.report.bench.row import Facts, make_row
 from camkit.report.bench.settings import QUICK_SIZE_PX, Settings
 from camkit.report.bench.timed.capture import SCENE_TEXT, timed_capture
 from camkit.report.bench.timed.process_run import Job, Run, run_job
@@ -45,21 +45,12 @@ from camkit.runtime.plan.ways import offered_methods
 REPORT_VERSION: Final = 1
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Camera:
-    """What all entrants of one camera share.
+class _TimedShot(NamedTuple):
+    """The capture of a camera that is timed: its (width, height), and what it shows."""
 
-    Attributes:
-        entrant: The bundle that takes the captures.
-        capture: The file that is timed.
-        size_px: Its (width, height).
-        capture_text: What it shows.
-    """
-
-    entrant: Entrant
-    capture: Path
+    file: Path
     size_px: tuple[int, int]
-    capture_text: str
+    text: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,11 +83,12 @@ def run_bench(settings: Settings, tell: Tell = lambda _text: None) -> Result:
         DecodeError: If the given capture or a file of linear light cannot be read.
     """
     entrants = open_entrants(settings.bundles, settings.references)
-    if measures := measures_of([entrant.bundle for entrant in entrants]):
-        own = [entrant.bundle for entrant in entrants]
-        return Result(report=measure_own(settings, own, measures, tell), own=True)
+    opened = [entrant.bundle for entrant in entrants]
+    if measures := measures_of(opened):
+        return Result(report=measure_own(settings, opened, measures, tell), own=True)
     folder = settings.folder()
-    _check(settings, [e.bundle for e in entrants if not e.is_reference])
+    cameras = [entrant for entrant in entrants if not entrant.is_reference]
+    _check(settings, [entrant.bundle for entrant in cameras])
     ground = Ground(
         threads=available_threads(None),
         providers=usable_providers(),
@@ -105,27 +97,55 @@ def run_bench(settings: Settings, tell: Tell = lambda _text: None) -> Result:
     trials, skips = make_trials(entrants, settings.axes, ground)
     if not trials:
         raise ContractError(_nothing(entrants, skips))
-    cameras = {}
-    for entrant in entrants:
-        if not entrant.is_reference:
-            tell(f"{entrant.label}: preparing the capture")
-            cameras[entrant.label] = _camera(entrant, settings, folder)
+    shots = {}
+    for entrant in cameras:
+        tell(f"{entrant.label}: preparing the capture")
+        shots[entrant.label] = _timed_shot(entrant.bundle, settings, folder)
     machine = describe_machine()
     peaks = {n: gemm_peak_gmac_per_s(n, settings.gemm_s) for n in {t.threads for t in trials}}
     machine["gemm_gmac_per_s"] = {str(n): round(peak, 2) for n, peak in sorted(peaks.items())}
-    runs = time_trials(trials, cameras, settings.repeat, tell)
-    random = {e.label for e in entrants if not e.bundle.manifest.is_trained}
+    files = {label: shot.file for label, shot in shots.items()}
+    runs = time_trials(trials, files, settings.repeat, tell)
+    bundles = {entrant.label: entrant.bundle for entrant in entrants}
+    random = {label for label, bundle in bundles.items() if not bundle.manifest.is_trained}
     idle = [trial for trial in trials if trial.bundle in random and trial.size is not None]
     skips += [Skip(what=f"accuracy of {t.camera} {t.label}", reason=NOT_TRAINED) for t in idle]
     shown = [trial for trial in trials if trial not in idle]
-    judged = {c.entrant.label: _judge(c, shown, settings, folder, tell) for c in cameras.values()}
+    judged = {camera.label: _judge(camera, shown, settings, folder, tell) for camera in cameras}
     skips += [
         Skip(what=f"accuracy of {label}", reason=found.error)
         for label, found in judged.items()
         if found.error is not None
     ]
     skips += [skip for found in judged.values() for skip in found.edges.skips]
-    return _join(trials, runs, cameras, judged, _Found(settings, machine, peaks, skips, entrants))
+
+    rows = [
+        make_row(trial, runs[trial], _facts(trial, trials, shots, judged, runs, peaks, bundles))
+        for trial in trials
+    ]
+    report = {
+        "report_version": REPORT_VERSION,
+        "machine": machine,
+        "repeat": settings.repeat,
+        "cameras": {
+            label: {
+                "width": shot.size_px[0],
+                "height": shot.size_px[1],
+                "capture": shot.text,
+                "accuracy": judged[label].text,
+                "bundle_sha256": bundles[label].sha256,
+            }
+            for label, shot in shots.items()
+        },
+        "tuning": tuning_table(trials, bundles),
+        "rows": rows,
+        "skipped": [skip._asdict() for skip in skips],
+    }
+    return Result(
+        report=report,
+        patches={label: found.patches for label, found in judged.items()},
+        names={trial.accuracy_key: trial.label for trial in reversed(trials)},
+    )
 
 
 def _nothing(entrants: Sequence[Entrant], skips: Sequence[Skip]) -> str:
@@ -188,36 +208,29 @@ def open_entrants(bundles: Sequence[str], references: Sequence[str]) -> list[Ent
     return found
 
 
-def _camera(entrant: Entrant, settings: Settings, folder: Path) -> Camera:
-    if settings.capture is not None:
-        manifest = entrant.bundle.manifest
-        shot = part_of(manifest).read(settings.capture, None, manifest, Options())
-        return Camera(
-            entrant=entrant,
-            capture=settings.capture,
-            size_px=(shot.width, shot.height),
-            capture_text=settings.capture.name,
-        )
+def _timed_shot(bundle: Bundle, settings: Settings, folder: Path) -> _TimedShot:
+    manifest, given, photo = bundle.manifest, settings.capture, settings.photo
+    if given is not None:
+        capture = part_of(manifest).read(given, None, manifest, Options())
+        return _TimedShot(given, (capture.width, capture.height), given.name)
     width, height = settings.width_px, settings.height_px
     if settings.small:
-        extent = entrant.bundle.manifest.sensor.extent
+        extent = manifest.sensor.extent
         most = QUICK_SIZE_PX if extent is None else (extent.width_px, extent.height_px)
         width = width or min(QUICK_SIZE_PX[0], most[0])
         height = height or min(QUICK_SIZE_PX[1], most[1])
-    photo = settings.photo
-    path, size = timed_capture(entrant.bundle, width, height, folder, photo)
-    text = photo.name if photo else SCENE_TEXT
-    return Camera(entrant=entrant, capture=path, size_px=size, capture_text=text)
+    path, size_px = timed_capture(bundle, width, height, folder, photo)
+    return _TimedShot(path, size_px, photo.name if photo else SCENE_TEXT)
 
 
 def time_trials(
-    trials: Sequence[Trial], cameras: dict[str, Camera], repeat: int, tell: Tell
+    trials: Sequence[Trial], captures: dict[str, Path], repeat: int, tell: Tell
 ) -> dict[Trial, list[Run]]:
     """Run every trial in fresh processes, all once per round; a trial that fails drops out."""
     runs: dict[Trial, list[Run]] = {trial: [] for trial in trials}
     with tempfile.TemporaryDirectory(prefix="camkit-bench-") as name:
         folder = Path(name)
-        twins = {label: _twins(camera.capture, folder / label) for label, camera in cameras.items()}
+        twins = {label: _twins(capture, folder / label) for label, capture in captures.items()}
         for trial in counted(list(interleaved(trials, repeat)), "timing", "runs"):
             if any(run.error is not None for run in runs[trial]):
                 continue
@@ -252,10 +265,10 @@ class _Judged:
 
 
 def _judge(
-    camera: Camera, trials: Sequence[Trial], settings: Settings, folder: Path, tell: Tell
+    camera: Entrant, trials: Sequence[Trial], settings: Settings, folder: Path, tell: Tell
 ) -> _Judged:
     """Measure the accuracy of all methods of one camera; without it the seconds still stand."""
-    bundle, label = camera.entrant.bundle, camera.entrant.label
+    bundle, label = camera.bundle, camera.label
     own = [trial for trial in trials if trial.camera == label]
     metrics = metrics_of(bundle.manifest)
     captures, count, text = _known_captures(bundle, settings, folder)
@@ -313,63 +326,28 @@ def _known_captures(
     return captures, pictures * len(part.positions) * len(part.isos), text
 
 
-@dataclass(frozen=True, slots=True)
-class _Found:
-    settings: Settings
-    machine: dict[str, Any]
-    peaks: dict[int, float]
-    skips: list[Skip]
-    entrants: list[Entrant]
-
-
-def _join(
+def _facts(
+    trial: Trial,
     trials: Sequence[Trial],
-    runs: dict[Trial, list[Run]],
-    cameras: dict[str, Camera],
+    shots: dict[str, _TimedShot],
     judged: dict[str, _Judged],
-    found: _Found,
-) -> Result:
-    bundles = {entrant.label: entrant.bundle for entrant in found.entrants}
-    rows: list[Row] = []
-    for trial in trials:
-        base = _base_of(trial, trials)
-        mac = None
-        if trial.size is not None:
-            mac = bundles[trial.bundle].manifest.mac_per_pixel(trial.size)
-        facts = Facts(
-            size_px=cameras[trial.camera].size_px,
-            mac_per_px=mac,
-            gemm_gmac_per_s=found.peaks[trial.threads],
-            scores=judged[trial.camera].scores,
-            metrics=judged[trial.camera].metrics,
-            edges=judged[trial.camera].edges,
-            base=runs[base],
-            base_label=base.label,
-            base_key=score_key(base),
-        )
-        rows.append(make_row(trial, runs[trial], facts))
-    report = {
-        "report_version": REPORT_VERSION,
-        "machine": found.machine,
-        "repeat": found.settings.repeat,
-        "cameras": {
-            label: {
-                "width": camera.size_px[0],
-                "height": camera.size_px[1],
-                "capture": camera.capture_text,
-                "accuracy": judged[label].text,
-                "bundle_sha256": camera.entrant.bundle.sha256,
-            }
-            for label, camera in cameras.items()
-        },
-        "tuning": tuning_table(trials, bundles),
-        "rows": rows,
-        "skipped": [{"what": skip.what, "reason": skip.reason} for skip in found.skips],
-    }
-    return Result(
-        report=report,
-        patches={label: judged[label].patches for label in cameras},
-        names={trial.accuracy_key: trial.label for trial in reversed(trials)},
+    runs: dict[Trial, list[Run]],
+    peaks: dict[int, float],
+    bundles: dict[str, Bundle],
+) -> Facts:
+    """Return what the row of `trial` is made of, besides its own runs."""
+    base, found = _base_of(trial, trials), judged[trial.camera]
+    manifest = bundles[trial.bundle].manifest
+    return Facts(
+        size_px=shots[trial.camera].size_px,
+        mac_per_px=None if trial.size is None else manifest.mac_per_pixel(trial.size),
+        gemm_gmac_per_s=peaks[trial.threads],
+        scores=found.scores,
+        metrics=found.metrics,
+        edges=found.edges,
+        base=runs[base],
+        base_label=base.label,
+        base_key=score_key(base),
     )
 
 

@@ -185,6 +185,20 @@ class Entrant:
         return self.camera != self.label
 
 
+def plain_trial(entrant: Entrant, axes: Axes, ground: Ground, maker: str, method: str) -> Trial:
+    """Return the trial of a method of a bundle, on the first number of threads asked for."""
+    threads = ground.base_threads(axes)
+    return Trial(
+        camera=entrant.camera,
+        bundle=entrant.label,
+        path=entrant.bundle.path,
+        maker=maker,
+        method=method,
+        threads=threads,
+        base_threads=threads,
+    )
+
+
 class Skip(NamedTuple):
     """Something that was asked for and cannot be measured here."""
 

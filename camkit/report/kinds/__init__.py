@@ -1,4 +1,5 @@
-"""The kinds of cameras that come with camkit, as reports see them: one folder each.
+"""The kinds of cameras that come with camkit and are more than photographs to reports.
 
-bayer    colour photographs behind a mosaic
+hdr    snapshot HDR: two captures of a scene, scenarios of lights and streaks
+spad   single photons: they measure themselves, scenarios of light, plate and times
 """

@@ -7,12 +7,14 @@ from typing import Any
 
 from camkit.bundle.reader import Bundle
 from camkit.report.stress.scenario import Scenario
+from camkit.report.stress.scene import stress_scenes
+from camkit.report.stress.score import judge_of
 from camkit.report.stress.verdict import Examiner
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StressPart:
-    """A kind of camera under stress.
+    """A kind of camera under stress; as it is, one whose captures are photographs.
 
     Attributes:
         scenes: (bundle, how many, folder of pictures or None) -> what is photographed, named.
@@ -21,6 +23,6 @@ class StressPart:
         scenarios: Of its own, beside those that serve every camera.
     """
 
-    scenes: Callable[[Bundle, int, Path | None], tuple[Any, ...]]
-    examiner: Callable[[Bundle, tuple[str, ...], Bundle | None], Examiner]
+    scenes: Callable[[Bundle, int, Path | None], tuple[Any, ...]] = stress_scenes
+    examiner: Callable[[Bundle, tuple[str, ...], Bundle | None], Examiner] = judge_of
     scenarios: tuple[Scenario, ...] = ()

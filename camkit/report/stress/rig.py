@@ -192,19 +192,10 @@ class Rig:
         """Project a scene on the sensor; that through the nominal lens is kept by its name."""
         if lens is None and scene.name in self._lights:
             return self._lights[scene.name]
-        made = self._fall(scene, scene.linear, lens or self.lens)
+        made = self.light_amid(scene, scene.linear, lens)
         if lens is None:
             self._lights[scene.name] = made
         return made
-
-    def light_amid(self, scene: Scene, around: FloatArray) -> Light:
-        """Project a scene on the sensor with what surrounds it, through the nominal lens.
-
-        Args:
-            scene: What is in the picture.
-            around: (3, h', w') linear Rec.709: the scene with as much on every side of it.
-        """
-        return self._fall(scene, around, self.lens)
 
     def light_in_place(self, scene: Scene) -> Light:
         """Project a scene on the sensor through the nominal lens, as if it distorted nothing.
@@ -212,15 +203,25 @@ class Rig:
         Scene, mirror images around it and capture are then in one geometry: what is photographed
         again after restoration meets the same haze.
         """
-        return self._fall(scene, scene.linear, self.lens, distort=False)
+        return self.light_amid(scene, scene.linear, distort=False)
 
-    def _fall(self, scene: Scene, seen: FloatArray, lens: Lens, *, distort: bool = True) -> Light:
+    def light_amid(
+        self, scene: Scene, around: FloatArray, lens: Lens | None = None, *, distort: bool = True
+    ) -> Light:
+        """Project a scene on the sensor with what surrounds it.
+
+        Args:
+            scene: What is in the picture.
+            around: (3, h', w') linear Rec.709: the scene, or it with as much on every side of it.
+            lens: None for the nominal one.
+            distort: Whether the lens distorts.
+        """
         extent, scale = self.sensor.known_extent, scene.scale
-        ring_px = (seen.shape[1] - scene.linear.shape[1]) // (2 * scale)
+        ring_px = (around.shape[1] - scene.linear.shape[1]) // (2 * scale)
         origin = scene.origin_px((extent.width_px, extent.height_px))
-        window = scene_window(seen, self.sensor, origin, scale=scale, surround_px=ring_px)
+        window = scene_window(around, self.sensor, origin, scale=scale, surround_px=ring_px)
         options = LightOptions(scale=scale, surround_px=ring_px, distort=distort)
-        return light_of(seen, self.sensor, lens, window, options)
+        return light_of(around, self.sensor, lens or self.lens, window, options)
 
     def shoot(self, scene: Scene, lens: Lens | None = None, setting: Setting | None = None) -> Shot:
         """Record a scene through a lens (None: the nominal one) with a setting of the camera."""

@@ -15,16 +15,17 @@ from camkit.bundle.manifest import Range
 from camkit.bundle.reader import Bundle
 from camkit.bundle.writer import write_bundle
 from camkit.errors import ContractError
+from camkit.report.figure import to_png
 from camkit.report.kind_finder import camera_of, find_part
+from camkit.report.pages.page import to_html
 from camkit.report.stress.break_point import Break
-from camkit.report.stress.chart import draw_curve
 from camkit.report.stress.curve import Curve, breaks_of, curve_of
 from camkit.report.stress.measured_ranges import measured_ranges
-from camkit.report.stress.page import Section, stress_page
 from camkit.report.stress.part import StressPart
-from camkit.report.stress.patch import worst_patches
 from camkit.report.stress.report import scenario_json, skipped_json
 from camkit.report.stress.scenario import Scenario, choose
+from camkit.report.stress.stress_chart import draw_curve
+from camkit.report.stress.stress_page import Swept, stress_page, worst_patches
 from camkit.report.stress.sweep import Sweep, run_sweep, sweep_identity
 from camkit.report.stress.verdict import Examiner, SweptScene
 
@@ -187,14 +188,14 @@ def _write(
     folder.mkdir(parents=True, exist_ok=True)
     text = json.dumps(result.rows, indent=1) + "\n"
     (folder / RESULTS).write_text(text, encoding="utf-8")
-    sections = []
+    swept = []
     for curve in result.curves:
         breaks = result.breaks[curve.scenario.name]
-        sections.append(
-            Section(
+        swept.append(
+            Swept(
                 curve=curve,
                 breaks=breaks,
-                chart=draw_curve(curve, breaks),
+                chart=to_png(draw_curve(curve, breaks)),
                 patches=worst_patches(curve, judge, scenes, result.primary),
             )
         )
@@ -207,6 +208,6 @@ def _write(
     }
     skipped = {row["title"]: row["skipped"] for row in result.rows if row["skipped"]}
     page = stress_page(
-        f"Where {manifest.name} fails", facts, sections, skipped=skipped, envelope=result.envelope
+        f"Where {manifest.name} fails", facts, swept, skipped=skipped, envelope=result.envelope
     )
-    (folder / PAGE).write_text(page, encoding="utf-8")
+    (folder / PAGE).write_text(to_html(page), encoding="utf-8")

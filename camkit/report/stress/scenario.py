@@ -1,16 +1,14 @@
-"""What a scenario is: a knob, its values, and how one value is measured on one scene.
+"""A scenario: a knob, its values, and how one value is measured on one scene.
 
-A scenario is one file in a folder of `scenarios/` that defines `SCENARIO`; nothing else has to
-know of it. One that photographs says how in `shoot`, and gets PSNR, chi^2 and patches for every
-method of the bundle. One with another judgement brings its own `measure`. Each says in `applies`
-for which bundles it is meant, by asking what a bundle states.
+Scenarios are rows of tables, the modules of `scenarios/`, which nothing else has to know of. One
+that photographs says how in `shoot`, and gets PSNR, chi^2 and patches for every method of the
+bundle. One with another judgement brings its own `measure`. Each says in `applies` for which
+bundles it is meant, by asking what a bundle states.
 
 A kind of camera may bring scenarios of its own (`camkit.report.stress.part`): they get the
 examiner and the scenes of that kind.
 """
 
-import importlib
-import pkgutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal
@@ -87,7 +85,8 @@ class Scenario:
         log: Break points are interpolated over the logarithm.
         bounds: Quantities of the runtime's envelope that this scenario limits, and at which end.
         applies: Says why a bundle cannot take part; None if it can.
-        fit: Gives the scenario with the values of a bundle, where they depend on it.
+        fit: (this scenario, bundle) -> the scenario with the values of the bundle, where they
+            depend on it.
         rival: Whether being below the methods without networks breaks a method here.
         rivals: The methods that others must not fall behind here; empty for those of the examiner.
         note: What a reader of the page should know.
@@ -106,7 +105,7 @@ class Scenario:
     log: bool = False
     bounds: Mapping[str, End] = field(default_factory=dict)
     applies: Applies = photographs
-    fit: Callable[[Bundle], "Scenario"] | None = None
+    fit: Callable[["Scenario", Bundle], "Scenario"] | None = None
     rival: bool = True
     rivals: tuple[str, ...] = ()
     note: str = ""
@@ -127,7 +126,7 @@ class Scenario:
 
     def for_bundle(self, bundle: Bundle) -> "Scenario":
         """Return the scenario with the values that a bundle asks for."""
-        return self if self.fit is None else self.fit(bundle)
+        return self if self.fit is None else self.fit(self, bundle)
 
     def take(self, judge: Examiner, scene: SweptScene, value: float) -> Verdict:
         """Measure one value on one scene."""
@@ -141,18 +140,39 @@ class Scenario:
         return tuple(v for v in self.values if v in self.quick) if quick else self.values
 
 
-SCENARIO: Final = "SCENARIO"
-"""Name of the global that every module of `scenarios/` defines."""
+def row(name: str, title: str, knob: str, unit: str, steps: str, **facts: Any) -> Scenario:
+    """Return a scenario whose values are written as text.
+
+    Args:
+        name: Of the scenario, as `--scenarios` takes it.
+        title: For people.
+        knob: What is turned.
+        unit: Of the knob; empty for a bare number.
+        steps: The values, increasing: the nominal one in brackets, those of a quick run as well
+            in parentheses, such as "-2 (-1) [0] (1) 2".
+        facts: Further fields of `Scenario`.
+    """
+    words = steps.split()
+    values = {word: float(word.strip("[]()")) for word in words}
+    return Scenario(
+        name=name,
+        title=title,
+        knob=knob,
+        unit=unit,
+        values=tuple(values.values()),
+        nominal=next(values[word] for word in words if word.startswith("[")),
+        quick=tuple(values[word] for word in words if word.startswith(("[", "("))),
+        **facts,
+    )
+
+
 SCENARIOS: Final = "camkit.report.stress.scenarios"
 """Named, not imported: its modules import this one."""
 
 
 def all_scenarios() -> tuple[Scenario, ...]:
-    """Return every scenario that serves all cameras, by folder and file."""
-    places = importlib.import_module(SCENARIOS).__path__
-    folders = sorted(m.name for m in pkgutil.iter_modules(places) if m.ispkg)
-    packages = [f"{SCENARIOS}.{name}" for name in folders]
-    return tuple(s for package in packages for s in discover(package, SCENARIO, Scenario))
+    """Return every scenario that serves all cameras, by module and row."""
+    return tuple(one for table in discover(SCENARIOS, "SCENARIOS", tuple) for one in table)
 
 
 def choose(names: str | None, own: tuple[Scenario, ...] = ()) -> tuple[Scenario, ...]:

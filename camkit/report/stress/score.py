@@ -5,9 +5,9 @@ darkened back to the exposure of the scene, with the border cut off.
 """
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import scipy.ndimage
@@ -160,8 +160,12 @@ def _digest(shot: Shot) -> bytes:
     parts: list[object] = [capture.iso, capture.white_balance, capture.white_level, shot.noise]
     parts += [capture.origin_px, shot.exposure, shot.border_px, shot.away_from_clipped]
     parts += [shot.scene.name, shot.spoiled is None, capture.noise]
-    arrays = (capture.samples, capture.black_level, light.clean)
-    digest = hashlib.sha256(repr(parts).encode())
+    return digest_of(parts, (capture.samples, capture.black_level, light.clean))
+
+
+def digest_of(facts: Sequence[object], arrays: Iterable[NDArray[Any]]) -> bytes:
+    """Return a hash of facts and arrays."""
+    digest = hashlib.sha256(repr(facts).encode())
     for array in arrays:
         digest.update(np.ascontiguousarray(array).data)
     return digest.digest()

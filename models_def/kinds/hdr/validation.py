@@ -42,7 +42,7 @@ class HdrJudge:
         }
 
     def score(self, restore: Restorer) -> Score:
-        """Judge a restoration by its mean PSNR in dB, by ISO."""
+        """Return the mean PSNR of a restoration in dB, by ISO."""
         with torch.no_grad():
             every = [_psnr_db(shot, restore, self.recipe) for _, shot in self.shots]
         return mean_score(every, by_iso=[f"{iso:g}" for iso, _ in self.shots])

@@ -7,7 +7,6 @@ plate_psf   the kernel of a plate: trained, written, read
 networks    networks by name, alone or trained with the plate before them
 samples     a picture seen by the array, counted, and the picture itself
 theory      what the best linear estimate could know: the best Gaussian of a level of light
-linear      the best linear filter, fitted
 evaluation  the protocol of tables 4.1 and 4.2
 validation  fixed photographs to choose by
 fitter      one step of a network and its plate

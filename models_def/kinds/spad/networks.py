@@ -1,8 +1,5 @@
 """Networks of single-photon cameras by name, alone or trained with the plate before them."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import replace
-from functools import partial
 from typing import Any, Final
 
 import torch
@@ -14,14 +11,9 @@ from camkit.models_def.kinds.spad.plate_psf import SoftmaxPsf
 from camkit.models_def.kinds.spad.sampling import GAUSSIAN_SIGMA, see_through
 from camkit.models_def.networks.back_projection import BackProjection, BackProjectionConfig
 from camkit.models_def.networks.bicubic import PHASE, SCALE
-from camkit.models_def.networks.srcnn import Srcnn, SrcnnConfig
-from camkit.models_def.networks.sub_pixel import (
-    SUB_PIXEL_M,
-    SUB_PIXEL_S,
-    SubPixel,
-    SubPixelConfig,
-)
-from camkit.models_def.networks.vdsr import Vdsr, VdsrConfig
+from camkit.models_def.networks.bicubic_first import Srcnn, SrcnnConfig, Vdsr, VdsrConfig
+from camkit.models_def.networks.catalog import Builders, build_one, changed, configured
+from camkit.models_def.networks.sub_pixel import SUB_PIXEL_M, SUB_PIXEL_S, SubPixel
 
 JOINT: Final = "joint_"
 
@@ -56,28 +48,12 @@ class JointCamera(nn.Module):
         return self.read(self.see(planes[:, :1]), planes[:, 1:, :1, :1])
 
 
-def _sub_pixel(base: SubPixelConfig, **config: Any) -> nn.Module:
-    return SubPixel(replace(base, **config))
-
-
-def _back_projection(**config: Any) -> nn.Module:
-    return BackProjection(BackProjectionConfig(**config))
-
-
-def _srcnn(**config: Any) -> nn.Module:
-    return Srcnn(SrcnnConfig(**config))
-
-
-def _vdsr(**config: Any) -> nn.Module:
-    return Vdsr(VdsrConfig(**config))
-
-
-_BUILDERS: Final[Mapping[str, Callable[..., nn.Module]]] = {
-    "sub_pixel_s": partial(_sub_pixel, SUB_PIXEL_S),
-    "sub_pixel_m": partial(_sub_pixel, SUB_PIXEL_M),
-    "d_dbpn": _back_projection,
-    "srcnn": _srcnn,
-    "vdsr": _vdsr,
+_BUILDERS: Final[Builders] = {
+    "sub_pixel_s": changed(SubPixel, SUB_PIXEL_S),
+    "sub_pixel_m": changed(SubPixel, SUB_PIXEL_M),
+    "d_dbpn": configured(BackProjection, BackProjectionConfig),
+    "srcnn": configured(Srcnn, SrcnnConfig),
+    "vdsr": configured(Vdsr, VdsrConfig),
 }
 NETWORK_NAMES: Final = (*_BUILDERS, *(f"{JOINT}{name}" for name in _BUILDERS))
 
@@ -95,17 +71,9 @@ def build_spad_network(name: str, **config: Any) -> nn.Module:
     """
     if name not in NETWORK_NAMES:
         raise ContractError(f"network must be one of {', '.join(NETWORK_NAMES)}; got {name!r}")
-    fields: dict[str, Any] = {
-        key: tuple(v) if isinstance(v, list) else v for key, v in config.items()
-    }
-    joint = name.startswith(JOINT)
-    sigma = float(fields.pop("sigma", GAUSSIAN_SIGMA)) if joint else GAUSSIAN_SIGMA
-    if joint:
-        fields = {"in_channels": 2} | fields
-    try:
-        network = _BUILDERS[name.removeprefix(JOINT)](**fields)
-    except TypeError as error:
-        raise ContractError(f"network {name} does not take this configuration: {error}") from error
-    if not joint:
-        return network
+    if not name.startswith(JOINT):
+        return build_one(_BUILDERS, name, config)
+    fields: dict[str, Any] = {"in_channels": 2} | config
+    sigma = float(fields.pop("sigma", GAUSSIAN_SIGMA))
+    network = build_one(_BUILDERS, name.removeprefix(JOINT), fields)
     return JointCamera(network, sigma=sigma, phase=int(fields.get("phase", PHASE)))

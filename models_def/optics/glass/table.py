@@ -1,12 +1,23 @@
 """Glasses written into a prescription as `[[glass]]` tables, so that one file says everything."""
 
 from collections.abc import Mapping
-from typing import Any, Final
+from dataclasses import dataclass
+from typing import Any
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.glass.material import Glass
+from camkit.models_def.optics.glass.material import Formula, Glass
+from camkit.models_def.toml_table import section
 
-KEYS: Final = ("name", "formula", "coefficients", "range_um", "source")
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _GlassTable:
+    """The keys of [[glass]]."""
+
+    name: str
+    formula: Formula
+    coefficients: tuple[float, ...]
+    range_um: tuple[float, ...]
+    source: str
 
 
 def parse_glass_table(table: Mapping[str, Any]) -> Glass:
@@ -15,22 +26,17 @@ def parse_glass_table(table: Mapping[str, Any]) -> Glass:
     Raises:
         ContractError: If a key is unknown, missing or of a wrong type.
     """
-    name = table.get("name")
-    if set(table) != set(KEYS):
-        raise ContractError(
-            f"a [[glass]] table needs the keys {', '.join(KEYS)}; got {', '.join(sorted(table))}"
-        )
-    if not all(isinstance(table[key], str) for key in ("name", "formula", "source")):
-        raise ContractError(f"glass {name!r}: name, formula and source must be text")
-    range_um = _numbers(table["range_um"], name)
-    if len(range_um) != 2:
-        raise ContractError(f"glass {name!r}: range_um must be [low, high]; got {range_um}")
+    where = f"glass {table.get('name')!r}" if isinstance(table, Mapping) else "[[glass]]"
+    known = section(where, _GlassTable, table)
+    if len(known.range_um) != 2:
+        raise ContractError(f"{where}: range_um must be [low, high]; got {known.range_um}")
+    low, high = known.range_um
     return Glass(
-        name=table["name"],
-        formula=table["formula"],
-        coefficients=_numbers(table["coefficients"], name),
-        range_um=(range_um[0], range_um[1]),
-        source=table["source"],
+        name=known.name,
+        formula=known.formula,
+        coefficients=known.coefficients,
+        range_um=(low, high),
+        source=known.source,
     )
 
 
@@ -43,11 +49,3 @@ def glass_table(glass: Glass) -> dict[str, str | tuple[float, ...]]:
         "range_um": glass.range_um,
         "source": glass.source,
     }
-
-
-def _numbers(value: object, name: object) -> tuple[float, ...]:
-    if not isinstance(value, list) or any(
-        isinstance(v, bool) or not isinstance(v, int | float) for v in value
-    ):
-        raise ContractError(f"glass {name!r}: expected a list of numbers; got {value!r}")
-    return tuple(map(float, value))

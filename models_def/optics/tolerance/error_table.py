@@ -33,6 +33,7 @@ KEYS: Final[dict[str, tuple[ErrorClass, float]]] = {
     "element_tilt_deg": ("element_tilt", to_radians(1.0)),
     "focus_mm": ("focus", 1.0),
 }
+_UNIT_TEXTS: Final = {"percent": " %", "mm": " mm", "arcmin": "'"}
 _SETTINGS: Final = {"distribution", "compensator"}
 _ENTRY_KEYS: Final = {"half_width", "distribution"}
 
@@ -89,16 +90,5 @@ def _width(key: str, value: object, unit: float, common: Any) -> ErrorWidth:
 
 def in_file_units(error_class: ErrorClass, value: float) -> str:
     """Return an error as people write it, such as `0.2 %`."""
-    texts = {
-        "radius": (0.01, " %"),
-        "abbe": (0.01, " %"),
-        "groove_depth": (0.01, " %"),
-        "thickness": (1.0, " mm"),
-        "focus": (1.0, " mm"),
-        "surface_decentre": (1.0, " mm"),
-        "element_decentre": (1.0, " mm"),
-        "surface_tilt": (_ARCMIN, "'"),
-        "element_tilt": (_ARCMIN, "'"),
-    }
-    unit, name = texts.get(error_class, (1.0, ""))
-    return f"{value / unit:.4g}{name}"
+    key, unit = next((key, unit) for key, (of, unit) in KEYS.items() if of == error_class)
+    return f"{value / unit:.4g}{_UNIT_TEXTS.get(key.rpartition('_')[2], '')}"

@@ -160,7 +160,9 @@ def land(lens: Lens, deviations: Deviations, view: View, compensator: Compensato
         middle = replace(view, wavelengths_um=wave, samples=pupil_centre())
         chief, alive = _trace(fixed, deviations, middle, walls=False)
         if not bool((alive > 0).all()) or not bool((weight > 0).any(-1).all()):
-            raise ContractError("the light of a copy is lost; use smaller errors or fields")
+            raise ContractError(
+                "the light of a Monte-Carlo sample is lost; use smaller errors or fields"
+            )
         rays, chief = _moved(rays, shift), _moved(chief, shift)
     return Landing(
         rays=rays,

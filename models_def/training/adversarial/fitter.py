@@ -29,7 +29,7 @@ Mix = Callable[[Batch, int], Batch]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PictureParts:
-    """What fitting by what a picture looks like is given besides a network and its schedule.
+    """Inputs of a fit by the look of a picture, besides a network and its schedule.
 
     Attributes:
         content: Weights of what is compared.

@@ -22,7 +22,7 @@ STEP_SEED: Final = 1_000_003
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OpponentPlan:
-    """Who opposes a generator, and how they learn.
+    """Opponents of a generator, and how they learn.
 
     Attributes:
         game: Losses of both players.
@@ -127,7 +127,7 @@ class Opponents:
         return {"weights": weights, "optimizer": self.optimizer.state_dict()}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Go back to a saved state.
+        """Restore a saved state.
 
         Raises:
             ContractError: If it is that of other opponents.

@@ -1,4 +1,4 @@
-"""The focus of a unit comes back from captures of a target; what shows none is refused."""
+"""The focus of a camera body comes back from captures of a target; what shows none is refused."""
 
 import math
 from dataclasses import replace
@@ -89,7 +89,7 @@ def test_edges_are_found_in_planes_too(bundle: Bundle) -> None:
 
 
 def test_a_body_in_focus_needs_no_file(bundle: Bundle) -> None:
-    with pytest.raises(ContractError, match="from the nominal one: leave the unit out"):
+    with pytest.raises(ContractError, match="from the nominal one: omit unit"):
         measure_focus([("target", taken(bundle, 0.0, iso=400.0))], camera(bundle))
 
 
@@ -150,5 +150,5 @@ def test_edges_of_another_lens_are_refused(bundle: Bundle) -> None:
 
 def test_a_psf_of_the_nominal_focus_alone_measures_nothing(bundle: Bundle) -> None:
     plain = replace(camera(bundle), psf=focus_psf(moved=False))
-    with pytest.raises(ContractError, match="knows the nominal focus alone"):
+    with pytest.raises(ContractError, match="has the nominal focus alone"):
         measure_focus([], plain)

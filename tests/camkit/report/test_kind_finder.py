@@ -11,9 +11,12 @@ from camkit.kinds import KINDS, Kind
 from camkit.report.bench.part import BenchPart
 from camkit.report.kind import ReportPart
 from camkit.report.kind_finder import find_part
+from camkit.report.quality import expose
 from camkit.report.stress.part import StressPart
 from camkit.report.stress.run import StressOptions, run_stress
 from camkit.report.stress.scenario import Scenario
+from camkit.report.stress.scene import stress_scenes
+from camkit.report.stress.score import judge_of
 from camkit.report.stress.verdict import Outcome, Verdict
 from camkit.runtime.kind import runtime_part
 
@@ -24,8 +27,13 @@ def test_every_kind_of_camkit_has_its_parts(kind: str) -> None:
     # a kind whose captures are no photographs measures itself
     makes_products = runtime_part(kind).maker is not None
     assert (part.measure is not None) == makes_products
-    assert (part.photograph is not BenchPart().photograph) != makes_products
     assert isinstance(find_part(kind, "stress", StressPart), StressPart)
+
+
+def _bring(monkeypatch: pytest.MonkeyPatch, module: ModuleType) -> None:
+    """Let every kind have a module as its part of the reports."""
+    monkeypatch.setattr(Kind, "has_part", lambda *_: True)
+    monkeypatch.setattr(Kind, "part", lambda *_: module)
 
 
 def test_an_unknown_kind_and_a_part_of_another_type_are_refused(
@@ -34,9 +42,17 @@ def test_an_unknown_kind_and_a_part_of_another_type_are_refused(
     with pytest.raises(UnsupportedError, match="no kind of camera 'plate'"):
         find_part("plate", "bench", BenchPart)
     hollow = ModuleType("hollow")
-    monkeypatch.setattr(Kind, "part", lambda *_: hollow)
+    _bring(monkeypatch, hollow)
     with pytest.raises(ContractError, match="hollow must define PART as a ReportPart with a Bench"):
         find_part("bayer", "bench", BenchPart)
+
+
+def test_a_kind_without_a_part_takes_photographs_as_any(monkeypatch: pytest.MonkeyPatch) -> None:
+    mine = Kind(name="mine", title="", sensor="bayer", stages=(), metrics=(), home="nobody_has_it")
+    monkeypatch.setitem(KINDS, "mine", mine)
+    assert find_part("mine", "bench", BenchPart) == BenchPart(photograph=expose)
+    stress = find_part("mine", "stress", StressPart)
+    assert stress == StressPart(scenes=stress_scenes, examiner=judge_of)
 
 
 class _Counter:
@@ -77,7 +93,7 @@ def test_a_kind_may_bring_scenes_and_an_examiner_of_another_sort(
     )
     module = ModuleType("counting")
     module.PART = part  # type: ignore[attr-defined]
-    monkeypatch.setattr(Kind, "part", lambda *_: module)
+    _bring(monkeypatch, module)
     rate = Scenario(
         name="rate",
         title="Rate",
@@ -110,7 +126,7 @@ def test_a_scenario_may_name_rivals_of_its_own(
     )
     module = ModuleType("counting")
     module.PART = part  # type: ignore[attr-defined]
-    monkeypatch.setattr(Kind, "part", lambda *_: module)
+    _bring(monkeypatch, module)
     rate = Scenario(
         name="rate",
         title="Rate",

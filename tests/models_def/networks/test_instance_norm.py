@@ -5,6 +5,7 @@ import torch
 from torch import nn
 
 from camkit.errors import ContractError
+from camkit.models_def.kinds.hdr.thesis.highlight import HighlightConfig, HighlightUnet
 from camkit.models_def.networks.discriminator import Discriminator, DiscriminatorConfig
 from camkit.models_def.networks.instance_norm import (
     FrozenNorm,
@@ -14,7 +15,6 @@ from camkit.models_def.networks.instance_norm import (
     live_norms,
 )
 from camkit.models_def.networks.normed_unet import NormedConfig, NormedUnet
-from camkit.models_def.networks.thesis.highlight import HighlightConfig, HighlightUnet
 
 
 def twins() -> tuple[NormedUnet, NormedUnet]:

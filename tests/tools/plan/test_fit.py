@@ -1,7 +1,5 @@
 """The fit finds the lines that made the errors, and a budget that keeps both limits."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -14,7 +12,6 @@ from tools.plan.fit import (
     MEAN_DB,
     WORST_DB,
     fit_model,
-    saving_of_the_all_knowing,
     true_loss_db,
 )
 
@@ -70,15 +67,6 @@ def test_budget_keeps_mean_and_worst_loss() -> None:
     lost = [true_loss_db(c, made.model, free, "S", made.model.adaptive_db) for c in captures]
     assert np.mean(lost) == pytest.approx(made.adaptive[0])
     assert max(lost) == pytest.approx(made.adaptive[1])
-
-
-def test_known_losses_save_all_networks_where_none_helps_and_nothing_where_all_do() -> None:
-    capture = _captures(1)[0]
-    same = dict.fromkeys(capture.errors, capture.errors["exact"])
-    useless = replace(capture, errors=same)
-    assert saving_of_the_all_knowing(useless, WORK, "S", 0.1) == pytest.approx(1.0)
-    worse = {name: 10 * error for name, error in same.items()} | {"exact": same["exact"]}
-    assert saving_of_the_all_knowing(replace(capture, errors=worse), WORK, "S", 0.1) == 0.0
 
 
 def test_too_few_cells_are_refused() -> None:

@@ -42,8 +42,9 @@ def show(
     from camkit.models_def.optics.analysis.sampling import Pupil
     from camkit.models_def.optics.glass.agf import read_agf
     from camkit.models_def.optics.lens_file.lens_file import read_noted_lens
-    from camkit.report.lens.facts import analyse, to_json
-    from camkit.report.lens.output import page_path, write_lens_page
+    from camkit.report.pages.lens.lens_facts import analyse, to_json
+    from camkit.report.pages.lens.lens_page import write_lens_page
+    from camkit.report.pages.page import page_path
 
     chosen = Pupil(definition=pupil, sampling=sampling)  # type: ignore[arg-type]
     folder = out_dir if out_dir is not None or json_ else Path()

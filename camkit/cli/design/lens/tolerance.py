@@ -58,7 +58,7 @@ def tolerance(
     from camkit.models_def.design.tolerance import ToleranceRun, run_tolerance
     from camkit.models_def.optics.glass.agf import read_agf
     from camkit.models_def.optics.lens_file.lens_file import read_noted_lens
-    from camkit.report.lens.yield_chart import chart_paths, to_json, to_text, write_tolerance
+    from camkit.report.pages.lens.yield_chart import chart_paths, to_json, to_text, write_tolerance
 
     folder = out_dir if out_dir is not None or json_ else Path()
     if folder is not None:
@@ -69,7 +69,7 @@ def tolerance(
     run = ToleranceRun(
         copies=samples, seed=seed, pictures=data, pitch_um=pitch_um, noise=noise, rays=rays
     )
-    with working("judging copies", unit="copies") as task:
+    with working("judging Monte-Carlo samples", unit="samples") as task:
         result = run_tolerance(lens, _tolerances(file, errors), run, task.count)
     written = () if folder is None else write_tolerance(result, folder, file.stem)
     if json_:

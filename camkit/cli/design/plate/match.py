@@ -47,7 +47,7 @@ def match(
     from camkit.models_def.optics.dots.camera import DotCamera
     from camkit.models_def.optics.dots.match import check_levels, match_dots
     from camkit.models_def.optics.dots.target import to_target
-    from camkit.report.plate.dots import older_files, write_dots
+    from camkit.report.pages.plate.dots import older_files, write_dots
 
     check_levels(levels)
     camera = DotCamera(cells=cells)

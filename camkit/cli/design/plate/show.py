@@ -48,8 +48,9 @@ def show(
 
     require_torch("camkit plate show")
     from camkit.models_def.optics.diffraction.plate import read_plate
-    from camkit.report.plate.facts import Look, analyse, to_json
-    from camkit.report.plate.output import page_path, write_plate_page
+    from camkit.report.pages.page import page_path
+    from camkit.report.pages.plate.plate_facts import Look, analyse, to_json
+    from camkit.report.pages.plate.plate_page import write_plate_page
 
     if depth_m is not None and not depth_m > 0:
         raise ContractError(f"--depth-m must be > 0; got {depth_m:g}")

@@ -77,7 +77,7 @@ def bundle(
         "out": str(out),
     }
     if page is not None:
-        from camkit.report.calibration.bundle_page import bundle_html
+        from camkit.report.pages.calibration.bundle_page import bundle_html
         from camkit.runtime.output.part_file import atomic_output
 
         with atomic_output(page) as part:

@@ -63,7 +63,7 @@ def flat(
     )
 
     def shown() -> str:
-        from camkit.report.calibration.flat_page import flat_html
+        from camkit.report.pages.calibration.flat_page import flat_html
 
         return flat_html(found)
 

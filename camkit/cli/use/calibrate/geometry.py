@@ -83,7 +83,6 @@ def _lines(found: "Geometry") -> list[str]:
 
 
 def _page(found: "Geometry") -> str:
-    from camkit.report.calibration.geometry import geometry_sections
-    from camkit.report.calibration.page import to_html
+    from camkit.report.pages.calibration.geometry_page import geometry_html
 
-    return to_html("camkit calibrate geometry", geometry_sections(found))
+    return geometry_html(found)

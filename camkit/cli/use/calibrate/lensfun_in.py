@@ -72,7 +72,7 @@ def lensfun_in(
     shown = {}
     with ExitStack() as stack:
         if page is not None:
-            from camkit.report.calibration.lensfun_page import bundle_html
+            from camkit.report.pages.calibration.lensfun_page import bundle_html
 
             page.parent.mkdir(parents=True, exist_ok=True)
             part = stack.enter_context(atomic_output(page))

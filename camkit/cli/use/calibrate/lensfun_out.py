@@ -54,7 +54,7 @@ def lensfun_out(
     check_out(out, ".xml", "an entry of lensfun", overwrite=overwrite)
     check_page(page, overwrite=overwrite)
     from camkit.calibration.lensfun.entry import EntryOptions, lensfun_entry
-    from camkit.runtime.output.part_file import atomic_outputs
+    from camkit.runtime.output.part_file import write_together
 
     options = EntryOptions(
         focal_mm=focal_mm,
@@ -66,16 +66,12 @@ def lensfun_out(
         most_residual_px=most_residual_px,
     )
     made = lensfun_entry(source, options)
-    texts = {out: made.to_xml()}
+    files = {out: made.to_xml().encode()}
     if page is not None:
-        from camkit.report.calibration.lensfun_page import entry_html
+        from camkit.report.pages.calibration.lensfun_page import entry_html
 
-        texts[page] = entry_html(made)
-    for path in texts:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    with atomic_outputs(*texts) as parts:
-        for part, text in zip(parts, texts.values(), strict=True):
-            part.write_text(text, encoding="utf-8")
+        files[page] = entry_html(made).encode()
+    write_together(files)
     fit = made.fit
     line = (
         f"  {made.name.model}, {fit.distortion.model} at {fit.distortion.focal_mm:g} mm, misses by "

@@ -47,7 +47,7 @@ def noise(
     found = measure_sensor(dark, flat, mosaic_options(mosaic, black_level, white_level), iso)
 
     def shown() -> str:
-        from camkit.report.calibration.noise_page import noise_html
+        from camkit.report.pages.calibration.noise_page import noise_html
 
         return noise_html(found)
 

@@ -57,16 +57,12 @@ class Outputs:
             ContractError: If the record holds what TOML cannot.
         """
         from camkit.calibration.record import to_toml
-        from camkit.runtime.output.part_file import atomic_outputs
+        from camkit.runtime.output.part_file import write_together
 
-        texts = {self.out: to_toml(record)}
+        contents = {self.out: to_toml(record).encode()}
         if self.page is not None:
-            texts[self.page] = page()
-        for path in texts:
-            path.parent.mkdir(parents=True, exist_ok=True)
-        with atomic_outputs(*texts) as parts:
-            for part, text in zip(parts, texts.values(), strict=True):
-                part.write_text(text, encoding="utf-8")
+            contents[self.page] = page().encode()
+        write_together(contents)
         both = {"out": self.out, "page": self.page}
         files = {name: str(path) for name, path in both.items() if path is not None}
         if self.as_json:

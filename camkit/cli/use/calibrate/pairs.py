@@ -123,6 +123,6 @@ def _tell(found: "Pairs", out: Path, page: Path | None, *, as_json: bool) -> Non
 
 
 def _html(found: "Pairs") -> str:
-    from camkit.report.calibration.pairs_page import pairs_html
+    from camkit.report.pages.calibration.pairs_page import pairs_html
 
     return pairs_html(found)

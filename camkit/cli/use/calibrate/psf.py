@@ -83,7 +83,7 @@ def psf(
     from camkit.calibration.measured import PsfOptions
     from camkit.calibration.psf import measure_psf
     from camkit.runtime.merging.survey import survey
-    from camkit.runtime.output.part_file import atomic_outputs
+    from camkit.runtime.output.part_file import write_together
 
     designed = None if dots is None else read_psf(dots)
     options = PsfOptions(
@@ -97,14 +97,10 @@ def psf(
     made, seen = (found.psf, None) if designed is None else dots_psf(found, designed)
     contents = {out: psf_to_bytes(made)}
     if page is not None:
-        from camkit.report.calibration.psf_page import psf_html
+        from camkit.report.pages.calibration.psf_page import psf_html
 
         contents[page] = psf_html(found).encode()
-    for path in contents:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    with atomic_outputs(*contents) as parts:
-        for part, content in zip(parts, contents.values(), strict=True):
-            part.write_bytes(content)
+    write_together(contents)
     _tell(contents, bracket, found, seen, as_json=json_)
 
 

@@ -42,7 +42,7 @@ def targets(
     )
     from camkit.calibration.geometry.board import Board
     from camkit.calibration.record import to_toml
-    from camkit.report.calibration.targets_page import shrunk, targets_html
+    from camkit.report.pages.calibration.targets_page import shrunk, targets_html
     from camkit.runtime.output.pixels import png_bytes
 
     given = pictures or []

@@ -35,7 +35,7 @@ def tone(
     found = measure_tone(files, levels_of(levels, len(files)), said)
 
     def shown() -> str:
-        from camkit.report.calibration.tone_page import tone_html
+        from camkit.report.pages.calibration.tone_page import tone_html
 
         return tone_html(found)
 

@@ -1,11 +1,8 @@
 """A bench as people see it.
 
-looks          which colour a camera has, which marker a method
+looks          which colour a camera has, which marker a method; the legend
 labels         texts beside markers where they cover nothing
 front_panel    time against PSNR, all cameras on common axes
-field_panels   PSNR over the field, a panel for every ISO
-legend         what colours, markers and lines mean
-chart          all of that as one picture
-tables         accuracy by ISO and field, and how every method was tuned, as tables of the page
-page           the page
+bench_chart    the chart: all of that, and below PSNR over the field, a panel for every ISO
+bench_page     the page
 """

@@ -7,9 +7,9 @@ from camkit.report.bench.pareto import pareto_front
 from camkit.report.bench.row import Row
 from camkit.report.bench.shown.labels import Label, place_labels, places_along, places_around
 from camkit.report.bench.shown.looks import Looks, area_pt2, reach_pt, seconds_per_mp
+from camkit.report.figure import Panel
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes as Panel
     from matplotlib.transforms import Bbox
 
 FRONT_ALPHA: Final = 0.35
@@ -40,7 +40,7 @@ def timed_alone(rows: Sequence[Row], cameras: Container[str]) -> list[Row]:
     ]
 
 
-def draw_front_panel(panel: "Panel", report: dict[str, Any], rows: list[Row], looks: Looks) -> None:
+def draw_front_panel(panel: Panel, report: dict[str, Any], rows: list[Row], looks: Looks) -> None:
     """Draw everything but the labels, which need the final layout.
 
     Args:
@@ -70,9 +70,8 @@ def draw_front_panel(panel: "Panel", report: dict[str, Any], rows: list[Row], lo
         "seconds per megapixel, file to EXR in a fresh process, start-up included (log scale)"
     )
     panel.set_ylabel("PSNR, dB")
-    panel.set_title(title(report, rows), fontsize=10, loc="left")
-    panel.grid(visible=True, which="both", color="#dddddd", linewidth=0.5)
-    panel.set_axisbelow(True)
+    panel.set_title(title(report, rows), loc="left")
+    panel.grid(visible=True, which="both")
 
 
 def input_level(rows: Sequence[Row]) -> float | None:
@@ -107,7 +106,7 @@ def _judged(report: dict[str, Any], rows: Sequence[Row], camera: str) -> str:
     )
 
 
-def _draw_front(panel: "Panel", rows: Sequence[Row], color: str) -> None:
+def _draw_front(panel: Panel, rows: Sequence[Row], color: str) -> None:
     points = [(seconds_per_mp(row), row["psnr_db"]) for row in rows]
     front = [points[index] for index in pareto_front(points)]
     panel.step(
@@ -121,7 +120,7 @@ def _draw_front(panel: "Panel", rows: Sequence[Row], color: str) -> None:
     )
 
 
-def _draw_point(panel: "Panel", row: Row, looks: Looks) -> None:
+def _draw_point(panel: Panel, row: Row, looks: Looks) -> None:
     color = looks.color(row)
     x, y = seconds_per_mp(row), row["psnr_db"]
     error = row.get("gain_se_psnr_db")
@@ -142,7 +141,7 @@ def _draw_point(panel: "Panel", row: Row, looks: Looks) -> None:
     )
 
 
-def _draw_time(panel: "Panel", row: Row, looks: Looks) -> None:
+def _draw_time(panel: Panel, row: Row, looks: Looks) -> None:
     """Draw a row that was not judged: where it stands in time, at no height."""
     x, color = seconds_per_mp(row), looks.color(row)
     panel.axvline(x, color=color, linestyle=":", linewidth=1.2, alpha=0.8, zorder=1)
@@ -160,7 +159,7 @@ def _draw_time(panel: "Panel", row: Row, looks: Looks) -> None:
     )
 
 
-def _tidy_axis(panel: "Panel") -> None:
+def _tidy_axis(panel: Panel) -> None:
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     low, high = panel.get_xlim()
@@ -170,7 +169,7 @@ def _tidy_axis(panel: "Panel") -> None:
     panel.xaxis.set_minor_formatter(NullFormatter())
 
 
-def label_front_panel(panel: "Panel", rows: Sequence[Row], looks: Looks) -> None:
+def label_front_panel(panel: Panel, rows: Sequence[Row], looks: Looks) -> None:
     """Write beside every marker what it is, and at every input line whose it is."""
     taken = [box for row in rows for box in _drawn_boxes(panel, row)]
     inputs = _input_labels(panel, rows, looks)
@@ -195,7 +194,7 @@ def _label(looks: Looks) -> Any:
     return label
 
 
-def _input_labels(panel: "Panel", rows: Sequence[Row], looks: Looks) -> list[Label]:
+def _input_labels(panel: Panel, rows: Sequence[Row], looks: Looks) -> list[Label]:
     found = []
     for camera, color in looks.colors.items():
         level = input_level([row for row in rows if row["camera"] == camera])
@@ -213,7 +212,7 @@ def _input_labels(panel: "Panel", rows: Sequence[Row], looks: Looks) -> list[Lab
     return found
 
 
-def _line_box(panel: "Panel", level: float) -> "Bbox":
+def _line_box(panel: Panel, level: float) -> "Bbox":
     """Return what the line of an input covers on the canvas."""
     from matplotlib.transforms import Bbox
 
@@ -221,7 +220,7 @@ def _line_box(panel: "Panel", level: float) -> "Bbox":
     return Bbox.from_extents(panel.bbox.x0, y - 1, panel.bbox.x1, y + 1)
 
 
-def _drawn_boxes(panel: "Panel", row: Row) -> "list[Bbox]":
+def _drawn_boxes(panel: Panel, row: Row) -> "list[Bbox]":
     """Return what a row covers on the canvas: its marker, and its bars of some width."""
     from matplotlib.transforms import Bbox
 

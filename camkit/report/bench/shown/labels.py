@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from camkit.report.figure import Panel
+
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes as Panel
     from matplotlib.transforms import Bbox
 
 NEAR_PT: Final = 3.5
@@ -69,7 +70,7 @@ def places_along(step_pt: float = 45.0, count: int = 8) -> list[Place]:
     return [p for x in ends for p in (Place(x, 2, "right", "bottom"), Place(x, -2, "right", "top"))]
 
 
-def place_labels(panel: "Panel", labels: Sequence[Label], taken: "list[Bbox]") -> None:
+def place_labels(panel: Panel, labels: Sequence[Label], taken: "list[Bbox]") -> None:
     """Draw labels, each where it shares least with what is taken and with the ones before it.
 
     Args:
@@ -87,7 +88,7 @@ def place_labels(panel: "Panel", labels: Sequence[Label], taken: "list[Bbox]") -
         taken.append(boxes[best])
 
 
-def _text_size_px(panel: "Panel", label: Label) -> tuple[float, float]:
+def _text_size_px(panel: Panel, label: Label) -> tuple[float, float]:
     renderer = panel.figure.canvas.get_renderer()  # type: ignore[attr-defined]
     text = panel.text(0, 0, label.text, fontsize=label.size_pt, fontweight=_weight(label))
     box = text.get_window_extent(renderer)
@@ -95,7 +96,7 @@ def _text_size_px(panel: "Panel", label: Label) -> tuple[float, float]:
     return float(box.width), float(box.height)
 
 
-def _draw(panel: "Panel", label: Label, place: Place) -> None:
+def _draw(panel: Panel, label: Label, place: Place) -> None:
     is_far = label.gap_pt > 0 and abs(complex(place.x_pt, place.y_pt)) > FAR_PT + label.gap_pt
     line = {
         "arrowstyle": "-",

@@ -6,8 +6,8 @@
 Shots of scenarios that serve every camera go to the common judge.
 """
 
-import hashlib
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -21,12 +21,12 @@ from camkit.report.kinds.hdr.capture import clipped_planes, developer
 from camkit.report.kinds.hdr.lights import exposed_night
 from camkit.report.stress.rig import INPUT, Restored, Rig
 from camkit.report.stress.scene import Scene
-from camkit.report.stress.score import Judge, Numbers, see, worst_patch
+from camkit.report.stress.score import Judge, Numbers, digest_of, see, worst_patch
 from camkit.report.stress.shot import Shot
 from camkit.report.stress.verdict import Outcome, Verdict
 from camkit.runtime.capture import Capture
 from camkit.runtime.twin.exposure import Setting
-from camkit.runtime.twin.light import Lens, Light, LightOptions, lens_of, light_of, scene_window
+from camkit.runtime.twin.light import Lens, Light, lens_of
 from camkit.runtime.twin.simulate import bare_psf
 from camkit.runtime.twin.truth import true_picture
 from camkit.scenes.saturation import CEILING
@@ -65,7 +65,6 @@ class HdrJudge:
         self.rig = rig
         self._common = Judge(rig)
         self._developer = developer(rig.bundle, threads=1)
-        self._bare: Lens | None = None
         self._scored: dict[bytes, Verdict] = {}
         self._lit: dict[tuple[str, float], Scene] = {}
         self._last: tuple[Scene, tuple[Light, Light]] | None = None
@@ -125,14 +124,14 @@ class HdrJudge:
             around: (3, h', w') linear Rec.709: the scene with as much on every side of it; None
                 where it goes on as its mirror image.
         """
-        if lens is None and around is None:
-            if self._last is None or self._last[0] is not scene:
-                both = self.rig.lens, self._bare_lens()
-                self._last = scene, (self._fall(scene, both[0]), self._fall(scene, both[1]))
+        is_nominal = lens is None and around is None
+        if is_nominal and self._last is not None and self._last[0] is scene:
             coded, bare = self._last[1]
         else:
-            coded = self._fall(scene, lens or self.rig.lens, around)
-            bare = self._fall(scene, self._bare_lens(), around)
+            seen = scene.linear if around is None else around
+            lenses = (lens, self._bare_lens)
+            coded, bare = (self.rig.light_amid(scene, seen, each) for each in lenses)
+            self._last = (scene, (coded, bare)) if is_nominal else self._last
         return HdrShot(
             coded=self.rig.record(scene, coded, setting),
             bare=self.rig.record(scene, bare, setting).capture,
@@ -160,23 +159,12 @@ class HdrJudge:
         """Return the lens that writes other streaks than the bundle knows."""
         return self._at_focus(psf_of_streaks(streaks, len(self.rig.sensor.channels)))
 
+    @cached_property
     def _bare_lens(self) -> Lens:
-        if self._bare is None:
-            self._bare = self._at_focus(bare_psf(self.rig.bundle))
-        return self._bare
+        return self._at_focus(bare_psf(self.rig.bundle))
 
     def _at_focus(self, psf: FrozenPsf) -> Lens:
         return lens_of(psf, self.rig.sensor, depth_mm=self.rig.bundle.reference_depth_mm)
-
-    def _fall(self, scene: Scene, lens: Lens, around: FloatArray | None = None) -> Light:
-        """Project a scene on the sensor."""
-        extent = self.rig.sensor.known_extent
-        origin = scene.origin_px((extent.width_px, extent.height_px))
-        seen = scene.linear if around is None else around
-        ring_px = (seen.shape[1] - scene.linear.shape[1]) // (2 * scene.scale)
-        window = scene_window(seen, self.rig.sensor, origin, scale=scene.scale, surround_px=ring_px)
-        options = LightOptions(scale=scene.scale, surround_px=ring_px)
-        return light_of(seen, self.rig.sensor, lens, window, options)
 
     def _restored(self, shot: HdrShot) -> tuple[dict[str, FloatArray], dict[str, str]]:
         """Return the picture of every method, and why some gave none."""
@@ -259,7 +247,4 @@ def _digest(shot: HdrShot) -> bytes:
     """Return what decides the verdict on a shot."""
     capture = shot.coded.capture
     facts = (capture.iso, capture.white_level, capture.white_balance, shot.coded.border_px)
-    digest = hashlib.sha256(repr(facts).encode())
-    for array in (capture.samples, shot.bare.samples, shot.truth):
-        digest.update(np.ascontiguousarray(array).data)
-    return digest.digest()
+    return digest_of(facts, (capture.samples, shot.bare.samples, shot.truth))

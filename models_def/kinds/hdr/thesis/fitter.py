@@ -15,6 +15,7 @@ from torch import Tensor
 
 from camkit.caller import option_text
 from camkit.errors import ContractError
+from camkit.models_def.kinds.hdr.thesis.chain import ThesisChain
 from camkit.models_def.kinds.hdr.thesis.losses import (
     exclusion_loss,
     fused_loss,
@@ -30,7 +31,6 @@ from camkit.models_def.kinds.hdr.thesis.networks import (
     to_light,
 )
 from camkit.models_def.kinds.hdr.thesis_recipe import ThesisRecipe
-from camkit.models_def.networks.thesis.chain import ThesisChain
 from camkit.models_def.networks.vgg import VggLevels, file_digest, take_vgg
 from camkit.models_def.training.fitter import Fitter, Objective
 from camkit.models_def.training.fitting import FitRequest, OwnFitting

@@ -3,17 +3,16 @@
 roots -- square -- network of the thesis, linear light -- root -- roots
 """
 
-from collections.abc import Callable
 from typing import Any, Final
 
 import torch
 from torch import Tensor, nn
 
-from camkit.errors import ContractError
-from camkit.models_def.networks.thesis.chain import ThesisChain
-from camkit.models_def.networks.thesis.fusion import FusionConfig, FusionNetwork
-from camkit.models_def.networks.thesis.highlight import HighlightConfig, HighlightUnet
-from camkit.models_def.networks.thesis.splitting import SplittingConfig, SplittingNetwork
+from camkit.models_def.kinds.hdr.thesis.chain import ThesisChain
+from camkit.models_def.kinds.hdr.thesis.fusion import FusionConfig, FusionNetwork
+from camkit.models_def.kinds.hdr.thesis.highlight import HighlightConfig, HighlightUnet
+from camkit.models_def.kinds.hdr.thesis.splitting import SplittingConfig, SplittingNetwork
+from camkit.models_def.networks.catalog import Builders, build_one, configured
 
 PICTURE: Final = 3
 
@@ -56,10 +55,10 @@ def _chain(**tables: Any) -> nn.Module:
     return ThesisChain(**{k: configs[k](**_tuples(v)) for k, v in tables.items()})
 
 
-_BUILDERS: Final[dict[str, Callable[..., nn.Module]]] = {
-    "thesis_split": lambda **config: SplittingNetwork(SplittingConfig(**config)),
-    "thesis_highlight": lambda **config: HighlightUnet(HighlightConfig(**config)),
-    "thesis_fusion": lambda **config: FusionNetwork(FusionConfig(**config)),
+_BUILDERS: Final[Builders] = {
+    "thesis_split": configured(SplittingNetwork, SplittingConfig),
+    "thesis_highlight": configured(HighlightUnet, HighlightConfig),
+    "thesis_fusion": configured(FusionNetwork, FusionConfig),
     "thesis_chain": _chain,
 }
 
@@ -77,10 +76,7 @@ def build_thesis_network(name: str, **config: Any) -> BetweenRoots:
     Raises:
         ContractError: If a field is unknown or a value is out of range.
     """
-    try:
-        return BetweenRoots(_BUILDERS[name](**_tuples(config)))
-    except TypeError as error:
-        raise ContractError(f"network {name} does not take this configuration: {error}") from error
+    return BetweenRoots(build_one(_BUILDERS, name, config))
 
 
 def _tuples(config: dict[str, Any]) -> dict[str, Any]:

@@ -27,9 +27,9 @@ from camkit.models_def.kinds.hdr.material import HdrMaterial
 from camkit.models_def.kinds.hdr.recipe import HdrRecipe
 from camkit.models_def.kinds.hdr.samples import develop, draw_corner, spread_light
 from camkit.models_def.kinds.hdr.scenes import LightSource, exposed
+from camkit.models_def.kinds.hdr.thesis.chain import saturated
 from camkit.models_def.kinds.hdr.thesis.networks import to_roots
 from camkit.models_def.kinds.hdr.thesis.star import draw_angle_rad, star_kernel
-from camkit.models_def.networks.thesis.chain import saturated
 from camkit.models_def.sensors.exposure import expose
 from camkit.models_def.training.sample import Sample, SampleLayout
 from camkit.scenes.saturation import CEILING

@@ -21,7 +21,7 @@ from camkit.runtime.kinds.spad.pixels import Pixels
 from camkit.runtime.kinds.spad.sharpen import Sharpened, Sharpener
 
 SHARPER: Final = 20.0
-"""Times the photons of a bin at which the estimate is taken (`tools.spad.depth_sigma`)."""
+"""Times the photons of a bin of the estimate (`tools.spad.depth_sigma` at 2a55aa66)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -138,8 +138,8 @@ class FineCamera:
     def size_of_bins(self, asked: str | None) -> str:
         """Return the size of network that makes bins finer for depth: asked for, else the smallest.
 
-        A larger one brings times nearer by a few percent at most (`tools.spad.depth`), and every
-        bin costs what it costs.
+        A larger one brings times nearer by a few percent at most (`tools.spad.depth` at 2a55aa66),
+        and every bin costs what it costs.
 
         Raises:
             ContractError: If there is none.

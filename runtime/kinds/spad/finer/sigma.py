@@ -6,7 +6,7 @@ with sigma_linear that of the linear estimate, s the change of times from one su
 and w the width of a bin. What an estimate misses between its pixels shifts times where depth falls
 off. A network does to noise what no sum of squares tells, the more the fainter a capture is, and
 has a rest of error that more photons do not take away; so its shares are fitted to errors measured
-on procedural scenes (`python -m tools.spad.depth_sigma`).
+on procedural scenes (`python -m tools.spad.depth_sigma` at 2a55aa66).
 """
 
 from dataclasses import dataclass

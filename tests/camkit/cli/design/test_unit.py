@@ -65,14 +65,14 @@ def test_a_camera_in_focus_and_one_without_kernels_are_refused(
 ) -> None:
     camkit_command("simulate", "squares:1", "--bundle", "focused.camkit", "-o", "1.dng")
     outcome = camkit_command("freeze", "focused.camkit", "1.dng", "--unit", "-o", "u.toml")
-    assert "from the nominal one: leave the unit out" in outcome.err
+    assert "from the nominal one: omit --unit" in outcome.err
     write_focus_bundle(tmp_path, "plain", moved=False)
     outcome = camkit_command("freeze", "plain.camkit", "1.dng", "--unit", "-o", "u.toml")
-    assert "knows the nominal focus alone: freeze it with --focus-um" in outcome.err
+    assert "has the nominal focus alone: freeze it with --focus-um" in outcome.err
     body(5.0)
     outcome = camkit_command("process", "1.dng", "--bundle", "plain.camkit", "--unit", "true.toml")
     assert outcome.code == ExitCode.USAGE
-    assert "knows the nominal focus alone" in outcome.err
+    assert "has the nominal focus alone" in outcome.err
     assert not Path("u.toml").exists()
 
 
@@ -80,7 +80,7 @@ def test_a_camera_in_focus_and_one_without_kernels_are_refused(
     ("words", "message"),
     [
         (("--unit", "-o", "u.toml"), "--unit needs captures of a target"),
-        (("--unit", "1.dng", "-o", "u.safetensors"), "a unit is TOML"),
+        (("--unit", "1.dng", "-o", "u.safetensors"), "a camera body is TOML"),
         (("1.dng", "-o", "u.toml"), "captures are for --unit"),
         (
             ("1.dng", "--unit", "-o", "u.toml", "--report", "r.json"),
@@ -109,7 +109,7 @@ def test_a_reach_is_a_number_or_auto(camkit_command, tmp_path: Path, text: str) 
 
 def test_only_a_lens_is_traced_with_its_sensor_moved(camkit_command, tmp_path: Path) -> None:
     words = ("freeze", "streak-4", "-o", tmp_path / "psf.safetensors", "--focus-um")
-    assert "only of a lens it is known" in camkit_command(*words, "auto").err
+    assert "auto needs a lens" in camkit_command(*words, "auto").err
     assert "only a lens is traced with its sensor moved" in camkit_command(*words, "20").err
     unit = ("freeze", "streak-4", tmp_path / "a.dng", "--unit", "-o", tmp_path / "u.toml")
     assert "measured with a lens or a bundle; streak-4 is neither" in camkit_command(*unit).err

@@ -1,7 +1,5 @@
 """Patches: the same busy place of every method, as PNGs that decode to what was restored."""
 
-import base64
-
 import cv2
 import numpy as np
 import pytest
@@ -15,13 +13,13 @@ from camkit.report.bench.crops import (
     CropCollector,
     busiest_place,
     display_gain,
-    png_base64,
 )
 from camkit.report.bench.known_captures import KnownCapture
+from camkit.report.figure import encode_png, levels_of
 
 
-def decode(png: str) -> FloatArray:
-    data = np.frombuffer(base64.b64decode(png), np.uint8)
+def decode(png: bytes) -> FloatArray:
+    data = np.frombuffer(png, np.uint8)
     levels = cv2.imdecode(data, cv2.IMREAD_COLOR)
     return levels[..., ::-1].transpose(2, 0, 1).astype(np.float32) / 255
 
@@ -54,7 +52,7 @@ def test_the_patch_lies_where_the_detail_is_and_inside_the_border() -> None:
 
 def test_a_png_holds_the_values_in_eight_bits() -> None:
     values = np.random.default_rng(1).random((3, 20, 30), dtype=np.float32)
-    np.testing.assert_allclose(decode(png_base64(values)), values, atol=0.5 / 255 + 1e-6)
+    np.testing.assert_allclose(decode(encode_png(levels_of(values))), values, atol=0.5 / 255 + 1e-6)
 
 
 def test_every_method_shows_the_same_place_with_its_own_psnr() -> None:

@@ -1,5 +1,6 @@
 """Makers and metrics of a camera: those that serve every camera, and those of its kind."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -7,10 +8,13 @@ import pytest
 from camkit.bundle.reader import Bundle
 from camkit.errors import UnsupportedError
 from camkit.kinds import Kind
-from camkit.report.bench import line_up
+from camkit.report.bench import common_rows, line_up
+from camkit.report.bench.common_rows import COMMON
 from camkit.report.bench.line_up import make_trials, makers_of, metrics_of
+from camkit.report.bench.part import BenchPart
+from camkit.report.bench.row_maker import RowMaker
 from camkit.report.bench.trial import Axes, Entrant, Ground
-from camkit.report.kinds import bayer
+from camkit.runtime.kind import part_of
 from camkit.runtime.stages import wiener
 from tests.plain_bundle import SIZES, write_bankless_bundle, write_networkless_bundle
 from tests.wide_bundle import write_wide_bundle
@@ -24,11 +28,28 @@ def labels(bundle: Bundle, axes: Axes) -> tuple[list[str], list[str]]:
     return [trial.label for trial in trials], [f"{s.what}: {s.reason}" for s in skips]
 
 
-def test_a_row_of_the_kind_stands_in_place_of_the_common_one(tmp_path: Path) -> None:
+def test_a_row_of_the_kind_stands_in_place_of_the_common_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     manifest = write_wide_bundle(tmp_path).manifest
+    assert makers_of(manifest) == COMMON
+    mine = RowMaker(name="develop", methods=("develop",), trials=lambda *_: ([], []))
+    monkeypatch.setattr(line_up, "find_part", lambda *_: BenchPart(rows=(mine,)))
     makers = {maker.name: maker for maker in makers_of(manifest)}
     assert list(makers) == ["classical", "develop", "network", "physics"]
-    assert makers["develop"] is bayer.PART.bench.rows[0]
+    assert makers["develop"] is mine
+
+
+def test_a_dng_is_developed_without_its_bundle_and_other_captures_with_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bundle = write_wide_bundle(tmp_path)
+    entrant = Entrant(label="tiny", bundle=bundle, camera="tiny")
+    asked = Axes(methods=("develop",))
+    assert [trial.path for trial in make_trials([entrant], asked, GROUND)[0]] == [None]
+    part = replace(part_of(bundle.manifest), suffix=".tif")
+    monkeypatch.setattr(common_rows, "part_of", lambda _manifest: part)
+    assert [trial.path for trial in make_trials([entrant], asked, GROUND)[0]] == [bundle.path]
 
 
 def test_the_kind_names_its_metrics(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

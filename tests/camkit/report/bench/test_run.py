@@ -22,11 +22,11 @@ from camkit.report.bench import known_captures, line_up, run
 from camkit.report.bench.known_captures import bench_scene, drawn_scene, picture_captures
 from camkit.report.bench.metrics import hdr
 from camkit.report.bench.output import write_bench
+from camkit.report.bench.part import BenchPart
 from camkit.report.bench.run import open_entrants, run_bench
 from camkit.report.bench.settings import Settings
 from camkit.report.bench.timed.capture import timed_capture
 from camkit.report.bench.trial import Axes
-from camkit.report.kinds import bayer
 from camkit.report.quality import Exposed, Shot, expose
 from camkit.runtime.twin.saturation import saturation_of
 from camkit.runtime.twin.truth import light_sensor, true_picture
@@ -203,7 +203,7 @@ def test_a_camera_judged_by_high_dynamic_range_gets_its_numbers_in_every_file(
 ) -> None:
     bundle = write_wide_bundle(tmp_path)
     kind = replace(find_kind("bayer"), metrics=("picture", "hdr"))
-    part = replace(bayer.PART.bench, photograph=_expose_hdr, positions=(0,), isos=(100.0,))
+    part = BenchPart(photograph=_expose_hdr, positions=(0,), isos=(100.0,))
     monkeypatch.setattr(line_up, "find_kind", lambda _name: kind)
     for module in (line_up, known_captures, run):
         monkeypatch.setattr(module, "find_part", lambda *_: part)

@@ -1,20 +1,20 @@
 """Stars and limbs under stress: numbers for every method, none for a picture that is the truth."""
 
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
 
 from camkit.bundle.reader import open_bundle
 from camkit.bundle.writer import write_bundle
-from camkit.report.stress.chart import draw_curve
+from camkit.report.figure import to_png
 from camkit.report.stress.curve import breaks_of, curve_of
 from camkit.report.stress.report import scenario_json
 from camkit.report.stress.scenario import LEAST_ROOM_PX, Scenario, choose, has_room
-from camkit.report.stress.scenarios.scene import limb, stars
+from camkit.report.stress.scenarios.scene_rows import limb_numbers, moonlit, star_numbers
 from camkit.report.stress.scene import Scene
-from camkit.report.stress.score import Comparison, Judge
+from camkit.report.stress.score import Comparison, Judge, Numbers
+from camkit.report.stress.stress_chart import draw_curve
 from camkit.report.stress.sweep import Sweep, run_sweep
 from tests.bundle_factory import tiny_manifest, tiny_members, tiny_sensor
 
@@ -31,16 +31,18 @@ def test_every_method_gets_its_numbers(scenario: Scenario, judge: Judge, scene: 
         assert name.endswith(("_percent", "_px"))
         assert grids.keys() == set(judge.methods)
         assert all(np.isfinite(value) for values in grids.values() for value in values)
-    assert draw_curve(curve, breaks_of(curve)).startswith(b"\x89PNG")
+    assert to_png(draw_curve(curve, breaks_of(curve))).startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize(("scenario", "part"), [(CLEAN[0], stars), (CLEAN[1], limb)])
+@pytest.mark.parametrize(
+    ("scenario", "numbers"), [(CLEAN[0], star_numbers), (CLEAN[1], limb_numbers)]
+)
 def test_the_truth_itself_has_nothing_to_be_blamed_for(
-    scenario: Scenario, part: ModuleType, judge: Judge, scene: Scene
+    scenario: Scenario, numbers: Numbers, judge: Judge, scene: Scene
 ) -> None:
     assert scenario.shoot is not None
     truth = Comparison(scenario.shoot(judge, scene, scenario.nominal)).truth
-    found = part.numbers(truth, truth)
+    found = dict(numbers(truth, truth))
     assert found.pop("core_median_percent", 100) > 95
     assert max(found.values()) < 5
     assert min(found.values()) >= 0
@@ -59,5 +61,5 @@ def test_the_smallest_sensor_has_room_for_the_disc(number: int) -> None:
     """A disc with its surroundings must fit, whatever its size and place."""
     black = np.zeros((3, LEAST_ROOM_PX, LEAST_ROOM_PX), np.float32)
     scene = Scene(name="black", number=number, linear=black)
-    shown = limb.moonlit(scene, 0.6).linear
-    assert limb.numbers(shown, shown)["wobble_px"] < 0.01
+    shown = moonlit(scene, 0.6).linear
+    assert limb_numbers(shown, shown)["wobble_px"] < 0.01

@@ -8,7 +8,7 @@ import pytest
 from camkit.bundle.reader import Bundle
 from camkit.report.stress.rig import Rig
 from camkit.report.stress.scenario import choose
-from camkit.report.stress.scenarios.lens.depth import FAR_M
+from camkit.report.stress.scenarios.lens_rows import FAR_M
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
 from tests.deep_bundle import write_deep_bundle

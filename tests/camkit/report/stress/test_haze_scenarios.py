@@ -16,8 +16,7 @@ from camkit.report.stress.kernel_change import with_transformed
 from camkit.report.stress.rig import Rig
 from camkit.report.stress.run import StressOptions, run_stress
 from camkit.report.stress.scenario import all_scenarios, choose
-from camkit.report.stress.scenarios.lens.energy_split import with_split
-from camkit.report.stress.scenarios.lens.lost_dark_frame import black_taken_off
+from camkit.report.stress.scenarios.lens_rows import black_taken_off, with_split
 from camkit.report.stress.scene import Scene, stress_scenes
 from camkit.report.stress.score import Judge
 from camkit.runtime.bank.haze import hazy_kernels

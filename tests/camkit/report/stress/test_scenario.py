@@ -1,13 +1,13 @@
-"""Scenarios are found by their place, and all of them run."""
+"""Scenarios are rows of tables that are found by their place, and all of them run."""
 
 import numpy as np
 import pytest
 
 from camkit.errors import ContractError
-from camkit.report.stress.scenario import Scenario, all_scenarios, choose
-from camkit.report.stress.scenarios.lens.haze import add_haze
-from camkit.report.stress.scenarios.lens.illuminant import GRID_UM, planck
-from camkit.report.stress.scenarios.sensor.saturated_area import POWER, with_discs
+from camkit.report.stress.lamps import planck
+from camkit.report.stress.scenario import Scenario, all_scenarios, choose, row
+from camkit.report.stress.scenarios.lens_rows import GRID_UM, add_haze
+from camkit.report.stress.scenarios.sensor_rows import POWER, with_discs
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
 from camkit.runtime.envelope import QUANTITIES
@@ -52,6 +52,13 @@ def test_chosen_by_name_in_the_order_asked_for() -> None:
     assert len(choose(None)) == len(ALL)
     with pytest.raises(ContractError, match=r"unknown scenario.*gremlins.*noise"):
         choose("noise,gremlins")
+
+
+def test_a_row_says_which_value_is_nominal_and_which_are_quick() -> None:
+    found = row("x", "X", "turn", "deg", "-2 (-0.5) [0] 1 (1e3)", shoot=lambda *_: None)
+    assert found.values == (-2, -0.5, 0, 1, 1000)
+    assert found.nominal == 0
+    assert found.quick == (-0.5, 0, 1000)
 
 
 @pytest.mark.parametrize(

@@ -8,11 +8,15 @@ import pytest
 
 from camkit.bundle.reader import Bundle
 from camkit.colorimetry import D65
+from camkit.report.stress.lamps import planckian, tint
 from camkit.report.stress.rig import Rig
 from camkit.report.stress.scenario import choose
-from camkit.report.stress.scenarios.unseen.dynamic_range import sunlit
-from camkit.report.stress.scenarios.unseen.light_colour import planckian, tint
-from camkit.report.stress.scenarios.unseen.surroundings import MOST_RING_PX, ring_px, surrounded
+from camkit.report.stress.scenarios.unseen_rows import (
+    MOST_RING_PX,
+    ring_px,
+    sunlit,
+    surrounded,
+)
 from camkit.report.stress.scene import WHITE, Scene
 from camkit.report.stress.score import Judge
 from tests.bundle_factory import tiny_sensor

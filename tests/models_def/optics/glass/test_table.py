@@ -20,11 +20,11 @@ def test_glass_comes_back_from_its_table() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"extra": 1}, "needs the keys"),
-        ({"name": 1}, "must be text"),
+        ({"extra": 1}, "unknown key 'extra'"),
+        ({"name": 1}, "name must be of type str"),
         ({"range_um": [0.3]}, "range_um"),
-        ({"range_um": 0.3}, "list of numbers"),
-        ({"coefficients": ["1"]}, "list of numbers"),
+        ({"range_um": 0.3}, "range_um must be a list"),
+        ({"coefficients": ["1"]}, r"coefficients\[0\] must be of type float"),
         ({"formula": "magic"}, "formula must be one of"),
     ],
 )

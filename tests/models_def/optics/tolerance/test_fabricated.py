@@ -99,7 +99,7 @@ def test_rays_of_a_misaligned_copy_fill_the_real_stop() -> None:
         if arrive:
             assert bool((land(cut, drawn, view, "none").weight > 0).all())
         else:
-            with pytest.raises(ContractError, match="light of a copy is lost"):
+            with pytest.raises(ContractError, match="light of a Monte-Carlo sample is lost"):
                 land(cut, drawn, view, "none")
 
 
@@ -308,7 +308,7 @@ def test_even_kernels_and_absurd_errors_are_refused() -> None:
     tight = replace(DUET, surfaces=tuple(replace(s, semi_diameter_mm=6.3) for s in DUET.surfaces))
     huge = Tolerances(element_decentre=ErrorWidth(half_width=50.0)).only("element_decentre")
     drawn = draw_deviations(tight, huge, range(4), 1, at_limits=True)
-    with pytest.raises(ContractError, match="light of a copy is lost"):
+    with pytest.raises(ContractError, match="light of a Monte-Carlo sample is lost"):
         land(tight, drawn, view_of(tight, [0.0], [0.0]), "none")
 
 

@@ -4,13 +4,13 @@ import pytest
 import torch
 
 from camkit.errors import ContractError
+from camkit.models_def.kinds.hdr.thesis.chain import ThesisChain
 from camkit.models_def.kinds.hdr.thesis.networks import (
     THESIS_NAMES,
     build_thesis_network,
     to_light,
     to_roots,
 )
-from camkit.models_def.networks.thesis.chain import ThesisChain
 from camkit.models_def.training.kind import training_kind
 from tests.models_def.kinds.hdr.thesis.conftest import NETWORKS
 

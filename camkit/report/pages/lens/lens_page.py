@@ -1,0 +1,219 @@
+"""The page of a lens, and its charts beside it."""
+
+import math
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+from camkit.models_def.optics.analysis.seidel import SEIDEL_NAMES, Seidel
+from camkit.models_def.optics.prescription import grooves_of
+from camkit.report.pages.lens.colour_chart import draw_colour
+from camkit.report.pages.lens.field_chart import draw_field
+from camkit.report.pages.lens.layout import draw_layout
+from camkit.report.pages.lens.lens_facts import LensFacts
+from camkit.report.pages.lens.mtf_chart import draw_mtf
+from camkit.report.pages.lens.seidel_chart import draw_seidel
+from camkit.report.pages.lens.spot_chart import draw_spots
+from camkit.report.pages.page import Page, Part, Picture, Section, Table, Words, write_page
+from camkit.units import UM_PER_MM, to_degrees
+
+_PUPILS: Final = {
+    "paraxial": "paraxial: rays fill the paraxial entrance pupil",
+    "chief": "chief: the chief ray is aimed at the middle of the stop, around it rays fill a disc "
+    "of the entrance pupil's diameter",
+    "stop": "stop: every ray is aimed at its point of the stop, whose radius is that of the real "
+    "marginal ray",
+}
+_CHARTS: Final = {
+    "layout": draw_layout,
+    "spots": draw_spots,
+    "mtf": draw_mtf,
+    "field": draw_field,
+    "colour": draw_colour,
+    "seidel": draw_seidel,
+}
+_CAPTIONS: Final = {
+    "layout": "Rays of the reference wavelength; of many fields, five.",
+    "mtf": "Tangential: lines across the meridian; sagittal: along it. Of many fields, five.",
+    "spots": "About the chief ray of the reference wavelength, all fields to one scale; circle: "
+    "Airy disc. RMS about the centroid at the wavelength of the file next to the reference.",
+    "field": "T tangential (solid), S sagittal (dashed) focus of close rays. Distortion against "
+    "the paraxial chief ray on the sensor. Light is traced with every ray aimed at the stop.",
+    "colour": "",
+    "seidel": "S = 2|n'u'| times the transverse third-order aberration: negative S_I is "
+    "undercorrected, negative S_V barrel distortion; Welford's sums are the negatives.",
+}
+_PRESCRIPTION: Final = (
+    *("surface", "radius, mm", "thickness, mm", "glass", "semi-diameter, mm", "conic"),
+    "r², r⁴, …",
+)
+_GROOVES: Final = (
+    *("surface", "groove, µm", "walls", "narrowest, mm", "tool radius, µm", "grooves"),
+)
+_FIELDS: Final = (
+    *("field", "µm", "RMS, µm", "RMS chief, µm", "max, µm", "Airy, µm", "OPD RMS, waves"),
+    *("distortion, %", "light", "rays lost"),
+)
+_BY_SAMPLING: Final = (
+    "RMS radius in µm about the centroid, reference wavelength, by sampling of the pupil:"
+)
+
+
+def write_lens_page(facts: LensFacts, folder: Path, name: str) -> list[Path]:
+    """Write NAME.html, and NAME-CHART.svg and .png beside it; return the files, the page first.
+
+    Raises:
+        UnsupportedError: If matplotlib is not installed.
+    """
+    charts = {
+        chart: partial(draw, facts)
+        for chart, draw in _CHARTS.items()
+        if chart != "seidel" or facts.seidel is not None
+    }
+    return write_page(folder, name, charts, partial(lens_page, facts))
+
+
+def lens_page(facts: LensFacts, pictures: Mapping[str, str]) -> Page:
+    """Return the page.
+
+    Args:
+        facts: Of the lens.
+        pictures: Name -> SVG text.
+    """
+    lens = facts.lens
+    shown = {name: Picture(_CAPTIONS[name], svg) for name, svg in pictures.items()}
+    lead: list[Part] = [Words(lens.note, "small")] if lens.note else []
+    lead += [_pupil_words(facts), *(Words(note, "note") for note in facts.notes)]
+    spots = (shown.get("spots"), _fields(facts), Words(_BY_SAMPLING, "small"), _convergence(facts))
+    sections = [
+        Section("Layout", (shown.get("layout"),)),
+        Section("First order", (_first_order(facts),)),
+        Section("Prescription", (_prescription(facts), _grooves(facts))),
+        Section("Spot diagrams", (*spots, f"PSF: {facts.model.reason}.")),
+        Section("MTF", (shown.get("mtf"),)),
+        Section("Field curvature, distortion, relative illumination", (shown.get("field"),)),
+        Section("Longitudinal aberration and colour", (shown.get("colour"),)),
+    ]
+    if facts.seidel is not None:
+        sums = (shown.get("seidel"), *_seidel(facts.seidel))
+        sections.append(Section("Third-order sums by surface", sums))
+    return Page(title=lens.name, lead=lead, sections=sections)
+
+
+def _pupil_words(facts: LensFacts) -> str:
+    real = facts.real_stop_mm
+    radii = f"Stop radius {facts.paraxial.stop_semi_diameter_mm:.6g} mm by the paraxial marginal "
+    radii += "ray" if real is None else f"ray, {real:.6g} mm by the real one"
+    return (
+        f"Pupil {_PUPILS[facts.pupil.definition]}. Sampling {facts.pupil.sampling} "
+        f"({len(facts.pupil.samples.x)} rays per field and wavelength). {radii}."
+    )
+
+
+def _first_order(facts: LensFacts) -> Table:
+    data, lens = facts.paraxial, facts.lens
+    sensor = lens.surfaces[-1].thickness_mm
+    near = math.isfinite(lens.object_distance_mm)
+    rows = [
+        ("reference wavelength, µm", lens.reference_wavelength_um),
+        ("object distance, mm", lens.object_distance_mm if near else math.inf),
+        ("EFL, mm", data.efl_mm),
+        ("BFL, mm", data.bfl_mm),
+        ("FFL, mm", data.ffl_mm),
+        ("f-number (EFL / entrance pupil)", data.f_number),
+        ("total track to the sensor, mm", facts.total_track_mm),
+        ("sensor beyond the paraxial focus of a distant object, mm", sensor - data.bfl_mm),
+        ("entrance pupil from the first vertex, mm", data.entrance_pupil_mm),
+        ("entrance pupil diameter, mm", data.entrance_pupil_diameter_mm),
+        ("exit pupil from the last vertex, mm", data.exit_pupil_mm),
+        ("exit pupil diameter, mm", data.exit_pupil_diameter_mm),
+    ]
+    return Table(rows=[(name, _number(value, 8)) for name, value in rows])
+
+
+def _prescription(facts: LensFacts) -> Table:
+    rows = [
+        (
+            f"{number} (stop)" if number == facts.lens.stop else str(number),
+            _number(surface.radius_mm, 8),
+            _number(surface.thickness_mm, 8),
+            surface.glass,
+            _number(surface.semi_diameter_mm, 6),
+            _number(surface.conic, 6) if surface.conic else "",
+            ", ".join(_number(a, 6) for a in surface.even_asphere),
+        )
+        for number, surface in enumerate(facts.lens.surfaces)
+    ]
+    return Table(header=_PRESCRIPTION, rows=rows)
+
+
+def _grooves(facts: LensFacts) -> Table | None:
+    rows = [
+        (
+            str(g["surface"]),
+            _number(g["groove_depth_um"], 6),
+            str(g["walls"]),
+            _number(math.nan if g["narrowest_mm"] is None else g["narrowest_mm"], 4),
+            _number(g["tool_radius_um"], 4),
+            "ideal" if g["ideal"] else "with walls",
+        )
+        for g in grooves_of(facts.lens)
+    ]
+    return Table(header=_GROOVES, rows=rows) if rows else None
+
+
+def _fields(facts: LensFacts) -> Table:
+    rows = []
+    for i, angle_rad in enumerate(facts.lens.field_angles_rad):
+        for j, wave in enumerate(facts.lens.wavelengths_um):
+            lost = {name: n for name, n in facts.fates(i, j).items() if n and name != "valid"}
+            spots = (facts.rms_mm, facts.rms_chief_mm, facts.max_mm)
+            rows.append(
+                (
+                    f"{to_degrees(angle_rad):.4g}°",
+                    f"{wave:.4g}",
+                    *(_number(float(v[i, j]) * UM_PER_MM, 5) for v in spots),
+                    _number(float(facts.airy_mm[j]) * UM_PER_MM, 4),
+                    _number(float(facts.wavefront_um[i, j]) / wave, 4),
+                    _number(100 * float(facts.distortion[i, j]), 4),
+                    _number(float(facts.illumination[i, j]), 4),
+                    ", ".join(f"{n} {name.replace('_', ' ')}" for name, n in lost.items()) or "0",
+                )
+            )
+    return Table(header=_FIELDS, rows=rows)
+
+
+def _convergence(facts: LensFacts) -> Table:
+    found = facts.convergence
+    angles = [f"{to_degrees(a):.4g}°" for a in facts.lens.field_angles_rad]
+    rows = [
+        (name, str(rays), *(_number(v * UM_PER_MM, 5) for v in rms))
+        for name, rays, rms in zip(found.samplings, found.rays, found.rms_mm.tolist(), strict=True)
+    ]
+    return Table(header=("sampling", "rays", *angles), rows=rows)
+
+
+def _seidel(sums: Seidel) -> list[Part]:
+    colours = (sums.axial_colour_mm, sums.lateral_colour_mm)
+    values = zip(sums.surfaces_mm.tolist(), *(c.tolist() for c in colours), strict=True)
+    rows = [
+        (str(number), *(_number(v, 5) for v in (*five, *two)))
+        for number, (five, *two) in enumerate(values)
+    ]
+    total = [*sums.sums_mm.tolist(), *(float(c.sum()) for c in colours)]
+    rows.append(("sum", *(_number(v, 6) for v in total)))
+    transverse = sums.transverse_mm()
+    return [
+        Table(header=("surface", *SEIDEL_NAMES, "C_L", "C_T"), rows=rows),
+        Words("Transverse, in mm (PTZ in 1/mm), as CODE V lists them:", "small"),
+        Table(header=tuple(transverse), rows=[[_number(v, 5) for v in transverse.values()]]),
+    ]
+
+
+def _number(value: float, digits: int) -> str:
+    if math.isnan(value):
+        return "–"
+    if math.isinf(value):
+        return "∞" if value > 0 else "-∞"
+    return f"{value:.{digits}g}"

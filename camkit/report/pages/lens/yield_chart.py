@@ -1,0 +1,188 @@
+"""Tolerances for people: yield curve, classes of errors, table and JSON."""
+
+import json
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from camkit.models_def.design.tolerance import Measured, Offender, ToleranceResult
+from camkit.models_def.optics.tolerance.error_table import in_file_units
+from camkit.report.figure import Figure, Panel, chart, field_color, new_figure, to_png, to_svg
+from camkit.units import UM_PER_MM, to_degrees
+
+PERCENTS: Final = (10, 50, 90)
+LOSSES_DB: Final = (0.25, 0.5, 1.0, 2.0, 3.0)
+_WORST: Final = 10
+
+
+def chart_paths(folder: Path, name: str) -> tuple[Path, Path, Path]:
+    """Return the files of a run: PNG, SVG, JSON."""
+    endings = (".png", ".svg", ".json")
+    png, svg, text = (folder / f"{name}-tolerance{ending}" for ending in endings)
+    return png, svg, text
+
+
+def write_tolerance(result: ToleranceResult, folder: Path, name: str) -> tuple[Path, ...]:
+    """Write chart and JSON; give the files."""
+    folder.mkdir(parents=True, exist_ok=True)
+    png, svg, text = chart_paths(folder, name)
+    figure = draw_yield(result)
+    svg.write_text(to_svg(figure), encoding="utf-8")
+    png.write_bytes(to_png(figure))
+    text.write_text(json.dumps(to_json(result), indent=1) + "\n", encoding="utf-8")
+    return png, svg, text
+
+
+@chart
+def draw_yield(result: ToleranceResult) -> Figure:
+    """Draw the yield over PSNR and RMS spot, and what each class costs alone."""
+    figure = new_figure(11, 3.9)
+    left, middle, right = figure.subplots(1, 3)
+    _draw_share(left, result)
+    rms_um = _overall_um(result.copies)
+    order = np.sort(rms_um)
+    middle.step(order, np.arange(1, len(order) + 1) / len(order) * 100, where="post")
+    middle.axvline(_overall_um(result.nominal)[0], color="black", linewidth=0.8, linestyle="--")
+    middle.set_xlabel("RMS spot over all fields, at most, µm")
+    _draw_classes(right, result)
+    for panel in (left, middle):
+        panel.set_ylabel("share of copies, %")
+        panel.set_ylim(0, 102)
+    return figure
+
+
+def _draw_share(panel: Panel, result: ToleranceResult) -> None:
+    order = np.sort(result.copies.mean_db)
+    share = 100 * (1 - np.arange(len(order)) / len(order))
+    panel.step([*order, order[-1]], [*share, 0], where="pre", color=field_color(0))
+    nominal = result.nominal.mean_db[0]
+    panel.axvline(nominal, color="black", linewidth=0.8, linestyle="--", label="as designed")
+    for percent in PERCENTS:
+        panel.plot(result.percentile_db(percent), 100 - percent, "o", color=field_color(2))
+    panel.set_title(f"{result.lens.name}: {len(order)} copies")
+    panel.set_xlabel("PSNR after recovery, at least, dB")
+    panel.legend(loc="lower left")
+
+
+def _draw_classes(panel: Panel, result: ToleranceResult) -> None:
+    classes = result.classes[::-1]
+    names = [
+        f"{c.error_class.replace('_', ' ')} {in_file_units(c.error_class, c.half_width)}"
+        for c in classes
+    ]
+    mean = [float(c.loss_db.mean()) for c in classes]
+    panel.barh(names, mean, color=field_color(0))
+    for place, found in enumerate(classes):
+        panel.plot(found.loss_db, [place] * len(found.loss_db), ".", color=field_color(2))
+    panel.axvline(0, color="black", linewidth=0.8)
+    panel.set_title("each class alone at its limit: loss, dB")
+    panel.grid(visible=False)
+
+
+def _overall_um(measured: Measured) -> "np.ndarray[Any, np.dtype[np.float64]]":
+    return np.asarray(np.sqrt((measured.spot_rms_mm**2).mean(1)) * UM_PER_MM)
+
+
+def to_json(result: ToleranceResult) -> dict[str, Any]:
+    """Return the object that `camkit lens tolerance --json` prints."""
+    nominal, copies, run = result.nominal, result.copies, result.run
+    nominal_db = float(nominal.mean_db[0])
+    return {
+        "name": result.lens.name,
+        "samples": run.copies,
+        "seed": run.seed,
+        "compensator": result.tolerances.compensator,
+        "pixel_pitch_um": run.pitch_um,
+        "noise": run.noise,
+        "kernel_px": result.kernel_px,
+        "energy_kept": min(nominal.energy_kept, copies.energy_kept),
+        "nominal_psnr_db": nominal_db,
+        "psnr_db": sorted(copies.mean_db.tolist()),
+        "percentiles_db": {f"p{p}": result.percentile_db(p) for p in PERCENTS},
+        "yield": [
+            {
+                "loss_db": loss,
+                "psnr_db": nominal_db - loss,
+                "share": result.share_at_least(nominal_db - loss),
+            }
+            for loss in LOSSES_DB
+        ],
+        "nominal_spot_rms_mm": float(_overall_um(nominal)[0] / UM_PER_MM),
+        "spot_rms_mm": sorted((_overall_um(copies) / UM_PER_MM).tolist()),
+        "refocus_mm": {
+            "min": float(copies.refocus_mm.min()),
+            "max": float(copies.refocus_mm.max()),
+        },
+        "fields": [_field(result, i) for i in range(len(result.fields))],
+        "sensitivity": [
+            {
+                "class": c.error_class,
+                "half_width": in_file_units(c.error_class, c.half_width),
+                "loss_db": float(c.loss_db.mean()),
+                "worst_loss_db": float(c.loss_db.max()),
+                "spot_growth_mm": c.spot_growth_mm,
+            }
+            for c in result.classes
+        ],
+        "worst_offenders": [_offender(found) for found in result.offenders[:_WORST]],
+    }
+
+
+def _field(result: ToleranceResult, number: int) -> dict[str, Any]:
+    share, azimuth_deg = result.fields[number]
+    far = np.tan(max(result.lens.field_angles_rad, default=0.0))
+    psnr, spot = result.copies.psnr_db[:, number], result.copies.spot_rms_mm[:, number]
+    return {
+        "field_angle_deg": round(to_degrees(float(np.arctan(share * far))), 9),
+        "azimuth_deg": azimuth_deg,
+        "nominal_psnr_db": float(result.nominal.psnr_db[0, number]),
+        "psnr_db": {f"p{p}": float(np.percentile(psnr, p)) for p in PERCENTS},
+        "nominal_spot_rms_mm": float(result.nominal.spot_rms_mm[0, number]),
+        "spot_rms_mm": {f"p{p}": float(np.percentile(spot, p)) for p in PERCENTS},
+    }
+
+
+def _offender(found: Offender) -> dict[str, Any]:
+    single = found.single
+    return {
+        "class": single.error_class,
+        "part": single.part,
+        "error": in_file_units(single.error_class, single.value),
+        "spot_growth_mm": found.spot_growth_mm,
+    }
+
+
+def to_text(result: ToleranceResult) -> str:
+    """Return the table for the terminal."""
+    nominal = float(result.nominal.mean_db[0])
+    spots = _overall_um(result.copies)
+    low, middle, high = (result.percentile_db(p) for p in PERCENTS)
+    yields = ", ".join(
+        f"{100 * result.share_at_least(nominal - loss):.0f} % within {loss:g} dB"
+        for loss in LOSSES_DB
+    )
+    lines = [
+        f"{result.lens.name}: {result.run.copies} fabricated copies, refocused at assembly: "
+        f"{result.tolerances.compensator}",
+        f"PSNR after recovery: {nominal:.2f} dB as designed; of the copies 10 % are below "
+        f"{low:.2f}, half below {middle:.2f}, 90 % below {high:.2f} dB",
+        f"of the design: {yields}",
+        f"RMS spot over all fields: {_overall_um(result.nominal)[0]:.2f} um as designed, copies "
+        f"{spots.min():.2f} to {spots.max():.2f} um",
+    ]
+    if result.classes:
+        lines += ["", f"{'alone, at its limit':<19} {'half-width':>12} {'loss dB':>8} {'worst':>7}"]
+    lines += [
+        f"{c.error_class:<19} {in_file_units(c.error_class, c.half_width):>12} "
+        f"{c.loss_db.mean():8.2f} {c.loss_db.max():7.2f}"
+        for c in result.classes
+    ]
+    if result.offenders:
+        lines += ["", f"{'worst single errors':<19} {'part':>4} {'error':>10} {'RMS spot um':>12}"]
+    for found in result.offenders[:_WORST]:
+        single, growth = found.single, found.spot_growth_mm * UM_PER_MM
+        part = "-" if single.part is None else str(single.part)
+        error = in_file_units(single.error_class, single.value)
+        lines.append(f"{single.error_class:<19} {part:>4} {error:>10} {growth:+12.3f}")
+    return "\n".join(lines)
