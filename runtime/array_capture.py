@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.bundle.manifest import Manifest
-from camkit.bundle.sensor import BayerSensor, SpadSensor
+from camkit.bundle.sensor import BayerSensor
 from camkit.contracts import shifted_cfa
-from camkit.errors import ContractError, UnsupportedError
+from camkit.errors import ContractError
 from camkit.runtime.capture import Capture
 from camkit.runtime.options import Options, checked_origin
 
@@ -43,9 +43,7 @@ def capture_of_array(
     """
     del options
     _check_samples(image)
-    sensor = manifest.sensor
-    if isinstance(sensor, SpadSensor):
-        raise UnsupportedError("arrays of photon counts are read by the kind of their camera")
+    sensor = manifest.light_sensor
     channels = len(sensor.channels)
     is_mosaic = image.ndim == 2
     if not is_mosaic and (image.ndim != 3 or image.shape[0] != channels):

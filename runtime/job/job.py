@@ -139,11 +139,11 @@ class Job:
         """Return the job with the noise: the file's, the bundle's at its ISO, or measured."""
         if self.measured_noise is not None:
             return self
-        sensor = self.known_bundle.manifest.sensor
+        manifest = self.known_bundle.manifest
         if self.capture.noise is not None:
             source, noise = "file", self.capture.noise
-        elif self.capture.iso is not None and sensor.type != "spad":
-            source, noise = "bundle", sensor.noise_at(self.capture.iso)
+        elif self.capture.iso is not None:
+            source, noise = "bundle", manifest.light_sensor.noise_at(self.capture.iso)
         else:
             with self.log.clock.stage("noise"):
                 source, noise = "measured", measure_noise(self.capture)

@@ -9,59 +9,44 @@ from camkit.runtime.rows import RowSource
 
 
 class KindCapture(Protocol):
-    """One capture of a kind, closed by whoever read it; stages of the kind know more of it."""
+    """One capture of a kind, closed by whoever read it; stages of the kind know more of it.
+
+    Attributes:
+        height: Rows.
+        width: Columns.
+        channels: Colours of the light.
+        gives_own_rows: Whether what `rows` reads is the reader's own to change.
+        resident_bytes: Memory that the samples take while they are worked on.
+        decoder_peak_mb: Peak memory of another process that decoded it.
+        sha256: Hash of its file, where reading computed it.
+    """
 
     @property
-    def height(self) -> int:
-        """Return the number of rows."""
-        ...
-
+    def height(self) -> int: ...  # noqa: D102
     @property
-    def width(self) -> int:
-        """Return the number of columns."""
-        ...
-
+    def width(self) -> int: ...  # noqa: D102
     @property
-    def channels(self) -> int:
-        """Return the number of colours of the light."""
-        ...
-
+    def channels(self) -> int: ...  # noqa: D102
     @property
-    def gives_own_rows(self) -> bool:
-        """Return whether what `rows` reads is the reader's own to change."""
-        ...
-
+    def gives_own_rows(self) -> bool: ...  # noqa: D102
     @property
-    def resident_bytes(self) -> int:
-        """Return the memory that the samples take while they are worked on."""
-        ...
-
+    def resident_bytes(self) -> int: ...  # noqa: D102
     @property
-    def decoder_peak_mb(self) -> float:
-        """Return the peak memory of another process that decoded it."""
-        ...
-
+    def decoder_peak_mb(self) -> float: ...  # noqa: D102
     @property
-    def sha256(self) -> str | None:
-        """Return the hash of its file, where reading computed it."""
-        ...
+    def sha256(self) -> str | None: ...  # noqa: D102
 
     def plane(self, stated: Plane | None) -> Plane:
         """Return what the samples are; `stated` is the plane of a bundle's sensor."""
-        ...
 
     def rows(self) -> RowSource:
         """Return the samples as the file holds them."""
-        ...
 
     def gives(self, plane: Plane) -> bool:
         """Return whether a plane can be a product of this capture."""
-        ...
 
     def shares_memory(self, array: NDArray[Any]) -> bool:
         """Return whether an array may lie where the samples do."""
-        ...
 
     def close(self) -> None:
         """Release its file."""
-        ...

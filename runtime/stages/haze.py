@@ -123,8 +123,7 @@ def coarse_band(entry: Dehaze, picture: Stream, job: Job) -> CoarseBand:
 @lru_cache(maxsize=KEPT_CAMERAS)
 def _kernels(bundle: Bundle, depth_mm: float | None, scale: float) -> HazyKernels:
     """Return the kernels of a camera; the same ones to all its captures."""
-    sensor = bundle.manifest.sensor
-    assert sensor.type != "spad"  # its counts never join
+    sensor = bundle.manifest.light_sensor
     response = sensor.response_arrays()
     return hazy_kernels(bundle.psf, bundle.haze, *response, depth_mm=depth_mm).scaled(scale)
 

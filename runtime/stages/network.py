@@ -133,9 +133,8 @@ def _parted(taken: Sequence[Stream]) -> tuple[list[Stream], list[Stream]]:
 
 def _familiar_noise(job: Job, stream: Stream) -> NoiseModel:
     """Return the noise by which a stream is stabilised."""
-    noise, sensor = job.noise.with_gains(stream.gains), job.known_bundle.manifest.sensor
-    if sensor.type == "spad":
-        return noise
+    noise = job.noise.with_gains(stream.gains)
+    sensor = job.known_bundle.manifest.light_sensor
     return familiar_noise(noise, [entry.read_noise_e for entry in sensor.noise])
 
 

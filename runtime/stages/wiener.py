@@ -182,8 +182,7 @@ def make_bank(entry: Wiener, job: Job, planes: Stream) -> BlockBank:
         planes: What it will restore.
     """
     bundle = job.known_bundle
-    sensor = bundle.manifest.sensor
-    assert sensor.type != "spad"  # a spad's counts never join a bank
+    sensor = bundle.manifest.light_sensor
     camera = bundle, job.options.focus_um, job.placement.kernel_scale
     window = job.window_of(planes.plane)
     if _finds_distance(entry, bundle, job.options):
@@ -207,8 +206,7 @@ def make_bank(entry: Wiener, job: Job, planes: Stream) -> BlockBank:
 
 def _kernels(bundle: Bundle, depth_mm: float | None, focus_um: float, scale: float) -> FieldKernels:
     """Return the kernels of an object distance; None for the mean."""
-    sensor = bundle.manifest.sensor
-    assert sensor.type != "spad"  # a spad's counts never join a bank
+    sensor = bundle.manifest.light_sensor
     return color_kernels(
         bundle.psf,
         *sensor.response_arrays(),

@@ -204,8 +204,7 @@ def _painter(
 
 def _kernels(job: Job) -> StreakKernels:
     bundle = job.known_bundle
-    sensor = bundle.manifest.sensor
-    assert sensor.type != "spad"  # its counts never join
+    sensor = bundle.manifest.light_sensor
     kernels = color_kernels(
         bundle.psf,
         *sensor.response_arrays(),
