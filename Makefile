@@ -11,7 +11,7 @@ SOURCES := camkit runtime export models_def tests tools setup.py
 
 demo: $(RUNTIME_STAMP)  ## main job on the demo capture, runtime only (no torch)
 	@echo "1 of 2: a night scene with streak-hdr, on the way to out/night.png (about ten seconds)"
-	$(VENV)/bin/python -m tools.hdr.gallery --out-dir out
+	$(VENV)/bin/python -m tools.hdr.night_gallery --out-dir out
 	@echo "2 of 2: two scenes with duet, photographed, planned, restored, compared (about a minute)"
 	$(VENV)/bin/python -m tools.demo --out-dir out
 
@@ -32,8 +32,9 @@ fuzz: $(DEV_STAMP)  ## search for bundles that camkit does not stand (Linux); FU
 	$(DEV)/bin/python -m pip install -q --disable-pip-version-check -c constraints.txt -e ".[fuzz]"
 	OMP_NUM_THREADS=1 FUZZ_SECONDS=$(FUZZ_SECONDS) $(DEV)/bin/python -m tests.hostile.fuzz
 
-check: $(DEV_STAMP)  ## format, lint, types, layers, spelling
-	@echo "Checking format, lint, types, layers and spelling: about a minute"
+check: $(DEV_STAMP)  ## weight, format, lint, types, layers, spelling
+	@echo "Checking weight, format, lint, types, layers and spelling: about a minute"
+	$(DEV)/bin/python -m tools.weight
 	$(DEV)/bin/ruff format --check $(SOURCES)
 	$(DEV)/bin/ruff check $(SOURCES)
 	$(DEV)/bin/mypy

@@ -23,9 +23,8 @@ import numpy as np
 
 from camkit.bundle.facts import NetworkFacts
 from camkit.bundle.frozen_optics import FrozenOptics, read_optics_file
-from camkit.bundle.golden import IMAGE, GoldenArrays, golden_to_bytes
+from camkit.bundle.golden import IMAGE, GoldenArrays
 from camkit.bundle.haze_file import haze_to_bytes, read_haze
-from camkit.bundle.haze_golden import haze_golden_to_bytes
 from camkit.bundle.manifest import (
     LIGHT_VERSION,
     Manifest,
@@ -36,8 +35,6 @@ from camkit.bundle.manifest import (
 from camkit.bundle.psf_file import psf_to_bytes, read_psf
 from camkit.bundle.reader import (
     CARD,
-    GOLDEN,
-    HAZE_GOLDEN,
     PREVIEW,
     STRESS_HAZE,
     STRESS_PSF,
@@ -48,11 +45,10 @@ from camkit.bundle.stages import Parts as KnownParts
 from camkit.bundle.writer import write_bundle
 from camkit.caller import option_text
 from camkit.contracts import FloatArray
-from camkit.errors import ContractError, ParityError
+from camkit.errors import ContractError
 from camkit.export.card import card_text, laws_text, preview_png
 from camkit.export.designed_optics import designed_members
 from camkit.export.golden_cases import (
-    HAZE_SCENE,
     CaseRecipe,
     Cases,
     add_outputs,
@@ -61,6 +57,7 @@ from camkit.export.golden_cases import (
 )
 from camkit.export.network_facts import ExportedNetwork, draft_network, measure_network
 from camkit.export.parts import Parts
+from camkit.export.proving import golden_members, write_proved
 from camkit.models_def.training.checkpoint import (
     Checkpoint,
     load_network,
@@ -72,9 +69,7 @@ from camkit.models_def.training.kind import Design, TrainingKind, training_kind
 from camkit.models_def.training.recipe import Recipe, differing_part
 from camkit.runtime.kind import part_of
 from camkit.runtime.plan.loss import read_loss_model
-from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work
-from camkit.runtime.proof.haze_band import make_haze_golden
 from camkit.runtime.proof.laws.proof import measure_laws, with_laws
 from camkit.side_file import read_side_text
 
@@ -134,9 +129,7 @@ def export_bundle(parts: Parts, out: Path) -> dict[str, Any]:
         manifest = _manifest(camera, parts, networks)
         second = write_bundle(Path(folder) / "second.camkit", manifest, members)
         golden = add_outputs(second, cases)
-        members[GOLDEN] = golden_to_bytes(golden)
-        if manifest.has_haze:
-            members[HAZE_GOLDEN] = haze_golden_to_bytes(make_haze_golden(second, HAZE_SCENE))
+        members |= golden_members(second, golden)
         whites = {name: float(case.recipe.get(WHITE, 1.0)) for name, (case, _) in cases.items()}
         manifest = manifest.model_copy(update={"golden": tuple(case for case, _ in cases.values())})
         third = write_bundle(Path(folder) / "third.camkit", manifest, members)
@@ -145,13 +138,8 @@ def export_bundle(parts: Parts, out: Path) -> dict[str, Any]:
         card = card_text(second, golden, camera.design.fails_on, whites)
         members[CARD] = (card + laws_text(laws)).encode()
         members[PREVIEW] = preview_png(second, golden)
-        proved = Path(folder) / "proved.camkit"
-        write_bundle(proved, manifest, members)
-        report = check_bundle(proved, run=case_work, without=("laws",))
-        if not report.passed:
-            raise ParityError("the bundle fails its own check: " + "; ".join(report.lines()))
         out.parent.mkdir(parents=True, exist_ok=True)
-        bundle = write_bundle(out, manifest, members)
+        bundle, report = write_proved(out, manifest, members)
     return {
         "bundle": str(out),
         "bytes": out.stat().st_size,

@@ -1,29 +1,26 @@
-"""What only a developer runs: `python -m tools.NAME` in the root of a checkout. Not in the wheel.
+"""Commands that only a developer runs: `python -m tools.NAME` in the root of a checkout.
 
-A file here is a command; a folder holds what commands are made of.
+They are not in the wheel. A file here is a command; a folder holds what commands are made of.
 
     demo                the main job, end to end
     quality             a bundle beside classical methods, by a fixed protocol
-    edge_contrast       contrast of a bundle's pictures on slanted edges
     plan_report         what `--quality adaptive` may skip, calibrated and proved
+    evidence            products, plans and seconds of two checkouts compared
+    tables              tables of the thesis, their networks trained for equal times
     design_start        a start lens by random search
-    design_stability    how far off a start may be
-    design_check        a design against pictures rendered by rays
-    joint_report        a joint design against lenses found on spots alone
-    lens_table          lenses compared after recovery
-    render_chart        pictures by rays and by maps of PSFs compared
-    psf_model_error     rays against waves
-    trace_speed         speed of the tracer
     stage_profile       where the time of a photograph goes
-    measure             time, tiling and RAW files of docs/results/measurements.md
+    measure, memory     time, tiling, RAW files; peak memory against its cap
     build_glass         the glass catalogues, from their sources
+    weight              refuses bundles that change under one version, checkpoints, big pictures
+    repack              bundles in the newest format
     coverage_gate       refuses a test run that covers too little
-    rooms               modules that know one camera only, and lines of code
 
     capture/            simulated captures, for the tools that judge pictures
-    pictures/           captions of the demo's pictures
+    pictures/           pictures of README and gallery; `hdr/` those of nights, and `deglare`
     comparison/         parts of `quality`
     plan/               parts of `plan_report`
-    design/             parts of the tools around a design
     start/              parts of `design_start`
+
+A study that made one result once leaves the tree; docs/results/README.md names the commit that has
+its command.
 """

@@ -20,7 +20,7 @@ PRESCRIPTIONS = Path(__file__).resolve().parents[1] / "models_def" / "prescripti
 
 
 def main() -> None:
-    """Search the lens and write it."""
+    """Find the lens and write it."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("recipe", type=Path)
     parser.add_argument("-o", "--output", type=Path)

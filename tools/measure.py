@@ -56,7 +56,7 @@ def main() -> None:
 
 
 def measure_speed(arguments: argparse.Namespace) -> None:
-    """Time `camkit process` to EXR in fresh processes, sizes taken in turn; medians."""
+    """Measure `camkit process` to EXR in fresh processes, sizes taken in turn; medians."""
     sizes = arguments.sizes.split(",")
     found: dict[str, list[dict[str, float]]] = {size: [] for size in sizes}
     with tempfile.TemporaryDirectory() as folder:

@@ -57,7 +57,7 @@ DIGITS, CAPTURE_DIGITS = 6, 4
 
 
 def main() -> None:
-    """Tune or compare."""
+    """Run a tuning or a comparison."""
     arguments = parse_arguments()
     cv2.setNumThreads(1)
     try:

@@ -65,7 +65,7 @@ def main() -> None:
 
 @dataclass
 class ThreadWatch:
-    """What a thread beside the work sees of it, every 20 ms."""
+    """Memory and CPU seconds as a thread beside the work sees them, every 20 ms."""
 
     clock: StageClock
     rss_mb: dict[str, float] = field(default_factory=lambda: defaultdict(float))
@@ -73,7 +73,7 @@ class ThreadWatch:
     names: dict[int, str] = field(default_factory=dict)
 
     def take(self) -> None:
-        """Note memory of the running stage and CPU seconds of every thread."""
+        """Record memory of the running stage and CPU seconds of every thread."""
         stage = self.clock.running or "else"
         pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
         rss = pages * os.sysconf("SC_PAGE_SIZE") / 1e6
@@ -164,7 +164,7 @@ def _profile_once(arguments: argparse.Namespace) -> dict[str, Any]:
 
 @contextmanager
 def _watched(clock: StageClock) -> Iterator[ThreadWatch]:
-    """Look at the work of the block from a thread beside it."""
+    """Measure the work of the block from a thread beside it."""
     seen, ended = ThreadWatch(clock), threading.Event()
 
     def watch() -> None:
@@ -213,14 +213,14 @@ def _cpu_s() -> float:
 
 
 def profile_layers(arguments: argparse.Namespace) -> None:
-    """Profile the networks of every role."""
+    """Measure the networks of every role."""
     bundle = open_bundle(find_bundle(arguments.bundle))
     for role in bundle.manifest.networks:
         _profile_network(arguments, bundle, role)
 
 
 def _profile_network(arguments: argparse.Namespace, bundle: Bundle, role: str) -> None:
-    """Time every node of a network on one window and compare it with the matrix product."""
+    """Measure every node of a network on one window and compare it with the matrix product."""
     threads = available_threads(arguments.threads)
     facts = bundle.network_facts(role, arguments.size)
     data = bundle.network_bytes(role, arguments.size)

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.training.similarity import ssim
+from camkit.models_def.training.losses import ssim
 
 LossName = Literal["l1", "log_mse", "edof"]
 LOSS_NAMES: Final[tuple[LossName, ...]] = get_args(LossName)

@@ -9,8 +9,8 @@
     fitting                        the steps that a kind brings
     adversarial                    such a step: content terms, and a critic
     trainer, log                   the run and its log
-    similarity                     SSIM with gradients
     checkpoint, credits            what is kept, and what it was trained on
+    frozen_norms                   norms that look at a picture become constants, before an export
     first_weights, refinement      what was trained before goes on
 
 A run that is interrupted goes on with the same bits.

@@ -77,14 +77,19 @@ class Checkpoint:
 
 def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
     """Write a checkpoint; an interrupted write leaves the old file."""
-    part = path.with_name(path.name + ".part")
     table = {f.name: getattr(checkpoint, f.name) for f in fields(checkpoint)}
     # the reader of weights alone takes text and tensors, no bytes
     table["designed"] = {
         name: torch.from_numpy(np.frombuffer(data, np.uint8).copy())
         for name, data in checkpoint.designed.items()
     }
-    torch.save({"format": FORMAT} | table, part)
+    write_table(path, {"format": FORMAT} | table)
+
+
+def write_table(path: Path, table: dict[str, Any]) -> None:
+    """Write what `read_table` reads; an interrupted write leaves the old file."""
+    part = path.with_name(path.name + ".part")
+    torch.save(table, part)
     part.replace(path)
 
 

@@ -24,6 +24,8 @@ ROOT = Path(__file__).resolve().parents[2]
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 CURRENT = [path for path in DOCUMENTS if path.parent.name != "background"]
 """History names commands, options and files as they were."""
+ENTRY_POINTS = {"stages"}
+"""Groups of entry points that are no modules."""
 MADE_BY_EXPORT = "camkit/bundles/duet.camkit"
 TOOL = re.compile(r"(?<![A-Za-z_])(?:tests/)?tools(?:[./][a-z_0-9]+)+")
 """A module of the tools, as `python -m` takes it or as a path."""
@@ -123,7 +125,7 @@ def test_every_file_and_module_named_exists(document: Path) -> None:
         assert name == MADE_BY_EXPORT or (ROOT / name).exists(), name
     for module in re.findall(r"`camkit((?:\.[a-z_]+)+)\b[^`]*`", text):
         parts = module.strip(".").split(".")
-        here = parts[0] in camkit.__all__
+        here = parts[0] in {*camkit.__all__, *ENTRY_POINTS}
         places = [Path("camkit", *parts[:n]) for n in range(1, len(parts) + 1)]
         files = [ROOT / p.with_suffix(".py") for p in places] + [ROOT / p for p in places[-1:]]
         assert here or any(f.exists() for f in files), module

@@ -164,7 +164,7 @@ def _rounds(data: Floats, blur: Blur, settings: Settings, rounds: Iterable[objec
     for _ in rounds:
         seen = blurred[blur.window] + crop_dual
         fitted = (data + crop * seen) / (np.float32(1) + crop)
-        crop_dual = seen - fitted
+        np.subtract(seen, fitted, out=crop_dual)
         blurred[blur.window] = fitted - crop_dual
         dual += scene
         wanted = np.abs(dual) * positive

@@ -14,7 +14,7 @@ from camkit.models_def.kinds.spad.evaluation import bicubic as trained_bicubic
 from camkit.models_def.kinds.spad.evaluation import evaluate_each
 from camkit.models_def.kinds.spad.samples import luminance
 from camkit.models_def.networks.bicubic import PHASE, SCALE, Bicubic
-from camkit.models_def.training.similarity import ssim as trained_ssim
+from camkit.models_def.training.losses import ssim as trained_ssim
 from camkit.report.kinds.spad.bicubic import bicubic
 from camkit.report.kinds.spad.pictures import SEED, count_picture, picture_rows
 from camkit.report.kinds.spad.scenes import coded_luminance

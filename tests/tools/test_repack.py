@@ -14,6 +14,7 @@ from camkit.bundle.psf_file import write_psf
 from camkit.bundle.reader import GOLDEN, MANIFEST, open_bundle
 from camkit.bundle.stages import Demosaic, Highlights, Network, Undistort, Wiener
 from camkit.errors import ContractError, ParityError
+from camkit.export import proving
 from camkit.runtime.proof.check import CheckReport, Layer
 from tests.hdr_bundle import write_hdr_bundle
 from tools import repack
@@ -45,8 +46,8 @@ def test_the_newest_format_is_written_and_nothing_is_lost(tmp_path: Path) -> Non
 def test_what_fails_its_check_gets_no_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     layer = Layer(name="golden", status="fail", message="another picture")
     failed = CheckReport(path=EXAMPLE, layers=(layer,))
-    monkeypatch.setattr(repack, "check_bundle", lambda *_, **__: failed)
-    with pytest.raises(ParityError, match=r"fails its check: fail +golden +another picture"):
+    monkeypatch.setattr(proving, "check_bundle", lambda *_, **__: failed)
+    with pytest.raises(ParityError, match=r"fails its own check: fail +golden +another picture"):
         repack.repack(EXAMPLE, tmp_path / "new.camkit")
     assert not list(tmp_path.iterdir())
 

@@ -5,8 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from camkit.report.bench.part import BenchPart
-from camkit.report.bench.row_maker import RowMaker
+from camkit.report.bench.part import BenchPart, RowMaker
 from camkit.report.bench.trial import Axes, Entrant, Ground, Skip, Trial
 from camkit.report.kind import ReportPart
 from camkit.report.stress.part import StressPart

@@ -1,4 +1,4 @@
-"""How far the transfer of a copy of a lens lies off the frozen one."""
+"""The distance of the transfer of a copy of a lens from the frozen one."""
 
 import math
 from typing import Final

@@ -173,7 +173,7 @@ def _stage_json(bundle: Bundle, wanted: type[Wiener] | type[Network]) -> str | N
 
 
 def protocol_text(bundle: Bundle, isos: Sequence[float]) -> list[str]:
-    """Say in sentences how the captures are made and judged."""
+    """Return in sentences how the captures are made and judged."""
     psf, sensor = bundle.psf, color_sensor(bundle)
     fields, waves = psf.field_heights_mm.size, psf.wavelengths_um.size
     corner_mm = np.hypot(sensor.width_px, sensor.height_px) / 2 * sensor.pixel_pitch_um / 1000

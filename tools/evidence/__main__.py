@@ -4,6 +4,7 @@ import argparse
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import tools.evidence
 from tools.evidence.checkout import HERE
@@ -16,17 +17,26 @@ def main(words: list[str] | None = None) -> int:
     """Run one of the three commands; return its exit code."""
     arguments = _parser().parse_args(words)
     if arguments.command == "record":
-        record = make_record(arguments.checkout, arguments.bundle)
+        record = make_record(
+            arguments.checkout,
+            arguments.bundle,
+            data=arguments.data,
+            is_judged=arguments.judged,
+        )
         text = json.dumps(record, indent=1, sort_keys=True, allow_nan=False)
         arguments.out.write_text(text + "\n", encoding="utf-8")
         return 0
     if arguments.command == "seconds":
         compare_seconds((arguments.a, arguments.b), arguments.bundle, arguments.rounds)
         return 0
-    records = [json.loads(path.read_text("utf-8")) for path in (arguments.before, arguments.after)]
-    comparison = compare(*records)
+    comparison = compare(read_record(arguments.before), read_record(arguments.after))
     print(*comparison.lines(), sep="\n")
     return int(bool(comparison.changed))
+
+
+def read_record(path: Path) -> dict[str, Any]:
+    """Read what `record` wrote."""
+    return dict(json.loads(path.read_text(encoding="utf-8")))
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -37,6 +47,10 @@ def _parser() -> argparse.ArgumentParser:
     record = commands.add_parser("record", help="hash what a checkout computes")
     record.add_argument("out", type=Path)
     record.add_argument("--checkout", type=Path, default=HERE, help="default: this one")
+    record.add_argument("--data", type=Path, help="folder of real captures, processed besides")
+    record.add_argument(
+        "--judged", action="store_true", help="also check, stress, bench and analyse: 15 minutes"
+    )
     two = commands.add_parser("compare", help="compare two records; exit code 1 if they differ")
     two.add_argument("before", type=Path)
     two.add_argument("after", type=Path)

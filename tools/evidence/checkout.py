@@ -104,7 +104,8 @@ class Worker:
         answer = self._child.stdout.readline()
         if answer:
             return dict(json.loads(answer))
-        code = self._child.wait()
+        self._child.communicate()
+        code = self._child.returncode
         self._child = self._started()
         return {"failed": f"the worker ended with exit code {code}"}
 

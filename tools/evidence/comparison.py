@@ -12,7 +12,7 @@ SHOWN: Final = 60
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comparison:
-    """What differs between two records.
+    """Differences between two records.
 
     Attributes:
         equal: How many entries are equal.

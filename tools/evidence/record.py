@@ -3,7 +3,6 @@
 {"commit": ..., "entries": {"BUNDLE CAPTURE WAY": {hashes, plan, warnings, ..., "seconds"}}}
 """
 
-import shutil
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,106 +10,87 @@ from typing import Any, Final
 
 from tools.evidence.captures import Capture, simulate_captures
 from tools.evidence.checkout import Checkout, Worker
-from tools.evidence.samples import file_samples
-from tools.evidence.scrubbed import scrubbed, told_values
+from tools.evidence.commands import run_commands
+from tools.evidence.real import real_jobs
+from tools.evidence.scrubbed import scrubbed
 from tools.evidence.ways import FIRST_PHOTOGRAPH, PHOTOGRAPHS, PHOTONS, Options, way_name
 
 Entry = tuple[str, dict[str, Any]]
 
-WITH_FORMATS: Final = ("duet", "streak-hdr", "spad-sr")
-"""Bundles whose pictures are written in every format; writers know no bundle."""
-FORMATS: Final = (
-    *(("--format", name) for name in ("tiff", "png", "jpeg", "dng")),
-    ("--format", "tiff", "--linear", "--color", "acescg"),
-    ("--format", "png", "--strip-metadata", "--preview"),
-)
-FORMATS_OF_PHOTONS: Final = (
-    *(("--format", name) for name in ("exr", "tiff")),
-    ("--product", "transient", "--format", "exr"),
-)
+WITHOUT_BUNDLE: Final = ("duet", "spad-sr")
+"""Bundles whose captures are processed without one too."""
 
 
-def make_record(root: Path, bundles: list[str] | None = None) -> dict[str, Any]:
+def make_record(
+    root: Path,
+    bundles: list[str] | None = None,
+    *,
+    data: Path | None = None,
+    is_judged: bool = False,
+) -> dict[str, Any]:
     """Return the record of a checkout.
 
     Args:
         root: The checkout.
         bundles: Names of built-in bundles; None for all.
+        data: A folder with real captures.
+        is_judged: Whether to run also the commands that take minutes.
     """
     with tempfile.TemporaryDirectory() as work:
         checkout = Checkout(root=root.resolve(), work=Path(work).resolve())
         entries: dict[str, Any] = {}
         with Worker(checkout) as worker:
             for bundle in bundles or checkout.bundles:
-                captures, entries_of_captures = simulate_captures(checkout, bundle)
-                entries |= entries_of_captures
+                captures, simulated = simulate_captures(checkout, bundle)
+                entries |= simulated
                 entries |= dict(_processed(worker, bundle, captures))
-                entries |= dict(_golden(worker, bundle, checkout.manifest(bundle)))
-                entries |= dict(_commands(checkout, bundle, captures))
+                if captures[0].is_photograph:
+                    entries |= dict(_golden(worker, bundle, checkout.manifest(bundle)))
+                if bundle in WITHOUT_BUNDLE:
+                    entries |= dict(_processed(worker, None, captures))
+                entries |= dict(run_commands(checkout, bundle, captures, is_judged=is_judged))
                 print(f"{bundle}: {len(entries)} entries so far", flush=True)
-        return {"commit": checkout.commit, "entries": scrubbed_entries(entries, checkout)}
+            for job in real_jobs(data, checkout.work) if data is not None else ():
+                options = {k: v for k, v in job["options"].items() if k != "timing"}
+                capture = Path(job["capture"]).name
+                name = f"{job['bundle'] or 'none'} {capture} {way_name(options)}"
+                entries[name] = worker.ask(job)
+        folders = (*checkout.folders, f"{data}/") if data is not None else checkout.folders
+        kept = {name: _scrubbed_entry(entry, folders) for name, entry in sorted(entries.items())}
+        return {"commit": checkout.commit, "entries": kept}
 
 
-def scrubbed_entries(entries: dict[str, Any], checkout: Checkout) -> dict[str, Any]:
-    """Return entries of which only the seconds differ from run to run."""
-    return {
-        name: scrubbed(entry, checkout.folders) | {"seconds": entry.get("seconds")}
-        for name, entry in sorted(entries.items())
-    }
-
-
-def _processed(worker: Worker, bundle: str, captures: list[Capture]) -> Iterator[Entry]:
-    """Process every capture by every way."""
-    is_photograph = captures[0].is_photograph
-    first = captures[0]
-    ways = [(way, captures) for way in (PHOTOGRAPHS if is_photograph else PHOTONS)]
-    ways += [(way, [first]) for way in (FIRST_PHOTOGRAPH if is_photograph else ())]
-    for way, some in ways:
-        for capture in some:
-            yield f"{bundle} {capture.name} {way_name(way)}", worker.ask(job(bundle, capture, way))
-
-
-def job(bundle: str | None, capture: Capture, way: Options) -> dict[str, Any]:
+def job_of(bundle: str | None, capture: Capture, way: Options) -> dict[str, Any]:
     """Return the job of processing a capture by a way."""
     return {
         "bundle": bundle,
+        "kind": None if capture.is_photograph or bundle is not None else "spad",
         "capture": str(capture.path),
         "is_photograph": capture.is_photograph,
-        "options": {**capture.options, **way},
+        "options": {**(capture.options if bundle is not None else {}), **way},
     }
+
+
+def _scrubbed_entry(entry: dict[str, Any], folders: tuple[str, ...]) -> dict[str, Any]:
+    return {**scrubbed(entry, folders), "seconds": entry.get("seconds")}
+
+
+def _processed(worker: Worker, bundle: str | None, captures: list[Capture]) -> Iterator[Entry]:
+    """Process every capture by every way."""
+    first, *_ = captures
+    ways = [(way, captures) for way in (PHOTOGRAPHS if first.is_photograph else PHOTONS)]
+    ways += [(way, [first]) for way in (FIRST_PHOTOGRAPH if first.is_photograph else ())]
+    for way, some in ways:
+        for capture in some:
+            # without a bundle, the file's name says whose capture it is
+            name = f"{bundle} {capture.name}" if bundle else f"none {capture.path.stem}"
+            yield f"{name} {way_name(way)}", worker.ask(job_of(bundle, capture, way))
 
 
 def _golden(worker: Worker, bundle: str, manifest: dict[str, Any]) -> Iterator[Entry]:
     """Process the arrays of golden cases with every size of network."""
     sizes = {size for sizes in manifest["networks"].values() for size in sizes}
-    for case in manifest["golden"]:
-        for way in [{}, *({"size": size} for size in sorted(sizes))]:
+    for way in [{}, *({"size": size} for size in sorted(sizes))]:
+        for case in manifest["golden"]:
             words = {"bundle": bundle, "case": case["name"], "options": way}
             yield f"{bundle} golden-{case['name']} {way_name(way)}", worker.ask(words)
-
-
-def _commands(checkout: Checkout, bundle: str, captures: list[Capture]) -> Iterator[Entry]:
-    """Run commands with `--json`, and read what they write."""
-    names = [capture.path.name for capture in captures]
-    is_forced = any(capture.options for capture in captures)
-    with_bundle = ["--bundle", bundle, *(["--force-bundle"] if is_forced else [])]
-    lines = [
-        ["info", bundle],
-        *(["info", name] for name in names),
-        ["check", bundle, "--level", "graph"],
-        ["plan", *names, *with_bundle],
-        ["process", *names, *with_bundle],
-    ]
-    if bundle in WITH_FORMATS:
-        is_photograph = captures[0].is_photograph
-        formats = FORMATS if is_photograph else FORMATS_OF_PHOTONS
-        lines += [["process", names[0 if is_photograph else 1], *some] for some in formats]
-        lines.append(["process", names[0], "--bundle", "none"])
-    for line in lines:
-        out = checkout.work / "out"
-        where = ["--out-dir", str(out)] if line[0] in {"plan", "process"} else []
-        told, seconds = checkout.command([*line, *where, "--json"])
-        files = {path.name: file_samples(path) for path in sorted(out.glob("*"))}
-        found = told_values(told, checkout.folders)
-        yield f"camkit {' '.join(line)}", {**found, "files": files, "seconds": seconds}
-        shutil.rmtree(out, ignore_errors=True)

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from tools.evidence.captures import simulate_captures
 from tools.evidence.checkout import Checkout, Worker
-from tools.evidence.record import job
+from tools.evidence.record import job_of
 
 START: Final = ("info", "duet", "--json")
 """The command that stands for starting the command line."""
@@ -33,7 +33,7 @@ def compare_seconds(roots: tuple[Path, Path], bundles: list[str] | None, rounds:
         ratios.append(_told("camkit " + " ".join(START), starts))
         for bundle in bundles or sorted({*first.bundles} & {*second.bundles}):
             for capture in simulate_captures(first, bundle)[0]:
-                words = {**job(bundle, capture, {}), "planned": False}
+                words = {**job_of(bundle, capture, {}), "planned": False}
                 pairs = []
                 for number in range(rounds + 1):
                     order = workers[:: 1 if number % 2 else -1]

@@ -4,7 +4,7 @@ from typing import Any, Final
 
 Options = dict[str, Any]
 
-METHODS: Final = ("net", "wiener", "rl", "admm-tv", "physics", "deglare", "develop")
+METHODS: Final = ("net", "wiener", "rl", "admm-tv", "haze", "physics", "deglare", "develop")
 METHODS_OF_PHOTONS: Final = ("log", "lsq", "net", "linear")
 PRODUCTS: Final = ("depth", "intensity", "transient", "lifetime")
 PHOTOGRAPHS: Final[tuple[Options, ...]] = (
@@ -18,10 +18,10 @@ FIRST_PHOTOGRAPH: Final[tuple[Options, ...]] = (
     {"mode": "fast"},
     {"mode": "whole"},
     {"tile_px": 128},
-    {"color": "acescg", "exposure_ev": 1.0, "white_balance": [1.5, 1.0, 2.0]},
+    {"color": "acescg", "exposure_ev": 1.0, "white_balance": (1.5, 1.0, 2.0)},
     {"color": "camera", "vignetting": False, "undistort": False},
     {"demosaic": "quality", "strength": 0.5, "laws": "enforce"},
-    {"depth_m": 2.0, "on_unsafe": "fallback"},
+    {"depth_m": 1.0, "on_unsafe": "fallback"},
     {"dtype": "fp16"},
 )
 """Of the first photograph of a bundle, besides."""

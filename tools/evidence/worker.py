@@ -20,7 +20,7 @@ from tools.evidence.samples import array_hash
 
 
 def main() -> None:
-    """Answer jobs until stdin ends; what libraries print goes to stderr."""
+    """Process jobs until stdin ends; what libraries print goes to stderr."""
     with os.fdopen(os.dup(1), "w") as answers:
         os.dup2(2, 1)
         answerer = Answerer()

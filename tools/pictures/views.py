@@ -26,9 +26,9 @@ from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from camkit.runtime.kinds.spad.twin.recording import PhotonOptions
 from camkit.runtime.kinds.spad.twin.simulate import fitted, luminance, record
 from camkit.runtime.kinds.spad.twin.write import write_recorded
-from tools.hdr.gallery import night_pictures
 from tools.hdr.glare_twin import exposed_scene, photographed, two_point_star
 from tools.hdr.glare_twin import psnr_db as streaks_psnr_db
+from tools.hdr.night_gallery import night_pictures
 from tools.pictures.crops import Place, around_brightest, crop_pictures, psnr_db, take
 
 SCENES: Final = Path(__file__).parent.parent / "scenes"
@@ -74,7 +74,7 @@ class Photograph:
     iso: float = 100.0
 
     def __call__(self, name: str) -> View:
-        """Take it with a camera, and restore it."""
+        """Photograph it with a camera, and restore it."""
         bundle = open_bundle(find_bundle(name))
         scene = read_light(SCENES / self.scene)
         extent = bundle.manifest.sensor.extent
@@ -108,7 +108,7 @@ class Night:
     stops: tuple[int, ...]
 
     def __call__(self, name: str) -> View:
-        """Take it with a camera, and read its lamps back."""
+        """Photograph it with a camera, and read its lamps back."""
         bundle = open_bundle(find_bundle(name))
         with TemporaryDirectory() as folder:
             pictures = night_pictures(bundle, Path(folder) / "night.dng")
@@ -137,7 +137,7 @@ class Windshield:
     angle_deg: float
 
     def __call__(self, name: str) -> View:
-        """Take it with any camera, and take its streaks away."""
+        """Photograph it with any camera, and remove its streaks."""
         bundle = open_bundle(find_bundle(name))
         scene = exposed_scene(f"night:{self.seed}", 384, 512)
         shot = photographed(scene, two_point_star(np.deg2rad(self.angle_deg)), self.seed)
@@ -205,7 +205,7 @@ VIEWS: Final[Mapping[str, Callable[[str], View]]] = MappingProxyType(
 def _view(
     bundle: Bundle, rows: Mapping[str, Sequence[FloatArray]], decibels: tuple[float, float]
 ) -> View:
-    """Caption rows of three pictures; decibels are the same for all rows."""
+    """Return rows of three pictures with captions; decibels are the same for all rows."""
     before, after = decibels
     captions = (f"{AS_TAKEN}: {before:.1f} dB", f"{RESTORED}: {after:.1f} dB", TRUTH)
     return View(
@@ -219,7 +219,7 @@ def _exposure(stop: int) -> str:
 
 
 def _deglared(seen: FloatArray) -> tuple[Glare, FloatArray]:
-    """Take the streaks out of a picture (3, h, w) that clips at 1, as the bundle does."""
+    """Remove the streaks from a picture (3, h, w) that clips at 1, as the bundle does."""
     entry = Deglare()
     settings = GlareSettings(
         least_rad=math.radians(entry.least_angle_deg),

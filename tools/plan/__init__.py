@@ -1,4 +1,4 @@
-"""What `--quality adaptive` may skip, in the order of the work.
+"""Parts of `plan_report`: what `--quality adaptive` may skip, in the order of the work.
 
 - `cells`: what each lattice cell loses with less than the exact result
 - `fit`: the loss model fitted to them

@@ -1,4 +1,4 @@
-"""What every lattice cell of a simulated capture would lose with less than the exact result.
+"""Losses of every lattice cell of a simulated capture with less than the exact result.
 
     picture -> capture -> content, and per cell the squared sRGB error of exact, bank, development
                            and every other size of network

@@ -1,4 +1,4 @@
-"""What `--quality adaptive` saves and loses against `exact`, scene by scene."""
+"""Savings and losses of `--quality adaptive` against `exact`, scene by scene."""
 
 import json
 import time

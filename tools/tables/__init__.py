@@ -8,7 +8,7 @@
 A table is rows, which are data, and how one of them is trained, measured and written. What trains
 for equal times, keeps a journal and writes a record is one runner:
 
-    rows             what is compared, and for how many seeds
+    table_rows       what is compared, and for how many seeds
     equal_training   the networks of rows, each for the same CPU time
     journal          finished work, by the hash of all that decides it
     records          compact JSON and Markdown

@@ -16,9 +16,9 @@ from camkit.errors import ContractError
 from camkit.models_def.training.kind import Material, read_recipe
 from camkit.models_def.training.trainer import TrainOptions, checkpoint_path, train
 from camkit.runtime.output.part_file import atomic_output
-from tools.tables.rows import Run
+from tools.tables.table_rows import Run
 
-DONE: Final = "done.json"
+DONE_FILE: Final = "done.json"
 RECIPE: Final = "recipe.toml"
 SAMPLES: Final = "samples_*"
 AT_THE_END_S: Final = 1e9
@@ -29,7 +29,7 @@ Tell = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EqualTime:
-    """What every network of a comparison is trained with.
+    """Settings that every network of a comparison is trained with.
 
     Attributes:
         out_dir: A folder for every run is made there.
@@ -75,31 +75,31 @@ def trained(one: Trainee, settings: EqualTime, tell: Tell) -> dict[str, Any]:
     """
     name = one.run.training
     folder = settings.out_dir / name
-    known, begun = finished(folder), folder / RECIPE
+    ending, begun = finished(folder), folder / RECIPE
     if begun.is_file() and begun.read_text(encoding="utf-8") != one.recipe:
         raise ContractError(f"{name} was begun by another recipe: remove {folder}")
-    if known is None:
+    if ending is None:
         tell(f"{name}: training for {settings.cpu_minutes:g} CPU-minutes")
-        known = _train(one, settings)
-    elif known["cpu_minutes"] != settings.cpu_minutes:
+        ending = _train(one, settings)
+    elif ending["cpu_minutes"] != settings.cpu_minutes:
         raise ContractError(
-            f"{name} was trained for {known['cpu_minutes']:g} CPU-minutes, not "
+            f"{name} was trained for {ending['cpu_minutes']:g} CPU-minutes, not "
             f"{settings.cpu_minutes:g}: say so, or remove {folder}"
         )
     tell(
-        f"{name}: {known['steps']} steps, {known['cpu_s']:.0f} CPU-s, "
-        f"{known['valid_db']:.2f} dB on fixed samples"
+        f"{name}: {ending['steps']} steps, {ending['cpu_s']:.0f} CPU-s, "
+        f"{ending['valid_db']:.2f} dB on fixed samples"
     )
-    return known
+    return ending
 
 
 def finished(folder: Path) -> dict[str, Any] | None:
     """Return how a training ended; None where it did not."""
-    path = folder / DONE
+    path = folder / DONE_FILE
     if not path.is_file():
         return None
-    found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    return found
+    ending: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return ending
 
 
 def checkpoint_of(runs: Path, run: Run) -> Path:
@@ -130,14 +130,14 @@ def _train(one: Trainee, settings: EqualTime) -> dict[str, Any]:
         validate_s=AT_THE_END_S,
     )
     result = train(recipe, options, material=one.material())
-    found = {
+    ending = {
         "cpu_minutes": settings.cpu_minutes,
         "cpu_s": round(result.cpu_s, 1),
         "steps": result.steps,
         "valid_db": round(result.valid_db, 3),
     }
-    with atomic_output(folder / DONE) as part:
-        part.write_text(json.dumps(found) + "\n", encoding="utf-8")
+    with atomic_output(folder / DONE_FILE) as part:
+        part.write_text(json.dumps(ending) + "\n", encoding="utf-8")
     for samples in folder.glob(SAMPLES):
         shutil.rmtree(samples)
-    return found
+    return ending

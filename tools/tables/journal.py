@@ -1,4 +1,4 @@
-"""What was measured is not measured again: a journal by the hash of all that decides an entry."""
+"""A journal by the hash of all that decides an entry: what is there is not measured again."""
 
 import hashlib
 import json
@@ -18,23 +18,23 @@ class Journal:
     def __init__(self, path: Path) -> None:
         self._path = path
         lines = read_journal(path, lambda line: {**line, "key": line["key"]}, "measurement")
-        self._known: dict[str, Entry] = {line["key"]: line for line in lines}
+        self._entries: dict[str, Entry] = {line["key"]: line for line in lines}
 
-    def kept(self, key: str, make: Callable[[], Entry]) -> Entry:
+    def entry(self, key: str, make: Callable[[], Entry]) -> Entry:
         """Return the entry of a key, which is made and written down where it is not known."""
-        if key not in self._known:
-            made = json.loads(json.dumps({"key": key, **make()}))
-            append_journal(self._path, [made])
-            self._known[key] = made
-        return self._known[key]
+        if key not in self._entries:
+            entry = json.loads(json.dumps({"key": key, **make()}))
+            append_journal(self._path, [entry])
+            self._entries[key] = entry
+        return self._entries[key]
 
 
 def digest(*parts: object) -> str:
     """Return a hash of all that decides an entry: bytes, and the text of other values."""
-    made = hashlib.sha256()
+    hasher = hashlib.sha256()
     for part in parts:
-        made.update((part if isinstance(part, bytes) else str(part).encode()) + b"\n")
-    return made.hexdigest()
+        hasher.update((part if isinstance(part, bytes) else str(part).encode()) + b"\n")
+    return hasher.hexdigest()
 
 
 @lru_cache

@@ -15,22 +15,22 @@ def with_keys(text: str, table: str, keys: Mapping[str, Value]) -> str:
     Raises:
         ContractError: If there is no such table, or the values do not come out.
     """
-    lines, inside, found = [], False, False
+    lines, inside, is_there = [], False, False
     for line in text.splitlines():
         if line.startswith("["):
             inside = line.strip() == f"[{table}]"
         if not (inside and line.split("=")[0].strip() in keys):
             lines.append(line)
         if inside and line.startswith("["):
-            found = True
+            is_there = True
             lines += [key_line(key, value) for key, value in keys.items()]
     changed = "\n".join(lines) + "\n"
-    if not found:
+    if not is_there:
         raise ContractError(f"the recipe has no table [{table}]")
     try:
-        given = tomllib.loads(changed)[table]
+        values = tomllib.loads(changed)[table]
     except tomllib.TOMLDecodeError as error:
         raise ContractError(f"[{table}] holds one of {', '.join(keys)} on many lines") from error
-    if any(given[key] != value for key, value in keys.items()):
+    if any(values[key] != value for key, value in keys.items()):
         raise ContractError(f"[{table}] holds one of {', '.join(keys)} twice")
     return changed

@@ -23,8 +23,8 @@ def markdown_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 def left_out_lines(record: dict[str, Any]) -> list[str]:
     """Return a line for everything that a record says is left out, and why."""
-    found = [pair for key in record if key.endswith("left_out") for pair in record[key].items()]
-    return [f"- {name} is left out: {reason}" for name, reason in found]
+    pairs = [pair for key in record if key.endswith("left_out") for pair in record[key].items()]
+    return [f"- {name} is left out: {reason}" for name, reason in pairs]
 
 
 def _rounded(value: Any, digits: int) -> Any:

@@ -22,7 +22,7 @@ from camkit.runtime.output.part_file import atomic_output
 from tools.tables.equal_training import EqualTime, Tell, Trainee, finished, trained
 from tools.tables.journal import Entry, Journal
 from tools.tables.records import to_compact_json
-from tools.tables.rows import Row, Run, chosen_trainings
+from tools.tables.table_rows import Row, Run, chosen_trainings
 
 JOURNAL: Final = "measured.jsonl"
 
@@ -30,8 +30,8 @@ Record = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Asked:
-    """What a table is asked to measure.
+class Request:
+    """A table's order to measure.
 
     Attributes:
         options: Of the command line, those of the table too.
@@ -48,21 +48,21 @@ class Asked:
         """Return the folder of trainings."""
         return Path(self.options.runs)
 
-    def kept(self, key: str, make: Callable[[], Entry], line: Callable[[Entry], str]) -> Entry:
+    def entry(self, key: str, make: Callable[[], Entry], line: Callable[[Entry], str]) -> Entry:
         """Return the entry of a key; what is not in the journal is made, and told by its line."""
 
-        def made() -> Entry:
+        def make_now() -> Entry:
             entry = make()
             self.tell(line(entry))
             return entry
 
-        return self.journal.kept(key, made)
+        return self.journal.entry(key, make_now)
 
     def trained(self, rows: Sequence[Row]) -> dict[str, Any]:
         """Return training -> how it ended, of those that ended."""
         names = [run.training for row in rows if row.recipe for run in row.runs]
-        known = {name: finished(self.runs / name) for name in names}
-        return {name: ended for name, ended in known.items() if ended is not None}
+        endings = {name: finished(self.runs / name) for name in names}
+        return {name: ended for name, ended in endings.items() if ended is not None}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,7 +70,7 @@ class Table:
     """A table of the thesis.
 
     Attributes:
-        about: What it is, for its help.
+        description: For its help.
         measure: Measures its rows, as plain values.
         to_text: A record as tables in Markdown.
         add_options: Adds options of its own to `measure`.
@@ -82,8 +82,8 @@ class Table:
         digits: Of numbers in its record.
     """
 
-    about: str
-    measure: Callable[[Asked], Record]
+    description: str
+    measure: Callable[[Request], Record]
     to_text: Callable[[Record], str]
     add_options: Callable[[ArgumentParser], None]
     rows: Callable[[Namespace], Sequence[Row]] | None = None
@@ -110,12 +110,12 @@ def run(tables: Mapping[str, Table], words: Sequence[str]) -> None:
 def _parser(tables: Mapping[str, Table]) -> ArgumentParser:
     form: Any = {"formatter_class": argparse.RawDescriptionHelpFormatter}
     parser = ArgumentParser(description=__doc__, **form)
-    named = parser.add_subparsers(dest="table", required=True)
+    parsers = parser.add_subparsers(dest="table", required=True)
     for name, table in tables.items():
-        about = named.add_parser(name, description=table.about, **form)
-        commands = about.add_subparsers(required=True)
+        table_parser = parsers.add_parser(name, description=table.description, **form)
+        commands = table_parser.add_subparsers(required=True)
         if table.trainee is not None:
-            train = commands.add_parser("train", description=table.about, **form)
+            train = commands.add_parser("train", description=table.description, **form)
             train.set_defaults(run=_train)
             train.add_argument("--out-dir", type=Path, required=True, help="folder of all runs")
             train.add_argument("--data", type=Path, help="pictures; without them drawn scenes")
@@ -124,7 +124,7 @@ def _parser(tables: Mapping[str, Table]) -> ArgumentParser:
             train.add_argument("--workers", type=int, default=1, help="processes of samples")
             train.add_argument("--rows", nargs="*", metavar="ROW", help="some of them, or ROW-SEED")
             table.add_train_options(train)
-        measure = commands.add_parser("measure", description=table.about, **form)
+        measure = commands.add_parser("measure", description=table.description, **form)
         measure.set_defaults(run=_measure)
         measure.add_argument("--runs", type=Path, required=True, help="the --out-dir of train")
         measure.add_argument("-o", "--output", type=Path, required=True, help="record (JSON)")
@@ -158,8 +158,8 @@ def _measure(table: Table, options: Namespace) -> None:
     if not out.parent.is_dir():
         raise ContractError(f"there is no folder {out.parent} for the record")
     options.runs.mkdir(parents=True, exist_ok=True)
-    asked = Asked(options=options, journal=Journal(options.runs / JOURNAL), tell=_tell)
-    record = table.measure(asked)
+    request = Request(options=options, journal=Journal(options.runs / JOURNAL), tell=_tell)
+    record = table.measure(request)
     with atomic_output(out) as part:
         part.write_text(to_compact_json(record, table.digits) + "\n", encoding="utf-8")
     print(table.to_text(record))

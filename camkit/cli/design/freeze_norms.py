@@ -37,7 +37,7 @@ def freeze_norms(
 
     require_torch("camkit freeze-norms")
     refuse_existing([output], overwrite=overwrite)
-    from camkit.export.frozen_norms import FreezeOptions, freeze_checkpoint
+    from camkit.models_def.training.frozen_norms import FreezeOptions, freeze_checkpoint
 
     options = FreezeOptions(pictures=data, valid=valid, cache_folder=cache_dir, samples=samples)
     output.parent.mkdir(parents=True, exist_ok=True)

@@ -21,15 +21,11 @@ def draw_light(found: Sequence[LensField]) -> Figure:
     figure = new_figure(9.0, 3.0)
     near, far, width = figure.subplots(1, 3)
     _lines(near, found, lambda p: p.image.near_share)
-    near.set_yscale("log")
-    near.set_ylim(LEAST_SHARE, 1.3)
-    near.set_ylabel("light within 10 px")
+    near.set(yscale="log", ylim=(LEAST_SHARE, 1.3), ylabel="light within 10 px")
     _lines(far, found, lambda p: p.image.far_share)
-    far.set_ylim(0, 1.05)
-    far.set_ylabel("light within 900 px")
+    far.set(ylim=(0, 1.05), ylabel="light within 900 px")
     _lines(width, found, lambda p: p.image.fwhm_px)
-    width.set_yscale("log")
-    width.set_ylabel("width of the peak, px")
+    width.set(yscale="log", ylabel="width of the peak, px")
     near.legend()
     return figure
 
@@ -44,16 +40,13 @@ def draw_detection(found: Sequence[LensField], bars_px: int) -> Figure:
         contrast, detection, cdp = panels
         _lines(contrast, found, _of_bars(row, "contrast"))
         contrast.axhline(0, color="black", linewidth=0.6)
-        contrast.set_ylabel("contrast")
-        contrast.set_title(title)
+        contrast.set(ylabel="contrast", title=title)
         _lines(detection, found, _of_bars(row, "detection"), interval=_interval(row))
         detection.axhline(0.95, color="black", linewidth=0.6, linestyle=":")
         detection.axhline(0.05, color="black", linewidth=0.6, linestyle=":")
-        detection.set_ylim(-0.03, 1.03)
-        detection.set_ylabel("told apart at 95 %")
+        detection.set(ylim=(-0.03, 1.03), ylabel="told apart at 95 %")
         _lines(cdp, found, _of_bars(row, "cdp"))
-        cdp.set_ylim(-0.03, 1.03)
-        cdp.set_ylabel("CDP, within half of nominal")
+        cdp.set(ylim=(-0.03, 1.03), ylabel="CDP, within half of nominal")
     rows[0][0].legend()
     return figure
 
@@ -70,9 +63,7 @@ def draw_mtf(found: Sequence[LensField]) -> Figure:
                 mtf = image.mtf(direction, _FREQUENCIES)
                 label = lens.subject.name if style == "-" else None
                 panel.plot(_FREQUENCIES, mtf, style, color=color, label=label)
-        panel.set_title(f"{share:g} of the field")
-        panel.set_xlabel("cycles/px")
-        panel.set_ylim(0, 1.02)
+        panel.set(title=f"{share:g} of the field", xlabel="cycles/px", ylim=(0, 1.02))
         if share == 0:
             panel.set_ylabel("MTF")
             panel.legend()
@@ -99,8 +90,7 @@ def draw_recovery(found: Sequence[LensField]) -> Figure:
             color=color,
             label=f"{lens.subject.name}, {lens.recovered.method}",
         )
-    panel.set_xlabel("mm from the axis")
-    panel.set_ylabel("PSNR, dB of sRGB")
+    panel.set(xlabel="mm from the axis", ylabel="PSNR, dB of sRGB")
     panel.legend()
     return figure
 

@@ -88,8 +88,7 @@ def draw_histograms(methods: Sequence[Method]) -> Figure:
                 continue
             color = field_color(number)
             panel.hist(values, _BINS, histtype="step", color=color, label=method.name)
-        panel.set_yscale("log")
-        panel.set_xlabel(_label(measure))
+        panel.set(yscale="log", xlabel=_label(measure))
         if measure == MEASURES[0]:
             panel.set_ylabel("patches")
     names = panels[0].get_legend_handles_labels()

@@ -2,11 +2,9 @@
 
 settings        what a caller may ask for
 trial           one way to do the work, and the axes along which trials vary
-row_maker       what makes the rows of one sort
-one_method      the rows of a single method that a bundle offers
-rows/           which trials a bundle gives; a new sort of row is one new file
 part            what a kind of camera brings: how it photographs, rows, metrics
-own/            kinds that measure themselves: their rows in one report
+common_rows     which trials any bundle gives
+own_rows        kinds that measure themselves: their rows in one report
 line_up         the makers and metrics of a camera, and all trials
 timed/          one capture through fresh processes, watched: seconds, memory, noise
 machine, gemm   what the machine is, and the fastest it multiplies

@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import Final
 
 from camkit.bundle.facts import NetworkFacts
-from camkit.report.bench.row_maker import RowMaker
+from camkit.report.bench.part import RowMaker
 from camkit.report.bench.trial import (
     BASE_SIZE,
     KNOWN,

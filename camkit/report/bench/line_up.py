@@ -8,8 +8,7 @@ from camkit.errors import ContractError, UnsupportedError
 from camkit.kinds import find_kind
 from camkit.report.bench.common_rows import COMMON
 from camkit.report.bench.metric import Metric, registered_metrics
-from camkit.report.bench.part import BenchPart
-from camkit.report.bench.row_maker import RowMaker
+from camkit.report.bench.part import BenchPart, RowMaker
 from camkit.report.bench.trial import Axes, Entrant, Ground, Skip, Trial
 from camkit.report.kind_finder import find_part
 from camkit.runtime.plan.ways import offered_methods

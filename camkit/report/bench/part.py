@@ -13,11 +13,27 @@ from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.reader import Bundle
 from camkit.contracts import FloatArray
 from camkit.report.bench.metric import Metric
-from camkit.report.bench.row_maker import RowMaker
-from camkit.report.bench.trial import Skip
+from camkit.report.bench.trial import Axes, Entrant, Ground, Skip, Trial
 from camkit.report.quality import FIELD_SHARES, Exposed, Shot, expose
 
 Tell = Callable[[str], None]
+MakeTrials = Callable[[Entrant, Axes, Ground], tuple[list[Trial], list[Skip]]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RowMaker:
+    """Makes the rows of one sort, as trials that are not measured yet.
+
+    Attributes:
+        name: Stands under `kind` in its rows.
+        methods: Names that `--methods` takes for it.
+        trials: Gives the trials of a bundle, and what was asked for but cannot be measured; called
+            only if one of its methods is wanted.
+    """
+
+    name: str
+    methods: tuple[str, ...]
+    trials: MakeTrials
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -21,8 +21,8 @@ from camkit.models_def.kinds.spad.samples import luminance, photograph
 from camkit.models_def.kinds.spad.sampling import Sampling
 from camkit.models_def.networks.bicubic import SCALE, Bicubic
 from camkit.models_def.training.kind import Restorer
+from camkit.models_def.training.losses import ssim
 from camkit.models_def.training.pictures import list_pictures, read_picture
-from camkit.models_def.training.similarity import ssim
 
 SEED: Final = 404
 SETS: Final = ("set5", "set14", "bsd100_half_a")

@@ -5,7 +5,7 @@ from skimage.metrics import structural_similarity
 
 from camkit.errors import ContractError
 from camkit.models_def.design.loss import DesignLoss, design_loss
-from camkit.models_def.training.similarity import ssim
+from camkit.models_def.training.losses import ssim
 
 GENERATOR = torch.Generator().manual_seed(4)
 SHARP = torch.rand(2, 3, 40, 40, generator=GENERATOR, dtype=torch.float64)

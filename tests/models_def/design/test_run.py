@@ -37,7 +37,7 @@ def test_a_stopped_run_goes_on_and_leaves_lens_log_and_checkpoint(
         f"camkit design, recipe {recipe.name}, from duet",
     )
     assert paraxial_data(lens).efl_mm == pytest.approx(50, abs=2)
-    entries = [json.loads(line) for line in resumed.log.read_text().splitlines()]
+    entries = [json.loads(line) for line in resumed.files.log.read_text().splitlines()]
     assert [entry["step"] for entry in entries] == [0, 3, 6]
     assert [entry["valid_rays"] for entry in entries] == [1, 1, 1]
     assert report["best_db"] >= report["begin_db"]

@@ -9,6 +9,7 @@ import pytest
 from camkit.bundle.reader import open_bundle
 from camkit.bundle.stages import Deglare
 from camkit.errors import ParityError
+from camkit.export import proving
 from camkit.runtime.proof.check import CheckReport, Layer
 from tools.hdr import glare_bundle
 
@@ -32,7 +33,7 @@ def test_a_bundle_that_fails_its_check_is_not_written(
     failed = CheckReport(
         path=tmp_path, layers=(Layer(name="golden", status="fail", message="off"),)
     )
-    monkeypatch.setattr(glare_bundle, "check_bundle", lambda *_, **__: failed)
+    monkeypatch.setattr(proving, "check_bundle", lambda *_, **__: failed)
     out = tmp_path / "deglare.camkit"
     with pytest.raises(ParityError, match="fails its own check"):
         glare_bundle.build(out, Deglare())

@@ -10,7 +10,7 @@ import pytest
 
 from tests.bundle_factory import write_tiny_bundle
 from tests.hdr_bundle import write_hdr_bundle
-from tools.hdr import gallery as nights
+from tools.hdr import night_gallery as nights
 from tools.pictures import gallery, views
 from tools.pictures.front import gained_db, restored_rows, write_front
 

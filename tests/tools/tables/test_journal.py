@@ -9,8 +9,8 @@ from tools.tables.journal import Journal, digest
 
 def test_an_entry_is_made_once_and_read_again(tmp_path: Path) -> None:
     path = tmp_path / "journal.jsonl"
-    first = Journal(path).kept("a", lambda: {"db": (1.0, 2.0)})
-    again = Journal(path).kept("a", lambda: pytest.fail("made again"))
+    first = Journal(path).entry("a", lambda: {"db": (1.0, 2.0)})
+    again = Journal(path).entry("a", lambda: pytest.fail("made again"))
     assert first == again == {"key": "a", "db": [1.0, 2.0]}
     assert len(path.read_text(encoding="utf-8").splitlines()) == 1
 

@@ -8,7 +8,7 @@ from typing import Any, Final
 from tools.tables.hdr.night_scenes import EASY, GROUPS, LDR_LIMIT_DB, SATURATED
 from tools.tables.journal import Entry
 from tools.tables.records import left_out_lines, markdown_table
-from tools.tables.rows import Row
+from tools.tables.table_rows import Row
 
 COLUMNS: Final = (
     *("hdr_psnr_db", "stops_rmse", "unclipped_psnr_db", "mu_psnr_db", "pu21_psnr_db", "jod"),
@@ -41,7 +41,7 @@ Record = dict[str, Any]
 
 @dataclass(slots=True, kw_only=True)
 class Measured:
-    """What was measured.
+    """Measurements of the rows.
 
     Attributes:
         groups: Group -> scenes.
@@ -57,74 +57,78 @@ class Measured:
 
 
 def record_of(
-    bare: str, rows: Iterable[Row], found: Measured, trained: Mapping[str, Any]
+    bare: str, rows: Iterable[Row], measured: Measured, trained: Mapping[str, Any]
 ) -> Record:
     """Return everything that was measured as plain values.
 
     Args:
         bare: Row that all others are held against.
         rows: Those asked for.
-        found: What was measured of them.
+        measured: Their measurements.
         trained: Training -> how it ended.
     """
-    there = [row for row in rows if row.key not in found.rows_left_out]
+    there = [row for row in rows if row.key not in measured.rows_left_out]
     return {
         "saturated": SATURATED,
         "ldr_limit_db": LDR_LIMIT_DB,
-        "groups": {name: found.groups[name] for name in GROUPS if name in found.groups},
-        "rows": {row.key: _row(bare, row, found, trained) for row in there},
-        "rows_left_out": dict(found.rows_left_out),
-        "scenes_left_out": dict(found.scenes_left_out),
+        "groups": {name: measured.groups[name] for name in GROUPS if name in measured.groups},
+        "rows": {row.key: _row(bare, row, measured, trained) for row in there},
+        "rows_left_out": dict(measured.rows_left_out),
+        "scenes_left_out": dict(measured.scenes_left_out),
     }
 
 
-def _row(bare: str, row: Row, found: Measured, trained: Mapping[str, Any]) -> Record:
+def _row(bare: str, row: Row, measured: Measured, trained: Mapping[str, Any]) -> Record:
     names = [run.name for run in row.runs]
     return {
         "label": row.label,
         "trained": {name: trained[name] for name in names if name in trained},
         "groups": {
-            name: _means(bare, [[found.entries[run, s] for s in scenes] for run in names], found)
-            for name, scenes in found.groups.items()
+            name: _means(
+                bare, [[measured.entries[run, s] for s in scenes] for run in names], measured
+            )
+            for name, scenes in measured.groups.items()
         },
-        "below_input": [] if row.key == bare else below_input(bare, names, found),
+        "below_input": [] if row.key == bare else below_input(bare, names, measured),
         "scenes": {
-            scene: [_main(found, run, scene) for run in names]
-            for scenes in found.groups.values()
+            scene: [_main(measured, run, scene) for run in names]
+            for scenes in measured.groups.values()
             for scene in scenes
         },
     }
 
 
-def below_input(bare: str, runs: Iterable[str], found: Measured) -> list[str]:
+def below_input(bare: str, runs: Iterable[str], measured: Measured) -> list[str]:
     """Return scenes of LDR > 45 dB that end below the lesser of LDR - 0.5 and 65 dB, any seed."""
-    easy = [scene for group in EASY for scene in found.groups.get(group, ())]
-    wanted = {scene: min(_main(found, bare, scene) - TIE_DB, GOOD_DB) for scene in easy}
+    easy = [scene for group in EASY for scene in measured.groups.get(group, ())]
+    least_db = {scene: min(_main(measured, bare, scene) - TIE_DB, GOOD_DB) for scene in easy}
     return [
-        scene for scene in easy if min(_main(found, run, scene) for run in runs) < wanted[scene]
+        scene
+        for scene in easy
+        if min(_main(measured, run, scene) for run in runs) < least_db[scene]
     ]
 
 
-def _main(found: Measured, run: str, scene: str) -> float:
-    return float(found.entries[run, scene]["scores"][MAIN])
+def _main(measured: Measured, run: str, scene: str) -> float:
+    return float(measured.entries[run, scene]["scores"][MAIN])
 
 
-def _means(bare: str, by_seed: list[list[Entry]], found: Measured) -> Record:
+def _means(bare: str, by_seed: list[list[Entry]], measured: Measured) -> Record:
     """Return mean and spread of every column: over scenes, then over seeds."""
-    made: Record = {}
+    means: Record = {}
     for name in (*COLUMNS, *ALIGNED):
-        known = [[e["scores"][name] for e in seed if name in e["scores"]] for seed in by_seed]
-        if all(known):
-            made[name] = _summary(known)
-    made[GAIN] = _summary(
-        [[e["scores"][MAIN] - _main(found, bare, e["scene"]) for e in seed] for seed in by_seed]
+        values = [[e["scores"][name] for e in seed if name in e["scores"]] for seed in by_seed]
+        if all(values):
+            means[name] = _summary(values)
+    means[GAIN] = _summary(
+        [[e["scores"][MAIN] - _main(measured, bare, e["scene"]) for e in seed] for seed in by_seed]
     )
     pairs = [[e["scores"] for e in seed if OF_BARE in e["scores"]] for seed in by_seed]
-    over = [[s["unclipped_psnr_db"] - s[OF_BARE] for s in scores] for scores in pairs]
-    if all(over):
-        made[OVER_BARE] = _summary(over)
-    made["cpu_s"] = _summary([[e["cpu_s"] for e in seed] for seed in by_seed])
-    return made
+    gains = [[s["unclipped_psnr_db"] - s[OF_BARE] for s in scores] for scores in pairs]
+    if all(gains):
+        means[OVER_BARE] = _summary(gains)
+    means["cpu_s"] = _summary([[e["cpu_s"] for e in seed] for seed in by_seed])
+    return means
 
 
 def _summary(by_seed: list[list[float]]) -> Record:
@@ -155,13 +159,13 @@ def _table(record: Record, group: str) -> str:
     return f"**{GROUPS[group]}** ({len(scenes)})\n\n{table}"
 
 
-def _cell(name: str, found: Record | None, is_bare: bool) -> str:
-    if found is None or (is_bare and name in {GAIN, OVER_BARE}):
+def _cell(name: str, summary: Record | None, is_bare: bool) -> str:
+    if summary is None or (is_bare and name in {GAIN, OVER_BARE}):
         return ""
     digits = DIGITS.get(name, 1)
     sign = "+" if name in {GAIN, OVER_BARE} else ""
-    text = f"{found['mean']:{sign}.{digits}f}"
-    spread = found["std_of_seeds"]
+    text = f"{summary['mean']:{sign}.{digits}f}"
+    spread = summary["std_of_seeds"]
     return text if spread is None else f"{text} +- {spread:.{max(digits, 2)}f}"
 
 

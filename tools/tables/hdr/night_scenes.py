@@ -1,4 +1,4 @@
-"""What is photographed, as `camkit bench --saturate 0.015` does, and into which group it falls.
+"""Scenes that are photographed, as `camkit bench --saturate 0.015` does, and their groups.
 
 Night scenes are 512 px a side, of larger pictures the middle 1024 px are taken.
 """
@@ -73,7 +73,7 @@ class Scene:
         return hashlib.sha256(self.name.encode() + content).hexdigest()
 
     def group(self, ldr_db: float) -> str:
-        """Say into which group it falls by the PSNR of the bare lens."""
+        """Return the group into which it falls by the PSNR of the bare lens."""
         if ldr_db > LDR_LIMIT_DB:
             return EASY[self.path is not None]
         if self.path is None:

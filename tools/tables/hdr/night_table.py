@@ -47,8 +47,8 @@ from tools.tables.hdr.plates import RECIPES, material_of, write_camera
 from tools.tables.hdr.restoring import Camera, Restorer, make_restorer, timed
 from tools.tables.journal import Entry, digest, file_digest
 from tools.tables.recipe_text import with_keys
-from tools.tables.rows import Row, Run, chosen_rows, read_rows
-from tools.tables.runner import Asked, Record, Table
+from tools.tables.runner import Record, Request, Table
+from tools.tables.table_rows import Row, Run, chosen_rows, read_rows
 
 NIGHTS: Final = 33
 CAMERAS: Final = "cameras"
@@ -82,11 +82,11 @@ def recipe_text(run: Run) -> str:
 class Bench:
     """Cameras and restorers of one folder of trainings; a scene is photographed once a plate."""
 
-    def __init__(self, asked: Asked) -> None:
-        self._asked = asked
+    def __init__(self, request: Request) -> None:
+        self._request = request
         self._cameras: dict[str, Camera] = {}
         self._restorers: dict[str, Restorer] = {}
-        self._taken: tuple[tuple[str, str], Exposed, Scores] | None = None
+        self._photograph: tuple[tuple[str, str], Exposed, Scores] | None = None
 
     def entry(self, run: Run, scene: Scene) -> Entry:
         """Return a run on a scene; what is not known yet is measured.
@@ -95,32 +95,32 @@ class Bench:
             CamkitError: If the scene cannot be read or photographed.
         """
         key = self._digest(run, scene)
-        return self._asked.kept(key, lambda: self._measured(run, scene), _line)
+        return self._request.entry(key, lambda: self._measured(run, scene), _line)
 
     def _measured(self, run: Run, scene: Scene) -> Entry:
         exposed, of_bare = self._exposed(scene, run.row.optics)
         if run.name not in self._restorers:
             camera = self._camera(run.row.optics)
-            self._restorers[run.name] = make_restorer(run, camera, self._asked.runs)
+            self._restorers[run.name] = make_restorer(run, camera, self._request.runs)
         picture, cpu_s = timed(self._restorers[run.name], exposed)
-        found = _scores(picture, exposed)
-        scores = {n: round(found[n], 4) for n in (*COLUMNS, *ALIGNED) if n in found}
+        every = _scores(picture, exposed)
+        scores = {n: round(every[n], 4) for n in (*COLUMNS, *ALIGNED) if n in every}
         if "unclipped_psnr_db" in of_bare:
             scores[OF_BARE] = round(of_bare["unclipped_psnr_db"], 4)
         return {"run": run.name, "scene": scene.name, "cpu_s": round(cpu_s, 3), "scores": scores}
 
     def _exposed(self, scene: Scene, plate: str) -> tuple[Exposed, Scores]:
         """Return a photograph, and the scores of the bare lens beside it."""
-        named = scene.name, plate
-        if self._taken is None or self._taken[0] != named:
+        key = scene.name, plate
+        if self._photograph is None or self._photograph[0] != key:
             bundle = self._camera(plate).bundle
             shot = photograph(scene.shot(), scene.light(bundle), bundle, bundle.frozen_optics)
-            self._taken = named, shot, _scores(shot.extras["input"], shot)
-        return self._taken[1:]
+            self._photograph = key, shot, _scores(shot.extras["input"], shot)
+        return self._photograph[1:]
 
     def _camera(self, plate: str) -> Camera:
         if plate not in self._cameras:
-            folder = self._asked.runs / CAMERAS
+            folder = self._request.runs / CAMERAS
             folder.mkdir(parents=True, exist_ok=True)
             frozen, bundle = write_camera(folder, plate)
             self._cameras[plate] = Camera(bundle=bundle, frozen=frozen)
@@ -129,41 +129,41 @@ class Bench:
     def _digest(self, run: Run, scene: Scene) -> str:
         decides = [run.name, scene.digest(), file_digest(self._camera(run.row.optics).frozen)]
         if run.row.recipe:
-            decides.append(file_digest(checkpoint_of(self._asked.runs, run)))
+            decides.append(file_digest(checkpoint_of(self._request.runs, run)))
         if run.row.method in {"physics", "network"}:
             decides.append(_source_digest())
         return digest(*decides)
 
 
-def measure(asked: Asked) -> Record:
+def measure(request: Request) -> Record:
     """Measure every row that is trained on every scene; the bare lens is always among them.
 
     Raises:
         ContractError: If there is no such row, or no scene is wanted.
     """
-    chosen = chosen_rows(ROWS, asked.options.rows)
-    rows = chosen if LDR in chosen else (LDR, *chosen)
-    nights: int = asked.options.scenes
+    listed = chosen_rows(ROWS, request.options.rows)
+    rows = listed if LDR in listed else (LDR, *listed)
+    nights: int = request.options.scenes
     if nights < 1:
         raise ContractError(f"--scenes must be >= 1; got {nights}")
-    bench, found = Bench(asked), Measured()
-    scenes = _grouped(bench, found, nights, asked.options.data)
-    if (fewer := len(found.groups.get(NIGHT, ()))) < nights:
-        asked.tell(f"only {fewer} night scenes of LDR <= {LDR_LIMIT_DB:g} dB, wanted {nights}")
+    bench, measured = Bench(request), Measured()
+    scenes = _grouped(bench, measured, nights, request.options.data)
+    if (fewer := len(measured.groups.get(NIGHT, ()))) < nights:
+        request.tell(f"only {fewer} night scenes of LDR <= {LDR_LIMIT_DB:g} dB, wanted {nights}")
     for scene in scenes:
-        for run in _measurable(rows, asked.runs, found):
-            found.entries[run.name, scene.name] = bench.entry(run, scene)
-    return record_of(LDR.key, rows, found, asked.trained(rows))
+        for run in _measurable(rows, request.runs, measured):
+            measured.entries[run.name, scene.name] = bench.entry(run, scene)
+    return record_of(LDR.key, rows, measured, request.trained(rows))
 
 
-def _measurable(rows: Iterable[Row], runs: Path, found: Measured) -> list[Run]:
+def _measurable(rows: Iterable[Row], runs: Path, measured: Measured) -> list[Run]:
     """Return runs that are trained, those of one plate together; name the other rows."""
     by_plate: dict[str, list[Run]] = {}
     for row in rows:
         missing = [r.name for r in row.runs if row.recipe and finished(runs / r.training) is None]
         if missing:
             why = LACKS_VGG if row.needs_vgg else f"not trained yet: {', '.join(missing)}"
-            found.rows_left_out[row.key] = why
+            measured.rows_left_out[row.key] = why
         else:
             by_plate.setdefault(row.optics, []).extend(row.runs)
     return [run for of_plate in by_plate.values() for run in of_plate]
@@ -178,26 +178,28 @@ def _scores(picture: FloatArray, exposed: Exposed) -> Scores:
     return METRIC.measure(picture, exposed.extras["linear"], **exposed.extras)
 
 
-def _grouped(bench: Bench, found: Measured, nights: int, pictures: Path | None) -> Sequence[Scene]:
+def _grouped(
+    bench: Bench, measured: Measured, nights: int, pictures: Path | None
+) -> Sequence[Scene]:
     """Measure the bare lens, by which scenes fall into their groups."""
     scenes: list[Scene] = []
     (bare,) = LDR.runs
 
     def take(scene: Scene) -> None:
-        entry = found.entries[bare.name, scene.name] = bench.entry(bare, scene)
+        entry = measured.entries[bare.name, scene.name] = bench.entry(bare, scene)
         group = scene.group(entry["scores"]["hdr_psnr_db"])
-        found.groups.setdefault(group, []).append(scene.name)
+        measured.groups.setdefault(group, []).append(scene.name)
         scenes.append(scene)
 
     for scene in islice(night_scenes(), MOST_NIGHTS * nights):
-        if len(found.groups.get(NIGHT, ())) >= nights:
+        if len(measured.groups.get(NIGHT, ())) >= nights:
             break
         take(scene)
     for scene in () if pictures is None else file_scenes(pictures):
         try:
             take(scene)
         except CamkitError as error:
-            found.scenes_left_out[scene.name] = str(error).rpartition(": ")[2]
+            measured.scenes_left_out[scene.name] = str(error).rpartition(": ")[2]
     return scenes
 
 
@@ -217,7 +219,7 @@ def _options(measure: ArgumentParser) -> None:
 
 
 TABLE: Final = Table(
-    about=__doc__,
+    description=__doc__,
     rows=lambda _: ROWS,
     trainee=trainee,
     measure=measure,

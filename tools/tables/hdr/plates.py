@@ -35,9 +35,9 @@ RECIPES: Final = Path(str(resources.files("camkit.models_def.recipes")))
 def material_of(plate: str) -> HdrMaterial:
     """Compute what a built-in plate writes (ten seconds); the bare lens is that of any."""
     recipe = shipped_recipe()
-    behind = replace(recipe.plate, file=CROSS if plate == BARE else plate)
-    found = compute_material(replace(recipe, plate=behind), RECIPES, RECIPES)
-    return HdrMaterial(streaks=core_alone(found.streaks)) if plate == BARE else found
+    plate_choice = replace(recipe.plate, file=CROSS if plate == BARE else plate)
+    material = compute_material(replace(recipe, plate=plate_choice), RECIPES, RECIPES)
+    return HdrMaterial(streaks=core_alone(material.streaks)) if plate == BARE else material
 
 
 def core_alone(streaks: StreakOptics) -> StreakOptics:
@@ -62,11 +62,11 @@ def write_camera(folder: Path, plate: str) -> tuple[Path, Bundle]:
     write_streaks(frozen, material.streaks)
     optics = FrozenOptics(psf=psf_of_streaks(material.streaks, 3), streaks=material.streaks)
     design = training_kind(recipe.kind).design(recipe)
-    kept = [stage for stage in design.stages if not isinstance(stage, Network)]
-    stages = rewired(kept, design.stages)
-    path, named = folder / f"{plate}.camkit", {"kind": recipe.kind, "name": plate}
+    physics = [stage for stage in design.stages if not isinstance(stage, Network)]
+    stages = rewired(physics, design.stages)
+    path, names = folder / f"{plate}.camkit", {"kind": recipe.kind, "name": plate}
     distance_mm = design.object_distance_mm
-    return frozen, write_physics(path, stages, recipe.sensor, optics, distance_mm, **named)
+    return frozen, write_physics(path, stages, recipe.sensor, optics, distance_mm, **names)
 
 
 @lru_cache

@@ -29,7 +29,7 @@ from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.twin.truth import true_picture
 from camkit.scenes.saturation import CEILING
 from tools.tables.equal_training import checkpoint_of
-from tools.tables.rows import Run
+from tools.tables.table_rows import Run
 
 NETWORK: Final = "net"
 
@@ -106,8 +106,8 @@ def _by_network(network: nn.Module, bundle: Bundle) -> Restorer:
         red, green, blue = gains
         planes = develop(_raw(samples, sensor), (red, green, blue), sensor.cfa)
         with torch.no_grad():
-            found = whole_frame(network, to_roots(torch.from_numpy(planes)[None]))
-        light = to_light(found).clamp(max=CEILING)
+            output = whole_frame(network, to_roots(torch.from_numpy(planes)[None]))
+        light = to_light(output).clamp(max=CEILING)
         return true_picture(np.ascontiguousarray(light[0].numpy()), sensor)
 
     return restore
@@ -124,5 +124,5 @@ def whole_frame(network: nn.Module, planes: Tensor) -> Tensor:
     stride: Any = network.stride_px
     height, width = planes.shape[-2:]
     more = (0, -width % stride, 0, -height % stride)
-    found: Tensor = network(nn.functional.pad(planes, more, mode="replicate"))
-    return found[..., :height, :width]
+    output: Tensor = network(nn.functional.pad(planes, more, mode="replicate"))
+    return output[..., :height, :width]

@@ -28,7 +28,7 @@ from camkit.units import UM_PER_MM
 # spots hundreds of pixels wide need them: their contrast is known to 1 / sqrt(rays) or better
 REST_RAYS: Final = 16_000
 _WINDOW_RAYS: Final = 1000
-_HELD: Final = 0.995
+_LIGHT_SHARE: Final = 0.995
 _LEAST_PX: Final = 33
 
 
@@ -42,7 +42,7 @@ class LensAtRest(DesignLens):
     kernels: Tensor
 
     def __init__(self, problem: Problem, pixels: Pixels, kernels: Tensor) -> None:
-        """Hold kernels (depth, field, 3, k, k)."""
+        """Store kernels (depth, field, 3, k, k)."""
         super().__init__()
         self.problem, self.pixels = problem, pixels
         self.register_buffer("kernels", kernels)
@@ -67,18 +67,18 @@ class LensAtRest(DesignLens):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Seen:
-    """What a lens does at every depth and field.
+class FieldLight:
+    """Kernels and light of a lens at every depth and field.
 
     Attributes:
         kernels: (depth, field, 3, k, k), each sums to 1.
-        held: (depth, field), share of the arriving light that falls into the window.
+        share_inside: (depth, field), share of the arriving light that falls into the window.
         arriving: (depth, field), share of the rays of the stop that reach the sensor.
         rms_mm: (depth, field), RMS spot radius of all wavelengths; NaN without light.
     """
 
     kernels: Tensor
-    held: Tensor
+    share_inside: Tensor
     arriving: Tensor
     rms_mm: Tensor
 
@@ -95,27 +95,27 @@ def at_work(
         focus: How the sensor is placed; None leaves it in a lens that is made for this distance
             and puts it at the paraxial image otherwise.
     """
-    own = math.isclose(lens.object_distance_mm, object_distance_mm, rel_tol=1e-9)
+    is_made_for_it = math.isclose(lens.object_distance_mm, object_distance_mm, rel_tol=1e-9)
     near = with_f_number(with_object_distance(lens, object_distance_mm), f_number)
-    return near if focus is None and own else with_focus(near, focus or "paraxial")
+    return near if focus is None and is_made_for_it else with_focus(near, focus or "paraxial")
 
 
 def window_of(problem: Problem, pixels: Pixels, largest_px: int) -> int:
     """Return the odd window that holds 99.5 % of the light of every field and depth, or the cap."""
     problem = replace(problem, samples=half_disc(_WINDOW_RAYS))
     diameters = [
-        energy_diameter(spots, _HELD).max()
+        energy_diameter(spots, _LIGHT_SHARE).max()
         for depth_mm in problem.depths_mm
         for spots in _field_spots(problem, depth_mm)
         if spots is not None
     ]
     if not diameters:
         raise ContractError("no field of the lens gets light; check stop, rims and fields")
-    needed = float(torch.stack(diameters).max()) * UM_PER_MM / pixels.pitch_um
-    return min(max(_LEAST_PX, 2 * math.ceil(needed / 2) + 3), largest_px)
+    side = float(torch.stack(diameters).max()) * UM_PER_MM / pixels.pitch_um
+    return min(max(_LEAST_PX, 2 * math.ceil(side / 2) + 3), largest_px)
 
 
-def trace_at_rest(problem: Problem, pixels: Pixels) -> Seen:
+def trace_at_rest(problem: Problem, pixels: Pixels) -> FieldLight:
     """Trace the kernels of a lens.
 
     Light outside the window is spread evenly over it: none is lost, and it carries no picture.
@@ -126,55 +126,55 @@ def trace_at_rest(problem: Problem, pixels: Pixels) -> Seen:
         problem: Its lens as it works, fields, wavelengths, depths and samples of half the pupil.
         pixels: Pitch, colours and window.
     """
-    seen = [
+    light = [
         [_field(spots, pixels) for spots in _field_spots(problem, depth_mm)]
         for depth_mm in problem.depths_mm
     ]
 
     def table(part: int) -> Tensor:
-        return torch.stack([torch.stack([field[part] for field in fields]) for fields in seen])
+        return torch.stack([torch.stack([field[part] for field in fields]) for fields in light])
 
-    return Seen(kernels=table(0), held=table(1), arriving=table(2), rms_mm=table(3))
+    return FieldLight(kernels=table(0), share_inside=table(1), arriving=table(2), rms_mm=table(3))
 
 
 def _field_spots(problem: Problem, depth_mm: float) -> list[Spots | None]:
     """Return spots (1, wave, ray) about the centroid of all rays; None without light."""
     lens = with_object_distance(problem.free.lens, depth_mm)
-    found: list[Spots | None] = []
+    fields: list[Spots | None] = []
     for slope in problem.slopes:
         try:
             spots = trace_spots(lens, slope[None], problem.wavelengths_um, problem.samples)
         except ContractError:
             # not even the chief ray arrives: this field is beyond the lens
-            found.append(None)
+            fields.append(None)
             continue
         alive = bool((spots.weight.sum(-1) > 0).all())
         middle = (spots.weight * spots.y_mm).sum((1, 2)) / spots.weight.sum((1, 2))
-        found.append(replace(spots, chief_y_mm=middle) if alive else None)
-    return found
+        fields.append(replace(spots, chief_y_mm=middle) if alive else None)
+    return fields
 
 
 def _field(spots: Spots | None, pixels: Pixels) -> tuple[Tensor, ...]:
-    """Return kernel (3, k, k), share held, share arriving and RMS radius of one field."""
+    """Return kernel (3, k, k), share inside, share arriving and RMS radius of one field."""
     size = pixels.kernel_px
     even = torch.full((3, size, size), 1 / size**2, dtype=torch.float64)
     none = torch.zeros((), dtype=torch.float64)
     if spots is None:
         return even, none, none, torch.full_like(none, math.nan)
     traced = splat(spots, size, pixels.pitch_um)
-    kept = pixels.color_weights * traced.energy_kept
-    kernel = torch.einsum("cw,wyx->cyx", kept, traced.kernels[0])
-    held = kept.sum(1)[:, None, None]
+    energy = pixels.color_weights * traced.energy_kept
+    kernel = torch.einsum("cw,wyx->cyx", energy, traced.kernels[0])
+    share_inside = energy.sum(1)[:, None, None]
     share = spots.weight / spots.weight.sum()
     off_y = spots.y_mm - spots.chief_y_mm[:, None, None]
     rms = torch.sqrt((share * (spots.x_mm**2 + off_y**2)).sum())
     arriving = (spots.weight > 0).double().mean()
-    return kernel + (1 - held).clamp_min(0) * even, held.min(), arriving, rms
+    return kernel + (1 - share_inside).clamp_min(0) * even, share_inside.min(), arriving, rms
 
 
 def at_rest(
     lens: Lens, problem: Problem, pixels: Pixels, rays: int = REST_RAYS
-) -> tuple[LensAtRest, Seen]:
+) -> tuple[LensAtRest, FieldLight]:
     """Return a lens at rest that looks at the fields, wavelengths and depths of a problem.
 
     Args:
@@ -183,10 +183,10 @@ def at_rest(
         pixels: Pitch, colours and window.
         rays: In half the stop.
     """
-    own = replace(
+    problem_at_rest = replace(
         problem,
         free=FreeLens(lens=lens, variables=(), rides=False),
         samples=half_disc(rays),
     )
-    seen = trace_at_rest(own, pixels)
-    return LensAtRest(own, pixels, seen.kernels.float()), seen
+    light = trace_at_rest(problem_at_rest, pixels)
+    return LensAtRest(problem_at_rest, pixels, light.kernels.float()), light

@@ -66,8 +66,8 @@ def _places(report: Entry, what: str, title: str, digits: int) -> list[str]:
     deep = len(report["depths_mm"]) > 1
     rows = []
     for name, entry in report["lenses"].items():
-        found = [np.mean(e[what], axis=1 if deep else 0) for e in entry["recovered"]]
-        mean = np.mean(found, axis=0)
+        values = [np.mean(e[what], axis=1 if deep else 0) for e in entry["recovered"]]
+        mean = np.mean(values, axis=0)
         spread = [np.ptp(mean)] if deep else []
         rows.append([name, *(f"{value:.{digits}f}" for value in (*mean, *spread))])
     head = ["lens", *_names_of_places(report), *(["spread"] if deep else [])]

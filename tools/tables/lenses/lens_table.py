@@ -34,20 +34,20 @@ from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.search.problem import Problem
 from camkit.models_def.optics.search.splat import Pixels
 from camkit.models_def.optics.search.variables import FreeLens
+from camkit.models_def.training.losses import ssim
 from camkit.models_def.training.pictures import SceneSource, open_source
-from camkit.models_def.training.similarity import ssim
 from camkit.units import to_degrees
 from tools.tables.journal import Entry, digest
-from tools.tables.lenses.lens_at_rest import Seen, at_rest, at_work, window_of
+from tools.tables.lenses.lens_at_rest import FieldLight, at_rest, at_work, window_of
 from tools.tables.lenses.lens_page import lens_table, mean_and_spread
-from tools.tables.runner import Asked, Record, Table
+from tools.tables.runner import Record, Request, Table
 
 DIGITS: Final = 5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Conditions:
-    """What is the same for all lenses."""
+    """Settings that are the same for all lenses."""
 
     recipe: DesignRecipe
     depths_mm: tuple[float, ...]
@@ -64,30 +64,30 @@ class Conditions:
         return digest(asdict(self), *more)
 
 
-def measure(asked: Asked) -> Record:
+def measure(request: Request) -> Record:
     """Measure every lens: captured, then recovered by a network for each seed.
 
     Raises:
         ContractError: If two lenses have one name, or there is no network to train.
     """
-    conditions, lenses = conditions_of(asked.options), {}
-    for name, place in named(asked.options.lens).items():
+    conditions, lenses = conditions_of(request.options), {}
+    for name, place in lenses_by_name(request.options.lens).items():
         lens = working_lens(place, conditions)
-        write_lens(lens, asked.runs / f"{name}.toml")
+        write_lens(lens, request.runs / f"{name}.toml")
         key = conditions.digest(asdict(lens))
-        entry = asked.kept(
-            key, partial(_timed, partial(before, lens, conditions)), partial(_line, name)
+        entry = request.entry(
+            key, partial(_timed, partial(captured, lens, conditions)), partial(_line, name)
         )
         entry["recovered"] = [
-            asked.kept(
+            request.entry(
                 conditions.digest(asdict(lens), seed),
-                partial(_timed, partial(after, lens, conditions, seed)),
+                partial(_timed, partial(recovered, lens, conditions, seed)),
                 partial(_line, name),
             )
-            for seed in range(1, asked.options.seeds + 1)
+            for seed in range(1, request.options.seeds + 1)
         ]
         lenses[name] = entry
-        asked.tell(row(name, entry))
+        request.tell(row(name, entry))
     recipe = conditions.recipe
     slopes = torch.atan(field_slopes(recipe.optics))
     return {
@@ -123,16 +123,16 @@ class Captures(nn.Module):
         return planes[:, :3]
 
 
-def named(lenses: list[str]) -> dict[str, str]:
+def lenses_by_name(lenses: list[str]) -> dict[str, str]:
     """Return built-in names or paths by the name that the table shows."""
-    found: dict[str, str] = {}
+    places: dict[str, str] = {}
     for text in lenses:
         name, _, place = text.rpartition("=")
         name = name or Path(place).stem
-        if name in found:
+        if name in places:
             raise ContractError(f"two lenses are called {name}; write NAME=FILE for one of them")
-        found[name] = place
-    return found
+        places[name] = place
+    return places
 
 
 def conditions_of(arguments: Namespace) -> Conditions:
@@ -156,10 +156,10 @@ def conditions_of(arguments: Namespace) -> Conditions:
     if arguments.network:
         network = NetworkChoice(name=arguments.network, config={"in_channels": front.channels})
     loss = recipe.loss if recipe.loss.needs_network else DesignLoss(kind="l1")
-    asked = arguments.depths_mm or str(arguments.object_mm)
+    depths = arguments.depths_mm or str(arguments.object_mm)
     return Conditions(
         recipe=replace(recipe, schedule=schedule, front=front, network=network, loss=loss),
-        depths_mm=tuple(float(word) for word in asked.split(",")),
+        depths_mm=tuple(float(word) for word in depths.split(",")),
         f_number=arguments.f_number,
         object_mm=arguments.object_mm,
         focus=arguments.focus,
@@ -194,7 +194,7 @@ def parts(
     network: nn.Module | None,
     *,
     widest: bool,
-) -> tuple[DesignParts, Seen]:
+) -> tuple[DesignParts, FieldLight]:
     """Return loop's parts: to judge in the widest window, so that patches are the same for all."""
     recipe = conditions.recipe
     weights = torch.tensor(recipe.pixels.color_weights, dtype=torch.float64)
@@ -211,8 +211,8 @@ def parts(
     )
     if not widest:
         pixels = replace(pixels, kernel_px=window_of(problem, pixels, conditions.largest_px))
-    rest, seen = at_rest(lens, problem, pixels)
-    made = DesignParts(
+    rest, light = at_rest(lens, problem, pixels)
+    design = DesignParts(
         lens=rest,
         network=network,
         front=recipe.front,
@@ -220,7 +220,7 @@ def parts(
         loss=recipe.loss,
         source=source,
     )
-    return made, seen
+    return design, light
 
 
 def fresh_source(plan: Conditions) -> SceneSource:
@@ -229,15 +229,15 @@ def fresh_source(plan: Conditions) -> SceneSource:
     return open_source(plan.fresh, picture_share=share, scenes=4, scene_px=512)
 
 
-def before(lens: Lens, conditions: Conditions) -> Entry:
-    """Judge captures, and what the front alone makes of them."""
-    judged, seen = parts(lens, conditions, fresh_source(conditions), Captures(), widest=True)
+def captured(lens: Lens, conditions: Conditions) -> Entry:
+    """Measure captures, and what the front alone makes of them."""
+    judged, light = parts(lens, conditions, fresh_source(conditions), Captures(), widest=True)
     fitting, _ = parts(lens, conditions, judged.source, None, widest=False)
     entry = {
         "window_px": fitting.lens.pixels.kernel_px,
-        "held": seen.held.tolist(),
-        "arriving": seen.arriving.tolist(),
-        "rms_um": (1000 * seen.rms_mm.nan_to_num(-1e-3)).tolist(),
+        "held": light.share_inside.tolist(),
+        "arriving": light.arriving.tolist(),
+        "rms_um": (1000 * light.rms_mm.nan_to_num(-1e-3)).tolist(),
         "capture": scores(judged, conditions.recipe.schedule, conditions.patches),
     }
     if conditions.recipe.front.kind != "none":
@@ -247,7 +247,7 @@ def before(lens: Lens, conditions: Conditions) -> Entry:
     return entry
 
 
-def after(lens: Lens, conditions: Conditions, seed: int) -> Entry:
+def recovered(lens: Lens, conditions: Conditions, seed: int) -> Entry:
     """Train a network for the lens at rest, and judge it."""
     recipe = replace(conditions.recipe, schedule=replace(conditions.recipe.schedule, seed=seed))
     network = network_of(recipe)
@@ -283,13 +283,13 @@ def scores(judged: DesignParts, schedule: DesignSchedule, patches: int) -> Entry
     psnr: list[list[Tensor]] = [[] for _ in range(fields)]
     alike: list[list[Tensor]] = [[] for _ in range(fields)]
     for field, pictures, sharp in loop.field_pictures(patches):
-        shown = pictures[:, 0].clamp(0, 1)
-        error = (shown - sharp).square().mean((1, 2, 3)).clamp_min(1e-10)
+        recorded = pictures[:, 0].clamp(0, 1)
+        error = (recorded - sharp).square().mean((1, 2, 3)).clamp_min(1e-10)
         psnr[field].append(-10 * torch.log10(error))
-        alike[field].append(ssim(shown, sharp.expand_as(shown)))
+        alike[field].append(ssim(recorded, sharp.expand_as(recorded)))
 
-    def table(found: list[list[Tensor]]) -> tuple[tuple[float, ...], ...]:
-        means = [torch.stack(of_field).double().mean(0) for of_field in found]
+    def table(patches_of: list[list[Tensor]]) -> tuple[tuple[float, ...], ...]:
+        means = [torch.stack(of_field).double().mean(0) for of_field in patches_of]
         return tuple(tuple(row) for row in torch.stack(means, dim=1).tolist())
 
     return {"db": table(psnr), "ssim": table(alike)}
@@ -335,7 +335,7 @@ def _options(measure: ArgumentParser) -> None:
 
 
 TABLE: Final = Table(
-    about=__doc__,
+    description=__doc__,
     measure=measure,
     to_text=lens_table,
     add_options=_options,

@@ -34,16 +34,16 @@ def by_block(method: str) -> Method:
     """Return a method of the runtime (see `block_filter`) on a sample as one block."""
 
     def restore(developed: Developed, recipe: BayerRecipe) -> Tensor:
-        given, settings = developed.given, recipe.wiener
-        planes, kernels = developed.planes[0].numpy(), given.frozen[0].numpy()
+        shot, settings = developed.given, recipe.wiener
+        planes, kernels = developed.planes[0].numpy(), shot.frozen[0].numpy()
         otf = to_otf(kernels, planes.shape[-1])
         block = Block(
             samples=taper_edges(planes, otf, settings.overlap_px // 4),
             otf=otf,
             unknown=developed.unknown[0].numpy() if bool(developed.unknown.any()) else None,
-            height_mm=given.height_mm,
+            height_mm=shot.height_mm,
         )
-        noise = given.noise.raised(given.noise_rise)
+        noise = shot.noise.raised(shot.noise_rise)
         restored = block_filter(method, settings, noise, kernels.shape[-1])(block)
         return torch.from_numpy(restored)[None]
 

@@ -21,8 +21,8 @@ from camkit.models_def.kinds.bayer.samples import NOT_JUDGED
 from camkit.models_def.training.adversarial.content import Features, gram_loss
 from camkit.models_def.training.adversarial.views import Views, make_views
 from camkit.models_def.training.kind import Restorer, SampleMaker, read_recipe, training_kind
+from camkit.models_def.training.losses import ssim
 from camkit.models_def.training.sample import Sample, SampleLayout
-from camkit.models_def.training.similarity import ssim
 from tools.tables.losses.classical import with_method
 
 METRICS: Final = ("psnr_db", "ssim", "perceptual")
@@ -50,30 +50,31 @@ class Domain:
     to_rec709: Tensor
 
     def score(self, restore: Restorer, features: Features) -> dict[str, Any]:
-        """Judge a restoration by `METRICS`: means over the samples, and `each` by its frame.
+        """Measure a restoration by `METRICS`: means over the samples, and `each` by its frame.
 
         Where scenes are at several distances, `at` has the mean PSNR at every one.
         """
-        found = [
+        scores = [
             (
                 _psnr_db(views),
                 float(ssim(views.seen, views.real)),
                 float(gram_loss(features(views.seen), features(views.real))),
             )
-            for views in self._seen(restore)
+            for views in self._views(restore)
         ]
-        each = dict(zip(METRICS, np.transpose(found).tolist(), strict=True))
+        each = dict(zip(METRICS, np.transpose(scores).tolist(), strict=True))
         means = {name: float(np.mean(values)) for name, values in each.items()}
-        decibels, far = np.array(each["psnr_db"]), np.array(self.distances_mm)
+        decibels, places_mm = np.array(each["psnr_db"]), np.array(self.distances_mm)
         at = {
-            depth_name(far_mm): float(np.mean(decibels[far == far_mm])) for far_mm in np.unique(far)
+            depth_name(far_mm): float(np.mean(decibels[places_mm == far_mm]))
+            for far_mm in np.unique(places_mm)
         }
         return {**means, "each": each, "frames": list(self.frames), **({"at": at} if at else {})}
 
-    def _seen(self, restore: Restorer) -> Iterator[Views]:
+    def _views(self, restore: Restorer) -> Iterator[Views]:
         for sample in self.samples:
             planes = sample.stacked(self.layout)[None]
-            output, truth = restore(planes), known(sample.target[None], planes)
+            output, truth = restore(planes), judged_target(sample.target[None], planes)
             yield make_views(output, truth, sample.weight[None], self.to_rec709)
 
 
@@ -87,7 +88,7 @@ def as_filtered(planes: Tensor) -> Tensor:
     return planes[:, -3:]
 
 
-def known(target: Tensor, planes: Tensor) -> Tensor:
+def judged_target(target: Tensor, planes: Tensor) -> Tensor:
     """Return target less what it has from the bank, which is asked for where light was clipped."""
     return torch.where(target == as_filtered(planes), torch.tensor(NOT_JUDGED), target)
 
@@ -123,8 +124,8 @@ def domain(
     frames, distances_mm = list(range(count)), []
     if isinstance(maker, TileMaker):
         frames = [maker.frame_of(number) for number in range(count)]
-        found = [maker.distance_mm(number) for number in range(count)]
-        distances_mm = [far_mm for far_mm in found if far_mm is not None]
+        known_mm = [maker.distance_mm(number) for number in range(count)]
+        distances_mm = [far_mm for far_mm in known_mm if far_mm is not None]
     if method is not None:
         maker = with_method(method, maker, recipe)
     return Domain(

@@ -45,8 +45,8 @@ from tools.tables.losses.domain import METRICS, Domain, as_filtered, domain
 from tools.tables.losses.overfitting import overfitting, sentences
 from tools.tables.losses.twins import Counts, judged_by, write_twins
 from tools.tables.records import markdown_table
-from tools.tables.rows import Row, Run, chosen_rows
-from tools.tables.runner import Asked, Record, Table
+from tools.tables.runner import Record, Request, Table
+from tools.tables.table_rows import Row, Run, chosen_rows
 
 DOMAINS: Final = ("lab", "wild")
 DIGITS: Final = 5
@@ -83,10 +83,10 @@ def _twins(runs: Path) -> tuple[Path, Path]:
     Raises:
         ContractError: If there are none, or of several cameras.
     """
-    found = sorted(runs.glob("*_display.toml"))
-    if len(found) != 1:
-        raise ContractError(f"{runs} must hold one recipe *_display.toml; it has {len(found)}")
-    return found[0], found[0].with_name(found[0].name.replace("_display.toml", "_wild.toml"))
+    recipes = sorted(runs.glob("*_display.toml"))
+    if len(recipes) != 1:
+        raise ContractError(f"{runs} must hold one recipe *_display.toml; it has {len(recipes)}")
+    return recipes[0], recipes[0].with_name(recipes[0].name.replace("_display.toml", "_wild.toml"))
 
 
 def trainee(run: Run, options: Namespace) -> Trainee:
@@ -105,92 +105,92 @@ def trainee(run: Run, options: Namespace) -> Trainee:
     )
 
 
-def measure(asked: Asked) -> Record:
-    """Judge every row in both domains.
+def measure(request: Request) -> Record:
+    """Measure every row in both domains.
 
     Raises:
         ContractError: If there are no recipes, or no such row.
     """
-    lab, wild = _twins(asked.runs)
+    lab, wild = _twins(request.runs)
     trained = [
         row
-        for row in chosen_rows(_rows_of(asked.runs), asked.options.rows)
-        if finished(asked.runs / row.runs[0].training) is not None
+        for row in chosen_rows(_rows_of(request.runs), request.options.rows)
+        if finished(request.runs / row.runs[0].training) is not None
     ]
-    found: dict[str, Entry] = {}
+    entries: dict[str, Entry] = {}
     for name in UNTRAINED:
-        found[name] = asked.kept(
-            _digest(name, asked), partial(_judge_untrained, name, asked), partial(line, name)
+        entries[name] = request.entry(
+            _digest(name, request), partial(_judge_untrained, name, request), partial(line, name)
         )
     for row in trained:
-        weights = file_digest(checkpoint_of(asked.runs, row.runs[0]))
-        found[row.key] = asked.kept(
-            _digest(row.key, asked, weights),
-            partial(_judge_trained, row.runs[0], asked),
+        weights = file_digest(checkpoint_of(request.runs, row.runs[0]))
+        entries[row.key] = request.entry(
+            _digest(row.key, request, weights),
+            partial(_judge_trained, row.runs[0], request),
             partial(line, row.key),
         )
-    minutes = [ended["cpu_minutes"] for ended in asked.trained(trained).values()]
-    vgg: Path | None = asked.options.vgg
+    minutes = [ended["cpu_minutes"] for ended in request.trained(trained).values()]
+    vgg: Path | None = request.options.vgg
     return {
         "lab": lab.stem,
         "wild": wild.stem,
         "minutes": max(minutes, default=0.0),
-        "samples": asked.options.samples,
+        "samples": request.options.samples,
         "features": "random" if vgg is None else vgg.name,
-        "classical": {"best": max(CLASSICAL, key=lambda name: found[name]["lab"]["psnr_db"])},
-        "overfitting": overfitting(found),
-        "rows": found,
+        "classical": {"best": max(CLASSICAL, key=lambda name: entries[name]["lab"]["psnr_db"])},
+        "overfitting": overfitting(entries),
+        "rows": entries,
     }
 
 
-def _digest(row: str, asked: Asked, *more: object) -> str:
+def _digest(row: str, request: Request, *more: object) -> str:
     """Return a hash of all that decides a row: the recipes, their frames, what is judged on."""
-    options = asked.options
-    recipes = [path for twin in _twins(asked.runs) for path in (twin, judged_by(twin))]
+    options = request.options
+    recipes = [path for twin in _twins(request.runs) for path in (twin, judged_by(twin))]
     frames = [
         path
         for recipe in recipes
-        for path in sorted((asked.runs / recipe.stem).glob(f"*/{FRAMES}"))
+        for path in sorted((request.runs / recipe.stem).glob(f"*/{FRAMES}"))
     ]
     texts = [path.read_text(encoding="utf-8") for path in (*recipes, *frames)]
     return digest(JUDGED, row, *texts, options.data, options.samples, options.vgg, *more)
 
 
-def _judge_untrained(name: str, asked: Asked) -> Entry:
+def _judge_untrained(name: str, request: Request) -> Entry:
     method = name if name in METHODS else None
-    return _scores(UNTRAINED[name], _domains(asked, method), asked)
+    return _scores(UNTRAINED[name], _domains(request, method), request)
 
 
-def _judge_trained(run: Run, asked: Asked) -> Entry:
+def _judge_trained(run: Run, request: Request) -> Entry:
     # the last average of all: some losses are not chosen by decibels
-    checkpoint = replace(read_checkpoint(checkpoint_of(asked.runs, run)), best={})
+    checkpoint = replace(read_checkpoint(checkpoint_of(request.runs, run)), best={})
     network = load_network(checkpoint)
 
     def restore(planes: Tensor) -> Tensor:
         with torch.no_grad():
             return torch.as_tensor(network(planes))
 
-    lab, _ = _twins(asked.runs)
+    lab, _ = _twins(request.runs)
     entry = read_recipe(lab).network(run.row.size)
     form = [entry.network, sorted(map(str, entry.config.items()))]
-    spent = finished(asked.runs / run.training)
-    told = {"loss": entry.schedule.loss, "network": form, "trained": spent}
-    return told | _scores(restore, _domains(asked), asked)
+    ending = finished(request.runs / run.training)
+    training = {"loss": entry.schedule.loss, "network": form, "trained": ending}
+    return training | _scores(restore, _domains(request), request)
 
 
-def _scores(restore: Restorer, domains: Mapping[str, Domain], asked: Asked) -> Entry:
-    features = Relu32(asked.options.vgg)
+def _scores(restore: Restorer, domains: Mapping[str, Domain], request: Request) -> Entry:
+    features = Relu32(request.options.vgg)
     return {where: one.score(restore, features) for where, one in domains.items()}
 
 
-def _domains(asked: Asked, method: str | None = None) -> dict[str, Domain]:
+def _domains(request: Request, method: str | None = None) -> dict[str, Domain]:
     """Return what rows are judged on: unseen pictures, and no drawn scenes."""
-    options, found = asked.options, {}
-    for where, twin in zip(DOMAINS, _twins(asked.runs), strict=True):
+    options, domains = request.options, {}
+    for where, twin in zip(DOMAINS, _twins(request.runs), strict=True):
         recipe = judged_by(twin)
-        folder = asked.runs / recipe.stem
-        found[where] = domain(recipe, folder, options.data, options.samples, method)
-    return found
+        folder = request.runs / recipe.stem
+        domains[where] = domain(recipe, folder, options.data, options.samples, method)
+    return domains
 
 
 def _capture(planes: Tensor) -> Tensor:
@@ -208,8 +208,8 @@ CLASSICAL: Final[tuple[str, ...]] = ("wiener", *METHODS)
 
 def line(name: str, entry: Entry) -> str:
     """Return a row for people while it runs."""
-    told = (f"{where} {entry[where]['psnr_db']:.2f} dB" for where in DOMAINS)
-    return f"{name:24} {', '.join(told)}"
+    words = (f"{where} {entry[where]['psnr_db']:.2f} dB" for where in DOMAINS)
+    return f"{name:24} {', '.join(words)}"
 
 
 def tables_text(record: Record) -> str:
@@ -219,27 +219,29 @@ def tables_text(record: Record) -> str:
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
-def table(found: Mapping[str, Entry]) -> str:
+def table(entries: Mapping[str, Entry]) -> str:
     """Return the table as Markdown; the last column is what a row loses abroad."""
     columns = [(where, metric) for where in DOMAINS for metric in METRICS]
     heads = ["row", *(" ".join(column) for column in columns), "steps", "lab - wild, dB"]
     cells = []
-    for name, entry in found.items():
-        lost = entry["lab"]["psnr_db"] - entry["wild"]["psnr_db"]
+    for name, entry in entries.items():
+        loss_db = entry["lab"]["psnr_db"] - entry["wild"]["psnr_db"]
         values = [f"{entry[where][metric]:.3f}" for where, metric in columns]
-        cells.append([name, *values, str(entry.get("trained", {}).get("steps", "")), f"{lost:.2f}"])
+        cells.append(
+            [name, *values, str(entry.get("trained", {}).get("steps", "")), f"{loss_db:.2f}"]
+        )
     return markdown_table(heads, cells)
 
 
-def table_of_distances(found: Mapping[str, Entry]) -> str:
+def table_of_distances(entries: Mapping[str, Entry]) -> str:
     """Return PSNR abroad by distance of the scenes; empty where all are at one."""
-    names = next(iter(found.values()))["wild"].get("at", {})
+    names = next(iter(entries.values()))["wild"].get("at", {})
     if not names:
         return ""
     cells = []
-    for name, entry in found.items():
+    for name, entry in entries.items():
         at = entry["wild"].get("at", {})
-        cells.append([name, *(f"{at[far]:.3f}" if far in at else "" for far in names)])
+        cells.append([name, *(f"{at[place]:.3f}" if place in at else "" for place in names)])
     return markdown_table(["wild psnr_db", *names], cells)
 
 
@@ -279,7 +281,7 @@ def _options(measure: ArgumentParser) -> None:
 
 
 TABLE: Final = Table(
-    about=__doc__,
+    description=__doc__,
     rows=rows,
     trainee=trainee,
     add_train_options=_train_options,

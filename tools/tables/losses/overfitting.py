@@ -1,4 +1,4 @@
-"""Does a supervised network overfit to where it was trained? A verdict from paired samples.
+"""A verdict from paired samples: does a supervised network overfit to where it was trained?
 
 Both networks of a pair are the same but for their losses, and are judged on the same samples. Its
 lead is the mean over samples of (supervised - other). Samples of one frame share its light and its
@@ -30,7 +30,7 @@ Entry = dict[str, Any]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lead:
-    """How far one network is ahead of another.
+    """The distance by which one network is ahead of another.
 
     Attributes:
         mean: Over samples.
@@ -69,14 +69,14 @@ def lead_of(one: Sequence[float], other: Sequence[float], frames: Sequence[int])
 
 def verdict_of(home: Lead, abroad: Lead) -> str:
     """Return holds, partly, fails, behind or untold."""
-    lost = home.less(abroad).sure
+    growth = home.less(abroad).sure
     if home.sure < 0 and abroad.sure <= 0:
         return "behind"
     if home.sure > 0 and abroad.sure < 0:
         return "holds"
-    if home.sure > 0 and lost > 0:
+    if home.sure > 0 and growth > 0:
         return "partly"
-    if (abroad.sure > 0 and lost <= 0) or lost < 0:
+    if (abroad.sure > 0 and growth <= 0) or growth < 0:
         return "fails"
     return "untold"
 
@@ -88,19 +88,19 @@ def overfitting(rows: Mapping[str, Entry]) -> list[Entry]:
         rows: Name -> `trained`, `loss`, `network` (alike where only losses differ), and of `lab`
             and `wild` for every metric the values of all samples (`each`), and their `frames`.
     """
-    found = []
+    pairs = []
     for name, row in rows.items():
         if row.get("loss") not in SUPERVISED:
             continue
         for rival, other in rows.items():
             if other.get("loss") in (None, *SUPERVISED) or other["network"] != row["network"]:
                 continue
-            found.append({"supervised": name, "other": rival, **_compared(row, other)})
-    return found
+            pairs.append({"supervised": name, "other": rival, **_compared(row, other)})
+    return pairs
 
 
 def _compared(row: Entry, other: Entry) -> Entry:
-    told: Entry = {}
+    leads: Entry = {}
     for metric, sign in HIGHER_IS_BETTER.items():
         home, abroad = (
             lead_of(
@@ -110,18 +110,18 @@ def _compared(row: Entry, other: Entry) -> Entry:
             )
             for where in ("lab", "wild")
         )
-        told[metric] = {
+        leads[metric] = {
             "lab": [home.mean, home.error],
             "wild": [abroad.mean, abroad.error],
             "verdict": verdict_of(home, abroad),
         }
-    return told
+    return leads
 
 
-def sentences(found: Sequence[Entry]) -> list[str]:
-    """Say it, a line for each pair and metric."""
+def sentences(pairs: Sequence[Entry]) -> list[str]:
+    """Return it in words, a line for each pair and metric."""
     lines = []
-    for pair in found:
+    for pair in pairs:
         for metric in HIGHER_IS_BETTER:
             one = pair[metric]
             (home, home_error), (abroad, abroad_error) = one["lab"], one["wild"]

@@ -50,7 +50,7 @@ LOSSES: Final = "[schedule]"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Counts:
-    """Of a lens with a haze, how much is photographed.
+    """Frames that are photographed through a lens with a haze.
 
     Attributes:
         frames: To train on.

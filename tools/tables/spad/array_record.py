@@ -1,4 +1,4 @@
-"""What was measured as plain values: means with their spread over seeds, and gains.
+"""Measurements as plain values: means with their spread over seeds, and gains.
 
 spread of a mean   standard deviation over seeds of training (n - 1); null for one
 spread of a gain   root of the sum of both rows' variances over seeds; beside it the standard
@@ -15,7 +15,7 @@ from typing import Any, Final
 from camkit.models_def.toml_table import read_table
 from tools.tables.journal import Entry
 from tools.tables.records import left_out_lines, markdown_table
-from tools.tables.rows import Row
+from tools.tables.table_rows import Row
 
 Record = dict[str, Any]
 
@@ -43,7 +43,7 @@ REMARK: Final = (
 
 @dataclass(slots=True, kw_only=True)
 class Measured:
-    """What was measured.
+    """Measurements of the rows.
 
     Attributes:
         pictures: Set -> how many.
@@ -63,61 +63,61 @@ class Measured:
     sets_left_out: dict[str, str] = field(default_factory=dict)
 
 
-def record_of(rows: Iterable[Row], found: Measured, trained: Mapping[str, Any]) -> Record:
+def record_of(rows: Iterable[Row], measured: Measured, trained: Mapping[str, Any]) -> Record:
     """Return everything that was measured.
 
     Args:
         rows: Those asked for.
-        found: What was measured of them.
+        measured: Their measurements.
         trained: Training -> how it ended.
     """
-    there = {row.key: row for row in rows if row.key not in found.rows_left_out}
+    there = {row.key: row for row in rows if row.key not in measured.rows_left_out}
     return {
-        "pictures": dict(found.pictures),
+        "pictures": dict(measured.pictures),
         "photons": [level_name(level) for level in LEVELS],
-        "rows": {key: _row(row, found, trained) for key, row in there.items()},
+        "rows": {key: _row(row, measured, trained) for key, row in there.items()},
         "gains": {
-            name: _gain(there[one], there[other], found)
+            name: _gain(there[one], there[other], measured)
             for name, (one, other) in GAINS.items()
             if one in there and other in there
         },
         "seeds_left_out": {
             key: missing
             for key, row in there.items()
-            if (missing := [seed for seed in row.seeds if seed not in found.seeds[key]])
+            if (missing := [seed for seed in row.seeds if seed not in measured.seeds[key]])
         },
-        "rows_left_out": dict(found.rows_left_out),
-        "sets_left_out": dict(found.sets_left_out),
+        "rows_left_out": dict(measured.rows_left_out),
+        "sets_left_out": dict(measured.sets_left_out),
     }
 
 
 def level_name(photons: float) -> str:
-    """Name a level of light."""
+    """Return the name of a level of light."""
     return NOISE_FREE if math.isinf(photons) else f"{photons:g}"
 
 
-def _row(row: Row, found: Measured, trained: Mapping[str, Any]) -> Record:
+def _row(row: Row, measured: Measured, trained: Mapping[str, Any]) -> Record:
     runs = [run.training for run in row.runs]
     return {
         "label": row.label,
         "sampling": row.optics,
         "method": row.method,
         "light": "equal counts" if row.equal_counts else "its own",
-        "mac_per_px": found.mac_per_px.get(row.key),
+        "mac_per_px": measured.mac_per_px.get(row.key),
         "trained": {run: trained[run] for run in runs if run in trained},
         "thesis": THESIS.get(row.key),
         "scores": {
             level_name(level): {
-                name: _scores(_entries(row, name, level, found)) for name in found.pictures
+                name: _scores(_entries(row, name, level, measured)) for name in measured.pictures
             }
             for level in LEVELS
         },
     }
 
 
-def _entries(row: Row, set_name: str, level: float, found: Measured) -> list[Entry]:
-    runs = [run.name for run in row.runs if run.seed in found.seeds[row.key]]
-    return [found.entries[run, set_name, level] for run in runs]
+def _entries(row: Row, set_name: str, level: float, measured: Measured) -> list[Entry]:
+    runs = [run.name for run in row.runs if run.seed in measured.seeds[row.key]]
+    return [measured.entries[run, set_name, level] for run in runs]
 
 
 def _scores(entries: Sequence[Entry]) -> Record:
@@ -136,11 +136,13 @@ def _summary(of_seeds: Sequence[float]) -> Record:
     }
 
 
-def _gain(one: Row, other: Row, found: Measured) -> Record:
+def _gain(one: Row, other: Row, measured: Measured) -> Record:
     return {
         level_name(level): {
-            name: _gain_on(_entries(one, name, level, found), _entries(other, name, level, found))
-            for name in found.pictures
+            name: _gain_on(
+                _entries(one, name, level, measured), _entries(other, name, level, measured)
+            )
+            for name in measured.pictures
         }
         for level in LEVELS
     }
@@ -161,7 +163,10 @@ def _gain_on(one: Sequence[Entry], other: Sequence[Entry]) -> Record:
 
 def _of_pictures(entries: Sequence[Entry]) -> list[float]:
     """Return the PSNR of every picture, mean over seeds."""
-    return [statistics.fmean(of) for of in zip(*(e["psnr_db"] for e in entries), strict=True)]
+    return [
+        statistics.fmean(pictures)
+        for pictures in zip(*(e["psnr_db"] for e in entries), strict=True)
+    ]
 
 
 def tables_text(record: Record) -> str:
@@ -197,24 +202,24 @@ def _table(record: Record, level: str) -> str:
 def _gains(record: Record) -> str:
     sets = list(record["pictures"])
     cells = [
-        [name, level, *(_gain_text(found[of_set]) for of_set in sets)]
+        [name, level, *(_gain_text(values[of_set]) for of_set in sets)]
         for name, levels in record["gains"].items()
-        for level, found in levels.items()
+        for level, values in levels.items()
     ]
     return markdown_table(["gain, dB", "photons", *(TITLES.get(n, n) for n in sets)], cells)
 
 
-def _score_text(found: Record) -> str:
-    psnr, ssim = found["psnr_db"], found["ssim"]
+def _score_text(values: Record) -> str:
+    psnr, ssim = values["psnr_db"], values["ssim"]
     spread = "" if psnr["spread"] is None else f" +- {psnr['spread']:.2f}"
     return f"{psnr['mean']:.2f}{spread} / {ssim['mean']:.4f}"
 
 
-def _gain_text(found: Record) -> str:
-    spread = "" if found["spread"] is None else f" +- {found['spread']:.2f}"
-    error = found["se_of_pictures"]
+def _gain_text(values: Record) -> str:
+    spread = "" if values["spread"] is None else f" +- {values['spread']:.2f}"
+    error = values["se_of_pictures"]
     pictures = "" if error is None else f" ({error:.2f})"
-    return f"{found['db']:+.2f}{spread}{pictures}"
+    return f"{values['db']:+.2f}{spread}{pictures}"
 
 
 def _printed(thesis: Record | None, name: str) -> str:

@@ -40,8 +40,7 @@ from camkit.runtime.kinds.spad.finer.covariance import PictureCovariance
 from camkit.runtime.kinds.spad.finer.linear import Grid, linear_estimate
 from tools.tables.equal_training import checkpoint_of, finished
 from tools.tables.journal import Entry, digest, file_digest
-from tools.tables.rows import Run, chosen_rows, read_rows
-from tools.tables.runner import Asked, Record, Table
+from tools.tables.runner import Record, Request, Table
 from tools.tables.spad.array_record import (
     LEVELS,
     ROWS_FILE,
@@ -51,6 +50,7 @@ from tools.tables.spad.array_record import (
     tables_text,
 )
 from tools.tables.spad.array_training import STEPS, level_sigma, plate_file, trainee
+from tools.tables.table_rows import Run, chosen_rows, read_rows
 
 ROWS: Final = read_rows(ROWS_FILE)
 LIKE_GAUSSIAN: Final = "gaussian.M-1"
@@ -78,42 +78,42 @@ class Reader:
     mac_per_px: float | None = None
 
 
-def measure(asked: Asked) -> Record:
+def measure(request: Request) -> Record:
     """Measure every row that is trained, by one thread of torch.
 
     Raises:
         ContractError: If there is no such row, no set, or one holds no picture.
     """
-    data: Path = asked.options.data
-    rows, found = chosen_rows(ROWS, asked.options.rows), Measured()
+    data: Path = request.options.data
+    rows, measured = chosen_rows(ROWS, request.options.rows), Measured()
     sets = {name: read_set(data / name) for name in SETS if (data / name).is_dir()}
     if not sets:
         raise ContractError(f"{data} holds none of {', '.join(SETS)}")
-    found.pictures = {name: len(pictures) for name, pictures in sets.items()}
-    found.sets_left_out = {name: "there is no such folder" for name in SETS if name not in sets}
+    measured.pictures = {name: len(pictures) for name, pictures in sets.items()}
+    measured.sets_left_out = {name: "there is no such folder" for name in SETS if name not in sets}
     for row in rows:
-        runs = [r for r in row.runs if not row.recipe or finished(asked.runs / r.training)]
+        runs = [r for r in row.runs if not row.recipe or finished(request.runs / r.training)]
         if not runs:
-            found.rows_left_out[row.key] = "not trained yet"
+            measured.rows_left_out[row.key] = "not trained yet"
             continue
-        found.seeds[row.key] = tuple(run.seed for run in runs)
+        measured.seeds[row.key] = tuple(run.seed for run in runs)
         for run in runs:
-            reader = _reader(run, asked)
+            reader = _reader(run, request)
             if reader.mac_per_px is not None:
-                found.mac_per_px[row.key] = reader.mac_per_px
-            for name, photons, entry in _entries(run, reader, sets, asked):
-                found.entries[run.name, name, photons] = entry
-    return record_of(rows, found, asked.trained(rows))
+                measured.mac_per_px[row.key] = reader.mac_per_px
+            for name, photons, entry in _entries(run, reader, sets, request):
+                measured.entries[run.name, name, photons] = entry
+    return record_of(rows, measured, request.trained(rows))
 
 
 def _entries(
-    run: Run, reader: Reader, sets: Sets, asked: Asked
+    run: Run, reader: Reader, sets: Sets, request: Request
 ) -> Iterator[tuple[str, float, Entry]]:
     for name, photons in product(sets, LEVELS):
         of_pictures = (picture.tobytes() for picture in sets[name])
         key = digest(run.name, name, photons, reader.digest, *of_pictures)
         make = partial(_judged, run, reader, sets[name], photons)
-        yield name, photons, asked.kept(key, make, partial(_line, name, photons))
+        yield name, photons, request.entry(key, make, partial(_line, name, photons))
 
 
 def _line(name: str, photons: float, entry: Entry) -> str:
@@ -134,17 +134,17 @@ def _judged(run: Run, reader: Reader, pictures: Sequence[FloatArray], photons: f
     }
 
 
-def _reader(run: Run, asked: Asked) -> Reader:
+def _reader(run: Run, request: Request) -> Reader:
     row = run.row
     if not row.recipe:
-        sampling = _plain_sampling(row.optics, asked)
+        sampling = _plain_sampling(row.optics, request)
         restore = _bicubic if row.method == "bicubic" else linear_restorer
         return Reader(
             sampling=sampling,
             restore=lambda exposure: restore(sampling, exposure),
             digest=_sampling_digest(sampling, row.method),
         )
-    path = checkpoint_of(asked.runs, run)
+    path = checkpoint_of(request.runs, run)
     checkpoint = read_checkpoint(path)
     network = load_network(checkpoint)
     if row.optics == "gaussian_untrained":
@@ -161,15 +161,15 @@ def _reader(run: Run, asked: Asked) -> Reader:
     )
 
 
-def _plain_sampling(sampling: str, asked: Asked) -> Sampling:
+def _plain_sampling(sampling: str, request: Request) -> Sampling:
     if sampling == "learned":
         return make_sampling("learned", kernel=read_plate_psf(plate_file()))
     if sampling != "gaussian":
         return make_sampling(cast("Mode", sampling))
     runs = {run.training: run for row in ROWS for run in row.runs if not row.trained_as}
-    if finished(asked.runs / LIKE_GAUSSIAN) is None:
-        return make_sampling("gaussian", sigma=level_sigma(asked.options.pictures))
-    recipe = recipe_of(read_checkpoint(checkpoint_of(asked.runs, runs[LIKE_GAUSSIAN])))
+    if finished(request.runs / LIKE_GAUSSIAN) is None:
+        return make_sampling("gaussian", sigma=level_sigma(request.options.pictures))
+    recipe = recipe_of(read_checkpoint(checkpoint_of(request.runs, runs[LIKE_GAUSSIAN])))
     assert isinstance(recipe, SpadRecipe)
     return make_sampling("gaussian", sigma=recipe.sampling.sigma)
 
@@ -182,21 +182,21 @@ def network_mac_per_px(network: nn.Module) -> float:
     return float(counter.get_total_flops()) / 2 / COST_PX**2
 
 
-def linear_restorer(told: Sampling, exposure: Exposure) -> Restorer:
+def linear_restorer(believed_sampling: Sampling, exposure: Exposure) -> Restorer:
     """Return the best linear estimate, at the photons that a picture shows.
 
     Args:
-        told: How the array is believed to sample, which need not be how it does.
+        believed_sampling: How the array is believed to sample, which need not be how it does.
         exposure: Of one sub-pixel.
     """
     covariance = PictureCovariance.of(SuperResolve())
-    grid = Grid(scale=SCALE, phase=told.phase)
-    white = exposure.brighter(told.light).white_counts
+    grid = Grid(scale=SCALE, phase=believed_sampling.phase)
+    white = exposure.brighter(believed_sampling.light).white_counts
 
     def restore(planes: Tensor) -> Tensor:
         photons = float(planes[:, :1].mean()) * white
-        found = linear_estimate(told.kernel, grid, covariance, photons)
-        return torch.from_numpy(found(planes[0, :1].numpy()))[None]
+        estimate = linear_estimate(believed_sampling.kernel, grid, covariance, photons)
+        return torch.from_numpy(estimate(planes[0, :1].numpy()))[None]
 
     return restore
 
@@ -210,6 +210,10 @@ def _sampling_digest(sampling: Sampling, what: str) -> str:
     return digest(sampling.kernel.tobytes(), sampling.phase, sampling.mode, what)
 
 
+def _train_options(train: ArgumentParser) -> None:
+    train.add_argument("--valid", type=Path, help="pictures to choose by")
+
+
 def _options(measure: ArgumentParser) -> None:
     more: Any = measure.add_argument
     more("--data", type=Path, required=True, help="folder of the test sets")
@@ -217,12 +221,8 @@ def _options(measure: ArgumentParser) -> None:
     more("--rows", nargs="+", metavar="ROW", help=f"of {', '.join(row.key for row in ROWS)}")
 
 
-def _train_options(train: ArgumentParser) -> None:
-    train.add_argument("--valid", type=Path, help="pictures to choose by")
-
-
 TABLE: Final = Table(
-    about=__doc__,
+    description=__doc__,
     rows=lambda _: ROWS,
     trainee=trainee,
     add_train_options=_train_options,

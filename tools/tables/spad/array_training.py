@@ -21,7 +21,7 @@ from camkit.models_def.kinds.spad.training import SpadMaterial
 from camkit.models_def.training.pictures import open_source
 from tools.tables.equal_training import Trainee
 from tools.tables.recipe_text import with_keys
-from tools.tables.rows import Run
+from tools.tables.table_rows import Run
 
 RECIPES: Final = Path(str(resources.files("camkit.models_def.recipes")))
 RECIPE: Final = "spad_sr.toml"
@@ -75,10 +75,10 @@ def plate_file() -> Path:
     Raises:
         ContractError: If the recipe names none.
     """
-    found = PLATE_FILE.search(_shipped())
-    if found is None:
+    match = PLATE_FILE.search(_shipped())
+    if match is None:
         raise ContractError(f'{RECIPE} must have a line psf = "..."')
-    return (RECIPES / found[1]).resolve()
+    return (RECIPES / match[1]).resolve()
 
 
 @lru_cache

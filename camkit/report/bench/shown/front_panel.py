@@ -51,8 +51,7 @@ def draw_front_panel(panel: Panel, report: dict[str, Any], rows: list[Row], look
     """
     alone = timed_alone(report["rows"], looks.colors)
     seconds = [seconds_per_mp(row) for row in (*rows, *alone)]
-    panel.set_xscale("log")
-    panel.set_xlim(min(seconds) / 1.5, max(seconds) * 1.8)
+    panel.set(xscale="log", xlim=(min(seconds) / 1.5, max(seconds) * 1.8))
     for camera, color in looks.colors.items():
         own = [row for row in rows if row["camera"] == camera]
         level = input_level(own)
@@ -66,10 +65,11 @@ def draw_front_panel(panel: Panel, report: dict[str, Any], rows: list[Row], look
     low, high = panel.get_ylim()
     panel.set_ylim(low - 0.06 * (high - low), high + 0.08 * (high - low))
     _tidy_axis(panel)
-    panel.set_xlabel(
-        "seconds per megapixel, file to EXR in a fresh process, start-up included (log scale)"
+    panel.set(
+        xlabel="seconds per megapixel, file to EXR in a fresh process, start-up included "
+        "(log scale)",
+        ylabel="PSNR, dB",
     )
-    panel.set_ylabel("PSNR, dB")
     panel.set_title(title(report, rows), loc="left")
     panel.grid(visible=True, which="both")
 

@@ -165,8 +165,7 @@ def draw(curves: Sequence[Curve], across: str, up: str, channels: Sequence[str] 
         below.plot(curve.radius, curve.now - curve.before, color=color)
     above.legend(*(part[:2] for part in above.get_legend_handles_labels()))
     above.set_ylabel(up)
-    below.set_ylabel("change")
-    below.set_xlabel(across)
+    below.set(ylabel="change", xlabel=across)
     return figure
 
 

@@ -53,9 +53,11 @@ def draw_profile(facts: FlatFacts) -> Figure:
     panel = figure.subplots()
     light, style = facts.relative_illumination, "o-" if facts.separated else "o--"
     panel.plot(facts.heights_mm, light, style, color=BLUE)
-    panel.set_ylim(0, 1.05 * max(1.0, float(light.max())))
-    panel.set_xlabel("height on the sensor, mm")
-    panel.set_ylabel("relative illumination")
+    panel.set(
+        ylim=(0, 1.05 * max(1.0, float(light.max()))),
+        xlabel="height on the sensor, mm",
+        ylabel="relative illumination",
+    )
     return figure
 
 

@@ -143,8 +143,7 @@ def draw_coverage(found: Geometry) -> Figure:
     )
     for view in found.corners:
         panel.plot(*view.T, ".", markersize=2.5)
-    panel.set_xlim(-0.5, width - 0.5)
-    panel.set_ylim(height - 0.5, -0.5)
+    panel.set(xlim=(-0.5, width - 0.5), ylim=(height - 0.5, -0.5))
     _circle(panel, found)
     panel.set_title(f"Corners; grey: within a board, {found.coverage.share:.0%} of the picture")
     return figure
@@ -163,8 +162,7 @@ def draw_radii(found: Geometry) -> Figure:
     full = [n for n in range(RINGS) if (ring == n).any()]
     middles = [(edges[n] + edges[n + 1]) / 2 for n in full]
     panel.plot(middles, [rms(rest[ring == n]) for n in full], color=_GUESSED, label="rms of a ring")
-    panel.set_xlabel("distance from the optical centre, px")
-    panel.set_ylabel("held-out error, px")
+    panel.set(xlabel="distance from the optical centre, px", ylabel="held-out error, px")
     panel.set_ylim(bottom=0)
     panel.legend()
     return figure
@@ -188,8 +186,10 @@ def draw_distortion(found: Geometry) -> Figure:
     lower.plot(placed, fitted - placed, color=_FITTED)
     lower.set_ylabel("polynomial off, px")
     low, high = lower.get_ylim()  # that make nothing of what is nothing
-    lower.set_ylim(min(low, -_SMALL_PX), max(high, _SMALL_PX))
-    lower.set_xlabel("distance from the optical centre on the picture, px")
+    lower.set(
+        ylim=(min(low, -_SMALL_PX), max(high, _SMALL_PX)),
+        xlabel="distance from the optical centre on the picture, px",
+    )
     covered_px, corner_px = profile.covered_px, found.coverage.corner_px
     for panel in (upper, lower):
         panel.axvspan(covered_px, corner_px, color=_GUESSED, alpha=0.12, linewidth=0)
@@ -202,11 +202,13 @@ def _picture_panel(found: Geometry) -> tuple[Figure, Panel]:
     width, height = found.size
     figure = new_figure(WIDTH_IN, WIDTH_IN * min(1.5, height / width) + 0.6)
     panel = figure.add_subplot()
-    panel.set_xlim(-0.5, width - 0.5)
-    panel.set_ylim(height - 0.5, -0.5)
-    panel.set_aspect("equal")
-    panel.set_xlabel("x, px")
-    panel.set_ylabel("y, px")
+    panel.set(
+        xlim=(-0.5, width - 0.5),
+        ylim=(height - 0.5, -0.5),
+        aspect="equal",
+        xlabel="x, px",
+        ylabel="y, px",
+    )
     return figure, panel
 
 

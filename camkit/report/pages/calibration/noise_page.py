@@ -62,8 +62,7 @@ def draw_transfer(facts: IsoFacts) -> Figure:
     curve.set_ylabel("variance, DN²")
     curve.legend()
     rest.axhline(0, color="black", linewidth=0.6)
-    rest.set_ylabel("off the line, %")
-    rest.set_xlabel("signal, DN above the dark")
+    rest.set(ylabel="off the line, %", xlabel="signal, DN above the dark")
     return figure
 
 

@@ -56,10 +56,12 @@ def draw_shifts(found: Pairs) -> Figure:
     factor = LONGEST * found.size[0] / max(float(np.linalg.norm(shifts, axis=1).max()), 1e-9)
     arrows: Any = {"angles": "xy", "scale_units": "xy", "scale": 1, "color": BLUE, "width": 0.002}
     panel.quiver(*at[::every].T, *(factor * shifts[::every]).T, **arrows)
-    panel.set_xlim(0, found.size[0])
-    panel.set_ylim(found.size[1], 0)
-    panel.set_aspect("equal")
-    panel.set_title(f"{factor:.0f} times enlarged")
+    panel.set(
+        xlim=(0, found.size[0]),
+        ylim=(found.size[1], 0),
+        aspect="equal",
+        title=f"{factor:.0f} times enlarged",
+    )
     return figure
 
 

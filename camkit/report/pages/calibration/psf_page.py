@@ -54,8 +54,7 @@ def draw_kernels(found: MeasuredPsf) -> Figure:
     look = {"cmap": "magma", "vmin": -_DECADES, "vmax": 0, "extent": (-half, half, half, -half)}
     for panel, colour, kernel in zip(panels, found.colours, found.psf.kernels[0, 0], strict=True):
         image = panel.imshow(np.log10(np.maximum(kernel / kernel.max(), 10.0**-_DECADES)), **look)
-        panel.set_title(colour.colour)
-        panel.set_xlabel("px")
+        panel.set(title=colour.colour, xlabel="px")
     figure.colorbar(image, ax=list(panels), fraction=0.02)
     return figure
 
@@ -69,9 +68,7 @@ def draw_shares(found: MeasuredPsf) -> Figure:
         inside, name = light_within(kernel), colour.colour
         panel.semilogx(np.arange(inside.size) + 0.5, inside, color=_COLORS[name], label=name)
     panel.axvline(PEAK_PX, color="black", linewidth=0.6, linestyle=":")
-    panel.set_ylim(0, 1.02)
-    panel.set_xlabel("radius, px")
-    panel.set_ylabel("share of the light")
+    panel.set(ylim=(0, 1.02), xlabel="radius, px", ylabel="share of the light")
     panel.legend()
     return figure
 
@@ -93,8 +90,7 @@ def draw_reblurred(found: MeasuredPsf) -> Figure:
     above.set_ylabel("light")
     above.legend()
     below.axhline(0, color="black", linewidth=0.6)
-    below.set_ylabel("left, %")
-    below.set_xlabel("distance, px")
+    below.set(ylabel="left, %", xlabel="distance, px")
     return figure
 
 

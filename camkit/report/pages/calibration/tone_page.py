@@ -51,6 +51,5 @@ def draw_tone(facts: ToneFacts) -> Figure:
         below.vlines(facts.levels, 0, 100 * rest, color=BLUE)
         below.plot(facts.levels, 100 * rest, "o", color=BLUE)
         below.axhline(0, color="black", linewidth=0.6)
-    below.set_xlabel("level")
-    below.set_ylabel("off the curve, %")
+    below.set(xlabel="level", ylabel="off the curve, %")
     return figure

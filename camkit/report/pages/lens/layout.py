@@ -50,9 +50,7 @@ def draw_layout_on(panel: Panel, facts: LensFacts) -> None:
     tall = max(tall * 1.05, 0.3 * max(heights))
     panel.plot([vertices[-1]] * 2, [-tall, tall], color="#222222", linewidth=2, zorder=4)
     panel.axhline(0, color="#999999", linewidth=0.6, dash_capstyle="butt", linestyle="-.")
-    panel.set_aspect("equal")
-    panel.set_xlabel("mm from the first vertex")
-    panel.set_ylabel("mm")
+    panel.set(aspect="equal", xlabel="mm from the first vertex", ylabel="mm")
     for side in ("top", "right"):
         panel.spines[side].set_visible(False)
     panel.grid(visible=False)

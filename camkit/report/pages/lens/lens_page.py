@@ -8,13 +8,15 @@ from typing import Final
 
 from camkit.models_def.optics.analysis.seidel import SEIDEL_NAMES, Seidel
 from camkit.models_def.optics.prescription import grooves_of
-from camkit.report.pages.lens.colour_chart import draw_colour
-from camkit.report.pages.lens.field_chart import draw_field
 from camkit.report.pages.lens.layout import draw_layout
+from camkit.report.pages.lens.lens_charts import (
+    draw_colour,
+    draw_field,
+    draw_mtf,
+    draw_seidel,
+    draw_spots,
+)
 from camkit.report.pages.lens.lens_facts import LensFacts
-from camkit.report.pages.lens.mtf_chart import draw_mtf
-from camkit.report.pages.lens.seidel_chart import draw_seidel
-from camkit.report.pages.lens.spot_chart import draw_spots
 from camkit.report.pages.page import Page, Part, Picture, Section, Table, Words, write_page
 from camkit.units import UM_PER_MM, to_degrees
 

@@ -47,8 +47,7 @@ def draw_yield(result: ToleranceResult) -> Figure:
     middle.set_xlabel("RMS spot over all fields, at most, µm")
     _draw_classes(right, result)
     for panel in (left, middle):
-        panel.set_ylabel("share of copies, %")
-        panel.set_ylim(0, 102)
+        panel.set(ylabel="share of copies, %", ylim=(0, 102))
     return figure
 
 
@@ -60,8 +59,9 @@ def _draw_share(panel: Panel, result: ToleranceResult) -> None:
     panel.axvline(nominal, color="black", linewidth=0.8, linestyle="--", label="as designed")
     for percent in PERCENTS:
         panel.plot(result.percentile_db(percent), 100 - percent, "o", color=field_color(2))
-    panel.set_title(f"{result.lens.name}: {len(order)} copies")
-    panel.set_xlabel("PSNR after recovery, at least, dB")
+    panel.set(
+        title=f"{result.lens.name}: {len(order)} copies", xlabel="PSNR after recovery, at least, dB"
+    )
     panel.legend(loc="lower left")
 
 

@@ -79,12 +79,10 @@ def draw_cuts(facts: PlateFacts) -> Figure:
             light = farther(psf[number]).clamp_min(_FLOOR)
             beyond.semilogy(light.numpy(), style, color=color, label=name)
     for panel, angle in zip(cuts, angles, strict=True):
-        panel.set_title(f"along the line at {angle:.1f}°")
-        panel.set_ylim(_FLOOR, 1)
+        panel.set(title=f"along the line at {angle:.1f}°", ylim=(_FLOOR, 1))
     cuts[0].set_ylabel("share of the light a pixel of length")
     beyond.axvline(CORE_PX, color="black", linewidth=0.6)
-    beyond.set_title("light farther out")
-    beyond.set_ylim(1e-4, 1)
+    beyond.set(title="light farther out", ylim=(1e-4, 1))
     beyond.legend()
     for panel in (*cuts, beyond):
         panel.set_xlabel("pixels from the middle")

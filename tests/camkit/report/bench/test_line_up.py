@@ -11,8 +11,7 @@ from camkit.kinds import Kind
 from camkit.report.bench import common_rows, line_up
 from camkit.report.bench.common_rows import COMMON
 from camkit.report.bench.line_up import make_trials, makers_of, metrics_of
-from camkit.report.bench.part import BenchPart
-from camkit.report.bench.row_maker import RowMaker
+from camkit.report.bench.part import BenchPart, RowMaker
 from camkit.report.bench.trial import Axes, Entrant, Ground
 from camkit.runtime.kind import part_of
 from camkit.runtime.stages import wiener

@@ -15,7 +15,7 @@ from tools.tables.hdr.night_record import (
 from tools.tables.hdr.night_scenes import GROUPS, Scene, night_scenes
 from tools.tables.hdr.night_table import LDR, ROWS
 from tools.tables.journal import Entry
-from tools.tables.rows import Row, chosen_rows
+from tools.tables.table_rows import Row, chosen_rows
 
 LDR_DB = {"night:0": 30.0, "night:1": 40.0, "a.exr": 60.0, "b.exr": 80.0}
 GROUPED = {"night": ["night:0", "night:1"], "files_easy": ["a.exr", "b.exr"]}

@@ -18,7 +18,7 @@ from tools.tables.equal_training import Trainee
 from tools.tables.hdr import night_scenes, night_table, restoring
 from tools.tables.hdr.night_table import LACKS_VGG, ROWS
 from tools.tables.journal import file_digest
-from tools.tables.rows import chosen_rows, chosen_trainings
+from tools.tables.table_rows import chosen_rows, chosen_trainings
 
 __all__ = ["rig"]
 PHYSICS = "streak-4.physics"
@@ -140,7 +140,7 @@ def test_a_training_that_was_stopped_goes_on(
     """The checkpoint is there and the word that it is done is not."""
     command = ("train", "--out-dir", tmp_path / "runs", "--workers", 0, "--rows")
     rig(*command, "streak-3.network")
-    (tmp_path / "runs" / "streak-3.network-1" / equal_training.DONE).unlink()
+    (tmp_path / "runs" / "streak-3.network-1" / equal_training.DONE_FILE).unlink()
     seen = []
     monkeypatch.setattr(
         equal_training, "train", lambda path, options, **_: seen.append(options) or _stop(path)
@@ -182,7 +182,7 @@ def test_another_time_than_before_is_refused(rig: Rig, tmp_path: Path) -> None:
     folder = tmp_path / "streak-3.network-1"
     folder.mkdir()
     done = {"cpu_minutes": 2.0, "cpu_s": 120.0, "steps": 9, "valid_db": 40.0}
-    (folder / equal_training.DONE).write_text(json.dumps(done), encoding="utf-8")
+    (folder / equal_training.DONE_FILE).write_text(json.dumps(done), encoding="utf-8")
     words = ("train", "--out-dir", tmp_path, "--rows", "streak-3.network")
     assert "9 steps, 120 CPU-s, 40.00 dB" in rig(*words, "--cpu-minutes", 2)
     with pytest.raises(SystemExit, match=r"for 2 CPU-minutes, not 15"):

@@ -77,9 +77,9 @@ def test_light_outside_the_window_is_spread_evenly_and_told() -> None:
     rest, seen = at_rest(lens, problem, _pixels(65), 2000)
     kernels = rest()[0]
     assert torch.allclose(kernels.sum((-2, -1)), torch.ones(1, 2, 3), atol=1e-5)
-    assert float(seen.held[0, 0]) > 0.5
-    assert float(seen.held[0, 1]) < 0.2
-    floor = float((1 - seen.held[0, 1]) / 65**2)
+    assert float(seen.share_inside[0, 0]) > 0.5
+    assert float(seen.share_inside[0, 1]) < 0.2
+    floor = float((1 - seen.share_inside[0, 1]) / 65**2)
     assert float(kernels[0, 1].min()) >= 0.5 * floor
     assert seen.rms_mm[0, 1] > 0.5
 
@@ -89,7 +89,7 @@ def test_the_window_holds_the_light_or_ends_at_the_cap() -> None:
     problem = _problem(lens, 0.0, 0.3)
     side = window_of(problem, _pixels(65), 1001)
     assert side % 2 == 1
-    assert float(at_rest(lens, problem, _pixels(side), 2000)[1].held.min()) > 0.99
+    assert float(at_rest(lens, problem, _pixels(side), 2000)[1].share_inside.min()) > 0.99
     assert window_of(problem, _pixels(65), 35) == 35
 
 

@@ -14,7 +14,7 @@ from camkit.models_def.kinds.bayer import training
 from camkit.models_def.training.adversarial.content import Relu32
 from tests.bayer_recipe import bank, material, recipe  # noqa: F401
 from tests.normed_recipe import NORMED_RECIPE, recipe_path  # noqa: F401
-from tools.tables.losses.domain import Domain, as_filtered, domain, known
+from tools.tables.losses.domain import Domain, as_filtered, domain, judged_target
 from tools.tables.losses.loss_table import table_of_distances
 
 Maker = Callable[..., Domain]
@@ -62,8 +62,8 @@ def test_what_was_asked_as_the_bank_has_it_is_not_judged() -> None:
     lost = torch.zeros(1, 1, 4, 4, dtype=torch.bool)
     lost[..., 1, 2] = True
     asked = torch.where(lost, planes[:, 3:], target)
-    assert torch.equal(known(asked, planes) == -1, lost.expand_as(target))
-    assert torch.equal(known(target, planes), target)
+    assert torch.equal(judged_target(asked, planes) == -1, lost.expand_as(target))
+    assert torch.equal(judged_target(target, planes), target)
 
 
 def test_a_method_stands_in_place_of_the_bank_on_the_same_captures(

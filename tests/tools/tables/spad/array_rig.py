@@ -17,8 +17,8 @@ from camkit.scenes import procedural_scene
 from tests.spad_bundle import leaning_kernel
 from tests.spad_checkpoint import write_untrained
 from tools.tables import equal_training
-from tools.tables.rows import chosen_trainings
 from tools.tables.spad import array_table, array_training
+from tools.tables.table_rows import chosen_trainings
 
 RECIPE = """
 name = "spad-sr"
@@ -95,7 +95,7 @@ def write_run(runs: Path, name: str) -> None:
     folder = runs / name
     folder.mkdir(parents=True)
     (folder / equal_training.RECIPE).write_text(text, encoding="utf-8")
-    (folder / equal_training.DONE).write_text('{"cpu_minutes": 15}', encoding="utf-8")
+    (folder / equal_training.DONE_FILE).write_text('{"cpu_minutes": 15}', encoding="utf-8")
     write_untrained(
         equal_training.checkpoint_of(runs, run),
         text,

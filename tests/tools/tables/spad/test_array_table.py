@@ -18,9 +18,9 @@ from camkit.runtime.kinds.spad.finer.covariance import PictureCovariance
 from camkit.runtime.kinds.spad.finer.linear import Grid, linear_estimate
 from tests.tools.tables.spad.array_rig import SIGMA, Rig, rig, write_run, write_sets
 from tools.tables import runner
-from tools.tables.rows import chosen_rows
 from tools.tables.spad.array_record import THESIS
 from tools.tables.spad.array_table import ROWS, linear_restorer, network_mac_per_px
+from tools.tables.table_rows import chosen_rows
 
 __all__ = ["rig"]
 LEVELS = ["noise-free", "10000", "1000", "100"]

@@ -15,7 +15,7 @@ from camkit.runtime.kinds.spad.finer.sampling import box_kernel, gaussian_kernel
 from camkit.runtime.network.graph import inspect_graph
 from tests.tools.tables.spad.array_rig import SIGMA, Rig, rig, write_run
 from tools.tables.spad import baselines
-from tools.tables.spad.baselines import SHOWN, main, round_mantissa
+from tools.tables.spad.baselines import ROWS_OF_ROLES, main, round_mantissa
 from tools.tables.spad.edge_export import PlainBicubic, with_plain_borders
 
 __all__ = ["rig"]
@@ -34,7 +34,7 @@ def test_a_bundle_of_baselines_says_how_its_pixels_see(
     roles = ("full_fill", "gaussian")
     runs, out = tmp_path / "runs", tmp_path / f"{baselines.BASELINES}.camkit"
     for role in roles:
-        write_run(runs, f"{SHOWN[role]}-1")
+        write_run(runs, f"{ROWS_OF_ROLES[role]}-1")
     words = ["--runs", str(runs), "-o", str(out), "--roles", *roles]
     assert main(words) == 0
     said = capsys.readouterr().out

@@ -1,4 +1,4 @@
-"""What a table compares: rows as data, each trained for some seeds."""
+"""Rows of a table as data, each trained for some seeds."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -79,9 +79,9 @@ def chosen_rows(rows: Sequence[Row], keys: Iterable[str] | None) -> tuple[Row, .
     """
     if keys is None:
         return tuple(rows)
-    wanted = list(keys)
-    _check_known(wanted, rows, [row.key for row in rows])
-    return tuple(row for row in rows if row.key in wanted)
+    names = list(keys)
+    _check_known(names, rows, [row.key for row in rows])
+    return tuple(row for row in rows if row.key in names)
 
 
 def chosen_trainings(rows: Sequence[Row], names: Iterable[str] | None) -> list[Run]:
@@ -92,16 +92,16 @@ def chosen_trainings(rows: Sequence[Row], names: Iterable[str] | None) -> list[R
     Raises:
         ContractError: If there is none of that name.
     """
-    own = [run for row in rows if row.recipe and not row.trained_as for run in row.runs]
-    every = sorted(own, key=lambda run: run.seed)
+    trainings = [run for row in rows if row.recipe and not row.trained_as for run in row.runs]
+    every = sorted(trainings, key=lambda run: run.seed)
     if names is None:
         return every
-    wanted = list(names)
-    _check_known(wanted, rows, [*(row.key for row in rows), *(run.training for run in every)])
-    return [run for run in every if {run.row.key, run.training} & set(wanted)]
+    listed = set(names)
+    _check_known(listed, rows, [*(row.key for row in rows), *(run.training for run in every)])
+    return [run for run in every if {run.row.key, run.training} & listed]
 
 
-def _check_known(names: Iterable[str], rows: Sequence[Row], known: Sequence[str]) -> None:
-    if unknown := [name for name in names if name not in known]:
+def _check_known(names: Iterable[str], rows: Sequence[Row], valid: Sequence[str]) -> None:
+    if unknown := [name for name in names if name not in valid]:
         listed = ", ".join(row.key for row in rows)
         raise ContractError(f"there is no row {unknown[0]!r}; there are {listed}")

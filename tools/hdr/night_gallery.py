@@ -1,6 +1,6 @@
 """A night photographed through a plate, its lights read back: a sheet of exposures and the PSF.
 
-    python -m tools.hdr.gallery --out-dir out [--bundle streak-hdr]
+    python -m tools.hdr.night_gallery --out-dir out [--bundle streak-hdr]
 
 Leaves night.dng and night.exr with its sidecar; night.png with captions, columns as developed, by
 physics, with the network and the truth, rows of the frame at 0 and -4 EV and of its brightest light

@@ -7,12 +7,12 @@ import pytest
 import torch
 
 from camkit.errors import ContractError
-from camkit.export.frozen_norms import FreezeOptions, freeze_checkpoint
 from camkit.export.network_facts import DEEP_ARENA, draft_network
 from camkit.models_def.kinds.bayer.samples import LAYOUT
 from camkit.models_def.networks.instance_norm import freeze_norms
 from camkit.models_def.networks.normed_unet import NormedConfig, NormedUnet
 from camkit.models_def.training.checkpoint import load_network, read_checkpoint
+from camkit.models_def.training.frozen_norms import FreezeOptions, freeze_checkpoint
 from camkit.models_def.training.trainer import TrainOptions, train
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.graph import inspect_graph

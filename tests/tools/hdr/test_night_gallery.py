@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 
 from tests.hdr_bundle import write_hdr_bundle
-from tools.hdr import gallery
+from tools.hdr import night_gallery
 from tools.pictures.captions import GAP_PX, text_px
 
 
 def test_a_night_is_photographed_read_back_and_drawn(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(gallery, "SIDES_PX", (96, 128))
+    monkeypatch.setattr(night_gallery, "SIDES_PX", (96, 128))
     bundle = write_hdr_bundle(tmp_path).path
-    gallery.show_gallery(str(bundle), tmp_path / "out")
+    night_gallery.show_gallery(str(bundle), tmp_path / "out")
     sheet = cv2.imread(str(tmp_path / "out" / "night.png"))
     assert sheet is not None
     line = 2 * text_px(128)
-    rows = len(gallery.STOPS) + len(gallery.STOPS_OF_DETAIL)
+    rows = len(night_gallery.STOPS) + len(night_gallery.STOPS_OF_DETAIL)
     assert sheet.shape == (3 * line + rows * (2 * line + 96), 4 * (128 + GAP_PX), 3)
     for column in range(4):
         left = column * (128 + GAP_PX)
@@ -40,7 +40,7 @@ def test_a_night_is_photographed_read_back_and_drawn(
 def test_the_brightest_light_is_shown_enlarged_also_at_the_border() -> None:
     truth = np.zeros((3, 32, 48), np.float32)
     truth[:, 31, 0] = 256
-    rows = gallery.night_rows({"network: 45.00 dB": truth / 2, "truth": truth})
+    rows = night_gallery.night_rows({"network: 45.00 dB": truth / 2, "truth": truth})
     frame, *_, darkest = rows.values()
     assert list(frame) == ["network: 45.00 dB", "truth"]
     assert list(darkest) == ["network", "truth"]
@@ -57,9 +57,9 @@ def test_built_in_cameras_bring_the_lamps_of_a_night_back(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr(gallery, "SIDES_PX", (320, 480))
-    monkeypatch.setattr(gallery, "find_spec", lambda _: None)  # the plate is drawn elsewhere
-    gallery.show_gallery(name, tmp_path)
+    monkeypatch.setattr(night_gallery, "SIDES_PX", (320, 480))
+    monkeypatch.setattr(night_gallery, "find_spec", lambda _: None)  # the plate is drawn elsewhere
+    night_gallery.show_gallery(name, tmp_path)
     found = re.findall(r"(\d+\.\d+) dB", capsys.readouterr().out)
     developed, physics, network = (float(value) for value in found)
     assert physics > developed + 3
