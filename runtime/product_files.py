@@ -1,87 +1,98 @@
-"""One capture made into products: every file and the sidecar appear together, or none does."""
+"""Captures that become arrays, tables or films: files that are written once all of it is made."""
 
+import time
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from camkit.caller import option_text
+from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.runtime.cancel import Cancel
-from camkit.runtime.development import FileResult, WriteOptions, bundle_name, identity_of
-from camkit.runtime.machine.memory import peak_rss_mb
-from camkit.runtime.network.tiling import Progress
-from camkit.runtime.output.part_file import atomic_outputs
-from camkit.runtime.output.sidecar import sidecar_path, sidecar_text
-from camkit.runtime.pipeline import Pipeline
-from camkit.runtime.raw import file_sha256
+from camkit.runtime.capture_result import Result
+from camkit.runtime.job.reconstruction import Reconstruction
+from camkit.runtime.kind_parts.outputs import FileSet, Outputs
+from camkit.runtime.options import Options
+from camkit.runtime.write_options import WriteOptions
 
 
-def make_file(
-    source: Path,
-    target: Path,
-    pipeline: Pipeline,
-    write: WriteOptions,
+def _stem(path: Path) -> str:
+    return path.stem
+
+
+def _no_identity(*_: object) -> Mapping[str, Any]:
+    return {}
+
+
+def product_outputs(
+    make: Callable[[Reconstruction], Result],
     *,
-    progress: Progress | None = None,
-    cancel: Cancel | None = None,
-) -> FileResult:
-    """Process one capture to its products and a sidecar; all appear or nothing changes.
+    suffix: str,
+    beside: Callable[[Options], tuple[str, ...]],
+    formats: Mapping[str, str],
+    identity: Callable[[Options, Path], Mapping[str, Any]] = _no_identity,
+    stem: Callable[[Path], str] = _stem,
+) -> Outputs:
+    """Return how captures become products that say who writes each of their files.
 
     Args:
-        source: The capture.
-        target: The main file; the others have its name and suffixes of their own.
-        pipeline: Of a kind that has a maker.
-        write: Where and how to write.
-        progress: Called with (work done, work in all).
-        cancel: Asked between pieces of work; true raises `Cancelled`.
-
-    Raises:
-        DecodeError: If the capture cannot be read.
-        ContractError: If capture and options do not fit, or a file is in the way.
-        Cancelled: If `cancel` said so.
+        make: A capture on its way -> its products.
+        suffix: Of the main file, with its dot.
+        beside: Options -> suffixes of the files that may appear beside it.
+        formats: What may be asked for as a picture besides, each with its suffix.
+        identity: See `Outputs`.
+        stem: A capture's file -> the name of its products, without suffix.
     """
-    made = pipeline.make(source, progress=progress, cancel=cancel)
-    files = made.files(write.format)
-    paths = [target.with_suffix(suffix) for suffix in files]
-    _check_free(source, paths, write)
-    with atomic_outputs(sidecar_path(target), *paths) as (proof, *parts):
-        for part, write_to in zip(parts, files.values(), strict=True):
+
+    def names(source: Path, options: Options, write: WriteOptions) -> tuple[str, ...]:
+        if write.preview:
+            raise ContractError(
+                f"{option_text('preview')} is for photographs; {source.name} becomes products, "
+                f"which have pictures as {option_text('format')}: leave it out"
+            )
+        if write.format is not None and write.format not in formats:
+            raise ContractError(
+                f"{option_text('format')} must be one of {', '.join(sorted(formats))} for "
+                f"such captures; got {write.format}"
+            )
+        picture = () if write.format is None else (formats[write.format],)
+        return tuple(stem(source) + end for end in (suffix, *beside(options), *picture))
+
+    def finish(
+        work: Reconstruction, products: Sequence[str] | None, out: FloatArray | None
+    ) -> Result:
+        if out is not None:
+            raise ContractError("out is filled with a picture; these captures become products")
+        return _chosen(make(work), products)
+
+    return Outputs(
+        names=names,
+        files=lambda work, write: _files(make(work), write),
+        finish=finish,
+        format=lambda write: write.format,
+        identity=identity,
+    )
+
+
+def _files(made: Result, write: WriteOptions) -> FileSet:
+    writers = made.files(write.format)
+
+    def written(parts: Sequence[Path]) -> float:
+        began = time.perf_counter()
+        for part, write_to in zip(parts, writers.values(), strict=True):
             write_to(part)
-        main, *beside = (file_sha256(part) for part in parts)
-        result = FileResult(
-            input=source,
-            output=target,
-            status="ok",
-            bundle=bundle_name(pipeline),
-            size=pipeline.size,
-            seconds=made.seconds,
-            peak_rss_mb=peak_rss_mb(),
-            warnings=made.warnings,
-            beside=tuple(paths[1:]),
-        )
-        record = {
-            **result.to_json(),
-            **identity_of(source, file_sha256(source), pipeline, write, None),
-            "output_sha256": main,
-            "beside_sha256": dict(zip(list(files)[1:], beside, strict=True)),
-            "plan": dict(made.record),
-            "clipped_fraction": None,
-        }
-        proof.write_text(sidecar_text(record, made.sections), encoding="utf-8")
-    return result
+        return time.perf_counter() - began
+
+    return FileSet(suffixes=tuple(writers), write=written, result=lambda: made)
 
 
-def _check_free(source: Path, paths: list[Path], write: WriteOptions) -> None:
-    """Refuse to replace the capture itself, or what nobody said may be replaced.
+def _chosen(made: Result, products: Sequence[str] | None) -> Result:
+    """Refuse products that a capture does not give.
 
     Raises:
-        ContractError: Names the file.
+        ContractError: Names those there are.
     """
-    for path in paths:
-        if path.resolve() == source.resolve():
-            raise ContractError(
-                f"{source} would overwrite itself; choose another {option_text('out_dir')}"
-            )
-        if path.exists() and not (write.overwrite or write.resume):
-            raise ContractError(
-                f"{path} exists; add {option_text('overwrite')}, or another "
-                f"{option_text('out_dir')}"
-            )
+    if foreign := [name for name in products or () if name not in made.arrays]:
+        raise ContractError(
+            f"there is no product {foreign[0]!r}; there are {', '.join(made.arrays)}"
+        )
+    return made

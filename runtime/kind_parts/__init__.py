@@ -1,5 +1,5 @@
-"""Parts of a kind whose captures are no photographs, beside its maker.
+"""What a kind of camera brings to the ordinary commands, as data with defaults for photographs.
 
-proving    golden captures of its bundles, and what becomes of them again
-recording  scenes recorded by its cameras, and their files
+outputs  files that its captures become
+golden   golden captures of its bundles
 """

@@ -23,8 +23,8 @@ from camkit.runtime.kinds.spad.products.preview import (
     white_of_flight,
     write_preview,
 )
-from camkit.runtime.kinds.spad.products.strips import KEPT_BYTES, check_room, pieces
 from camkit.runtime.kinds.spad.products.video import write_video
+from camkit.runtime.kinds.spad.strips import KEPT_BYTES, check_room, pieces
 
 
 def test_an_archive_is_numpys_and_equal_arrays_give_equal_bytes(tmp_path: Path) -> None:
