@@ -1,7 +1,8 @@
 """Captures of single photons: pulses, banks of them, fits and their bounds; products.
 
 files          readers of captures
-captures       captures on their way: their times, pixels, plan
+captures       captures on their way to products
+pixels         what is known of pixels besides their counts
 timing         what is known of their times
 containers     what files hold, in bytes, before it is read
 pulse          the time of one photon, in closed form
@@ -29,12 +30,12 @@ from typing import Final
 
 from camkit.bundle.stages import Correct, Lifetime, Sharpen
 from camkit.runtime.kind import RuntimePart
-from camkit.runtime.kinds.spad.captures.decisions import know_photons
 from camkit.runtime.kinds.spad.captures.photon_capture import photons_of_array, read_photons
 from camkit.runtime.kinds.spad.files.described import describe
 from camkit.runtime.kinds.spad.files.named import named_bundle
 from camkit.runtime.kinds.spad.golden_captures import GOLDEN
 from camkit.runtime.kinds.spad.products import OUTPUTS, PLANES
+from camkit.runtime.kinds.spad.products.decisions import know_photons
 from camkit.runtime.kinds.spad.twin.recording import PhotonOptions
 from camkit.runtime.kinds.spad.twin.simulate import record
 from camkit.runtime.kinds.spad.twin.write import SUFFIXES, files_of, write_recorded

@@ -2,9 +2,7 @@
 
 settings        what the caller chose, with the timing file
 photon_capture  an open capture with all that is known of its times
-decisions       what would be done, and why
 corrected       rows of a capture, pile-up undone
-pixels          what is known of pixels besides their counts
 strips          in how many rows at once a capture is worked through
 frames          photons by pixel and time, without dark counts and hot pixels
 known_pulse     the pulse of a capture

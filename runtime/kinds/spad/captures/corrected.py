@@ -6,8 +6,8 @@ import numpy as np
 
 from camkit.runtime.cancel import check_wish
 from camkit.runtime.kinds.spad.captures.photon_capture import PhotonCapture
-from camkit.runtime.kinds.spad.captures.pixels import Pixels, by_pixel
 from camkit.runtime.kinds.spad.pile_up import without_pile_up
+from camkit.runtime.kinds.spad.pixels import Pixels, by_pixel
 from camkit.runtime.kinds.spad.time_axis import Orientation
 from camkit.runtime.rows import Rows, RowSource
 

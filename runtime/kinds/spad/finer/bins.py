@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.runtime.cancel import current_wish
-from camkit.runtime.kinds.spad.captures.pixels import Pixels
 from camkit.runtime.kinds.spad.finer.camera import FineCamera, white_of
 from camkit.runtime.kinds.spad.hot_pixels import MOST_DEAD, painted_over
+from camkit.runtime.kinds.spad.pixels import Pixels
 from camkit.runtime.kinds.spad.sharpen import Sharpened, Sharpener
 
 SHARPER: Final = 20.0

@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
 
 from camkit.contracts import FloatArray
-from camkit.runtime.kinds.spad.captures.pixels import Pixels
 from camkit.runtime.kinds.spad.evidence import threshold_for
 from camkit.runtime.kinds.spad.finer.bins import SHARPER, FineBins, finer_bins
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from camkit.runtime.kinds.spad.finer.linear import REACH
 from camkit.runtime.kinds.spad.finer.sigma import OF_LINEAR, OF_NETWORK, SigmaShares, slopes
 from camkit.runtime.kinds.spad.fit import evidence_at
+from camkit.runtime.kinds.spad.pixels import Pixels
 from camkit.runtime.kinds.spad.pulse import Pulse
 from camkit.runtime.kinds.spad.sharpen import Sharpened, Sharpener, Way, times_photons
 from camkit.runtime.kinds.spad.time_axis import TimeAxis

@@ -3,6 +3,7 @@
 depth      depth, time of flight, amplitude and what goes with them
 frames     pictures, films and light in flight
 lifetime   how long fluorescence takes to fade
+decisions  what would be done, and why
 record     what a sidecar and a plan say of how a capture is worked through
 archive    NAME.npz
 points     NAME.ply

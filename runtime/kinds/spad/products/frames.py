@@ -12,7 +12,7 @@ from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.job.stream import Stream
 from camkit.runtime.kinds.spad.captures.frames import frames_of
 from camkit.runtime.kinds.spad.captures.photon_capture import PhotonCapture
-from camkit.runtime.kinds.spad.captures.pixels import Pixels
+from camkit.runtime.kinds.spad.pixels import Pixels
 from camkit.runtime.kinds.spad.products.archive import write_archive
 from camkit.runtime.kinds.spad.products.picture import write_exr, write_tiff
 from camkit.runtime.kinds.spad.products.preview import (

@@ -16,11 +16,11 @@ from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
 from camkit.runtime.kinds.spad.captures.known_pulse import pulse_of
 from camkit.runtime.kinds.spad.captures.photon_capture import PhotonCapture, photons_of
-from camkit.runtime.kinds.spad.captures.pixels import Pixels, by_pixel
 from camkit.runtime.kinds.spad.captures.strips import pieces
 from camkit.runtime.kinds.spad.lifetime.decay import Decay
 from camkit.runtime.kinds.spad.lifetime.fitter import LifetimeFitter, Lifetimes
 from camkit.runtime.kinds.spad.lifetime.guess import guess_width
+from camkit.runtime.kinds.spad.pixels import Pixels, by_pixel
 from camkit.runtime.kinds.spad.pulse import Pulse
 from camkit.runtime.kinds.spad.time_axis import LEAST_BINS, TimeAxis
 from camkit.runtime.rows import Rows

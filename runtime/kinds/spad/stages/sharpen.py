@@ -11,11 +11,11 @@ from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
 from camkit.runtime.kinds.spad.captures.known_pulse import growth_of, pulse_of
 from camkit.runtime.kinds.spad.captures.photon_capture import photons_of
-from camkit.runtime.kinds.spad.captures.pixels import Pixels, by_pixel
 from camkit.runtime.kinds.spad.captures.strips import pieces
 from camkit.runtime.kinds.spad.finer.bins import FineBins
 from camkit.runtime.kinds.spad.finer.depth import fine_sharpener, fitted_bins
 from camkit.runtime.kinds.spad.hot_pixels import check_map
+from camkit.runtime.kinds.spad.pixels import Pixels, by_pixel
 from camkit.runtime.kinds.spad.pulse import Pulse
 from camkit.runtime.kinds.spad.sharpen import METHODS as FITS
 from camkit.runtime.kinds.spad.sharpen import Sharpened, Sharpener, stacked
