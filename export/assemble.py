@@ -247,14 +247,14 @@ def _models(networks: Networks) -> dict[str, bytes]:
 
 def _windows(bundle: Bundle, cases: Cases) -> dict[tuple[str, str], list[FloatArray]]:
     """Return the inputs of every network: for a larger probe first, then for the golden cases."""
-    captures, proving = list(cases.values()), part_of(bundle.manifest).proving
+    captures, golden = list(cases.values()), part_of(bundle.manifest).golden
     windows: dict[tuple[str, str], list[FloatArray]] = {}
-    if proving is None:
+    if golden is None:
         case, capture, reference = photograph(PROBE, PROBE_RECIPE, bundle)
         captures.insert(0, (case, GoldenArrays(capture=capture, reference=reference)))
     else:
         for role, sizes in bundle.manifest.networks.items():
-            windows |= {(role, size): [proving.probe(bundle, role)[None]] for size in sizes}
+            windows |= {(role, size): [golden.probe(bundle, role)[None]] for size in sizes}
     for size in bundle.manifest.sizes:
         for one, arrays in captures:
             work = case_work(bundle, one, arrays, size)

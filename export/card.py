@@ -9,7 +9,7 @@ import numpy as np
 from camkit.bundle.golden import IMAGE, GoldenArrays
 from camkit.bundle.manifest import Manifest
 from camkit.bundle.reader import Bundle
-from camkit.bundle.sensor import BayerSensor, Sensor, SpadSensor
+from camkit.bundle.sensor import Sensor
 from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray, depth_name
 from camkit.export.energy import energy_diameter_px, modulation
@@ -42,7 +42,7 @@ def card_text(
         _title(manifest),
         "",
         f"Sensor {sensor.width_px}x{sensor.height_px} of {sensor.pixel_pitch_um} um, "
-        f"{_seen_by(sensor)}. "
+        f"{sensor.text}. "
         f"PSF frozen at {psf.field_heights_mm.size} {_PLACES[psf.symmetry]} and "
         f"{psf.wavelengths_um.size} wavelengths, {psf.kernels.shape[-1]} px a side, "
         f"for objects at {depths}.",
@@ -120,16 +120,9 @@ def _title(manifest: Manifest) -> str:
 
 
 def _response(sensor: Sensor) -> list[str]:
-    if isinstance(sensor, SpadSensor) or sensor.channel_response is None:
+    if sensor.channel_response is None:
         return []
     return [f"Response of the colours: {sensor.channel_response.source}.", ""]
-
-
-def _seen_by(sensor: Sensor) -> str:
-    if isinstance(sensor, SpadSensor):
-        return "counting photons"
-    seen = sensor.cfa if isinstance(sensor, BayerSensor) else ", ".join(sensor.channels)
-    return f"{seen}, full well {sensor.full_well_e:g} e-"
 
 
 def _networks(bundle: Bundle) -> list[str]:

@@ -97,9 +97,9 @@ def photograph(
 @working("photographing golden cases")
 def photograph_all(bundle: Bundle) -> Cases:
     """Photograph all golden cases, their outputs still to be added."""
-    proving = part_of(bundle.manifest).proving
-    if proving is not None:
-        return dict(proving.cases(bundle))
+    golden = part_of(bundle.manifest).golden
+    if golden is not None:
+        return dict(golden.cases(bundle))
     cases: Cases = {}
     for name, recipe in GOLDEN_RECIPES.items():
         case, capture, reference = photograph(name, recipe, bundle)
@@ -111,23 +111,20 @@ def photograph_all(bundle: Bundle) -> Cases:
 def add_outputs(bundle: Bundle, cases: Cases) -> dict[str, GoldenArrays]:
     """Return the cases with the outputs of the pipeline, for every product and size."""
     return {
-        name: replace(
-            arrays,
-            outputs={
-                product: {
-                    size or NO_SIZE: case_work(bundle, case, arrays, size).fill(product=product)
-                    for size in bundle.manifest.sizes or (None,)
-                }
-                for product in _products(bundle, arrays)
-            },
-        )
+        name: replace(arrays, outputs=_outputs(bundle, case, arrays))
         for name, (case, arrays) in cases.items()
     }
 
 
-def _products(bundle: Bundle, arrays: GoldenArrays) -> tuple[str, ...]:
-    proving = part_of(bundle.manifest).proving
-    return tuple(bundle.manifest.products) if proving is None else proving.products(arrays)
+def _outputs(
+    bundle: Bundle, case: GoldenCase, arrays: GoldenArrays
+) -> dict[str, dict[str, FloatArray]]:
+    outputs: dict[str, dict[str, FloatArray]] = {}
+    for size in bundle.manifest.sizes or (None,):
+        work = case_work(bundle, case, arrays, size)
+        for product in work.products:
+            outputs.setdefault(product, {})[size or NO_SIZE] = work.fill(product=product)
+    return outputs
 
 
 def _side_px(extent: Extent, recipe: CaseRecipe) -> int:

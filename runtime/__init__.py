@@ -12,11 +12,12 @@
     content, plan/                     what a capture holds; no more work than it needs
     envelope                           is a capture inside the bundle's measured ranges?
     options, job/                      one capture: what is decided, then the stages joined
-    pipeline, development, batch       one capture in memory, one file, many files
+    pipeline, development, batch       one capture in memory, its files, many captures
+    capture_result, write_options      what became of a capture; how its files are written
     merging/                           brackets to one picture
     proof/                             a bundle proves itself
     twin/                              the digital twin: a scene becomes a RAW file
-    kind, kinds/, maker, kind_parts/   what a kind of camera brings: readers, products, proofs
+    kind, kinds/, kind_parts/          what a kind of camera brings: readers, stages, products
 
 Design time may call the runtime; the runtime never imports what lies above it.
 """

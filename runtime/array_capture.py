@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.bundle.manifest import Manifest
-from camkit.bundle.sensor import BayerSensor, SpadSensor
+from camkit.bundle.sensor import BayerSensor
 from camkit.contracts import shifted_cfa
-from camkit.errors import ContractError, UnsupportedError
+from camkit.errors import ContractError
 from camkit.runtime.capture import Capture
-from camkit.runtime.options import checked_origin
+from camkit.runtime.options import Options, checked_origin
 
 _LEAST_DN_WHITE: Final = 64
 _MOST_LIGHT: Final = 1.5
@@ -23,6 +23,7 @@ def capture_of_array(
     iso: float | None = None,
     white_balance: tuple[float, float, float] | None = None,
     origin_px: tuple[int, int] | None = None,
+    options: Options | None = None,
 ) -> Capture:
     """Return an array the meaning that a bundle's sensor gives it.
 
@@ -34,15 +35,15 @@ def capture_of_array(
         white_balance: Gains (R, G, B); None for what the bundle says.
         origin_px: (x, y) of the first pixel on the sensor, for a crop; None for a whole frame. An
             odd one begins the crop with another pixel of the CFA.
+        options: What the caller chose; photographs mean the same whatever it is.
 
     Raises:
         ContractError: If shape or type do not fit the sensor.
         UnsupportedError: If the sensor counts photons.
     """
+    del options
     _check_samples(image)
-    sensor = manifest.sensor
-    if isinstance(sensor, SpadSensor):
-        raise UnsupportedError("arrays of photon counts are read by the kind of their camera")
+    sensor = manifest.light_sensor
     channels = len(sensor.channels)
     is_mosaic = image.ndim == 2
     if not is_mosaic and (image.ndim != 3 or image.shape[0] != channels):

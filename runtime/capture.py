@@ -12,6 +12,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.bundle.plane import Plane
+from camkit.bundle.sensor import MOSAIC, RGB
 from camkit.caller import option_text
 from camkit.contracts import CFA_PATTERNS, CfaPattern, FloatArray, InputContract, NoiseModel
 from camkit.errors import ContractError
@@ -19,6 +21,7 @@ from camkit.field_types import check_fields
 from camkit.picture_window import PictureWindow
 from camkit.runtime.machine.memory import mapping_of
 from camkit.runtime.metadata import Metadata
+from camkit.runtime.rows import Rows, RowSource
 
 SATURATION_SHARE: Final = 0.99
 """A sample at this share of the white level is taken as clipped.
@@ -182,6 +185,11 @@ class Capture:
             raise ContractError(f"color matrix must be finite (3, 3); got {matrix.shape}")
 
     @property
+    def gives_own_rows(self) -> bool:
+        """Return whether what `rows` reads is the reader's own: it is a view of the samples."""
+        return False
+
+    @property
     def contract(self) -> InputContract:
         """Name the input of bundles that this capture is."""
         if self.cfa is not None:
@@ -197,6 +205,35 @@ class Capture:
     def plane_shape(self) -> tuple[int, int, int]:
         """Return (channel, h, w) of the samples; a mosaic is one channel."""
         return 1 if self.cfa is not None else self.channels, self.height, self.width
+
+    def plane(self, stated: Plane | None) -> Plane:
+        """Return what the samples are.
+
+        Args:
+            stated: The plane of a bundle's sensor; planes that come in place of a mosaic have their
+                own channels.
+        """
+        channels = MOSAIC if self.cfa is not None else RGB
+        if stated is None:
+            return Plane(type="uint16", channels=channels, domain="dn")
+        if self.cfa is None and stated.channels == MOSAIC:
+            return stated.model_copy(update={"channels": RGB})
+        return stated
+
+    def rows(self) -> RowSource:
+        """Return the samples as the file holds them."""
+        return _Samples(self)
+
+    def gives(self, _plane: Plane) -> bool:
+        """Return whether a plane can be a product of this capture: any can."""
+        return True
+
+    def shares_memory(self, array: NDArray[Any]) -> bool:
+        """Return whether an array may lie where the samples do."""
+        return bool(np.may_share_memory(array, self.samples))
+
+    def close(self) -> None:
+        """Release the file: it was read whole."""
 
     @property
     def height(self) -> int:
@@ -274,3 +311,20 @@ class Capture:
     def _check_rows(self, top: int, bottom: int) -> None:
         if not 0 <= top <= bottom <= self.height:
             raise ContractError(f"rows must lie in 0..{self.height}; got {top}..{bottom}")
+
+
+class _Samples:
+    """The samples of a capture as rows."""
+
+    def __init__(self, capture: Capture) -> None:
+        self._capture = capture
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Return (channel, h, w); a mosaic is one channel."""
+        return self._capture.plane_shape
+
+    def read(self, top: int, bottom: int) -> Rows:
+        """Return rows top..bottom."""
+        rows: Rows = self._capture.samples[..., top:bottom, :]
+        return rows if rows.ndim == 3 else rows[None]

@@ -1,98 +1,27 @@
-"""One capture file developed: decode, reconstruct, write, and say what was done in a sidecar."""
+"""One capture made into files: read, reconstructed, written, and a sidecar with what was done."""
 
 import json
 import math
 import time
+from contextlib import closing
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Final, Literal, Self
+from typing import Any, Literal, Self
 
 from camkit.caller import option_text
 from camkit.errors import ContractError, one_line
-from camkit.field_types import check_fields
 from camkit.runtime.cancel import Cancel
-from camkit.runtime.capture import Capture, MosaicOptions
+from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.machine.memory import peak_rss_mb
 from camkit.runtime.network.tiling import Progress
-from camkit.runtime.output.band_queue import BandQueue
 from camkit.runtime.output.part_file import atomic_outputs
-from camkit.runtime.output.picture_writer import DEFAULT_JPEG_QUALITY, PictureFormat
-from camkit.runtime.output.preview_file import PREVIEW_BYTES, PREVIEW_SUFFIX, preview_path
 from camkit.runtime.output.sidecar import read_sidecar, sidecar_path, sidecar_text
-from camkit.runtime.output.writer import SUFFIXES, FileFormat, held_bytes, open_writer
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.raw import file_sha256
+from camkit.runtime.write_options import WriteOptions
 
-OTHER_NAMES: Final[dict[str, FileFormat]] = {"jpg": "jpeg", "tif": "tiff"}
-LINEAR_FORMATS: Final = frozenset({"exr", "dng"})
 Status = Literal["ok", "failed", "skipped"]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WriteOptions:
-    """The place and the format of pictures.
-
-    Attributes:
-        out_dir: Folder of pictures and sidecars, made if needed.
-        keep_folders: Below it, the folders of the captures from what they have in common on.
-        format: exr, tiff (or tif), png, jpeg (or jpg) or dng; None for exr, and for no picture
-            beside products.
-        preview: A small tone-mapped JPEG beside the picture, see `tone_mapping`.
-        linear: TIFF and PNG without the sRGB curve.
-        jpeg_quality: Of JPEG, 1..100; None for 92.
-        strip_metadata: Leave out what the capture says of camera, lens, date, exposure and place.
-        resume: Skip what a sidecar proves done.
-        overwrite: Replace pictures that exist.
-        jobs: Captures at once; threads and memory are shared among them.
-    """
-
-    out_dir: Path = Path()
-    keep_folders: bool = False
-    format: FileFormat | None = None
-    preview: bool = False
-    linear: bool = False
-    jpeg_quality: int | None = None
-    strip_metadata: bool = False
-    resume: bool = False
-    overwrite: bool = False
-    jobs: int = 1
-
-    def __post_init__(self) -> None:
-        named = OTHER_NAMES.get(str(self.format), self.format)
-        object.__setattr__(self, "format", named)  # one name from here on
-        check_fields(self)
-        if self.linear and self.picture in LINEAR_FORMATS:
-            raise ContractError(
-                f"{self.picture} is always linear; leave {option_text('linear')} out"
-            )
-        if self.format == "jpeg" and self.linear:
-            raise ContractError(
-                f"8 bits hold no linear light; add {option_text('format')} png or tiff"
-            )
-        if self.jpeg_quality is not None and self.format != "jpeg":
-            raise ContractError(f"a quality is for JPEG; leave it out for {self.picture}")
-        if not 1 <= self.quality <= 100:
-            raise ContractError(f"JPEG quality must be 1..100; got {self.jpeg_quality}")
-        if self.jobs < 1:
-            raise ContractError(f"jobs must be >= 1; got {self.jobs}")
-        if self.resume and self.overwrite:
-            raise ContractError("resume keeps what is done, overwrite redoes it: choose one")
-
-    @property
-    def picture(self) -> FileFormat:
-        """Return the format of pictures."""
-        return "exr" if self.format is None else self.format
-
-    @property
-    def quality(self) -> int:
-        """Return the quality of a JPEG."""
-        return DEFAULT_JPEG_QUALITY if self.jpeg_quality is None else self.jpeg_quality
-
-    @property
-    def suffix(self) -> str:
-        """Return the suffix of the pictures, with its dot."""
-        return "." + SUFFIXES[self.picture].lstrip(".")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -165,24 +94,22 @@ class FileResult:
 
 def begin(
     pipeline: Pipeline,
-    capture: Capture,
+    capture: Any,
     write: WriteOptions,
     *,
     progress: Progress | None = None,
     cancel: Cancel | None = None,
 ) -> Reconstruction:
-    """Plan a picture, the memory that its file takes while it is written counted.
+    """Plan a capture, the memory that its files take while they are written counted.
 
     Raises:
         ContractError: If capture and bundle do not fit each other, or the cap does not do.
     """
-    pixels, turned = capture.height * capture.width, capture.orientation
-    reserved_bytes = held_bytes(write.picture, pixels=pixels, orientation=turned)
-    reserved_bytes += PREVIEW_BYTES * write.preview
+    reserved_bytes = pipeline.part.outputs.reserved_bytes(capture, write)
     return pipeline.start(capture, progress=progress, cancel=cancel, reserved_bytes=reserved_bytes)
 
 
-def develop_file(
+def make_file(
     source: Path,
     target: Path,
     pipeline: Pipeline,
@@ -192,55 +119,84 @@ def develop_file(
     progress: Progress | None = None,
     cancel: Cancel | None = None,
 ) -> FileResult:
-    """Process one capture to a picture and a sidecar; either both appear or neither changes.
+    """Process one capture to its files and a sidecar; either all appear or nothing changes.
+
+    Args:
+        source: The capture.
+        target: The main file; the others have its name and suffixes of their own.
+        pipeline: Of its camera.
+        write: Where and how to write.
+        mosaic: How to read a headerless mosaic.
+        progress: Called with (work done, work in all).
+        cancel: Asked ten times a second; true raises `Cancelled`.
 
     Raises:
         DecodeError: If the capture cannot be read.
-        ContractError: If capture and bundle do not fit each other.
+        ContractError: If capture, bundle and options do not fit each other, or a file is in the
+            way.
         Cancelled: If `cancel` said so.
     """
     began = time.perf_counter()
-    capture = pipeline.read(source, mosaic, cancel=cancel)
-    decode_s = time.perf_counter() - began
-    # What both held while the child decoded; later this process grows, but the child is gone.
-    decoded_mb = peak_rss_mb() + capture.decoder_peak_mb
-    work = begin(pipeline, capture, write, progress=progress, cancel=cancel)
-    # who asks for a time has had the machine timed; nobody else waits for it
-    estimate = None if pipeline.options.max_seconds is None else work.explain()
-    beside = (preview_path(target),) if write.preview else ()
-    with atomic_outputs(sidecar_path(target), target, *beside) as (proof, part, *parts):
-        write_s = _write_picture(part, work, write, *parts)
-        output_sha256 = file_sha256(part)
-        seconds = {"decode": decode_s, **work.seconds, "write": write_s}
-        result = FileResult(
-            input=source,
-            output=target,
-            status="ok",
-            bundle=bundle_name(pipeline),
-            size=work.size,
-            seconds=seconds,
-            peak_rss_mb=max(peak_rss_mb(), decoded_mb),
-            warnings=work.warnings,
-            beside=beside,
-        )
-        if estimate is not None:
-            total_s = sum(seconds.values())
-            work.record["estimate"] = estimate.compare(total_s, result.peak_rss_mb)
-        record = {
-            **result.to_json(),
-            **identity_of(source, capture.sha256, pipeline, write, mosaic),
-            "output_sha256": output_sha256,
-            "beside_sha256": dict(zip([PREVIEW_SUFFIX], map(file_sha256, parts), strict=False)),
-            "plan": work.record,
-            "clipped_fraction": work.clipped_fraction,
-            "orientation": capture.orientation,
-            "camera": capture.camera,
-            "iso": capture.iso,
-            "exposure_time_s": capture.exposure_time_s,
-            "metadata": {} if write.strip_metadata else work.origin.metadata.stated(),
-        }
-        proof.write_text(sidecar_text(record, work.sections), encoding="utf-8")
+    outputs = pipeline.part.outputs
+    with closing(pipeline.read(source, mosaic, cancel=cancel)) as capture:
+        decode_s = time.perf_counter() - began
+        # What both held while the child decoded; later this process grows, but the child is gone.
+        decoded_mb = peak_rss_mb() + capture.decoder_peak_mb
+        work = begin(pipeline, capture, write, progress=progress, cancel=cancel)
+        # who asks for a time has had the machine timed; nobody else waits for it
+        estimate = None if pipeline.options.max_seconds is None else work.explain()
+        files = outputs.files(work, write)
+        paths = [target.with_suffix(suffix) for suffix in files.suffixes]
+        _check_free(source, paths, write)
+        with atomic_outputs(sidecar_path(target), *paths) as (proof, *parts):
+            write_s = files.write(parts)
+            main, *beside = (file_sha256(part) for part in parts)
+            made = files.result()
+            seconds = {"decode": decode_s, **made.seconds, "write": write_s}
+            result = FileResult(
+                input=source,
+                output=target,
+                status="ok",
+                bundle=bundle_name(pipeline),
+                size=work.size,
+                seconds=seconds,
+                peak_rss_mb=max(peak_rss_mb(), decoded_mb),
+                warnings=made.warnings,
+                beside=tuple(paths[1:]),
+            )
+            if estimate is not None:
+                total_s = sum(seconds.values())
+                work.record["estimate"] = estimate.compare(total_s, result.peak_rss_mb)
+            input_sha256 = capture.sha256 or file_sha256(source)
+            record = {
+                **result.to_json(),
+                **identity_of(source, input_sha256, pipeline, write, mosaic),
+                "output_sha256": main,
+                "beside_sha256": dict(zip(files.suffixes[1:], beside, strict=True)),
+                "plan": dict(made.record),
+                "clipped_fraction": work.clipped_fraction,
+                **outputs.facts(work, write),
+            }
+            proof.write_text(sidecar_text(record, made.sections), encoding="utf-8")
     return result
+
+
+def _check_free(source: Path, paths: list[Path], write: WriteOptions) -> None:
+    """Refuse to replace the capture itself, or what nobody said may be replaced.
+
+    Raises:
+        ContractError: Names the file.
+    """
+    for path in paths:
+        if path.resolve() == source.resolve():
+            raise ContractError(
+                f"{source} would overwrite itself; choose another {option_text('out_dir')}"
+            )
+        if path.exists() and not (write.overwrite or write.resume):
+            raise ContractError(
+                f"{path} exists; add {option_text('overwrite')}, or another "
+                f"{option_text('out_dir')}"
+            )
 
 
 def proved_done(
@@ -285,15 +241,17 @@ def identity_of(
     if chosen["depth_m"] == math.inf:
         chosen["depth_m"] = "inf"  # JSON knows no infinity
     chosen["unit"] = None if pipeline.options.unit is None else asdict(pipeline.options.unit)
-    chosen["format"] = write.picture if pipeline.maker is None else write.format
+    outputs = pipeline.part.outputs
+    chosen["format"] = outputs.format(write)
     chosen["linear"] = write.linear
     chosen |= {"jpeg_quality": write.quality if write.format == "jpeg" else None}
     chosen |= {"strip_metadata": write.strip_metadata}
     chosen |= {"preview": True} if write.preview else {}
     chosen["mosaic"] = None if mosaic is None else asdict(mosaic)
-    chosen["of_kind"] = dict(pipeline.options.of_kind)
-    if pipeline.maker is not None:
-        chosen["of_kind"] |= pipeline.maker.identity(pipeline.options, source)
+    chosen["of_kind"] = {
+        **dict(pipeline.options.of_kind),
+        **outputs.identity(pipeline.options, source),
+    }
     identity = {
         "camkit": __version__,
         "input_sha256": input_sha256,
@@ -301,38 +259,6 @@ def identity_of(
         "options": chosen,
     }
     return dict(json.loads(json.dumps(identity)))
-
-
-def _write_picture(
-    path: Path, work: Reconstruction, write: WriteOptions, preview_file: Path | None = None
-) -> float:
-    """Stream the bands into the files; return the seconds for which the writer was waited for."""
-    _, height, width = work.shape
-    picture = PictureFormat(
-        width=width,
-        height=height,
-        color=work.color,
-        orientation=1 if write.format == "dng" else work.capture.orientation,
-        tone="linear" if write.linear else "srgb",
-        jpeg_quality=write.quality,
-        origin=work.origin.stripped() if write.strip_metadata else work.origin,
-    )
-    seconds, preview = 0.0, None
-    if preview_file is not None:
-        from camkit.runtime.output.tone_mapping import ToneMappedPreview
-
-        preview = ToneMappedPreview(height, width)
-    with open_writer(path, write.picture, picture) as writer, BandQueue(writer) as queue:
-        for band in work.bands():
-            began = time.perf_counter()
-            if preview is not None:
-                preview.add(band)
-            queue.write(band)
-            seconds += time.perf_counter() - began
-        began = time.perf_counter()
-    if preview is not None and preview_file is not None:
-        preview.write(preview_file, work.color, work.capture.orientation)
-    return seconds + time.perf_counter() - began
 
 
 def bundle_name(pipeline: Pipeline) -> str | None:

@@ -1,28 +1,38 @@
-"""The runtime part of a kind of camera: the reader of its captures, and its digital twin.
+"""The runtime part of a kind of camera: readers, usual stages, products, and the twin.
 
 A kind's part of the runtime (`camkit.runtime.kinds.NAME`, or the `runtime` of its own package)
 defines `PART`, a `RuntimePart`.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NoReturn, Protocol
+from typing import Any, Final, NoReturn, Protocol
 
 from numpy.typing import NDArray
 
 from camkit.bundle.manifest import Manifest
 from camkit.bundle.reader import Bundle
-from camkit.contracts import FloatArray
+from camkit.bundle.stages import StageEntry
 from camkit.errors import BundleError, ContractError, UnsupportedError
 from camkit.kinds import BAYER, Kind, all_kinds, find_kind, kind_of_file
 from camkit.runtime.array_capture import capture_of_array
-from camkit.runtime.capture import Capture, MosaicOptions
-from camkit.runtime.kind_parts.proving import Proving
-from camkit.runtime.kind_parts.recording import Recording
-from camkit.runtime.maker import Maker
+from camkit.runtime.capture import MosaicOptions
+from camkit.runtime.job.choices import OF_CAPTURE
+from camkit.runtime.job.job import Job
+from camkit.runtime.job.kind_capture import KindCapture
+from camkit.runtime.job.photograph import know_photograph
+from camkit.runtime.job.setup import DEVELOPED, DEVELOPMENT
+from camkit.runtime.kind_parts.golden import GoldenCaptures
+from camkit.runtime.kind_parts.outputs import Outputs
+from camkit.runtime.kind_parts.photograph_facts import describe_photograph
+from camkit.runtime.kind_parts.picture_files import PICTURES
 from camkit.runtime.options import Options
-from camkit.runtime.twin.simulate import Simulation, SimulationOptions, photograph
+from camkit.runtime.raw import named_bundle
+from camkit.runtime.twin.simulate import SimulationOptions, photograph
+
+OF_PHOTOGRAPHS: Final = OF_CAPTURE | {"mosaic"}
+"""What may be said of how a photograph was taken."""
 
 
 class FromArray(Protocol):
@@ -37,42 +47,62 @@ class FromArray(Protocol):
         iso: float | None = None,
         white_balance: tuple[float, float, float] | None = None,
         origin_px: tuple[int, int] | None = None,
-    ) -> Capture:
-        """Return the capture."""
+        options: Options | None = None,
+    ) -> Any:
+        """Return the capture, a `KindCapture`."""
         ...
 
 
-def _no_photograph(*_: object) -> NoReturn:
-    raise UnsupportedError(
-        "captures of this kind are no photographs; camkit.process and Pipeline.make make their "
-        "products"
-    )
+def _no_files(*_: object) -> NoReturn:
+    raise UnsupportedError("captures of this kind are not read from files, or written")
+
+
+def _itself(path: Path) -> tuple[Path, ...]:
+    return (path,)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RuntimePart:
-    """A kind of camera at use time: of photographs, or one that has a `maker` of its products.
+    """A kind of camera at use time; what a part leaves out is that of photographs.
 
     Attributes:
-        read: (file, how to read a headerless mosaic, manifest or None) -> capture.
-        write: (file, simulation, bundle): the capture as a file that `read` reads.
-        suffix: Of the files that `write` writes, with its dot.
+        read: (file, how to read a headerless mosaic, manifest or None, options) -> capture.
         from_array: An array as a capture.
-        simulate: (scene (3, h, w) linear Rec.709, bundle, options) -> what the camera records.
-        maker: What makes its products; None for photographs.
-        proving: How its bundles prove themselves, where it has a maker.
-        recording: How its captures are simulated, where it has a maker.
+        stages: What is done to a capture without a bundle.
+        products: What comes out of that: name -> plane.
+        know: Completes what is known of a capture before its stages are made ready, and plans.
+        outputs: What captures become, in memory and as files.
+        of_capture: What a caller may say of how a capture was taken: names of options, and of
+            parameters of `Pipeline.run`.
+        named: A capture's file -> the bundle that it names; None if it names none.
+        describe: (a capture's file, how to read a headerless mosaic) -> what it is, as plain JSON
+            values.
+        simulate: (scene, bundle, its `simulation`) -> what the camera records; a scene is (3, h, w)
+            linear Rec.709, or for some kinds the file of one.
+        simulation: Type of the options of `simulate`.
+        write: (file, what was recorded, bundle): writes a capture that `read` reads.
+        suffixes: Of the files that `write` writes, with their dots; the usual one first.
+        files: A capture's file -> all files that `write` writes for it, the capture first.
+        golden: How golden captures of bundles are taken; None where procedural scenes are
+            photographed.
         laws: Name of the module whose `LAWS` holds the laws of its pictures against a bundle.
     """
 
-    read: Callable[[Path, MosaicOptions | None, Manifest | None], Capture] = _no_photograph
-    write: Callable[[Path, Simulation, Bundle], None] = _no_photograph
-    suffix: str = ""
+    read: Callable[[Path, MosaicOptions | None, Manifest | None, Options], KindCapture] = _no_files
     from_array: FromArray = capture_of_array
-    simulate: Callable[[FloatArray, Bundle, SimulationOptions], Simulation] = photograph
-    maker: Maker | None = None
-    proving: Proving | None = None
-    recording: Recording | None = None
+    stages: Sequence[StageEntry] = DEVELOPMENT
+    products: Mapping[str, str] = field(default_factory=lambda: DEVELOPED)
+    know: Callable[[Job], Job] = know_photograph
+    outputs: Outputs = PICTURES
+    of_capture: frozenset[str] = OF_PHOTOGRAPHS
+    named: Callable[[Path], str | None] = named_bundle
+    describe: Callable[[Path, MosaicOptions | None], Mapping[str, Any]] = describe_photograph
+    simulate: Callable[[Any, Bundle, Any], Any] = photograph
+    simulation: type = SimulationOptions
+    write: Callable[[Path, Any, Bundle], None] = _no_files
+    suffixes: tuple[str, ...] = ()
+    files: Callable[[Path], tuple[Path, ...]] = _itself
+    golden: GoldenCaptures | None = None
     laws: str = "camkit.runtime.proof.laws.photographs"
 
 

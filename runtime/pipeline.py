@@ -1,8 +1,7 @@
 """The pipeline: a bundle and options made ready, then any number of captures.
 
-    load(bundle) -> Pipeline -> process(file) | process_array(array) -> linear Rec.709
+    load(bundle) -> Pipeline -> run(file or array) -> Result: products by name
                              -> start(capture) -> Reconstruction: bands for a writer
-                             -> make(file) -> Made: products of captures that are no photographs
 
 A `Pipeline` is immutable and may serve many threads at once; each capture gets its own
 `Reconstruction`.
@@ -11,7 +10,8 @@ A `Pipeline` is immutable and may serve many threads at once; each capture gets 
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from contextlib import AbstractContextManager, closing
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from types import NoneType
@@ -28,7 +28,8 @@ from camkit.errors import BundleError, ContractError, UnsupportedError
 from camkit.field_types import check_value
 from camkit.kinds import Kind, find_kind
 from camkit.runtime.cancel import Cancel, cancellable
-from camkit.runtime.capture import Capture, MosaicOptions
+from camkit.runtime.capture import MosaicOptions
+from camkit.runtime.capture_result import Result
 from camkit.runtime.face.keywords import LoadKeywords
 from camkit.runtime.files.in_memory import FilePath, Source, stored
 from camkit.runtime.job.choices import check_choices
@@ -36,7 +37,7 @@ from camkit.runtime.job.reconstruction import Reconstruction, check_out
 from camkit.runtime.job.setup import Setup
 from camkit.runtime.job.stream import Stream
 from camkit.runtime.kind import kind_without_bundle, part_of, runtime_part
-from camkit.runtime.maker import Made, Maker, Making
+from camkit.runtime.kind_parts.picture_files import result_of
 from camkit.runtime.network.engine import NetworkEngine, available_threads
 from camkit.runtime.network.tiling import Progress
 from camkit.runtime.options import (
@@ -49,44 +50,8 @@ from camkit.runtime.plan.planner import asked_work, default_size
 from camkit.runtime.plan.speed import Speed, measure_speed
 from camkit.runtime.stage_finder import check_stages
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Picture:
-    """The result of one capture.
-
-    Attributes:
-        image: (3, h, w) float32, linear, in the colour space asked for (Rec.709 by default), in
-            sensor orientation; h and w are those of the capture unless the camera makes it finer.
-        orientation: EXIF orientation (1..8) that a viewer should apply.
-        seconds: Seconds per stage.
-        warnings: What the user should know.
-        sections: What stages found of the capture, by the names of the sidecar: `hdr`, `glare`.
-    """
-
-    image: FloatArray
-    orientation: int
-    seconds: dict[str, float]
-    warnings: tuple[str, ...]
-    sections: Mapping[str, Any]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Summary:
-    """The result of a capture whose bands went to a callback.
-
-    Attributes:
-        shape: (3, h, w) of the picture.
-        orientation: EXIF orientation (1..8) that a viewer should apply.
-        seconds: Seconds per stage.
-        warnings: What the user should know.
-        sections: What stages found of the capture, by the names of the sidecar: `hdr`, `glare`.
-    """
-
-    shape: tuple[int, int, int]
-    orientation: int
-    seconds: dict[str, float]
-    warnings: tuple[str, ...]
-    sections: Mapping[str, Any]
+Picture = Summary = Made = Result
+"""Names by which results of `process`, `stream` and `make` have been known."""
 
 
 class Pipeline:
@@ -96,7 +61,7 @@ class Pipeline:
         bundle: The camera; None develops only.
         options: What the caller chose.
         kind: The kind of camera whose captures it takes.
-        maker: What makes products of them; None where they are photographs.
+        part: What is known of that kind.
         threads: Threads to compute with.
         size: Size of network that is ready; None where none will run.
     """
@@ -119,24 +84,25 @@ class Pipeline:
         self.options = options
         self.threads = available_threads(options.threads)
         if bundle is not None:
-            self._part = part_of(bundle.manifest)
-            if self._part.maker is None:
-                check_stages(bundle.manifest, options.max_mem_bytes or DEFAULT_MAX_MEM_BYTES)
+            self.part = part_of(bundle.manifest)
+            check_stages(bundle.manifest, options.max_mem_bytes or DEFAULT_MAX_MEM_BYTES)
             self.kind = find_kind(bundle.manifest.kind)
         else:
             self.kind = kind or kind_without_bundle(None, options)
-            self._part = runtime_part(self.kind.name)
-        self.maker: Maker | None = self._part.maker
-        if self.maker is None:
-            check_choices(bundle, options)
-        else:
-            self.maker.check(self.kind, bundle, options)
+            self.part = runtime_part(self.kind.name)
+        check_choices(
+            bundle,
+            options,
+            kind=self.kind,
+            usual=self.part.stages,
+            of_capture=self.part.of_capture,
+        )
         self._lock = threading.Lock()
         self._engines: dict[tuple[str, str], NetworkEngine] = {}
         self._speeds: dict[tuple[str, str], float] = {}
         self._speed: Speed | None = None
         self.size: str | None = None
-        if bundle is not None and self.maker is None and asked_work(bundle, options).networks:
+        if bundle is not None and asked_work(bundle, options).networks:
             self.size = default_size(bundle, options)
             for role in bundle.manifest.networks:
                 self.network(role, self.size)
@@ -186,8 +152,8 @@ class Pipeline:
         *,
         origin_px: tuple[int, int] | None = None,
         cancel: Cancel | None = None,
-    ) -> Capture:
-        """Read a capture of the bundle's kind of camera.
+    ) -> Any:
+        """Read a capture of the bundle's kind of camera; to be closed by the caller.
 
         Args:
             file: A path, bytes, or a file opened in binary mode.
@@ -205,7 +171,7 @@ class Pipeline:
         check_value("mosaic", mosaic, MosaicOptions | None)
         manifest = None if self.bundle is None else self.bundle.manifest
         with cancellable(cancel), stored(file) as path:
-            capture = self._part.read(path, mosaic, manifest)
+            capture: Any = self.part.read(path, mosaic, manifest, self.options)
         origin = self.options.origin_px if origin_px is None else checked_origin(origin_px)
         if origin is None:
             return capture
@@ -219,7 +185,7 @@ class Pipeline:
 
     def start(
         self,
-        capture: Capture,
+        capture: Any,
         *,
         progress: Progress | None = None,
         cancel: Cancel | None = None,
@@ -244,15 +210,55 @@ class Pipeline:
             networks=self.network,
             speed=self.speed,
             threads=self.threads,
+            usual_stages=tuple(self.part.stages),
+            usual_products=self.part.products,
         )
         return Reconstruction(
             setup,
             capture,
+            know=self.part.know,
             progress=progress,
             cancel=cancel,
             known=known,
             reserved_bytes=reserved_bytes,
         )
+
+    def run(
+        self,
+        file: Source | NDArray[Any],
+        *,
+        products: Sequence[str] | None = None,
+        mosaic: MosaicOptions | None = None,
+        origin_px: tuple[int, int] | None = None,
+        out: FloatArray | None = None,
+        progress: Progress | None = None,
+        cancel: Cancel | None = None,
+    ) -> Result:
+        """Make the products of one capture, of whatever kind.
+
+        Args:
+            file: A path, bytes, a file opened in binary mode; or an array as the bundle's sensor
+                gives it, see `process_array`.
+            products: Names of products; None for the image of a photograph, or what the capture of
+                another kind is for.
+            mosaic: How to read a headerless mosaic, or levels in place of a RAW file's.
+            origin_px: (x, y) of its first pixel on the sensor, for a crop that records none.
+            out: (3, h, w) float32 to fill with the first product; a new array when None.
+            progress: Called with (work done, work in all), over all stages.
+            cancel: Asked ten times a second; true raises `Cancelled`.
+
+        Raises:
+            DecodeError: If the file cannot be read.
+            ContractError: If capture, options and bundle do not fit each other, or there is no such
+                product.
+        """
+        check_out(out)
+        began = time.perf_counter()
+        with self._opened(file, mosaic, origin_px, cancel) as capture:
+            decode_s = time.perf_counter() - began
+            work = self.start(capture, progress=progress, cancel=cancel)
+            result = self.part.outputs.finish(work, products, out)
+        return replace(result, seconds={"decode": decode_s, **result.seconds})
 
     def process(
         self,
@@ -263,33 +269,10 @@ class Pipeline:
         out: FloatArray | None = None,
         progress: Progress | None = None,
         cancel: Cancel | None = None,
-    ) -> Picture:
-        """Read one capture and reconstruct it.
-
-        Args:
-            file: RAW, DNG, EXR, TIFF or PNG: a path, bytes, or a file opened in binary mode.
-            mosaic: How to read a headerless mosaic, or levels in place of a RAW file's.
-            origin_px: (x, y) of its first pixel on the sensor, for a crop that records none.
-            out: (3, h, w) float32 to fill; a new array when None.
-            progress: Called with (work done, work in all), over all stages.
-            cancel: Asked ten times a second; true raises `Cancelled`.
-
-        Raises:
-            DecodeError: If the file cannot be read.
-            ContractError: If capture and bundle do not fit each other.
-        """
-        check_out(out)
-        began = time.perf_counter()
-        capture = self.read(file, mosaic, origin_px=origin_px, cancel=cancel)
-        decode_s = time.perf_counter() - began
-        work = self.start(capture, progress=progress, cancel=cancel)
-        image = work.fill(out)
-        return Picture(
-            image=image,
-            orientation=work.capture.orientation,
-            seconds={"decode": decode_s, **work.seconds},
-            warnings=work.warnings,
-            sections=work.sections,
+    ) -> Result:
+        """Read one photograph and reconstruct it: `run`, whose result has an `image`."""
+        return self.run(
+            file, mosaic=mosaic, origin_px=origin_px, out=out, progress=progress, cancel=cancel
         )
 
     def make(
@@ -298,21 +281,9 @@ class Pipeline:
         *,
         progress: Progress | None = None,
         cancel: Cancel | None = None,
-    ) -> Made:
-        """Read one capture that is no photograph and make its products.
-
-        Args:
-            file: A path, bytes, or a file opened in binary mode.
-            progress: Called with (work done, work in all).
-            cancel: Asked between pieces of work; true raises `Cancelled`.
-
-        Raises:
-            DecodeError: If the file cannot be read.
-            ContractError: If capture, options and bundle do not fit each other.
-            UnsupportedError: If captures of this kind are photographs.
-        """
-        with cancellable(cancel), stored(file) as path:
-            return self._a_maker().make(self._making(path, progress, cancel))
+    ) -> Result:
+        """Read one capture and make its products: `run`, whose result has `arrays`."""
+        return self.run(file, progress=progress, cancel=cancel)
 
     def plan(
         self,
@@ -322,7 +293,7 @@ class Pipeline:
         origin_px: tuple[int, int] | None = None,
         cancel: Cancel | None = None,
     ) -> Mapping[str, Any]:
-        """Return what `process` or `make` would do with a capture, without doing it.
+        """Return what `run` would do with a capture, without doing it.
 
         Args:
             file: A path, bytes, a file opened in binary mode, or an array as `process_array` takes.
@@ -339,40 +310,33 @@ class Pipeline:
             ContractError: If capture, options and bundle do not fit each other, or captures of
                 this kind are no mosaics and have no place on a sensor.
         """
-        if isinstance(file, np.ndarray):
-            check_value("mosaic", mosaic, NoneType)
-            origin_px = self.options.origin_px if origin_px is None else origin_px
-            capture = self.capture_of(file, iso=None, white_balance=None, origin_px=origin_px)
+        with self._opened(file, mosaic, origin_px, cancel) as capture:
             return self.start(capture, cancel=cancel).planned()
-        if self.maker is None:
-            capture = self.read(file, mosaic, origin_px=origin_px, cancel=cancel)
-            return self.start(capture, cancel=cancel).planned()
+
+    def _opened(
+        self,
+        file: Source | NDArray[Any],
+        mosaic: MosaicOptions | None,
+        origin_px: tuple[int, int] | None,
+        cancel: Cancel | None,
+    ) -> AbstractContextManager[Any]:
+        """Return a capture that is closed at the end of a block.
+
+        Raises:
+            ContractError: If something is said that captures of this kind do not have.
+        """
         given = {"mosaic": mosaic, "origin_px": origin_px}
-        if said := [name for name, value in given.items() if value is not None]:
+        said = [name for name, value in given.items() if value is not None]
+        if foreign := [name for name in said if name not in self.part.of_capture]:
             raise ContractError(
-                f"{option_list(said)} does not apply to captures of the kind {self.kind.name}; "
-                "leave it out"
+                f"{option_list(foreign)} does not apply to captures of the kind "
+                f"{self.kind.name}; leave it out"
             )
-        with cancellable(cancel), stored(file) as path:
-            return self.maker.plan(self._making(path, None, cancel))
-
-    def _a_maker(self) -> Maker:
-        if self.maker is None:
-            raise UnsupportedError(
-                f"captures of the kind {self.kind.name} are photographs; Pipeline.process makes "
-                "their pictures"
-            )
-        return self.maker
-
-    def _making(self, path: Path, progress: Progress | None, cancel: Cancel | None) -> Making:
-        return Making(
-            path=path,
-            bundle=self.bundle,
-            options=self.options,
-            threads=self.threads,
-            progress=progress,
-            cancel=cancel,
-        )
+        if not isinstance(file, np.ndarray):
+            return closing(self.read(file, mosaic, origin_px=origin_px, cancel=cancel))
+        check_value("mosaic", mosaic, NoneType)
+        origin = self.options.origin_px if origin_px is None else origin_px
+        return closing(self.capture_of(file, iso=None, white_balance=None, origin_px=origin))
 
     def stream(
         self,
@@ -383,7 +347,7 @@ class Pipeline:
         origin_px: tuple[int, int] | None = None,
         progress: Progress | None = None,
         cancel: Cancel | None = None,
-    ) -> Summary:
+    ) -> Result:
         """Read one capture and hand its picture on, band by band, without holding it.
 
         Args:
@@ -399,20 +363,15 @@ class Pipeline:
             ContractError: If capture and bundle do not fit each other.
         """
         began = time.perf_counter()
-        capture = self.read(file, mosaic, origin_px=origin_px, cancel=cancel)
-        decode_s = time.perf_counter() - began
-        work = self.start(capture, progress=progress, cancel=cancel)
-        top = 0
-        for band in work.bands():
-            on_band(top, band)
-            top += band.shape[1]
-        return Summary(
-            shape=work.shape,
-            orientation=work.capture.orientation,
-            seconds={"decode": decode_s, **work.seconds},
-            warnings=work.warnings,
-            sections=work.sections,
-        )
+        with self._opened(file, mosaic, origin_px, cancel) as capture:
+            decode_s = time.perf_counter() - began
+            work = self.start(capture, progress=progress, cancel=cancel)
+            top = 0
+            for band in work.bands():
+                on_band(top, band)
+                top += band.shape[1]
+            result = result_of(work, {})
+        return replace(result, seconds={"decode": decode_s, **result.seconds})
 
     def process_array(
         self,
@@ -448,7 +407,8 @@ class Pipeline:
         if origin_px is None:
             origin_px = self.options.origin_px
         capture = self.capture_of(image, iso=iso, white_balance=white_balance, origin_px=origin_px)
-        return self.start(capture, progress=progress, cancel=cancel).fill(out)
+        work = self.start(capture, progress=progress, cancel=cancel)
+        return self.part.outputs.finish(work, None, out).image
 
     def capture_of(
         self,
@@ -457,17 +417,21 @@ class Pipeline:
         iso: float | None,
         white_balance: tuple[float, float, float] | None,
         origin_px: tuple[int, int] | None,
-    ) -> Capture:
-        """Return an array the meaning that the bundle's sensor gives it; see `process_array`.
+    ) -> Any:
+        """Return an array with the meaning that the bundle's sensor gives it; see `process_array`.
 
         Raises:
             ContractError: If shape, type or size do not fit the bundle.
         """
         if self.bundle is None:
             raise ContractError("an array needs a bundle: it says what the numbers mean")
-        manifest = self.bundle.manifest
-        return self._part.from_array(
-            image, manifest, iso=iso, white_balance=white_balance, origin_px=origin_px
+        return self.part.from_array(
+            image,
+            self.bundle.manifest,
+            iso=iso,
+            white_balance=white_balance,
+            origin_px=origin_px,
+            options=self.options,
         )
 
 

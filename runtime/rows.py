@@ -181,3 +181,24 @@ class RowReader:
     def pieces(self, top: int, bottom: int) -> list[Rows]:
         """Return the same rows as they lie, in consecutive pieces."""
         return self._rows.pieces_for(self, top, bottom)
+
+
+class RowsMadeWhole:
+    """A picture that is made whole when its first row is asked for."""
+
+    def __init__(self, shape: tuple[int, int, int], make: Callable[[], Rows]) -> None:
+        """Store the way it is made.
+
+        Args:
+            shape: (channel, h, w).
+            make: Gives it; called once.
+        """
+        self.shape = shape
+        self._make = make
+        self._made: Rows | None = None
+
+    def read(self, top: int, bottom: int) -> Rows:
+        """Return rows top..bottom as a view."""
+        if self._made is None:
+            self._made = self._make()
+        return self._made[:, top:bottom]

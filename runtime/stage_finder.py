@@ -6,9 +6,12 @@ It is the one that the stage names as its `runtime`, else that of its type in
 A module defines
 
     prepare(entry, job) -> StageWork     what the stage does to one capture; cheap, before any row
-    seconds(entry, subject, work, speed)    what it will take, for the plan
+    seconds(entry, subject, work, speed)    what it will take, for plans that estimate seconds
     METHODS                              names of its ways, as `--method` takes them; may be empty
     OPTIONS                              fields of `Options` that mean something to it
+    look(entry, job) -> Job              optional: looks at the capture before anything is planned;
+                                         the job returned knows what it found
+    IS_NEEDED                            optional: true where no method leaves the stage out
     is_left_out(options)                 optional: whether the caller wants it left out
     check(entry, manifest, max_bytes)    optional: refuses, when a bundle is loaded, what asks too
                                          much of a machine
@@ -23,7 +26,7 @@ from types import ModuleType
 from typing import Final
 
 from camkit.bundle.manifest import Manifest
-from camkit.bundle.stages import Stage, StageEntry, all_stages, find_stage, type_of
+from camkit.bundle.stages import StageEntry, all_stages, find_stage, type_of
 from camkit.entry_points import has_module
 from camkit.errors import UnsupportedError
 
@@ -39,9 +42,21 @@ def stage_module(name: str) -> ModuleType:
         UnsupportedError: If there is no such stage, or this runtime does not do it.
         ContractError: If a package brings what is none.
     """
-    module = _module_name(find_stage(name))
+    return _module(find_stage(name))
+
+
+def module_of(stage: StageEntry) -> ModuleType:
+    """Return the module of a listed stage, which need not be one that a bundle may list."""
+    return _module(type(stage))
+
+
+@cache
+def _module(entry: type[StageEntry]) -> ModuleType:
+    module = _module_name(entry)
     if not has_module(module):
-        raise UnsupportedError(f"the stage {name!r} is not walked: there is no module {module}")
+        raise UnsupportedError(
+            f"the stage {type_of(entry)!r} is not walked: there is no module {module}"
+        )
     return importlib.import_module(module)
 
 
@@ -61,21 +76,19 @@ def check_stages(manifest: Manifest, max_bytes: int) -> None:
         ContractError: If one cannot do with the memory.
     """
     for stage in manifest.stages:
-        check = getattr(stage_module(stage.type), "check", None)
+        check = getattr(module_of(stage), "check", None)
         if check is not None:
             check(stage, manifest, max_bytes)
 
 
-def known_facts(stages: Sequence[Stage]) -> tuple[str, ...]:
+def known_facts(stages: Sequence[StageEntry]) -> tuple[str, ...]:
     """Return the facts of a camera body that some stages know."""
     return tuple(
-        dict.fromkeys(
-            fact for stage in stages for fact in getattr(stage_module(stage.type), "FACTS", ())
-        )
+        dict.fromkeys(fact for stage in stages for fact in getattr(module_of(stage), "FACTS", ()))
     )
 
 
-def stage_keys(stages: Sequence[Stage]) -> tuple[str, ...]:
+def stage_keys(stages: Sequence[StageEntry]) -> tuple[str, ...]:
     """Return a name of every stage for people and clocks: its type, and its role or number."""
     types: list[str] = [stage.type for stage in stages]
     roles = [(stage.type, getattr(stage, "role", None)) for stage in stages]
@@ -90,16 +103,15 @@ def stage_keys(stages: Sequence[Stage]) -> tuple[str, ...]:
     return tuple(keys)
 
 
-def methods_of(stages: Sequence[Stage]) -> tuple[str, ...]:
+def methods_of(stages: Sequence[StageEntry]) -> tuple[str, ...]:
     """Return the ways of the stages, as `--method` takes them; those of the last stage first."""
     return tuple(
-        dict.fromkeys(
-            method for stage in reversed(stages) for method in stage_module(stage.type).METHODS
-        )
+        dict.fromkeys(method for stage in reversed(stages) for method in module_of(stage).METHODS)
     )
 
 
 def all_methods() -> tuple[str, ...]:
-    """Return the ways of every stage of this runtime, whatever a bundle lists."""
+    """Return the ways of every stage whose seconds a plan estimates, whatever a bundle lists."""
     names = sorted(type_of(entry) for entry in all_stages() if has_module(_module_name(entry)))
-    return tuple(dict.fromkeys(m for name in names for m in stage_module(name).METHODS))
+    modules = [module for name in names if hasattr(module := stage_module(name), "seconds")]
+    return tuple(dict.fromkeys(method for module in modules for method in module.METHODS))

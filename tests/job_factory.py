@@ -10,8 +10,8 @@ from camkit.bundle.sensor import MOSAIC, RGB
 from camkit.bundle.stages import Stage
 from camkit.runtime.capture import Capture
 from camkit.runtime.job.job import Job
+from camkit.runtime.job.photograph import looked_at
 from camkit.runtime.job.reconstruction import Reconstruction
-from camkit.runtime.job.setup import Setup
 from camkit.runtime.job.stream import Stream
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
@@ -61,15 +61,7 @@ def made_job(
     capture: Capture, bundle: Bundle | None = None, *, threads: int = 1, **choices: Any
 ) -> Job:
     """Give what is known of a capture before any stage is prepared."""
-    pipeline = Pipeline(bundle, Options(threads=threads, **choices))
-    setup = Setup(
-        bundle=bundle,
-        options=pipeline.options,
-        networks=pipeline.network,
-        speed=pipeline.speed,
-        threads=threads,
-    )
-    return Job(setup, capture)
+    return Pipeline(bundle, Options(threads=threads, **choices)).start(capture).job
 
 
 def stream_of(
@@ -101,6 +93,7 @@ def captured(capture: Capture) -> Stream:
 
 def run_stage(entry: Stage, job: Job, *taken: Stream) -> tuple[Stream, ...]:
     """Give what a stage makes of planes."""
+    job = looked_at(job, [entry])
     made: tuple[Stream, ...] = stage_module(entry.type).prepare(entry, job).run(taken)
     return made
 

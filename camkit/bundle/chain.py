@@ -12,8 +12,8 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from camkit.bundle.optics import Optics
-from camkit.bundle.plane import Axes, Plane
-from camkit.bundle.sensor import Sensor, SpadSensor
+from camkit.bundle.plane import Plane
+from camkit.bundle.sensor import Sensor
 from camkit.bundle.stages import Dehaze, JoinError, Parts, Stage, Wiener
 
 CAPTURE: Final = "capture"
@@ -22,10 +22,7 @@ CAPTURE: Final = "capture"
 
 def capture_plane(sensor: Sensor) -> Plane:
     """Return the plane that a sensor gives: digital numbers, or photons."""
-    if isinstance(sensor, SpadSensor):
-        axes: Axes = "t y x" if sensor.time_bins else "y x"
-        return Plane(axes=axes, type="uint32", channels=sensor.captured, domain="counts")
-    return Plane(type="uint16", channels=sensor.captured, domain="dn")
+    return sensor.plane
 
 
 def join_stages(stages: Sequence[Stage], parts: Parts) -> dict[str, Plane]:

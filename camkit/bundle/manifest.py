@@ -29,7 +29,7 @@ from camkit.bundle.facts import Card, NetworkFacts, StatedLaw
 from camkit.bundle.golden import IMAGE
 from camkit.bundle.optics import Optics
 from camkit.bundle.plane import Plane
-from camkit.bundle.sensor import Sensor
+from camkit.bundle.sensor import ColorSensor, LightSensor, Sensor
 from camkit.bundle.stages import (
     JoinError,
     Parts,
@@ -39,7 +39,7 @@ from camkit.bundle.stages import (
 from camkit.bundle.strict_json import read_json
 from camkit.bundle.upgrade import UpgradeError, upgrade
 from camkit.contracts import FrozenPsf
-from camkit.errors import BundleError
+from camkit.errors import BundleError, UnsupportedError
 
 FORMAT_VERSION: Final = (2, 9)
 TOGETHER_VERSION: Final = (2, 4)
@@ -197,6 +197,19 @@ class Manifest(Entry):
     def parts(self) -> Parts:
         """Return the parts that stages use to derive their planes."""
         return Parts(sensor=self.sensor, optics=self.optics, networks=self.networks)
+
+    @property
+    def light_sensor(self) -> ColorSensor:
+        """Return the sensor, which a stage of pictures always has: one of light in colours.
+
+        Raises:
+            UnsupportedError: If it counts photons.
+        """
+        if not isinstance(self.sensor, LightSensor):
+            raise UnsupportedError(
+                f"bundle {self.name} counts photons; this is for light in colours"
+            )
+        return self.sensor
 
     @property
     def has_kernels(self) -> bool:

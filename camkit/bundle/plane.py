@@ -9,10 +9,10 @@ from camkit.bundle.entry import Entry, Positive
 Axes = Literal["y x", "t y x"]
 """Axes behind that of the channels."""
 SampleType = Literal["uint8", "uint16", "uint32", "float32", "bool"]
-Domain = Literal["dn", "linear", "stabilised", "counts", "mask", "output", "depth"]
+Domain = Literal["dn", "linear", "stabilised", "counts", "mask", "output", "depth", "lifetime"]
 """dn: digital numbers; linear: light, 1.0 = white level; stabilised: of equal noise everywhere;
 counts: photons; mask: true or false; output: linear light in the colour of the output; depth:
-metres (2.3)."""
+metres (2.3); lifetime: picoseconds (2.9)."""
 
 
 class Grid(Entry):

@@ -9,13 +9,14 @@ The inputs that a bundle takes follow from its sensor.
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, ClassVar, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from camkit.bundle.entry import Entry, NonNegative, Positive
+from camkit.bundle.plane import Axes, Plane
 from camkit.contracts import CfaPattern, InputContract, NoiseModel
 from camkit.errors import ContractError, UnsupportedError
 
@@ -237,6 +238,16 @@ class BayerSensor(LightSensor):
         return MOSAIC
 
     @property
+    def plane(self) -> Plane:
+        """The plane that the sensor gives: digital numbers."""
+        return Plane(type="uint16", channels=self.captured, domain="dn")
+
+    @property
+    def text(self) -> str:
+        """Its colours and full well, in words."""
+        return f"{self.cfa}, full well {self.full_well_e:g} e-"
+
+    @property
     def inputs(self) -> tuple[InputContract, ...]:
         """Names of the inputs that are taken, the sensor's own first."""
         return ("raw_bayer_v1", "linear_rgb_v1")
@@ -291,6 +302,16 @@ class PlanesSensor(LightSensor):
         return self.channels
 
     @property
+    def plane(self) -> Plane:
+        """The plane that the sensor gives: digital numbers."""
+        return Plane(type="uint16", channels=self.captured, domain="dn")
+
+    @property
+    def text(self) -> str:
+        """Its colours and full well, in words."""
+        return f"{', '.join(self.channels)}, full well {self.full_well_e:g} e-"
+
+    @property
     def inputs(self) -> tuple[InputContract, ...]:
         """Names of the inputs that are taken."""
         return ("linear_rgb_v1" if len(self.channels) == len(RGB) else "linear_planes_v1",)
@@ -332,6 +353,8 @@ class SpadSensor(PixelSensor):
     sub_pixels: Annotated[int, Field(ge=1, le=16)] = 1
     phase: Annotated[int, Field(ge=0, lt=16)] = 0
 
+    channel_response: ClassVar[None] = None
+
     @model_validator(mode="after")
     def _check(self) -> "SpadSensor":
         if self.phase >= self.sub_pixels:
@@ -349,6 +372,17 @@ class SpadSensor(PixelSensor):
     def captured(self) -> tuple[str, ...]:
         """Names of the channels of a capture."""
         return self.channels
+
+    @property
+    def plane(self) -> Plane:
+        """The plane that the sensor gives: photons, by time if it has bins."""
+        axes: Axes = "t y x" if self.time_bins else "y x"
+        return Plane(axes=axes, type="uint32", channels=self.captured, domain="counts")
+
+    @property
+    def text(self) -> str:
+        """Its way of seeing, in words."""
+        return "counting photons"
 
     @property
     def inputs(self) -> tuple[InputContract, ...]:

@@ -11,13 +11,13 @@ from camkit.errors import CamkitError, ContractError, unexpected
 from camkit.runtime.batch.tasks import NO_BUNDLE, Task, state_of
 from camkit.runtime.cancel import Cancel, Cancelled
 from camkit.runtime.capture import MosaicOptions
-from camkit.runtime.development import FileResult, WriteOptions, develop_file, proved_done
+from camkit.runtime.development import FileResult, make_file, proved_done
 from camkit.runtime.job.choices import check_idle
 from camkit.runtime.kind import kind_without_bundle
 from camkit.runtime.options import Options
 from camkit.runtime.output.claim import claimed
 from camkit.runtime.pipeline import Pipeline, load
-from camkit.runtime.product_files import make_file
+from camkit.runtime.write_options import WriteOptions
 
 logger = logging.getLogger(__name__)
 
@@ -61,8 +61,7 @@ class Pipelines:
             if (bundle, kind) not in self._made:
                 name = None if is_bare else bundle
                 made = load(name, kind=kind, options=self._options)
-                if made.maker is None:
-                    check_idle(made.bundle, self._options)
+                check_idle(made.bundle, self._options)
                 self._made[bundle, kind] = made
             return self._made[bundle, kind]
 
@@ -123,16 +122,7 @@ def _make(task: Task, pipeline: Pipeline, common: Common) -> FileResult:
         if appeared and task.target.exists() and not write.overwrite:
             raise ContractError(f"{task.target} appeared since the run began; it is left as it is")
     tick = None if common.progress is None else _tick(common.progress, task.source)
-    if pipeline.maker is not None:
-        return make_file(
-            task.source,
-            task.target,
-            pipeline,
-            write,
-            progress=tick,
-            cancel=common.cancel,
-        )
-    return develop_file(
+    return make_file(
         task.source,
         task.target,
         pipeline,

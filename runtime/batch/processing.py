@@ -19,7 +19,7 @@ from camkit.runtime.batch.sources import expand
 from camkit.runtime.batch.tasks import NO_BUNDLE, Task, list_tasks
 from camkit.runtime.cancel import Cancel
 from camkit.runtime.capture import MosaicOptions
-from camkit.runtime.development import FileResult, WriteOptions
+from camkit.runtime.development import FileResult
 from camkit.runtime.face.keywords import ProcessKeywords
 from camkit.runtime.files.in_memory import FilePath, list_paths
 from camkit.runtime.kind import kind_without_bundle
@@ -32,6 +32,7 @@ from camkit.runtime.options import (
     with_absolute_files,
     with_choices,
 )
+from camkit.runtime.write_options import WriteOptions
 
 if TYPE_CHECKING:
     from distributed import Client

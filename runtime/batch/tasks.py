@@ -11,12 +11,9 @@ from camkit.caller import option_text
 from camkit.errors import ContractError, unexpected
 from camkit.kinds import Kind
 from camkit.runtime.batch.sources import refusal_of
-from camkit.runtime.development import WriteOptions
-from camkit.runtime.kind import kind_without_bundle, runtime_part
-from camkit.runtime.maker import Maker
+from camkit.runtime.kind import RuntimePart, kind_without_bundle, runtime_part
 from camkit.runtime.options import Options
-from camkit.runtime.output.preview_file import preview_path
-from camkit.runtime.raw import named_bundle
+from camkit.runtime.write_options import WriteOptions
 
 logger = logging.getLogger(__name__)
 
@@ -82,13 +79,13 @@ def list_tasks(
     """
     folders = _folders(sources, write)
     made = options or Options()
-    makers = [runtime_part((kind or kind_without_bundle(s, made)).name).maker for s in sources]
-    outputs = [_outputs(s, m, made, write) for s, m in zip(sources, makers, strict=True)]
+    parts = [runtime_part((kind or kind_without_bundle(s, made)).name) for s in sources]
+    outputs = [_outputs(s, p, made, write) for s, p in zip(sources, parts, strict=True)]
     if outputs and all(isinstance(names, ContractError) for names in outputs):
         raise next(names for names in outputs if isinstance(names, ContractError))
     tasks = [
-        _make_task(source, bundle, folder, maker, names)
-        for source, folder, maker, names in zip(sources, folders, makers, outputs, strict=True)
+        _make_task(source, bundle, folder, part, names)
+        for source, folder, part, names in zip(sources, folders, parts, outputs, strict=True)
     ]
     sound = [t for t in tasks if t.refusal is None]
     if writes:
@@ -124,19 +121,11 @@ def _folders(sources: Sequence[Path], write: WriteOptions) -> list[Path]:
 
 
 def _outputs(
-    source: Path, maker: Maker | None, options: Options, write: WriteOptions
+    source: Path, part: RuntimePart, options: Options, write: WriteOptions
 ) -> tuple[str, ...] | ContractError:
     """Return the files of an input, the main one first; or the reason why it has none."""
-    if maker is None:
-        name = f"{source.stem}{write.suffix}"
-        return (name, preview_path(Path(name)).name) if write.preview else (name,)
-    if write.preview:
-        return ContractError(
-            f"{option_text('preview')} is for photographs; {source.name} becomes products, which "
-            f"have pictures as {option_text('format')}: leave it out"
-        )
     try:
-        return maker.names(source, options, write.format)
+        return part.outputs.names(source, options, write)
     except ContractError as error:
         return error
 
@@ -145,7 +134,7 @@ def _make_task(
     source: Path,
     bundle: str | None,
     folder: Path,
-    maker: Maker | None,
+    part: RuntimePart,
     names: tuple[str, ...] | ContractError,
 ) -> Task:
     refusal = refusal_of(source)
@@ -155,7 +144,7 @@ def _make_task(
     chosen = bundle
     if chosen is None and refusal is None:
         try:
-            chosen = (named_bundle if maker is None else maker.named)(source)
+            chosen = part.named(source)
         except Exception as error:
             logger.debug("%s failed", source, exc_info=error)
             refusal = f"cannot read {source}: {unexpected(error)}"

@@ -2,7 +2,10 @@
 
 setup           what all captures of a pipeline share
 choices         options held against what a camera can do with them
-job             what is known of the capture, found when asked
+kind_capture    a capture of any kind, as the engine sees it
+job             what is known of the capture, made once
+log             what is found of it on the way
+photograph      what is known of a photograph, and planned for it
 stage_work      a stage made ready
 stream          a plane on its way from one stage to the next
 walker          the stages joined, given their share of memory, rows pulled through them

@@ -7,45 +7,58 @@ from collections.abc import Sequence
 from typing import Final
 
 from camkit.bundle.reader import Bundle
-from camkit.bundle.stages import Stage
+from camkit.bundle.stages import StageEntry
 from camkit.caller import option_list, option_text
 from camkit.contracts import depth_weights
 from camkit.errors import ContractError
-from camkit.kinds import BAYER, find_kind
+from camkit.kinds import BAYER, Kind
 from camkit.runtime.job.setup import DEVELOPMENT
 from camkit.runtime.options import Options, check_kind_options, given_options
 from camkit.runtime.plan.decision import DEVELOP, Work
 from camkit.runtime.plan.ways import LEFT_OUT, offered_methods, ways_of
-from camkit.runtime.stage_finder import stage_module
+from camkit.runtime.stage_finder import methods_of, module_of
 
-GENERAL: Final = frozenset({"max_mem_bytes", "threads", "method", "unit"})
+GENERAL: Final = frozenset({"max_mem_bytes", "threads", "method"})
 ON_A_SENSOR: Final = frozenset({"assume", "origin_px"})
 """What means something wherever the size of the sensor is known."""
 WITH_A_BUNDLE: Final = frozenset({"force_bundle"})
+ALWAYS: Final = frozenset({"unit"})
+OF_CAPTURE: Final = ON_A_SENSOR | WITH_A_BUNDLE | ALWAYS
+"""What may be said of how a photograph was taken."""
 
 
-def known_options(stages: Sequence[Stage]) -> frozenset[str]:
+def known_options(stages: Sequence[StageEntry]) -> frozenset[str]:
     """Return the names of the options that some stages use."""
-    return GENERAL.union(*(stage_module(stage.type).OPTIONS for stage in stages))
+    return GENERAL.union(*(module_of(stage).OPTIONS for stage in stages))
 
 
-def check_choices(bundle: Bundle | None, options: Options) -> None:
+def check_choices(
+    bundle: Bundle | None,
+    options: Options,
+    *,
+    kind: Kind = BAYER,
+    usual: Sequence[StageEntry] = DEVELOPMENT,
+    of_capture: frozenset[str] = OF_CAPTURE,
+) -> None:
     """Refuse options before any work.
+
+    Args:
+        bundle: The camera; None for none.
+        options: What the caller chose.
+        kind: Of the captures.
+        usual: Stages without a bundle.
+        of_capture: What may be said of how such a capture was taken.
 
     Raises:
         ContractError: If no stage has the method asked for, an option that was given means nothing
             to any stage, the unit is of another bundle, or the PSF does not reach the depth.
     """
-    stages = DEVELOPMENT if bundle is None else bundle.manifest.stages
-    known = known_options(stages)
-    if bundle is not None and bundle.manifest.sensor.extent is not None:
-        known |= ON_A_SENSOR
+    stages = usual if bundle is None else bundle.manifest.stages
+    known = known_options(stages) | (_of_capture(bundle) & of_capture)
+    where = f"to captures of the kind {kind.name}" if kind != BAYER else "without a bundle"
     if bundle is not None:
-        known |= WITH_A_BUNDLE
-    where = "without a bundle" if bundle is None else f"to bundle {bundle.manifest.name}"
-    if options.of_kind:
-        kind = BAYER if bundle is None else find_kind(bundle.manifest.kind)
-        check_kind_options(options, kind, where)
+        where = f"to bundle {bundle.manifest.name}"
+    check_kind_options(options, kind, where)
     own = {name for name, _ in options.of_kind}
     given = [name for name in given_options(options) if name not in own]
     if foreign := [name for name in given if name not in known]:
@@ -60,7 +73,10 @@ def check_choices(bundle: Bundle | None, options: Options) -> None:
                 f"bundle {bundle.manifest.name} holds size(s) {', '.join(sizes) or 'none'}; asked "
                 f"for {options.size}"
             )
-    methods = (DEVELOP,) if bundle is None else offered_methods(stages, bundle.manifest.all_planes)
+    if bundle is None:
+        methods = methods_of(stages) or (DEVELOP,)
+    else:
+        methods = offered_methods(stages, bundle.manifest.all_planes)
     if options.method is not None and options.method not in methods:
         raise ContractError(
             f"method must be one of {', '.join(methods)} {where}; got {options.method!r}"
@@ -70,6 +86,15 @@ def check_choices(bundle: Bundle | None, options: Options) -> None:
     if options.depth_m is not None and bundle is not None:
         # a stage that knows of depths never joins without optics
         depth_weights(bundle.psf.depths_mm, options.depth_mm)
+
+
+def _of_capture(bundle: Bundle | None) -> frozenset[str]:
+    """Return the options that may tell how a photograph was taken."""
+    if bundle is None:
+        return ALWAYS
+    if bundle.manifest.sensor.extent is None:
+        return ALWAYS | WITH_A_BUNDLE
+    return OF_CAPTURE
 
 
 def check_idle(bundle: Bundle | None, options: Options) -> None:

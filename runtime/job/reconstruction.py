@@ -5,37 +5,35 @@
 Nothing is computed before the first band is asked for; a `Reconstruction` serves one thread, once.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 
 from camkit.bundle.golden import IMAGE
-from camkit.bundle.stages import Network
-from camkit.caller import option_text
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.cancel import Cancel, cancellable
-from camkit.runtime.capture import Capture
 from camkit.runtime.clock import StageClock
 from camkit.runtime.color import ColorStage
-from camkit.runtime.content import Content, light_squares, measure_content
 from camkit.runtime.job.job import Job
-from camkit.runtime.job.setup import DEVELOPMENT, Setup
+from camkit.runtime.job.kind_capture import KindCapture
+from camkit.runtime.job.log import Log
+from camkit.runtime.job.meter import Meter
+from camkit.runtime.job.photograph import content_of, know_photograph
+from camkit.runtime.job.setup import Setup
 from camkit.runtime.job.stream import Stream
-from camkit.runtime.job.walker import Walk
+from camkit.runtime.job.walker import Walk, probed
 from camkit.runtime.network.tiling import Progress
 from camkit.runtime.network.windows import NetworkWindows
 from camkit.runtime.output.origin import Origin
-from camkit.runtime.plan.decision import DEVELOP, Labels, Subject, Work
+from camkit.runtime.plan.decision import Labels
 from camkit.runtime.plan.estimate import Estimate, estimate_seconds, stage_seconds
-from camkit.runtime.plan.planner import Plan, make_plan, needs_content
-from camkit.runtime.plan.rules.lights import needs_lights
+from camkit.runtime.plan.planner import Plan
 from camkit.runtime.plan.speed import Speed
-from camkit.runtime.plan.ways import without_networks
 from camkit.runtime.rows import Rows, RowSource
-from camkit.runtime.stage_finder import stage_module
+from camkit.runtime.stage_finder import module_of
 
 BEFORE_STAGES: Final = ("noise", "envelope", "scene")
 
@@ -46,14 +44,14 @@ class Reconstruction:
     Attributes:
         capture: What is reconstructed.
         job: What is known of it.
-        plan: What was decided; None without a bundle.
     """
 
     def __init__(
         self,
         setup: Setup,
-        capture: Capture,
+        capture: KindCapture,
         *,
+        know: Callable[[Job], Job] = know_photograph,
         progress: Progress | None = None,
         cancel: Cancel | None = None,
         known: Mapping[str, Stream] | None = None,
@@ -61,30 +59,46 @@ class Reconstruction:
     ) -> None:
         """Plan everything that is known before the first row.
 
+        Args:
+            setup: What the captures of a pipeline share.
+            capture: As its kind reads it.
+            know: How its kind completes what is known of it, and plans.
+            progress: Called with (work done, work in all).
+            cancel: Asked ten times a second; true raises `Cancelled`.
+            known: Planes of this capture that another reconstruction kept, by name.
+            reserved_bytes: Of the memory cap, what the caller needs for what becomes of the bands.
+
         Raises:
             ContractError: If capture, bundle and options do not fit each other.
         """
-        self.capture = capture
+        self.capture: Any = capture
         self._setup = setup
-        self.job = Job(
-            setup,
-            capture,
-            progress=progress,
-            cancel=cancel,
-            known=known,
-            reserved_bytes=reserved_bytes,
+        self.job = know(
+            Job(
+                setup=setup,
+                capture=capture,
+                log=Log(meter=Meter(progress, cancel)),
+                prober=probed,
+                cancel=cancel,
+                known=dict(known or {}),
+                reserved_bytes=reserved_bytes,
+            )
         )
         self._walk = Walk(self.job)
-        self.plan = self._decide()
-        self._walk.settle()
+
+    @property
+    def plan(self) -> Plan | None:
+        """Return what was decided; None where nothing is."""
+        return self.job.plan
 
     @property
     def products(self) -> dict[str, str]:
-        """Return the products that can be had: name -> plane."""
-        bundle = self._setup.bundle
+        """Return the products that can be had of this capture: name -> plane."""
+        products, bundle = self._setup.products, self._setup.bundle
         if bundle is None:
-            return {IMAGE: DEVELOPMENT[-1].gives[0]}
-        return dict(bundle.manifest.products)
+            return products
+        planes = bundle.manifest.all_planes
+        return {name: p for name, p in products.items() if self.capture.gives(planes[p])}
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -99,9 +113,9 @@ class Reconstruction:
         """
         plane = self._plane_of(product)
         bundle = self._setup.bundle
-        if bundle is None:
-            return 3, self.capture.height, self.capture.width
-        stated = bundle.manifest.planes[plane]
+        stated = None if bundle is None else bundle.manifest.all_planes[plane]
+        if stated is None or "t" in stated.axes:  # its samples of time are the capture's
+            return self._walk.stream(plane).shape
         return len(stated.channels), *self.job.grid_px(stated)
 
     def _plane_of(self, product: str) -> str:
@@ -114,7 +128,7 @@ class Reconstruction:
     @property
     def record(self) -> dict[str, Any]:
         """Return what was decided, for the sidecar."""
-        return self.job.record
+        return self.job.log.record
 
     @property
     def sections(self) -> dict[str, Any]:
@@ -122,7 +136,7 @@ class Reconstruction:
 
         Complete once all rows are out.
         """
-        return self.job.sections
+        return self.job.log.sections
 
     @property
     def white_balance(self) -> tuple[float, ...]:
@@ -161,7 +175,7 @@ class Reconstruction:
     @property
     def size(self) -> str | None:
         """Return the size of network in use; None if none runs."""
-        sizes = self.job.work.sizes() if self.job.windows else ()
+        sizes = self.job.work.sizes() if self.windows else ()
         return sizes[0] if sizes else None
 
     @property
@@ -172,7 +186,7 @@ class Reconstruction:
     @property
     def windows(self) -> dict[str, NetworkWindows]:
         """Return role -> the planned windows of its network; empty if none runs."""
-        return self.job.windows
+        return self.job.log.windows
 
     def measured_speed(self, sizes: Sequence[str]) -> Speed:
         """Return how fast this machine is with the networks of some sizes."""
@@ -188,17 +202,17 @@ class Reconstruction:
     @property
     def clock(self) -> StageClock:
         """Return the clock of the stages, for profiles."""
-        return self.job.clock
+        return self.job.log.clock
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Return what the user should know; complete once the last band is out."""
-        return (*self.job.notes, *self._walk.warnings())
+        return (*self.job.log.notes, *self._walk.warnings())
 
     @property
-    def clipped_fraction(self) -> float:
-        """Return the share of clipped samples seen so far."""
-        return self.job.clipped_fraction
+    def clipped_fraction(self) -> float | None:
+        """Return the share of clipped samples seen so far; None where none can be clipped."""
+        return self.job.log.clipped_fraction
 
     def bands(self, product: str = IMAGE) -> Iterator[Rows]:
         """Yield finished bands (c, rows, w) of a product, from top to bottom.
@@ -206,9 +220,18 @@ class Reconstruction:
         Raises:
             ContractError: If there is no such product.
         """
-        return self._metered(self._walk.stream(self._plane_of(product)).bands())
+        return self.metered(self.stream_of(product).bands())
 
-    def _metered(self, bands: Iterator[Rows]) -> Iterator[Rows]:
+    def stream_of(self, product: str) -> Stream:
+        """Return the rows of a product, with what is known besides.
+
+        Raises:
+            ContractError: If there is no such product.
+        """
+        return self._walk.stream(self._plane_of(product))
+
+    def metered(self, bands: Iterator[Rows]) -> Iterator[Rows]:
+        """Yield bands of a product; what makes them hears of the caller's wish to stop."""
         while True:
             with cancellable(self.job.cancel):
                 band = next(bands, None)
@@ -216,7 +239,7 @@ class Reconstruction:
                 break
             yield band
             del band  # not held while the next one is made
-        self.job.meter.finish()
+        self.job.log.meter.finish()
 
     def rows_of(self, plane: str) -> RowSource:
         """Return the rows of any plane of the manifest, for export, reports and tests."""
@@ -237,9 +260,9 @@ class Reconstruction:
             ContractError: If no stage has the role.
         """
         for number, stage in enumerate(self._setup.stages):
-            if isinstance(stage, Network) and stage.role == role:
+            if getattr(stage, "role", None) == role:
                 taken = [s for s in self._walk.taken_by(number) if s.plane.domain != "mask"]
-                rows = stage_module(stage.type).given_rows(stage, self.job, taken)
+                rows = module_of(stage).given_rows(stage, self.job, taken)
                 made: FloatArray = rows.read(0, rows.shape[1])
                 return made
         raise ContractError(f"no stage has a network of the role {role!r}")
@@ -257,7 +280,7 @@ class Reconstruction:
         check_out(out)
         if out.shape != shape:
             raise ContractError(f"out must be float32 {shape}; got {out.dtype} {out.shape}")
-        if np.may_share_memory(out, self.capture.samples):
+        if self.capture.shares_memory(out):
             raise ContractError("out shares memory with the capture, which is read while it fills")
         top = 0
         for band in self.bands(product):
@@ -274,7 +297,8 @@ class Reconstruction:
         if made is None:
             return None
         if made.subject.content is None:
-            made = replace(made, subject=replace(made.subject, content=self._measure_content()))
+            content = content_of(self.job.with_noise())
+            made = replace(made, subject=replace(made.subject, content=content))
         speed = self._setup.speed(made.sizes())
         self.record["decisions"] = [decision.to_json() for decision in made.decisions(speed)]
         window_mp = {role: windows.window_mp() for role, windows in self.windows.items()}
@@ -299,50 +323,6 @@ class Reconstruction:
             "plan": details,
             "warnings": list(self.warnings),
         }
-
-    def _decide(self) -> Plan | None:
-        """Plan no more than the capture needs; without a bundle there is nothing to plan."""
-        job, bundle = self.job, self._setup.bundle
-        if bundle is None:
-            job.work = Work(method=DEVELOP, networks=False)
-            return None
-        options = job.options
-        if job.falls_back:
-            below = without_networks(bundle.manifest, Work())
-            if below is None:
-                raise ContractError(
-                    f"bundle {bundle.manifest.name} has nothing to fall back to: its networks "
-                    f"cannot be left out; use {option_text('on_unsafe', 'warn')}"
-                )
-            options = replace(options, method=below.method)
-        content = self._measure_content() if needs_content(options) else None
-        lights = None
-        if needs_lights(bundle):
-            lights = light_squares(self.capture) if content is None else content.lights
-        subject = Subject(
-            bundle=bundle,
-            options=options,
-            height_px=self.capture.height,
-            width_px=self.capture.width,
-            placement=job.placement,
-            content=content,
-            lights=lights,
-        )
-        plan = make_plan(subject, lambda: self._setup.speed(bundle.manifest.sizes))
-        if plan.note:
-            job.notes.append(plan.note)
-        job.subject, job.work = plan.subject, plan.work
-        self.record["quality"] = options.quality
-        self.record["decisions"] = [decision.to_json() for decision in plan.decisions()]
-        return plan
-
-    def _measure_content(self) -> Content:
-        job = self.job
-        noise = job.noise.with_gains(job.white_balance)
-        with job.clock.stage("scene"):
-            content = measure_content(self.capture, noise, job.white_balance, job.placement.window)
-        self.record["scene"] = content.to_json()
-        return content
 
 
 def check_out(out: FloatArray | None) -> None:

@@ -1,25 +1,35 @@
 """The setup that all captures of a pipeline share."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Final
 
+from camkit.bundle.golden import IMAGE
 from camkit.bundle.reader import Bundle
-from camkit.bundle.stages import Color, Demosaic, Linearise, RaiseClipped, Stage, WhiteBalance
+from camkit.bundle.stages import (
+    Color,
+    Demosaic,
+    Linearise,
+    RaiseClipped,
+    StageEntry,
+    WhiteBalance,
+)
 from camkit.errors import ContractError
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.options import Options
 from camkit.runtime.plan.bounded_networks import bounded_stages
 from camkit.runtime.plan.speed import Speed
 
-DEVELOPMENT: Final[tuple[Stage, ...]] = (
+DEVELOPMENT: Final[tuple[StageEntry, ...]] = (
     Linearise(gives=("light",)),
     WhiteBalance(takes=("light",)),
     Demosaic(method="fast"),
     RaiseClipped(takes=("rgb",)),
     Color(takes=("neutral",)),
 )
-"""What is done to a capture without a bundle."""
+"""What is done to a photograph without a bundle."""
+DEVELOPED: Final[Mapping[str, str]] = {IMAGE: DEVELOPMENT[-1].gives[0]}
+"""Its products: name -> plane."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,6 +42,8 @@ class Setup:
         networks: Gives the network of a role and size.
         speed: Gives how fast this machine is with the networks of some sizes.
         threads: Threads to compute with.
+        usual_stages: What is done to a capture without a bundle.
+        usual_products: Its products then: name -> plane.
     """
 
     bundle: Bundle | None
@@ -39,12 +51,21 @@ class Setup:
     networks: Callable[[str, str], NetworkEngine]
     speed: Callable[[Sequence[str]], Speed]
     threads: int
+    usual_stages: tuple[StageEntry, ...] = DEVELOPMENT
+    usual_products: Mapping[str, str] = field(default_factory=lambda: DEVELOPED)
 
     @property
-    def stages(self) -> tuple[Stage, ...]:
+    def products(self) -> dict[str, str]:
+        """Return name -> plane of what can be made."""
+        if self.bundle is None:
+            return dict(self.usual_products)
+        return dict(self.bundle.manifest.products)
+
+    @property
+    def stages(self) -> tuple[StageEntry, ...]:
         """Return the stages that are walked."""
         if self.bundle is None:
-            return DEVELOPMENT
+            return self.usual_stages
         return bounded_stages(self.bundle.manifest, self.options.laws)
 
     @property

@@ -5,6 +5,7 @@ a source (rows of any place, made when asked for)    or    bands (from top to bo
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 from camkit.bundle.plane import Plane
 from camkit.errors import ContractError
@@ -28,6 +29,8 @@ class Stream:
         owned: Whether what the source reads is the reader's own to change.
         noise_rise: Gives what the variance of the noise of every channel was multiplied by besides,
             on average; to be asked when the first row is, as `Job.probe`. None for nothing.
+        beside: What the giver knows of the rows besides, for stages of its kind; what is known of
+            single rows is complete once they are read. None for nothing.
     """
 
     plane: Plane
@@ -37,6 +40,7 @@ class Stream:
     made: Iterator[Rows] | None = None
     owned: bool = True
     noise_rise: Callable[[], tuple[float, ...]] | None = None
+    beside: Any = None
 
     def __post_init__(self) -> None:
         if (self.source is None) == (self.made is None):

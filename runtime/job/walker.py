@@ -1,6 +1,6 @@
 """The stages of a manifest walked in order: made ready, given their share of memory, joined.
 
-    prepare every stage -> plan -> ways -> memory -> streams -> the rows of a product
+    ways -> every stage made ready -> memory -> streams -> the rows of a product
 
 Nothing is computed before the first row is asked for.
 """
@@ -8,13 +8,11 @@ Nothing is computed before the first row is asked for.
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Final
 
 from camkit.bundle.chain import CAPTURE
 from camkit.bundle.plane import Plane
-from camkit.bundle.sensor import MOSAIC, RGB
-from camkit.bundle.stages import Stage
+from camkit.bundle.stages import StageEntry
 from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.runtime.job.job import Job
@@ -22,8 +20,8 @@ from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
 from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES
 from camkit.runtime.plan.ways import LEFT_OUT, stand_ins, ways_of
-from camkit.runtime.rows import ArrayRows, Rows, RowSource
-from camkit.runtime.stage_finder import stage_keys, stage_module
+from camkit.runtime.rows import ArrayRows, RowSource
+from camkit.runtime.stage_finder import module_of, stage_keys
 
 FIXED_BYTES: Final = 240_000_000
 """Interpreter and libraries, and what they keep (measured, see docs/performance.md)."""
@@ -37,43 +35,33 @@ class Walk:
     Attributes:
         stages: As the manifest lists them.
         keys: Their names for people and clocks.
-        ways: The way each takes; set by `settle`.
+        ways: The way each takes.
     """
 
-    def __init__(self, job: Job, *, before: int | None = None) -> None:
-        """Prepare every stage; `settle` does what was not planned yet.
+    def __init__(self, job: Job) -> None:
+        """Make every stage ready, and share the memory among those that run.
 
         Args:
-            job: The capture.
-            before: Number of a stage; planes that it and those behind it give cannot be asked for
-                beforehand. None for all planes.
-        """
-        self._job = job
-        self.stages = job.setup.stages
-        self.keys = stage_keys(self.stages)
-        self.ways: tuple[str, ...] = ()
-        self._before = len(self.stages) if before is None else before
-        self._instead: dict[str, str] = {}
-        self._planes = _planes_of(job)
-        self._works: list[StageWork] = [
-            stage_module(stage.type).prepare(stage, job) for stage in self.stages
-        ]
-
-    def settle(self) -> None:
-        """Choose the ways by the job's plan, and share the memory among the stages that run.
+            job: The capture, planned.
 
         Raises:
             ContractError: If the memory does not do, or a stage is left out that no plane stands in
                 for.
         """
-        job = self._job
+        self._job = job
+        self.stages = job.setup.stages
+        self.keys = stage_keys(self.stages)
         self.ways = ways_of(self.stages, job.work)
+        self._planes = _planes_of(job)
         self._instead = stand_ins(self.stages, self.ways, self._planes)
-        # not a method: a job must not hold the walk that holds it, or it waits for the collector
-        job.prober = partial(_probed, before=self._before)
-        job.record["stages"] = {
-            key: {"way": way or "left out"} for key, way in zip(self.keys, self.ways, strict=True)
-        }
+        self._works: list[StageWork] = [
+            module_of(stage).prepare(stage, job) for stage in self.stages
+        ]
+        self._share_memory()
+        job.log.is_ready = True
+
+    def _share_memory(self) -> None:
+        job = self._job
         running = [work for work, way in zip(self._works, self.ways, strict=True) if way]
         flexible = [work for work in running if work.fit is not None]
         cap = job.options.max_mem_bytes or DEFAULT_MAX_MEM_BYTES
@@ -107,7 +95,8 @@ class Walk:
         held = sum(work.held_bytes for work in running)
         job = self._job
         stored = 0 if job.bundle is None else max(job.bundle.stored_bytes - USUAL_BYTES, 0)
-        return FIXED_BYTES + stored + job.capture.resident_bytes + job.reserved_bytes + held
+        resident: int = job.capture.resident_bytes
+        return FIXED_BYTES + stored + resident + job.reserved_bytes + held
 
     def warnings(self) -> tuple[str, ...]:
         """Return what the stages have to say once the last row is out."""
@@ -141,13 +130,15 @@ class Walk:
         takers = Counter([*lasts, *(name for number in needed for name in self._taken(number))])
         there = {CAPTURE: _capture_stream(job, self._planes[CAPTURE]), **job.known}
         ready = {name: stream.shared(takers[name]) for name, stream in there.items()}
-        job.meter.expect([name for number in needed for name in self.stages[number].gives])
+        job.log.meter.expect([name for number in needed for name in self.stages[number].gives])
         for number in needed:
             taken = [ready[name].pop() for name in self._taken(number)]
             made = self._works[number].run(taken)
             for name, given in zip(self.stages[number].gives, made, strict=True):
                 if name not in job.known:
-                    counted = given.timed(job.clock, self.keys[number]).metered(job.meter, name)
+                    counted = given.timed(job.log.clock, self.keys[number]).metered(
+                        job.log.meter, name
+                    )
                     ready[name] = counted.shared(takers[name])
         return tuple(ready[last].pop() for last in lasts)
 
@@ -179,7 +170,7 @@ class Walk:
         return tuple(self._instead.get(name, name) for name in self.stages[number].takes)
 
 
-def _giver_of(plane: str, stages: Sequence[Stage]) -> int:
+def _giver_of(plane: str, stages: Sequence[StageEntry]) -> int:
     """Return the number of the stage that gives a plane; -1 for the sensor.
 
     Raises:
@@ -194,7 +185,7 @@ def _giver_of(plane: str, stages: Sequence[Stage]) -> int:
     raise ContractError(f"no stage gives the plane {plane!r}; there are {there}")
 
 
-def _probed(job: Job, planes: Sequence[str], *, before: int) -> tuple[RowSource, ...]:
+def probed(job: Job, planes: Sequence[str]) -> tuple[RowSource, ...]:
     """Return what `Job.probe` gives.
 
     Raises:
@@ -202,10 +193,9 @@ def _probed(job: Job, planes: Sequence[str], *, before: int) -> tuple[RowSource,
     """
     numbers = [_giver_of(plane, job.setup.stages) for plane in planes]
     for plane, number in zip(planes, numbers, strict=True):
-        if number >= before:
+        if job.before is not None and number >= job.before:
             raise ContractError(f"the plane {plane!r} is asked for by a stage that it is made from")
-    walk = Walk(job.unheard(), before=max(numbers))
-    walk.settle()
+    walk = Walk(job.unheard(before=max(numbers)))
     return tuple(stream.rows() for stream in walk.streams(*planes))
 
 
@@ -213,36 +203,18 @@ def _planes_of(job: Job) -> dict[str, Plane]:
     """Return the planes that are stated; without a bundle that of the capture alone."""
     if job.bundle is not None:
         return job.bundle.manifest.all_planes
-    channels = MOSAIC if job.capture.cfa is not None else RGB
-    return {CAPTURE: Plane(type="uint16", channels=channels, domain="dn")}
+    plane: Plane = job.capture.plane(None)
+    return {CAPTURE: plane}
 
 
-def _capture_stream(job: Job, plane: Plane) -> Stream:
-    """Return capture as it is; planes that come in place of a mosaic have their own channels."""
+def _capture_stream(job: Job, stated: Plane) -> Stream:
+    """Return the capture as it is."""
     capture = job.capture
-    if capture.cfa is None and plane.channels == MOSAIC:
-        plane = plane.model_copy(update={"channels": RGB})
+    rows = capture.rows()
     return Stream(
-        plane=plane,
-        shape=capture.plane_shape,
+        plane=capture.plane(stated),
+        shape=rows.shape,
         gains=(1.0,) * capture.channels,
-        source=_Samples(job),
-        owned=False,
+        source=rows,
+        owned=capture.gives_own_rows,
     )
-
-
-class _Samples:
-    """The samples of a capture as the file holds them."""
-
-    def __init__(self, job: Job) -> None:
-        self._capture = job.capture
-
-    @property
-    def shape(self) -> tuple[int, int, int]:
-        """Return (channel, h, w); a mosaic is one channel."""
-        return self._capture.plane_shape
-
-    def read(self, top: int, bottom: int) -> Rows:
-        """Return rows top..bottom."""
-        rows: Rows = self._capture.samples[..., top:bottom, :]
-        return rows if rows.ndim == 3 else rows[None]

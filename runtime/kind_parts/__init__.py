@@ -1,5 +1,8 @@
-"""Parts of a kind whose captures are no photographs, beside its maker.
+"""Parts of a kind of camera for the ordinary commands, as data with defaults for photographs.
 
-proving    golden captures of its bundles, and what becomes of them again
-recording  scenes recorded by its cameras, and their files
+outputs           files that its captures become
+picture_files     those of photographs
+product_files     those of all else
+photograph_facts  what a photograph states of itself
+golden            golden captures of its bundles
 """

@@ -9,7 +9,7 @@ from camkit.runtime.plan.decision import FULL, SMALL, Subject, Work
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.plan.tiers import TierWork, work_shares
 from camkit.runtime.plan.ways import LEFT_OUT, ways_of
-from camkit.runtime.stage_finder import stage_module
+from camkit.runtime.stage_finder import module_of
 
 WINDOW_OVERLAP: Final = 1.15
 """Computed over kept pixels of a usual plan, where no windows are planned yet."""
@@ -80,7 +80,7 @@ def stage_seconds(
         elif isinstance(stage, Network) and windows is not None:
             taken.append(network_seconds(stage.role, windows, speed))
         else:
-            taken.append(stage_module(stage.type).seconds(stage, subject, work, speed))
+            taken.append(module_of(stage).seconds(stage, subject, work, speed))
     return tuple(taken)
 
 

@@ -26,7 +26,7 @@ from camkit.runtime.plan.ways import (
     ways_of,
     without_networks,
 )
-from camkit.runtime.stage_finder import stage_module
+from camkit.runtime.stage_finder import module_of
 
 LADDER: Final = (0.0, 1.0, 3.0, 10.0, 30.0)
 """Losses tried for --max-seconds, in units of that of `adaptive`."""
@@ -145,7 +145,7 @@ def asked_work(bundle: Bundle, options: Options) -> Work:
     unwanted = {
         stage.type
         for stage in stages
-        if (test := getattr(stage_module(stage.type), "is_left_out", None)) and test(options)
+        if (test := getattr(module_of(stage), "is_left_out", None)) and test(options)
     }
     work = Work(
         method=options.method,

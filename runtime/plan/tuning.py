@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from camkit.bundle.entry import Entry
 from camkit.bundle.stages import Stage
-from camkit.runtime.stage_finder import stage_module
+from camkit.runtime.stage_finder import module_of
 
 Value = float | int | str | None
 NOT_RECORDED = "not recorded"
@@ -34,11 +34,11 @@ def stage_tuning(stages: Sequence[Stage], method: str) -> Tuning | None:
     A stage whose module defines `tuning(entry, method)` says it itself; of any other the numbers
     that the bundle states for it are told.
     """
-    found = [stage for stage in stages if method in stage_module(stage.type).METHODS]
+    found = [stage for stage in stages if method in module_of(stage).METHODS]
     if not found:
         return None
     stage = found[-1]
-    own = getattr(stage_module(stage.type), "tuning", None)
+    own = getattr(module_of(stage), "tuning", None)
     if own is not None:
         told: Tuning = own(stage, method)
         return told

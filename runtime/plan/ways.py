@@ -13,17 +13,17 @@ from typing import Final
 
 from camkit.bundle.manifest import Manifest
 from camkit.bundle.plane import Plane
-from camkit.bundle.stages import Network, Stage
+from camkit.bundle.stages import Network, StageEntry
 from camkit.errors import ContractError
 from camkit.runtime.plan.decision import DEVELOP, Work
-from camkit.runtime.stage_finder import methods_of, stage_module
+from camkit.runtime.stage_finder import methods_of, module_of
 
 LEFT_OUT: Final = ""
 WHOLE: Final = "whole"
 """The way of a stage that has only one."""
 
 
-def ways_of(stages: Sequence[Stage], work: Work) -> tuple[str, ...]:
+def ways_of(stages: Sequence[StageEntry], work: Work) -> tuple[str, ...]:
     """Return the way of every stage.
 
     Raises:
@@ -32,19 +32,20 @@ def ways_of(stages: Sequence[Stage], work: Work) -> tuple[str, ...]:
     last = len(stages) if work.method is None else _last_with(stages, work.method)
     ways: list[str] = []
     for number, stage in enumerate(stages):
-        methods = stage_module(stage.type).METHODS
+        module = module_of(stage)
+        methods, is_needed = module.METHODS, getattr(module, "IS_NEEDED", False)
         if stage.type in work.left_out:
             ways.append(LEFT_OUT)
         elif not methods:
             ways.append(WHOLE)
-        elif number > last:
+        elif number > last and not is_needed:
             ways.append(LEFT_OUT)
         else:
             ways.append(work.method if number == last and work.method else methods[0])
     return tuple(ways)
 
 
-def planned(stages: Sequence[Stage], work: Work) -> Work:
+def planned(stages: Sequence[StageEntry], work: Work) -> Work:
     """Return the work with what follows from its ways.
 
     Raises:
@@ -53,7 +54,7 @@ def planned(stages: Sequence[Stage], work: Work) -> Work:
     return replace(work, networks=runs(stages, Network, work))
 
 
-def runs(stages: Sequence[Stage], kind: type[Stage], work: Work) -> bool:
+def runs(stages: Sequence[StageEntry], kind: type[StageEntry], work: Work) -> bool:
     """Return whether any stage of a kind is run.
 
     Raises:
@@ -71,7 +72,7 @@ def without_networks(manifest: Manifest, work: Work) -> Work | None:
     return next((other for other in tried if not other.networks), None)
 
 
-def offered_methods(stages: Sequence[Stage], planes: Mapping[str, Plane]) -> tuple[str, ...]:
+def offered_methods(stages: Sequence[StageEntry], planes: Mapping[str, Plane]) -> tuple[str, ...]:
     """Return the methods by which the stages can be walked, the best first.
 
     Args:
@@ -82,17 +83,24 @@ def offered_methods(stages: Sequence[Stage], planes: Mapping[str, Plane]) -> tup
         method
         for method in (*methods_of(stages), DEVELOP)
         if all(
-            way != LEFT_OUT or known_stand_in(stage, planes) is not None
+            _is_possible(stage, way, method, planes)
             for stage, way in zip(stages, ways_of(stages, Work(method=method)), strict=True)
         )
     )
 
 
-def _last_with(stages: Sequence[Stage], method: str) -> int:
+def _is_possible(stage: StageEntry, way: str, method: str, planes: Mapping[str, Plane]) -> bool:
+    """Return whether a stage can take a way; where nothing is restored, no stage restores."""
+    if way == LEFT_OUT:
+        return known_stand_in(stage, planes) is not None
+    return method != DEVELOP or way == WHOLE
+
+
+def _last_with(stages: Sequence[StageEntry], method: str) -> int:
     """Return the number of the last stage that has a method; -1 where nothing is restored."""
     if method == DEVELOP:
         return -1
-    found = [n for n, stage in enumerate(stages) if method in stage_module(stage.type).METHODS]
+    found = [n for n, stage in enumerate(stages) if method in module_of(stage).METHODS]
     if found:
         return found[-1]
     if not methods_of(stages):
@@ -103,7 +111,7 @@ def _last_with(stages: Sequence[Stage], method: str) -> int:
 
 
 def stand_ins(
-    stages: Sequence[Stage], ways: Sequence[str], planes: Mapping[str, Plane]
+    stages: Sequence[StageEntry], ways: Sequence[str], planes: Mapping[str, Plane]
 ) -> dict[str, str]:
     """Return the replacement of every plane that left-out stages would give.
 
@@ -123,7 +131,7 @@ def stand_ins(
     return instead
 
 
-def stand_in(stage: Stage, planes: Mapping[str, Plane]) -> str:
+def stand_in(stage: StageEntry, planes: Mapping[str, Plane]) -> str:
     """Return the plane that replaces the output of a stage that is left out.
 
     Args:
@@ -142,7 +150,7 @@ def stand_in(stage: Stage, planes: Mapping[str, Plane]) -> str:
     )
 
 
-def known_stand_in(stage: Stage, planes: Mapping[str, Plane]) -> str | None:
+def known_stand_in(stage: StageEntry, planes: Mapping[str, Plane]) -> str | None:
     """Return the plane that replaces the output of a stage; None if there is none."""
     given = planes[stage.gives[0]]
     if len(stage.gives) == 1:

@@ -25,9 +25,9 @@ from camkit.contracts import depth_name
 from camkit.errors import CamkitError, ContractError, one_line
 from camkit.progress import working
 from camkit.runtime.kind import part_of
-from camkit.runtime.kind_parts.proving import GoldenRun
 from camkit.runtime.network.graph import COST_RTOL, check_graph
 from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES
+from camkit.runtime.proof.golden_run import GoldenRun
 from camkit.runtime.proof.laws.proof import BrokenLawsError, prove_laws
 from camkit.runtime.proof.layers import prove_golden, prove_range, prove_tiling
 from camkit.runtime.stage_finder import check_stages
@@ -156,8 +156,8 @@ def _layer(name: str, prove: Callable[[], Result]) -> Layer:
 
 def _describe(path: Path) -> str:
     manifest = read_container_manifest(read_container(path))
-    if part_of(manifest).maker is None:  # what is made otherwise is not walked
-        check_stages(manifest, DEFAULT_MAX_MEM_BYTES)
+    part_of(manifest)  # its kind is installed
+    check_stages(manifest, DEFAULT_MAX_MEM_BYTES)
     sizes = ", ".join(manifest.sizes) or "none"
     return (
         f"{manifest.name} {manifest.version}, format {manifest.format_version}, "

@@ -1,17 +1,22 @@
 """A golden case run through the whole pipeline, for export and for `camkit check`."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from camkit.bundle.golden import GoldenArrays
 from camkit.bundle.manifest import GoldenCase
 from camkit.bundle.reader import Bundle
-from camkit.runtime.kind import part_of
-from camkit.runtime.kind_parts.proving import CaseWork
+from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 
+GoldenRun = Callable[[Bundle, GoldenCase, GoldenArrays, str | None], Reconstruction]
 
-def case_work(bundle: Bundle, case: GoldenCase, arrays: GoldenArrays, size: str | None) -> CaseWork:
+
+def case_work(
+    bundle: Bundle, case: GoldenCase, arrays: GoldenArrays, size: str | None
+) -> Reconstruction:
     """Prepare the processing of a golden capture, on one thread.
 
     Args:
@@ -20,9 +25,6 @@ def case_work(bundle: Bundle, case: GoldenCase, arrays: GoldenArrays, size: str 
         arrays: The case's capture and what it must become.
         size: Of the networks; None for a bundle without any.
     """
-    proving = part_of(bundle.manifest).proving
-    if proving is not None:
-        return proving.run(bundle, case, arrays, size)
     pipeline = Pipeline(bundle, Options(size=size, threads=1))
     capture = pipeline.capture_of(
         np.ascontiguousarray(arrays.capture),

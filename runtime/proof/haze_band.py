@@ -92,8 +92,7 @@ def _shape(bundle: Bundle) -> tuple[int, int, int]:
 
 
 def _found(bundle: Bundle, cells: FloatArray) -> CoarseBand:
-    stage, sensor = _stage(bundle), bundle.manifest.sensor
-    assert sensor.type != "spad"  # its counts never join
+    stage, sensor = _stage(bundle), bundle.manifest.light_sensor
     kernels = hazy_kernels(bundle.psf, bundle.haze, *sensor.response_arrays())
     clipped = np.zeros(cells.shape, np.bool_)
     return solve_coarse(

@@ -20,7 +20,6 @@ from camkit.bundle.reader import GOLDEN, Bundle, is_built_in
 from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ParityError
 from camkit.progress import counted
-from camkit.runtime.kind_parts.proving import GoldenRun
 from camkit.runtime.machine.limits import PROOF_MB, PROOF_WORK
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.graph import inspect_graph
@@ -28,6 +27,7 @@ from camkit.runtime.network.graph_walk import GraphFacts
 from camkit.runtime.network.probe import perturbation_reach, probe_runs
 from camkit.runtime.network.ranges import FP16_LIMIT, fits_fp16, node_activations
 from camkit.runtime.network.tiling import TileLayout, TileLimits, infer_bands, lay_windows
+from camkit.runtime.proof.golden_run import GoldenRun
 from camkit.runtime.proof.haze_band import prove_haze
 from camkit.runtime.proof.one_window import prove_one_window
 from camkit.runtime.rows import ArrayRows

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.bundle.reader import Bundle
-from camkit.bundle.sensor import BayerSensor, ColorSensor, SpadSensor
+from camkit.bundle.sensor import BayerSensor, ColorSensor
 from camkit.errors import ContractError, ParityError
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
@@ -28,9 +28,9 @@ def prove_one_window(bundle: Bundle, role: str, size: str) -> str:
             have to be tiled, and that is refused in mode exact.
     """
     cannot = f"cannot be tiled ({bundle.network_facts(role, size).global_text})"
-    sensor = bundle.manifest.sensor
-    if isinstance(sensor, SpadSensor):
+    if bundle.manifest.sensor.plane.domain == "counts":
         return f"{cannot}; photons are never tiled"
+    sensor = bundle.manifest.light_sensor
     if sensor.extent is None:
         raise ParityError(
             f"size {size}: {cannot}, and the sensor takes pictures of any size: state its extent, "

@@ -24,13 +24,21 @@ BYTES_PER_COLUMN: Final = 1_000
 REST_SHARE: Final = 0.06
 
 
-def prepare(_entry: Color, job: Job) -> StageWork:
+def look(_entry: Color, job: Job) -> Job:
     """Choose the colour matrix."""
-    options = job.options
-    matrix = job.color_matrix
+    options, matrix = job.options, job.color_matrix
     if matrix is None and job.capture.cfa is not None:
-        job.notes.append("no colour matrix: camera RGB is used as Rec.709, colours are approximate")
-    job.color = color = color_stage(matrix, options.color, exposure_ev=options.exposure_ev)
+        job.log.notes.append(
+            "no colour matrix: camera RGB is used as Rec.709, colours are approximate"
+        )
+    color = color_stage(matrix, options.color, exposure_ev=options.exposure_ev)
+    return replace(job, color=color)
+
+
+def prepare(_entry: Color, job: Job) -> StageWork:
+    """Make ready; nothing is decided here."""
+    assert job.color is not None  # it has looked
+    color = job.color
 
     def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
         (light,) = taken

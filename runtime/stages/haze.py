@@ -75,7 +75,7 @@ def prepare(entry: Dehaze, job: Job) -> StageWork:
         @cache
         def band() -> CoarseBand:
             # whoever asks first, the time is this stage's
-            with job.clock.stage(entry.type):
+            with job.log.clock.stage(entry.type):
                 return coarse_band(entry, picture, job)
 
         cleared = picture.with_bands(_cleared(picture, band, job.threads))
@@ -123,8 +123,7 @@ def coarse_band(entry: Dehaze, picture: Stream, job: Job) -> CoarseBand:
 @lru_cache(maxsize=KEPT_CAMERAS)
 def _kernels(bundle: Bundle, depth_mm: float | None, scale: float) -> HazyKernels:
     """Return the kernels of a camera; the same ones to all its captures."""
-    sensor = bundle.manifest.sensor
-    assert sensor.type != "spad"  # its counts never join
+    sensor = bundle.manifest.light_sensor
     response = sensor.response_arrays()
     return hazy_kernels(bundle.psf, bundle.haze, *response, depth_mm=depth_mm).scaled(scale)
 

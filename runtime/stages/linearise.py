@@ -64,7 +64,8 @@ class LinearRows:
     @property
     def shape(self) -> tuple[int, int, int]:
         """Return (channel, h, w)."""
-        return self._job.capture.plane_shape
+        shape: tuple[int, int, int] = self._job.capture.plane_shape
+        return shape
 
     def read(self, top: int, bottom: int) -> Rows:
         """Return rows top..bottom as (channel, rows, w) float32, a new array."""
@@ -87,7 +88,7 @@ class LinearRows:
         self._end = bottom
         self._clipped += int(np.count_nonzero(capture.saturated_rows(top, bottom)))
         self._counted += (bottom - top) * capture.samples.size // capture.height
-        self._job.clipped_fraction = self._clipped / self._counted
+        self._job.log.clipped_fraction = self._clipped / self._counted
 
 
 class MaskRows:

@@ -66,12 +66,15 @@ _OTHER_CAUSES: Final = (
 )
 
 
-def prepare(entry: Network, job: Job) -> StageWork:
-    """Check the capture against the envelope; the windows are planned when the memory is known."""
+def look(entry: Network, job: Job) -> Job:
+    """Check the capture against the envelope, unless another network did."""
     if entry.transform == "stabilise":
-        _ = job.noise  # known to the plan before any row
-    if "envelope" not in job.record:  # one network has looked already
-        job.falls_back = _falls_back(job)
+        job = job.with_noise()
+    return job if "envelope" in job.log.record else _compared(job)
+
+
+def prepare(entry: Network, job: Job) -> StageWork:
+    """Make ready; the windows are planned when the memory is known."""
     stage = _NetworkStage(entry, job)
     return StageWork(
         run=stage.run,
@@ -81,21 +84,22 @@ def prepare(entry: Network, job: Job) -> StageWork:
     )
 
 
-def _falls_back(job: Job) -> bool:
-    """Compare the capture with the bundle's envelope; return whether the network is left out."""
+def _compared(job: Job) -> Job:
+    """Return the job that knows whether the capture lies too far outside the bundle's envelope."""
     bundle, options = job.known_bundle, job.options
     asked = planned(bundle.manifest.stages, Work(method=options.method))
     if bundle.manifest.envelope is None or not asked.networks:
-        return False
-    with job.clock.stage("envelope"):
+        return job
+    job = job.with_noise()
+    with job.log.clock.stage("envelope"):
         seen = observe(job.capture, job.noise)
     found = findings(bundle.manifest.envelope, seen)
     warning = verdict(found, bundle.manifest.name, options.on_unsafe)
     falls_back = warning is not None and options.on_unsafe == "fallback"
-    job.record["envelope"] = {"seen": seen, "outside": found, "fallback": falls_back}
+    job.log.record["envelope"] = {"seen": seen, "outside": found, "fallback": falls_back}
     if warning is not None:
-        job.notes.append(warning)
-    return falls_back
+        job.log.notes.append(warning)
+    return replace(job, falls_back=falls_back)
 
 
 def seconds(entry: Network, subject: Subject, work: Work, speed: Speed) -> float:
@@ -129,9 +133,8 @@ def _parted(taken: Sequence[Stream]) -> tuple[list[Stream], list[Stream]]:
 
 def _familiar_noise(job: Job, stream: Stream) -> NoiseModel:
     """Return the noise by which a stream is stabilised."""
-    noise, sensor = job.noise.with_gains(stream.gains), job.known_bundle.manifest.sensor
-    if sensor.type == "spad":
-        return noise
+    noise = job.noise.with_gains(stream.gains)
+    sensor = job.known_bundle.manifest.light_sensor
     return familiar_noise(noise, [entry.read_noise_e for entry in sensor.noise])
 
 
@@ -177,11 +180,12 @@ class _NetworkStage:
         ]
         taken = bundle.manifest.planes[entry.takes[0]]
         self._windows = lay_network(job.grid_px(taken), networks, limits, work.network_labels())
-        job.windows[entry.role] = self._windows
-        job.notes.extend(self._windows.notes())
-        tiles = {role: windows.to_json() for role, windows in job.windows.items()}
+        log = job.log
+        log.windows[entry.role] = self._windows
+        log.notes.extend(self._windows.notes())
+        tiles = {role: windows.to_json() for role, windows in log.windows.items()}
         one = len(bundle.manifest.networks) == 1
-        job.record["tiles"] = tiles[entry.role] if one else tiles
+        log.record["tiles"] = tiles[entry.role] if one else tiles
 
     def _trimmed(self, engine: NetworkEngine, cap_bytes: int) -> Run:
         """Return the run of a network that has the memory to itself, as far as it is near the cap.
@@ -254,7 +258,7 @@ class _NetworkStage:
         )
         bands = self._windows.bands(
             given_rows(entry, job, taken),
-            progress=lambda done, total: job.meter.reach(entry.gives[0], done / total),
+            progress=lambda done, total: job.log.meter.reach(entry.gives[0], done / total),
             cancel=job.cancel,
             guard=self._guard,
             stand_in=stand_in,
@@ -305,7 +309,7 @@ class _NetworkStage:
     def _counted(self, bands: Iterator[FloatArray], keeper: LightKeeper) -> Iterator[FloatArray]:
         """Write down with every band in how much of the picture so far light was moved."""
         for band in bands:
-            self._job.sections["laws"] = {
+            self._job.log.sections["laws"] = {
                 "enforced": keeper.bound is not None,
                 "fallback_fraction": round(keeper.fallback_fraction, 6),
             }

@@ -22,10 +22,14 @@ OPTIONS: Final = ("white_balance",)
 REST_SHARE: Final = 0.04
 
 
-def prepare(_entry: WhiteBalance, job: Job) -> StageWork:
+def look(_entry: WhiteBalance, job: Job) -> Job:
     """Choose the gains."""
-    job.white_balance = gains = _choose(job)
-    cfa = job.capture.cfa
+    return replace(job, white_balance=_choose(job))
+
+
+def prepare(_entry: WhiteBalance, job: Job) -> StageWork:
+    """Make ready; nothing is decided here."""
+    cfa, gains = job.capture.cfa, job.white_balance
 
     def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
         (light,) = taken
@@ -51,11 +55,11 @@ def _choose(job: Job) -> Gains:
         return (1.0, 1.0, 1.0)
     sensor = None if job.bundle is None else job.bundle.manifest.sensor
     if sensor is None or sensor.type != "bayer":
-        job.notes.append(
+        job.log.notes.append(
             "the capture states no white balance: gains of 1 are used, colours may have a cast"
         )
         return (1.0, 1.0, 1.0)
-    job.notes.append(f"the capture states no white balance: {sensor.illuminant} is assumed")
+    job.log.notes.append(f"the capture states no white balance: {sensor.illuminant} is assumed")
     return camera_from_rec709(np.array(sensor.color_matrix))[1]
 
 

@@ -108,16 +108,21 @@ def block_bytes(block_px: int, channels: int, *, threads: int) -> int:
     return 4 * channels * block_px * block_px * (PLANES_HELD + PLANES_PER_BLOCK * threads)
 
 
+def look(_entry: Wiener, job: Job) -> Job:
+    """Return the job with its noise."""
+    return job.with_noise()
+
+
 def prepare(entry: Wiener, job: Job) -> StageWork:
     """Return the bank: the kernels, where there is a choice, and the noise."""
-    bundle, depth_mm, _ = job.known_bundle, job.options.depth_mm, job.noise
+    bundle, depth_mm = job.known_bundle, job.options.depth_mm
     depths_mm = bundle.psf.depths_mm
     if depths_mm.size > 1:
         known = ", ".join(map(depth_name, depths_mm))
         untold = ESTIMATED if entry.depth == ESTIMATED else f"mean of {known}"
-        job.record["depth"] = untold if depth_mm is None else depth_name(depth_mm)
+        job.log.record["depth"] = untold if depth_mm is None else depth_name(depth_mm)
     if job.options.unit is not None and FOCUS in job.options.unit.facts:
-        job.record[FOCUS] = job.options.focus_um
+        job.log.record[FOCUS] = job.options.focus_um
 
     def warnings() -> tuple[str, ...]:
         found = job.kept.get(_nearness_key(entry))
@@ -177,8 +182,7 @@ def make_bank(entry: Wiener, job: Job, planes: Stream) -> BlockBank:
         planes: What it will restore.
     """
     bundle = job.known_bundle
-    sensor = bundle.manifest.sensor
-    assert sensor.type != "spad"  # a spad's counts never join a bank
+    sensor = bundle.manifest.light_sensor
     camera = bundle, job.options.focus_um, job.placement.kernel_scale
     window = job.window_of(planes.plane)
     if _finds_distance(entry, bundle, job.options):
@@ -202,8 +206,7 @@ def make_bank(entry: Wiener, job: Job, planes: Stream) -> BlockBank:
 
 def _kernels(bundle: Bundle, depth_mm: float | None, focus_um: float, scale: float) -> FieldKernels:
     """Return the kernels of an object distance; None for the mean."""
-    sensor = bundle.manifest.sensor
-    assert sensor.type != "spad"  # a spad's counts never join a bank
+    sensor = bundle.manifest.light_sensor
     return color_kernels(
         bundle.psf,
         *sensor.response_arrays(),
@@ -243,7 +246,7 @@ def _scene_kernels(
             cfa=seen.cfa,
             threads=job.threads,
         )
-    job.sections["distance"] = found.to_json()
+    job.log.sections["distance"] = found.to_json()
     return kernels.over(found)
 
 

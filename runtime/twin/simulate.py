@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from camkit.bundle.frozen_optics import psf_of_streaks
 from camkit.bundle.reader import Bundle
-from camkit.bundle.sensor import BayerSensor, Sensor, SpadSensor
+from camkit.bundle.sensor import BayerSensor, ColorSensor, Sensor
 from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import ContractError, UnsupportedError
 from camkit.haze import Haze
@@ -95,7 +95,7 @@ class Simulation:
 
 def simulate(
     scene: FloatArray,
-    sensor: Sensor,
+    sensor: ColorSensor,
     psf: FrozenPsf,
     options: SimulationOptions,
     *,
@@ -115,10 +115,7 @@ def simulate(
     Raises:
         ContractError: If the scene is not as stated or does not lie on the sensor, or the PSF
             does not reach the depth.
-        UnsupportedError: If the sensor counts photons.
     """
-    if isinstance(sensor, SpadSensor):
-        raise UnsupportedError("this twin has no sensor that counts photons")
     window = scene_window(
         scene, sensor, options.origin_px, scale=options.scale, surround_px=options.surround_px
     )
@@ -160,7 +157,7 @@ def photograph(scene: FloatArray, bundle: Bundle, options: SimulationOptions) ->
     """Photograph a scene with sensor and optics of a bundle; see `simulate` and `bare_psf`."""
     psf = bundle.psf if options.plate else bare_psf(bundle)
     haze = bundle.haze if bundle.manifest.has_haze else None
-    return simulate(scene, bundle.manifest.sensor, psf, options, haze=haze)
+    return simulate(scene, bundle.manifest.light_sensor, psf, options, haze=haze)
 
 
 def bare_psf(bundle: Bundle) -> FrozenPsf:

@@ -10,7 +10,7 @@ import numpy as np
 from camkit.bundle.golden import IMAGE
 from camkit.bundle.manifest import Manifest
 from camkit.bundle.reader import Bundle
-from camkit.bundle.sensor import RGB, ColorSensor, SpadSensor
+from camkit.bundle.sensor import RGB, ColorSensor
 from camkit.colorimetry import apply_matrix, rec709_from_camera
 from camkit.contracts import FloatArray
 from camkit.errors import UnsupportedError
@@ -29,9 +29,7 @@ def light_sensor(manifest: Manifest) -> ColorSensor:
     Raises:
         UnsupportedError: If it counts photons.
     """
-    if isinstance(manifest.sensor, SpadSensor):
-        raise UnsupportedError(f"bundle {manifest.name} counts photons; this twin sends light")
-    return manifest.sensor
+    return manifest.light_sensor
 
 
 def picture_scale(manifest: Manifest) -> int:

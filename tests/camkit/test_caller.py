@@ -24,9 +24,9 @@ from camkit.caller import (
     speaking_here,
 )
 from camkit.cli.app import app, run
-from camkit.runtime.development import WriteOptions
 from camkit.runtime.options import Options
 from camkit.runtime.output.dng import write_bayer_dng
+from camkit.runtime.write_options import WriteOptions
 from tests.capture_factory import write_tiny_captures
 from tests.dng_factory import dng_tags, scene_mosaic
 

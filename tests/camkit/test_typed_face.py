@@ -15,9 +15,9 @@ from camkit.bundle.stages import Color, Linearise
 from camkit.cli.app import run
 from camkit.field_types import check_value
 from camkit.kinds import KINDS
-from camkit.runtime.development import WriteOptions
 from camkit.runtime.face.keywords import KindKeywords, LoadKeywords, ProcessKeywords
 from camkit.runtime.options import Options
+from camkit.runtime.write_options import WriteOptions
 from tests.bundle_factory import write_tiny_bundle
 from tests.capture_factory import write_tiny_captures
 from tests.glare_bundle import write_glare_bundle

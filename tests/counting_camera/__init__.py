@@ -1,6 +1,6 @@
 """A kind of camera whose captures are no photographs: lists of counts that become sums.
 
-It stands for cameras of somebody else that bring a maker of products; no file of camkit knows it.
+It stands for cameras of somebody else that bring stages and products; no file of camkit knows it.
 """
 
 from typing import Final

@@ -111,7 +111,7 @@ def test_an_array_that_does_not_fit_is_refused_with_what_would(
 
 def test_photon_counts_are_for_the_kind_of_their_camera() -> None:
     diodes = SpadSensor(extent=Extent(width_px=8, height_px=6, pixel_pitch_um=6.0))
-    with pytest.raises(UnsupportedError, match="photon counts"):
+    with pytest.raises(UnsupportedError, match="counts photons"):
         _taken(np.zeros((6, 8), np.uint16), diodes)
 
 

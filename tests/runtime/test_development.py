@@ -10,11 +10,13 @@ from PIL import Image
 import camkit
 from camkit.bundle.reader import built_in_bundles, open_bundle
 from camkit.errors import ContractError
-from camkit.runtime.development import FileFormat, WriteOptions, begin
+from camkit.runtime.development import begin
 from camkit.runtime.options import Options
 from camkit.runtime.output.sidecar import sidecar_path
+from camkit.runtime.output.writer import FileFormat
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.raw import read_capture
+from camkit.runtime.write_options import WriteOptions
 from tests.capture_factory import write_tiny_captures
 from tests.dng_factory import write_scene
 

@@ -148,7 +148,7 @@ def test_the_bank_takes_the_kernels_of_the_unit_and_says_so(tmp_path: Path) -> N
             samples, iso=100, white_balance=(1.0, 1.0, 1.0), origin_px=(300, 300)
         )
         work = pipeline.start(capture)
-        return work.fill(), work.job.record
+        return work.fill(), work.job.log.record
 
     nominal, said = restored(plain, None)
     assert "focus_um" not in said

@@ -15,6 +15,7 @@ from camkit.bundle.reader import Bundle
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.kind import RuntimePart
+from camkit.runtime.options import Options
 from camkit.runtime.output.part_file import atomic_output
 from camkit.runtime.raw import file_sha256
 from camkit.runtime.twin.simulate import Simulation
@@ -23,7 +24,9 @@ from camkit.runtime.twin.truth import light_sensor
 NAME: Final = "toy"
 
 
-def read(file: Path, mosaic: MosaicOptions | None, _manifest: Manifest | None) -> Capture:
+def read(
+    file: Path, mosaic: MosaicOptions | None, _manifest: Manifest | None, _options: Options
+) -> Capture:
     """Read a file of the toy camera."""
     if mosaic is not None:
         raise ContractError("the toy camera has no mosaic; leave --mosaic out")
@@ -68,4 +71,4 @@ def write(path: Path, simulation: Simulation, bundle: Bundle) -> None:
         )
 
 
-PART: Final = RuntimePart(read=read, write=write, suffix=".tif")
+PART: Final = RuntimePart(read=read, write=write, suffixes=(".tif",))

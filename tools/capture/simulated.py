@@ -3,7 +3,7 @@
 import numpy as np
 
 from camkit.bundle.reader import Bundle
-from camkit.bundle.sensor import ColorSensor, SpadSensor
+from camkit.bundle.sensor import ColorSensor
 from camkit.colorimetry import Matrix, rec709_from_camera
 from camkit.errors import UnsupportedError
 from camkit.runtime.capture import Capture
@@ -17,8 +17,8 @@ def color_sensor(bundle: Bundle) -> ColorSensor:
     Raises:
         UnsupportedError: If it has not three channels.
     """
-    sensor = bundle.manifest.sensor
-    if isinstance(sensor, SpadSensor) or len(sensor.channels) != 3:
+    sensor = bundle.manifest.light_sensor
+    if len(sensor.channels) != 3:
         raise UnsupportedError(
             f"this tool judges pictures in three colours; {bundle.manifest.name} gives "
             f"{', '.join(sensor.channels)}"
@@ -37,9 +37,10 @@ def captured(pipeline: Pipeline, simulation: Simulation) -> Capture:
     """Return the simulation as a capture that the pipeline of its camera takes."""
     red, green, blue = simulation.white_balance
     x, y = (int(v) for v in simulation.window.origin_px)
-    return pipeline.capture_of(
+    capture: Capture = pipeline.capture_of(
         simulation.samples,
         iso=simulation.iso,
         white_balance=(red, green, blue),
         origin_px=(x, y),
     )
+    return capture

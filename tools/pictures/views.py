@@ -21,9 +21,9 @@ from camkit.bundle.stages import Deglare
 from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray
 from camkit.runtime.files.picture import read_light
-from camkit.runtime.kind_parts.recording import RecordingOptions
 from camkit.runtime.kinds.hdr.deglare.removal import Glare, GlareSettings, find_glare
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
+from camkit.runtime.kinds.spad.twin.recording import PhotonOptions
 from camkit.runtime.kinds.spad.twin.simulate import fitted, luminance, record
 from camkit.runtime.kinds.spad.twin.write import write_recorded
 from tools.hdr.glare_twin import exposed_scene, photographed, two_point_star
@@ -169,7 +169,7 @@ class Photons:
         bundle = open_bundle(find_bundle(name))
         camera = FineCamera.of(bundle)
         light = read_light(SCENES / self.scene)
-        recorded = record(light, bundle, RecordingOptions(photons=self.photons, seed=1))
+        recorded = record(light, bundle, PhotonOptions(photons=self.photons, seed=1))
         with TemporaryDirectory() as folder:
             capture = Path(folder) / "counts.npz"
             write_recorded(capture, recorded)

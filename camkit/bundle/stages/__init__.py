@@ -6,7 +6,7 @@ does stands in the module of the same name in `camkit.runtime.stages`, or in the
 linearise, repair, white_balance, demosaic    the front
 haze, wiener, highlights, deglare, network    the restoration
 raise_clipped, illumination, undistort, color what every picture needs behind it
-correct, super_resolve, sharpen               single photons
+correct, super_resolve, sharpen, lifetime     single photons
 register                                      all of them by type, and those of packages
 """
 
@@ -18,6 +18,7 @@ from camkit.bundle.stages.entry import JoinError, PackageStage, Parts, StageEntr
 from camkit.bundle.stages.haze import Dehaze
 from camkit.bundle.stages.highlights import Highlights
 from camkit.bundle.stages.illumination import Illumination
+from camkit.bundle.stages.lifetime import Lifetime
 from camkit.bundle.stages.linearise import Linearise
 from camkit.bundle.stages.network import Network
 from camkit.bundle.stages.raise_clipped import RaiseClipped
@@ -39,6 +40,7 @@ __all__ = [
     "Highlights",
     "Illumination",
     "JoinError",
+    "Lifetime",
     "Linearise",
     "Network",
     "PackageStage",

@@ -115,6 +115,19 @@ def need_rows(plane: Plane) -> None:
         raise JoinError(f"it takes pictures (y x), not planes over {plane.axes}")
 
 
+def need_counts_of_pixels(taken: Sequence[Plane]) -> Plane:
+    """Return the one plane of photons that a stage takes, as the pixels of the array counted them.
+
+    Raises:
+        JoinError: If it is given none, several, one of another domain or a finer one.
+    """
+    need_count(taken, 1)
+    need_domain(taken[0], "counts")
+    if taken[0].grid.pitch_ratio != 1:
+        raise JoinError("it takes what the pixels of the array counted, not a finer plane")
+    return taken[0]
+
+
 def one_linear(taken: Sequence[Plane]) -> Plane:
     """Return the one linear plane that a stage takes.
 

@@ -17,6 +17,7 @@ from camkit.bundle.stages.entry import PackageStage, StageEntry
 from camkit.bundle.stages.haze import Dehaze
 from camkit.bundle.stages.highlights import Highlights
 from camkit.bundle.stages.illumination import Illumination
+from camkit.bundle.stages.lifetime import Lifetime
 from camkit.bundle.stages.linearise import Linearise
 from camkit.bundle.stages.network import Network
 from camkit.bundle.stages.raise_clipped import RaiseClipped
@@ -48,6 +49,7 @@ BUILT_IN: Final[tuple[type[StageEntry], ...]] = (
     Correct,
     SuperResolve,
     Sharpen,
+    Lifetime,
 )
 """The stages that come with camkit: one line each."""
 

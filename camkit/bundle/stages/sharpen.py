@@ -1,7 +1,7 @@
 """Times of photons to depth."""
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import ClassVar, Literal
 
 from camkit.bundle.entry import NonNegative, Positive, Word
 from camkit.bundle.plane import Plane
@@ -24,6 +24,7 @@ class Sharpen(StageEntry):
         laser_wavelength_nm: Of its light.
     """
 
+    runtime: ClassVar[str] = "camkit.runtime.kinds.spad.stages.sharpen"
     type: Literal["sharpen"] = "sharpen"
     takes: tuple[Word, ...] = ("fine",)
     gives: tuple[Word, ...] = ("depth",)

@@ -1,7 +1,7 @@
 """Photons of an array behind a plate on a finer grid: linearly, or by a network."""
 
 from collections.abc import Sequence
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -13,8 +13,7 @@ from camkit.bundle.stages.entry import (
     JoinError,
     Parts,
     StageEntry,
-    need_count,
-    need_domain,
+    need_counts_of_pixels,
 )
 
 PORTS = (1, 1)
@@ -42,6 +41,7 @@ class SuperResolve(StageEntry):
             pixels around it counted for sure (format 2.8); 0 for none, as before.
     """
 
+    runtime: ClassVar[str] = "camkit.runtime.kinds.spad.stages.super_resolve"
     type: Literal["super_resolve"] = "super_resolve"
     takes: tuple[Word, ...] = ("photons",)
     gives: tuple[Word, ...] = ("fine",)
@@ -62,8 +62,7 @@ class SuperResolve(StageEntry):
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Return the photons on the fine grid."""
-        need_count(taken, 1)
-        need_domain(taken[0], "counts")
+        plane = need_counts_of_pixels(taken)
         sensor, optics = parts.sensor, parts.need_optics("it undoes their blur")
         if not isinstance(sensor, SpadSensor) or sensor.sub_pixels < 2:
             raise JoinError("it takes an array that counts photons and states its sub_pixels")
@@ -84,7 +83,6 @@ class SuperResolve(StageEntry):
                     f"its network of size {size} makes {facts.output_scale} samples of a pixel, "
                     f"the sensor has {sensor.sub_pixels} sub-pixels"
                 )
-        plane = taken[0]
         share = 1 / sensor.sub_pixels
         x, y = plane.grid.origin_px
         shift = sensor.phase * plane.grid.pitch_ratio * share

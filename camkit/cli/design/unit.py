@@ -96,9 +96,7 @@ def _of_bundle(path: Path, depths_mm: tuple[float, ...]) -> "tuple[EdgeCamera, d
     from camkit.runtime.unit import lens_hash
 
     bundle = open_bundle(path)
-    sensor = bundle.manifest.sensor
-    if sensor.type == "spad":
-        raise UnsupportedError("a sensor that counts photons has no edges to measure a focus on")
+    sensor = bundle.manifest.light_sensor
     depth_mm = depths_mm[0] if depths_mm else bundle.reference_depth_mm
     camera = EdgeCamera(psf=bundle.psf, sensor=sensor, depth_mm=depth_mm)
     if PRESCRIPTION in bundle.names:

@@ -13,7 +13,6 @@ from camkit.errors import ContractError
 
 if TYPE_CHECKING:
     from camkit.bundle.reader import Bundle
-    from camkit.runtime.capture import Capture
 
 LONGEST: Final = 300
 """Characters of a value of a part of a list that are printed."""
@@ -115,53 +114,14 @@ def _describe_psf(bundle: "Bundle") -> dict[str, Any] | None:
 
 
 def _describe_capture(path: Path, mosaic: Any) -> dict[str, Any]:
-    from camkit.kinds import kind_of_file
+    from camkit.kinds import BAYER, kind_of_file
     from camkit.runtime.kind import runtime_part
-    from camkit.runtime.raw import file_sha256, read_capture
+    from camkit.runtime.raw import file_sha256
 
     kind = kind_of_file(path)
-    if kind is not None and (maker := runtime_part(kind.name).maker) is not None:
-        facts = maker.describe(path)
-        return {"capture": str(path), "sha256": file_sha256(path), "kind": kind.name, **facts}
-    capture = read_capture(path, mosaic=mosaic)
-    matrix = capture.color_matrix
-    noise = capture.noise
-    return {
-        "capture": str(path),
-        "sha256": capture.sha256,
-        "contract": capture.contract,
-        "camera": capture.camera,
-        "width": capture.width,
-        "height": capture.height,
-        "cfa": capture.cfa,
-        "black_level": capture.black_level.ravel().tolist(),
-        "white_level": capture.white_level,
-        "white_balance": capture.white_balance,
-        "color_matrix": None if matrix is None else matrix.round(4).tolist(),
-        "orientation": capture.orientation,
-        "iso": capture.iso,
-        "exposure_time_s": capture.exposure_time_s,
-        "metadata": capture.metadata.stated(),
-        "noise": None if noise is None else [noise.shot, noise.read_variance],
-        "origin_px": capture.origin_px,
-        "sensor_size_px": capture.sensor_size_px,
-        "pixel_pitch_um": capture.pixel_pitch_um,
-        "bundle_named": capture.bundle_name,
-        "notes": _notes(capture),
-    }
-
-
-def _notes(capture: "Capture") -> list[str]:
-    """Return the notes of a capture, without those that its named optics explain."""
-    from camkit.bundle.reader import built_in_bundles, open_bundle
-    from camkit.runtime.files.doubts import notes_behind
-
-    path = built_in_bundles().get(capture.bundle_name or "")
-    if path is not None and capture.notes:
-        bundle = open_bundle(path)
-        if bundle.manifest.has_haze:
-            return notes_behind(capture, bundle.haze)
-    return list(capture.notes)
+    facts = runtime_part((kind or BAYER).name).describe(path, mosaic)
+    known = {} if kind is None else {"kind": kind.name}
+    return {"capture": str(path), "sha256": file_sha256(path), **known, **facts}
 
 
 def _lines(value: Any, indent: str) -> list[str]:

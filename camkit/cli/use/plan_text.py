@@ -3,6 +3,7 @@
 import json
 import logging
 from collections.abc import Sequence
+from contextlib import closing
 from typing import TYPE_CHECKING, Any, Final
 
 from camkit.cli.say import say
@@ -12,8 +13,8 @@ from camkit.progress import counted
 if TYPE_CHECKING:
     from camkit.runtime.batch import Pipelines, Task
     from camkit.runtime.capture import MosaicOptions
-    from camkit.runtime.development import WriteOptions
     from camkit.runtime.options import Options
+    from camkit.runtime.write_options import WriteOptions
 
 logger = logging.getLogger(__name__)
 
@@ -78,10 +79,8 @@ def _planned(
     if task.refusal is not None:
         raise ContractError(task.refusal)
     pipeline = pipelines.get(task.bundle, task.source)
-    if pipeline.maker is not None:
-        planned = pipeline.plan(task.source)
-    else:
-        planned = begin(pipeline, pipeline.read(task.source, headerless), write).planned()
+    with closing(pipeline.read(task.source, headerless)) as capture:
+        planned = begin(pipeline, capture, write).planned()
     return {"status": "planned", "bundle": task.bundle, **planned}
 
 

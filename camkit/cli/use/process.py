@@ -169,9 +169,9 @@ def process(
     from camkit.cli.use.cluster import cluster_client
     from camkit.cli.use.results import print_result
     from camkit.runtime.batch import process as run
-    from camkit.runtime.development import WriteOptions
     from camkit.runtime.options import Options, parse_memory, with_choices
     from camkit.runtime.unit import read_unit
+    from camkit.runtime.write_options import WriteOptions
 
     plain = Options(
         size=size,

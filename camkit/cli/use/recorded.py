@@ -12,7 +12,7 @@ from camkit.errors import ContractError
 if TYPE_CHECKING:
     from camkit.bundle.reader import Bundle
     from camkit.contracts import FloatArray
-    from camkit.runtime.kind_parts.recording import Recording, RecordingOptions
+    from camkit.runtime.kind import RuntimePart
 
 DEFAULT_PHOTONS: Final = 1e4
 
@@ -21,7 +21,7 @@ def simulate_recorded(
     scene: str,
     bundle: "Bundle",
     out: Path,
-    options: "RecordingOptions",
+    options: Any,
     given: Mapping[str, Any],
     *,
     overwrite: bool,
@@ -31,7 +31,7 @@ def simulate_recorded(
 
     Args:
         scene: A picture, the name of a scene of a seed, or the file of a scene of this kind.
-        bundle: The camera, whose kind has a recording.
+        bundle: The camera, which counts photons.
         out: The capture to write.
         options: How much light there is.
         given: Flag -> value of the options of photographs alone; those that are not None or False
@@ -42,23 +42,22 @@ def simulate_recorded(
     Raises:
         ContractError: If an option means nothing here, or the name is of no such file.
     """
-    recording = _recording(bundle)
+    part = _part_of(bundle)
     if said := [flag for flag, value in given.items() if value not in (None, False)]:
         raise ContractError(
             f"{', '.join(said)} does not apply to bundle {bundle.manifest.name}, which counts "
             "photons: use --photons, --sbr and --seed"
         )
-    if out.suffix.lower() not in recording.suffixes:
+    if out.suffix.lower() not in part.suffixes:
         raise ContractError(
-            f"a simulated capture of this camera is a file in {', '.join(recording.suffixes)}; "
-            f"got {out}"
+            f"a simulated capture of this camera is a file in {', '.join(part.suffixes)}; got {out}"
         )
-    files = recording.files(out)
+    files = part.files(out)
     if not overwrite and (there := [str(file) for file in files if file.exists()]):
         raise ContractError(f"{', '.join(there)} exists; add --overwrite or choose another name")
-    recorded = recording.record(_scene(scene), bundle, options)
+    recorded = part.simulate(_scene(scene), bundle, options)
     out.parent.mkdir(parents=True, exist_ok=True)
-    recording.write(out, recorded)
+    part.write(out, recorded, bundle)
     shape = list(recorded.values.shape)
     counts = int(recorded.values.sum(dtype="int64"))
     if json_:
@@ -70,21 +69,19 @@ def simulate_recorded(
         say(f"{out}{beside}: {recorded.name} {'x'.join(map(str, shape))}, {counts} counts")
 
 
-def light_of(
-    photons: float | None, sbr: float | None, seed: int, bundle: "Bundle"
-) -> "RecordingOptions | None":
+def light_of(photons: float | None, sbr: float | None, seed: int, bundle: "Bundle") -> Any:
     """Return the amount of light, for cameras whose captures are no photographs; else None.
 
     Raises:
         ContractError: If photons are stated of a camera that counts none.
     """
-    from camkit.runtime.kind import part_of
-    from camkit.runtime.kind_parts.recording import RecordingOptions
+    from camkit.runtime.twin.simulate import SimulationOptions
 
-    if part_of(bundle.manifest).recording is None:
+    options = _part_of(bundle).simulation
+    if options is SimulationOptions:
         _check_light_alone(photons, sbr, bundle)
         return None
-    return RecordingOptions(
+    return options(
         photons=DEFAULT_PHOTONS if photons is None else photons,
         sbr=math.inf if sbr is None else sbr,
         seed=seed,
@@ -105,12 +102,10 @@ def _check_light_alone(photons: float | None, sbr: float | None, bundle: "Bundle
         )
 
 
-def _recording(bundle: "Bundle") -> "Recording":
+def _part_of(bundle: "Bundle") -> "RuntimePart":
     from camkit.runtime.kind import part_of
 
-    recording = part_of(bundle.manifest).recording
-    assert recording is not None
-    return recording
+    return part_of(bundle.manifest)
 
 
 def _scene(scene: str) -> "FloatArray | Path":

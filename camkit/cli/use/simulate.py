@@ -15,7 +15,7 @@ from camkit.units import MM_PER_M
 
 if TYPE_CHECKING:
     from camkit.bundle.reader import Bundle
-    from camkit.bundle.sensor import Sensor
+    from camkit.bundle.sensor import ColorSensor, Sensor
     from camkit.contracts import FloatArray
     from camkit.runtime.twin.simulate import Simulation, SimulationOptions
     from camkit.scenes.saturation import Saturation
@@ -125,10 +125,10 @@ def simulate(
         }
         simulate_recorded(scene, opened, out, counted, given, overwrite=overwrite, json_=json_)
         return
-    if out.suffix.lower() != part.suffix:
+    if out.suffix.lower() not in part.suffixes:
         raise ContractError(
-            f"a simulated capture of this camera is a {part.suffix[1:].upper()}; expected a name "
-            f"in {part.suffix}, got {out}"
+            f"a simulated capture of this camera is a {part.suffixes[0][1:].upper()}; expected a "
+            f"name in {part.suffixes[0]}, got {out}"
         )
     _check_bits(bits, sensor)
     _check_truth(truth, out, opened)
@@ -149,7 +149,7 @@ def simulate(
         workers=available_threads(None),
     )
     drawn = _scene(scene, size, surround_px, is_cut=size_px is not None)
-    drawn, saturation = _exposed(drawn, sensor, options, saturate)
+    drawn, saturation = _exposed(drawn, opened.manifest.light_sensor, options, saturate)
     with working(f"photographing {scene}"):
         simulation = part.simulate(drawn, opened, options)
         shown = None if truth is None else ideal_picture(simulation, opened)
@@ -192,16 +192,12 @@ def _check_truth(truth: Path | None, out: Path, bundle: "Bundle") -> None:
 
 
 def _exposed(
-    scene: "FloatArray", sensor: "Sensor", options: "SimulationOptions", share: float | None
+    scene: "FloatArray", sensor: "ColorSensor", options: "SimulationOptions", share: float | None
 ) -> "tuple[FloatArray, Saturation | None]":
     """Return the scene with its exposure, and the share of its picture that saturates."""
     from camkit.runtime.twin.saturation import exposure_for_share, saturation_of
     from camkit.scenes.saturation import with_exposure
 
-    if sensor.type == "spad":
-        if share is not None:
-            raise ContractError("--saturate is for sensors that clip; this one counts photons")
-        return scene, None
     inner = slice(options.surround_px, -options.surround_px or None)
     seen = scene[:, inner, inner]
     if share is None:

@@ -63,7 +63,7 @@ def _physics(entrant: Entrant, axes: Axes, ground: Ground) -> Made:
 
 def _develop(entrant: Entrant, axes: Axes, ground: Ground) -> Made:
     """Return one trial; captures that are DNG need no bundle to be developed."""
-    if not entrant.is_reference and part_of(entrant.bundle.manifest).suffix == DNG:
+    if not entrant.is_reference and DNG in part_of(entrant.bundle.manifest).suffixes:
         return [replace(plain_trial(entrant, axes, ground, DEVELOP, DEVELOP), path=None)], []
     reason = "nothing stands for what its restoration gives"
     return _one_method(entrant, axes, ground, DEVELOP, reason)

@@ -39,6 +39,7 @@ from camkit.report.kind_finder import camera_of, check_photographs, find_part
 from camkit.report.quality import LIGHT_SUFFIXES, list_set, read_picture
 from camkit.runtime.kind import part_of
 from camkit.runtime.network.engine import available_threads, usable_providers
+from camkit.runtime.options import Options
 from camkit.runtime.plan.ways import offered_methods
 
 REPORT_VERSION: Final = 1
@@ -210,7 +211,7 @@ def open_entrants(bundles: Sequence[str], references: Sequence[str]) -> list[Ent
 def _timed_shot(bundle: Bundle, settings: Settings, folder: Path) -> _TimedShot:
     manifest, given, photo = bundle.manifest, settings.capture, settings.photo
     if given is not None:
-        capture = part_of(manifest).read(given, None, manifest)
+        capture = part_of(manifest).read(given, None, manifest, Options())
         return _TimedShot(given, (capture.width, capture.height), given.name)
     width, height = settings.width_px, settings.height_px
     if settings.small:

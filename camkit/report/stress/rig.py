@@ -30,7 +30,7 @@ from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.plan.decision import DEVELOP, Work
 from camkit.runtime.plan.rules.size import REFERENCE
 from camkit.runtime.plan.ways import offered_methods, planned
-from camkit.runtime.stage_finder import stage_module
+from camkit.runtime.stage_finder import module_of
 from camkit.runtime.twin.exposure import Setting, expose, levels_of, noise_of
 from camkit.runtime.twin.light import (
     Lens,
@@ -294,7 +294,7 @@ def usual_sizes(manifest: Manifest) -> tuple[str, ...]:
 
 def restored_plane(manifest: Manifest) -> str | None:
     """Return the plane that holds the light when all that restores is done; None if none does."""
-    last = next((s for s in manifest.stages[::-1] if stage_module(s.type).METHODS), None)
+    last = next((s for s in manifest.stages[::-1] if module_of(s).METHODS), None)
     names = list(manifest.planes)[::-1] if last is None else last.gives
     known = manifest.planes
     return next((n for n in names if known[n].domain == "linear" and known[n].grid.warped), None)
@@ -310,7 +310,7 @@ def _simple(bundle: Bundle, chosen: Mapping[str, Any]) -> tuple[Method, ...]:
     """Return the methods without networks that the bundle offers: nothing, and what comes first."""
     manifest = bundle.manifest
     offered = offered_methods(manifest.stages, manifest.all_planes)
-    usual = [methods[0] for s in manifest.stages if (methods := stage_module(s.type).METHODS)]
+    usual = [methods[0] for s in manifest.stages if (methods := module_of(s).METHODS)]
     found = [DEVELOP, *(m for m in usual if not planned(manifest.stages, Work(method=m)).networks)]
     return tuple(
         _method(bundle, INPUT if name == DEVELOP else name, {"method": name, **chosen})

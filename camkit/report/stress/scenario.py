@@ -14,7 +14,6 @@ from dataclasses import dataclass, field
 from typing import Any, Final, Literal
 
 from camkit.bundle.reader import Bundle
-from camkit.bundle.sensor import SpadSensor
 from camkit.errors import ContractError
 from camkit.report.discovery import discover
 from camkit.report.stress.verdict import Examiner, SweptScene, Verdict
@@ -31,7 +30,7 @@ LEAST_ROOM_PX: Final = 160
 def photographs(bundle: Bundle) -> str | None:
     """Return why a bundle cannot take scenarios that photograph; None if it can."""
     manifest = bundle.manifest
-    if isinstance(manifest.sensor, SpadSensor):
+    if manifest.sensor.plane.domain == "counts":
         return f"it takes {manifest.sensor.inputs[0]}, the scenario a photograph"
     if not manifest.has_kernels:
         return "it states no optics to photograph through"

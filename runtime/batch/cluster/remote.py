@@ -14,9 +14,10 @@ from camkit.caller import Language, option_text, speaking_here
 from camkit.runtime.batch.making import Common, Pipelines, try_task
 from camkit.runtime.batch.tasks import NO_BUNDLE, Task
 from camkit.runtime.capture import MosaicOptions
-from camkit.runtime.development import FileResult, WriteOptions
+from camkit.runtime.development import FileResult
 from camkit.runtime.machine.memory import keep_freed_memory, trim_heap
 from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES, Options
+from camkit.runtime.write_options import WriteOptions
 
 if TYPE_CHECKING:
     from distributed import Worker

@@ -7,11 +7,14 @@ from camkit.bundle.manifest import Manifest
 from camkit.bundle.reader import Bundle
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.kind import RuntimePart
+from camkit.runtime.options import Options
 from camkit.runtime.raw import read_capture
 from camkit.runtime.twin.simulate import Simulation, write_capture
 
 
-def read(file: Path, mosaic: MosaicOptions | None, _manifest: Manifest | None) -> Capture:
+def read(
+    file: Path, mosaic: MosaicOptions | None, _manifest: Manifest | None, _options: Options
+) -> Capture:
     """Read RAW, DNG, EXR, TIFF or PNG."""
     return read_capture(file, mosaic=mosaic)
 
@@ -21,4 +24,4 @@ def write(path: Path, simulation: Simulation, bundle: Bundle) -> None:
     write_capture(path, simulation, bundle.manifest.sensor, bundle.manifest.name)
 
 
-PART: Final = RuntimePart(read=read, write=write, suffix=".dng")
+PART: Final = RuntimePart(read=read, write=write, suffixes=(".dng",))

@@ -1,11 +1,12 @@
 """Captures of single photons: pulses, banks of them, fits and their bounds; products.
 
 files          readers of captures
+captures       captures on their way to products
+pixels         what is known of pixels besides their counts
 timing         what is known of their times
 containers     what files hold, in bytes, before it is read
 pulse          the time of one photon, in closed form
 time_axis      bins of a histogram or delays of a gate: what each sees of a pulse
-corrected      rows of a capture, pile-up undone
 pile_up        counts as a detector that is never blind would have given them
 guess_pulse    a pulse where none is stated
 bank           templates at many times of flight, scored against counts
@@ -19,23 +20,41 @@ hot_pixels     pixels that count without light: found and painted over
 sharpen        all of it for the rows of a capture
 lifetime       decays of fluorescence behind a pulse
 finer          the fine grid behind the plate of a bundle
+stages         what its bundles list
 twin           scenes recorded by the array of a bundle
-proving        its golden cases
+golden_captures   those that its bundles hold
 products       depth, intensity, light in flight, and their files
 """
 
 from typing import Final
 
+from camkit.bundle.stages import Correct, Lifetime, Sharpen
 from camkit.runtime.kind import RuntimePart
-from camkit.runtime.kind_parts.recording import Recording
-from camkit.runtime.kinds.spad.products.maker import MAKER
-from camkit.runtime.kinds.spad.proving import PROVING
+from camkit.runtime.kinds.spad.captures.photon_capture import photons_of_array, read_photons
+from camkit.runtime.kinds.spad.files.described import describe
+from camkit.runtime.kinds.spad.files.named import named_bundle
+from camkit.runtime.kinds.spad.golden_captures import GOLDEN
+from camkit.runtime.kinds.spad.products import OUTPUTS, PLANES
+from camkit.runtime.kinds.spad.products.decisions import know_photons
+from camkit.runtime.kinds.spad.twin.recording import PhotonOptions
 from camkit.runtime.kinds.spad.twin.simulate import record
 from camkit.runtime.kinds.spad.twin.write import SUFFIXES, files_of, write_recorded
 
 PART: Final = RuntimePart(
-    maker=MAKER,
-    proving=PROVING,
+    read=read_photons,
+    from_array=photons_of_array,
+    stages=(Correct(), Sharpen(takes=("photons",)), Lifetime()),
+    products=PLANES,
+    know=know_photons,
+    outputs=OUTPUTS,
+    of_capture=frozenset(),
+    named=named_bundle,
+    describe=describe,
+    simulate=record,
+    simulation=PhotonOptions,
+    write=write_recorded,
+    suffixes=SUFFIXES,
+    files=files_of,
+    golden=GOLDEN,
     laws="camkit.runtime.kinds.spad.twin.laws",
-    recording=Recording(suffixes=SUFFIXES, record=record, write=write_recorded, files=files_of),
 )

@@ -141,7 +141,7 @@ class Darkroom:
 def reason_not_judged(bundle: Bundle) -> str | None:
     """Return why no laws of photographs can be held against a bundle; None if they can."""
     manifest = bundle.manifest
-    if manifest.sensor.type == "spad" or manifest.stage(Color) is None:
+    if manifest.stage(Color) is None:
         return "it makes no photographs"
     if not manifest.networks:
         return "no network"

@@ -19,13 +19,14 @@ from camkit.report.stress.scene import stress_scenes
 from camkit.report.stress.score import judge_of
 from camkit.report.stress.verdict import Outcome, Verdict
 from camkit.runtime.kind import runtime_part
+from camkit.runtime.kind_parts.picture_files import PICTURES
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_of_camkit_has_its_parts(kind: str) -> None:
     part = find_part(kind, "bench", BenchPart)
     # a kind whose captures are no photographs measures itself
-    makes_products = runtime_part(kind).maker is not None
+    makes_products = runtime_part(kind).outputs is not PICTURES
     assert (part.measure is not None) == makes_products
     assert isinstance(find_part(kind, "stress", StressPart), StressPart)
 

@@ -17,18 +17,18 @@ from tests.planes_bundle import planes_sensor, write_planes_bundle
 
 
 def test_a_capture_that_states_everything_leaves_nothing_to_note(bundle: Bundle) -> None:
-    assert start(bundle, made_mosaic()).job.notes == []
+    assert start(bundle, made_mosaic()).job.log.notes == []
 
 
 def test_notes_of_the_decode_come_first(bundle: Bundle) -> None:
     capture = made_mosaic(notes=("half of it is missing",), white_balance=None)
-    notes = start(bundle, capture).job.notes
+    notes = start(bundle, capture).job.log.notes
     assert notes[0] == "half of it is missing"
     assert len(notes) == 2
 
 
 def test_planes_in_place_of_a_mosaic_are_noted(bundle: Bundle) -> None:
-    notes = start(bundle, made_planes()).job.notes
+    notes = start(bundle, made_planes()).job.log.notes
     assert notes == ["the capture has full colour instead of a mosaic: demosaicking is skipped"]
 
 
@@ -52,15 +52,15 @@ def test_an_assumed_place_is_noted_and_a_wrong_size_is_refused(bundle: Bundle) -
     small = made_mosaic(samples=np.full((32, 48), 500, np.uint16))
     centred = start(bundle, small, assume="centre").job
     assert centred.placement.window.origin_px == (24.0, 16.0)
-    assert centred.notes == [centred.placement.note]
+    assert centred.log.notes == [centred.placement.note]
     with pytest.raises(ContractError, match="48x32 pixels, the bundle's sensor 96x64"):
         start(bundle, small)
 
 
 def test_a_walk_that_nobody_hears_adds_no_section(bundle: Bundle) -> None:
     job = made_job(made_mosaic(), bundle)
-    job.unheard().sections["hdr"] = {"regions": 1}
-    assert job.sections == {}
+    job.unheard().log.sections["hdr"] = {"regions": 1}
+    assert job.log.sections == {}
 
 
 def test_noise_is_the_files_before_the_bundles_before_a_measured_one(bundle: Bundle) -> None:
@@ -73,7 +73,7 @@ def test_noise_is_the_files_before_the_bundles_before_a_measured_one(bundle: Bun
     for source, capture in captures.items():
         assert start(bundle, capture).record["noise"]["source"] == source
     job = start(bundle, captures["file"]).job
-    assert job.record["noise"]["shot"] == stated.shot
+    assert job.log.record["noise"]["shot"] == stated.shot
     assert job.noise == stated, "before white balance, which is a stage"
     assert job.white_balance == OWN_BALANCE
     at_iso = start(bundle, replace(captures["bundle"], iso=400.0)).job.noise
@@ -86,7 +86,7 @@ def test_noise_is_known_for_every_channel_of_a_camera(tmp_path: Path) -> None:
     camera = write_planes_bundle(tmp_path, stages, sensor=sensor, products={"image": "light"})
     capture = made_planes(samples=np.random.default_rng(0).random((5, *SHAPE), np.float32))
     for known in (capture, replace(capture, iso=None)):
-        assert len(made_job(known, camera).noise.shot) == 5
+        assert len(made_job(known, camera).with_noise().noise.shot) == 5
 
 
 def test_the_window_of_a_finer_plane_covers_the_same_place(bundle: Bundle) -> None:
@@ -118,22 +118,22 @@ def test_a_capture_of_another_camera_is_refused_unless_it_is_forced(bundle: Bund
     with pytest.raises(ContractError, match=r"names bundle trio, not tiny; .* force_bundle"):
         start(bundle, capture)
     forced = start(bundle, capture, force_bundle=True).job
-    assert forced.notes == [
+    assert forced.log.notes == [
         "the capture names bundle trio, not tiny: "
         "the result is right only if both have the same lens"
     ]
-    assert start(bundle, made_mosaic(bundle_name="tiny")).job.notes == []
+    assert start(bundle, made_mosaic(bundle_name="tiny")).job.log.notes == []
 
 
 def test_a_foreign_camera_whose_place_is_assumed_is_warned_of(bundle: Bundle) -> None:
     small = np.full((32, 48), 500, np.uint16)
     foreign = made_mosaic(samples=small, camera="Nikon D850")
-    notes = start(bundle, foreign, assume="centre").job.notes
+    notes = start(bundle, foreign, assume="centre").job.log.notes
     assert notes[0].startswith(
         "the capture is from the camera Nikon D850: the result is right only with the lens of"
     )
     nameless = made_mosaic(samples=small, sha256="0" * 64)
-    notes = start(bundle, nameless, assume="centre").job.notes
+    notes = start(bundle, nameless, assume="centre").job.log.notes
     assert notes[0].startswith("the capture names no camera: the result is right only with")
     own = made_mosaic(samples=small, camera="camkit tiny", bundle_name="tiny")
-    assert len(start(bundle, own, assume="centre").job.notes) == 1
+    assert len(start(bundle, own, assume="centre").job.log.notes) == 1

@@ -352,7 +352,7 @@ def test_a_time_that_the_network_does_not_fit_leaves_it_in_where_it_must_stay(
     camera = _enlarging(tmp_path, 1, 1, 2, "none")
     made = start(camera, _light(), max_seconds=1e-9)
     assert made.size == "M"
-    assert any("even the least work" in note for note in made.job.notes)
+    assert any("even the least work" in note for note in made.job.log.notes)
     assert made.fill().shape == (1, 128, 192)
 
 
@@ -586,11 +586,8 @@ def test_without_a_bundle_the_development_is_walked() -> None:
 def test_memory_of_the_walk_is_that_of_its_running_stages(bundle: Bundle) -> None:
     job = start(bundle, _broken()).job
     walk = Walk(job)
-    walk.settle()
     with_network = walk.needed_bytes()
-    job.work = replace(job.work, method="develop", networks=False)
-    walk = Walk(job)
-    walk.settle()
+    walk = Walk(replace(job, work=replace(job.work, method="develop", networks=False)))
     assert walk.needed_bytes() < with_network
     assert walk.needed_bytes() >= FIXED_BYTES + job.capture.resident_bytes
 
@@ -601,9 +598,7 @@ def test_memory_holds_what_weights_and_bundle_take_beyond_the_usual(
     job = start(bundle, _broken()).job
 
     def needed() -> int:
-        walk = Walk(job)
-        walk.settle()
-        return walk.needed_bytes()
+        return Walk(job).needed_bytes()
 
     small = needed()
     assert bundle.stored_bytes == bundle.path.stat().st_size

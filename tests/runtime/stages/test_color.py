@@ -35,14 +35,14 @@ def test_the_files_own_matrix_wins_over_the_bundles(bundle: Bundle) -> None:
 def test_without_bundle_and_statement_colours_are_rec709_and_that_is_said() -> None:
     made = start(None, made_mosaic(color_matrix=None))
     np.testing.assert_array_equal(made.color.matrix, np.eye(3))
-    assert [note.split(":")[0] for note in made.job.notes] == ["no colour matrix"]
+    assert [note.split(":")[0] for note in made.job.log.notes] == ["no colour matrix"]
 
 
 def test_planes_without_a_matrix_are_rec709_already(bundle: Bundle) -> None:
     for camera in (bundle, None):
         made = start(camera, made_planes())
         np.testing.assert_array_equal(made.color.matrix, np.eye(3))
-        assert not any("matrix" in note for note in made.job.notes)
+        assert not any("matrix" in note for note in made.job.log.notes)
 
 
 @pytest.mark.parametrize("step", [1, 7, 64])

@@ -22,7 +22,7 @@ from camkit.runtime.bank.haze import few_of
 from camkit.runtime.cancel import Cancelled
 from camkit.runtime.capture import Capture
 from camkit.runtime.files.doubts import NOTHING_DARK
-from camkit.runtime.job import cells
+from camkit.runtime.job import coarse_cells
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.plan.decision import PLAIN, Subject, Work
@@ -69,7 +69,7 @@ def test_the_mosaic_is_summed_not_what_was_made_of_it(
         shapes.append(samples.shape)
         return cell_means(samples, *rest)
 
-    monkeypatch.setattr(cells, "cell_means", watched)
+    monkeypatch.setattr(coarse_cells, "cell_means", watched)
     _filled(bundle, _capture())
     _filled(bundle, made_planes())
     assert shapes == [(1, 64, 96), (3, 64, 96)]
@@ -133,7 +133,7 @@ def test_its_seconds_are_its_own(bundle: Bundle, monkeypatch: pytest.MonkeyPatch
     found = haze.solve_coarse
 
     def watched(*args: Any, **options: Any) -> Any:
-        inside.append(work.job.clock.running)
+        inside.append(work.job.log.clock.running)
         return found(*args, **options)
 
     monkeypatch.setattr(haze, "solve_coarse", watched)
@@ -313,7 +313,7 @@ def test_a_capture_that_its_haze_lifts_is_not_noted_as_fog(bundle: Bundle, tmp_p
     noted = replace(_capture(), notes=(doubt, "another"))
     few = noted.samples.astype(np.float64)
     assert np.quantile(few, 1e-3) - 64 < 0.5 * (few.mean() - 64)
-    assert "another" in start(bundle, noted).job.notes
-    assert doubt not in start(bundle, noted).job.notes
+    assert "another" in start(bundle, noted).job.log.notes
+    assert doubt not in start(bundle, noted).job.log.notes
     clear = open_bundle(write_tiny_bundle(tmp_path))
-    assert doubt in start(clear, noted).job.notes
+    assert doubt in start(clear, noted).job.log.notes

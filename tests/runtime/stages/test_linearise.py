@@ -43,7 +43,7 @@ def test_rows_are_the_light_of_the_capture_wherever_reading_begins(
     np.testing.assert_array_equal(read_all(light.rows(), step), wanted)
     clipped = np.broadcast_to(capture.saturated_rows(0, 70), light.shape)
     np.testing.assert_array_equal(read_all(mask.rows(), step), clipped)
-    assert job.clipped_fraction == clipped.mean() > 0
+    assert job.log.clipped_fraction == clipped.mean() > 0
 
 
 @pytest.mark.parametrize("first", [0, 33])
@@ -54,7 +54,7 @@ def test_a_clipped_sample_is_counted_once_however_readings_overlap(first: int) -
     rows = light.rows()
     for bottom in range(first + 1, 70, 4):
         rows.read(max(bottom - 8, first), bottom)
-    assert job.clipped_fraction == capture.saturated_rows(first, bottom).mean()
+    assert job.log.clipped_fraction == capture.saturated_rows(first, bottom).mean()
 
 
 def test_the_mask_alone_counts_nothing() -> None:
@@ -62,7 +62,7 @@ def test_the_mask_alone_counts_nothing() -> None:
     job = made_job(capture)
     _, mask = run_stage(Linearise(), job, captured(capture))
     assert read_all(mask.rows()).any()
-    assert job.clipped_fraction == 0
+    assert job.log.clipped_fraction == 0
 
 
 def test_without_a_name_for_the_mask_none_is_given() -> None:

@@ -356,12 +356,12 @@ def test_a_capture_outside_the_envelope_is_told_once_however_many_networks(
     )
     capture = made_planes(samples=_light(1))
     made = start(camera, capture)
-    assert len(made.job.notes) == 1
+    assert len(made.job.log.notes) == 1
     assert made.size == "M"
     back = start(camera, capture, on_unsafe="fallback")
     assert back.record["envelope"]["fallback"]
     assert back.size is None
-    assert len(back.job.notes) == 1
+    assert len(back.job.log.notes) == 1
     np.testing.assert_array_equal(back.fill(), capture.samples)
     with pytest.raises(ContractError, match="outside the measured range"):
         start(camera, capture, on_unsafe="fail")

@@ -36,7 +36,7 @@ def test_a_silent_capture_gets_the_white_balance_of_the_bundles_light(bundle: Bu
     expected = camera_from_rec709(np.array(sensor.color_matrix))[1]
     np.testing.assert_allclose(made.white_balance, expected)
     assert made.white_balance != (1.0, 1.0, 1.0)
-    assert made.job.notes == [
+    assert made.job.log.notes == [
         f"the capture states no white balance: {sensor.illuminant} is assumed"
     ]
 
@@ -44,14 +44,14 @@ def test_a_silent_capture_gets_the_white_balance_of_the_bundles_light(bundle: Bu
 def test_without_bundle_and_statement_gains_are_1_and_that_is_said() -> None:
     made = start(None, made_mosaic(white_balance=None))
     assert made.white_balance == (1.0, 1.0, 1.0)
-    assert made.job.notes == [
+    assert made.job.log.notes == [
         "the capture states no white balance: gains of 1 are used, colours may have a cast"
     ]
 
 
 def test_planes_that_state_none_are_taken_as_they_are(bundle: Bundle) -> None:
     assert start(bundle, made_planes()).white_balance == (1.0, 1.0, 1.0)
-    assert start(None, made_planes()).job.notes == []
+    assert start(None, made_planes()).job.log.notes == []
 
 
 @pytest.mark.parametrize("cfa", CFA_PATTERNS)

@@ -8,7 +8,6 @@ import pytest
 import rawpy
 import tifffile
 
-from camkit.bundle.sensor import Extent, SpadSensor
 from camkit.colorimetry import camera_from_rec709
 from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import ContractError, UnsupportedError
@@ -135,9 +134,6 @@ def test_impossible_options_and_sensors_are_refused() -> None:
         SimulationOptions(exposure=-1)
     with pytest.raises(ContractError, match="seed"):
         SimulationOptions(seed=-1)
-    diodes = SpadSensor(extent=Extent(width_px=96, height_px=64, pixel_pitch_um=6.0))
-    with pytest.raises(UnsupportedError, match="counts photons"):
-        simulate(scene(), diodes, delta_psf(SENSOR), QUIET)
     anywhere = planes_sensor(size_px=None)
     with pytest.raises(UnsupportedError, match="any size"):
         simulate(scene(), anywhere, uniform_psf(streak_kernel(0.0)), QUIET)

@@ -47,7 +47,7 @@ from camkit.models_def.kinds.spad.sampling import Sampling
 from camkit.models_def.kinds.spad.training import PART, sampling_of
 from camkit.models_def.training.checkpoint import load_network, read_checkpoint, recipe_of
 from camkit.report.kinds.spad.ways import BASELINES
-from camkit.runtime.kinds.spad.proving import PROVING
+from camkit.runtime.kinds.spad.golden_captures import probe
 from camkit.scenes import procedural_scene
 from tools.tables.equal_training import checkpoint_of, finished
 from tools.tables.spad.array_table import ROWS
@@ -156,7 +156,7 @@ def write_baselines(
         height, width = WINDOW_PX
         networks = {}
         for role, one in baselines_of.items():
-            window = np.ascontiguousarray(PROVING.probe(bundle, role)[None, :, :height, :width])
+            window = np.ascontiguousarray(probe(bundle, role)[None, :, :height, :width])
             networks[role] = _slim(measure_network(drafts[role], one.network, [window]))
         manifest, members = _manifest(baselines_of, networks), _members(networks)
         bundle = write_bundle(first, manifest, members)

@@ -68,7 +68,7 @@ def timed_capture(
     camera = (manifest.kind, manifest.sensor.model_dump_json(), lens, depth_mm)
     parts = (*camera, width, height, shown, _VERSION)
     key = hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
-    path = folder / f"{bundle.manifest.name}-{width}x{height}-{key}{part.suffix}"
+    path = folder / f"{bundle.manifest.name}-{width}x{height}-{key}{part.suffixes[0]}"
     if not path.is_file():
         if photo is None:
             scene = np.minimum(procedural_scene(SCENE_SEED, height, width), np.float32(1))

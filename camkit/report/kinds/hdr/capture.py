@@ -65,12 +65,13 @@ def developer(bundle: Bundle, threads: int) -> Pipeline:
 def capture_of(pipeline: Pipeline, simulation: Simulation) -> Capture:
     """Return a simulated photograph as its camera's pipeline takes it."""
     x, y = (int(v) for v in simulation.window.origin_px)
-    return pipeline.capture_of(
+    capture: Capture = pipeline.capture_of(
         simulation.samples,
         iso=simulation.iso,
         white_balance=stated_balance(simulation.white_balance),
         origin_px=(x, y),
     )
+    return capture
 
 
 def clipped_planes(capture: Capture) -> NDArray[np.bool_]:

@@ -20,17 +20,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.bundle.reader import Bundle
+from camkit.bundle.stages import Sharpen
 from camkit.contracts import FloatArray
 from camkit.report.bench.timed.process_run import Job, run_job
 from camkit.report.bench.trial import Skip
 from camkit.report.kinds.spad.scenes import drawn_pictures
-from camkit.runtime.kind_parts.recording import Recorded
+from camkit.runtime.kinds.spad.captures.photon_capture import times_of_bundle
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from camkit.runtime.kinds.spad.finer.depth import FineSharpener
 from camkit.runtime.kinds.spad.finer.pictures import finer_frames
-from camkit.runtime.kinds.spad.proving import stage_set
+from camkit.runtime.kinds.spad.golden_captures import stage_set
 from camkit.runtime.kinds.spad.sharpen import Way
 from camkit.runtime.kinds.spad.twin.counting import Disturbances, count_times, scaled_to
+from camkit.runtime.kinds.spad.twin.recording import Recorded
 from camkit.runtime.kinds.spad.twin.scene import light_of_depth
 from camkit.runtime.kinds.spad.twin.simulate import seen_by, times_of
 from camkit.runtime.kinds.spad.twin.write import write_recorded
@@ -65,7 +67,7 @@ def timed_captures(camera: FineCamera) -> Timed:
     rng = np.random.default_rng(SEED)
     light = np.maximum(seen_by(camera, picture[None])[0], 0)
     frame = rng.poisson(light * PHOTONS).astype(np.float32)
-    if camera.sensor.time_bins == 0 or camera.sharpen is None:
+    if camera.sensor.time_bins == 0 or camera.bundle.manifest.stage(Sharpen) is None:
         return Timed(frame=frame, histogram=None)
     axis, pulse = times_of(camera)
     scene = light_of_depth(stage_set(camera, SEED), picture, axis, pulse)
@@ -133,7 +135,7 @@ def _process_row(
     with tempfile.TemporaryDirectory(prefix="camkit-bench-") as name:
         folder = Path(name)
         cube = folder / "cube.npz"
-        stated = dict(camera.stated_times())
+        stated = times_of_bundle(camera.bundle.manifest)
         write_recorded(cube, Recorded(name="histogram", values=histogram, stated=stated))
         job = Job(
             files=(cube,),

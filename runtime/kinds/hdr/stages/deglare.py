@@ -81,7 +81,7 @@ def _cleared(
         lambda: check_cancelled(job.cancel),
     )
     found[:] = [glare]
-    job.sections["glare"] = glare.to_json()
+    job.log.sections["glare"] = glare.to_json()
     top = 0
     for band in picture.bands():
         glare.paint(band, top, picture.gains)

@@ -198,14 +198,13 @@ def _painter(
         cells, kernels, lambda: check_cancelled(job.cancel), least_samples=least_samples
     )
     notes[:] = recovery.notes
-    job.sections["hdr"] = recovery.to_json()
+    job.log.sections["hdr"] = recovery.to_json()
     return Painter(recovery, rec709_of_planes(job.color_matrix))
 
 
 def _kernels(job: Job) -> StreakKernels:
     bundle = job.known_bundle
-    sensor = bundle.manifest.sensor
-    assert sensor.type != "spad"  # its counts never join
+    sensor = bundle.manifest.light_sensor
     kernels = color_kernels(
         bundle.psf,
         *sensor.response_arrays(),

@@ -92,6 +92,10 @@ class ArrayFile(CountsFile):
             part, axes = part[..., None], axes + "t"
         return checked_counts(self.path, part.transpose([axes.index(a) for a in "yxt"]), top)
 
+    def shares_memory(self, array: NDArray[Any]) -> bool:
+        """Return whether an array may lie where the counts do."""
+        return isinstance(self._values, np.ndarray) and np.may_share_memory(self._values, array)
+
     def close(self) -> None:
         """Release what it lies in."""
         self._close()

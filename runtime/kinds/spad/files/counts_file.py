@@ -89,6 +89,10 @@ class CountsFile(ABC):
             DecodeError: If the file is damaged, or what it holds are no counts.
         """
 
+    def shares_memory(self, _array: NDArray[Any]) -> bool:
+        """Return whether an array may lie where the counts do."""
+        return False
+
     @abstractmethod
     def close(self) -> None:
         """Release the file."""

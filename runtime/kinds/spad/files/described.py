@@ -6,13 +6,14 @@ from typing import Any
 
 import numpy as np
 
+from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.kinds.spad.files.counts_file import Hints
 from camkit.runtime.kinds.spad.files.named import named_bundle
 from camkit.runtime.kinds.spad.files.open_counts import open_counts
 from camkit.runtime.kinds.spad.timing import Timing, read_timing, timing_beside
 
 
-def describe(path: Path) -> Mapping[str, Any]:
+def describe(path: Path, _mosaic: MosaicOptions | None = None) -> Mapping[str, Any]:
     """Return what a capture holds, as plain JSON values.
 
     Args:

@@ -1,4 +1,4 @@
-"""The array of a bundle: its photons on the fine grid, linearly or by its network.
+"""The array of a bundle behind a stage that makes its photons finer: linearly, or by its network.
 
     photons (n, h, w) -- linear estimate at their level of light --> (n, m h, m w)
                       -- light and 3 sigma, white = 1 -- network --> (n, m h, m w)
@@ -8,15 +8,17 @@ of white, as it was in training. Whatever N is, what it gives is photons again.
 """
 
 import threading
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, Final
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
+from camkit.bundle.manifest import Manifest
 from camkit.bundle.reader import Bundle, is_built_in
 from camkit.bundle.sensor import SpadSensor
-from camkit.bundle.stages import Sharpen, SuperResolve
+from camkit.bundle.stages import SuperResolve
 from camkit.caller import option_text
 from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ContractError
@@ -36,7 +38,9 @@ LEAST_WHITE: Final = 4.0
 DEFAULT_SIZE: Final = "M"
 
 
-def network_planes(photons: FloatArray, white: float, dark: FloatArray | float = 0.0) -> FloatArray:
+def network_planes(
+    photons: FloatArray, white: float, dark: NDArray[np.floating] | float = 0.0
+) -> FloatArray:
     """Return what a network is given of a picture, (2, h, w): light, and 3 sigma of it.
 
     Args:
@@ -64,16 +68,12 @@ class FineCamera:
     Attributes:
         bundle: The camera.
         stage: How it makes pictures finer.
-        sharpen: Times that it takes captures to have which state none.
-        threads: Of its networks.
+        networks: Gives the network of a role and size.
     """
 
     bundle: Bundle
     stage: SuperResolve
-    sharpen: Sharpen | None
-    threads: int = 1
-    _engines: dict[str, NetworkEngine] = field(default_factory=dict, repr=False)
-    _lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
+    networks: Callable[[str, str], NetworkEngine]
 
     @classmethod
     def of(cls, bundle: Bundle, threads: int = 1, *, role: str | None = None) -> "FineCamera":
@@ -98,7 +98,7 @@ class FineCamera:
                 f"bundle {manifest.name} has no stage super_resolve; captures of single photons "
                 f"are sharpened with {option_text('bundle', 'none')}"
             )
-        return cls(bundle=bundle, stage=stage, sharpen=manifest.stage(Sharpen), threads=threads)
+        return cls(bundle=bundle, stage=stage, networks=_Networks(bundle, threads))
 
     @property
     def sensor(self) -> SpadSensor:
@@ -133,14 +133,7 @@ class FineCamera:
         Raises:
             ContractError: If there is none.
         """
-        sizes = self.sizes
-        if not sizes or (asked is not None and asked not in sizes):
-            have = ", ".join(sizes) or "none"
-            raise ContractError(
-                f"bundle {self.bundle.manifest.name} holds size(s) {have}; asked for "
-                f"{asked or 'a network'}; {option_text('method', 'linear')} needs none"
-            )
-        return asked or (DEFAULT_SIZE if DEFAULT_SIZE in sizes else next(iter(sizes)))
+        return size_of(self.bundle.manifest, self.stage.role, asked)
 
     def size_of_bins(self, asked: str | None) -> str:
         """Return the size of network that makes bins finer for depth: asked for, else the smallest.
@@ -153,37 +146,6 @@ class FineCamera:
         """
         small = next((s for s in self.bundle.manifest.sizes if s in self.sizes), None)
         return self.size(asked or small)
-
-    def stated_times(self) -> dict[str, Any]:
-        """Return what the bundle says of times and pulse, by the names of a timing file."""
-        usual, sensor = self.sharpen, self.sensor
-        if usual is None:
-            return {}
-        stated = {
-            "orientation": usual.orientation,
-            "time_bin_ps": sensor.time_bin_ps,
-            "first_ps": usual.first_ps,
-            "width_ps": usual.gate_width_ps,
-            "rc_ps": usual.gate_rc_ps,
-            "jitter_ps": usual.jitter_ps,
-            "fwhm_ps": usual.laser_fwhm_ps,
-            "wavelength_nm": usual.laser_wavelength_nm,
-        }
-        return {name: value for name, value in stated.items() if value is not None}
-
-    def check_shape(self, shape: tuple[int, int]) -> None:
-        """Refuse captures of another array, (h, w).
-
-        Raises:
-            ContractError: Names both sides.
-        """
-        own = (self.sensor.height_px, self.sensor.width_px)
-        if shape != own:
-            raise ContractError(
-                f"the capture has {shape[1]}x{shape[0]} pixels, the array of bundle "
-                f"{self.bundle.manifest.name} {own[1]}x{own[0]}; use "
-                f"{option_text('bundle', 'none')}"
-            )
 
     def linear(self, photons: float, kernel: FloatArray | None = None) -> LinearEstimate:
         """Return the linear estimate at a level of light.
@@ -204,18 +166,7 @@ class FineCamera:
         Raises:
             BundleError: If there is none, or its graph is not what the bundle says.
         """
-        with self._lock:
-            if size not in self._engines:
-                facts = self.bundle.network_facts(self.stage.role, size)
-                data = self.bundle.network_bytes(self.stage.role, size)
-                found = check_graph(data, facts)
-                self._engines[size] = NetworkEngine(
-                    data,
-                    threads=self.threads,
-                    scale=facts.output_scale,
-                    block_bytes=None if is_built_in(self.bundle) else found.block_bytes_per_pixel,
-                )
-            return self._engines[size]
+        return self.networks(self.stage.role, size)
 
     def by_network(
         self,
@@ -223,7 +174,7 @@ class FineCamera:
         size: str,
         *,
         white: float,
-        dark: FloatArray | float = 0.0,
+        dark: NDArray[np.floating] | float = 0.0,
         cancel: Cancel | None = None,
     ) -> FloatArray:
         """Return pictures (n, m h, m w) of photons (n, h, w) by the network of a size.
@@ -248,3 +199,43 @@ class FineCamera:
         np.maximum(found, 0, out=found)
         found *= np.float32(white)
         return found
+
+
+def size_of(manifest: Manifest, role: str, asked: str | None) -> str:
+    """Return the size of network to run for a role: the one asked for, else M.
+
+    Raises:
+        ContractError: If there is none.
+    """
+    sizes = manifest.networks.get(role, {})
+    if not sizes or (asked is not None and asked not in sizes):
+        have = ", ".join(sizes) or "none"
+        raise ContractError(
+            f"bundle {manifest.name} holds size(s) {have}; asked for "
+            f"{asked or 'a network'}; {option_text('method', 'linear')} needs none"
+        )
+    return asked or (DEFAULT_SIZE if DEFAULT_SIZE in sizes else next(iter(sizes)))
+
+
+class _Networks:
+    """The networks of a bundle outside a pipeline."""
+
+    def __init__(self, bundle: Bundle, threads: int) -> None:
+        self._bundle, self._threads = bundle, threads
+        self._engines: dict[tuple[str, str], NetworkEngine] = {}
+        self._lock = threading.Lock()
+
+    def __call__(self, role: str, size: str) -> NetworkEngine:
+        """Return a network, made when first asked for."""
+        with self._lock:
+            if (role, size) not in self._engines:
+                facts = self._bundle.network_facts(role, size)
+                data = self._bundle.network_bytes(role, size)
+                found = check_graph(data, facts)
+                self._engines[role, size] = NetworkEngine(
+                    data,
+                    threads=self._threads,
+                    scale=facts.output_scale,
+                    block_bytes=None if is_built_in(self._bundle) else found.block_bytes_per_pixel,
+                )
+            return self._engines[role, size]

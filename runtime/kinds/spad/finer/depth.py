@@ -1,50 +1,32 @@
-"""Depth on the fine grid: the photons of every bin made finer, then the times fitted.
+"""Depth on the fine grid: times fitted to bins that were made finer.
 
-    counts -- hot pixels painted over -- linear estimate of every bin -- / share -- fit -- * share
+    bins -- / share -- fit -- * share
 
 An estimate of weights w has the variance of counts times sum(w^2), so divided by that sum it has
 the mean and the variance of Poisson counts again, and sigma needs no other formula. But no photon
 may count for more than one, or chance is taken for a surface where they are few: the share is
 max(sum(w^2), largest w), and sigma is made smaller by the root of what that is too much. Amplitudes
 are multiplied back.
-
-Smearing times over a depth edge is worse than noise, so the estimate is that of a picture with
-more photons than a bin has. From some light on a network makes bins finer still.
 """
 
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
 
 from camkit.contracts import FloatArray
-from camkit.runtime.cancel import current_wish
 from camkit.runtime.kinds.spad.evidence import threshold_for
-from camkit.runtime.kinds.spad.finer.camera import FineCamera, white_of
+from camkit.runtime.kinds.spad.finer.bins import SHARPER, FineBins, finer_bins
+from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from camkit.runtime.kinds.spad.finer.linear import REACH
 from camkit.runtime.kinds.spad.finer.sigma import OF_LINEAR, OF_NETWORK, SigmaShares, slopes
 from camkit.runtime.kinds.spad.fit import evidence_at
-from camkit.runtime.kinds.spad.hot_pixels import MOST_DEAD, painted_over
+from camkit.runtime.kinds.spad.pixels import Pixels
 from camkit.runtime.kinds.spad.pulse import Pulse
 from camkit.runtime.kinds.spad.sharpen import Sharpened, Sharpener, Way, times_photons
 from camkit.runtime.kinds.spad.time_axis import TimeAxis
-
-SHARPER: Final = 20.0
-"""Times the photons of a bin of the estimate (`tools.spad.depth_sigma` at 2a55aa66)."""
-
-
-def _lit(coarse: Sharpened) -> float:
-    """Return the signal photons of a pixel, on average over those that show a surface."""
-    valid = coarse.valid[0]
-    return float(coarse.amplitude[0][valid].mean()) if valid.any() else 0.0
-
-
-def bright_bin(frames: FloatArray) -> float:
-    """Return the photons of a pixel in a bin where photons are, of (bins, h, w)."""
-    means = np.maximum(frames.mean(axis=(1, 2), dtype=np.float64), 0)
-    return float((means**2).sum() / max(float(means.sum()), 1e-12))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,8 +44,18 @@ class FineDepth:
     photons: float
 
 
+def coarse_sharpener(axis: TimeAxis, pulse: Pulse, way: Way) -> Sharpener:
+    """Return what fits the array's own pixels before anything is made finer."""
+    return Sharpener(axis, pulse, replace(way, pool="1", returns=1, method="log"))
+
+
+def fine_sharpener(axis: TimeAxis, pulse: Pulse, way: Way) -> Sharpener:
+    """Return what fits bins that were made finer."""
+    return Sharpener(axis, pulse, replace(way, pool="1", seek_hot=False))
+
+
 class FineSharpener:
-    """A pulse on an axis behind the plate of a bundle.
+    """A pulse on an axis behind the plate of a bundle, from counts to depth.
 
     Attributes:
         camera: The array.
@@ -93,8 +85,8 @@ class FineSharpener:
             always: Whether it does so however few photons there are.
         """
         self.camera = camera
-        self.sharpener = Sharpener(axis, pulse, replace(way, pool="1", seek_hot=False))
-        self._coarse = Sharpener(axis, pulse, replace(way, pool="1", returns=1, method="log"))
+        self.sharpener = fine_sharpener(axis, pulse, way)
+        self._coarse = coarse_sharpener(axis, pulse, way)
         self._size, self._always = size, always
         self.sharper = SHARPER
         self.shares: tuple[SigmaShares, SigmaShares] = (OF_LINEAR, OF_NETWORK)
@@ -117,96 +109,100 @@ class FineSharpener:
             blind: (h, w) pixels that pile-up left no counts in some bins.
             growth: (h, w) variance over mean of the counts, where pile-up was taken out of them.
         """
-        coarse = self._coarse.strip(counts, hot=hot, blind=blind)
-        is_hot, photons = coarse.hot[0], _lit(coarse)
-        lost = is_hot | blind if (is_hot | blind).mean() <= MOST_DEAD else is_hot
-        sound = painted_over(counts, lost) if lost.any() else counts
-        frames = np.ascontiguousarray(sound.transpose(2, 0, 1)) - dark.astype(np.float32)
-        enough = self._always or photons >= self.camera.stage.network_from_photons
-        size = self._size if enough else None
-        estimate = self.camera.linear(self.sharper * bright_bin(frames))
-        fine = estimate(frames) if size is None else self._by_network(frames, size, dark)
-        # dark counts scatter too: what is fitted holds them, as evidence and sigma must
-        fine += self._finer(dark).astype(np.float32)
-        gain = estimate.noise_gain.astype(np.float64) ** 2
-        share = np.maximum(gain, estimate.largest)
-        everywhere = np.tile(share, counts.shape[:2])
-        if growth is not None:
-            everywhere = everywhere * self._finer(growth)
-        even = np.ascontiguousarray((fine / everywhere).transpose(1, 2, 0), dtype=np.float32)
-        found = self._proved(even, self.sharpener.strip(even), coarse, everywhere)
-        less = np.tile(np.sqrt(gain / share), counts.shape[:2])
-        found = self._told(found, everywhere, is_hot, is_hot | blind)
-        sigma_ps = self.shares[size is not None].sigma_ps(
-            found.sigma_ps * less,
-            slopes(found.time_of_flight_ps),
-            photons=photons,
-            bin_ps=self.sharpener.fitter.bank.axis.step_ps,
+        known = Pixels.unknown(counts.shape[:2], hot=hot, dark=np.asarray(dark, np.float64))
+        bins = finer_bins(
+            self.camera,
+            self._coarse,
+            counts,
+            replace(known, blind=blind),
+            size=self._size,
+            always=self._always,
+            growth=growth,
+            sharper=self.sharper,
         )
-        return FineDepth(found=replace(found, sigma_ps=sigma_ps), size=size, photons=photons)
+        found = fitted_bins(bins.fine, bins, self.sharpener, self.shares)
+        return FineDepth(found=found, size=bins.size, photons=bins.photons)
 
-    def _by_network(self, frames: FloatArray, size: str, dark: NDArray[np.floating]) -> FloatArray:
-        return self.camera.by_network(
-            frames, size, white=white_of(frames), dark=np.asarray(dark), cancel=current_wish()
-        )
 
-    def _proved(
-        self,
-        even: FloatArray,
-        found: Sharpened,
-        coarse: Sharpened,
-        share: NDArray[np.float64],
-    ) -> Sharpened:
-        """Return it with the evidence of first returns over the background of the pixels around.
+def fitted_bins(
+    fine: FloatArray,
+    bins: FineBins,
+    sharpener: Sharpener,
+    shares: tuple[SigmaShares, SigmaShares] = (OF_LINEAR, OF_NETWORK),
+) -> Sharpened:
+    """Fit every sub-pixel.
 
-        Weights below 0 can take the background of a sub-pixel away, and anything is evidence over
-        nothing.
+    Args:
+        fine: (bins, m h, m w) photons without dark counts; changed.
+        bins: How they were made finer.
+        sharpener: See `fine_sharpener`.
+        shares: What goes into sigma, of the linear estimate and of a network.
+    """
+    scale, shape = bins.scale, bins.hot.shape
+    # dark counts scatter too: what is fitted holds them, as evidence and sigma must
+    fine += _finer(bins.pixels.dark, scale).astype(np.float32)
+    share = np.maximum(bins.gain, bins.largest)
+    everywhere = np.tile(share, shape)
+    if bins.growth is not None:
+        everywhere = everywhere * _finer(bins.growth, scale)
+    even = np.ascontiguousarray((fine / everywhere).transpose(1, 2, 0), dtype=np.float32)
+    found = _proved(even, sharpener, bins, everywhere)
+    less = np.tile(np.sqrt(bins.gain / share), shape)
+    found = _in_pixels(found, everywhere, bins)
+    sigma_ps = shares[bins.size is not None].sigma_ps(
+        found.sigma_ps * less,
+        slopes(found.time_of_flight_ps),
+        photons=bins.photons,
+        bin_ps=sharpener.fitter.bank.axis.step_ps,
+    )
+    return replace(found, sigma_ps=sigma_ps)
 
-        Args:
-            even: (m h, m w, bins) what was fitted.
-            found: In it.
-            coarse: In the array's own pixels.
-            share: (m h, m w) photons of a pixel for each that was fitted.
-        """
-        fitter, way = self.sharpener.fitter, self.sharpener.way
-        around = uniform_filter(coarse.background[0], size=2 * REACH + 1, mode="nearest")
-        least = (self._finer(around) / share).reshape(-1)
-        rows = np.flatnonzero(found.valid[0])
-        step = fitter.bank.step_ps
-        nearest = (found.time_of_flight_ps[0].reshape(-1)[rows] - fitter.bank.mu_ps[0]) / step
-        proof = evidence_at(
-            fitter.bank,
-            even.reshape(-1, even.shape[2])[rows],
-            np.clip(np.rint(nearest).astype(np.int64), 0, len(fitter.bank.mu_ps) - 1),
-            found.amplitude[0].reshape(-1)[rows],
-            found.background[0].reshape(-1)[rows],
-            least=least[rows],
-        )
-        evidence, valid = found.evidence.copy(), found.valid.copy()
-        own = evidence[0].reshape(-1)
-        own[rows] = np.minimum(own[rows], proof)
-        threshold = threshold_for(way.false_alarms, fitter.search_length)
-        valid &= valid[:1] & (own.reshape(valid.shape[1:]) > threshold)
-        return replace(found, evidence=evidence, valid=valid)
 
-    def _finer(self, values: NDArray[Any]) -> NDArray[Any]:
-        return _finer(values, self.camera.scale)
+def _proved(
+    even: FloatArray, sharpener: Sharpener, bins: FineBins, share: NDArray[np.float64]
+) -> Sharpened:
+    """Fit sub-pixels, with the evidence of first returns over the background of pixels around.
 
-    def _told(
-        self,
-        found: Sharpened,
-        share: NDArray[np.float64],
-        hot: NDArray[np.bool_],
-        doubtful: NDArray[np.bool_],
-    ) -> Sharpened:
-        scale = self.camera.scale
-        valid = found.valid & ~_finer(doubtful, scale)
-        return replace(
-            times_photons(found, share),
-            valid=valid,
-            pooled=np.where(valid, found.pooled, 0),
-            hot=np.broadcast_to(_finer(hot, scale), valid.shape).copy(),
-        )
+    Weights below 0 can take the background of a sub-pixel away, and anything is evidence over
+    nothing.
+
+    Args:
+        even: (m h, m w, bins) what is fitted.
+        sharpener: Fits it.
+        bins: Background of the array's own pixels.
+        share: (m h, m w) photons of a pixel for each that is fitted.
+    """
+    found, fitter, way = sharpener.strip(even), sharpener.fitter, sharpener.way
+    around = uniform_filter(bins.background, size=2 * REACH + 1, mode="nearest")
+    least = (_finer(around, bins.scale) / share).reshape(-1)
+    rows = np.flatnonzero(found.valid[0])
+    step = fitter.bank.step_ps
+    nearest = (found.time_of_flight_ps[0].reshape(-1)[rows] - fitter.bank.mu_ps[0]) / step
+    proof = evidence_at(
+        fitter.bank,
+        even.reshape(-1, even.shape[2])[rows],
+        np.clip(np.rint(nearest).astype(np.int64), 0, len(fitter.bank.mu_ps) - 1),
+        found.amplitude[0].reshape(-1)[rows],
+        found.background[0].reshape(-1)[rows],
+        least=least[rows],
+    )
+    evidence, valid = found.evidence.copy(), found.valid.copy()
+    own = evidence[0].reshape(-1)
+    own[rows] = np.minimum(own[rows], proof)
+    threshold = threshold_for(way.false_alarms, fitter.search_length)
+    valid &= valid[:1] & (own.reshape(valid.shape[1:]) > threshold)
+    return replace(found, evidence=evidence, valid=valid)
+
+
+def _in_pixels(found: Sharpened, share: NDArray[np.float64], bins: FineBins) -> Sharpened:
+    """Return it in photons of a pixel, without belief in what is hot or blind."""
+    valid = found.valid & ~_finer(bins.hot | bins.pixels.blind, bins.scale)
+    return replace(
+        times_photons(found, share),
+        valid=valid,
+        pooled=np.where(valid, found.pooled, 0),
+        hot=np.broadcast_to(_finer(bins.hot, bins.scale), valid.shape).copy(),
+    )
 
 
 def _finer(values: NDArray[Any], scale: int) -> NDArray[Any]:

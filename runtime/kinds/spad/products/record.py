@@ -3,9 +3,12 @@
 from collections.abc import Mapping
 from typing import Any
 
-from camkit.runtime.kinds.spad.products.survey import Survey
+from camkit.bundle.stages import SuperResolve
+from camkit.runtime.job.job import Job
+from camkit.runtime.kinds.spad.captures.photon_capture import photons_of
 from camkit.runtime.kinds.spad.pulse import FWHM_PER_SIGMA, GatedPulse, GaussianPulse, Pulse
 from camkit.runtime.kinds.spad.sharpen import Way
+from camkit.runtime.kinds.spad.stages.super_resolve import camera_of, size_of_network
 from camkit.runtime.kinds.spad.time_axis import TimeAxis
 
 
@@ -19,11 +22,12 @@ def told_way(way: Way) -> Mapping[str, Any]:
     }
 
 
-def told_finer(survey: Survey) -> Mapping[str, Any]:
-    """Return how pictures were made finer, as plain JSON values; nothing without a bundle."""
-    if survey.camera is None:
+def told_finer(job: Job) -> Mapping[str, Any]:
+    """Return how pictures were made finer, as plain JSON values; nothing where they were not."""
+    stage = next((s for s in job.setup.stages if isinstance(s, SuperResolve)), None)
+    if stage is None:
         return {}
-    size = survey.size_of_pictures
+    size = size_of_network(camera_of(stage, job), photons_of(job))
     return {"finer": "linear" if size is None else "net", "size": size}
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from camkit.bundle.reader import Bundle
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError, DecodeError
-from camkit.runtime.kind_parts.recording import Recorded, RecordingOptions
+from camkit.runtime.kinds.spad.captures.photon_capture import times_of_bundle
 from camkit.runtime.kinds.spad.files.npz import read_npz
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from camkit.runtime.kinds.spad.finer.linear import Grid
@@ -31,6 +31,7 @@ from camkit.runtime.kinds.spad.twin.counting import (
     count_times,
     scaled_to,
 )
+from camkit.runtime.kinds.spad.twin.recording import PhotonOptions, Recorded
 from camkit.runtime.kinds.spad.twin.scene import light_in_flight, light_of_depth
 from camkit.runtime.kinds.spad.twin.working import WORKING_POINTS
 from camkit.runtime.twin.light import LUMINANCE
@@ -41,7 +42,7 @@ MOST_BYTES: Final = 2_000_000_000
 S_PER_PS: Final = 1e-12
 
 
-def record(scene: FloatArray | Path, bundle: Bundle, options: RecordingOptions) -> Recorded:
+def record(scene: FloatArray | Path, bundle: Bundle, options: PhotonOptions) -> Recorded:
     """Record a scene.
 
     Args:
@@ -99,7 +100,7 @@ def times_of(camera: FineCamera) -> tuple[TimeAxis, Pulse]:
     Raises:
         ContractError: If its bundle states none.
     """
-    timing = Timing().with_stated(camera.stated_times())
+    timing = Timing().with_stated(times_of_bundle(camera.bundle.manifest))
     pulse = timing.pulse()
     if camera.sensor.time_bins == 0 or pulse is None:
         raise ContractError(
@@ -167,7 +168,7 @@ def dead_share(camera: FineCamera, point: str) -> float:
 
 
 def _counted(
-    camera: FineCamera, light: FloatArray, options: RecordingOptions, rng: np.random.Generator
+    camera: FineCamera, light: FloatArray, options: PhotonOptions, rng: np.random.Generator
 ) -> Recorded:
     photons = collected(camera, options.photons)
     mean = seen_by(camera, light[None]).astype(np.float64) * photons
@@ -183,7 +184,7 @@ def _timed(
     camera: FineCamera,
     light: FloatArray,
     axis: TimeAxis,
-    options: RecordingOptions,
+    options: PhotonOptions,
     rng: np.random.Generator,
 ) -> Recorded:
     photons = collected(camera, options.photons)
@@ -191,7 +192,7 @@ def _timed(
     mean += photons / options.sbr / axis.bins
     dark = dark_counts(camera, "depth")
     counts = count_times(mean, axis.orientation, Disturbances(dark=dark), rng)
-    stated = {**_stated(camera), **camera.stated_times()}
+    stated = {**_stated(camera), **times_of_bundle(camera.bundle.manifest)}
     return Recorded(name="histogram", values=counts, stated=stated)
 
 

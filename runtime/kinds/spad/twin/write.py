@@ -12,11 +12,12 @@ import scipy.io
 import tifffile
 from numpy.typing import NDArray
 
+from camkit.bundle.reader import Bundle
 from camkit.errors import ContractError, UnsupportedError
-from camkit.runtime.kind_parts.recording import Recorded
 from camkit.runtime.kinds.spad.files.counts_file import EXTRA
 from camkit.runtime.kinds.spad.files.named import NAME
 from camkit.runtime.kinds.spad.timing import TABLE_OF, timing_beside
+from camkit.runtime.kinds.spad.twin.recording import Recorded
 from camkit.runtime.output.part_file import atomic_output
 
 CYCLE: Final = 2
@@ -25,8 +26,8 @@ MOST_STAMPS: Final = 50_000_000
 """Photons of a PTU, 200 MB."""
 
 
-def write_recorded(path: Path, recorded: Recorded) -> None:
-    """Write a capture; the suffix says as what.
+def write_recorded(path: Path, recorded: Recorded, _bundle: Bundle | None = None) -> None:
+    """Write a capture; the suffix says as what, and the capture which bundle it is of.
 
     Raises:
         UnsupportedError: If a package is missing that writes such files.

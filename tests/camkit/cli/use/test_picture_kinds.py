@@ -11,8 +11,8 @@ import pytest
 import tifffile
 from PIL import Image
 
-from camkit.runtime.development import WriteOptions
 from camkit.runtime.files.picture import read_scene
+from camkit.runtime.write_options import WriteOptions
 from tests.data_folder import data_path
 
 HIGH, WIDE = 96, 128

@@ -18,7 +18,7 @@ KILLS_ITS_WORKER = """
 import os, signal
 from camkit.runtime.batch import making
 
-develop = getattr(making.develop_file, "original", making.develop_file)
+develop = getattr(making.make_file, "original", making.make_file)
 
 def develop_or_die(source, *args, **kwargs):
     if source.stem == "huge":
@@ -26,13 +26,13 @@ def develop_or_die(source, *args, **kwargs):
     return develop(source, *args, **kwargs)
 
 develop_or_die.original = develop  # preloads are run twice
-making.develop_file = develop_or_die
+making.make_file = develop_or_die
 """
 FILLS_ITS_WORKER = """
 import time
 from camkit.runtime.batch import making
 
-develop = getattr(making.develop_file, "original", making.develop_file)
+develop = getattr(making.make_file, "original", making.make_file)
 
 def develop_or_hoard(source, *args, **kwargs):
     held = []
@@ -43,7 +43,7 @@ def develop_or_hoard(source, *args, **kwargs):
     return develop(source, *args, **kwargs)
 
 develop_or_hoard.original = develop  # preloads are run twice
-making.develop_file = develop_or_hoard
+making.make_file = develop_or_hoard
 """
 
 

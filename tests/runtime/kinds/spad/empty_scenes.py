@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.runtime.kinds.spad.captures.known_pulse import LITTLE_LOST
 from camkit.runtime.kinds.spad.pile_up import without_pile_up
-from camkit.runtime.kinds.spad.products.depth import LITTLE_LOST
 from camkit.runtime.kinds.spad.pulse import GatedPulse
 from camkit.runtime.kinds.spad.scatter import growth
 from camkit.runtime.kinds.spad.sharpen import Sharpener, Way

@@ -19,7 +19,7 @@ from camkit.runtime.plan.decision import FULL, PLAIN, SMALL, Subject, Work
 from camkit.runtime.plan.rules.lights import decide, needs_lights
 from tests.bundle_factory import tiny_network
 from tests.hdr_bundle import hdr_stages, write_hdr_bundle
-from tests.job_factory import made_job, start
+from tests.job_factory import start
 from tests.planes_bundle import facts_of
 from tests.streak_factory import blurred, captured, star, street, with_lamps
 
@@ -77,11 +77,7 @@ def night() -> Capture:
 
 def _plane(bundle: Bundle, capture: Capture, name: str) -> FloatArray:
     """Give a plane as the plan of the capture has it."""
-    run = start(bundle, capture)
-    job = made_job(capture, bundle)
-    job.work, job.subject = run.job.work, run.job.subject
-    walk = Walk(job)
-    walk.settle()
+    walk = Walk(start(bundle, capture).job)
     return np.concatenate(list(walk.stream(name).bands()), axis=1)
 
 

@@ -20,7 +20,7 @@ from camkit.contracts import FloatArray
 from camkit.errors import BundleError
 from camkit.runtime.cancel import Cancelled
 from camkit.runtime.capture import Capture
-from camkit.runtime.development import WriteOptions, develop_file
+from camkit.runtime.development import make_file
 from camkit.runtime.kinds.hdr.deglare.removal import GlareSettings, find_glare
 from camkit.runtime.kinds.hdr.stages import deglare
 from camkit.runtime.options import Options
@@ -29,6 +29,7 @@ from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work
+from camkit.runtime.write_options import WriteOptions
 from tests.job_factory import start
 from tools.hdr.glare_bundle import build, mosaic_of
 from tools.hdr.glare_twin import exposed_scene, photographed, two_point_star
@@ -101,7 +102,7 @@ def test_files_of_any_size_are_taken_and_the_sidecar_says_the_angle(
         path, np.round(cut * 65535).astype(np.uint16).transpose(1, 2, 0), photometric="rgb"
     )
     target = tmp_path / "night.exr"
-    result = develop_file(path, target, Pipeline(bundle, Options()), WriteOptions())
+    result = make_file(path, target, Pipeline(bundle, Options()), WriteOptions())
     assert result.status == "ok"
     record = json.loads((tmp_path / "night.camkit.json").read_text(encoding="utf-8"))
     assert record["glare"]["angle_deg"] == pytest.approx(-5, abs=0.2)

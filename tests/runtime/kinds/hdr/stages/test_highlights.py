@@ -105,7 +105,6 @@ def _plane(capture: Capture, camera: Bundle, name: str, **choices: Any) -> Float
     """Give a plane of a walk."""
     job = made_job(capture, camera, **choices)
     walk = Walk(job)
-    walk.settle()
     return np.concatenate(list(walk.stream(name).bands()), axis=1)
 
 
@@ -172,11 +171,10 @@ def test_the_record_is_there_with_the_first_band(camera: Bundle, light: FloatArr
     """Whoever counts rows never asks for a band behind the last one."""
     job = made_job(_mosaic(light), camera)
     walk = Walk(job)
-    walk.settle()
     bands = walk.stream("lit").bands()
-    assert "hdr" not in job.sections
+    assert "hdr" not in job.log.sections
     next(iter(bands))
-    assert job.sections["hdr"]["regions"] > 0
+    assert job.log.sections["hdr"]["regions"] > 0
 
 
 def test_what_could_not_be_told_is_warned_of_once_the_rows_are_out(camera: Bundle) -> None:
@@ -206,13 +204,11 @@ def test_nothing_clipped_costs_no_window(camera: Bundle) -> None:
 
 
 def test_whoever_waits_may_stop_before_a_window(camera: Bundle, light: FloatArray) -> None:
-    job = made_job(_mosaic(light), camera)
-    job.cancel = lambda: True
+    job = replace(made_job(_mosaic(light), camera), cancel=lambda: True)
     walk = Walk(job)
-    walk.settle()
     with pytest.raises(Cancelled):
         list(walk.stream("lit").bands())
-    assert "hdr" not in job.sections
+    assert "hdr" not in job.log.sections
 
 
 def test_the_depth_asked_for_is_that_of_the_kernels(tmp_path: Path, light: FloatArray) -> None:
@@ -328,7 +324,6 @@ def test_rows_that_others_read_too_are_not_changed(camera: Bundle, light: FloatA
     capture = _planes(light)
     job = made_job(capture, camera)
     walk = Walk(job)
-    walk.settle()
     rgb = np.concatenate(list(walk.stream("rgb").bands()), axis=1)
     before = rgb.copy()
     (lit,) = highlights.prepare(_entry(camera), job).run([stream_of(rgb, gains=GAINS)])

@@ -28,12 +28,6 @@ def test_a_camera_of_photographs_is_refused(tmp_path) -> None:  # type: ignore[n
         FineCamera.of(open_bundle(write_tiny_bundle(tmp_path)))
 
 
-def test_captures_of_another_array_are_refused_naming_both(camera: FineCamera) -> None:
-    camera.check_shape((HEIGHT, WIDTH))
-    with pytest.raises(ContractError, match="20x10 pixels, the array of bundle tiny-spad 24x16"):
-        camera.check_shape((10, 20))
-
-
 def test_sizes_that_are_not_held_are_refused(camera: FineCamera) -> None:
     assert camera.size(None) == "S"
     with pytest.raises(ContractError, match=r"holds size.s. S; asked for XL"):

@@ -6,7 +6,7 @@ import pytest
 
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from camkit.runtime.kinds.spad.finer.depth import FineSharpener
-from camkit.runtime.kinds.spad.proving import stage_set
+from camkit.runtime.kinds.spad.golden_captures import stage_set
 from camkit.runtime.kinds.spad.sharpen import Sharpener, Way
 from camkit.runtime.kinds.spad.timing import LIGHT_M_PER_PS
 from camkit.runtime.kinds.spad.twin.counting import Disturbances, count_times, scaled_to

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camkit.errors import ContractError
+from camkit.runtime.kinds.spad.captures.strips import KEPT_BYTES, check_room, pieces
 from camkit.runtime.kinds.spad.products.archive import write_archive
 from camkit.runtime.kinds.spad.products.picture import write_exr, write_tiff
 from camkit.runtime.kinds.spad.products.points import directions, write_points
@@ -23,7 +24,6 @@ from camkit.runtime.kinds.spad.products.preview import (
     white_of_flight,
     write_preview,
 )
-from camkit.runtime.kinds.spad.products.strips import KEPT_BYTES, check_room, pieces
 from camkit.runtime.kinds.spad.products.video import write_video
 
 

@@ -17,11 +17,11 @@ from camkit.bundle.sensor import SpadSensor
 from camkit.bundle.stages import Correct, Sharpen, SuperResolve
 from camkit.cli.app import run
 from camkit.errors import ContractError, DecodeError
-from camkit.runtime.kind_parts.recording import RecordingOptions
 from camkit.runtime.kinds.spad.files.named import named_bundle
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
-from camkit.runtime.kinds.spad.proving import stage_set
+from camkit.runtime.kinds.spad.golden_captures import stage_set
 from camkit.runtime.kinds.spad.timing import LIGHT_M_PER_PS
+from camkit.runtime.kinds.spad.twin.recording import PhotonOptions
 from camkit.runtime.kinds.spad.twin.scene import light_in_flight, light_of_depth
 from camkit.runtime.kinds.spad.twin.simulate import record, times_of
 from camkit.runtime.kinds.spad.twin.working import GATE_WIDTH_PS, STEP_PS, WORKING_POINTS
@@ -161,8 +161,7 @@ def test_a_picture_gives_counts_that_name_their_bundle(
 def test_the_same_seed_gives_the_same_counts(bundle: Bundle) -> None:
     picture = np.random.default_rng(0).random((3, *FINE)).astype(np.float32)
     first, again, other = (
-        record(picture, bundle, RecordingOptions(photons=50, seed=seed)).values
-        for seed in (1, 1, 2)
+        record(picture, bundle, PhotonOptions(photons=50, seed=seed)).values for seed in (1, 1, 2)
     )
     assert (first == again).all()
     assert (first != other).any()
@@ -171,7 +170,7 @@ def test_the_same_seed_gives_the_same_counts(bundle: Bundle) -> None:
 
 def _even_counts(folder: Path, photons: float, **changes: Any) -> np.ndarray:
     """Count even white with the array of a bundle that is changed."""
-    options = RecordingOptions(photons=photons, seed=3)
+    options = PhotonOptions(photons=photons, seed=3)
     white = np.ones((3, *FINE), np.float32)
     return record(white, write_spad_bundle(folder, **changes), options).values
 
@@ -183,7 +182,7 @@ def test_pixels_that_see_all_of_themselves_collect_the_light_of_all_sub_pixels(
     counts = _even_counts(tmp_path, 40, stages=stages)
     assert counts.mean() == pytest.approx(16 * 40, rel=0.02)
     full = write_spad_bundle(tmp_path, stages=stages)
-    cube = record(scene, full, RecordingOptions(photons=20, sbr=1, seed=3)).values
+    cube = record(scene, full, PhotonOptions(photons=20, sbr=1, seed=3)).values
     assert cube.sum(axis=0).mean() == pytest.approx(16 * 40, rel=0.02)
 
 
@@ -270,7 +269,7 @@ def test_photons_mean_nothing_to_a_camera_of_photographs(
 
 
 def test_scenes_of_another_array_or_of_nothing_are_refused(bundle: Bundle, tmp_path: Path) -> None:
-    options = RecordingOptions(photons=10)
+    options = PhotonOptions(photons=10)
     small = tmp_path / "small.npz"
     np.savez(small, depth_m=np.full((8, 8), 0.1), albedo=np.ones((8, 8)))
     with pytest.raises(ContractError, match="has 96x64 sub-pixels; got 8x8"):
@@ -299,7 +298,7 @@ def test_scenes_of_what_is_no_number_are_refused(
     np.savez(path, **{"depth_m": np.ones(FINE), "albedo": np.ones(FINE), **changes})
     (name,) = changes
     with pytest.raises(DecodeError, match=rf"scene.npz: {name} holds .*; expected real numbers"):
-        record(path, bundle, RecordingOptions(photons=10))
+        record(path, bundle, PhotonOptions(photons=10))
 
 
 def test_a_scene_that_announces_more_than_it_holds_is_refused(
@@ -311,7 +310,7 @@ def test_a_scene_that_announces_more_than_it_holds_is_refused(
     with zipfile.ZipFile(tmp_path / "scene.npz", "w") as archive:
         archive.writestr("depth_m.npy", header.getvalue() + bytes(800))
     with pytest.raises(DecodeError, match=r"cannot read the scene .*has only \d+ bytes"):
-        record(tmp_path / "scene.npz", bundle, RecordingOptions(photons=10))
+        record(tmp_path / "scene.npz", bundle, PhotonOptions(photons=10))
 
 
 def test_light_of_a_surface_is_its_albedo_at_its_time(camera: FineCamera) -> None:

@@ -1,25 +1,20 @@
-"""The golden cases of an array: counts in three lights, and a scan of depth; made again to compare.
+"""The golden captures of an array: counts in three lights, and a scan of depth.
 
 dim, typical, bright   a procedural scene counted; `image` in photons
 scan                   surfaces in front of a wall, by time; `depth_m`
 """
 
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.bundle.golden import IMAGE, GoldenArrays
+from camkit.bundle.golden import GoldenArrays
 from camkit.bundle.manifest import GoldenCase
 from camkit.bundle.reader import Bundle
 from camkit.contracts import FloatArray
-from camkit.errors import ContractError
-from camkit.runtime.kind_parts.proving import Cases, Proving
-from camkit.runtime.kinds.spad.finer.camera import FineCamera, network_planes, white_of
-from camkit.runtime.kinds.spad.finer.depth import FineSharpener
-from camkit.runtime.kinds.spad.finer.pictures import finer_frames
-from camkit.runtime.kinds.spad.sharpen import Way
+from camkit.runtime.kind_parts.golden import Cases, GoldenCaptures
+from camkit.runtime.kinds.spad.finer.camera import FineCamera, network_planes
 from camkit.runtime.kinds.spad.timing import LIGHT_M_PER_PS
 from camkit.runtime.kinds.spad.twin.array import see_through
 from camkit.runtime.kinds.spad.twin.counting import (
@@ -54,11 +49,6 @@ def golden_cases(bundle: Bundle) -> Cases:
     if DEPTH in bundle.manifest.products:
         cases[SCAN] = _scanned(camera)
     return cases
-
-
-def products_of(arrays: GoldenArrays) -> tuple[str, ...]:
-    """Return the names of the products that can be made of a golden capture."""
-    return (IMAGE,) if arrays.capture.ndim == 2 else (DEPTH,)
 
 
 def _counted(
@@ -121,69 +111,6 @@ def _case(name: str, recipe: dict[str, Any]) -> GoldenCase:
     return GoldenCase(name=name, iso=ISO, recipe=recipe)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SpadWork:
-    """A golden capture on its way; see `camkit.runtime.kind_parts.proving.CaseWork`."""
-
-    camera: FineCamera
-    capture: NDArray[Any]
-    size: str | None
-
-    def shape_of(self, product: str) -> tuple[int, int, int]:
-        """Return (1, m h, m w)."""
-        self._check(product)
-        scale, (height, width) = self.camera.scale, self.capture.shape[-2:]
-        return 1, scale * height, scale * width
-
-    def fill(self, out: FloatArray | None = None, product: str = IMAGE) -> FloatArray:
-        """Return a picture of counts in photons, or the depth of a scan, NaN nowhere."""
-        self._check(product)
-        found = self._picture() if product == IMAGE else self._depth()
-        if out is None:
-            return found
-        out[:] = found
-        return out
-
-    def network_input(self, role: str) -> FloatArray:
-        """Return light and noise of the counts, or of all photons of a scan."""
-        del role
-        photons = self._photons()
-        return network_planes(photons, white_of(photons))
-
-    def _photons(self) -> FloatArray:
-        counts = self.capture.astype(np.float32)
-        return counts if counts.ndim == 2 else counts.sum(axis=0)
-
-    def _picture(self) -> FloatArray:
-        return finer_frames(self.camera, self._photons()[None], 0.0, self.size)
-
-    def _depth(self) -> FloatArray:
-        shape = self.capture.shape[1:]
-        axis, pulse = times_of(self.camera)
-        nothing = np.zeros(shape, dtype=bool)
-        counts = np.ascontiguousarray(self.capture.transpose(1, 2, 0), dtype=np.float32)
-        sharpener = FineSharpener(self.camera, axis, pulse, Way(), size=self.size)
-        found = sharpener.cube(counts, np.zeros(shape), hot=nothing, blind=nothing).found
-        return np.asarray(found.time_of_flight_ps * LIGHT_M_PER_PS / 2, np.float32)
-
-    def _check(self, product: str) -> None:
-        made = IMAGE if self.capture.ndim == 2 else DEPTH
-        if product != made:
-            raise ContractError(f"this golden capture gives {made}, not {product}")
-
-
-def case_work(bundle: Bundle, case: GoldenCase, arrays: GoldenArrays, size: str | None) -> SpadWork:
-    """Prepare the processing of a golden capture.
-
-    Raises:
-        BundleError: If the bundle makes no picture of photons finer.
-    """
-    del case
-    camera = FineCamera.of(bundle)
-    camera.check_shape((arrays.capture.shape[-2], arrays.capture.shape[-1]))
-    return SpadWork(camera=camera, capture=arrays.capture, size=size)
-
-
 def probe(bundle: Bundle, role: str) -> FloatArray:
     """Return light and noise of an array that is larger than that of the bundle."""
     camera = FineCamera.of(bundle, role=role)
@@ -194,4 +121,4 @@ def probe(bundle: Bundle, role: str) -> FloatArray:
     return network_planes(counts.astype(np.float32), PROBE_PHOTONS)
 
 
-PROVING: Final = Proving(cases=golden_cases, products=products_of, run=case_work, probe=probe)
+GOLDEN: Final = GoldenCaptures(cases=golden_cases, probe=probe)

@@ -46,8 +46,8 @@ class Settings:
     size: str | None = None
 
     @classmethod
-    def of(cls, options: Options, capture: Path) -> "Settings":
-        """Read what was chosen for a capture.
+    def of(cls, options: Options, capture: Path | None) -> "Settings":
+        """Read what was chosen for a capture; None for one that is no file.
 
         Raises:
             ContractError: If the timing file is none.
@@ -106,10 +106,10 @@ def _digest(file: Path) -> str:
     return hashlib.sha256(read_side_bytes(file, "the file")).hexdigest()
 
 
-def _timing_file(options: Options, capture: Path) -> Path | None:
+def _timing_file(options: Options, capture: Path | None) -> Path | None:
     """Return the timing file that was named, else that beside the capture, if one lies there."""
     named = options.chosen("timing")
     if named is not None:
         return Path(named)
-    beside = timing_beside(capture)
-    return beside if beside.is_file() else None
+    beside = None if capture is None else timing_beside(capture)
+    return beside if beside is not None and beside.is_file() else None

@@ -1,4 +1,4 @@
-"""Captures that are no photographs: a package brings their maker, the ordinary commands make them.
+"""Captures that are no photographs: a package brings stages and products, ordinary commands run.
 
 The kind is `tests/counting_camera`, installed as somebody else's package would be.
 """
@@ -14,7 +14,7 @@ import pytest
 
 import camkit
 from camkit import kinds
-from camkit.errors import ContractError, DecodeError, UnsupportedError
+from camkit.errors import ContractError, DecodeError
 from camkit.kinds import BAYER, find_kind, kind_of_file
 from camkit.runtime.batch import expand
 from camkit.runtime.kind import kind_without_bundle
@@ -78,11 +78,16 @@ def test_products_in_memory_are_the_same(capture: Path) -> None:
         pipeline.make(capture).files("png")
 
 
-def test_photographs_and_products_are_not_mistaken(capture: Path) -> None:
-    with pytest.raises(UnsupportedError, match=r"Pipeline.process makes their pictures"):
-        camkit.load(None).make(capture)
-    with pytest.raises(UnsupportedError, match=r"no photographs; camkit.process and Pipeline.make"):
-        camkit.load(None, kind="counting").process(capture)
+def test_products_are_no_picture(capture: Path) -> None:
+    pipeline = camkit.load(None, kind="counting")
+    with pytest.raises(ContractError, match=r"this capture gives sums, not an image; see `arrays`"):
+        _ = pipeline.process(capture).image
+    with pytest.raises(ContractError, match="out is filled with a picture"):
+        pipeline.run(capture, out=np.zeros((3, 4, 5), np.float32))
+    with pytest.raises(ContractError, match="no product 'depth_m'; there are sums"):
+        pipeline.run(capture, products=["depth_m"])
+    with pytest.raises(ContractError, match="origin_px does not apply to captures of the kind cou"):
+        pipeline.run(capture, origin_px=(0, 0))
     with pytest.raises(ContractError, match="leave kind out"):
         camkit.load("duet", kind="counting")
 

@@ -1,24 +1,17 @@
-"""Captures that are no photographs, simulated: a scene -> what the camera records -> its file.
-
-A kind that has a `Maker` of products has a `Recording` in its part of the runtime, where its
-cameras exist as data; `camkit simulate` asks it.
-"""
+"""A scene recorded: how much light there is, and what is recorded of it."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from numpy.typing import NDArray
 
-from camkit.bundle.reader import Bundle
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RecordingOptions:
+class PhotonOptions:
     """The options of recording a scene.
 
     Attributes:
@@ -53,21 +46,3 @@ class Recorded:
     name: str
     values: NDArray[Any]
     stated: Mapping[str, Any]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Recording:
-    """The simulation of a kind's captures.
-
-    Attributes:
-        suffixes: Of the files that can be written, with their dots.
-        record: (a picture (3, h, w) linear Rec.709, or the file of a scene, bundle, options) ->
-            capture.
-        write: (file, capture): writes it.
-        files: A capture's file -> all files that `write` writes for it, the capture first.
-    """
-
-    suffixes: tuple[str, ...]
-    record: Callable[[FloatArray | Path, Bundle, RecordingOptions], Recorded]
-    write: Callable[[Path, Recorded], None]
-    files: Callable[[Path], tuple[Path, ...]]

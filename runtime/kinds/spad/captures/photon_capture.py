@@ -1,0 +1,328 @@
+"""A capture of single photons: its counts, and all that is known of their times.
+
+file, options, bundle -> PhotonCapture -> counts (t, rows, w)
+"""
+
+from collections.abc import Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+from itertools import permutations
+from pathlib import Path
+from typing import Any, ClassVar, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.bundle.manifest import Manifest
+from camkit.bundle.plane import Plane
+from camkit.bundle.sensor import SpadSensor
+from camkit.bundle.stages import Sharpen, SuperResolve
+from camkit.caller import option_text
+from camkit.errors import ContractError, UnsupportedError
+from camkit.runtime.capture import MosaicOptions
+from camkit.runtime.job.job import Job
+from camkit.runtime.kinds.spad.captures.settings import Product, Settings
+from camkit.runtime.kinds.spad.files.array_file import ArrayFile
+from camkit.runtime.kinds.spad.files.counts_file import CountsFile, Hints
+from camkit.runtime.kinds.spad.files.open_counts import open_counts
+from camkit.runtime.kinds.spad.finer.camera import size_of
+from camkit.runtime.kinds.spad.time_axis import TimeAxis
+from camkit.runtime.kinds.spad.timing import Timing, timing_beside
+from camkit.runtime.options import Options
+from camkit.runtime.rows import Rows, RowSource
+
+PULSE: Final = frozenset({"width_ps", "rc_ps", "jitter_ps", "fwhm_ps"})
+WHAT: Final = {"gate": "a scan with a gate", "histogram": "a histogram of arrivals"}
+"""Orientation -> what such a capture is."""
+IN_MEMORY: Final = Path("the array")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PhotonCapture:
+    """A capture before its rows are read.
+
+    Attributes:
+        file: Open.
+        product: What is to be made.
+        timing: What is known of times, from the caller, the capture and its bundle.
+        axis: Of its times; None for counts.
+        settings: What the caller chose.
+        notes: What the user should know of how the capture was understood.
+    """
+
+    file: CountsFile
+    product: Product
+    timing: Timing
+    axis: TimeAxis | None
+    settings: Settings
+    notes: tuple[str, ...] = ()
+
+    channels: ClassVar[int] = 1
+    gives_own_rows: ClassVar[bool] = True
+    resident_bytes: ClassVar[int] = 0
+    """Those of rows on their way are counted by what works through them."""
+    decoder_peak_mb: ClassVar[float] = 0.0
+    sha256: ClassVar[str | None] = None
+
+    @property
+    def height(self) -> int:
+        """Return the number of rows."""
+        return self.file.height
+
+    @property
+    def width(self) -> int:
+        """Return the number of columns."""
+        return self.file.width
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Return (h, w)."""
+        return self.file.height, self.file.width
+
+    @property
+    def bins(self) -> int:
+        """Return how many time bins, or frames, a pixel has."""
+        return self.file.bins if self.axis is None else self.axis.bins
+
+    @property
+    def an_axis(self) -> TimeAxis:
+        """Return the axis.
+
+        Raises:
+            ContractError: If the capture has no times.
+        """
+        if self.axis is None:
+            raise ContractError(f"{self.file.path.name} holds no times of photons")
+        return self.axis
+
+    def plane(self, stated: Plane | None) -> Plane:
+        """Return what the counts are; those of any array run over time."""
+        own = Plane(axes="t y x", type="uint32", channels=("photons",), domain="counts")
+        return own if stated is None else stated
+
+    def rows(self) -> RowSource:
+        """Return the counts as the file holds them, time first."""
+        return _Rows(self)
+
+    def gives(self, plane: Plane) -> bool:
+        """Return whether a plane can be a product of what is to be made."""
+        return plane.domain == DOMAINS.get(self.product, "counts")
+
+    def shares_memory(self, array: NDArray[Any]) -> bool:
+        """Return whether an array may lie where the counts do."""
+        return self.file.shares_memory(array)
+
+    def late_notes(self) -> tuple[str, ...]:
+        """Return what the user should know besides once its rows were read."""
+        outside = self.file.outside
+        if not outside:
+            return ()
+        return (f"{outside} time stamps lie outside the bins of [timing] and were left out",)
+
+    def close(self) -> None:
+        """Release the file."""
+        self.file.close()
+
+
+DOMAINS: Final[Mapping[Product, str]] = {"depth": "depth", "lifetime": "lifetime"}
+"""Of the planes of products; those of the others are counts."""
+
+
+class _Rows:
+    """The counts of a file as rows; each reading is the reader's own."""
+
+    def __init__(self, capture: PhotonCapture) -> None:
+        self._capture = capture
+        self._edges: NDArray[np.float64] | None = None
+        if capture.axis is not None and capture.file.kind == "stamps":
+            self._edges = capture.axis.edges_ps / (capture.timing.array.stamp_ps or 1.0)
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Return (t, h, w)."""
+        return self._capture.bins, *self._capture.shape
+
+    def read(self, top: int, bottom: int) -> Rows:
+        """Return rows top..bottom: a view of (rows, w, t) float32."""
+        return self._capture.file.rows(top, bottom, self._edges).transpose(2, 0, 1)
+
+
+def photons_of(job: Job) -> PhotonCapture:
+    """Return the capture of a job, which is one of single photons.
+
+    Raises:
+        ContractError: If it is none.
+    """
+    capture = job.capture
+    if not isinstance(capture, PhotonCapture):
+        raise ContractError(f"this stage takes photons; the capture is a {type(capture).__name__}")
+    return capture
+
+
+def read_photons(
+    file: Path, _mosaic: MosaicOptions | None, manifest: Manifest | None, options: Options
+) -> PhotonCapture:
+    """Open a capture and say what it is.
+
+    Raises:
+        DecodeError: If it cannot be read.
+        ContractError: If capture, bundle and options do not fit each other.
+    """
+    settings = Settings.of(options, file)
+    _check_finer(settings, manifest)
+    array = settings.timing.array
+    hints = Hints(axes=array.axes, key=array.key, max_bytes=settings.max_mem_bytes // 4)
+    with ExitStack() as stack:
+        counts = stack.enter_context(open_counts(file, hints))
+        capture = _understood(counts, settings, manifest)
+        stack.pop_all()
+        return capture
+
+
+def photons_of_array(
+    image: NDArray[Any], manifest: Manifest, *, options: Options | None = None, **_: object
+) -> PhotonCapture:
+    """Return counts (h, w) or a histogram (t, h, w) as a capture of a bundle's array.
+
+    Raises:
+        DecodeError: If they are no counts.
+        ContractError: If they are of another array.
+    """
+    settings = Settings.of(options or Options(), None)
+    _check_finer(settings, manifest)
+    return _understood(ArrayFile(IN_MEMORY, image, Hints()), settings, manifest)
+
+
+def _understood(file: CountsFile, settings: Settings, manifest: Manifest | None) -> PhotonCapture:
+    timing = settings.timing.with_stated(file.stated)
+    notes: tuple[str, ...] = ()
+    if manifest is not None:
+        _check_shape(file, manifest)
+        notes = _surprise(file, timing, manifest)
+        timing = _with_bundle(timing, manifest)
+    timing = timing.with_stated(file.assumed)
+    product = settings.product_of(is_histogram=file.kind != "counts")
+    _check_listed(product, manifest)
+    return PhotonCapture(
+        file=file,
+        product=product,
+        timing=timing,
+        axis=None if file.kind == "counts" else _axis(file, timing),
+        settings=settings,
+        notes=() if product == "intensity" else notes,
+    )
+
+
+def _check_finer(settings: Settings, manifest: Manifest | None) -> None:
+    """Refuse what means nothing where pictures become finer, or where they do not.
+
+    Raises:
+        ContractError: Names it.
+    """
+    stages = () if manifest is None else manifest.stages_of(SuperResolve)
+    if not stages and settings.finer is not None:
+        raise ContractError(
+            f"{option_text('method', settings.finer)} makes pictures finer behind the plate of a "
+            f"bundle; add {option_text('bundle')} too"
+        )
+    if stages and settings.way.pool not in ("auto", "1"):
+        raise ContractError(
+            f"{option_text('pool')} puts pixels of an array together; with a bundle the estimate "
+            f"of the fine grid does so by itself: leave {option_text('pool')} out"
+        )
+    if manifest is not None and (settings.size is not None or settings.finer == "net"):
+        for stage in stages:
+            size_of(manifest, stage.role, settings.size)
+
+
+def _check_listed(product: Product, manifest: Manifest | None) -> None:
+    """Refuse a product that no stage of a bundle gives.
+
+    Raises:
+        ContractError: Names those there are.
+        UnsupportedError: If it is a lifetime.
+    """
+    if manifest is None:
+        return
+    domains = {manifest.all_planes[plane].domain for plane in manifest.products.values()}
+    if product == "lifetime" and "lifetime" not in domains:
+        raise UnsupportedError(
+            f"lifetimes are those of the array's own pixels; use {option_text('bundle', 'none')}"
+        )
+    if DOMAINS.get(product, "counts") not in domains:
+        raise ContractError(
+            f"bundle {manifest.name} gives no {product}: its products are "
+            f"{', '.join(manifest.products)}; choose another {option_text('product')}, or use "
+            f"{option_text('bundle', 'none')}"
+        )
+
+
+def _check_shape(file: CountsFile, manifest: Manifest) -> None:
+    """Refuse a capture of another array, and say so if its axes are only in another order.
+
+    Raises:
+        ContractError: If it is none of this array.
+    """
+    extent = manifest.sensor.known_extent
+    own = extent.height_px, extent.width_px
+    if (file.height, file.width) == own:
+        return
+    told = (
+        f"the capture has {file.width}x{file.height} pixels, the array of bundle "
+        f"{manifest.name} {own[1]}x{own[0]}; use {option_text('bundle', 'none')}"
+    )
+    sizes = {"y": file.height, "x": file.width, "t": file.bins}
+    shape = [sizes[axis] for axis in file.axes]
+    for axes in permutations(file.axes):
+        turned = dict(zip(axes, shape, strict=True))
+        if (turned["y"], turned["x"]) == own:
+            raise ContractError(
+                f"{told}; or, if its axes are in another order, [array] axes = "
+                f'"{"".join(axes)}" in a file for {option_text("timing")}'
+            )
+    raise ContractError(told)
+
+
+def times_of_bundle(manifest: Manifest) -> dict[str, Any]:
+    """Return what a bundle says of times and pulse, by the names of a timing file."""
+    usual, sensor = manifest.stage(Sharpen), manifest.sensor
+    if usual is None or not isinstance(sensor, SpadSensor):
+        return {}
+    stated = {
+        "orientation": usual.orientation,
+        "time_bin_ps": sensor.time_bin_ps,
+        "first_ps": usual.first_ps,
+        "width_ps": usual.gate_width_ps,
+        "rc_ps": usual.gate_rc_ps,
+        "jitter_ps": usual.jitter_ps,
+        "fwhm_ps": usual.laser_fwhm_ps,
+        "wavelength_nm": usual.laser_wavelength_nm,
+    }
+    return {name: value for name, value in stated.items() if value is not None}
+
+
+def _with_bundle(timing: Timing, manifest: Manifest) -> Timing:
+    """Return what is known of times, with what the bundle says where nobody else does."""
+    pitch_um = manifest.sensor.known_extent.pixel_pitch_um
+    stated = {"pitch_um": pitch_um, **times_of_bundle(manifest)}
+    # a measured pulse stands for gate and laser together
+    unwanted = PULSE if timing.irf.file is not None else frozenset()
+    return timing.with_stated({n: value for n, value in stated.items() if n not in unwanted})
+
+
+def _surprise(file: CountsFile, timing: Timing, manifest: Manifest) -> tuple[str, ...]:
+    """Return a note where a bundle makes something else of a capture than is usual."""
+    usual, own = file.assumed.get("orientation"), times_of_bundle(manifest).get("orientation")
+    if timing.timing.orientation is not None or None in (usual, own) or usual == own:
+        return ()
+    return (
+        f"{file.path.name} is taken as {WHAT[str(own)]}, as bundle {manifest.name} "
+        f"states, though such files usually hold {WHAT[str(usual)]}; state [timing] orientation in "
+        f"a file for {option_text('timing')}, or in {timing_beside(file.path).name} beside it",
+    )
+
+
+def _axis(file: CountsFile, timing: Timing) -> TimeAxis:
+    if file.kind == "stamps":
+        return timing.axis(orientation="histogram")
+    return timing.axis(bins=file.bins)
