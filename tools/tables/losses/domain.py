@@ -21,8 +21,8 @@ from camkit.models_def.kinds.bayer.samples import NOT_JUDGED
 from camkit.models_def.training.adversarial.content import Features, gram_loss
 from camkit.models_def.training.adversarial.views import Views, make_views
 from camkit.models_def.training.kind import Restorer, SampleMaker, read_recipe, training_kind
+from camkit.models_def.training.losses import ssim
 from camkit.models_def.training.sample import Sample, SampleLayout
-from camkit.models_def.training.similarity import ssim
 from tools.tables.losses.classical import with_method
 
 METRICS: Final = ("psnr_db", "ssim", "perceptual")
