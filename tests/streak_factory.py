@@ -129,7 +129,7 @@ def one_light(
         window=Window(top=0, bottom=height, left=0, right=width),
         light=9 * (clipped > 0).astype(np.float32),
         streaks=np.zeros_like(clipped),
-        thrown=(0, 0, 0),
+        streak_sums=(0, 0, 0),
     )
     return Recovery(
         fine=cells,

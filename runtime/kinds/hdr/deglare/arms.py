@@ -32,7 +32,7 @@ PRICE: Final = 1e-4
 MOST_RUNS: Final = 10
 """In a column; where there are more, those with the least between them become one."""
 HOLDS: Final = 6
-_HELD: Final = 1e12
+_ZERO_WEIGHT: Final = 1e12
 _TINY: Final = 1e-12
 Mask = NDArray[np.bool_]
 Labels = NDArray[np.intp]
@@ -44,13 +44,13 @@ class Columns:
     """Columns of a slant that a light may reach, one after the other, of one colour.
 
     Attributes:
-        seen: (column, row) float32.
+        light: (column, row) float32.
         usable: (column, row): neither light, nor beside one, nor outside the picture.
         level: (column, row) float32, > 0: how large a step of the scene may be there.
         joined: (column - 1,): whether a column and the next one are neighbours.
     """
 
-    seen: FloatArray
+    light: FloatArray
     usable: Mask
     level: FloatArray
     joined: Mask
@@ -108,18 +108,18 @@ def seek_arms(
     dead = np.asarray(~(fields > 0).any(axis=1))
     for scale in scales:
         equations = _equations(columns, fields, amounts, scale)
-        held: Mask = dead.copy()
+        at_zero: Mask = dead.copy()
         for _ in range(HOLDS):
-            amounts = equations.solved(held)
-            below = (amounts < 0) & ~held
-            if not below.any():
+            amounts = equations.solved(at_zero)
+            negative = (amounts < 0) & ~at_zero
+            if not negative.any():
                 break
-            held = held | below
-        amounts = np.where(held, 0, np.maximum(amounts, 0))
+            at_zero = at_zero | negative
+        amounts = np.where(at_zero, 0, np.maximum(amounts, 0))
     return amounts
 
 
-def thrown(fields: FloatArray, amounts: Amounts) -> FloatArray:
+def arm_streaks(fields: FloatArray, amounts: Amounts) -> FloatArray:
     """Return the streaks (column, row) of all runs."""
     return np.asarray(np.matmul(fields, amounts.astype(np.float32)[:, :, None])[:, :, 0])
 
@@ -129,10 +129,10 @@ class _Equations:
     """Normal equations of one step: blocks of a column's runs, and to those of the next one."""
 
     diagonal: NDArray[np.float64]
-    below: NDArray[np.float64]
-    wanted: NDArray[np.float64]
+    coupling: NDArray[np.float64]
+    right_side: NDArray[np.float64]
 
-    def solved(self, held: Mask) -> Amounts:
+    def solved(self, at_zero: Mask) -> Amounts:
         """Solve with some amounts held at 0."""
         count, runs, _ = self.diagonal.shape
         band = np.zeros((2 * runs, count * runs))
@@ -140,37 +140,37 @@ class _Equations:
             for column in range(row + 1):
                 band[row - column, column::runs] = self.diagonal[:, row, column]
             for column in range(runs):
-                reached = band[runs + row - column, column::runs]
-                reached[: count - 1] = self.below[:, row, column]
-        band[0][held.ravel()] = _HELD * max(float(band[0].max()), 1.0)
-        wanted = np.where(held, 0, self.wanted).ravel()
-        found = scipy.linalg.solveh_banded(band, wanted, lower=True, check_finite=False)
-        return np.asarray(found).reshape(count, runs)
+                blocks = band[runs + row - column, column::runs]
+                blocks[: count - 1] = self.coupling[:, row, column]
+        band[0][at_zero.ravel()] = _ZERO_WEIGHT * max(float(band[0].max()), 1.0)
+        right_side = np.where(at_zero, 0, self.right_side).ravel()
+        solution = scipy.linalg.solveh_banded(band, right_side, lower=True, check_finite=False)
+        return np.asarray(solution).reshape(count, runs)
 
 
 def _equations(columns: Columns, fields: FloatArray, amounts: Amounts, scale: float) -> _Equations:
-    seen, usable = columns.seen, columns.usable
+    light, usable = columns.light, columns.usable
     level = np.asarray(np.float32(scale) * columns.level)
-    streaks = thrown(fields, amounts)
+    streaks = arm_streaks(fields, amounts)
     across = usable[1:] & usable[:-1] & columns.joined[:, None]
     along = usable[:, 1:] & usable[:, :-1]
-    step_x, step_y = np.diff(seen, axis=0), np.diff(seen, axis=1)
+    step_x, step_y = np.diff(light, axis=0), np.diff(light, axis=1)
     weight_x = _weight(step_x - np.diff(streaks, axis=0), 0.5 * (level[1:] + level[:-1]), across)
     weight_y = _weight(step_y - np.diff(streaks, axis=1), (level[:, 1:] + level[:, :-1]) / 2, along)
-    excess = np.where(usable & (streaks > seen), np.float32(EXCESS) / level**2, 0)
+    excess = np.where(usable & (streaks > light), np.float32(EXCESS) / level**2, 0)
     sloped = np.diff(fields, axis=1)
     whole = excess.copy()
     whole[1:] += weight_x
     whole[:-1] += weight_x
     diagonal = _product(fields, whole, fields) + _product(sloped, weight_y, sloped)
     price = PRICE * np.matmul(fields.transpose(0, 2, 1) ** 2, level[:, :, None] ** -2)[:, :, 0]
-    own = np.arange(fields.shape[2])
-    diagonal[:, own, own] += price + _TINY
-    below = -_product(fields[1:], weight_x, fields[:-1])
-    wanted = _gathered(fields, excess * seen) + _gathered(sloped, weight_y * step_y)
-    wanted[1:] += _gathered(fields[1:], weight_x * step_x)
-    wanted[:-1] -= _gathered(fields[:-1], weight_x * step_x)
-    return _Equations(diagonal=diagonal, below=below, wanted=wanted)
+    runs = np.arange(fields.shape[2])
+    diagonal[:, runs, runs] += price + _TINY
+    coupling = -_product(fields[1:], weight_x, fields[:-1])
+    right_side = _gathered(fields, excess * light) + _gathered(sloped, weight_y * step_y)
+    right_side[1:] += _gathered(fields[1:], weight_x * step_x)
+    right_side[:-1] -= _gathered(fields[:-1], weight_x * step_x)
+    return _Equations(diagonal=diagonal, coupling=coupling, right_side=right_side)
 
 
 def _weight(rest: FloatArray, scale: NDArray[np.floating], where: Mask) -> FloatArray:

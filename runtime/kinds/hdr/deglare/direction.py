@@ -95,18 +95,18 @@ def _grid(least_rad: float, most_rad: float) -> list[float]:
     return [first + GRID_RAD * number for number in range(count)]
 
 
-def _peaks(tried: list[Direction], mirrored: list[Direction]) -> list[Direction]:
+def _peaks(directions: list[Direction], mirrored: list[Direction]) -> list[Direction]:
     """Return the part that rises above its neighbours, the ground on either side, its mirror."""
-    strength = [one.strength for one in tried]
-    found = []
-    for here in range(1, len(tried) - 1):
+    strength = [one.strength for one in directions]
+    peaks = []
+    for here in range(1, len(directions) - 1):
         top = strength[here]
         ground = max(min(strength[:here]), min(strength[here + 1 :]))
         is_top = top >= max(strength[here - 1], strength[here + 1])
         is_high = top - ground >= LEAST_PROMINENCE * top > 0
         if is_top and is_high and mirrored[here].strength <= MOST_MIRRORED * top:
-            found.append(tried[here])
-    return found
+            peaks.append(directions[here])
+    return peaks
 
 
 def _refined(trial: "_Trial", start: Direction) -> Direction:
@@ -127,23 +127,23 @@ class _Trial:
     """An overview made ready to be sheared by many angles."""
 
     def __init__(self, overview: Overview) -> None:
-        seen = np.sqrt(np.maximum(overview.light, 0) + np.float32(DARK))
+        brightness = np.sqrt(np.maximum(overview.light, 0) + np.float32(DARK))
         near = scipy.ndimage.maximum_filter(overview.lights, size=(3, 5)) > 0
-        self._planes = np.stack([seen, near.astype(np.float32), overview.lights])
-        steps = np.abs(np.diff(seen, axis=1))
+        self._planes = np.stack([brightness, near.astype(np.float32), overview.lights])
+        steps = np.abs(np.diff(brightness, axis=1))
         self._scale = np.float32(max(2 * float(np.median(steps)) if steps.size else 0.0, 1e-3))
-        self._fade = np.float32(math.exp(-FADING / seen.shape[0]))
+        self._fade = np.float32(math.exp(-FADING / brightness.shape[0]))
 
     def at(self, angle_rad: float) -> Direction:
         """Return the evidence for streaks of an angle."""
         _, height, width = self._planes.shape
         slant = Slant(angle_rad=angle_rad, height=height, width=width)
-        (seen, near, lights), share = slant.gathered(
+        (brightness, near, lights), share = slant.gathered(
             lambda top, bottom: self._planes[:, top:bottom], 3
         )
         good = (share > 0) & (near <= 0)
-        step = np.zeros_like(seen)
-        step[:, 1:] = seen[:, 1:] - seen[:, :-1]
+        step = np.zeros_like(brightness)
+        step[:, 1:] = brightness[:, 1:] - brightness[:, :-1]
         step[:, 1:][~(good[:, 1:] & good[:, :-1])] = 0
         step /= np.sqrt(step * step + self._scale**2)
         above, below = _both_sides(step, lights > _LIGHT_SHARE, self._fade)

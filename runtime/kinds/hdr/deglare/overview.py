@@ -50,8 +50,8 @@ def overview_of(
     for first in range(0, rows, at_once):
         last = min(first + at_once, rows)
         band = read(first * side, last * side)[..., : columns * side]
-        seen = np.minimum(band, 1).mean(axis=0, dtype=np.float32)
-        light[first:last] = _squares(seen, side)
+        grey = np.minimum(band, 1).mean(axis=0, dtype=np.float32)
+        light[first:last] = _squares(grey, side)
         lights[first:last] = _squares((band.max(axis=0) >= level).astype(np.float32), side)
     return Overview(light=light, lights=lights, square_px=side)
 

@@ -52,10 +52,10 @@ def fitted_fading(
     place = np.arange(rows)
     hats = np.stack([np.interp(place, knots, unit, right=0) for unit in np.eye(KNOTS)])
     parts = [_steps(c, runs, a, hats) for c, a in zip(colours, amounts, strict=True)]
-    made = np.concatenate([part[0] for part in parts])
-    seen = np.concatenate([part[1] for part in parts])
+    hat_steps = np.concatenate([part[0] for part in parts])
+    light_steps = np.concatenate([part[1] for part in parts])
     level = np.concatenate([part[2] for part in parts])
-    curve = _falling(made, seen, SCALE * level, np.interp(knots, place, fading))
+    curve = _falling(hat_steps, light_steps, SCALE * level, np.interp(knots, place, fading))
     if not curve[0] > 0:
         return None
     return np.asarray(np.interp(place, knots, curve, right=0), np.float32)
@@ -66,29 +66,29 @@ def _steps(
 ) -> tuple[Curve, Curve, Curve]:
     """Return the steps across columns of every hat, those seen, and the level, where usable."""
     usable = columns.usable[1:] & columns.usable[:-1] & columns.joined[:, None]
-    source = np.zeros(columns.seen.shape, np.float32)
+    source = np.zeros(columns.light.shape, np.float32)
     for run in range(amounts.shape[1]):
         source += np.where(run + 1 == runs.T, amounts[:, run, None], 0).astype(np.float32)
     place = np.arange(hats.shape[1])
-    apart = np.abs(place[:, None] - place[None, :])
-    made = [np.diff(source @ hat[apart].astype(np.float32), axis=0)[usable] for hat in hats]
+    distance = np.abs(place[:, None] - place[None, :])
+    hat_steps = [np.diff(source @ hat[distance].astype(np.float32), axis=0)[usable] for hat in hats]
     level = (columns.level[1:] + columns.level[:-1])[usable] / 2
-    seen = np.diff(columns.seen, axis=0)[usable]
-    return np.stack(made, axis=1).astype(np.float64), seen.astype(np.float64), level
+    light_steps = np.diff(columns.light, axis=0)[usable]
+    return np.stack(hat_steps, axis=1).astype(np.float64), light_steps.astype(np.float64), level
 
 
-def _falling(made: Curve, seen: Curve, scale: Curve, first: Curve) -> Curve:
+def _falling(hat_steps: Curve, light_steps: Curve, scale: Curve, first: Curve) -> Curve:
     """Return the falling curve, >= 0, whose steps fit those seen."""
     summed = np.triu(np.ones((KNOTS, KNOTS)))  # a curve of its falls
-    made = made @ summed
+    hat_steps = hat_steps @ summed
     falls = np.linalg.solve(summed, first)
     for _ in range(ROUNDS):
-        weight = 1 / (scale**2 * (1 + ((seen - made @ falls) / scale) ** 2) ** 2)
-        normal = made.T @ (weight[:, None] * made)
+        weight = 1 / (scale**2 * (1 + ((light_steps - hat_steps @ falls) / scale) ** 2) ** 2)
+        normal = hat_steps.T @ (weight[:, None] * hat_steps)
         size = float(np.trace(normal)) / KNOTS
         if not size > 0:
             return np.zeros(KNOTS)
         root = np.linalg.cholesky(normal + _STEADY * size * np.eye(KNOTS))
-        wanted = np.linalg.solve(root, made.T @ (weight * seen))
-        falls = scipy.optimize.nnls(root.T, wanted)[0]
+        right_side = np.linalg.solve(root, hat_steps.T @ (weight * light_steps))
+        falls = scipy.optimize.nnls(root.T, right_side)[0]
     return np.asarray(summed @ falls)

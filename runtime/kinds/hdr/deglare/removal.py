@@ -24,10 +24,10 @@ from camkit.runtime.kinds.hdr.deglare.arms import (
     Columns,
     Labels,
     Mask,
+    arm_streaks,
     fields_of,
     runs_of,
     seek_arms,
-    thrown,
 )
 from camkit.runtime.kinds.hdr.deglare.direction import Direction, find_direction
 from camkit.runtime.kinds.hdr.deglare.overview import overview_of
@@ -106,19 +106,19 @@ class Glare:
             return
         gain = np.array(gains, np.float32)[:, None, None]
         rows = planes.shape[1]
-        streaks = self.slant.laid(self.streaks, top, rows) * gain
-        floor = self.slant.laid(self.floor, top, rows) * gain
+        streaks = self.slant.resampled(self.streaks, top, rows) * gain
+        floor = self.slant.resampled(self.floor, top, rows) * gain
         clean = np.maximum(planes - streaks, np.minimum(planes, floor))
         light = (planes >= np.float32(self.settings.level) * gain).any(axis=0)
         np.copyto(planes, clean, where=~light)
 
     def to_json(self) -> dict[str, float | None]:
         """Return the values for a sidecar."""
-        found = self.direction
+        direction = self.direction
         return {
-            "angle_deg": None if found is None else round(math.degrees(found.angle_rad), 3),
-            "agreement": 0.0 if found is None else round(found.agreement, 3),
-            "significance": 0.0 if found is None else round(found.significance, 2),
+            "angle_deg": None if direction is None else round(math.degrees(direction.angle_rad), 3),
+            "agreement": 0.0 if direction is None else round(direction.agreement, 3),
+            "significance": 0.0 if direction is None else round(direction.significance, 2),
             "lit_fraction": round(self.lit_fraction, 6),
             "streak_peak": round(float(self.streaks.max(initial=0.0)), 4),
         }
@@ -205,29 +205,29 @@ def _streaks(
         return np.concatenate([np.minimum(band, 1), lights])
 
     slanted, share = slant.gathered(with_lights, COLOURS + 1)
-    seen = slanted[:COLOURS]
+    light = slanted[:COLOURS]
     inside = share > 0
     lights = (slanted[COLOURS] > _LEAST_LIT) & inside
     usable = (share > _WHOLE) & ~scipy.ndimage.maximum_filter(lights, size=3)
     wide = scipy.ndimage.maximum_filter(lights, size=(1, 2 * GROWN_PX + 1)) & inside
     there = np.flatnonzero(scipy.ndimage.maximum_filter(wide.any(axis=0), size=3))
-    colours = [_columns(plane, usable, lights, there) for plane in seen]
+    colours = [_columns(plane, usable, lights, there) for plane in light]
     reach_rows = settings.reach * math.hypot(slant.height, slant.width) / slant.step
-    streaks = np.zeros_like(seen)
-    found = _solved(colours, runs_of(wide[:, there]), reach_rows, pause)
-    for plane, columns in zip(streaks, found, strict=True):
+    streaks = np.zeros_like(light)
+    colour_streaks = _solved(colours, runs_of(wide[:, there]), reach_rows, pause)
+    for plane, columns in zip(streaks, colour_streaks, strict=True):
         plane[:, there] = columns.T
     return streaks, np.stack(
-        [_surroundings(s - t, usable) for s, t in zip(seen, streaks, strict=True)]
+        [_surroundings(s - t, usable) for s, t in zip(light, streaks, strict=True)]
     )
 
 
-def _columns(seen: FloatArray, usable: Mask, lights: Mask, there: NDArray[np.intp]) -> Columns:
+def _columns(light: FloatArray, usable: Mask, lights: Mask, there: NDArray[np.intp]) -> Columns:
     """Select the columns that contain lights, and those beside them."""
-    dark = np.where(lights, 0, seen)
+    dark = np.where(lights, 0, light)
     level = DARK + LEVEL_SHARE * np.maximum(scipy.ndimage.gaussian_filter(dark, LEVEL_SIGMA), 0)
     return Columns(
-        seen=np.ascontiguousarray(seen[:, there].T),
+        light=np.ascontiguousarray(light[:, there].T),
         usable=np.ascontiguousarray(usable[:, there].T),
         level=np.ascontiguousarray(level[:, there].T.astype(np.float32)),
         joined=np.asarray(np.diff(there) == 1),
@@ -242,18 +242,18 @@ def _solved(
     amounts: list[Amounts | None] = [None] * len(colours)
     for turn in range(TURNS):
         fields = fields_of(runs, fading)
-        known = []
+        new_amounts = []
         for columns, first in zip(colours, amounts, strict=True):
             pause()
-            known.append(seek_arms(columns, fields, LAST_SCALES if turn else SCALES, first))
-        amounts = list(known)
+            new_amounts.append(seek_arms(columns, fields, LAST_SCALES if turn else SCALES, first))
+        amounts = list(new_amounts)
         if turn == TURNS - 1:
             break
-        fitted = fitted_fading(colours, runs, known, fading, reach_rows)
+        fitted = fitted_fading(colours, runs, new_amounts, fading, reach_rows)
         if fitted is None:
             break
         fading = fitted
-    return [thrown(fields, one) for one in known]
+    return [arm_streaks(fields, one) for one in new_amounts]
 
 
 def _surroundings(clean: FloatArray, usable: Mask) -> FloatArray:

@@ -100,7 +100,7 @@ class Slant:
         target[:, inside] += (1 - rest) * line[:, :-1] + rest * line[:, 1:]
         share[inside] += 1
 
-    def laid(self, field: FloatArray, top: int, rows: int) -> FloatArray:
+    def resampled(self, field: FloatArray, top: int, rows: int) -> FloatArray:
         """Interpolate a field of the slant over rows of the picture, linear between its samples.
 
         Args:

@@ -32,9 +32,9 @@ def add_bokeh(rng: Generator, canvas: Canvas, cy: float, cx: float, radius: floa
     out_y, out_x = (cy - height / 2) / half, (cx - width / 2) / half
     alpha = disc(patch, radius)
     # the rim of the front lens cuts the disc on the side that is turned away from the middle
-    moved = radius * CAT_EYE * np.float32(1)
-    apart = np.hypot(patch.dy + moved * out_y, patch.dx + moved * out_x)
-    alpha = np.minimum(alpha, np.clip(np.float32(radius + 0.5) - apart, 0, 1))
+    shift = radius * CAT_EYE * np.float32(1)
+    distance = np.hypot(patch.dy + shift * out_y, patch.dx + shift * out_x)
+    alpha = np.minimum(alpha, np.clip(np.float32(radius + 0.5) - distance, 0, 1))
     rim = np.minimum(np.hypot(patch.dy, patch.dx) / np.float32(radius), 1) ** 6
     profile = alpha * (1 - np.float32(rng.uniform(0.0, 0.4)) * (1 - rim))
     colour = draw_white(rng) if rng.random() < 0.7 else draw_neon(rng)

@@ -75,9 +75,9 @@ def patch_around(
 ) -> Patch | None:
     """Return the part of a canvas within a reach of a place, in pixels; None if it lies outside."""
     height, width = canvas.size
-    across = reach_y if reach_x is None else reach_x
+    side_reach = reach_y if reach_x is None else reach_x
     top, bottom = max(0, int(cy - reach_y - 1)), min(height, int(cy + reach_y + 2))
-    left, right = max(0, int(cx - across - 1)), min(width, int(cx + across + 2))
+    left, right = max(0, int(cx - side_reach - 1)), min(width, int(cx + side_reach + 2))
     if top >= bottom or left >= right:
         return None
     return Patch(
@@ -148,10 +148,10 @@ def stroke_distance(patch: Patch, points: FloatArray) -> FloatArray:
         (a, b) float32 pixels.
     """
     nearest = np.full((patch.dy.shape[0], patch.dx.shape[1]), np.inf, dtype=np.float32)
-    for (ay, ax), (by, bx) in pairwise(points):
-        down, across = by - ay, bx - ax
+    for (start_y, start_x), (end_y, end_x) in pairwise(points):
+        down, across = end_y - start_y, end_x - start_x
         length2 = max(float(down**2 + across**2), 1e-6)
-        y, x = patch.dy - ay, patch.dx - ax
+        y, x = patch.dy - start_y, patch.dx - start_x
         along = np.clip((y * down + x * across) / np.float32(length2), 0, 1)
         np.minimum(nearest, (y - along * down) ** 2 + (x - along * across) ** 2, out=nearest)
     return np.asarray(np.sqrt(nearest))

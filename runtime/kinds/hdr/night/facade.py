@@ -102,9 +102,9 @@ def _rooms(rng: Generator, down: FloatArray, across: FloatArray, lit: float) -> 
     floors, rooms = int(rows.max()) + 1, int(columns.max()) + 1
     # some floors are lit as a whole, most rooms are not
     share = np.clip(lit * np.exp(rng.normal(0, 0.7, (floors, 1))), 0, 0.95)
-    on = rng.random((floors, rooms)) < share
+    lit_rooms = rng.random((floors, rooms)) < share
     power = np.exp(rng.normal(np.log(0.5), 1.3, (floors, rooms)))
-    power = np.clip(power, 0.03, MOST_WINDOW_POWER) * on
+    power = np.clip(power, 0.03, MOST_WINDOW_POWER) * lit_rooms
     usual = int(rng.integers(len(_WHITES)))
     other = rng.integers(len(_WHITES), size=(floors, rooms))
     kind = np.where(rng.random((floors, rooms)) < 0.7, usual, other)
@@ -113,8 +113,8 @@ def _rooms(rng: Generator, down: FloatArray, across: FloatArray, lit: float) -> 
     depth = 1 - np.float32(rng.uniform(0.2, 0.7)) * (down % 1)
     curtain = rng.uniform(0.15, 1, (floors, rooms)).astype(np.float32)
     side = np.where(across % 1 < 0.5, curtain[rows[:, None], columns], np.float32(1))
-    seen = colour[rows[:, None], columns].transpose(2, 0, 1)
-    return np.asarray(seen * (depth * side), dtype=np.float32)
+    radiance = colour[rows[:, None], columns].transpose(2, 0, 1)
+    return np.asarray(radiance * (depth * side), dtype=np.float32)
 
 
 def add_near_window(
@@ -152,8 +152,8 @@ def _curtains(rng: Generator, patch: Patch, half_width: float) -> FloatArray:
     """Return the transmission of two curtains with folds."""
     open_share = rng.uniform(0.0, 0.8)
     folds = 0.5 + 0.25 * np.sin(patch.dx * np.float32(2 * np.pi / rng.uniform(4, 9)))
-    drawn = np.abs(patch.dx) > np.float32(open_share * half_width)
-    return np.where(drawn, folds * np.float32(rng.uniform(0.15, 0.6)), np.float32(1))
+    curtain = np.abs(patch.dx) > np.float32(open_share * half_width)
+    return np.where(curtain, folds * np.float32(rng.uniform(0.15, 0.6)), np.float32(1))
 
 
 def _furnish(
@@ -171,8 +171,8 @@ def _furnish(
         for y, radius in ((cy + half[0] - tall, tall * 0.18), (cy + half[0], tall * 0.55)):
             figure = patch_around(canvas, y, x, radius + 1)
             if figure is not None:
-                below = figure.dy + np.float32(y) <= cy + half[0] + 1
-                cover(canvas, figure, disc(figure, radius) * below, dark)
+                inside = figure.dy + np.float32(y) <= cy + half[0] + 1
+                cover(canvas, figure, disc(figure, radius) * inside, dark)
 
 
 def _bars(rng: Generator, patch: Patch, half: tuple[float, float]) -> FloatArray:

@@ -103,9 +103,9 @@ def add_reflection(scene: FloatArray, gloss: FloatArray, mirror: Mirror) -> None
     far = np.clip((rows * (1 + mirror.smear) + 3).astype(np.intp), near + 1, depth)
     for left in range(0, width, COLUMN_BLOCK):
         columns = slice(left, min(left + COLUMN_BLOCK, width))
-        above = scene[:, top - depth : top, columns][:, ::-1]
-        sums = np.zeros((3, depth + 1, above.shape[2]))
-        np.cumsum(above, axis=1, out=sums[:, 1:])
+        mirrored = scene[:, top - depth : top, columns][:, ::-1]
+        sums = np.zeros((3, depth + 1, mirrored.shape[2]))
+        np.cumsum(mirrored, axis=1, out=sums[:, 1:])
         mean = (sums[:, far] - sums[:, near]) / (far - near)[:, None]
         scene[:, top : top + depth, columns] += mean * gloss[top : top + depth, columns]
 

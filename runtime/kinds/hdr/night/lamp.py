@@ -58,8 +58,8 @@ def draw_neon(rng: Generator) -> Colour:
 
 def _near(rng: Generator, palette: FloatArray) -> Colour:
     base = palette[int(rng.integers(len(palette)))]
-    drawn = base * np.exp(rng.normal(0, 0.08, 3)).astype(np.float32)
-    return np.asarray(drawn / drawn.max(), dtype=np.float32)
+    colour = base * np.exp(rng.normal(0, 0.08, 3)).astype(np.float32)
+    return np.asarray(colour / colour.max(), dtype=np.float32)
 
 
 def draw_power(rng: Generator, least: float = LEAST_POWER, most: float = MOST_POWER) -> np.float32:
@@ -92,9 +92,9 @@ def add_glow(
     patch = patch_around(canvas, cy, cx, reach)
     if patch is None:
         return
-    far = (patch.dy**2 + patch.dx**2) / np.float32(reach**2)
-    fall = (1 + far * np.float32((reach / (1.5 * radius + 1)) ** 2)) ** np.float32(-1.5)
-    fall *= np.maximum(1 - far, 0) ** 2
+    square_distance = (patch.dy**2 + patch.dx**2) / np.float32(reach**2)
+    fall = (1 + square_distance * np.float32((reach / (1.5 * radius + 1)) ** 2)) ** np.float32(-1.5)
+    fall *= np.maximum(1 - square_distance, 0) ** 2
     glow(canvas, patch, (radiance * np.float32(strength))[:, None, None] * fall)
 
 
@@ -138,8 +138,8 @@ def add_globe(
 
 
 def _squared(patch: Patch, radius: float) -> FloatArray:
-    far = (patch.dy**2 + patch.dx**2) / np.float32(radius**2)
-    return np.asarray(np.minimum(far, 1), dtype=np.float32)
+    square_distance = (patch.dy**2 + patch.dx**2) / np.float32(radius**2)
+    return np.asarray(np.minimum(square_distance, 1), dtype=np.float32)
 
 
 def _shine_profile(
@@ -185,11 +185,11 @@ def _add_flame(
     patch = patch_around(canvas, cy, cx, tall + 1, radius + 1)
     if patch is None:
         return
-    up = np.clip((np.float32(tall) - patch.dy) / np.float32(2 * tall), 0, 1)
-    lean = np.float32(rng.uniform(-0.3, 0.3) * radius) * up**2
-    half = np.float32(radius * 1.9) * np.sqrt(up) * (1 - up)
+    height = np.clip((np.float32(tall) - patch.dy) / np.float32(2 * tall), 0, 1)
+    lean = np.float32(rng.uniform(-0.3, 0.3) * radius) * height**2
+    half = np.float32(radius * 1.9) * np.sqrt(height) * (1 - height)
     alpha = np.clip(half - np.abs(patch.dx - lean) + 0.5, 0, 1) * (half > 0.2)
-    profile = 0.35 + 0.65 * np.exp(-(((up - 0.4) / 0.3) ** 2)) + 0 * patch.dx
+    profile = 0.35 + 0.65 * np.exp(-(((height - 0.4) / 0.3) ** 2)) + 0 * patch.dx
     _shine_profile(canvas, patch, alpha, radiance, profile)
 
 
@@ -210,12 +210,12 @@ def add_shaded_lamp(
     patch = patch_around(canvas, cy - tall / 2, cx, tall / 2 + 1, size + 1)
     if patch is None:
         return
-    down = np.clip((patch.dy + np.float32(tall / 2)) / np.float32(tall), 0, 1)
-    half = np.float32(size) * (np.float32(rng.uniform(0.3, 0.8)) * (1 - down) + down)
+    depth = np.clip((patch.dy + np.float32(tall / 2)) / np.float32(tall), 0, 1)
+    half = np.float32(size) * (np.float32(rng.uniform(0.3, 0.8)) * (1 - depth) + depth)
     inside = np.clip(np.float32(tall / 2) - np.abs(patch.dy) + 0.5, 0, 1)
     alpha = np.clip(half - np.abs(patch.dx) + 0.5, 0, 1) * inside
     cover(canvas, patch, alpha, np.array(CLOTH, dtype=np.float32)[:, None, None])
-    cloth = np.exp(-((patch.dx / np.float32(size)) ** 2)) * (0.3 + 0.7 * down)
+    cloth = np.exp(-((patch.dx / np.float32(size)) ** 2)) * (0.3 + 0.7 * depth)
     dim = np.minimum(radiance * np.float32(rng.uniform(0.02, 0.2)), 12)
     shine(canvas, patch, alpha, dim[:, None, None] * cloth)
     add_glow(canvas, cy, cx, size / 3, radiance, 0.01)

@@ -50,9 +50,9 @@ def _shine_tube(
 ) -> None:
     """Paint a tube by the distance from its axis: round, and hot in the middle."""
     column = radiance[:, None, None]
-    around = np.exp(-distance / np.float32(2.5 * thick + 1))
-    around *= np.maximum(1 - distance / np.float32(GLOW_REACH * thick + 4), 0)
-    glow(canvas, patch, column * np.float32(0.02) * around)
+    glow_light = np.exp(-distance / np.float32(2.5 * thick + 1))
+    glow_light *= np.maximum(1 - distance / np.float32(GLOW_REACH * thick + 4), 0)
+    glow(canvas, patch, column * np.float32(0.02) * glow_light)
     alpha = np.clip(np.float32(thick + 0.5) - distance, 0, 1)
     core = 1 - 0.45 * np.minimum(distance / np.float32(thick), 1) ** 2
     shine(canvas, patch, alpha, column * core)

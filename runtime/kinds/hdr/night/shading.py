@@ -40,11 +40,11 @@ def shade(rng: Generator, canvas: Canvas, median: float) -> FloatArray:
     factor = _factor(canvas, lit, median)
     for top in range(0, height, BAND_ROWS):
         rows = np.s_[:, top : min(top + BAND_ROWS, height)]
-        shown = canvas.surface[rows] * _enlarged(lit, top, rows[1].stop, width)
-        shown *= np.float32(factor)
+        surface = canvas.surface[rows] * _enlarged(lit, top, rows[1].stop, width)
+        surface *= np.float32(factor)
         # a smooth knee below white: nothing that is lit is brighter than a lamp
-        shown *= (1 + shown**2) ** np.float32(-0.5)
-        canvas.light[rows] += shown
+        surface *= (1 + surface**2) ** np.float32(-0.5)
+        canvas.light[rows] += surface
     return canvas.light
 
 
@@ -64,8 +64,8 @@ def _cells(light: FloatArray) -> FloatArray:
 def _irradiance(cells: FloatArray, height_cells: float) -> FloatArray:
     """Convolve the light of the cells, by FFT; nothing wraps around."""
     at = np.arange(-REACH_CELLS, REACH_CELLS + 1, dtype=np.float64)
-    far = at[:, None] ** 2 + at**2
-    kernel = (1 + far / height_cells**2) ** -1.5
+    square_distance = at[:, None] ** 2 + at**2
+    kernel = (1 + square_distance / height_cells**2) ** -1.5
     full = tuple(side + 2 * REACH_CELLS for side in cells.shape[1:])
     spectrum = np.fft.rfft2(cells, full) * np.fft.rfft2(kernel, full)
     spread = np.fft.irfft2(spectrum, full)[:, REACH_CELLS:, REACH_CELLS:]
@@ -74,13 +74,13 @@ def _irradiance(cells: FloatArray, height_cells: float) -> FloatArray:
 
 def _enlarged(cells: FloatArray, top: int, bottom: int, width: int) -> FloatArray:
     """Return rows top..bottom of the cells in pixels, by linear interpolation between middles."""
-    first, second, share = _between(np.arange(top, bottom), cells.shape[1])
+    first, second, share = _interpolation(np.arange(top, bottom), cells.shape[1])
     tall = cells[:, first] * (1 - share[:, None]) + cells[:, second] * share[:, None]
-    first, second, share = _between(np.arange(width), cells.shape[2])
+    first, second, share = _interpolation(np.arange(width), cells.shape[2])
     return np.asarray(tall[:, :, first] * (1 - share) + tall[:, :, second] * share)
 
 
-def _between(at_px: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, FloatArray]:
+def _interpolation(at_px: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, FloatArray]:
     place = np.clip((at_px + 0.5) / CELL_PX - 0.5, 0, count - 1)
     first = place.astype(np.intp)
     share = (place - first).astype(np.float32)
@@ -97,9 +97,9 @@ def _factor(canvas: Canvas, lit: FloatArray, median: float) -> float:
     last_row, last_column = (side - 1 for side in canvas.size)
     rows, columns = np.minimum(rows + middle, last_row), np.minimum(columns + middle, last_column)
     place = np.ix_(np.arange(3), rows, columns)
-    shown = (canvas.surface[place] * lit).mean(axis=0)
-    lightless = shown[(canvas.light[place].max(axis=0) < median) & (shown > 0)]
+    surface = (canvas.surface[place] * lit).mean(axis=0)
+    lightless = surface[(canvas.light[place].max(axis=0) < median) & (surface > 0)]
     if not lightless.size:
         return 1.0
-    wanted = median * min(2 * lightless.size / shown.size, 1.0)
-    return float(min(wanted / np.median(lightless), MOST_FACTOR))
+    goal = median * min(2 * lightless.size / surface.size, 1.0)
+    return float(min(goal / np.median(lightless), MOST_FACTOR))

@@ -63,7 +63,7 @@ def add_car(rng: Generator, canvas: Canvas, cy: float, cx: float, size: float) -
         cx: Column between them.
         size: Half of their distance, in pixels.
     """
-    coming = rng.random() < 0.65
+    is_oncoming = rng.random() < 0.65
     body = patch_around(canvas, cy - size * 0.3, cx, size * 1.2, size * 1.5)
     if body is None:
         return
@@ -72,11 +72,11 @@ def add_car(rng: Generator, canvas: Canvas, cy: float, cx: float, size: float) -
     glass = patch_around(canvas, cy - size * 0.75, cx, size * 0.3, size)
     if glass is not None:
         cover(canvas, glass, rectangle(glass, size * 0.28, size * 0.95), paint * np.float32(0.2))
-    colour = draw_white(rng) if coming else np.array(TAIL_RED, dtype=np.float32)
-    radiance = colour * (draw_power(rng, 20.0) if coming else draw_power(rng, 1.5, 25.0))
+    colour = draw_white(rng) if is_oncoming else np.array(TAIL_RED, dtype=np.float32)
+    radiance = colour * (draw_power(rng, 20.0) if is_oncoming else draw_power(rng, 1.5, 25.0))
     radius = max(0.8, size * rng.uniform(0.1, 0.2))
     for x in (cx - size, cx + size):
-        if coming:
+        if is_oncoming:
             _add_cone(canvas, cy, x, radius, radiance)
         add_glow(canvas, cy, x, radius, radiance, 0.015)
         add_globe(rng, canvas, cy, x, radius, radiance)
@@ -88,9 +88,9 @@ def _add_cone(canvas: Canvas, cy: float, cx: float, radius: float, radiance: Flo
     patch = patch_around(canvas, cy + long / 2, cx, long / 2, long * 0.6)
     if patch is None:
         return
-    down = np.clip((patch.dy + np.float32(long / 2)) / np.float32(long), 0, 1)
-    wide = np.float32(radius) + np.float32(0.45 * long) * down
-    fall = np.exp(-2 * (patch.dx / wide) ** 2) * down * (1 - down) ** 2
+    depth = np.clip((patch.dy + np.float32(long / 2)) / np.float32(long), 0, 1)
+    wide = np.float32(radius) + np.float32(0.45 * long) * depth
+    fall = np.exp(-2 * (patch.dx / wide) ** 2) * depth * (1 - depth) ** 2
     glow(canvas, patch, np.minimum(radiance * np.float32(0.02), 2.5)[:, None, None] * fall)
 
 
@@ -133,12 +133,12 @@ def add_long_wire(rng: Generator, canvas: Canvas, cy: float) -> None:
     """Draw a straight wire across the picture."""
     _, width = canvas.size
     fall = rng.uniform(-0.25, 0.25) * min(width, 600) / 2
-    for left in range(0, width, 600):
-        half = min(600, width - left) / 2
-        middle = cy + fall * (left + half - width / 2) / max(width / 2, 1)
+    for start in range(0, width, 600):
+        half = min(600, width - start) / 2
+        middle = cy + fall * (start + half - width / 2) / max(width / 2, 1)
         tilt = fall * half / max(width / 2, 1)
         ends = np.array([[-tilt, -half], [tilt, half]], dtype=np.float32)
-        add_wire(canvas, middle, left + half, ends, 0.7)
+        add_wire(canvas, middle, start + half, ends, 0.7)
 
 
 def add_railing(rng: Generator, canvas: Canvas, top: float, bottom: float) -> None:
@@ -148,8 +148,8 @@ def add_railing(rng: Generator, canvas: Canvas, top: float, bottom: float) -> No
     if patch is None or height < 8:
         return
     step, thick = np.float32(rng.uniform(9, 30)), np.float32(rng.uniform(0.6, 2.0))
-    across = np.abs((patch.dx + np.float32(rng.uniform(0, 30))) % step - step / 2)
-    bars = np.clip(thick + 0.5 - across, 0, 1) * np.ones_like(patch.dy)
+    distance = np.abs((patch.dx + np.float32(rng.uniform(0, 30))) % step - step / 2)
+    bars = np.clip(thick + 0.5 - distance, 0, 1) * np.ones_like(patch.dy)
     half = np.float32((bottom - top) / 2)
     rails = np.clip(1.4 * thick + 0.5 - np.abs(np.abs(patch.dy) - half), 0, 1)
     metal = np.full((3, 1, 1), rng.uniform(0.1, 0.6), dtype=np.float32)
@@ -170,8 +170,8 @@ def add_wheel(rng: Generator, canvas: Canvas, cy: float, cx: float, radius: floa
     ring = patch_around(canvas, cy, cx, radius + 2)
     if ring is not None:
         tint = colours[0] * np.float32(0.3 * power)
-        away = np.abs(np.hypot(ring.dy, ring.dx) - np.float32(radius))
-        edge = np.asarray(np.clip(1.5 - away, 0, 1), dtype=np.float32)
+        distance = np.abs(np.hypot(ring.dy, ring.dx) - np.float32(radius))
+        edge = np.asarray(np.clip(1.5 - distance, 0, 1), dtype=np.float32)
         shine(canvas, ring, edge, tint[:, None, None])
 
 

@@ -65,8 +65,8 @@ def add_sky(rng: Generator, canvas: Canvas, horizon: float) -> None:
     low = draw_white(rng) * draw_power(rng, 0.004, 0.06)
     near = np.clip(rows / np.float32(max(horizon, 1)), 0, 1) ** 2
     clouds = textured(rng, canvas, patch, np.ones(3, np.float32), rng.uniform(0.1, 0.5), kind=2)
-    shown = high[:, None, None] * (1 - near) + low[:, None, None] * near
-    glow(canvas, patch, shown * clouds)
+    sky = high[:, None, None] * (1 - near) + low[:, None, None] * near
+    glow(canvas, patch, sky * clouds)
 
 
 def add_buildings(rng: Generator, canvas: Canvas, rows: Span, lit: float) -> None:
@@ -79,21 +79,21 @@ def add_buildings(rng: Generator, canvas: Canvas, rows: Span, lit: float) -> Non
         lit: Share of windows that are lit, about.
     """
     _, width = canvas.size
-    apart = rng.uniform(90, 170)
-    tiers = max(1, round((rows.bottom - rows.top) / apart))
+    tier_height = rng.uniform(90, 170)
+    tiers = max(1, round((rows.bottom - rows.top) / tier_height))
     for tier in range(tiers):
-        base = rows.bottom - (tiers - 1 - tier) * apart
-        left = -rng.uniform(0, 100)
-        while left < width:
+        base = rows.bottom - (tiers - 1 - tier) * tier_height
+        edge = -rng.uniform(0, 100)
+        while edge < width:
             wide = rng.uniform(40, 230)
-            tall = rng.uniform(50, 330) if tier == 0 else rng.uniform(0.5, 1.4) * apart
+            tall = rng.uniform(50, 330) if tier == 0 else rng.uniform(0.5, 1.4) * tier_height
             share = float(np.clip(lit * np.exp(rng.normal(0, 0.7)), 0, 0.7))
-            bottom = min(base + apart, rows.bottom)
+            bottom = min(base + tier_height, rows.bottom)
             building = Building(
-                top=base - tall, bottom=bottom, left=left, right=left + wide, lit=share
+                top=base - tall, bottom=bottom, left=edge, right=edge + wide, lit=share
             )
             add_building(rng, canvas, building)
-            left += wide + (rng.uniform(0, 60) if tier == 0 and rng.random() < 0.3 else 0)
+            edge += wide + (rng.uniform(0, 60) if tier == 0 and rng.random() < 0.3 else 0)
 
 
 def add_signs(rng: Generator, canvas: Canvas, rows: Span, share: float) -> None:
@@ -126,18 +126,18 @@ def add_lamps(
     """
     height, width = canvas.size
     goal = share * height * width
-    wanted = max(goal - canvas.count_lit(), LEAST_LAMP_SHARE * goal)
+    missing_px = max(goal - canvas.count_lit(), LEAST_LAMP_SHARE * goal)
     for _ in range(FILLING_ROUNDS):
-        most = float(np.clip(np.sqrt(0.3 * wanted / np.pi), 0.8, MOST_RADIUS_PX))
-        spent = 0.0
-        while spent < wanted:
+        most = float(np.clip(np.sqrt(0.3 * missing_px / np.pi), 0.8, MOST_RADIUS_PX))
+        added_px = 0.0
+        while added_px < missing_px:
             radius = draw_radius(rng, most)
             y, x = _place(rng, canvas, rows)
             colour = draw_neon(rng) if rng.random() < coloured else draw_white(rng)
             add_lamp(rng, canvas, y, x, radius, colour * draw_power(rng))
-            spent += 4 + np.pi * radius**2
-        wanted = goal - canvas.count_lit()
-        if wanted < 0.1 * goal:
+            added_px += 4 + np.pi * radius**2
+        missing_px = goal - canvas.count_lit()
+        if missing_px < 0.1 * goal:
             return
 
 

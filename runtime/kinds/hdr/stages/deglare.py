@@ -38,16 +38,16 @@ def prepare(entry: Deglare, job: Job) -> StageWork:
         reach=entry.reach,
         level=entry.level,
     )
-    found: list[Glare] = []
+    glares: list[Glare] = []
 
-    def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
-        (picture,) = taken
-        return (picture.with_bands(_cleared(picture, job, entry.takes[0], settings, found)),)
+    def run(inputs: Sequence[Stream]) -> tuple[Stream, ...]:
+        (picture,) = inputs
+        return (picture.with_bands(_cleared(picture, job, entry.takes[0], settings, glares)),)
 
     return StageWork(
         run=run,
         held_bytes=BYTES_PER_COLUMN * job.capture.width,
-        warnings=lambda: tuple(note for glare in found for note in glare.notes),
+        warnings=lambda: tuple(note for glare in glares for note in glare.notes),
     )
 
 
@@ -69,7 +69,7 @@ def seconds(_entry: Deglare, subject: Subject, _work: Work, speed: Speed) -> flo
 
 
 def _cleared(
-    picture: Stream, job: Job, plane: str, settings: GlareSettings, found: list[Glare]
+    picture: Stream, job: Job, plane: str, settings: GlareSettings, glares: list[Glare]
 ) -> Iterator[Rows]:
     """Yield the bands of a picture without its streaks; finds them when the first is asked for."""
     _, height, width = picture.shape
@@ -80,7 +80,7 @@ def _cleared(
         settings,
         lambda: check_cancelled(job.cancel),
     )
-    found[:] = [glare]
+    glares[:] = [glare]
     job.log.sections["glare"] = glare.to_json()
     top = 0
     for band in picture.bands():

@@ -67,18 +67,18 @@ def prepare(entry: Highlights, job: Job) -> StageWork:
             f"clipped lights are not restored: that needs {LEAST_PX} px on each side, and the "
             f"picture has {width} x {height}"
         )
-        return StageWork(run=lambda taken: (taken[0],), warnings=lambda: (note,))
+        return StageWork(run=lambda inputs: (inputs[0],), warnings=lambda: (note,))
     notes: list[str] = []
 
     method = job.options.demosaic or entry.method
 
-    def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
-        picture, *samples = taken
+    def run(inputs: Sequence[Stream]) -> tuple[Stream, ...]:
+        picture, *samples = inputs
         if not samples or samples[0].plane.channels != MOSAIC:
-            made = _painted(picture, job, (light, mask), notes)
+            bands = _painted(picture, job, (light, mask), notes)
         else:
-            made = _from_samples([picture, *samples], job, (light, mask), notes, method)
-        return (picture.with_bands(made),)
+            bands = _from_samples([picture, *samples], job, (light, mask), notes, method)
+        return (picture.with_bands(bands),)
 
     pixels = height * width
     return StageWork(
@@ -106,11 +106,13 @@ def _looked_at(entry: Highlights, stages: Sequence[Stage]) -> tuple[str, str]:
     Raises:
         ContractError: If there are none.
     """
-    before = takewhile(lambda stage: stage != entry and stage.type != "white_balance", stages)
-    given = [stage.gives for stage in before if stage.type in FRONT and len(stage.gives) > 1]
-    if not given:
+    front_stages = takewhile(lambda stage: stage != entry and stage.type != "white_balance", stages)
+    outputs = [
+        stage.gives for stage in front_stages if stage.type in FRONT and len(stage.gives) > 1
+    ]
+    if not outputs:
         raise ContractError("highlights needs a stage that gives light and a mask of what clipped")
-    return given[-1][0], given[-1][1]
+    return outputs[-1][0], outputs[-1][1]
 
 
 def _painted(
@@ -134,7 +136,7 @@ def _bands_painted(picture: Stream, painter: Painter, job: Job) -> Iterator[Rows
 
 
 def _from_samples(
-    taken: list[Stream],
+    inputs: list[Stream],
     job: Job,
     looked_at: tuple[str, str],
     notes: list[str],
@@ -143,14 +145,14 @@ def _from_samples(
     """Yield the bands of a picture whose streaks are taken from its mosaic.
 
     Args:
-        taken: The picture and its mosaic; emptied, since rows are kept for all who hold a stream.
+        inputs: The picture and its mosaic; emptied, since rows are kept for all who hold a stream.
         job: The capture.
         looked_at: Planes of light and of what clipped.
         notes: For what the search has to say.
         method: Of the demosaic.
     """
     painter = _painter(job, looked_at, notes, least_samples=1)
-    mosaic, picture = taken.pop(), taken.pop()
+    mosaic, picture = inputs.pop(), inputs.pop()
     if painter.blind:
         del mosaic
         yield from _bands_painted(picture, painter, job)
@@ -159,7 +161,7 @@ def _from_samples(
     assert cfa is not None  # it is a mosaic
     cleared = RollingRows(mosaic.shape, _cleared(mosaic, painter, capture)).reader()
     source = ColorRows(cleared, cfa, method, threads=job.threads)
-    seen, gains, height = picture.rows(), mosaic.gains, capture.height
+    captured, gains, height = picture.rows(), mosaic.gains, capture.height
     del picture, mosaic
     for top in range(0, height, LIT_ROWS):
         bottom = min(top + LIT_ROWS, height)
@@ -168,7 +170,7 @@ def _from_samples(
         painter.light_up(planes, clipped, above, gains)
         inside = np.s_[..., top - above : bottom - above, :]
         lit, near = planes[inside], near_clipped(clipped)[inside]
-        no_brighter(lit, seen.read(top, bottom), near)
+        no_brighter(lit, captured.read(top, bottom), near)
         yield np.ascontiguousarray(lit)
 
 
@@ -223,7 +225,7 @@ def _cells(job: Job, light_plane: str, mask_plane: str) -> Cells:
     height = samples.shape[1] // 2 * 2
     shape = COLOURS, height // 2, samples.shape[2] // 2
     # zeros that nothing is written to take no memory
-    light, over = np.empty(shape, np.float32), np.zeros(shape, np.float32)
+    light, clipped = np.empty(shape, np.float32), np.zeros(shape, np.float32)
     pixels = np.zeros((samples.shape[0], *shape[1:]), np.uint8)
     for top in range(0, height, BAND_ROWS):
         bottom = min(top + BAND_ROWS, height)
@@ -231,6 +233,6 @@ def _cells(job: Job, light_plane: str, mask_plane: str) -> Cells:
         rows = slice(top // 2, bottom // 2)
         light[:, rows] = part.light
         if part.pixels.any():
-            over[:, rows] = part.clipped
+            clipped[:, rows] = part.clipped
             pixels[:, rows] = part.pixels
-    return replace(part, light=light, clipped=over, pixels=pixels)
+    return replace(part, light=light, clipped=clipped, pixels=pixels)

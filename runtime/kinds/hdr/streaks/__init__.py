@@ -9,7 +9,7 @@
     refinement   the same in finer cells, each group of neighbours near itself
     light_evidence     how much of a light the picture proves
     spots        lights of cells shared out over the pixels that clipped
-    thrown       what lights throw beside themselves, over pixels
+    streak_rows  streaks of lights, over rows of pixels
     recovery     all of it: cells -> lights, their streaks, the veil of everything else
     doubt        samples without streaks, believed as far as these are known
     rims         colours within and beside lights

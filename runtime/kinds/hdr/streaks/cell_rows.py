@@ -21,7 +21,9 @@ class Lattice:
     left: int = 0
     step_px: int = 1
 
-    def within(self, box: tuple[int, int, int, int], shape: tuple[int, ...]) -> tuple[slice, slice]:
+    def pixels_in(
+        self, box: tuple[int, int, int, int], shape: tuple[int, ...]
+    ) -> tuple[slice, slice]:
         """Return a mask of the pixels that lie in a box (top, left, bottom, right) of the picture.
 
         Args:

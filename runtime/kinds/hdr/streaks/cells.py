@@ -46,7 +46,7 @@ class Cells:
     pixels: NDArray[np.uint8]
 
     @property
-    def known(self) -> FloatArray:
+    def unclipped(self) -> FloatArray:
         """Return the light of what did not clip, spread over its cell."""
         return self.light * (1 - self.clipped)
 
@@ -93,7 +93,7 @@ def cells_of(samples: FloatArray, clipped: NDArray[np.bool_], sites: Sequence[Si
         share[colour] /= len(places)
         light[colour] /= len(places)
     return Cells(
-        light=_among_known(light, share) if any_clipped else light,
+        light=_unclipped_mean(light, share) if any_clipped else light,
         clipped=share,
         pitch_px=PITCH_PX,
         offset_px=tuple(_middle(places) for places in sites),
@@ -111,7 +111,7 @@ def coarser(cells: Cells) -> Cells:
         raise ContractError(f"cells need two on each side; got {cells.light.shape[1:]}")
     if cells.clipped.any():
         share = pooled(cells.clipped)
-        light = _among_known(pooled(cells.known), share)
+        light = _unclipped_mean(pooled(cells.unclipped), share)
     else:
         light = pooled(cells.light)
         share = np.zeros_like(light)
@@ -189,7 +189,7 @@ def _every_second(kernel: FloatArray) -> FloatArray:
     return np.ascontiguousarray(kernel[first::2, first::2])
 
 
-def _among_known(light: FloatArray, clipped: FloatArray) -> FloatArray:
+def _unclipped_mean(light: FloatArray, clipped: FloatArray) -> FloatArray:
     """Return the mean of what did not clip from its mean over all; 0 where all did."""
-    known = 1 - clipped
-    return np.divide(light, known, out=np.zeros_like(light), where=known > 0)
+    share = 1 - clipped
+    return np.divide(light, share, out=np.zeros_like(light), where=share > 0)

@@ -71,34 +71,34 @@ class FewLights:
         ]
 
     @cached_property
-    def _laid(self) -> FloatArray:
+    def _kernels(self) -> FloatArray:
         """Kernels about every light: (lights, h w)."""
         height, width = self._shape
-        laid = np.empty((len(self._at[0]), height * width), np.float32)
-        for row, y, x in zip(laid, *self._at, strict=True):
-            row[:] = self._about(y, x).ravel()
-        return laid
+        kernels = np.empty((len(self._at[0]), height * width), np.float32)
+        for row, y, x in zip(kernels, *self._at, strict=True):
+            row[:] = self._kernel_at(y, x).ravel()
+        return kernels
 
-    def _about(self, y: int, x: int) -> FloatArray:
+    def _kernel_at(self, y: int, x: int) -> FloatArray:
         """Return the kernel about a place (h, w)."""
         half, (height, width) = self._wide.shape[0] // 2, self._shape
         return self._wide[half - y : half - y + height, half - x : half - x + width]
 
     def spread(self, light: FloatArray) -> FloatArray:
         """Return the convolution of light (h, w); only allowed places count."""
-        if "_laid" in self.__dict__:
+        if "_kernels" in self.__dict__:
             # a sum over rows of fixed order: products of matrices hang on threads and processors
-            whole = np.einsum("ji,j->i", self._laid, light[self._at])
+            whole = np.einsum("ji,j->i", self._kernels, light[self._at])
             return np.asarray(whole, np.float32).reshape(self._shape)
         once = np.zeros(self._shape, np.float32)
         for y, x in zip(*self._at, strict=True):
-            once += light[y, x] * self._about(y, x)
+            once += light[y, x] * self._kernel_at(y, x)
         return once
 
     def gathered(self, image: FloatArray) -> FloatArray:
         """Return the transpose at the places of lights; 0 elsewhere."""
         out = np.zeros(self._shape, np.float32)
-        out[self._at] = np.einsum("ji,i->j", self._laid, image.ravel())
+        out[self._at] = np.einsum("ji,i->j", self._kernels, image.ravel())
         return out
 
 
@@ -148,12 +148,12 @@ class Convolution:
     def _filtered(self, image: FloatArray, transform: NDArray[np.complex64]) -> FloatArray:
         """Multiply the transform of an image; rows that are empty or not looked at are left out."""
         (height, width), (rows, columns) = self._shape, self._size
-        across = scipy.fft.rfft(image, columns, axis=1)
-        whole = scipy.fft.fft(across, rows, axis=0, overwrite_x=True)
+        spectrum = scipy.fft.rfft(image, columns, axis=1)
+        whole = scipy.fft.fft(spectrum, rows, axis=0, overwrite_x=True)
         whole *= transform
         there = scipy.fft.ifft(whole, axis=0, norm="forward", overwrite_x=True)[:height]
-        made = scipy.fft.irfft(there, columns, axis=1, norm="forward")
-        return np.asarray(made[:, :width] * np.float32(1 / (rows * columns)), np.float32)
+        filtered = scipy.fft.irfft(there, columns, axis=1, norm="forward")
+        return np.asarray(filtered[:, :width] * np.float32(1 / (rows * columns)), np.float32)
 
 
 def _check_kernel(kernel: FloatArray) -> None:

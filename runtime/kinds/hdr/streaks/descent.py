@@ -70,7 +70,7 @@ FINE_STEPS: Final = Steps(scales=FINE, rounds=3, root=0.5, price=0.00125, dim_pr
 
 
 def seek_lights(
-    seen: FloatArray,
+    measured: FloatArray,
     clipped: Mask,
     spread: Spread,
     first: FloatArray,
@@ -80,7 +80,7 @@ def seek_lights(
     """Return the light of clipped cells.
 
     Args:
-        seen: (h, w) float32: light of the cells, less what known light has thrown there; of no
+        measured: (h, w) float32: light of the cells, less what known light has thrown there; of no
             meaning in clipped ones.
         clipped: (h, w): cells in which a sample clipped.
         spread: What a cell's light becomes.
@@ -95,25 +95,25 @@ def seek_lights(
     down, across = usable[1:] & usable[:-1], usable[:, 1:] & usable[:, :-1]
     light = np.where(clipped, np.maximum(first, FAINTEST), 0).astype(np.float32)
     for scale in steps.scales:
-        thrown = spread.spread(light)
-        rest_y, rest_x = gradient(seen - thrown)
+        blurred = spread.spread(light)
+        rest_y, rest_x = gradient(measured - blurred)
         weights = _Weights(
             y=np.where(down, _weight(rest_y, scale), 0).astype(np.float32),
             x=np.where(across, _weight(rest_x, scale), 0).astype(np.float32),
-            excess=np.where(usable & (thrown > seen), EXCESS / scale**2, 0).astype(np.float32),
+            excess=np.where(usable & (blurred > measured), EXCESS / scale**2, 0).astype(np.float32),
         )
         unit = np.where(clipped, light**steps.root, 0).astype(np.float32)
         price = (_price(light, steps) * unit**2 / np.maximum(light, DIMMEST)).astype(np.float32)
         system = _System(spread=spread, weights=weights, unit=unit, price=price)
         start = np.divide(light, unit, out=np.zeros_like(light), where=unit > 0)
-        rest = unit * system.gathered(rest_y, rest_x, seen - thrown) - price * start
-        found = unit * _conjugate_gradients(system, rest, start, steps.rounds)
-        light = np.where(clipped, np.clip(found, FAINTEST, BRIGHTEST), 0).astype(np.float32)
+        rest = unit * system.gathered(rest_y, rest_x, measured - blurred) - price * start
+        solution = unit * _conjugate_gradients(system, rest, start, steps.rounds)
+        light = np.where(clipped, np.clip(solution, FAINTEST, BRIGHTEST), 0).astype(np.float32)
     return light
 
 
 def not_outshining(
-    guess: FloatArray, seen: FloatArray, clipped: Mask, spread: Spread
+    guess: FloatArray, measured: FloatArray, clipped: Mask, spread: Spread
 ) -> FloatArray:
     """Return a guess, less bright where its streaks would be brighter than what is seen.
 
@@ -122,27 +122,27 @@ def not_outshining(
 
     Args:
         guess: (h, w) float32: light of the clipped cells.
-        seen: (h, w) float32, as in `seek_lights`.
+        measured: (h, w) float32, as in `seek_lights`.
         clipped: (h, w).
         spread: What a cell's light becomes.
     """
-    thrown, there = spread.spread(guess)[~clipped], seen[~clipped]
+    blurred, there = spread.spread(guess)[~clipped], measured[~clipped]
     low, high = _DIMMEST_START, 1.0
-    if _beyond(thrown, there) <= MOST_BEYOND:
+    if _excess_share(blurred, there) <= MOST_BEYOND:
         return guess
     for _ in range(_HALVINGS):
         middle = (low * high) ** 0.5
-        if _beyond(np.float32(middle) * thrown, there) > MOST_BEYOND:
+        if _excess_share(np.float32(middle) * blurred, there) > MOST_BEYOND:
             high = middle
         else:
             low = middle
     return guess * np.float32(low)
 
 
-def _beyond(thrown: FloatArray, seen: FloatArray) -> float:
+def _excess_share(blurred: FloatArray, measured: FloatArray) -> float:
     """Return the share of streaks that is brighter than what is seen."""
-    whole = float(thrown.sum(dtype=np.float64))
-    return float(np.maximum(thrown - seen, 0).sum(dtype=np.float64)) / max(whole, _TINY)
+    whole = float(blurred.sum(dtype=np.float64))
+    return float(np.maximum(blurred - measured, 0).sum(dtype=np.float64)) / max(whole, _TINY)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -171,15 +171,15 @@ class _System:
 
     def applied(self, light: FloatArray) -> FloatArray:
         """Return the matrix times lights in their units."""
-        thrown = self.spread.spread(self.unit * light)
-        return self.unit * self.gathered(*gradient(thrown), thrown) + self.price * light
+        blurred = self.spread.spread(self.unit * light)
+        return self.unit * self.gathered(*gradient(blurred), blurred) + self.price * light
 
 
 def _conjugate_gradients(
     system: _System, rest: FloatArray, start: FloatArray, rounds: int
 ) -> FloatArray:
     """Solve from a start with this residual."""
-    found = start
+    solution = start
     way = rest.copy()
     size = float(np.vdot(rest, rest))
     for _ in range(rounds):
@@ -187,11 +187,11 @@ def _conjugate_gradients(
             break
         image = system.applied(way)
         step = np.float32(size / max(float(np.vdot(way, image)), _TINY))
-        found = found + step * way
+        solution = solution + step * way
         rest = rest - step * image
         last, size = size, float(np.vdot(rest, rest))
         way = rest + np.float32(size / last) * way
-    return found
+    return solution
 
 
 def _price(light: FloatArray, steps: Steps) -> FloatArray:
@@ -224,7 +224,7 @@ def usable_cells(clipped: Mask) -> Mask:
     rows = clipped.copy()
     rows[1:] |= clipped[:-1]
     rows[:-1] |= clipped[1:]
-    grown = rows.copy()
-    grown[:, 1:] |= rows[:, :-1]
-    grown[:, :-1] |= rows[:, 1:]
-    return ~grown
+    near = rows.copy()
+    near[:, 1:] |= rows[:, :-1]
+    near[:, :-1] |= rows[:, 1:]
+    return ~near

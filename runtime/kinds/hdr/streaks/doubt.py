@@ -42,24 +42,24 @@ Lattices = Sequence[FloatArray]
 """(h, w) each: samples of one colour at one place of every cell of 2 px."""
 
 
-def settled(rest: Lattices, thrown: Lattices, clipped: Sequence[Mask]) -> list[FloatArray]:
+def settled(rest: Lattices, streaks: Lattices, clipped: Sequence[Mask]) -> list[FloatArray]:
     """Return samples of a colour with those in doubt nearer to their surroundings.
 
     Args:
         rest: Samples less their streaks, 1.0 = where samples clip. The first row of the mosaic is a
             multiple of `BLOCK_PX` in its picture, and rows within `MARGIN_PX` of a cut are of no
             use.
-        thrown: The streaks.
+        streaks: What was taken away.
         clipped: Samples that say nothing; they stay as they are.
     """
     out = [plane.copy() for plane in rest]
-    brightest = [widened(plane, 1, 1) for plane in thrown]
+    brightest = [widened(plane, 1, 1) for plane in streaks]
     for first, end in _runs(brightest):
         start = max(first - MARGIN_PX // PITCH_PX, 0)
         cut = np.s_[:, start : end + MARGIN_PX // PITCH_PX]
-        light, under, bright = ([p[cut] for p in planes] for planes in (rest, thrown, brightest))
-        found = _nearer(light, under, [plane[cut] for plane in clipped], bright)
-        for plane, near in zip(out, found, strict=True):
+        light, dimming, bright = ([p[cut] for p in planes] for planes in (rest, streaks, brightest))
+        samples = _shrunk(light, dimming, [plane[cut] for plane in clipped], bright)
+        for plane, near in zip(out, samples, strict=True):
             plane[:, first:end] = near[:, first - start : end - start]
     return out
 
@@ -76,41 +76,41 @@ def _runs(brightest: Lattices) -> Iterator[tuple[int, int]]:
         yield int(first) * RUN, int(end) * RUN
 
 
-def _nearer(
-    rest: Lattices, thrown: Lattices, clipped: Sequence[Mask], brightest: Lattices
+def _shrunk(
+    rest: Lattices, streaks: Lattices, clipped: Sequence[Mask], brightest: Lattices
 ) -> Iterator[FloatArray]:
     """Yield samples nearer to the mean of their surroundings, weighted by doubt."""
     doubts = [np.square(np.float32(DOUBT) * plane) for plane in brightest]
-    weight, mean, square = _around(rest, clipped, doubts)
-    for own, under, over, doubt in zip(rest, thrown, clipped, doubts, strict=True):
-        whole = np.maximum(_laid(weight, own.shape), _TINY)
-        middle = _laid(mean, own.shape)
+    weight, mean, square = _local_moments(rest, clipped, doubts)
+    for plane, streak, mask, doubt in zip(rest, streaks, clipped, doubts, strict=True):
+        whole = np.maximum(_interpolated(weight, plane.shape), _TINY)
+        middle = _interpolated(mean, plane.shape)
         middle /= whole
-        spread = _laid(square, own.shape)
+        spread = _interpolated(square, plane.shape)
         spread /= whole
         spread -= middle * middle
         np.maximum(spread, _LEAST, out=spread)
         spread /= spread + doubt
-        found = own - middle
-        found *= spread
-        found += middle
+        samples = plane - middle
+        samples *= spread
+        samples += middle
         # no streak takes light away, none leaves less than nothing
-        seen = own + under
-        np.clip(found, np.minimum(seen, 0), seen, out=found)
-        np.copyto(found, own, where=over | (doubt <= SURE**2))
-        yield found
+        light = plane + streak
+        np.clip(samples, np.minimum(light, 0), light, out=samples)
+        np.copyto(samples, plane, where=mask | (doubt <= SURE**2))
+        yield samples
 
 
-def _around(
+def _local_moments(
     rest: Lattices, clipped: Sequence[Mask], doubts: Lattices
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return sums of weights, of samples and of their squares, in squares of all lattices."""
     height, width = (max(plane.shape[axis] for plane in rest) for axis in (0, 1))
     sums = np.zeros((3, -(-height // BLOCK), -(-width // BLOCK)), np.float32)
-    for own, over, doubt in zip(rest, clipped, doubts, strict=True):
+    for samples, mask, doubt in zip(rest, clipped, doubts, strict=True):
         weight = np.float32(NOISE**2) / (np.float32(NOISE**2) + doubt)
-        weight[over] = 0
-        for number, part in enumerate(_moments(weight, own)):
+        weight[mask] = 0
+        for number, part in enumerate(_moments(weight, samples)):
             sums[number] += _in_squares(part, sums.shape[1:])
     for axis in (1, 2):
         sums = scipy.ndimage.correlate1d(sums, _SMOOTH, axis, mode="nearest")
@@ -137,6 +137,6 @@ def _in_squares(plane: FloatArray, shape: tuple[int, ...]) -> FloatArray:
     return squares
 
 
-def _laid(squares: FloatArray, shape: tuple[int, ...]) -> FloatArray:
+def _interpolated(squares: FloatArray, shape: tuple[int, ...]) -> FloatArray:
     """Return samples (h, w) of `shape`, linear between the middles of squares."""
     return rows_of_cells(squares, BLOCK, (_MIDDLE, _MIDDLE), 0, shape[0], shape[1])

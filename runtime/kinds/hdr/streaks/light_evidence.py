@@ -51,14 +51,14 @@ class Judge:
 
     def evidence(self, excess: FloatArray, box: Box) -> float:
         """Return cost of the picture without an excess that lies in a box, less that with it."""
-        around, inner = self._around(box)
-        rest, usable = self._rest[around], self._usable[around]
+        outer, inner = self._boxes(box)
+        rest, usable = self._rest[outer], self._usable[outer]
         light = np.zeros(rest.shape, np.float32)
         light[inner] = excess
         streaks = spreading(self._kernel, light > 0).spread(light)
         return _cost(rest + streaks, usable) - _cost(rest, usable)
 
-    def _around(self, box: Box) -> tuple[Box, Box]:
+    def _boxes(self, box: Box) -> tuple[Box, Box]:
         """Return the place that the streaks of a box reach, and the box within it."""
         reach = self._kernel.shape[0] // 2
         (top, bottom), (left, right) = (
@@ -84,10 +84,10 @@ class Proven:
     share: FloatArray
     given_up: int
 
-    def left(self, light: FloatArray) -> FloatArray:
+    def part_of(self, light: FloatArray) -> FloatArray:
         """Return the proven part of light (..., h, w)."""
-        over = np.maximum(light - np.float32(WHITE), 0)
-        return np.asarray(light - (1 - self.share) * over, np.float32)
+        excess = np.maximum(light - np.float32(WHITE), 0)
+        return np.asarray(light - (1 - self.share) * excess, np.float32)
 
     def finer(self, shape: tuple[int, int]) -> "Proven":
         """Return the same in cells of half the pitch; a last odd one goes with its neighbour."""
@@ -109,9 +109,9 @@ def proven(light: FloatArray, judges: Sequence[Judge | None]) -> Proven:
         box = rows, columns
         excess = np.where(labels[box] == number, np.maximum(light[:, *box] - WHITE, 0), 0)
         evidence = [
-            judge.evidence(own, box)
-            for own, judge in zip(excess, judges, strict=True)
-            if judge is not None and own.any()
+            judge.evidence(part, box)
+            for part, judge in zip(excess, judges, strict=True)
+            if judge is not None and part.any()
         ]
         if evidence:
             share = share_of(sum(evidence))

@@ -24,7 +24,7 @@ from camkit.runtime.kinds.hdr.streaks.doubt import settled
 from camkit.runtime.kinds.hdr.streaks.recovery import Recovery
 from camkit.runtime.kinds.hdr.streaks.rims import colour_by_surroundings, in_own_colours
 from camkit.runtime.kinds.hdr.streaks.spots import lit_pixels
-from camkit.runtime.kinds.hdr.streaks.thrown import streaks_of
+from camkit.runtime.kinds.hdr.streaks.streak_rows import streaks_of
 
 DIMMEST: Final = 0.1
 """Of its strongest colour: lights have no less of any in the colours of the output."""
@@ -69,9 +69,9 @@ class Painter:
         """
         rows, width = planes.shape[1:]
         for colour, gain in enumerate(gains):
-            under = self._thrown(colour, Lattice(top=top), (rows, width))
-            under *= np.float32(gain)
-            planes[colour] -= under
+            glare = self._glare(colour, Lattice(top=top), (rows, width))
+            glare *= np.float32(gain)
+            planes[colour] -= glare
             planes[colour] *= np.float32(1 / self._core[colour])
         self._put_lights(planes, top, gains)
 
@@ -95,15 +95,15 @@ class Painter:
         for colour, places in enumerate(sites):
             at = [np.s_[y::PITCH_PX, x::PITCH_PX] for y, x in places]
             lattices = [Lattice(top=top + y, left=x, step_px=PITCH_PX) for y, x in places]
-            thrown = [
-                self._thrown(colour, lattice, samples[there].shape)
+            glares = [
+                self._glare(colour, lattice, samples[there].shape)
                 for lattice, there in zip(lattices, at, strict=True)
             ]
             light = np.float32(1 / gains[colour])
-            rest = [samples[there] * light - under for there, under in zip(at, thrown, strict=True)]
-            made = settled(rest, thrown, [clipped[there] for there in at])
-            for there, found in zip(at, made, strict=True):
-                samples[there] = found * np.float32(gains[colour] / self._core[colour])
+            rest = [samples[there] * light - glare for there, glare in zip(at, glares, strict=True)]
+            cleared = settled(rest, glares, [clipped[there] for there in at])
+            for there, plane in zip(at, cleared, strict=True):
+                samples[there] = plane * np.float32(gains[colour] / self._core[colour])
 
     def light_up(
         self, planes: FloatArray, clipped: Mask, top: int, gains: tuple[float, ...]
@@ -125,13 +125,13 @@ class Painter:
             np.maximum(plane, np.float32(-DARKEST * gain), out=plane)
         self._put_lights(planes, top, gains, own_colours=True)
 
-    def _thrown(self, colour: int, lattice: Lattice, shape: tuple[int, ...]) -> FloatArray:
+    def _glare(self, colour: int, lattice: Lattice, shape: tuple[int, ...]) -> FloatArray:
         """Return veil and streaks at the pixels of a lattice (rows, columns)."""
         pitch_px, offset_px = self._veil_grid
-        under = lattice.cells(self._veil[colour], pitch_px, offset_px[colour], shape)
+        glare = lattice.cells(self._veil[colour], pitch_px, offset_px[colour], shape)
         for streaks in self._streaks:
-            streaks.add(under, colour, lattice)
-        return under
+            streaks.add(glare, colour, lattice)
+        return glare
 
     def _lit_within(self, top: int, rows: int) -> tuple[slice, tuple[Index, Index]]:
         """Return the lit pixels of some rows, and their places."""
@@ -165,16 +165,20 @@ def _untinted(light: FloatArray, lit: NDArray[np.bool_]) -> FloatArray:
         light: (3, n), multiplied by the gains.
         lit: (3, n): which colours clipped.
     """
-    seen = ~lit.all(axis=0)
+    has_unclipped = ~lit.all(axis=0)
     out = light.copy()
     for colour in range(COLOURS):
         others = np.delete(light, colour, axis=0).min(axis=0)
-        out[colour] = np.where(lit[colour] & seen, np.maximum(light[colour], others), light[colour])
+        out[colour] = np.where(
+            lit[colour] & has_unclipped, np.maximum(light[colour], others), light[colour]
+        )
     return out
 
 
 def _visible(light: FloatArray, colours: OutputColours) -> FloatArray:
     """Raise colours that were sought apart to where the output has them; (3, n) light."""
-    seen = colours.of(light)
-    least = np.float32(DIMMEST) * seen.max(axis=0)
-    return colours.raised(light, np.where((seen > 1).any(axis=0), least, np.float32(-np.inf)))
+    output_light = colours.of(light)
+    least = np.float32(DIMMEST) * output_light.max(axis=0)
+    return colours.raised(
+        light, np.where((output_light > 1).any(axis=0), least, np.float32(-np.inf))
+    )

@@ -20,7 +20,7 @@ from camkit.runtime.kinds.hdr.streaks.convolution import Convolution, spreading
 from camkit.runtime.kinds.hdr.streaks.descent import COARSE_STEPS, not_outshining, seek_lights
 from camkit.runtime.kinds.hdr.streaks.kernels import StreakKernels
 from camkit.runtime.kinds.hdr.streaks.light_evidence import Judge, proven
-from camkit.runtime.kinds.hdr.streaks.refinement import Found, Group, groups_of, refined
+from camkit.runtime.kinds.hdr.streaks.refinement import CoarseLights, Group, groups_of, refined
 from camkit.runtime.kinds.hdr.streaks.regions import Window, windows_of
 from camkit.runtime.kinds.hdr.streaks.shapes import pooled, rim_distance_px, upsampled
 
@@ -43,14 +43,14 @@ class Region:
         window: Its place, in cells of 2 px.
         light: (3, h, w) float32: light of clipped cells, 0 elsewhere; 1.0 = where samples clip.
         streaks: (3, h, w) float32: what they throw beside themselves.
-        thrown: (on clipped cells, beyond what is seen elsewhere, in all): light of the streaks.
+        streak_sums: Light of the streaks: on clipped cells, beyond what is seen elsewhere, in all.
         given_up: Places of whose lights the picture proves nothing.
     """
 
     window: Window
     light: FloatArray
     streaks: FloatArray
-    thrown: tuple[float, float, float]
+    streak_sums: tuple[float, float, float]
     given_up: int = 0
 
 
@@ -91,12 +91,12 @@ class Recovery:
         """
         cells = self.fine.clipped[0].size
         inside = sum(region.light[0].size for region in self.regions)
-        hidden, beyond, thrown = np.sum([r.thrown for r in self.regions] or [(0, 0, 0)], axis=0)
+        hidden, excess, total = np.sum([r.streak_sums for r in self.regions] or [(0, 0, 0)], axis=0)
         return {
             "regions": len(self.regions),
             "saturated_fraction": round(float(self.fine.clipped.mean(dtype=np.float64)), 6),
-            "clipped_streak_fraction": round(float(hidden / thrown), 4) if thrown else 0.0,
-            "unexplained": round(float(beyond / thrown), 4) if thrown else 0.0,
+            "clipped_streak_fraction": round(float(hidden / total), 4) if total else 0.0,
+            "unexplained": round(float(excess / total), 4) if total else 0.0,
             "peak": round(max((float(r.light.max()) for r in self.regions), default=1.0), 2),
             "window_fraction": round(inside / cells, 4),
             "fallbacks": self.fallbacks,
@@ -120,7 +120,7 @@ def recover(
             taken from the samples of a mosaic.
     """
     coarse = coarser(cells)
-    veil = veil_of(coarse.known, kernels.coarse.veil)
+    veil = veil_of(coarse.unclipped, kernels.coarse.veil)
     reach = -(-kernels.reach_px // coarse.pitch_px)
     clipped = np.asarray((coarse.clipped > 0).any(axis=0))
     share = float(clipped.mean())
@@ -157,19 +157,19 @@ def _at_border(mask: Mask) -> bool:
     return bool(mask[0].any() or mask[-1].any() or mask[:, 0].any() or mask[:, -1].any())
 
 
-def veil_of(known: FloatArray, kernels: tuple[FloatArray, ...]) -> FloatArray:
+def veil_of(light: FloatArray, kernels: tuple[FloatArray, ...]) -> FloatArray:
     """Return the light that lights spread beside themselves; the frame continues at its border.
 
     Args:
-        known: (3, h, w) light.
+        light: (3, h, w).
         kernels: For every colour, in the same cells.
     """
-    veil = np.empty_like(known)
+    veil = np.empty_like(light)
     for colour, kernel in enumerate(kernels):
         half = kernel.shape[0] // 2
-        wide = np.pad(known[colour], half, mode="edge")
-        thrown = Convolution(kernel, wide.shape).spread(wide)
-        veil[colour] = thrown[half:-half, half:-half]
+        wide = np.pad(light[colour], half, mode="edge")
+        scattered = Convolution(kernel, wide.shape).spread(wide)
+        veil[colour] = scattered[half:-half, half:-half]
     return veil
 
 
@@ -184,14 +184,14 @@ def _region(
     light = np.empty((COLOURS, *place.shape), np.float32)
     judges = []
     for colour in range(COLOURS):
-        light[colour], judge = _sought(colour, window, groups, cells, veil, kernels)
+        light[colour], judge = _lights_of_colour(colour, window, groups, cells, veil, kernels)
         judges.append(judge)
     if light[0].size > FINE_CELLS:
-        kept = proven(pooled(light), judges).finer(place.shape)
+        proof = proven(pooled(light), judges).finer(place.shape)
     else:
-        kept = proven(light, judges)
+        proof = proven(light, judges)
     for plane in light:
-        plane[:] = kept.left(plane)
+        plane[:] = proof.part_of(plane)
     streaks = np.zeros_like(light)
     for colour in range(COLOURS):
         clipped = fine.clipped[(colour, *place.at)] > 0
@@ -202,28 +202,28 @@ def _region(
         window=place,
         light=light,
         streaks=streaks,
-        thrown=_thrown(streaks, fine, place),
-        given_up=kept.given_up,
+        streak_sums=_streak_sums(streaks, fine, place),
+        given_up=proof.given_up,
     )
 
 
-def _thrown(streaks: FloatArray, fine: Cells, place: Window) -> tuple[float, float, float]:
+def _streak_sums(streaks: FloatArray, fine: Cells, place: Window) -> tuple[float, float, float]:
     """Sum the streaks: on clipped cells, beyond what is seen elsewhere, in all."""
-    hidden, beyond, every = 0.0, 0.0, 0.0
+    hidden, excess, every = 0.0, 0.0, 0.0
     for colour, plane in enumerate(streaks):
         clipped = fine.clipped[(colour, *place.at)] > 0
-        over = np.maximum(plane - fine.light[(colour, *place.at)], 0)
+        outshining = np.maximum(plane - fine.light[(colour, *place.at)], 0)
         hidden += _sum(plane[clipped])
-        beyond += _sum(over[~clipped])
+        excess += _sum(outshining[~clipped])
         every += _sum(plane)
-    return hidden, beyond, every
+    return hidden, excess, every
 
 
 def _sum(light: FloatArray) -> float:
     return float(light.sum(dtype=np.float64))
 
 
-class _Sought(NamedTuple):
+class _ColourLights(NamedTuple):
     """Lights of one colour in a window, in cells of 2 px; their judge, None where nothing clipped.
 
     The judge is of cells of 4 px in a large window.
@@ -233,33 +233,35 @@ class _Sought(NamedTuple):
     judge: Judge | None
 
 
-def _sought(
+def _lights_of_colour(
     colour: int,
     window: Window,
     groups: Sequence[Group],
     cells: tuple[Cells, Cells],
     veil: FloatArray,
     kernels: StreakKernels,
-) -> _Sought:
+) -> _ColourLights:
     """Find the lights of one colour in a window; a large one is judged in cells of 4 px."""
     fine, coarse = cells
     at, place = (colour, *window.at), window.finer(fine.light.shape[-2:])
     clipped = fine.clipped[(colour, *place.at)] > 0
     if not clipped.any():
-        return _Sought(light=np.zeros(clipped.shape, np.float32), judge=None)
+        return _ColourLights(light=np.zeros(clipped.shape, np.float32), judge=None)
     rim_px = rim_distance_px(clipped, fine.pitch_px)
     guess = np.where(clipped, 1 + GUESS * rim_px**2, 0).astype(np.float32)
-    seen, hidden = coarse.light[at] - veil[at], coarse.clipped[at] > 0
+    measured, hidden = coarse.light[at] - veil[at], coarse.clipped[at] > 0
     kernel = kernels.coarse.whole[colour]
     spread = spreading(kernel, hidden)
-    first = not_outshining(pooled(guess), seen, hidden, spread)
-    light = seek_lights(seen, hidden, spread, first, COARSE_STEPS)
-    thrown = spread.spread(light)
-    found = Found(window=window, light=light, thrown=thrown, veil=veil[at], rim_px=rim_px)
-    finer = refined(colour, found, groups, fine, kernels)
+    first = not_outshining(pooled(guess), measured, hidden, spread)
+    light = seek_lights(measured, hidden, spread, first, COARSE_STEPS)
+    blurred = spread.spread(light)
+    coarse_lights = CoarseLights(
+        window=window, light=light, blurred=blurred, veil=veil[at], rim_px=rim_px
+    )
+    finer = refined(colour, coarse_lights, groups, fine, kernels)
     if clipped.size > FINE_CELLS:
-        return _Sought(light=finer, judge=Judge(light, seen - thrown, kernel))
-    seen = fine.light[(colour, *place.at)] - upsampled(veil[at], clipped.shape)
+        return _ColourLights(light=finer, judge=Judge(light, measured - blurred, kernel))
+    measured = fine.light[(colour, *place.at)] - upsampled(veil[at], clipped.shape)
     kernel = kernels.fine.whole[colour]
-    thrown = spreading(kernel, clipped).spread(finer)
-    return _Sought(light=finer, judge=Judge(finer, seen - thrown, kernel))
+    blurred = spreading(kernel, clipped).spread(finer)
+    return _ColourLights(light=finer, judge=Judge(finer, measured - blurred, kernel))

@@ -23,7 +23,7 @@ from camkit.runtime.kinds.hdr.streaks.kernels import StreakKernels
 from camkit.runtime.kinds.hdr.streaks.regions import Window
 from camkit.runtime.kinds.hdr.streaks.shapes import dome, repeated, upsampled, with_means
 
-APART: Final = 8
+GROUP_REACH: Final = 8
 """Coarse cells: lights farther from each other than twice that are of different groups."""
 NEAR: Final = 16
 """Coarse cells about a group that are looked at."""
@@ -32,20 +32,20 @@ Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Found:
+class CoarseLights:
     """Lights of one colour in a window, in cells of 4 px.
 
     Attributes:
         window: In these cells.
         light: (h, w) float32, 0 outside the clipped cells.
-        thrown: (h, w) float32: what becomes of it, itself included.
+        blurred: (h, w) float32: what becomes of it, itself included.
         veil: (h, w) float32: what unclipped light has thrown there.
         rim_px: Of its cells of 2 px: how far from the rim of what clipped, 0 outside.
     """
 
     window: Window
     light: FloatArray
-    thrown: FloatArray
+    blurred: FloatArray
     veil: FloatArray
     rim_px: FloatArray
 
@@ -56,16 +56,16 @@ class Group:
 
     Attributes:
         window: Those cells and what is looked at about them, within the window of all.
-        own: (h, w) of that window: which cells are of the group, with those about them.
+        cells: (h, w) of that window: which cells are of the group, with those about them.
     """
 
     window: Window
-    own: Mask
+    cells: Mask
 
 
 def groups_of(clipped: Mask) -> tuple[Group, ...]:
     """Group the clipped cells (h, w) of a window, of any colour; every cell is in one group."""
-    near = scipy.ndimage.maximum_filter(clipped, size=2 * APART + 1, mode="constant")
+    near = scipy.ndimage.maximum_filter(clipped, size=2 * GROUP_REACH + 1, mode="constant")
     labels, _ = scipy.ndimage.label(near, structure=_EIGHT)
     groups = []
     places = scipy.ndimage.find_objects(np.where(clipped, labels, 0))
@@ -76,39 +76,39 @@ def groups_of(clipped: Mask) -> tuple[Group, ...]:
             left=max(columns.start - NEAR, 0),
             right=min(columns.stop + NEAR, clipped.shape[1]),
         )
-        groups.append(Group(window=window, own=labels[window.at] == number))
+        groups.append(Group(window=window, cells=labels[window.at] == number))
     return tuple(groups)
 
 
 def refined(
-    colour: int, found: Found, groups: Sequence[Group], fine: Cells, kernels: StreakKernels
+    colour: int, lights: CoarseLights, groups: Sequence[Group], fine: Cells, kernels: StreakKernels
 ) -> FloatArray:
     """Return the lights of one colour in a window, in cells of 2 px.
 
     Args:
         colour: Which.
-        found: Its lights in cells of 4 px.
+        lights: Its lights in cells of 4 px.
         groups: Of `groups_of`, within the window.
         fine: The whole capture in cells of 2 px.
         kernels: For its cells.
     """
-    place = found.window.finer(fine.light.shape[-2:])
+    place = lights.window.finer(fine.light.shape[-2:])
     clipped = fine.clipped[(colour, *place.at)] > 0
     light = np.zeros(place.shape, np.float32)
     for group in groups:
         near = group.window.finer(place.shape)
-        own = repeated(group.own, near.shape) & clipped[near.at]
-        if not own.any():
+        clipped_cells = repeated(group.cells, near.shape) & clipped[near.at]
+        if not clipped_cells.any():
             continue
-        coarse = np.where(group.own, found.light[group.window.at], 0).astype(np.float32)
+        coarse = np.where(group.cells, lights.light[group.window.at], 0).astype(np.float32)
         mine = spreading(kernels.coarse.whole[colour], coarse > 0).spread(coarse)
-        known = found.veil[group.window.at] + found.thrown[group.window.at] - mine
-        seen = fine.light[(colour, *near.moved(place.top, place.left).at)]
+        other_light = lights.veil[group.window.at] + lights.blurred[group.window.at] - mine
+        measured = fine.light[(colour, *near.shifted(place.top, place.left).at)]
         light[near.at] += seek_lights(
-            seen - upsampled(known, near.shape),
-            own,
-            spreading(kernels.fine.whole[colour], own),
-            with_means(np.where(own, dome(found.rim_px[near.at]), 0), coarse),
+            measured - upsampled(other_light, near.shape),
+            clipped_cells,
+            spreading(kernels.fine.whole[colour], clipped_cells),
+            with_means(np.where(clipped_cells, dome(lights.rim_px[near.at]), 0), coarse),
             FINE_STEPS,
             hidden=clipped[near.at],
         )

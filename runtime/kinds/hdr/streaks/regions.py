@@ -34,7 +34,7 @@ class Window:
         """Return the place in an array."""
         return slice(self.top, self.bottom), slice(self.left, self.right)
 
-    def moved(self, rows: int, columns: int) -> "Window":
+    def shifted(self, rows: int, columns: int) -> "Window":
         """Return the same, so many cells farther down and to the right."""
         return Window(
             top=self.top + rows,
@@ -74,36 +74,36 @@ def windows_of(clipped: Mask, reach: int) -> tuple[Window, ...]:
     boxes = []
     for rows, columns in scipy.ndimage.find_objects(labels):
         boxes.append([rows.start, rows.stop, columns.start, columns.stop])
-    merged = _apart(boxes)
-    found = [
+    merged = _merged(boxes)
+    windows = [
         Window(
             top=max(top, 0), bottom=min(bottom, height), left=max(left, 0), right=min(right, width)
         )
         for top, bottom, left, right in merged
     ]
-    return tuple(sorted(found, key=lambda w: (w.top, w.left)))
+    return tuple(sorted(windows, key=lambda w: (w.top, w.left)))
 
 
 def _finer_end(end: int, cells: int) -> int:
     return cells if 2 * end + 1 == cells else 2 * end
 
 
-def _apart(boxes: list[list[int]]) -> list[list[int]]:
+def _merged(boxes: list[list[int]]) -> list[list[int]]:
     """Join boxes that overlap until none do."""
-    left = list(boxes)
-    done: list[list[int]] = []
-    while left:
-        box = left.pop()
-        hits = [other for other in (*left, *done) if _overlap(box, other)]
+    pending = list(boxes)
+    disjoint: list[list[int]] = []
+    while pending:
+        box = pending.pop()
+        hits = [other for other in (*pending, *disjoint) if _overlap(box, other)]
         if not hits:
-            done.append(box)
+            disjoint.append(box)
             continue
-        left = [other for other in left if other not in hits]
-        done = [other for other in done if other not in hits]
+        pending = [other for other in pending if other not in hits]
+        disjoint = [other for other in disjoint if other not in hits]
         every = np.array([box, *hits])
         low, high = every.min(axis=0), every.max(axis=0)
-        left.append([int(low[0]), int(high[1]), int(low[2]), int(high[3])])
-    return done
+        pending.append([int(low[0]), int(high[1]), int(low[2]), int(high[3])])
+    return disjoint
 
 
 def _overlap(a: list[int], b: list[int]) -> bool:

@@ -48,8 +48,8 @@ def in_own_colours(
     hue = excess + np.float32(PALE) * (1 + excess.mean(axis=0))
     hue /= hue.sum(axis=0)
     least = np.where(lit, levels / hue, 0).max(axis=0)
-    wanted = np.minimum(hue * least, np.float32(MOST_RAISED) * np.maximum(light, levels))
-    return np.where(lit, np.maximum(light, wanted), light)
+    raised = np.minimum(hue * least, np.float32(MOST_RAISED) * np.maximum(light, levels))
+    return np.where(lit, np.maximum(light, raised), light)
 
 
 def near_clipped(clipped: Mask) -> Mask:
@@ -57,19 +57,19 @@ def near_clipped(clipped: Mask) -> Mask:
     return widened(clipped, LIT_PX, LIT_PX)
 
 
-def no_brighter(lit: FloatArray, seen: FloatArray, near: Mask) -> None:
+def no_brighter(lit: FloatArray, captured: FloatArray, near: Mask) -> None:
     """Darken a picture (3, h, w) in place to hardly brighter than it was seen, away from lights.
 
     Networks act where it is brighter, and are left out where no sample clipped.
 
     Args:
         lit: With lights, without streaks.
-        seen: As captured.
+        captured: As captured.
         near: (h, w) of `near_clipped`.
     """
     far = ~near
-    for plane, before in zip(lit, seen, strict=True):
-        most = np.maximum(before, 0)
+    for plane, original in zip(lit, captured, strict=True):
+        most = np.maximum(original, 0)
         most *= np.float32(MOST_OVER)
         np.minimum(plane, most, out=plane, where=far)
 
@@ -85,17 +85,17 @@ def colour_by_surroundings(planes: FloatArray, clipped: Mask, lit: Mask) -> None
     """
     mixed = widened(clipped, MIXED_PX, 1) | widened(clipped, 1, MIXED_PX)
     rows, columns = np.nonzero(mixed & ~clipped & ~lit)
-    own = planes[:, rows, columns]
-    sums = np.zeros_like(own)
-    known = np.pad(~mixed, AROUND_PX)
+    colours = planes[:, rows, columns]
+    sums = np.zeros_like(colours)
+    unmixed = np.pad(~mixed, AROUND_PX)
     flat, places = planes.reshape(len(planes), -1), rows * planes.shape[2] + columns
     for down, right in np.ndindex(2 * AROUND_PX + 1, 2 * AROUND_PX + 1):
         y, x = down - AROUND_PX, right - AROUND_PX
         weight = np.float32(np.exp(-0.5 * (y**2 + x**2) / SIGMA_PX**2))
-        weights = weight * known[rows + down, columns + right]
+        weights = weight * unmixed[rows + down, columns + right]
         # what lies outside has no weight, whatever stands in its place
         there = flat.take(places + (y * planes.shape[2] + x), axis=1, mode="clip")
         sums += weights * np.maximum(there, 0, out=there)
-    whole, bright = sums.sum(axis=0), np.maximum(own, 0).sum(axis=0)
+    whole, bright = sums.sum(axis=0), np.maximum(colours, 0).sum(axis=0)
     coloured = sums / np.maximum(whole, _TINY) * bright
-    planes[:, rows, columns] = np.where(whole > _TINY, coloured, own)
+    planes[:, rows, columns] = np.where(whole > _TINY, coloured, colours)

@@ -28,11 +28,11 @@ def rim_distance_px(mask: NDArray[np.bool_], pitch_px: float) -> FloatArray:
     """
     distance = np.zeros(mask.shape, np.float32)
     for top in range(0, mask.shape[0], STRIP_ROWS):
-        above = max(top - FARTHEST_CELLS, 0)
-        strip = mask[above : top + STRIP_ROWS + FARTHEST_CELLS]
+        start = max(top - FARTHEST_CELLS, 0)
+        strip = mask[start : top + STRIP_ROWS + FARTHEST_CELLS]
         if strip.any():
-            found = scipy.ndimage.distance_transform_edt(strip)
-            distance[top : top + STRIP_ROWS] = found[top - above :][:STRIP_ROWS]
+            strip_distance = scipy.ndimage.distance_transform_edt(strip)
+            distance[top : top + STRIP_ROWS] = strip_distance[top - start :][:STRIP_ROWS]
     return np.minimum(distance, FARTHEST_CELLS) * np.float32(pitch_px)
 
 
@@ -46,11 +46,11 @@ def pooled(fine: FloatArray) -> FloatArray:
     height, width = fine.shape[-2] // 2, fine.shape[-1] // 2
     means = np.empty((*fine.shape[:-2], height, width), np.float32)
     for top in range(0, height, STRIP_ROWS):
-        into = means[..., top : top + STRIP_ROWS, :]
-        strip = fine[..., 2 * top : 2 * (top + into.shape[-2]), : 2 * width]
-        np.add(strip[..., 0::2, 0::2], strip[..., 0::2, 1::2], out=into)
-        into += strip[..., 1::2, 0::2] + strip[..., 1::2, 1::2]
-        into *= np.float32(0.25)
+        part = means[..., top : top + STRIP_ROWS, :]
+        strip = fine[..., 2 * top : 2 * (top + part.shape[-2]), : 2 * width]
+        np.add(strip[..., 0::2, 0::2], strip[..., 0::2, 1::2], out=part)
+        part += strip[..., 1::2, 0::2] + strip[..., 1::2, 1::2]
+        part *= np.float32(0.25)
     return means
 
 
@@ -100,9 +100,9 @@ def widened(plane: NDArray[Any], down: int, right: int) -> NDArray[Any]:
     out = plane
     for axis, reach in enumerate((down, right)):
         wide = out.copy()
-        for far in range(1, reach + 1):
-            for into, there in ((np.s_[far:], np.s_[:-far]), (np.s_[:-far], np.s_[far:])):
-                part = wide[into] if axis == 0 else wide[:, into]
+        for shift in range(1, reach + 1):
+            for target, there in ((np.s_[shift:], np.s_[:-shift]), (np.s_[:-shift], np.s_[shift:])):
+                part = wide[target] if axis == 0 else wide[:, target]
                 np.maximum(part, out[there] if axis == 0 else out[:, there], out=part)
         out = wide
     return out

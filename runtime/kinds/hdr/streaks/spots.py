@@ -23,7 +23,7 @@ from camkit.contracts import FloatArray
 from camkit.runtime.kinds.hdr.streaks.cells import COLOURS, PITCH_PX, Cells
 from camkit.runtime.kinds.hdr.streaks.recovery import Recovery, Region
 
-SEEN: Final = 0.98
+FULL_LEVEL: Final = 0.98
 """Of where samples clip: a pixel between samples that is darker did not, it was seen."""
 SMOOTHING_CELLS: Final = 0.4
 DEEPEST: Final = 2.0
@@ -94,14 +94,14 @@ class _Shaped:
         columns: (n,).
         numbers: (n,) of their places.
         shapes: (3, n) of the lights; 0 where a colour is not lit.
-        seen: (3, n): what samples say of the light, 1 at most.
+        levels: (3, n): what samples say of the light, 1 at most.
     """
 
     rows: Index
     columns: Index
     numbers: Index
     shapes: FloatArray
-    seen: FloatArray
+    levels: FloatArray
 
 
 def _region_pixels(region: Region, cells: Cells) -> LitPixels:
@@ -121,8 +121,8 @@ def _region_pixels(region: Region, cells: Cells) -> LitPixels:
 def _excess(light: FloatArray, numbers: Index) -> FloatArray:
     """Return the excess over white at the place of every pixel, mean over its pixels."""
     pixels = np.maximum(np.bincount(numbers), 1)
-    over = [np.bincount(numbers, np.maximum(plane - 1, 0)) / pixels for plane in light]
-    return np.asarray(over, np.float32)[:, numbers]
+    excess = [np.bincount(numbers, np.maximum(plane - 1, 0)) / pixels for plane in light]
+    return np.asarray(excess, np.float32)[:, numbers]
 
 
 def _places(clipped: FloatArray, light: FloatArray) -> _Places:
@@ -146,10 +146,10 @@ def _lit(numbers: Index, cells: Cells, region: Region) -> Mask:
     for rows, columns in _pixels_of(numbers):
         for colour in range(COLOURS):
             offset = cells.offset_px[colour]
-            own = _own(pixels[min(colour, len(pixels) - 1)], rows, columns)
-            full = _between(level[colour], rows, columns, offset) >= SEEN
-            near = _between(clipped[colour], rows, columns, offset) > 0
-            lit[colour, rows + 1, columns + 1] = near & (own | full)
+            sample_clipped = _sample_clipped(pixels[min(colour, len(pixels) - 1)], rows, columns)
+            full = _interpolated(level[colour], rows, columns, offset) >= FULL_LEVEL
+            near = _interpolated(clipped[colour], rows, columns, offset) > 0
+            lit[colour, rows + 1, columns + 1] = near & (sample_clipped | full)
     return lit
 
 
@@ -160,21 +160,21 @@ def _shaped(numbers: Index, lit: Mask, cells: Cells, region: Region) -> _Shaped:
     level = _level(cells, region)
     fields = [_smoothed(*planes) for planes in zip(region.light, clipped, strict=True)]
     none = np.zeros(0, np.int32)
-    found = [(none, none, none)]
+    places = [(none, none, none)]
     values = [np.zeros((2, COLOURS, 0), np.float32)]
     for rows, columns in _pixels_of(numbers):
         some = lit[:, rows + 1, columns + 1].any(axis=0)
         y, x = rows[some], columns[some]
-        made = np.empty((2, COLOURS, y.size), np.float32)
+        block = np.empty((2, COLOURS, y.size), np.float32)
         for colour, field in enumerate(fields):
             offset = cells.offset_px[colour]
-            made[0, colour] = _between(field, y, x, offset) * _depth(lit[colour], y, x)
-            made[1, colour] = _between(level[colour], y, x, offset)
-        found.append((y, x, numbers[y // PITCH_PX, x // PITCH_PX]))
-        values.append(made)
-    rows, columns, of_place = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    shapes, seen = np.concatenate(values, axis=2)
-    return _Shaped(rows=rows, columns=columns, numbers=of_place, shapes=shapes, seen=seen)
+            block[0, colour] = _interpolated(field, y, x, offset) * _depth(lit[colour], y, x)
+            block[1, colour] = _interpolated(level[colour], y, x, offset)
+        places.append((y, x, numbers[y // PITCH_PX, x // PITCH_PX]))
+        values.append(block)
+    rows, columns, of_place = (np.concatenate(parts) for parts in zip(*places, strict=True))
+    shapes, levels = np.concatenate(values, axis=2)
+    return _Shaped(rows=rows, columns=columns, numbers=of_place, shapes=shapes, levels=levels)
 
 
 def _level(cells: Cells, region: Region) -> FloatArray:
@@ -192,11 +192,11 @@ def _shared_out(shaped: _Shaped, light: FloatArray) -> FloatArray:
         light: (3, places + 1).
     """
     shapes, numbers = shaped.shapes, shaped.numbers
-    own = _all_summing_to(shapes, numbers, light)
-    own = _all_summing_to(np.minimum(own, _most(shaped, light)), numbers, light)
-    every, whole = own.sum(axis=0), np.maximum(light.sum(axis=0), _TINY)
+    lights = _all_summing_to(shapes, numbers, light)
+    lights = _all_summing_to(np.minimum(lights, _most(shaped, light)), numbers, light)
+    every, whole = lights.sum(axis=0), np.maximum(light.sum(axis=0), _TINY)
     alike = np.where(shapes > 0, every * (light / whole)[:, numbers], 0)
-    mixed = (1 - ALIKE) * own + ALIKE * _all_summing_to(alike, numbers, light)
+    mixed = (1 - ALIKE) * lights + ALIKE * _all_summing_to(alike, numbers, light)
     return np.asarray(np.where(shapes > 0, np.maximum(mixed, 1), 0), np.float32)
 
 
@@ -207,10 +207,10 @@ def _most(shaped: _Shaped, light: FloatArray) -> FloatArray:
     """
     most = np.full(shaped.shapes.shape, np.inf, np.float32)
     for dim in range(COLOURS):
-        seen = (shaped.shapes[dim] == 0) & (light[dim] > 0)[shaped.numbers]
+        dim_pixels = (shaped.shapes[dim] == 0) & (light[dim] > 0)[shaped.numbers]
         ratios = light / np.maximum(light[dim], _TINY)
-        bound = COLOUR_SPAN * shaped.seen[dim] * ratios[:, shaped.numbers]
-        most = np.where(seen, np.minimum(most, np.maximum(bound, 1)), most)
+        bound = COLOUR_SPAN * shaped.levels[dim] * ratios[:, shaped.numbers]
+        most = np.where(dim_pixels, np.minimum(most, np.maximum(bound, 1)), most)
     return np.asarray(most, np.float32)
 
 
@@ -218,9 +218,9 @@ def _all_summing_to(shapes: FloatArray, numbers: Index, light: FloatArray) -> Fl
     return np.stack([_summing_to(s, numbers, f) for s, f in zip(shapes, light, strict=True)])
 
 
-def _summing_to(shape: FloatArray, numbers: Index, wanted: FloatArray) -> FloatArray:
-    there = np.bincount(numbers, shape, wanted.size)
-    factor = np.divide(wanted, there, out=np.zeros(wanted.size), where=there > _TINY)
+def _summing_to(shape: FloatArray, numbers: Index, sums: FloatArray) -> FloatArray:
+    there = np.bincount(numbers, shape, sums.size)
+    factor = np.divide(sums, there, out=np.zeros(sums.size), where=there > _TINY)
     return np.asarray(shape * factor[numbers], np.float32)
 
 
@@ -237,7 +237,7 @@ def _pixels_of(numbers: Index) -> Iterator[tuple[Index, Index]]:
         )
 
 
-def _own(pixels: NDArray[np.uint8], rows: Index, columns: Index) -> Mask:
+def _sample_clipped(pixels: NDArray[np.uint8], rows: Index, columns: Index) -> Mask:
     """Return a mask of the pixels whose own sample clipped."""
     bit = (rows % PITCH_PX) * PITCH_PX + columns % PITCH_PX
     return (pixels[rows // PITCH_PX, columns // PITCH_PX] >> bit.astype(np.uint8)) & 1 > 0
@@ -253,17 +253,17 @@ def _smoothed(light: FloatArray, clipped: FloatArray) -> FloatArray:
 
 def _depth(lit: Mask, rows: Index, columns: Index) -> FloatArray:
     """Return the distance of pixels from what is not lit, at most `DEEPEST`; 0 outside."""
-    beside, across = np.ones(rows.size, np.bool_), np.ones(rows.size, np.bool_)
+    sides, corners = np.ones(rows.size, np.bool_), np.ones(rows.size, np.bool_)
     for dy, dx in ((0, 1), (1, 0), (1, 2), (2, 1)):
-        beside &= lit[rows + dy, columns + dx]
+        sides &= lit[rows + dy, columns + dx]
     for dy, dx in ((0, 0), (0, 2), (2, 0), (2, 2)):
-        across &= lit[rows + dy, columns + dx]
-    inner = np.where(across, DEEPEST, np.sqrt(2))
-    depth = np.where(beside, inner, 1) * lit[rows + 1, columns + 1]
+        corners &= lit[rows + dy, columns + dx]
+    inner = np.where(corners, DEEPEST, np.sqrt(2))
+    depth = np.where(sides, inner, 1) * lit[rows + 1, columns + 1]
     return np.asarray(depth, np.float32)
 
 
-def _between(
+def _interpolated(
     field: FloatArray, rows: Index, columns: Index, offset_px: tuple[float, float]
 ) -> FloatArray:
     """Return a field of cells at pixels, linear between the middles of cells."""

@@ -9,10 +9,10 @@ from camkit.runtime.kinds.hdr.deglare.arms import (
     MOST_RUNS,
     SCALES,
     Columns,
+    arm_streaks,
     fields_of,
     runs_of,
     seek_arms,
-    thrown,
 )
 
 ROWS, COLUMNS = 60, 40
@@ -28,7 +28,7 @@ def _lights() -> np.ndarray:
 
 def _columns(seen: np.ndarray, lights: np.ndarray) -> Columns:
     return Columns(
-        seen=np.ascontiguousarray(seen.T.astype(np.float32)),
+        light=np.ascontiguousarray(seen.T.astype(np.float32)),
         usable=np.ascontiguousarray(~lights.T),
         level=np.full(seen.T.shape, 0.05, np.float32),
         joined=np.ones(seen.shape[1] - 1, bool),
@@ -70,7 +70,7 @@ def test_amounts_over_an_even_scene_come_back(scales: tuple[float, ...]) -> None
     fading = np.exp(-np.arange(ROWS) / 15).astype(np.float32)
     fields = fields_of(runs_of(lights), fading)
     wanted = np.where(fields.any(axis=1), 0.02, 0) * (1 + np.arange(COLUMNS)[:, None] % 3)
-    seen = 0.1 + thrown(fields, wanted).T
+    seen = 0.1 + arm_streaks(fields, wanted).T
     start = wanted * 0.9 if scales == LAST_SCALES else None
     found = seek_arms(_columns(seen, lights), fields, scales, start)
     # the price takes a little
@@ -85,13 +85,13 @@ def test_amounts_survive_edges_of_the_scene_and_are_never_negative() -> None:
     scene = np.full((ROWS, COLUMNS), 0.1)
     scene[:, 16:] = 0.3  # a wall, whose edge lies within the second light
     scene[20:24, :] = 0.5
-    seen = scene + thrown(fields, wanted).T
+    seen = scene + arm_streaks(fields, wanted).T
     found = seek_arms(_columns(seen, lights), fields, SCALES)
     assert found.min() >= 0
-    error = np.abs(thrown(fields, found) - thrown(fields, wanted))
+    error = np.abs(arm_streaks(fields, found) - arm_streaks(fields, wanted))
     assert np.median(error[fields.any(axis=(1, 2))]) < 0.01
     nothing = seek_arms(_columns(scene, lights), fields, SCALES)
-    assert np.median(thrown(fields, nothing)[fields.any(axis=(1, 2))]) < 0.01
+    assert np.median(arm_streaks(fields, nothing)[fields.any(axis=(1, 2))]) < 0.01
 
 
 def test_the_band_solves_what_dense_equations_say() -> None:

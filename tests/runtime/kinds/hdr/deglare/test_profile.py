@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from camkit.runtime.kinds.hdr.deglare.arms import Columns, fields_of, runs_of, thrown
+from camkit.runtime.kinds.hdr.deglare.arms import Columns, arm_streaks, fields_of, runs_of
 from camkit.runtime.kinds.hdr.deglare.profile import first_fading, fitted_fading
 
 ROWS, COLUMNS, REACH = 80, 30, 60.0
@@ -14,9 +14,9 @@ def test_the_fading_of_known_amounts_is_found() -> None:
     runs = runs_of(lights)
     true = np.exp(-np.arange(ROWS) / 12).astype(np.float32)
     amounts = np.where(fields_of(runs, true).any(axis=1), 0.05, 0)
-    seen = 0.1 + thrown(fields_of(runs, true), amounts)
+    seen = 0.1 + arm_streaks(fields_of(runs, true), amounts)
     columns = Columns(
-        seen=seen,
+        light=seen,
         usable=np.ascontiguousarray(~lights.T),
         level=np.full(seen.shape, 0.1, np.float32),
         joined=np.ones(COLUMNS - 1, bool),

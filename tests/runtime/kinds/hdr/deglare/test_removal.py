@@ -62,7 +62,7 @@ def test_lights_are_untouched_and_nothing_becomes_brighter(shot: Shot, glare: Gl
 
 def test_no_pixel_ends_below_its_smooth_surroundings(shot: Shot, glare: Glare) -> None:
     assert glare.slant is not None
-    floor = glare.slant.laid(glare.floor, 0, SHAPE[0])
+    floor = glare.slant.resampled(glare.floor, 0, SHAPE[0])
     assert (_cleared(glare, shot.seen) >= np.minimum(shot.seen, floor)).all()
     assert floor.max() > 0
 

@@ -31,7 +31,7 @@ def test_what_is_even_along_the_streaks_comes_back() -> None:
     slant = Slant(angle_rad=math.radians(6), height=48, width=40, step=4)
     column = np.arange(slant.shape[1], dtype=np.float32)
     field = np.stack([np.broadcast_to(column, slant.shape)] * 2)
-    laid = slant.laid(field, 0, 48)
+    laid = slant.resampled(field, 0, 48)
     y, x = np.mgrid[:48, :40]
     wanted = x - np.array([slant.shift_px(row) for row in range(48)])[y]
     np.testing.assert_allclose(laid, np.broadcast_to(wanted, laid.shape), atol=1e-4)
@@ -45,8 +45,8 @@ def test_rows_read_and_laid_in_bands_are_those_of_the_whole() -> None:
     parts = slant.gathered(lambda top, bottom: picture[:, top:bottom], 3, rows_at_once=7)
     for one, other in zip(whole, parts, strict=True):
         np.testing.assert_array_equal(one, other)
-    laid = slant.laid(whole[0], 0, 61)
-    pieces = [slant.laid(whole[0], top, 1) for top in range(61)]
+    laid = slant.resampled(whole[0], 0, 61)
+    pieces = [slant.resampled(whole[0], top, 1) for top in range(61)]
     np.testing.assert_array_equal(np.concatenate(pieces, axis=1), laid)
 
 

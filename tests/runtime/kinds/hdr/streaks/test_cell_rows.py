@@ -33,7 +33,7 @@ def test_pixels_of_a_lattice_have_the_bits_of_every_pixel(pitch: int, y: int, x:
     wanted = rows_of_cells(field, pitch, offset, 8, height, width)[y::2, x::2]
     lattice = Lattice(top=8 + y, left=x, step_px=2)
     np.testing.assert_array_equal(lattice.cells(field, pitch, offset, wanted.shape), wanted)
-    at = lattice.within((11, 5, 19, 22), wanted.shape)
+    at = lattice.pixels_in((11, 5, 19, 22), wanted.shape)
     part = lattice.part(at).cells(field, pitch, offset, wanted[at].shape)
     np.testing.assert_array_equal(part, wanted[at])
 
@@ -47,7 +47,7 @@ def test_pixels_of_a_lattice_have_the_bits_of_every_pixel(pitch: int, y: int, x:
 def test_a_lattice_knows_which_of_its_pixels_lie_in_a_box(
     box: tuple[int, int, int, int], first: tuple[int, int], shape: tuple[int, int], step: int
 ) -> None:
-    rows, columns = Lattice(top=first[0], left=first[1], step_px=step).within(box, shape)
+    rows, columns = Lattice(top=first[0], left=first[1], step_px=step).pixels_in(box, shape)
     for pixels, start, count, low, high in (
         (rows, first[0], shape[0], box[0], box[2]),
         (columns, first[1], shape[1], box[1], box[3]),

@@ -61,7 +61,7 @@ def test_a_cell_holds_the_mean_of_what_did_not_clip_and_the_share_that_did(
     assert cells.pitch_px == 2
     np.testing.assert_allclose(cells.light, light, atol=FLOAT32)
     np.testing.assert_array_equal(cells.clipped, share)
-    np.testing.assert_allclose(cells.known, light * (1 - share), atol=FLOAT32)
+    np.testing.assert_allclose(cells.unclipped, light * (1 - share), atol=FLOAT32)
     assert ((share > 0) & (share < 1)).any()
 
 
@@ -92,14 +92,16 @@ def test_coarser_cells_hold_the_light_of_four_and_leave_an_odd_rest_out(
     for colour, y, x in np.ndindex(3, rows, columns):
         four = (colour, slice(2 * y, 2 * y + 2), slice(2 * x, 2 * x + 2))
         assert wide.clipped[colour, y, x] == cells.clipped[four].mean()
-        assert wide.known[colour, y, x] == pytest.approx(cells.known[four].mean(), abs=FLOAT32)
+        assert wide.unclipped[colour, y, x] == pytest.approx(
+            cells.unclipped[four].mean(), abs=FLOAT32
+        )
 
 
 def test_a_cell_of_which_all_clipped_holds_no_known_light() -> None:
     samples = np.ones((3, 4, 4), np.float32)
     cells = coarser(cells_of(samples, samples >= 1, sample_sites(None)))
     assert (cells.light == 0).all()
-    assert (cells.known == 0).all()
+    assert (cells.unclipped == 0).all()
     assert (cells.clipped == 1).all()
 
 

@@ -51,7 +51,7 @@ def _proven(light: FloatArray, seen: FloatArray) -> tuple[FloatArray, int]:
     dark = np.zeros_like(light)
     every = np.stack([dark, light, dark])
     found = proven(every, [None, _judge(light, seen), None])
-    left = found.left(every)
+    left = found.part_of(every)
     assert not left[[0, 2]].any()
     return left[1], found.given_up
 
@@ -126,9 +126,9 @@ def test_what_one_colour_proves_speaks_for_the_others() -> None:
     lights = [_disc(30, 30, 1.5, size) for size in (80.0, 3.0)]
     judges = [_judge(x, (_scene() + _spread(x)).astype(np.float32)) for x in lights]
     both = np.stack([*lights, np.zeros(SHAPE, np.float32)])
-    np.testing.assert_array_equal(proven(both, [*judges, None]).left(both), both)
+    np.testing.assert_array_equal(proven(both, [*judges, None]).part_of(both), both)
     dim = np.stack([both[2], lights[1], both[2]])
-    assert proven(dim, [None, judges[1], None]).left(dim).max() < 3
+    assert proven(dim, [None, judges[1], None]).part_of(dim).max() < 3
 
 
 def test_what_is_proven_in_coarse_cells_holds_for_the_finer_ones_that_they_cover() -> None:
@@ -137,7 +137,7 @@ def test_what_is_proven_in_coarse_cells_holds_for_the_finer_ones_that_they_cover
     assert fine.given_up == 1
     wanted = [[1, 1, 0, 0]] * 2 + [[0.5, 0.5, 1, 1]] * 3
     np.testing.assert_array_equal(fine.share, wanted)
-    np.testing.assert_array_equal(fine.left(np.full((5, 4), 5, np.float32)), 1 + 4 * fine.share)
+    np.testing.assert_array_equal(fine.part_of(np.full((5, 4), 5, np.float32)), 1 + 4 * fine.share)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,13 @@ from camkit.runtime.kinds.hdr.streaks.cells import Cells, coarser
 from camkit.runtime.kinds.hdr.streaks.convolution import spreading
 from camkit.runtime.kinds.hdr.streaks.kernels import StreakKernels
 from camkit.runtime.kinds.hdr.streaks.recovery import veil_of
-from camkit.runtime.kinds.hdr.streaks.refinement import NEAR, Found, Group, groups_of, refined
+from camkit.runtime.kinds.hdr.streaks.refinement import (
+    NEAR,
+    CoarseLights,
+    Group,
+    groups_of,
+    refined,
+)
 from camkit.runtime.kinds.hdr.streaks.regions import Window
 from camkit.runtime.kinds.hdr.streaks.shapes import pooled, rim_distance_px
 from tests.streak_factory import blurred, captured_cells, star, star_kernels, street, with_lamps
@@ -33,17 +39,17 @@ def _cells(scene: FloatArray) -> Cells:
     return captured_cells(blurred(scene, star()))
 
 
-def _found(cells: Cells, kernels: StreakKernels, scene: FloatArray) -> Found:
+def _found(cells: Cells, kernels: StreakKernels, scene: FloatArray) -> CoarseLights:
     """Give lights of green in cells of 4 px that have all their light, shared out evenly."""
     coarse = coarser(cells)
     clipped = coarse.clipped[GREEN] > 0
     truth = pooled(captured_truth(scene))[: clipped.shape[0], : clipped.shape[1]]
     light = np.where(clipped, np.maximum(truth, 0.01), 0).astype(np.float32)
-    return Found(
+    return CoarseLights(
         window=_whole(),
         light=light,
-        thrown=spreading(kernels.coarse.whole[GREEN], clipped).spread(light),
-        veil=veil_of(coarse.known, kernels.coarse.veil)[GREEN],
+        blurred=spreading(kernels.coarse.whole[GREEN], clipped).spread(light),
+        veil=veil_of(coarse.unclipped, kernels.coarse.veil)[GREEN],
         rim_px=rim_distance_px(cells.clipped[GREEN] > 0, cells.pitch_px),
     )
 
@@ -68,7 +74,7 @@ def test_neighbours_are_one_group_and_lights_far_away_another(scene: FloatArray)
     clipped = (coarser(_cells(scene)).clipped > 0).any(axis=0)
     counts = np.zeros(clipped.shape, int)
     for group in groups:
-        counts[group.window.at] += group.own
+        counts[group.window.at] += group.cells
     assert (counts[clipped] == 1).all()
     near, far = groups
     assert near.window.top == 0

@@ -97,5 +97,5 @@ def test_the_finer_window_at_the_border_takes_the_odd_rest(
 
 def test_a_window_moves_as_a_whole() -> None:
     window = Window(top=1, bottom=4, left=2, right=9)
-    assert window.moved(3, 5) == Window(top=4, bottom=7, left=7, right=14)
-    assert window.moved(3, 5).shape == window.shape
+    assert window.shifted(3, 5) == Window(top=4, bottom=7, left=7, right=14)
+    assert window.shifted(3, 5).shape == window.shape

@@ -32,7 +32,7 @@ Half = NDArray[np.float16]
 class Streaks(Protocol):
     """The streaks of the lights of a window."""
 
-    def add(self, under: FloatArray, colour: int, lattice: Lattice) -> None:
+    def add(self, light: FloatArray, colour: int, lattice: Lattice) -> None:
         """Add it to light (rows, columns) at the pixels of a lattice."""
         ...
 
@@ -51,9 +51,9 @@ def streaks_of(recovery: Recovery, lit: LitPixels) -> list[Streaks]:
         kernels = recovery.kernels if small else (None,) * COLOURS
         if small:
             fine.append(PixelStreaks(region.window, lit, kernels))
-        left = tuple(colour for colour, kernel in enumerate(kernels) if kernel is None)
-        if left:
-            rough.append(CellStreaks(region, recovery.fine.offset_px, left))
+        colours = tuple(colour for colour, kernel in enumerate(kernels) if kernel is None)
+        if colours:
+            rough.append(CellStreaks(region, recovery.fine.offset_px, colours))
     return fine + rough
 
 
@@ -75,25 +75,25 @@ class PixelStreaks:
         # beside the last cell lies a last odd row or column
         height, width = (PITCH_PX * side + 1 for side in window.shape)
         rows, columns = lit.rows - self._top, lit.columns - self._left
-        own = (rows >= 0) & (rows < height - 1) & (columns >= 0) & (columns < width - 1)
+        inside = (rows >= 0) & (rows < height - 1) & (columns >= 0) & (columns < width - 1)
         self._planes: list[Half | None] = []
-        for light, kernel in zip(lit.light[:, own], kernels, strict=True):
+        for light, kernel in zip(lit.light[:, inside], kernels, strict=True):
             plane = np.zeros((height, width), np.float32)
-            plane[rows[own], columns[own]] = light
+            plane[rows[inside], columns[inside]] = light
             there = plane > 0
             if kernel is None or not there.any():
                 self._planes.append(None)
             else:
                 self._planes.append(_half(spreading(kernel, there).spread(plane)))
 
-    def add(self, under: FloatArray, colour: int, lattice: Lattice) -> None:
+    def add(self, light: FloatArray, colour: int, lattice: Lattice) -> None:
         """Add them to light at the pixels of a lattice."""
         plane = self._planes[colour]
         if plane is None:
             return
         bottom, right = self._top + plane.shape[0], self._left + plane.shape[1]
-        at = lattice.within((self._top, self._left, bottom, right), under.shape)
-        first, step, part = lattice.part(at), lattice.step_px, under[at]
+        at = lattice.pixels_in((self._top, self._left, bottom, right), light.shape)
+        first, step, part = lattice.part(at), lattice.step_px, light[at]
         there = plane[first.top - self._top :: step, first.left - self._left :: step]
         part += there[: part.shape[0], : part.shape[1]]
 
@@ -117,18 +117,18 @@ class CellStreaks:
         self._window, self._offset_px = region.window, offset_px
         self._planes = {c: region.streaks[c] for c in colours if region.streaks[c].any()}
 
-    def add(self, under: FloatArray, colour: int, lattice: Lattice) -> None:
+    def add(self, light: FloatArray, colour: int, lattice: Lattice) -> None:
         """Add them to light at the pixels of a lattice."""
         if colour not in self._planes:
             return
         window, offset = self._window, self._offset_px[colour]
         top, left = PITCH_PX * window.top, PITCH_PX * window.left
         bottom, right = PITCH_PX * window.bottom + 1, PITCH_PX * window.right + 1
-        at = lattice.within((top - 1, left - 1, bottom, right), under.shape)
-        part = under[at]
+        at = lattice.pixels_in((top - 1, left - 1, bottom, right), light.shape)
+        part = light[at]
         if part.size:
-            moved = offset[0] + top, offset[1] + left
-            part += lattice.part(at).cells(self._planes[colour], PITCH_PX, moved, part.shape)
+            origin = offset[0] + top, offset[1] + left
+            part += lattice.part(at).cells(self._planes[colour], PITCH_PX, origin, part.shape)
 
 
 def _shows(region: Region) -> bool:

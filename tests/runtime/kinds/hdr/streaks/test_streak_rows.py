@@ -7,13 +7,13 @@ import pytest
 import scipy.signal
 
 from camkit.contracts import FloatArray
-from camkit.runtime.kinds.hdr.streaks import thrown
+from camkit.runtime.kinds.hdr.streaks import streak_rows
 from camkit.runtime.kinds.hdr.streaks.cell_rows import Lattice
 from camkit.runtime.kinds.hdr.streaks.cells import COLOURS
 from camkit.runtime.kinds.hdr.streaks.recovery import Recovery, recover
 from camkit.runtime.kinds.hdr.streaks.regions import Window
 from camkit.runtime.kinds.hdr.streaks.spots import lit_pixels
-from camkit.runtime.kinds.hdr.streaks.thrown import (
+from camkit.runtime.kinds.hdr.streaks.streak_rows import (
     FAINT,
     CellStreaks,
     PixelStreaks,
@@ -101,7 +101,7 @@ def test_large_windows_keep_their_cells_and_both_ways_agree_roughly(
 ) -> None:
     lit = lit_pixels(found)
     small = streaks_of(found, lit)
-    monkeypatch.setattr(thrown, "FINE_CELLS", 100)
+    monkeypatch.setattr(streak_rows, "FINE_CELLS", 100)
     large = streaks_of(found, lit)
     assert {type(one) for one in small} == {PixelStreaks}
     assert {type(one) for one in large} == {CellStreaks}
@@ -121,7 +121,7 @@ def test_streaks_taken_away_pixel_by_pixel_leave_less_than_those_of_cells(
     rows, columns = np.indices(SIZE)
     away = np.min([np.hypot(rows - y, columns - x) for y, x, _, _ in LAMPS], axis=0) > 12
     for cells in (2**20, 100):
-        monkeypatch.setattr(thrown, "FINE_CELLS", cells)
+        monkeypatch.setattr(streak_rows, "FINE_CELLS", cells)
         rest = light - _under(streaks_of(found, lit)) - blurred(street(*SIZE), star())
         left[cells] = float(np.std(np.diff(rest[:, away], axis=1)))
     assert left[2**20] < 0.7 * left[100]
