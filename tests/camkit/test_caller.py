@@ -44,7 +44,7 @@ FLAG = re.compile(r"(?<![\w-])--[a-z][a-z0-9-]+")
 COMMAND = re.compile(r"`camkit [^`]*`")
 NAMES_OF_FILES = {
     "runtime/kinds/spad/twin/scene.py": "arrays of an NPZ",
-    "runtime/kinds/spad/twin/simulate.py": "arrays of an NPZ",
+    "runtime/kinds/spad/twin/photon_twin.py": "arrays of an NPZ",
     "runtime/network/tiling.py": "for tests and measurements, no flag",
     "runtime/plan/planner.py": "a mistake of the caller in Python",
     "models_def/kinds/bayer/fine_tuning/pairs.py": "keys of a TOML",

@@ -23,8 +23,8 @@ from camkit.contracts import FloatArray
 from camkit.runtime.files.picture import read_light
 from camkit.runtime.kinds.hdr.deglare.removal import Glare, GlareSettings, find_glare
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
+from camkit.runtime.kinds.spad.twin.photon_twin import fitted, luminance, record
 from camkit.runtime.kinds.spad.twin.recording import PhotonOptions
-from camkit.runtime.kinds.spad.twin.simulate import fitted, luminance, record
 from camkit.runtime.kinds.spad.twin.write import write_recorded
 from tools.hdr.glare_twin import exposed_scene, photographed, two_point_star
 from tools.hdr.glare_twin import psnr_db as streaks_psnr_db

@@ -11,6 +11,7 @@ pile_up        counts as a detector that is never blind would have given them
 guess_pulse    a pulse where none is stated
 bank           templates at many times of flight, scored against counts
 bound          the Cramer-Rao bound of a time of flight
+template_cubics   templates between those of a bank
 fit            time, amplitude, background and sigma of every pixel
 least_squares  the same by least squares, as the dissertation does
 two_returns    two surfaces in one pixel, fitted together
@@ -31,13 +32,13 @@ from typing import Final
 from camkit.bundle.stages import Correct, Lifetime, Sharpen
 from camkit.runtime.kind import RuntimePart
 from camkit.runtime.kinds.spad.captures.photon_capture import photons_of_array, read_photons
+from camkit.runtime.kinds.spad.files.bundle_name import named_bundle
 from camkit.runtime.kinds.spad.files.described import describe
-from camkit.runtime.kinds.spad.files.named import named_bundle
 from camkit.runtime.kinds.spad.golden_captures import GOLDEN
 from camkit.runtime.kinds.spad.products import OUTPUTS, PLANES
 from camkit.runtime.kinds.spad.products.decisions import know_photons
+from camkit.runtime.kinds.spad.twin.photon_twin import record
 from camkit.runtime.kinds.spad.twin.recording import PhotonOptions
-from camkit.runtime.kinds.spad.twin.simulate import record
 from camkit.runtime.kinds.spad.twin.write import SUFFIXES, files_of, write_recorded
 
 PART: Final = RuntimePart(

@@ -93,11 +93,11 @@ def make_bank(axis: TimeAxis, pulse: Pulse) -> Bank:
     bins = np.where(is_there, bins, 0)
     shares = np.where(is_there, axis.shares(pulse, mu, bins), 0.0)
     slopes = np.where(is_there, axis.slopes(pulse, mu, bins), 0.0)
-    seen = shares > NEAR_SHARE * shares.max(axis=1, keepdims=True)
+    is_near = shares > NEAR_SHARE * shares.max(axis=1, keepdims=True)
     near = np.stack(
         [
-            np.where(seen, bins, axis.bins).min(axis=1),
-            np.where(seen, bins, -1).max(axis=1) + 1,
+            np.where(is_near, bins, axis.bins).min(axis=1),
+            np.where(is_near, bins, -1).max(axis=1) + 1,
         ],
         axis=1,
     )
@@ -128,20 +128,20 @@ class Banded:
         self._parts: list[tuple[slice, slice, FloatArray]] = []
         for start in range(0, len(rows), GROUP):
             group = slice(start, min(start + GROUP, len(rows)))
-            own, held = bank.bins[rows[group]], bank.shares[rows[group]] > 0
-            left = int(np.where(held, own, bank.axis.bins).min())
-            right = int(np.where(held, own, 0).max()) + 1
+            bins, has_share = bank.bins[rows[group]], bank.shares[rows[group]] > 0
+            left = int(np.where(has_share, bins, bank.axis.bins).min())
+            right = int(np.where(has_share, bins, 0).max()) + 1
             matrix = np.zeros((max(right - left, 1), group.stop - start), np.float32)
-            at, bin_at = np.nonzero(held)
-            matrix[own[at, bin_at] - left, at] = values[group][at, bin_at]
+            at, bin_at = np.nonzero(has_share)
+            matrix[bins[at, bin_at] - left, at] = values[group][at, bin_at]
             self._parts.append((slice(left, max(right, left + 1)), group, matrix))
 
     def product(self, counts: FloatArray) -> FloatArray:
         """Return the sum over bins of counts (p, bins) times values: (p, n) float32."""
-        found = np.empty((len(counts), self._count), np.float32)
+        sums = np.empty((len(counts), self._count), np.float32)
         for columns, group, matrix in self._parts:
-            np.matmul(counts[:, columns], matrix, out=found[:, group])
-        return found
+            np.matmul(counts[:, columns], matrix, out=sums[:, group])
+        return sums
 
 
 class Scorer:
@@ -171,6 +171,6 @@ class Scorer:
         Returns:
             (p, m) float32; those of an empty pixel are 0.
         """
-        found = self._logs.product(counts)
-        found += photons[:, None] * self._offset
-        return found
+        logs = self._logs.product(counts)
+        logs += photons[:, None] * self._offset
+        return logs

@@ -22,11 +22,11 @@ def information(bank: Bank, ratio: float) -> NDArray[np.float64]:
     """
     s, ds, bins = bank.shares, bank.slopes, bank.axis.bins
     rate = s + ratio
-    held = s > 0
-    outside = (bins - held.sum(axis=1)) / ratio
+    has_share = s > 0
+    outside = (bins - has_share.sum(axis=1)) / ratio
 
     def summed(values: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(np.where(held, values / rate, 0.0).sum(axis=1))
+        return np.asarray(np.where(has_share, values / rate, 0.0).sum(axis=1))
 
     tt, ta, tb = summed(ds * ds), summed(ds * s), summed(ds)
     aa, ab = summed(s * s), summed(s)
@@ -34,5 +34,5 @@ def information(bank: Bank, ratio: float) -> NDArray[np.float64]:
     # what amplitude and background take away: the Schur complement of their block
     det = aa * bb - ab * ab
     safe = np.where(det > 1e-12 * aa * bb, det, np.inf)
-    lost = (ta * ta * bb - 2 * ta * tb * ab + tb * tb * aa) / safe
-    return np.asarray(np.maximum(tt - lost, 0.0))
+    loss = (ta * ta * bb - 2 * ta * tb * ab + tb * tb * aa) / safe
+    return np.asarray(np.maximum(tt - loss, 0.0))

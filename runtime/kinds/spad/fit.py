@@ -107,22 +107,22 @@ class Fitter:
         template = self._first.score(counts, photons).argmax(axis=1) * FIRST_EVERY
         amplitude, background = self.split(sums, template)
         shift, best = np.zeros(len(counts)), np.zeros(len(counts))
-        used = np.full(len(counts), -1)
+        scored = np.full(len(counts), -1)
         for _ in range(MOST_PASSES):
-            wanted = _nearest_ratio(amplitude, background)
-            for index in np.unique(wanted[wanted != used]):
+            nearest = _nearest_ratio(amplitude, background)
+            for index in np.unique(nearest[nearest != scored]):
                 check_wish()
-                rows = np.flatnonzero((wanted == index) & (used != index))
+                rows = np.flatnonzero((nearest == index) & (scored != index))
                 scores = self._scorer(int(index)).score(counts[rows], photons[rows])
                 template[rows], shift[rows], best[rows] = peak(scores)
-            if (wanted == used).all():
+            if (nearest == scored).all():
                 break
-            used = wanted
+            scored = nearest
             amplitude, background = self.split(sums, template)
         evidence = 2 * (best + photons * np.log(self.bank.axis.bins))
         doubtful = np.flatnonzero(evidence < DOUBTFUL)
-        own = (template[doubtful], amplitude[doubtful], background[doubtful])
-        exact = evidence_at(self.bank, counts[doubtful], *own)
+        doubtful_fit = (template[doubtful], amplitude[doubtful], background[doubtful])
+        exact = evidence_at(self.bank, counts[doubtful], *doubtful_fit)
         evidence[doubtful] = np.maximum(evidence[doubtful], exact)
         return Fit(
             time_of_flight_ps=self.bank.mu_ps[template] + shift * self.bank.step_ps,
@@ -159,9 +159,11 @@ class Fitter:
         share_in = padded[template, to_right] - padded[template, from_left]
         share_out = bank.totals[template] - share_in
         det = bins_out * share_in - bins_in * share_out
-        known = (bins_out > 0) & (det > 0)
-        solved = ((whole - inside) * share_in - inside * share_out) / np.where(known, det, 1.0)
-        background = np.where(known, np.maximum(solved, 0.0), 0.0)
+        is_solvable = (bins_out > 0) & (det > 0)
+        solved = ((whole - inside) * share_in - inside * share_out) / np.where(
+            is_solvable, det, 1.0
+        )
+        background = np.where(is_solvable, np.maximum(solved, 0.0), 0.0)
         signal = (whole - background * bank.axis.bins) / np.maximum(bank.totals[template], 1e-6)
         return np.maximum(signal, 0.0), background
 
@@ -173,15 +175,15 @@ class Fitter:
     ) -> NDArray[np.float64]:
         """Return the bound, between the ratios of the table by the logarithm of the ratio."""
         ratio = _log_ratio(amplitude, background)
-        known = np.log(np.array(RATIOS))
-        place = np.interp(ratio, known, np.arange(len(known), dtype=np.float64))
-        low = np.minimum(place.astype(np.int64), len(known) - 2)
+        log_ratios = np.log(np.array(RATIOS))
+        place = np.interp(ratio, log_ratios, np.arange(len(log_ratios), dtype=np.float64))
+        low = np.minimum(place.astype(np.int64), len(log_ratios) - 2)
         part = place - low
         table = np.log(self._information + 1e-30)
         logs = table[low, template] * (1 - part) + table[low + 1, template] * part
         # beyond the table background rules, and information falls as 1 / ratio
-        beyond = np.maximum(ratio - known[-1], 0.0)
-        bound = np.exp(-0.5 * (logs - beyond)) / np.sqrt(np.maximum(amplitude, LEAST_SIGNAL))
+        excess = np.maximum(ratio - log_ratios[-1], 0.0)
+        bound = np.exp(-0.5 * (logs - excess)) / np.sqrt(np.maximum(amplitude, LEAST_SIGNAL))
         return np.asarray(np.hypot(bound, self.bank.resolved_ps / np.sqrt(12)))
 
 

@@ -23,8 +23,8 @@ from camkit.runtime.kinds.spad.twin.counting import (
     count_times,
     scaled_to,
 )
+from camkit.runtime.kinds.spad.twin.photon_twin import fitted, luminance, seen_by, times_of
 from camkit.runtime.kinds.spad.twin.scene import light_of_depth
-from camkit.runtime.kinds.spad.twin.simulate import fitted, luminance, seen_by, times_of
 from camkit.scenes import procedural_scene
 
 DEPTH: Final = "depth_m"
@@ -91,14 +91,14 @@ def stage_set(camera: FineCamera, seed: int) -> NDArray[np.float64]:
     depth = span_m * (0.75 + 0.15 * x / width + 0.05 * y / height)
     for number in range(7):
         middle_x, middle_y = rng.uniform(0.1, 0.9) * width, rng.uniform(0.1, 0.9) * height
-        radius, nearer = rng.uniform(0.08, 0.28) * height, rng.uniform(0.25, 0.65) * span_m
+        radius, distance = rng.uniform(0.08, 0.28) * height, rng.uniform(0.25, 0.65) * span_m
         tall = rng.uniform(0.4, 1.0)
         inside = (
             np.hypot(x - middle_x, y - middle_y) < radius
             if number % 2
             else (np.abs(x - middle_x) < radius) & (np.abs(y - middle_y) < tall * radius)
         )
-        depth = np.where(inside, nearer + 0.1 * span_m * (x - middle_x) / width, depth)
+        depth = np.where(inside, distance + 0.1 * span_m * (x - middle_x) / width, depth)
     return np.asarray(depth, np.float64)
 
 

@@ -15,7 +15,7 @@ from camkit.runtime.kinds.spad.time_axis import TimeAxis
 NARROWEST: Final = 0.5
 WIDEST: Final = 0.1
 """Standard deviations that are tried: from half a bin to a tenth of the axis."""
-APART: Final = 1.3
+SIGMA_STEP: Final = 1.3
 PIXELS: Final = 256
 LEAST_PHOTONS: Final = 200
 LOOK: Final = 2.0
@@ -33,19 +33,19 @@ def guess_pulse(counts: FloatArray, axis: TimeAxis) -> GaussianPulse:
         ContractError: If they hold too few photons.
     """
     bright = counts[np.argsort(counts.sum(axis=1))[::-1][: 16 * PIXELS]]
-    shown = _fitter(axis, LOOK * axis.step_ps).fit(bright)
-    best = np.argsort(shown.evidence)[::-1][:PIXELS]
-    chosen = bright[best]
-    if shown.amplitude[best].sum() < LEAST_PHOTONS:
+    first_fit = _fitter(axis, LOOK * axis.step_ps).fit(bright)
+    best = np.argsort(first_fit.evidence)[::-1][:PIXELS]
+    brightest = bright[best]
+    if first_fit.amplitude[best].sum() < LEAST_PHOTONS:
         raise ContractError(
-            f"no pulse is stated, and {shown.amplitude[best].sum():.0f} photons are too few to "
+            f"no pulse is stated, and {first_fit.amplitude[best].sum():.0f} photons are too few to "
             "find its width; state [laser] fwhm_ps, [gate] or [irf] in a file for "
             f"{option_text('timing')}"
         )
     low, high = NARROWEST * axis.step_ps, WIDEST * axis.step_ps * axis.bins
-    count = max(3, int(np.log(max(high / low, APART)) / np.log(APART)) + 1)
-    sigmas = np.geomspace(low, max(high, low * APART), count)
-    likely = [_fitter(axis, sigma).fit(chosen).evidence.sum() for sigma in sigmas]
+    count = max(3, int(np.log(max(high / low, SIGMA_STEP)) / np.log(SIGMA_STEP)) + 1)
+    sigmas = np.geomspace(low, max(high, low * SIGMA_STEP), count)
+    likely = [_fitter(axis, sigma).fit(brightest).evidence.sum() for sigma in sigmas]
     at = int(np.clip(np.argmax(likely), 1, count - 2))
     left, top, right = likely[at - 1 : at + 2]
     bend = left - 2 * top + right

@@ -21,7 +21,7 @@ TIMES: Final = 5.0
 SIGMAS: Final = 6.0
 SHARE: Final = 0.5
 """Of a pixel's counts that are background."""
-AROUND: Final = 5
+NEIGHBOURHOOD_PX: Final = 5
 SPANS: Final = 8
 """Into which time is cut."""
 FEW: Final = 2
@@ -43,7 +43,7 @@ def find_hot(background: NDArray[np.float64], cube: FloatArray) -> NDArray[np.bo
     bins = cube.shape[2]
     photons = cube.sum(axis=2, dtype=np.float64)
     check_wish()
-    usual = median_filter(background, size=AROUND, mode="mirror")
+    usual = median_filter(background, size=NEIGHBOURHOOD_PX, mode="mirror")
     cuts = np.linspace(0, bins, SPANS, endpoint=False).astype(int)
     spans = np.add.reduceat(cube, cuts, axis=2)
     check_wish()
@@ -82,7 +82,7 @@ def painted_over(cube: NDArray[Any], hot: NDArray[np.bool_]) -> NDArray[Any]:
         )
     if hot.all():
         raise ContractError("every pixel is hot: there is nothing to paint them over with")
-    found = cube.copy()
+    painted = cube.copy()
     for y, x in np.argwhere(hot):
         check_wish()
         reach = 1
@@ -93,5 +93,5 @@ def painted_over(cube: NDArray[Any], hot: NDArray[np.bool_]) -> NDArray[Any]:
             if sound.any():
                 break
             reach += 1
-        found[y, x] = cube[rows, columns][sound].mean(axis=0)
-    return found
+        painted[y, x] = cube[rows, columns][sound].mean(axis=0)
+    return painted

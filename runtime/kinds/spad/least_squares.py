@@ -77,13 +77,13 @@ def _scatter(
     """
     bins = bank.axis.bins
     s, ds = bank.shares[template], bank.slopes[template]
-    held = s > 0
+    has_share = s > 0
     mean_s, mean_ds = s.sum(axis=1) / bins, ds.sum(axis=1) / bins
     norm = np.maximum((s * s).sum(axis=1) - bins * mean_s**2, 1e-12)
     part = ((s * ds).sum(axis=1) - bins * mean_s * mean_ds) / norm
     outside = part * mean_s - mean_ds  # g of the bins that the pulse does not reach
-    g = np.where(held, ds - part[:, None] * s + outside[:, None], 0.0)
+    g = np.where(has_share, ds - part[:, None] * s + outside[:, None], 0.0)
     noise = (g * g * (amplitude[:, None] * s + background[:, None])).sum(axis=1)
-    noise += (bins - held.sum(axis=1)) * outside**2 * background
+    noise += (bins - has_share.sum(axis=1)) * outside**2 * background
     steepness = np.maximum(amplitude, LEAST_RATE) * np.maximum((g * ds).sum(axis=1), 1e-12)
     return np.asarray(np.hypot(np.sqrt(noise) / steepness, bank.resolved_ps / np.sqrt(12)))

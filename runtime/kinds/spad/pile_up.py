@@ -53,22 +53,22 @@ def without_pile_up(counts: FloatArray, cycles: int, orientation: Orientation) -
     """
     if cycles < 1:
         raise ContractError(f"cycles must be >= 1; got {cycles}")
-    seen = counts.astype(np.float64)
-    before = np.zeros_like(seen)
+    measured = counts.astype(np.float64)
+    earlier = np.zeros_like(measured)
     if orientation == "histogram":
-        np.cumsum(seen[:, :-1], axis=1, out=before[:, 1:])
-    left = cycles - before
-    most = float((before + seen).max(initial=0.0))
+        np.cumsum(measured[:, :-1], axis=1, out=earlier[:, 1:])
+    free_cycles = cycles - earlier
+    most = float((earlier + measured).max(initial=0.0))
     if most > cycles:
         raise ContractError(
             f"counts go up to {most:.0f}, above the {cycles} cycles in which they can have come; "
             "correct cycles, or state 0 where they are not known"
         )
-    told = left - seen >= LEAST_LEFT * cycles
-    most_told = np.maximum(1 - LEAST_LEFT * cycles / np.maximum(left, 1e-9), 0.0)
-    chance = np.minimum(seen / np.maximum(left, 1.0), most_told)
+    is_correctable = free_cycles - measured >= LEAST_LEFT * cycles
+    most_told = np.maximum(1 - LEAST_LEFT * cycles / np.maximum(free_cycles, 1e-9), 0.0)
+    chance = np.minimum(measured / np.maximum(free_cycles, 1.0), most_told)
     return PileUp(
         counts=(-cycles * np.log1p(-chance)).astype(np.float32),
-        blind=np.asarray(~told.all(axis=1)),
-        worst=np.asarray(1 - (left - seen).min(axis=1) / cycles),
+        blind=np.asarray(~is_correctable.all(axis=1)),
+        worst=np.asarray(1 - (free_cycles - measured).min(axis=1) / cycles),
     )

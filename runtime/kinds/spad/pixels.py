@@ -47,8 +47,8 @@ class Pixels:
     @classmethod
     def of(cls, photons: Stream) -> Self:
         """Return the pixels of photons; those that no stage corrected are not known."""
-        beside = photons.beside
-        return beside if isinstance(beside, cls) else cls.unknown(photons.shape[1:])
+        pixels = photons.beside
+        return pixels if isinstance(pixels, cls) else cls.unknown(photons.shape[1:])
 
 
 def by_pixel(rows: Rows) -> FloatArray:

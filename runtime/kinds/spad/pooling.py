@@ -92,17 +92,17 @@ def fit_pooled(
     sides = SIDES[pool]
     threshold = threshold_for(false_alarms / len(sides), fitter.search_length)
     height, width, bins = cube.shape
-    own = cube.reshape(-1, bins)
-    found = alone
+    counts = cube.reshape(-1, bins)
+    best = alone
     side_of = np.zeros(height * width, dtype=np.int64)
-    asked = np.zeros((height, width), dtype=bool)
-    asked[core or slice(None)] = True
+    is_core = np.zeros((height, width), dtype=bool)
+    is_core[core or slice(None)] = True
     for side in sides:
-        rows = np.flatnonzero(asked.ravel() & (side_of == 0))
+        rows = np.flatnonzero(is_core.ravel() & (side_of == 0))
         if not len(rows):
             break
         if side == 1:
-            new = fit(own[rows]) if alone is None else taken(alone, rows)
+            new = fit(counts[rows]) if alone is None else fit_of_rows(alone, rows)
         else:
             square = Squares(cube, side, sound)
             new = _per_pixel(fit(square.counts(rows)), square.members[rows])
@@ -110,15 +110,17 @@ def fit_pooled(
         if side > 1 and pool == "auto":
             near = np.flatnonzero(good)
             good[near] = are_believed(
-                *(fitter.bank, cube, sound, rows[near], taken(new, near), side),
+                *(fitter.bank, cube, sound, rows[near], fit_of_rows(new, near), side),
                 rate=false_alarms / len(sides),
             )
         elif side > 1:
-            single = fit(own[rows]) if alone is None else taken(alone, rows)
-            good &= ~_refute(fitter, own[rows], new, single)
-        found = new if len(rows) == len(own) else _merged(found or _nothing(len(own)), new, rows)
+            single = fit(counts[rows]) if alone is None else fit_of_rows(alone, rows)
+            good &= ~_refute(fitter, counts[rows], new, single)
+        best = (
+            new if len(rows) == len(counts) else _merged(best or _nothing(len(counts)), new, rows)
+        )
         side_of[rows[good]] = side
-    return Pooled(fit=found or _nothing(len(own)), valid=side_of > 0, side=side_of)
+    return Pooled(fit=best or _nothing(len(counts)), valid=side_of > 0, side=side_of)
 
 
 class Squares:
@@ -139,7 +141,7 @@ class Squares:
         height, width, _ = cube.shape
         self._cube, self._side = cube, side
         self._sound = np.ones((height, width), bool) if sound is None else sound
-        inside = self._around(self._sound[..., None].astype(np.float32)).reshape(-1)
+        inside = self._square_sums(self._sound[..., None].astype(np.float32)).reshape(-1)
         self.members = np.maximum(inside.astype(np.float64), 1.0)
 
     def counts(self, rows: NDArray[np.int64]) -> FloatArray:
@@ -147,41 +149,41 @@ class Squares:
         height, width, bins = self._cube.shape
         if len(rows) > SPARSE * height * width:
             sound = np.where(self._sound[..., None], self._cube, np.float32(0))
-            return self._around(sound).reshape(-1, bins)[rows]
+            return self._square_sums(sound).reshape(-1, bins)[rows]
         reach = self._side // 2
         y, x = np.divmod(rows, width)
-        found = np.zeros((len(rows), bins), np.float32)
+        sums = np.zeros((len(rows), bins), np.float32)
         for dy in range(-reach, reach + 1):
             for dx in range(-reach, reach + 1):
                 check_wish()
                 at = (y + dy, x + dx)
                 there = (at[0] >= 0) & (at[0] < height) & (at[1] >= 0) & (at[1] < width)
                 there[there] = self._sound[at[0][there], at[1][there]]
-                found[there] += self._cube[at[0][there], at[1][there]]
-        return found
+                sums[there] += self._cube[at[0][there], at[1][there]]
+        return sums
 
-    def _around(self, values: FloatArray) -> FloatArray:
+    def _square_sums(self, values: FloatArray) -> FloatArray:
         """Return the sums of every square, (h, w, n); whole numbers of photons stay exact."""
         reach = self._side // 2
-        found = values
+        sums = values
         for axis in (0, 1):
-            found = sum(
-                (_shifted(found, step, axis) for step in range(1, reach + 1)), start=found.copy()
+            sums = sum(
+                (_shifted(sums, step, axis) for step in range(1, reach + 1)), start=sums.copy()
             )
-        return found
+        return sums
 
 
 def _shifted(values: FloatArray, step: int, axis: int) -> FloatArray:
     """Return what lies so many places before and after along an axis, together."""
-    found = np.zeros_like(values)
+    sums = np.zeros_like(values)
     check_wish()
     if step < values.shape[axis]:
-        ahead = [slice(None)] * 3
-        behind = [slice(None)] * 3
-        ahead[axis], behind[axis] = slice(step, None), slice(None, -step)
-        found[tuple(behind)] += values[tuple(ahead)]
-        found[tuple(ahead)] += values[tuple(behind)]
-    return found
+        later = [slice(None)] * 3
+        earlier = [slice(None)] * 3
+        later[axis], earlier[axis] = slice(step, None), slice(None, -step)
+        sums[tuple(earlier)] += values[tuple(later)]
+        sums[tuple(later)] += values[tuple(earlier)]
+    return sums
 
 
 def _per_pixel(fit: Fit, members: NDArray[np.float64]) -> Fit:
@@ -189,45 +191,45 @@ def _per_pixel(fit: Fit, members: NDArray[np.float64]) -> Fit:
 
 
 def _gain(
-    fitter: Fitter, own: FloatArray, fit: Fit, template: NDArray[np.int64] | None = None
+    fitter: Fitter, counts: FloatArray, fit: Fit, template: NDArray[np.int64] | None = None
 ) -> NDArray[np.float64]:
     """Return how much pixels' own photons speak for the pulse of their square."""
     bank = fitter.bank
     at = fit.template if template is None else template
     background = np.maximum(fit.background, LEAST_BACKGROUND)
     logs = np.log1p(fit.amplitude[:, None] * bank.shares[at] / background[:, None])
-    gained = (np.take_along_axis(own, bank.bins[at], axis=1) * logs).sum(axis=1)
+    gained = (np.take_along_axis(counts, bank.bins[at], axis=1) * logs).sum(axis=1)
     return np.asarray(gained - fit.amplitude * bank.totals[at])
 
 
-def _refute(fitter: Fitter, own: FloatArray, fit: Fit, single: Fit) -> NDArray[np.bool_]:
+def _refute(fitter: Fitter, counts: FloatArray, fit: Fit, single: Fit) -> NDArray[np.bool_]:
     """Return which pixels' own photons refute the pulse that their square found.
 
     Args:
         fitter: The bank.
-        own: (p, bins) counts of the pixels alone.
+        counts: (p, bins) counts of the pixels alone.
         fit: What the squares found.
         single: What the pixels found alone.
     """
-    gained = _gain(fitter, own, fit)
-    elsewhere = _gain(fitter, own, fit, single.template)
+    gained = _gain(fitter, counts, fit)
+    elsewhere = _gain(fitter, counts, fit, single.template)
     near = fitter.bank.near
     here, there = near[fit.template], near[single.template]
-    apart = (there[:, 0] >= here[:, 1]) | (here[:, 0] >= there[:, 1])
+    is_apart = (there[:, 0] >= here[:, 1]) | (here[:, 0] >= there[:, 1])
     is_silent = gained < np.log(REFUTED)
     surplus = threshold_for(REFUTED, fitter.search_length) / 2
-    return np.asarray(is_silent | (apart & (elsewhere - gained > surplus)))
+    return np.asarray(is_silent | (is_apart & (elsewhere - gained > surplus)))
 
 
-def taken(fit: Fit, rows: NDArray[np.int64]) -> Fit:
+def fit_of_rows(fit: Fit, rows: NDArray[np.int64]) -> Fit:
     """Return what was found of some pixels."""
     return Fit(**{field.name: getattr(fit, field.name)[rows] for field in fields(Fit)})
 
 
 def _nothing(count: int) -> Fit:
-    found: dict[str, NDArray[Any]] = {field.name: np.zeros(count) for field in fields(Fit)}
-    found["template"] = np.zeros(count, dtype=np.int64)
-    return Fit(**found)
+    arrays: dict[str, NDArray[Any]] = {field.name: np.zeros(count) for field in fields(Fit)}
+    arrays["template"] = np.zeros(count, dtype=np.int64)
+    return Fit(**arrays)
 
 
 def _merged(old: Fit, new: Fit, rows: NDArray[np.int64]) -> Fit:

@@ -172,13 +172,13 @@ class GatedPulse:
 
     def density(self, u_ps: Times) -> Times:
         """Return the density, 1/ps."""
-        found = self._edge(u_ps) - self._edge(u_ps - self.width_ps)
-        return np.asarray(np.maximum(found, 0.0) / self.width_ps)
+        edges = self._edge(u_ps) - self._edge(u_ps - self.width_ps)
+        return np.asarray(np.maximum(edges, 0.0) / self.width_ps)
 
     def cdf(self, u_ps: Times) -> Times:
         """Return the share of photons that came before, by the integral of the edges."""
-        found = self._ramp(u_ps) - self._ramp(u_ps - self.width_ps)
-        return np.asarray(np.clip(found / self.width_ps, 0.0, 1.0))
+        ramps = self._ramp(u_ps) - self._ramp(u_ps - self.width_ps)
+        return np.asarray(np.clip(ramps / self.width_ps, 0.0, 1.0))
 
     def _edge(self, u: Times) -> Times:
         """Return R convolved with the Gaussian: the distribution of exponential plus normal."""
@@ -258,6 +258,6 @@ class SampledPulse:
         sums = np.concatenate([[0.0], np.cumsum((v[1:] + v[:-1]) / 2 * np.diff(t))])
         u = np.clip(u_ps, t[0], t[-1])
         i = np.clip(np.searchsorted(t, u, side="right") - 1, 0, len(t) - 2)
-        into = u - t[i]
+        offset = u - t[i]
         slope = (v[i + 1] - v[i]) / (t[i + 1] - t[i])
-        return np.asarray((sums[i] + into * (v[i] + slope * into / 2)) / sums[-1])
+        return np.asarray((sums[i] + offset * (v[i] + slope * offset / 2)) / sums[-1])

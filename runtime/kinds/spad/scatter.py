@@ -36,10 +36,10 @@ def growth_of_bins(
         orientation: Of the time axis.
     """
     rates = np.maximum(counts / float(cycles), LEAST_RATE)
-    found = np.expm1(rates) / rates
+    growth = np.expm1(rates) / rates
     if orientation == "histogram":
-        found[:, 1:] *= np.exp(np.cumsum(counts[:, :-1] / float(cycles), axis=1))
-    return np.asarray(found)
+        growth[:, 1:] *= np.exp(np.cumsum(counts[:, :-1] / float(cycles), axis=1))
+    return np.asarray(growth)
 
 
 def growth(fitter: Fitter, counts: FloatArray, cycles: int) -> NDArray[np.float64]:
@@ -58,10 +58,10 @@ def growth(fitter: Fitter, counts: FloatArray, cycles: int) -> NDArray[np.float6
 
 
 def _growth(fitter: Fitter, counts: FloatArray, cycles: int) -> NDArray[np.float64]:
-    bank, found = fitter.bank, fitter.fit(counts)
-    ratio = found.background / np.maximum(found.amplitude, LEAST_SIGNAL)
-    rate = np.maximum(bank.shares[found.template] + ratio[:, None], LEAST_RATE)
-    told = bank.slopes[found.template] ** 2 / rate
+    bank, fit = fitter.bank, fitter.fit(counts)
+    ratio = fit.background / np.maximum(fit.amplitude, LEAST_SIGNAL)
+    rate = np.maximum(bank.shares[fit.template] + ratio[:, None], LEAST_RATE)
+    information = bank.slopes[fit.template] ** 2 / rate
     of_bins = growth_of_bins(counts, cycles, bank.axis.orientation)
-    near = np.take_along_axis(of_bins, bank.bins[found.template], axis=1)
-    return np.asarray((told * near).sum(axis=1) / np.maximum(told.sum(axis=1), TINY))
+    near = np.take_along_axis(of_bins, bank.bins[fit.template], axis=1)
+    return np.asarray((information * near).sum(axis=1) / np.maximum(information.sum(axis=1), TINY))

@@ -16,7 +16,7 @@ from camkit.contracts import FloatArray
 from camkit.runtime.cancel import check_wish
 from camkit.runtime.kinds.spad.evidence import threshold_for
 from camkit.runtime.kinds.spad.fit import Fit, Fitter
-from camkit.runtime.kinds.spad.pooling import Pooled, Squares, taken
+from camkit.runtime.kinds.spad.pooling import Pooled, Squares, fit_of_rows
 from camkit.runtime.kinds.spad.surroundings import LEAST_BACKGROUND
 from camkit.runtime.kinds.spad.two_returns import TwoFitter, TwoReturns
 
@@ -35,7 +35,7 @@ class SecondReturns:
 
     def added(
         self,
-        found: Mapping[str, NDArray[Any]],
+        arrays: Mapping[str, NDArray[Any]],
         pooled: Pooled,
         cube: FloatArray,
         sound: NDArray[np.bool_],
@@ -47,50 +47,50 @@ class SecondReturns:
         not valid.
 
         Args:
-            found: Arrays by the names of `Sharpened`.
+            arrays: Arrays by the names of `Sharpened`.
             pooled: The fits of one return, and the squares that they took.
             cube: (h, w, bins) counts.
             sound: (h, w) pixels whose photons count in squares.
             false_alarms: Rate per pixel at which a second return is believed that is none.
         """
-        layers = {name: np.concatenate([values, values]) for name, values in found.items()}
+        layers = {name: np.concatenate([values, values]) for name, values in arrays.items()}
         for name in ("amplitude", "evidence", "valid", "pooled"):
             layers[name][1] = 0
         threshold = threshold_for(false_alarms, self._fitter.search_length)
-        valid = found["valid"].ravel()
-        own = cube.reshape(-1, cube.shape[2])
+        valid = arrays["valid"].ravel()
+        pixel_counts = cube.reshape(-1, cube.shape[2])
         for side in np.unique(pooled.side[valid]):
             check_wish()
             rows = np.flatnonzero(valid & (pooled.side == side))
             squares = None if side == 1 else Squares(cube, int(side), sound)
-            counts = own[rows] if squares is None else squares.counts(rows)
+            counts = pixel_counts[rows] if squares is None else squares.counts(rows)
             members = np.ones(len(rows)) if squares is None else squares.members[rows]
-            one = _of_square(taken(pooled.fit, rows), members)
+            one = _of_square(fit_of_rows(pooled.fit, rows), members)
             check_wish()
-            asked = self._two.asks_for_second(counts, one)
-            rows, members, one = rows[asked], members[asked], taken(one, np.flatnonzero(asked))
+            asks = self._two.asks_for_second(counts, one)
+            rows, members, one = rows[asks], members[asks], fit_of_rows(one, np.flatnonzero(asks))
             check_wish()
-            two = self._two.fit(counts[asked], one)
+            two = self._two.fit(counts[asks], one)
             proved = two.evidence > threshold
             if side > 1:
-                proved &= self._speak_for_both(own[rows], two, members)
-            _put(layers, rows, two, members, proved)
+                proved &= self._speak_for_both(pixel_counts[rows], two, members)
+            _store(layers, rows, two, members, proved)
             layers["pooled"].reshape(2, -1)[1, rows[proved]] = side
         return layers
 
     def _speak_for_both(
-        self, own: FloatArray, two: TwoReturns, members: NDArray[np.float64]
+        self, pixel_counts: FloatArray, two: TwoReturns, members: NDArray[np.float64]
     ) -> NDArray[np.bool_]:
         """Return which pixels' own photons speak for either return beside the other."""
         bank = self._fitter.bank
-        every = np.broadcast_to(np.arange(bank.axis.bins), own.shape)
+        every = np.broadcast_to(np.arange(bank.axis.bins), pixel_counts.shape)
         pulses = [
             (a / members)[:, None] * bank.axis.shares(bank.pulse, t, every)
             for t, a in zip(two.times_of_flight_ps, two.amplitudes, strict=True)
         ]
         dark = np.maximum(two.background / members, LEAST_BACKGROUND)[:, None]
         gained = [
-            (own * np.log1p(pulse / (dark + other)) - pulse).sum(axis=1)
+            (pixel_counts * np.log1p(pulse / (dark + other)) - pulse).sum(axis=1)
             for pulse, other in (pulses, pulses[::-1])
         ]
         return np.asarray(np.minimum(*gained) > 0)
@@ -100,7 +100,7 @@ def _of_square(fit: Fit, members: NDArray[np.float64]) -> Fit:
     return replace(fit, amplitude=fit.amplitude * members, background=fit.background * members)
 
 
-def _put(
+def _store(
     layers: Arrays,
     rows: NDArray[np.int64],
     two: TwoReturns,

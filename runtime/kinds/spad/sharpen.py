@@ -19,7 +19,7 @@ from camkit.contracts import FloatArray
 from camkit.runtime.cancel import check_wish
 from camkit.runtime.kinds.spad.bank import make_bank
 from camkit.runtime.kinds.spad.fit import Fit, Fitter
-from camkit.runtime.kinds.spad.hot_pixels import AROUND, check_map, find_hot, painted_over
+from camkit.runtime.kinds.spad.hot_pixels import NEIGHBOURHOOD_PX, check_map, find_hot, painted_over
 from camkit.runtime.kinds.spad.least_squares import LeastSquares
 from camkit.runtime.kinds.spad.pooling import FALSE_ALARMS, SIDES, Pool, Pooled, fit_pooled
 from camkit.runtime.kinds.spad.pulse import Pulse
@@ -54,7 +54,7 @@ class Way:
     def reach_px(self) -> int:
         """Return how far beyond a row others bear on it."""
         widest = max(SIDES[self.pool])
-        return AROUND // 2 + widest // 2
+        return NEIGHBOURHOOD_PX // 2 + widest // 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,10 +84,10 @@ class Sharpened:
     hot: NDArray[np.bool_]
 
 
-def times_photons(found: Sharpened, factor: NDArray[np.float64]) -> Sharpened:
+def times_photons(sharpened: Sharpened, factor: NDArray[np.float64]) -> Sharpened:
     """Return it with more photons, (h, w) times as many."""
-    changed: dict[str, Any] = {name: getattr(found, name) * factor for name in PER_PIXEL}
-    return replace(found, **changed)
+    changed: dict[str, Any] = {name: getattr(sharpened, name) * factor for name in PER_PIXEL}
+    return replace(sharpened, **changed)
 
 
 def stacked(strips: Sequence[Sharpened]) -> Sharpened:
@@ -172,14 +172,14 @@ class Sharpener:
             sound=~doubtful,
             core=core,
         )
-        found = self._arrays(pooled, photons, doubtful, is_hot)
+        arrays = self._arrays(pooled, photons, doubtful, is_hot)
         if self.way.returns == 2:
-            found = self._second.added(found, pooled, cube, ~doubtful, self.way.false_alarms)
+            arrays = self._second.added(arrays, pooled, cube, ~doubtful, self.way.false_alarms)
         if is_hot[core or slice(None)].any():
             painted = _painted(cube, is_hot)
-            self._put(found, self._fit(painted[is_hot]), is_hot)
-            found["intensity"][:, is_hot] = painted[is_hot].sum(axis=1, dtype=np.float64)
-        return Sharpened(**{name: a[:, core or slice(None)] for name, a in found.items()})
+            self._store(arrays, self._fit(painted[is_hot]), is_hot)
+            arrays["intensity"][:, is_hot] = painted[is_hot].sum(axis=1, dtype=np.float64)
+        return Sharpened(**{name: a[:, core or slice(None)] for name, a in arrays.items()})
 
     def _arrays(
         self,
@@ -201,11 +201,11 @@ class Sharpener:
         }
 
     @staticmethod
-    def _put(found: dict[str, NDArray[Any]], fit: Fit, where: NDArray[np.bool_]) -> None:
+    def _store(arrays: dict[str, NDArray[Any]], fit: Fit, where: NDArray[np.bool_]) -> None:
         for name in FITTED:
-            found[name] = found[name].copy()
+            arrays[name] = arrays[name].copy()
             layers = slice(None) if name in OF_BOTH else slice(1)
-            found[name][layers, where] = getattr(fit, name)
+            arrays[name][layers, where] = getattr(fit, name)
 
 
 def _painted(values: NDArray[Any], hot: NDArray[np.bool_]) -> NDArray[Any]:

@@ -70,7 +70,7 @@ def are_believed(
         rate: Of false alarms.
     """
     # two ways to be believed share the rate
-    least, believed = least_gain(rate / 2), np.zeros(len(rows), dtype=bool)
+    least, is_believed = least_gain(rate / 2), np.zeros(len(rows), dtype=bool)
     at_once = max(1, AT_ONCE_BYTES // (16 * side * side * bank.bins.shape[1]))
     everywhere = np.ones(cube.shape[:2], bool) if sound is None else sound
     photons = cube.sum(axis=2)
@@ -88,8 +88,8 @@ def are_believed(
             patches, slice(side // 2, side // 2 + 1), slice(side // 2, side // 2 + 1)
         )
         lowest = _lowest_gains(pulses, patches, places, cube.shape[:2], side)
-        believed[part] = ((alone > 0) & (lowest > least)) | (alone > least)
-    return believed
+        is_believed[part] = ((alone > 0) & (lowest > least)) | (alone > least)
+    return is_believed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,14 +123,14 @@ class _Pulses:
         members = patches.members[:, down, across].sum(axis=(1, 2), dtype=np.float64)
         bins, counted = self.bank.axis.bins, np.maximum(members, 1.0)
         pulse = self.amplitude[:, None] * self.bank.shares[self.template]
-        seen = self.amplitude * self.bank.totals[self.template]
+        visible = self.amplitude * self.bank.totals[self.template]
         even = np.maximum(photons / (counted * bins), LEAST_BACKGROUND)
-        left = photons / (counted * bins) - seen / bins
+        rest = photons / (counted * bins) - visible / bins
         gains = []
-        for background in (self.background, left):
+        for background in (self.background, rest):
             dark = np.maximum(background, LEAST_BACKGROUND)
             of_bins = (near * np.log1p(pulse / dark[:, None])).sum(axis=1)
-            of_all = photons * np.log(dark / even) - members * (seen + bins * (dark - even))
+            of_all = photons * np.log(dark / even) - members * (visible + bins * (dark - even))
             gains.append(of_bins + of_all)
         return np.asarray(np.maximum(*gains))
 

@@ -129,32 +129,37 @@ class Timing(_Table):
             ContractError: If something is missing, or stated and counted bins differ.
         """
         times = self.timing
-        chosen = times.orientation or orientation
-        if chosen is None:
+        axis_orientation = times.orientation or orientation
+        if axis_orientation is None:
             raise ContractError(
                 "nothing says whether times are those of a gate or of a histogram; state [timing] "
                 f'orientation = "gate" or "histogram" in a file for {option_text("timing")}'
             )
         edges = times.bin_edges_ps
-        stated = times.bins if edges is None else len(edges) - 1
-        if bins is not None and stated is not None and bins != stated:
+        stated_bins = times.bins if edges is None else len(edges) - 1
+        if bins is not None and stated_bins is not None and bins != stated_bins:
             raise ContractError(
-                f"the capture has {bins} time bins, [timing] states {stated}; correct bins, or "
-                "[array] axes if time is another axis"
+                f"the capture has {bins} time bins, [timing] states {stated_bins}; correct bins, "
+                "or [array] axes if time is another axis"
             )
         if edges is not None:
             _only_edges(times)
-            return TimeAxis(orientation=chosen, edges_ps=np.array(edges, dtype=np.float64))
+            return TimeAxis(
+                orientation=axis_orientation, edges_ps=np.array(edges, dtype=np.float64)
+            )
         if times.time_bin_ps is None:
             raise ContractError(
                 "nothing says how wide a time bin is; state [timing] time_bin_ps (or bin_edges_ps) "
                 f"in a file for {option_text('timing')}"
             )
-        count = bins if bins is not None else stated
+        count = bins if bins is not None else stated_bins
         if count is None:
             raise ContractError("time stamps need [timing] bins: how many time bins to sort into")
         return TimeAxis.regular(
-            chosen, bins=count, time_bin_ps=times.time_bin_ps, first_ps=times.first_ps or 0.0
+            axis_orientation,
+            bins=count,
+            time_bin_ps=times.time_bin_ps,
+            first_ps=times.first_ps or 0.0,
         )
 
     def pulse(self) -> Pulse | None:
@@ -186,11 +191,11 @@ class Timing(_Table):
         dark = self.correction.dark
         if not isinstance(dark, str):
             return np.full(shape, dark)
-        found = read_map(self.folder / dark, "the map of dark counts").astype(np.float64)
-        _check_map(found, shape, "dark counts")
-        if (found < 0).any():
+        dark_map = read_map(self.folder / dark, "the map of dark counts").astype(np.float64)
+        _check_map(dark_map, shape, "dark counts")
+        if (dark_map < 0).any():
             raise ContractError("the map of dark counts holds negative numbers")
-        return found
+        return dark_map
 
     def hot(self, shape: tuple[int, int]) -> NDArray[np.bool_]:
         """Return the pixels that are stated to be hot, (h, w).
@@ -200,18 +205,18 @@ class Timing(_Table):
         """
         if self.correction.hot is None:
             return np.zeros(shape, dtype=bool)
-        found = read_map(self.folder / self.correction.hot, "the map of hot pixels")
-        _check_map(found, shape, "hot pixels")
-        return np.asarray(found != 0)
+        hot_map = read_map(self.folder / self.correction.hot, "the map of hot pixels")
+        _check_map(hot_map, shape, "hot pixels")
+        return np.asarray(hot_map != 0)
 
     @property
     def files(self) -> list[Path]:
         """Name the files that it names."""
         dark = self.correction.dark
-        named = (self.irf.file, dark if isinstance(dark, str) else None, self.correction.hot)
-        return [self.folder / name for name in named if name is not None]
+        names = (self.irf.file, dark if isinstance(dark, str) else None, self.correction.hot)
+        return [self.folder / name for name in names if name is not None]
 
-    def with_stated(self, stated: Mapping[str, object]) -> "Timing":
+    def with_stated(self, values: Mapping[str, object]) -> "Timing":
         """Return it with what a capture states of itself, where it says nothing.
 
         Raises:
@@ -221,8 +226,8 @@ class Timing(_Table):
         if {"time_bin_ps", "bin_edges_ps"} & set(tables.get("timing", {})):
             theirs = {"time_bin_ps", "bin_edges_ps"}
             theirs |= {"first_ps"} if self.timing.bin_edges_ps is not None else set()
-            stated = {name: value for name, value in stated.items() if name not in theirs}
-        for name, value in stated.items():
+            values = {name: value for name, value in values.items() if name not in theirs}
+        for name, value in values.items():
             if name in TABLE_OF:
                 table = tables.setdefault(TABLE_OF[name], {})
                 table.setdefault(name, _plain(name, value))
@@ -281,11 +286,11 @@ def _checked(tables: Mapping[str, Any], folder: Path, what: str) -> Timing:
         first = error.errors(include_url=False)[0]
         place = [str(part) for part in first["loc"]]
         if first["type"] == "extra_forbidden":
-            told = f"is unknown; known are {', '.join(TABLES[place[0]].model_fields)}"
+            text = f"is unknown; known are {', '.join(TABLES[place[0]].model_fields)}"
         else:
-            told = f"{first['msg'][0].lower()}{first['msg'][1:]}; got {first['input']!r:.60}"
+            text = f"{first['msg'][0].lower()}{first['msg'][1:]}; got {first['input']!r:.60}"
         name = f"[{place[0]}] {' '.join(place[1:2])}".rstrip()
-        raise ContractError(f"{what}: {name}: {told}") from error
+        raise ContractError(f"{what}: {name}: {text}") from error
 
 
 def _only_edges(times: Times) -> None:
@@ -296,9 +301,9 @@ def _only_edges(times: Times) -> None:
         )
 
 
-def _check_map(found: NDArray[Any], shape: tuple[int, int], what: str) -> None:
-    if found.shape != shape:
+def _check_map(values: NDArray[Any], shape: tuple[int, int], what: str) -> None:
+    if values.shape != shape:
         raise ContractError(
-            f"the map of {what} is {found.shape[1]}x{found.shape[0]}, the capture "
+            f"the map of {what} is {values.shape[1]}x{values.shape[0]}, the capture "
             f"{shape[1]}x{shape[0]}"
         )

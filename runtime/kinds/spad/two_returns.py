@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.runtime.kinds.spad.bank import Banded, Bank
-from camkit.runtime.kinds.spad.between import Between, Floats
 from camkit.runtime.kinds.spad.fit import Fit
+from camkit.runtime.kinds.spad.template_cubics import Floats, TemplateCubics
 
 STEPS: Final = 25
-TRIED: Final = 3
+TRIAL_STEPS: Final = 3
 """Steps from every place, before the better ones are followed."""
 FOLLOWED: Final = 2
 CUTS: Final = 4
@@ -32,7 +32,7 @@ SIDES: Final = (0.6, 1.5, 3.0)
 ENOUGH: Final = 1e-3
 BLOCK_COUNTS: Final = 262_144
 """Counts that are fitted at once."""
-ASKED: Final = 5.0
+LEAST_GAIN: Final = 5.0
 """Gain of the likelihood, twice its logarithm, from which on a second pulse is tried."""
 LEAST_BACKGROUND: Final = 1e-6
 
@@ -63,8 +63,8 @@ class TwoFitter:
         self._bank = bank
 
     @cached_property
-    def _between(self) -> Between:
-        return Between(self._bank)
+    def _cubics(self) -> TemplateCubics:
+        return TemplateCubics(self._bank)
 
     @cached_property
     def _sums(self) -> tuple[Banded, Banded]:
@@ -81,11 +81,11 @@ class TwoFitter:
             counts: (p, bins) >= 0.
             one: What the fit of one return gave of the same pixels.
         """
-        found = np.zeros(len(counts), dtype=bool)
+        asks = np.zeros(len(counts), dtype=bool)
         for rows in self._blocks(len(counts)):
             mean = self._mean_of_one(one, rows)
-            found[rows] = self._wish(counts[rows], mean)[0].max(axis=1, initial=0) > ASKED
-        return found
+            asks[rows] = self._wish(counts[rows], mean)[0].max(axis=1, initial=0) > LEAST_GAIN
+        return asks
 
     def fit(self, counts: FloatArray, one: Fit) -> TwoReturns:
         """Fit two returns to every pixel; arguments as of `asks_for_second`."""
@@ -93,12 +93,12 @@ class TwoFitter:
             self._fit_block(counts[rows].astype(np.float64), one, rows)
             for rows in self._blocks(len(counts))
         ]
-        found, evidence, sigmas = (np.concatenate(p, axis=-1) for p in zip(*parts, strict=True))
-        order = np.argsort(found[:2], axis=0)
+        values, evidence, sigmas = (np.concatenate(p, axis=-1) for p in zip(*parts, strict=True))
+        order = np.argsort(values[:2], axis=0)
         return TwoReturns(
-            times_of_flight_ps=np.take_along_axis(found[:2], order, 0),
-            amplitudes=np.take_along_axis(found[2:4], order, 0),
-            background=found[4],
+            times_of_flight_ps=np.take_along_axis(values[:2], order, 0),
+            amplitudes=np.take_along_axis(values[2:4], order, 0),
+            background=values[4],
             sigmas_ps=np.take_along_axis(sigmas, order, 0),
             evidence=evidence,
         )
@@ -110,7 +110,7 @@ class TwoFitter:
     def _mean_of_one(self, one: Fit, rows: slice) -> Floats:
         bank = self._bank
         mu = np.clip(one.time_of_flight_ps[rows], bank.mu_ps[0], bank.mu_ps[-1])
-        shares, _ = self._between.shapes(mu)
+        shares, _ = self._cubics.shapes(mu)
         background = np.maximum(one.background[rows], LEAST_BACKGROUND)
         return np.asarray(one.amplitude[rows, None] * shares + background[:, None])
 
@@ -131,17 +131,17 @@ class TwoFitter:
         a, b = np.maximum(one.amplitude[rows], 0.1), np.maximum(one.background[rows], 1e-6)
         alone, base = self._ascend(counts, np.stack([mu, mu, a / 2, a / 2, b]), STEPS, is_one=True)
         places = self._starts(counts, alone, a, b)
-        tried = [self._ascend(counts, place, TRIED) for place in places]
-        heights = np.stack([height for _, height in tried])
+        trials = [self._ascend(counts, place, TRIAL_STEPS) for place in places]
+        heights = np.stack([height for _, height in trials])
         order = np.argsort(heights, axis=0)[::-1]
-        values = np.stack([value for value, _ in tried])
+        values = np.stack([value for value, _ in trials])
         best, most = alone, base
         every = np.arange(len(counts))
         for rank in range(FOLLOWED):
             start = values[order[rank], :, every].T
-            found, height = self._ascend(counts, start, STEPS)
+            end, height = self._ascend(counts, start, STEPS)
             better = height > most
-            best, most = np.where(better, found, best), np.where(better, height, most)
+            best, most = np.where(better, end, best), np.where(better, height, most)
         mean, gradients = self._model(best)
         sigmas = np.sqrt(np.linalg.inv(_fisher(mean, gradients))[:, [0, 1], [0, 1]]).T
         return best, np.maximum(2 * (most - base), 0.0), sigmas
@@ -169,7 +169,7 @@ class TwoFitter:
 
     def _model(self, values: Floats) -> tuple[Floats, Floats]:
         """Return mean counts (p, bins) and their derivatives (p, 5, bins) at (5, p) parameters."""
-        (s1, d1), (s2, d2) = (self._between.shapes(values[i]) for i in (0, 1))
+        (s1, d1), (s2, d2) = (self._cubics.shapes(values[i]) for i in (0, 1))
         a1, a2, b = (values[i][:, None] for i in (2, 3, 4))
         gradients = np.stack([a1 * d1, a2 * d2, s1, s2, np.ones_like(s1)], axis=1)
         return a1 * s1 + a2 * s2 + b, gradients
@@ -181,16 +181,18 @@ class TwoFitter:
         values = start.copy()
         mean, gradients = self._model(values)
         height = _height(counts, mean)
-        going = np.arange(len(counts))
+        active = np.arange(len(counts))
         for _ in range(steps):
-            step = self._step(counts[going], mean, gradients, is_one=is_one)
-            tried, risen = self._highest(counts[going], values[:, going], step, height[going])
-            values[:, going] = tried
-            height[going] += risen
-            going = going[risen > ENOUGH]
-            if not len(going):
+            step = self._step(counts[active], mean, gradients, is_one=is_one)
+            new_values, risen = self._highest(
+                counts[active], values[:, active], step, height[active]
+            )
+            values[:, active] = new_values
+            height[active] += risen
+            active = active[risen > ENOUGH]
+            if not len(active):
                 break
-            mean, gradients = self._model(values[:, going])
+            mean, gradients = self._model(values[:, active])
         return values, height
 
     def _step(self, counts: Floats, mean: Floats, gradients: Floats, *, is_one: bool) -> Floats:
@@ -208,34 +210,34 @@ class TwoFitter:
         self, counts: Floats, values: Floats, step: Floats, height: Floats
     ) -> tuple[Floats, Floats]:
         """Try a step, else a third of it and so on until it rises; return its end, and the rise."""
-        found, risen = values.copy(), np.zeros(len(height))
-        left = np.arange(len(height))
+        best, risen = values.copy(), np.zeros(len(height))
+        pending = np.arange(len(height))
         for cut in range(CUTS):
-            tried = values[:, left] + step[:, left] / 3**cut
-            tried[:2] = np.clip(tried[:2], self._bank.mu_ps[0], self._bank.mu_ps[-1])
-            tried[2:4] = np.maximum(tried[2:4], 1e-3)
-            tried[4] = np.maximum(tried[4], LEAST_BACKGROUND)
-            rise = _height(counts[left], self._mean(tried)) - height[left]
+            new_values = values[:, pending] + step[:, pending] / 3**cut
+            new_values[:2] = np.clip(new_values[:2], self._bank.mu_ps[0], self._bank.mu_ps[-1])
+            new_values[2:4] = np.maximum(new_values[2:4], 1e-3)
+            new_values[4] = np.maximum(new_values[4], LEAST_BACKGROUND)
+            rise = _height(counts[pending], self._mean(new_values)) - height[pending]
             better = rise > 0
-            found[:, left[better]] = tried[:, better]
-            risen[left[better]] = rise[better]
-            left = left[~better]
-            if not len(left):
+            best[:, pending[better]] = new_values[:, better]
+            risen[pending[better]] = rise[better]
+            pending = pending[~better]
+            if not len(pending):
                 break
-        return found, risen
+        return best, risen
 
     def _mean(self, values: Floats) -> Floats:
-        (s1, _), (s2, _) = (self._between.shapes(values[i]) for i in (0, 1))
+        (s1, _), (s2, _) = (self._cubics.shapes(values[i]) for i in (0, 1))
         return np.asarray(values[2][:, None] * s1 + values[3][:, None] * s2 + values[4][:, None])
 
 
 def _fisher(mean: Floats, gradients: Floats) -> Floats:
     """Return the information (p, 5, 5), a little of its diagonal added so that it can be solved."""
     scaled = gradients / np.sqrt(mean)[:, None]
-    found = scaled @ scaled.transpose(0, 2, 1)
-    diagonal = np.einsum("pii->pi", found)
+    information = scaled @ scaled.transpose(0, 2, 1)
+    diagonal = np.einsum("pii->pi", information)
     diagonal += 1e-6 * diagonal + 1e-12
-    return np.asarray(found)
+    return np.asarray(information)
 
 
 def _height(counts: Floats, mean: Floats) -> Floats:

@@ -32,9 +32,9 @@ from camkit.runtime.kinds.spad.finer.pictures import finer_frames
 from camkit.runtime.kinds.spad.golden_captures import stage_set
 from camkit.runtime.kinds.spad.sharpen import Way
 from camkit.runtime.kinds.spad.twin.counting import Disturbances, count_times, scaled_to
+from camkit.runtime.kinds.spad.twin.photon_twin import seen_by, times_of
 from camkit.runtime.kinds.spad.twin.recording import Recorded
 from camkit.runtime.kinds.spad.twin.scene import light_of_depth
-from camkit.runtime.kinds.spad.twin.simulate import seen_by, times_of
 from camkit.runtime.kinds.spad.twin.write import write_recorded
 
 PHOTONS: Final = 1000.0
@@ -136,7 +136,7 @@ def _process_row(
         folder = Path(name)
         cube = folder / "cube.npz"
         stated = times_of_bundle(camera.bundle.manifest)
-        write_recorded(cube, Recorded(name="histogram", values=histogram, stated=stated))
+        write_recorded(cube, Recorded(name="histogram", values=histogram, attributes=stated))
         job = Job(
             files=(cube,),
             bundle=str(camera.bundle.path.resolve()),

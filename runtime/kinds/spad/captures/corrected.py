@@ -64,8 +64,12 @@ class CorrectedRows:
             for start in range(0, len(flat), size):
                 check_wish()
                 part = slice(start, start + size)
-                found = without_pile_up(flat[part], self._cycles, self._orientation)
-                flat[part], blind[part], worst[part] = found.counts, found.blind, found.worst
+                corrected = without_pile_up(flat[part], self._cycles, self._orientation)
+                flat[part], blind[part], worst[part] = (
+                    corrected.counts,
+                    corrected.blind,
+                    corrected.worst,
+                )
             pixels.blind[top:bottom] = blind.reshape(counts.shape[:2])
             pixels.worst[top:bottom] = worst.reshape(counts.shape[:2]).max(axis=1)
         return counts.transpose(2, 0, 1)

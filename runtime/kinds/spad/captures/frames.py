@@ -35,19 +35,19 @@ def frames_of(photons: Stream, capture: PhotonCapture) -> FloatArray:
     """
     cap, pixels = capture.settings.max_mem_bytes, Pixels.of(photons)
     if is_summed(capture):
-        found = np.empty((1, *photons.shape[1:]), np.float32)
-        for top, counts in _strips(photons, pixels, cap, found.nbytes):
-            found[0, top : top + len(counts)] = counts.sum(axis=2, dtype=np.float64)
+        frames = np.empty((1, *photons.shape[1:]), np.float32)
+        for top, counts in _strips(photons, pixels, cap, frames.nbytes):
+            frames[0, top : top + len(counts)] = counts.sum(axis=2, dtype=np.float64)
     else:
-        found = _room(photons.shape, cap)
-        held = 0 if isinstance(found, np.memmap) else found.nbytes
-        for top, counts in _strips(photons, pixels, cap, held):
-            found[:, top : top + len(counts)] = counts.transpose(2, 0, 1)
+        frames = _room(photons.shape, cap)
+        held_bytes = 0 if isinstance(frames, np.memmap) else frames.nbytes
+        for top, counts in _strips(photons, pixels, cap, held_bytes):
+            frames[:, top : top + len(counts)] = counts.transpose(2, 0, 1)
     check_map(pixels.hot)
     if pixels.hot.any():
-        for frame in found:
+        for frame in frames:
             frame[:] = painted_over(frame, pixels.hot)
-    return found
+    return frames
 
 
 def is_summed(capture: PhotonCapture) -> bool:

@@ -17,7 +17,7 @@ from camkit.runtime.kinds.spad.sharpen import Sharpener
 
 SAMPLE_ROWS: Final = 16
 """Rows, evenly spread, in which a pulse is looked for that nobody stated."""
-KEPT: Final = "pulse"
+CACHE_KEY: Final = "pulse"
 LITTLE_LOST: Final = 0.02
 """Of the cycles: a pixel that lost less to pile-up scatters as Poisson counts do, within 1 %."""
 
@@ -34,14 +34,16 @@ def pulse_of(job: Job, plane: str, guess: Callable[[FloatArray], Pulse] | None =
         ContractError: If none is stated and too few photons show one.
     """
     capture = photons_of(job)
-    stated = capture.timing.pulse()
-    if stated is not None:
-        return stated
-    if KEPT not in job.kept:
+    stated_pulse = capture.timing.pulse()
+    if stated_pulse is not None:
+        return stated_pulse
+    if CACHE_KEY not in job.kept:
         sample = _sample(job, plane)
-        job.kept[KEPT] = guess_pulse(sample, capture.an_axis) if guess is None else guess(sample)
-    found: Pulse = job.kept[KEPT]
-    return found
+        job.kept[CACHE_KEY] = (
+            guess_pulse(sample, capture.an_axis) if guess is None else guess(sample)
+        )
+    pulse: Pulse = job.kept[CACHE_KEY]
+    return pulse
 
 
 def growth_of(
@@ -65,5 +67,5 @@ def _sample(job: Job, plane: str) -> FloatArray:
     (rows,) = job.probe(plane)
     bins, height, _ = rows.shape
     tops = np.unique(np.linspace(0, height - 1, min(height, SAMPLE_ROWS)).astype(int))
-    found = [by_pixel(rows.read(int(top), int(top) + 1)) for top in tops]
-    return np.concatenate(found).reshape(-1, bins)
+    samples = [by_pixel(rows.read(int(top), int(top) + 1)) for top in tops]
+    return np.concatenate(samples).reshape(-1, bins)

@@ -95,10 +95,10 @@ class PhotonCapture:
             raise ContractError(f"{self.file.path.name} holds no times of photons")
         return self.axis
 
-    def plane(self, stated: Plane | None) -> Plane:
+    def plane(self, sensor_plane: Plane | None) -> Plane:
         """Return what the counts are; those of any array run over time."""
-        own = Plane(axes="t y x", type="uint32", channels=("photons",), domain="counts")
-        return own if stated is None else stated
+        counts_plane = Plane(axes="t y x", type="uint32", channels=("photons",), domain="counts")
+        return counts_plane if sensor_plane is None else sensor_plane
 
     def rows(self) -> RowSource:
         """Return the counts as the file holds them, time first."""
@@ -194,7 +194,7 @@ def photons_of_array(
 
 
 def _understood(file: CountsFile, settings: Settings, manifest: Manifest | None) -> PhotonCapture:
-    timing = settings.timing.with_stated(file.stated)
+    timing = settings.timing.with_stated(file.stated_times)
     notes: tuple[str, ...] = ()
     if manifest is not None:
         _check_shape(file, manifest)
@@ -264,23 +264,23 @@ def _check_shape(file: CountsFile, manifest: Manifest) -> None:
         ContractError: If it is none of this array.
     """
     extent = manifest.sensor.known_extent
-    own = extent.height_px, extent.width_px
-    if (file.height, file.width) == own:
+    array_px = extent.height_px, extent.width_px
+    if (file.height, file.width) == array_px:
         return
-    told = (
+    text = (
         f"the capture has {file.width}x{file.height} pixels, the array of bundle "
-        f"{manifest.name} {own[1]}x{own[0]}; use {option_text('bundle', 'none')}"
+        f"{manifest.name} {array_px[1]}x{array_px[0]}; use {option_text('bundle', 'none')}"
     )
     sizes = {"y": file.height, "x": file.width, "t": file.bins}
     shape = [sizes[axis] for axis in file.axes]
     for axes in permutations(file.axes):
         turned = dict(zip(axes, shape, strict=True))
-        if (turned["y"], turned["x"]) == own:
+        if (turned["y"], turned["x"]) == array_px:
             raise ContractError(
-                f"{told}; or, if its axes are in another order, [array] axes = "
+                f"{text}; or, if its axes are in another order, [array] axes = "
                 f'"{"".join(axes)}" in a file for {option_text("timing")}'
             )
-    raise ContractError(told)
+    raise ContractError(text)
 
 
 def times_of_bundle(manifest: Manifest) -> dict[str, Any]:
@@ -288,7 +288,7 @@ def times_of_bundle(manifest: Manifest) -> dict[str, Any]:
     usual, sensor = manifest.stage(Sharpen), manifest.sensor
     if usual is None or not isinstance(sensor, SpadSensor):
         return {}
-    stated = {
+    values = {
         "orientation": usual.orientation,
         "time_bin_ps": sensor.time_bin_ps,
         "first_ps": usual.first_ps,
@@ -298,25 +298,25 @@ def times_of_bundle(manifest: Manifest) -> dict[str, Any]:
         "fwhm_ps": usual.laser_fwhm_ps,
         "wavelength_nm": usual.laser_wavelength_nm,
     }
-    return {name: value for name, value in stated.items() if value is not None}
+    return {name: value for name, value in values.items() if value is not None}
 
 
 def _with_bundle(timing: Timing, manifest: Manifest) -> Timing:
     """Return what is known of times, with what the bundle says where nobody else does."""
     pitch_um = manifest.sensor.known_extent.pixel_pitch_um
-    stated = {"pitch_um": pitch_um, **times_of_bundle(manifest)}
+    values = {"pitch_um": pitch_um, **times_of_bundle(manifest)}
     # a measured pulse stands for gate and laser together
     unwanted = PULSE if timing.irf.file is not None else frozenset()
-    return timing.with_stated({n: value for n, value in stated.items() if n not in unwanted})
+    return timing.with_stated({n: value for n, value in values.items() if n not in unwanted})
 
 
 def _surprise(file: CountsFile, timing: Timing, manifest: Manifest) -> tuple[str, ...]:
     """Return a note where a bundle makes something else of a capture than is usual."""
-    usual, own = file.assumed.get("orientation"), times_of_bundle(manifest).get("orientation")
-    if timing.timing.orientation is not None or None in (usual, own) or usual == own:
+    usual, of_bundle = file.assumed.get("orientation"), times_of_bundle(manifest).get("orientation")
+    if timing.timing.orientation is not None or None in (usual, of_bundle) or usual == of_bundle:
         return ()
     return (
-        f"{file.path.name} is taken as {WHAT[str(own)]}, as bundle {manifest.name} "
+        f"{file.path.name} is taken as {WHAT[str(of_bundle)]}, as bundle {manifest.name} "
         f"states, though such files usually hold {WHAT[str(usual)]}; state [timing] orientation in "
         f"a file for {option_text('timing')}, or in {timing_beside(file.path).name} beside it",
     )

@@ -28,7 +28,7 @@ class Settings:
     Attributes:
         product: None for what the capture is: depth of histograms, intensity of counts.
         way: How depth is fitted.
-        chosen: Options of depth alone that were chosen.
+        depth_options: Options of depth alone that were chosen.
         finer: How pictures become finer behind a bundle's plate; None for what the plan says.
         size: Of its network; None for the usual one.
         timing: What is known of times.
@@ -38,7 +38,7 @@ class Settings:
 
     product: Product | None
     way: Way
-    chosen: tuple[str, ...]
+    depth_options: tuple[str, ...]
     timing: Timing
     max_mem_bytes: int
     timing_file: Path | None = None
@@ -56,13 +56,13 @@ class Settings:
         method: Method = next((m for m in METHODS if m == options.method), "log")
         pool: Pool = options.chosen("pool") or "auto"  # type: ignore[assignment]
         finer: Finer | None = next((way for way in FINER if way == options.method), None)
-        chosen = [name for name in ("pool", "returns") if options.chosen(name) is not None]
+        depth_options = [name for name in ("pool", "returns") if options.chosen(name) is not None]
         if options.method is not None and finer is None:
-            chosen.insert(0, "method")
+            depth_options.insert(0, "method")
         return cls(
             product=options.chosen("product"),  # type: ignore[arg-type]
             way=Way(method=method, pool=pool, returns=int(options.chosen("returns") or 1)),
-            chosen=tuple(chosen),
+            depth_options=tuple(depth_options),
             timing=Timing() if file is None else read_timing(file),
             max_mem_bytes=options.max_mem_bytes or DEFAULT_MAX_MEM_BYTES,
             timing_file=file,
@@ -82,10 +82,10 @@ class Settings:
                 f"{product} needs the times of photons, and this capture holds counts alone; use "
                 + option_text("product", "intensity")
             )
-        if product != "depth" and self.chosen:
+        if product != "depth" and self.depth_options:
             raise ContractError(
-                f"{', '.join('--' + name for name in self.chosen)} does not apply to the product "
-                f"{product}: it is for depth; leave it out"
+                f"{', '.join('--' + name for name in self.depth_options)} does not apply to the "
+                f"product {product}: it is for depth; leave it out"
             )
         return product
 
@@ -108,8 +108,8 @@ def _digest(file: Path) -> str:
 
 def _timing_file(options: Options, capture: Path | None) -> Path | None:
     """Return the timing file that was named, else that beside the capture, if one lies there."""
-    named = options.chosen("timing")
-    if named is not None:
-        return Path(named)
-    beside = None if capture is None else timing_beside(capture)
-    return beside if beside is not None and beside.is_file() else None
+    name = options.chosen("timing")
+    if name is not None:
+        return Path(name)
+    path = None if capture is None else timing_beside(capture)
+    return path if path is not None and path.is_file() else None

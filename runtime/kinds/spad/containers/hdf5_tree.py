@@ -51,7 +51,7 @@ def tree_of(path: Path, file: Any) -> Tree:
     sets: dict[str, Any] = {}
     links: dict[str, str] = {}
     items = [file]
-    seen = {_address(file)}
+    addresses = {_address(file)}
     waiting = [("", file, 0)]
     while waiting:
         prefix, group, depth = waiting.pop()
@@ -65,9 +65,9 @@ def tree_of(path: Path, file: Any) -> Tree:
                 links[where] = target
                 continue
             item = group[name]
-            if _address(item) in seen:
+            if _address(item) in addresses:
                 continue
-            seen.add(_address(item))
+            addresses.add(_address(item))
             items.append(item)
             if len(items) > MOST_ITEMS:
                 raise DecodeError(f"{path.name} holds more than {MOST_ITEMS} groups and data sets")
@@ -88,13 +88,13 @@ def type_of(item: Any) -> Any:
         return None
 
 
-def stated(tree: Tree, item: Any, names: Iterable[str]) -> dict[str, Any]:
+def small_attributes(tree: Tree, item: Any, names: Iterable[str]) -> dict[str, Any]:
     """Return the small attributes of an item that have one of some names."""
-    found: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for name in names:
         if name in item.attrs and is_small(item.attrs.get_id(name), tree):
-            found[name] = item.attrs[name]
-    return found
+            values[name] = item.attrs[name]
+    return values
 
 
 def is_small(item: Any, tree: Tree) -> bool:
@@ -128,9 +128,9 @@ def check_readable(path: Path, name: str, item: Any) -> None:
         raise DecodeError(f"{path.name}: {name} lies in other files; store it in one")
     packed = item.id.get_create_plist()
     for number in range(packed.get_nfilters()):
-        code, _, _, told = packed.get_filter(number)
+        code, _, _, filter_name = packed.get_filter(number)
         if not h5py.h5z.filter_avail(code):
-            label = told.decode("utf-8", "replace") or "without a name"
+            label = filter_name.decode("utf-8", "replace") or "without a name"
             raise UnsupportedError(
                 f"{path.name}: {name} is packed by the HDF5 filter {code} ({label}), which is not "
                 "installed; pack it anew with h5repack -f GZIP=4"

@@ -121,20 +121,20 @@ class _Unpacked:
     """Bytes of a packed element, unpacked so many at once as are asked for."""
 
     def __init__(self, file: IO[bytes], size: int) -> None:
-        self._file, self._left, self._unpack = file, size, zlib.decompressobj()
+        self._file, self._bytes_left, self._unpack = file, size, zlib.decompressobj()
 
     def read(self, count: int) -> bytes:
-        found = b""
-        while len(found) < count and not self._unpack.eof:
+        data = b""
+        while len(data) < count and not self._unpack.eof:
             packed = self._unpack.unconsumed_tail
             if not packed:
-                packed = self._file.read(min(self._left, PIECE))
-                self._left -= len(packed)
-            more = self._unpack.decompress(packed, count - len(found))
+                packed = self._file.read(min(self._bytes_left, PIECE))
+                self._bytes_left -= len(packed)
+            more = self._unpack.decompress(packed, count - len(data))
             if not more and not packed:
                 break
-            found += more
-        return found
+            data += more
+        return data
 
 
 @dataclass(slots=True)
@@ -144,13 +144,13 @@ class _Walk:
     Attributes:
         source: Where bytes come from.
         end: Order of bytes, as `struct` names it.
-        left: Bytes of memory that may still be counted.
+        bytes_left: Bytes of memory that may still be counted.
         listed: Where variables are put down.
     """
 
     source: _Plain | _Unpacked
     end: str
-    left: int
+    bytes_left: int
     listed: list[Listed]
 
     def tag(self) -> tuple[int, int]:
@@ -180,12 +180,12 @@ class _Walk:
             count *= max(side, 0)
         if kind == CELL or kind in STRUCTS:
             return self._inner(kind, count, depth)
-        own = OBJECT_BYTES + max(rest, 0) * TEXT_TIMES
+        memory_bytes = OBJECT_BYTES + max(rest, 0) * TEXT_TIMES
         if kind in NUMBER_BYTES:
-            own = OBJECT_BYTES + count * NUMBER_BYTES[kind] * (2 if flags & COMPLEX else 1)
-        self._counted(own)
+            memory_bytes = OBJECT_BYTES + count * NUMBER_BYTES[kind] * (2 if flags & COMPLEX else 1)
+        self._counted(memory_bytes)
         self._skip(max(rest, 0))
-        return own
+        return memory_bytes
 
     def _inner(self, kind: int, count: int, depth: int) -> int:
         """Skip the arrays in a cell or a structure."""
@@ -204,12 +204,12 @@ class _Walk:
                 total += self.matrix(size, depth + 1, None)
             else:
                 self._skip(size)
-            if self.left < 0:
+            if self.bytes_left < 0:
                 break
         return total
 
     def _counted(self, size: int) -> int:
-        self.left -= size
+        self.bytes_left -= size
         return size
 
     def _element(self) -> tuple[int, bytes]:
@@ -224,12 +224,12 @@ class _Walk:
         return 8 + padded, self._read(padded)[:size]
 
     def _read(self, count: int) -> bytes:
-        found = self.source.read(count)
-        if len(found) < count:
+        data = self.source.read(count)
+        if len(data) < count:
             raise EOFError("it is cut off")
-        return found
+        return data
 
     def _skip(self, count: int) -> None:
         """Skip bytes; beyond the memory there is no need to go on."""
-        while count > 0 and self.left >= 0:
+        while count > 0 and self.bytes_left >= 0:
             count -= len(self._read(min(count, PIECE)))

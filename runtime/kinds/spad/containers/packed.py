@@ -78,10 +78,10 @@ def member_bytes(
 
 def _mapped(path: Path, member: zipfile.ZipInfo) -> mmap.mmap:
     with path.open("rb") as file:
-        found = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
-    if member.header_offset + LOCAL_HEADER + member.file_size > len(found):
+        data = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+    if member.header_offset + LOCAL_HEADER + member.file_size > len(data):
         raise DecodeError(f"{path.name} is cut off")
-    return found
+    return data
 
 
 def _at(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> int:

@@ -33,12 +33,12 @@ def read_columns(path: Path, what: str) -> NDArray[np.float64]:
     try:
         text = data.decode("utf-8").replace(",", " ")
         rows = [line.split() for line in text.splitlines() if line.strip() and line[0] != "#"]
-        found = np.array(rows, dtype=np.float64)
+        columns = np.array(rows, dtype=np.float64)
     except ValueError as error:
         raise ContractError(f"{what} {path} must be lines of two numbers: {error}") from error
-    if found.ndim != 2 or found.shape[1] != 2:
+    if columns.ndim != 2 or columns.shape[1] != 2:
         raise ContractError(f"{what} {path} must be lines of two numbers")
-    return np.ascontiguousarray(found.T)
+    return np.ascontiguousarray(columns.T)
 
 
 def read_map(path: Path, what: str) -> NDArray[Any]:
@@ -50,14 +50,14 @@ def read_map(path: Path, what: str) -> NDArray[Any]:
     data = read_side_bytes(path, what, most_bytes=MOST_BYTES)
     try:
         _check_announced(data, path.name)
-        found = npy.read_array(io.BytesIO(data), allow_pickle=False)
+        values = npy.read_array(io.BytesIO(data), allow_pickle=False)
     except (*BROKEN_HEADER, DecodeError) as error:
         raise ContractError(f"{what} {path} must be an .npy file of numbers: {error}") from error
-    if found.ndim != 2 or found.dtype.kind not in "biuf" or not np.isfinite(found).all():
+    if values.ndim != 2 or values.dtype.kind not in "biuf" or not np.isfinite(values).all():
         raise ContractError(
-            f"{what} {path} must hold finite numbers (h, w); it holds {found.dtype} {found.shape}"
+            f"{what} {path} must hold finite numbers (h, w); it holds {values.dtype} {values.shape}"
         )
-    return np.asarray(found)
+    return np.asarray(values)
 
 
 def _check_announced(data: bytes, name: str) -> None:

@@ -41,7 +41,7 @@ class ArrayFile(CountsFile):
         *,
         kind: CountsKind | None = None,
         usual: str | None = "tyx",
-        stated: Mapping[str, object] | None = None,
+        stated_times: Mapping[str, object] | None = None,
         assumed: Mapping[str, object] | None = None,
         close: Callable[[], None] | None = None,
     ) -> None:
@@ -53,7 +53,7 @@ class ArrayFile(CountsFile):
             hints: What the caller knows.
             kind: What it holds; None: times where it has three axes, else counts.
             usual: The axes that it has unless the caller says otherwise; None if that is not known.
-            stated: What it says of its times.
+            stated_times: What it says of its times.
             assumed: What is usual of such files.
             close: Lets go of what it lies in.
 
@@ -61,7 +61,11 @@ class ArrayFile(CountsFile):
             DecodeError: If it holds no numbers, has no pixels, or more bins than any capture.
             ContractError: If its axes are not known.
         """
-        self.path, self.stated, self._close = path, stated or {}, close or (lambda: None)
+        self.path, self.stated_times, self._close = (
+            path,
+            stated_times or {},
+            close or (lambda: None),
+        )
         self.assumed = assumed or {}
         if values.dtype.kind not in "biuf" or values.dtype.itemsize > 8:
             raise DecodeError(f"{path.name} holds {values.dtype}; expected numbers")
@@ -72,7 +76,7 @@ class ArrayFile(CountsFile):
             )
         usual = "yx" if len(values.shape) == 2 else usual
         self._axes = axes_of(path, values.shape, hints.axes, usual)
-        self.axes, is_flat = self._axes.text, "t" not in self._axes.kept
+        self.axes, is_flat = self._axes.text, "t" not in self._axes.remaining
         self._values = values
         sizes = dict(zip(self._axes.letters, values.shape, strict=True))
         self.height, self.width = checked_size(path, sizes["y"], sizes["x"])
@@ -87,7 +91,7 @@ class ArrayFile(CountsFile):
             part = np.asarray(self._values[self._axes.at_rows(top, bottom)])
         except (OSError, ValueError, RuntimeError) as error:
             raise DecodeError(f"{self.path.name} is damaged: {error}") from error
-        axes = self._axes.kept
+        axes = self._axes.remaining
         if "t" not in axes:
             part, axes = part[..., None], axes + "t"
         return checked_counts(self.path, part.transpose([axes.index(a) for a in "yxt"]), top)

@@ -15,7 +15,7 @@ from camkit.errors import ContractError
 
 _ONE: Final = re.compile(r"([a-z])(\d{0,9})")
 _WHOLE: Final = re.compile(rf"(?:{_ONE.pattern})+")
-OWN: Final = ("txy", "xy")
+LETTERS: Final = ("txy", "xy")
 """Letters that an array must have, sorted."""
 
 
@@ -43,7 +43,7 @@ class Axes:
         )
 
     @property
-    def kept(self) -> str:
+    def remaining(self) -> str:
         """Return the letters of what is left."""
         pairs = zip(self.letters, self.places, strict=True)
         return "".join(letter for letter, place in pairs if place is None)
@@ -60,7 +60,7 @@ class Axes:
 
     def fits(self, shape: Sequence[int]) -> bool:
         """Return whether an array may have these axes."""
-        if len(self.letters) != len(shape) or "".join(sorted(self.kept)) not in OWN:
+        if len(self.letters) != len(shape) or "".join(sorted(self.remaining)) not in LETTERS:
             return False
         pairs = zip(self.letters, self.places, shape, strict=True)
         return all(place is None or (n not in "tyx" and place < side) for n, place, side in pairs)
@@ -76,24 +76,24 @@ class Axes:
 
 def backwards(text: str) -> str:
     """Return stated axes from the other end; what states none as it is."""
-    found = Axes.read(text)
-    return text if found is None else found.backwards().text
+    axes = Axes.read(text)
+    return text if axes is None else axes.backwards().text
 
 
-def axes_of(path: Path, shape: Sequence[int], stated: str | None, usual: str | None) -> Axes:
+def axes_of(path: Path, shape: Sequence[int], stated_axes: str | None, usual: str | None) -> Axes:
     """Return the axes of an array.
 
     Args:
         path: The file, for errors.
         shape: Of the array.
-        stated: What the caller says.
+        stated_axes: What the caller says.
         usual: What such arrays have; None where that cannot be known.
 
     Raises:
         ContractError: If axes are stated that cannot be, or none are known.
     """
     shape = tuple(shape)
-    if stated is None and len(shape) > len("tyx"):
+    if stated_axes is None and len(shape) > len("tyx"):
         example = "abcdefg"[: len(shape) - len("tyx")]
         raise ContractError(
             f"{path.name} holds an array of {shape}; expected time, rows and columns: name its "
@@ -101,14 +101,14 @@ def axes_of(path: Path, shape: Sequence[int], stated: str | None, usual: str | N
             f'"{"".join(letter + "0" for letter in example)}tyx" or what it is, in a file for '
             f"{option_text('timing')}"
         )
-    text = usual if stated is None else stated
+    text = usual if stated_axes is None else stated_axes
     if text is None:
         raise ContractError(
             f"{path.name} holds an array of {shape}: nothing says which axis is time; state "
             f'[array] axes = "yxt", "tyx" or what it is, in a file for {option_text("timing")}'
         )
-    found = Axes.read(text)
-    if found is None or not found.fits(shape):
+    axes = Axes.read(text)
+    if axes is None or not axes.fits(shape):
         raise ContractError(
             f'[array] axes = "{text}" does not fit {path.name}, an array of {shape}: expected each '
             f"of the letters {'t, y, x' if len(shape) > 2 else 'y, x'} once, in its order"
@@ -118,7 +118,7 @@ def axes_of(path: Path, shape: Sequence[int], stated: str | None, usual: str | N
                 else ""
             )
         )
-    return found
+    return axes
 
 
 def _more(shape: Sequence[int]) -> bool:

@@ -25,47 +25,47 @@ def chosen_places(
     Raises:
         ContractError: If nobody says which of several, or the choice is none of them.
     """
-    stated = {} if key is None else _read(key, numbers, summed)
-    found = {name: stated.get(name, ALL - 1) for name in numbers}
-    for name, known in numbers.items():
-        if name not in stated and len(known) == 1:
-            found[name] = known[0]
-    is_known = stated.keys() <= numbers.keys() and all(
-        found[name] in known or (found[name] == ALL and name == summed)
-        for name, known in numbers.items()
+    stated_choice = {} if key is None else _read(key, numbers, summed)
+    choice = {name: stated_choice.get(name, ALL - 1) for name in numbers}
+    for name, places in numbers.items():
+        if name not in stated_choice and len(places) == 1:
+            choice[name] = places[0]
+    is_known = stated_choice.keys() <= numbers.keys() and all(
+        choice[name] in places or (choice[name] == ALL and name == summed)
+        for name, places in numbers.items()
     )
     if not is_known:
-        several = {name: known for name, known in numbers.items() if len(known) > 1} or numbers
+        several = {name: places for name, places in numbers.items() if len(places) > 1} or numbers
         listed = "; ".join(_listed(n, k, is_summed=n == summed) for n, k in several.items())
-        asked = "" if key is None else f", and no {key!r}"
-        first = ", ".join(f"{name} {known[0]}" for name, known in several.items())
+        rejection = "" if key is None else f", and no {key!r}"
+        first = ", ".join(f"{name} {places[0]}" for name, places in several.items())
         raise ContractError(
-            f"{path.name} holds {listed}{asked}; choose one in the file of "
+            f"{path.name} holds {listed}{rejection}; choose one in the file of "
             f'{option_text("timing")}: under [array] the line key = "{first}"'
         )
     return {
-        name: ALL if found[name] == ALL else list(known).index(found[name])
-        for name, known in numbers.items()
+        name: ALL if choice[name] == ALL else list(places).index(choice[name])
+        for name, places in numbers.items()
     }
 
 
 def _read(key: str, names: Mapping[str, Sequence[int]], summed: str | None) -> dict[str, int]:
     """Return what a key states; what states no place is a name that no axis has."""
-    found: dict[str, int] = {}
+    choice: dict[str, int] = {}
     for part in (part.strip() for part in key.split(",")):
         name, _, number = part.rpartition(" ")
         if summed is not None and part == f"all {summed}s":
-            found[summed] = ALL
+            choice[summed] = ALL
         elif name in names and number.isascii() and number.isdigit() and len(number) < 10:
-            found[name] = int(number)
+            choice[name] = int(number)
         else:
-            found[f"{part}?"] = ALL
-    return found
+            choice[f"{part}?"] = ALL
+    return choice
 
 
-def _listed(name: str, known: Sequence[int], *, is_summed: bool) -> str:
+def _listed(name: str, places: Sequence[int], *, is_summed: bool) -> str:
     """Return the names of all places; of many the first and the last."""
-    own = [f"{name} {number}" for number in known]
-    if len(own) > MOST_LISTED:
-        own = [f"{own[0]} to {own[-1]}"]
-    return ", ".join(own + [f"all {name}s"] * (is_summed and len(known) > 1))
+    names = [f"{name} {number}" for number in places]
+    if len(names) > MOST_LISTED:
+        names = [f"{names[0]} to {names[-1]}"]
+    return ", ".join(names + [f"all {name}s"] * (is_summed and len(places) > 1))

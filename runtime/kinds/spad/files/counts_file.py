@@ -53,7 +53,7 @@ class CountsFile(ABC):
         height: Rows of pixels.
         width: Pixels of a row.
         bins: Time bins, or frames; 0 for stamps.
-        stated: What the file says of its times, by the names of the timing file.
+        stated_times: What the file says of its times, by the names of the timing file.
         assumed: What is usual of such files; what anyone states goes before.
         axes: Of the file's array in its order, as a caller would state them; empty where nobody
             can.
@@ -64,7 +64,7 @@ class CountsFile(ABC):
     height: int
     width: int
     bins: int
-    stated: Mapping[str, object]
+    stated_times: Mapping[str, object]
     assumed: Mapping[str, object] = MappingProxyType({})
     axes: str = ""
 
@@ -147,9 +147,9 @@ def checked_counts(path: Path, values: NDArray[Any], top: int) -> FloatArray:
         DecodeError: If one is negative, fractional, not finite or beyond what is exact; names
             where the first is.
     """
-    found = np.ascontiguousarray(values, dtype=np.float32)
+    counts = np.ascontiguousarray(values, dtype=np.float32)
     if values.dtype.kind == "b" or (values.dtype.kind == "u" and values.dtype.itemsize <= 2):
-        return found.copy() if np.shares_memory(found, values) else found
+        return counts.copy() if np.shares_memory(counts, values) else counts
     with np.errstate(invalid="ignore"):
         bad = ~((values >= 0) & (values <= MOST_COUNT))
         if values.dtype.kind == "f":
@@ -160,4 +160,4 @@ def checked_counts(path: Path, values: NDArray[Any], top: int) -> FloatArray:
             f"{path.name} holds no counts: {values[y, x, t]} at pixel ({x}, {y + top}), bin {t}; "
             "expected whole numbers >= 0"
         )
-    return found.copy() if np.shares_memory(found, values) else found
+    return counts.copy() if np.shares_memory(counts, values) else counts

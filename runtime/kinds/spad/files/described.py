@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from camkit.runtime.capture import MosaicOptions
+from camkit.runtime.kinds.spad.files.bundle_name import named_bundle
 from camkit.runtime.kinds.spad.files.counts_file import Hints
-from camkit.runtime.kinds.spad.files.named import named_bundle
 from camkit.runtime.kinds.spad.files.open_counts import open_counts
 from camkit.runtime.kinds.spad.timing import Timing, read_timing, timing_beside
 
@@ -24,9 +24,9 @@ def describe(path: Path, _mosaic: MosaicOptions | None = None) -> Mapping[str, A
         ContractError: If it holds several variables, or an array whose axes nobody states.
         UnsupportedError: If the library for such files is not installed.
     """
-    beside = timing_beside(path)
-    is_there = beside.is_file()
-    array = (read_timing(beside) if is_there else Timing()).array
+    timing_path = timing_beside(path)
+    is_there = timing_path.is_file()
+    array = (read_timing(timing_path) if is_there else Timing()).array
     with open_counts(path, Hints(axes=array.axes, key=array.key)) as file:
         return {
             "holds": file.kind,
@@ -34,14 +34,14 @@ def describe(path: Path, _mosaic: MosaicOptions | None = None) -> Mapping[str, A
             "height": file.height,
             "frames" if file.kind == "counts" else "bins": file.bins or None,
             "axes": file.axes or None,
-            "stated": {name: _told(value) for name, value in file.stated.items()},
+            "stated": {name: _plain(value) for name, value in file.stated_times.items()},
             "usual": dict(file.assumed),
-            "timing": beside.name if is_there else None,
+            "timing": timing_path.name if is_there else None,
             "bundle_named": named_bundle(path),
         }
 
 
-def _told(value: object) -> object:
+def _plain(value: object) -> object:
     """Return a stated value; of many numbers, such as edges, how many there are and their ends."""
     if not isinstance(value, np.ndarray | np.generic):
         return value

@@ -34,8 +34,10 @@ def attribute_of(path: Path, name: str) -> Any:
     """Return the first small attribute of a name in an HDF5 file; None without one."""
     import h5py
 
-    from camkit.runtime.kinds.spad.containers.hdf5_tree import stated, tree_of
+    from camkit.runtime.kinds.spad.containers.hdf5_tree import small_attributes, tree_of
 
     with h5py.File(path, "r") as file:
         tree = tree_of(path, file)
-        return next((v for item in tree.items for v in stated(tree, item, {name}).values()), None)
+        return next(
+            (v for item in tree.items for v in small_attributes(tree, item, {name}).values()), None
+        )

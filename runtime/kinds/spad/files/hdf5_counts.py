@@ -19,16 +19,16 @@ from camkit.runtime.kinds.spad.containers.hdf5_tree import (
     is_small,
     links_told,
     piece_bytes,
-    stated,
+    small_attributes,
     tree_of,
     type_of,
 )
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
 from camkit.runtime.kinds.spad.files.axes import backwards
 from camkit.runtime.kinds.spad.files.broken import BROKEN
-from camkit.runtime.kinds.spad.files.chosen import chosen_name, stated_values
 from camkit.runtime.kinds.spad.files.counts_file import KEYS, CountsFile, Hints
 from camkit.runtime.kinds.spad.files.stamps import StampsFile
+from camkit.runtime.kinds.spad.files.variable import chosen_name, stated_values
 from camkit.runtime.kinds.spad.timing import TABLE_OF
 
 MATLAB_EMPTY: Final = "MATLAB_empty"
@@ -40,20 +40,22 @@ def counts_of(path: Path, file: Any, hints: Hints, *, is_matlab: bool) -> Counts
     large = {n: d for n, d in tree.sets.items() if d.ndim > 1 and min(d.shape) > 0 and _is_cube(d)}
     _check_links(path, tree, large, hints)
     name = chosen_name(path, large, hints, "data sets")
-    chosen = large[name]
-    check_readable(path, name, chosen)
-    told = _told(tree, file, chosen)
-    if h5py.check_ref_dtype(chosen.dtype) is not None:
-        return _cells(path, file, chosen, told, hints)
-    _check_pieces(path, name, chosen, hints)
+    data_set = large[name]
+    check_readable(path, name, data_set)
+    stated_times = _stated_times(tree, file, data_set)
+    if h5py.check_ref_dtype(data_set.dtype) is not None:
+        return _cells(path, file, data_set, stated_times, hints)
+    _check_pieces(path, name, data_set, hints)
     kind = KEYS.get(name.rsplit("/", 1)[-1])
     usual = "tyx" if kind is not None else None
     if is_matlab:  # MATLAB counts its axes from the other end
         hints = replace(hints, axes=None if hints.axes is None else backwards(hints.axes))
         usual = None if usual is None else usual[::-1]
-    found = ArrayFile(path, chosen, hints, kind=kind, usual=usual, stated=told, close=file.close)
-    found.axes = backwards(found.axes) if is_matlab else found.axes
-    return found
+    counts = ArrayFile(
+        path, data_set, hints, kind=kind, usual=usual, stated_times=stated_times, close=file.close
+    )
+    counts.axes = backwards(counts.axes) if is_matlab else counts.axes
+    return counts
 
 
 def _check_links(path: Path, tree: Tree, large: Mapping[str, Any], hints: Hints) -> None:
@@ -63,23 +65,31 @@ def _check_links(path: Path, tree: Tree, large: Mapping[str, Any], hints: Hints)
         DecodeError: Says where it leads.
     """
     if hints.key is not None:
-        told = [] if hints.key in large else links_told(tree, {hints.key})
+        links = [] if hints.key in large else links_told(tree, {hints.key})
     elif any(name.rsplit("/", 1)[-1] in KEYS for name in large):
-        told = []
+        links = []
     else:
-        told = links_told(tree, KEYS if large else None)
-    if told:
+        links = links_told(tree, KEYS if large else None)
+    if links:
         raise DecodeError(
             f"{path.name} holds no data sets of counts, histograms or time stamps itself: "
-            f"{told[0]}; name the place itself by [array] key, or store it in this file"
+            f"{links[0]}; name the place itself by [array] key, or store it in this file"
         )
 
 
-def _told(tree: Tree, file: Any, chosen: Any) -> dict[str, object]:
+def _stated_times(tree: Tree, file: Any, data_set: Any) -> dict[str, object]:
     """Return what small data sets and attributes say of times."""
-    own = {n.rsplit("/", 1)[-1]: item for n, item in tree.sets.items()}
-    told = {n: i[()] for n, i in own.items() if n in TABLE_OF and i.size and is_small(i, tree)}
-    return stated_values({**told, **stated(tree, file, TABLE_OF), **stated(tree, chosen, TABLE_OF)})
+    by_name = {n.rsplit("/", 1)[-1]: item for n, item in tree.sets.items()}
+    values = {
+        n: i[()] for n, i in by_name.items() if n in TABLE_OF and i.size and is_small(i, tree)
+    }
+    return stated_values(
+        {
+            **values,
+            **small_attributes(tree, file, TABLE_OF),
+            **small_attributes(tree, data_set, TABLE_OF),
+        }
+    )
 
 
 def _check_pieces(path: Path, name: str, item: Any, hints: Hints) -> None:
@@ -104,7 +114,9 @@ def _is_cube(item: Any) -> bool:
     return is_cells or (item.dtype.kind in "biuf" and not is_vector)
 
 
-def _cells(path: Path, file: Any, cells: Any, told: dict[str, object], hints: Hints) -> CountsFile:
+def _cells(
+    path: Path, file: Any, cells: Any, stated_times: dict[str, object], hints: Hints
+) -> CountsFile:
     if cells.ndim != 2:
         raise DecodeError(f"{path.name}: cells of time stamps must be (rows, columns)")
     _check_pieces(path, cells.name, cells, hints)
@@ -120,7 +132,9 @@ def _cells(path: Path, file: Any, cells: Any, told: dict[str, object], hints: Hi
         except BROKEN as error:
             raise DecodeError(f"{path.name} is damaged: {error}") from error
 
-    return StampsFile(path, (height, width), row, stated=told, close=partial(file.close))
+    return StampsFile(
+        path, (height, width), row, stated_times=stated_times, close=partial(file.close)
+    )
 
 
 def _check_cells(path: Path, items: Sequence[Any], hints: Hints) -> None:

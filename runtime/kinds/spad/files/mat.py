@@ -21,10 +21,10 @@ from camkit.runtime.kinds.spad.containers.mat_sizes import (
     listed_variables,
 )
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
-from camkit.runtime.kinds.spad.files.chosen import chosen_name, stated_values
 from camkit.runtime.kinds.spad.files.counts_file import KEYS, CountsFile, Hints
 from camkit.runtime.kinds.spad.files.hdf5 import open_hdf5
 from camkit.runtime.kinds.spad.files.stamps import StampsFile
+from camkit.runtime.kinds.spad.files.variable import chosen_name, stated_values
 from camkit.runtime.kinds.spad.timing import TABLE_OF
 
 HDF5_MAGIC: Final = b"\x89HDF\r\n\x1a\n"
@@ -63,8 +63,8 @@ def open_mat(path: Path, hints: Hints) -> CountsFile:
     listed = listed_variables(path) if is_walked else _listed_by_scipy(path)
     kinds = {name: (shape, kind) for name, shape, kind in listed if min(shape, default=0) > 0}
     large = [name for name, (shape, kind) in kinds.items() if _may_be(name, shape, kind)]
-    asked = [name for name in kinds if name == hints.key]
-    name = chosen_name(path, asked or large, hints, "variables")
+    matches = [name for name in kinds if name == hints.key]
+    name = chosen_name(path, matches or large, hints, "variables")
     most = TIMES * hints.max_bytes
     size = 0 if kinds[name][1] == "cell" else _listed_bytes(*kinds[name])
     if is_walked and size <= most:
@@ -77,23 +77,28 @@ def open_mat(path: Path, hints: Hints) -> CountsFile:
         )
     small = [
         n
-        for n, (_, own) in kinds.items()
-        if n in TABLE_OF and own in PLAIN and _listed_bytes(*kinds[n]) <= SMALL_BYTES
+        for n, (_, matlab_class) in kinds.items()
+        if n in TABLE_OF and matlab_class in PLAIN and _listed_bytes(*kinds[n]) <= SMALL_BYTES
     ]
     try:
         with _doubts_raised():
-            found = scipy.io.loadmat(str(path), appendmat=False, variable_names=[name, *small])
-        values, stated = found[name], stated_values({n: found[n] for n in small})
+            variables = scipy.io.loadmat(str(path), appendmat=False, variable_names=[name, *small])
+        values, stated_times = variables[name], stated_values({n: variables[n] for n in small})
     except BROKEN as error:
         raise DecodeError(f"{path.name} is damaged: {error}") from error
     if values.dtype == object:
         if values.ndim != 2:
             raise DecodeError(f"{path.name}: cells of time stamps must be (rows, columns)")
         return StampsFile(
-            path, values.shape, lambda y: [_cell(path, c) for c in values[y]], stated=stated
+            path,
+            values.shape,
+            lambda y: [_cell(path, c) for c in values[y]],
+            stated_times=stated_times,
         )
     usual = "tyx" if name in KEYS else None
-    return ArrayFile(path, values, hints, kind=KEYS.get(name), usual=usual, stated=stated)
+    return ArrayFile(
+        path, values, hints, kind=KEYS.get(name), usual=usual, stated_times=stated_times
+    )
 
 
 def _listed_by_scipy(path: Path) -> list[Listed]:

@@ -14,8 +14,8 @@ from camkit.errors import DecodeError
 from camkit.runtime.kinds.spad.containers.npy_header import Header, read_header
 from camkit.runtime.kinds.spad.containers.packed import member_bytes, opened_zip
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
-from camkit.runtime.kinds.spad.files.chosen import chosen_name, stated_values
 from camkit.runtime.kinds.spad.files.counts_file import KEYS, CountsFile, Hints
+from camkit.runtime.kinds.spad.files.variable import chosen_name, stated_values
 from camkit.runtime.kinds.spad.timing import TABLE_OF
 
 HEADER_BYTES: Final = 20_000
@@ -38,7 +38,7 @@ def open_npz(path: Path, hints: Hints) -> CountsFile:
             if other in TABLE_OF and len(shape) <= 1 and members[other].file_size < SMALL_BYTES
         }
         values = _array(archive, members[name], headers[name], hints.max_bytes)
-    return ArrayFile(path, values, hints, kind=KEYS.get(name), stated=stated_values(small))
+    return ArrayFile(path, values, hints, kind=KEYS.get(name), stated_times=stated_values(small))
 
 
 def read_npz(
@@ -56,8 +56,8 @@ def read_npz(
     """
     with opened_zip(path) as archive:
         members = {i.filename.removesuffix(SUFFIX): i for i in archive.infolist()}
-        wanted = {n: i for n, i in members.items() if names is None or n in names}
-        size = sum(info.file_size for info in wanted.values())
+        selected = {n: i for n, i in members.items() if names is None or n in names}
+        size = sum(info.file_size for info in selected.values())
         if size > max_bytes:
             raise DecodeError(
                 f"{path.name} unpacks to {size / 1e9:.1f} GB; expected at most "
@@ -65,7 +65,7 @@ def read_npz(
             )
         return {
             name: _array(archive, info, _header(archive, info), max_bytes)
-            for name, info in wanted.items()
+            for name, info in selected.items()
         }
 
 

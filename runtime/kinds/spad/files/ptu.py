@@ -51,7 +51,7 @@ def open_ptu(path: Path, hints: Hints) -> CountsFile:
         hints,
         kind="histogram",
         usual="yxt",
-        stated={"time_bin_ps": width_ps},
+        stated_times={"time_bin_ps": width_ps},
         assumed=ARRIVALS,
     )
 
@@ -85,10 +85,10 @@ def _histograms(path: Path, file: Any, hints: Hints) -> NDArray[Any]:
         )
     channel = active[place["channel"]] - active[0]
     if not file.is_image:
-        found = np.asarray(file.decode_histogram(dtype="uint32", dtime=bins))
-        return np.asarray(found.reshape(-1, found.shape[-1])[channel])[None, None]
-    own = {"channel": channel, "dtime": bins, "dtype": "uint32"}
-    cube = np.asarray(file.decode_image(frame=place["frame"], **own))
+        histogram = np.asarray(file.decode_histogram(dtype="uint32", dtime=bins))
+        return np.asarray(histogram.reshape(-1, histogram.shape[-1])[channel])[None, None]
+    options = {"channel": channel, "dtime": bins, "dtype": "uint32"}
+    cube = np.asarray(file.decode_image(frame=place["frame"], **options))
     return cube.reshape(cube.shape[1], cube.shape[2], cube.shape[-1])
 
 

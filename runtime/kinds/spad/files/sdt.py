@@ -44,8 +44,8 @@ def open_sdt_zip(path: Path, hints: Hints) -> CountsFile:
         with opened_zip(path) as archive:
             members = [i for i in archive.infolist() if i.filename.lower().endswith(".sdt")]
             if len(members) != 1:
-                named = ", ".join(i.filename for i in members) or "none"
-                raise DecodeError(f"{path.name} must hold one .sdt file; it holds {named}")
+                names = ", ".join(i.filename for i in members) or "none"
+                raise DecodeError(f"{path.name} must hold one .sdt file; it holds {names}")
             _check_total(path, members[0].file_size, TIMES * hints.max_bytes)
             data = member_bytes(archive, members[0], hints.max_bytes)
             with plain.open("wb") as file:
@@ -87,7 +87,7 @@ def _open_plain(path: Path, plain: Path, hints: Hints) -> CountsFile:
         hints,
         kind="histogram",
         usual="yxt",
-        stated={"time_bin_ps": width_ps},
+        stated_times={"time_bin_ps": width_ps},
         assumed=ARRIVALS,
     )
 

@@ -69,11 +69,11 @@ def decode_spc(data: bytes) -> Photons:
     many = np.where(is_none, records & OVERFLOWS, 1)
     overflows = np.cumsum(np.where(is_over, many, 0).astype(np.int64))
     is_photon = _are_photons(records)
-    own = records[is_photon]
+    photons = records[is_photon]
     return Photons(
-        macro=(own & 0xFFF).astype(np.int64) + MACRO_TICKS * overflows[is_photon],
-        micro=_micro(own),
-        routing=_routing(own),
+        macro=(photons & 0xFFF).astype(np.int64) + MACRO_TICKS * overflows[is_photon],
+        micro=_micro(photons),
+        routing=_routing(photons),
     )
 
 
@@ -93,17 +93,17 @@ def checked_records(data: NDArray[np.uint8]) -> NDArray[np.uint32]:
 
 def photons_of_routing(records: NDArray[np.uint32]) -> NDArray[np.int64]:
     """Return how many photons each detector has, (16,)."""
-    found = np.zeros(ROUTINGS, np.int64)
+    counts = np.zeros(ROUTINGS, np.int64)
     for part in _parts(records):
-        found += np.bincount(_routing(part[_are_photons(part)]), minlength=ROUTINGS)
-    return found
+        counts += np.bincount(_routing(part[_are_photons(part)]), minlength=ROUTINGS)
+    return counts
 
 
 def micro_times(records: NDArray[np.uint32], routing: int) -> Iterator[NDArray[np.uint16]]:
     """Yield the times within the cycle of a detector's photons, part by part."""
     for part in _parts(records):
-        own = part[_are_photons(part)]
-        yield _micro(own[_routing(own) == routing])
+        photons = part[_are_photons(part)]
+        yield _micro(photons[_routing(photons) == routing])
 
 
 def _parts(records: NDArray[np.uint32]) -> Iterator[NDArray[np.uint32]]:
@@ -131,8 +131,8 @@ def open_spc(path: Path, hints: Hints) -> CountsFile:
     except (DecodeError, ValueError) as error:
         raise DecodeError(f"{path.name} is damaged, or no SPC: {error}") from error
     photons = photons_of_routing(records)
-    known = np.flatnonzero(photons).tolist() or [0]
-    routing = known[chosen_places(path, {"channel": known}, hints.key)["channel"]]
+    detectors = np.flatnonzero(photons).tolist() or [0]
+    routing = detectors[chosen_places(path, {"channel": detectors}, hints.key)["channel"]]
     size = int(photons[routing]) * MICRO_BYTES
     if size > hints.max_bytes:
         raise ContractError(
@@ -141,8 +141,8 @@ def open_spc(path: Path, hints: Hints) -> CountsFile:
         )
     micro = np.concatenate([*micro_times(records, routing), np.empty(0, np.uint16)])
     step = _tac_step_ps(path.with_suffix(".set"))
-    stated = {} if step is None else {"stamp_ps": step}
-    return StampsFile(path, (1, 1), lambda _: [micro], stated=stated)
+    stated_times = {} if step is None else {"stamp_ps": step}
+    return StampsFile(path, (1, 1), lambda _: [micro], stated_times=stated_times)
 
 
 def _tac_step_ps(path: Path) -> float | None:
@@ -150,8 +150,8 @@ def _tac_step_ps(path: Path) -> float | None:
     if not path.is_file():
         return None
     with path.open("rb") as file:
-        found = TAC_STEP.search(file.read(SET_BYTES))
+        match = TAC_STEP.search(file.read(SET_BYTES))
     try:
-        return None if found is None else float(found[1]) * 1e12
+        return None if match is None else float(match[1]) * 1e12
     except ValueError:
         return None

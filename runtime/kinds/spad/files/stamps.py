@@ -25,7 +25,7 @@ class StampsFile(CountsFile):
         shape: tuple[int, int],
         cells: Callable[[int], Sequence[NDArray[Any]]],
         *,
-        stated: Mapping[str, object] | None = None,
+        stated_times: Mapping[str, object] | None = None,
         close: Callable[[], None] | None = None,
     ) -> None:
         """Store the stamps of all pixels.
@@ -34,12 +34,12 @@ class StampsFile(CountsFile):
             path: Where they came from.
             shape: (h, w).
             cells: Row -> the stamps of each of its pixels, arrays of any shape.
-            stated: What the file says of their times.
+            stated_times: What the file says of their times.
             close: Lets go of what they lie in.
         """
         self.path, self.kind, self.bins = path, "stamps", 0
         self.height, self.width = checked_size(path, *shape)
-        self.stated, self.assumed, self._close = stated or {}, ARRIVALS, close
+        self.stated_times, self.assumed, self._close = stated_times or {}, ARRIVALS, close
         self._cells = cells
         self._outside: dict[int, int] = {}
 
@@ -47,7 +47,7 @@ class StampsFile(CountsFile):
         """Sort the stamps of some rows; see `CountsFile`."""
         if edges is None:
             raise ContractError("time stamps need the edges of bins")
-        found = np.empty((bottom - top, self.width, len(edges) - 1), np.float32)
+        histograms = np.empty((bottom - top, self.width, len(edges) - 1), np.float32)
         for y in range(top, bottom):
             counts = np.zeros(self.width * (len(edges) - 1), np.int64)
             outside = 0
@@ -58,8 +58,8 @@ class StampsFile(CountsFile):
                 flat = pixels[inside] * (len(edges) - 1) + at[inside]
                 counts += np.bincount(flat, minlength=len(counts))
             self._outside[y] = outside
-            found[y - top] = counts.reshape(self.width, -1)
-        return found
+            histograms[y - top] = counts.reshape(self.width, -1)
+        return histograms
 
     def _pieces(self, y: int) -> Iterator[tuple[NDArray[np.int64], NDArray[np.float64]]]:
         """Yield the stamps of a row with their pixels, as many at once as need little memory."""

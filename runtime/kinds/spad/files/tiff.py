@@ -74,10 +74,10 @@ def _stack(path: Path, file: tifffile.TiffFile, hints: Hints) -> tuple[str | Non
     if size > hints.max_bytes:
         return axes, _spilled(pages, first).reshape(whole)
     if series is None:
-        found = file.asarray(key=slice(None), maxworkers=1)
+        values = file.asarray(key=slice(None), maxworkers=1)
     else:
-        found = series.asarray(maxworkers=1)
-    return axes, np.asarray(found).reshape(whole)
+        values = series.asarray(maxworkers=1)
+    return axes, np.asarray(values).reshape(whole)
 
 
 def _spilled(pages: Iterable[Any], first: Any) -> NDArray[Any]:
@@ -86,8 +86,8 @@ def _spilled(pages: Iterable[Any], first: Any) -> NDArray[Any]:
         for page in pages:
             check_wish()
             # tifffile has None for a page that its series lacks
-            found = np.zeros(first.shape, first.dtype) if page is None else page.asarray()
-            file.write(np.ascontiguousarray(found, first.dtype).data)
+            values = np.zeros(first.shape, first.dtype) if page is None else page.asarray()
+            file.write(np.ascontiguousarray(values, first.dtype).data)
         file.flush()
         return np.memmap(file, first.dtype, "r")
 

@@ -95,13 +95,13 @@ def check_whole(path: Path, file: tifffile.TiffFile) -> None:
     Raises:
         DecodeError: If it is cut off.
     """
-    found = sum(math.prod(one.shape) for one in file.series)
+    pixels = sum(math.prod(one.shape) for one in file.series)
     shaped = [math.prod(one.get("shape", ())) for one in file.shaped_metadata or ()]
     images = (file.imagej_metadata or {}).get("images", 0)
     announced = max(sum(shaped), images * math.prod(file.pages[0].shape))
     in_series = sum(len(one) for one in file.series)
     is_mapped = all(one.dataoffset is not None for one in file.series)
-    if found < announced or (not is_mapped and len(file.pages) != in_series):
+    if pixels < announced or (not is_mapped and len(file.pages) != in_series):
         raise DecodeError(f"{path.name} is cut off: its pages are not those that it announces")
 
 
@@ -115,13 +115,13 @@ def check_pages(path: Path, pages: Iterable[Any], max_bytes: int) -> None:
     for page in pages:
         if page is None or page.compression == 1:
             continue
-        own = page.dtype.itemsize
+        piece_bytes = page.dtype.itemsize
         for side in page.chunks:
-            own *= side
-        if own > max_bytes:
+            piece_bytes *= side
+        if piece_bytes > max_bytes:
             raise ContractError(
-                f"{path.name} is packed in pieces of {own / 1e9:.3g} GB, more than fits the "
-                f"memory; raise {option_text('max_mem_bytes')}, or store it as HDF5"
+                f"{path.name} is packed in pieces of {piece_bytes / 1e9:.3g} GB, more than fits "
+                f"the memory; raise {option_text('max_mem_bytes')}, or store it as HDF5"
             )
         unpacker = _UNPACKERS.get(int(page.compression))
         for offset, size in zip(page.dataoffsets, page.databytecounts, strict=True):
@@ -129,8 +129,8 @@ def check_pages(path: Path, pages: Iterable[Any], max_bytes: int) -> None:
                 continue
             with path.open("rb") as file:
                 file.seek(offset)
-                found = unpacker().decompress(file.read(min(size, 2 * max_bytes)), own + 1)
-            if len(found) > own:
+                data = unpacker().decompress(file.read(min(size, 2 * max_bytes)), piece_bytes + 1)
+            if len(data) > piece_bytes:
                 raise DecodeError(
                     f"{path.name} is damaged: a piece of its pixels unpacks to more than they are"
                 )

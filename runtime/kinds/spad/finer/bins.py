@@ -76,10 +76,10 @@ def finer_bins(
         growth: See `FineBins`.
         sharper: Times the photons of a bin at which the linear estimate is taken.
     """
-    found = coarse.strip(counts, hot=pixels.hot, blind=pixels.blind)
-    hot, blind, photons = found.hot[0], pixels.blind, _lit(found)
-    lost = hot | blind if (hot | blind).mean() <= MOST_DEAD else hot
-    sound = painted_over(counts, lost) if lost.any() else counts
+    coarse_fit = coarse.strip(counts, hot=pixels.hot, blind=pixels.blind)
+    hot, blind, photons = coarse_fit.hot[0], pixels.blind, _lit(coarse_fit)
+    unusable = hot | blind if (hot | blind).mean() <= MOST_DEAD else hot
+    sound = painted_over(counts, unusable) if unusable.any() else counts
     dark = pixels.dark
     frames = np.ascontiguousarray(sound.transpose(2, 0, 1)) - dark.astype(np.float32)
     if not (always or photons >= camera.stage.network_from_photons):
@@ -101,7 +101,7 @@ def finer_bins(
         largest=estimate.largest,
         pixels=pixels,
         hot=hot,
-        background=found.background[0],
+        background=coarse_fit.background[0],
         growth=growth,
     )
 

@@ -29,7 +29,7 @@ from camkit.runtime.kinds.spad.finer.sampling import sampling_kernel
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.graph import check_graph
 
-TOLD: Final = 3.0
+NOISE_SCALE: Final = 3.0
 """Deviations in the plane that tells a network of noise."""
 WHITE_PERCENTILE: Final = 99.5
 """Of the photons of a picture that are taken for white where nobody says."""
@@ -48,7 +48,7 @@ def network_planes(
         white: Photons of white.
         dark: Dark counts that were taken off, (h, w) or one number.
     """
-    noise = TOLD * np.sqrt(np.maximum(photons + dark, 0) + 1)
+    noise = NOISE_SCALE * np.sqrt(np.maximum(photons + dark, 0) + 1)
     return np.stack([photons, noise]).astype(np.float32) / np.float32(white)
 
 
@@ -91,8 +91,8 @@ class FineCamera:
         stages = manifest.stages_of(SuperResolve)
         stage = next((s for s in stages if role is None or s.role == role), None)
         if stage is None and stages:
-            known = ", ".join(s.role for s in stages)
-            raise BundleError(f"bundle {manifest.name} has no role {role!r}; it has {known}")
+            roles = ", ".join(s.role for s in stages)
+            raise BundleError(f"bundle {manifest.name} has no role {role!r}; it has {roles}")
         if stage is None or not isinstance(manifest.sensor, SpadSensor):
             raise BundleError(
                 f"bundle {manifest.name} has no stage super_resolve; captures of single photons "
@@ -127,15 +127,15 @@ class FineCamera:
         """Return its networks by size."""
         return self.bundle.manifest.networks.get(self.stage.role, {})
 
-    def size(self, asked: str | None) -> str:
+    def size(self, choice: str | None) -> str:
         """Return the size of network to run: the one asked for, else M.
 
         Raises:
             ContractError: If there is none.
         """
-        return size_of(self.bundle.manifest, self.stage.role, asked)
+        return size_of(self.bundle.manifest, self.stage.role, choice)
 
-    def size_of_bins(self, asked: str | None) -> str:
+    def size_of_bins(self, choice: str | None) -> str:
         """Return the size of network that makes bins finer for depth: asked for, else the smallest.
 
         A larger one brings times nearer by a few percent at most (`tools.spad.depth` at 2a55aa66),
@@ -145,7 +145,7 @@ class FineCamera:
             ContractError: If there is none.
         """
         small = next((s for s in self.bundle.manifest.sizes if s in self.sizes), None)
-        return self.size(asked or small)
+        return self.size(choice or small)
 
     def linear(self, photons: float, kernel: FloatArray | None = None) -> LinearEstimate:
         """Return the linear estimate at a level of light.
@@ -157,8 +157,8 @@ class FineCamera:
         Raises:
             ContractError: As `linear_estimate`.
         """
-        seen = self.kernel if kernel is None else kernel
-        return linear_estimate(seen, self.grid, PictureCovariance.of(self.stage), photons)
+        array_kernel = self.kernel if kernel is None else kernel
+        return linear_estimate(array_kernel, self.grid, PictureCovariance.of(self.stage), photons)
 
     def network(self, size: str) -> NetworkEngine:
         """Return the network of a size, made when first asked for.
@@ -191,30 +191,30 @@ class FineCamera:
         """
         engine, scale = self.network(size), self.scale
         count, height, width = frames.shape
-        found = np.empty((count, scale * height, scale * width), np.float32)
-        for frame, out in zip(frames, found, strict=True):
+        pictures = np.empty((count, scale * height, scale * width), np.float32)
+        for frame, out in zip(frames, pictures, strict=True):
             check_cancelled(cancel)
             planes = network_planes(frame, white, dark)[None]
             engine.run(planes, out[None, None], cancel=cancel)
-        np.maximum(found, 0, out=found)
-        found *= np.float32(white)
-        return found
+        np.maximum(pictures, 0, out=pictures)
+        pictures *= np.float32(white)
+        return pictures
 
 
-def size_of(manifest: Manifest, role: str, asked: str | None) -> str:
+def size_of(manifest: Manifest, role: str, choice: str | None) -> str:
     """Return the size of network to run for a role: the one asked for, else M.
 
     Raises:
         ContractError: If there is none.
     """
     sizes = manifest.networks.get(role, {})
-    if not sizes or (asked is not None and asked not in sizes):
+    if not sizes or (choice is not None and choice not in sizes):
         have = ", ".join(sizes) or "none"
         raise ContractError(
             f"bundle {manifest.name} holds size(s) {have}; asked for "
-            f"{asked or 'a network'}; {option_text('method', 'linear')} needs none"
+            f"{choice or 'a network'}; {option_text('method', 'linear')} needs none"
         )
-    return asked or (DEFAULT_SIZE if DEFAULT_SIZE in sizes else next(iter(sizes)))
+    return choice or (DEFAULT_SIZE if DEFAULT_SIZE in sizes else next(iter(sizes)))
 
 
 class _Networks:
@@ -231,11 +231,11 @@ class _Networks:
             if (role, size) not in self._engines:
                 facts = self._bundle.network_facts(role, size)
                 data = self._bundle.network_bytes(role, size)
-                found = check_graph(data, facts)
+                graph = check_graph(data, facts)
                 self._engines[role, size] = NetworkEngine(
                     data,
                     threads=self._threads,
                     scale=facts.output_scale,
-                    block_bytes=None if is_built_in(self._bundle) else found.block_bytes_per_pixel,
+                    block_bytes=None if is_built_in(self._bundle) else graph.block_bytes_per_pixel,
                 )
             return self._engines[role, size]

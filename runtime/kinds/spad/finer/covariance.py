@@ -30,8 +30,8 @@ class PictureCovariance:
     exponent: float
 
     def __post_init__(self) -> None:
-        given = (self.contrast, self.reach, self.exponent)
-        if not all(math.isfinite(v) and v > 0 for v in given) or self.exponent > 2:
+        values = (self.contrast, self.reach, self.exponent)
+        if not all(math.isfinite(v) and v > 0 for v in values) or self.exponent > 2:
             raise ContractError(
                 "contrast and reach of a covariance must be > 0, its exponent in (0, 2]; got "
                 f"{self.contrast}, {self.reach}, {self.exponent}"

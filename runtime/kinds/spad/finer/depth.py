@@ -34,12 +34,12 @@ class FineDepth:
     """Depth on the fine grid, and how it was found.
 
     Attributes:
-        found: Arrays of (returns, m h, m w); photons are those of a pixel of the array.
+        sharpened: Arrays of (returns, m h, m w); photons are those of a pixel of the array.
         size: Of the network that made bins finer; None for the linear estimate.
         photons: Signal photons of a pixel, on average.
     """
 
-    found: Sharpened
+    sharpened: Sharpened
     size: str | None
     photons: float
 
@@ -109,19 +109,19 @@ class FineSharpener:
             blind: (h, w) pixels that pile-up left no counts in some bins.
             growth: (h, w) variance over mean of the counts, where pile-up was taken out of them.
         """
-        known = Pixels.unknown(counts.shape[:2], hot=hot, dark=np.asarray(dark, np.float64))
+        pixels = Pixels.unknown(counts.shape[:2], hot=hot, dark=np.asarray(dark, np.float64))
         bins = finer_bins(
             self.camera,
             self._coarse,
             counts,
-            replace(known, blind=blind),
+            replace(pixels, blind=blind),
             size=self._size,
             always=self._always,
             growth=growth,
             sharper=self.sharper,
         )
-        found = fitted_bins(bins.fine, bins, self.sharpener, self.shares)
-        return FineDepth(found=found, size=bins.size, photons=bins.photons)
+        sharpened = fitted_bins(bins.fine, bins, self.sharpener, self.shares)
+        return FineDepth(sharpened=sharpened, size=bins.size, photons=bins.photons)
 
 
 def fitted_bins(
@@ -146,16 +146,16 @@ def fitted_bins(
     if bins.growth is not None:
         everywhere = everywhere * _finer(bins.growth, scale)
     even = np.ascontiguousarray((fine / everywhere).transpose(1, 2, 0), dtype=np.float32)
-    found = _proved(even, sharpener, bins, everywhere)
+    sharpened = _proved(even, sharpener, bins, everywhere)
     less = np.tile(np.sqrt(bins.gain / share), shape)
-    found = _in_pixels(found, everywhere, bins)
+    sharpened = _in_pixels(sharpened, everywhere, bins)
     sigma_ps = shares[bins.size is not None].sigma_ps(
-        found.sigma_ps * less,
-        slopes(found.time_of_flight_ps),
+        sharpened.sigma_ps * less,
+        slopes(sharpened.time_of_flight_ps),
         photons=bins.photons,
         bin_ps=sharpener.fitter.bank.axis.step_ps,
     )
-    return replace(found, sigma_ps=sigma_ps)
+    return replace(sharpened, sigma_ps=sigma_ps)
 
 
 def _proved(
@@ -172,35 +172,35 @@ def _proved(
         bins: Background of the array's own pixels.
         share: (m h, m w) photons of a pixel for each that is fitted.
     """
-    found, fitter, way = sharpener.strip(even), sharpener.fitter, sharpener.way
-    around = uniform_filter(bins.background, size=2 * REACH + 1, mode="nearest")
-    least = (_finer(around, bins.scale) / share).reshape(-1)
-    rows = np.flatnonzero(found.valid[0])
+    sharpened, fitter, way = sharpener.strip(even), sharpener.fitter, sharpener.way
+    background = uniform_filter(bins.background, size=2 * REACH + 1, mode="nearest")
+    least = (_finer(background, bins.scale) / share).reshape(-1)
+    rows = np.flatnonzero(sharpened.valid[0])
     step = fitter.bank.step_ps
-    nearest = (found.time_of_flight_ps[0].reshape(-1)[rows] - fitter.bank.mu_ps[0]) / step
+    nearest = (sharpened.time_of_flight_ps[0].reshape(-1)[rows] - fitter.bank.mu_ps[0]) / step
     proof = evidence_at(
         fitter.bank,
         even.reshape(-1, even.shape[2])[rows],
         np.clip(np.rint(nearest).astype(np.int64), 0, len(fitter.bank.mu_ps) - 1),
-        found.amplitude[0].reshape(-1)[rows],
-        found.background[0].reshape(-1)[rows],
+        sharpened.amplitude[0].reshape(-1)[rows],
+        sharpened.background[0].reshape(-1)[rows],
         least=least[rows],
     )
-    evidence, valid = found.evidence.copy(), found.valid.copy()
-    own = evidence[0].reshape(-1)
-    own[rows] = np.minimum(own[rows], proof)
+    evidence, valid = sharpened.evidence.copy(), sharpened.valid.copy()
+    first_evidence = evidence[0].reshape(-1)
+    first_evidence[rows] = np.minimum(first_evidence[rows], proof)
     threshold = threshold_for(way.false_alarms, fitter.search_length)
-    valid &= valid[:1] & (own.reshape(valid.shape[1:]) > threshold)
-    return replace(found, evidence=evidence, valid=valid)
+    valid &= valid[:1] & (first_evidence.reshape(valid.shape[1:]) > threshold)
+    return replace(sharpened, evidence=evidence, valid=valid)
 
 
-def _in_pixels(found: Sharpened, share: NDArray[np.float64], bins: FineBins) -> Sharpened:
+def _in_pixels(sharpened: Sharpened, share: NDArray[np.float64], bins: FineBins) -> Sharpened:
     """Return it in photons of a pixel, without belief in what is hot or blind."""
-    valid = found.valid & ~_finer(bins.hot | bins.pixels.blind, bins.scale)
+    valid = sharpened.valid & ~_finer(bins.hot | bins.pixels.blind, bins.scale)
     return replace(
-        times_photons(found, share),
+        times_photons(sharpened, share),
         valid=valid,
-        pooled=np.where(valid, found.pooled, 0),
+        pooled=np.where(valid, sharpened.pooled, 0),
         hot=np.broadcast_to(_finer(bins.hot, bins.scale), valid.shape).copy(),
     )
 

@@ -78,17 +78,17 @@ class LinearEstimate:
         """Return pictures (n, m h, m w) of photons (n, h, w); borders go on as they end."""
         count, height, width = frames.shape
         wide = np.pad(frames, ((0, 0), (REACH, REACH), (REACH, REACH)), mode="edge")
-        around = np.lib.stride_tricks.sliding_window_view(wide, (SIDE, SIDE), axis=(1, 2))
+        windows = np.lib.stride_tricks.sliding_window_view(wide, (SIDE, SIDE), axis=(1, 2))
         table = self.weights.reshape(len(self.weights), -1).T
         scale = self.scale
-        found = np.empty((count, height, scale, width, scale), np.float32)
+        pictures = np.empty((count, height, scale, width, scale), np.float32)
         step = max(1, AT_ONCE // (height * width))
         for start in range(0, count, step):
             check_wish()
-            some = around[start : start + step].reshape(-1, SIDE * SIDE) @ table
+            some = windows[start : start + step].reshape(-1, SIDE * SIDE) @ table
             block = some.reshape(-1, height, width, scale, scale)
-            found[start : start + step] = block.transpose(0, 1, 3, 2, 4)
-        return found.reshape(count, scale * height, scale * width)
+            pictures[start : start + step] = block.transpose(0, 1, 3, 2, 4)
+        return pictures.reshape(count, scale * height, scale * width)
 
 
 def linear_estimate(
@@ -113,8 +113,8 @@ def linear_estimate(
     spread = np.asarray(kernel, np.float64)
     values = covariance.lags(scale * 2 * REACH + 2 * half)
     # a sample is sum p(u) I(x - u), so it has C(d + u) in common with a sub-pixel d beside it
-    seen = convolve(values, spread[::-1, ::-1], mode="valid")
-    twice = convolve(seen, spread, mode="valid")
+    cross = convolve(values, spread[::-1, ::-1], mode="valid")
+    twice = convolve(cross, spread, mode="valid")
     at = scale * np.arange(-REACH, REACH + 1)
     rows, columns = (axis.ravel() for axis in np.meshgrid(at, at, indexing="ij"))
     inside = np.arange(scale) - grid.phase
@@ -124,9 +124,9 @@ def linear_estimate(
     system[:count, :count] = _at(twice, rows[:, None] - rows, columns[:, None] - columns)
     system[range(count), range(count)] += 1 / max(photons, FEWEST)
     system[count, count] = 0
-    wanted = np.ones((count + 1, scale**2))
-    wanted[:count] = _at(seen, fine_rows - rows[:, None], fine_columns - columns[:, None])
-    weights = np.linalg.solve(system, wanted)[:count].T
+    right_side = np.ones((count + 1, scale**2))
+    right_side[:count] = _at(cross, fine_rows - rows[:, None], fine_columns - columns[:, None])
+    weights = np.linalg.solve(system, right_side)[:count].T
     return LinearEstimate(weights=weights.reshape(-1, SIDE, SIDE).astype(np.float32), scale=scale)
 
 

@@ -61,25 +61,25 @@ def finer_frames(
         Cancelled: If `cancel` said so.
     """
     scale, (count, height, width) = camera.scale, frames.shape
-    found = np.zeros((count, scale * height, scale * width), np.float32)
+    pictures = np.zeros((count, scale * height, scale * width), np.float32)
     white = white_of(frames) if white is None else white
     for number, frame in enumerate(frames):
         check_cancelled(cancel)
         photons = float(frame.sum(dtype=np.float64))
         if photons > EMPTY:
             one = frame[None]
-            found[number] = (
+            pictures[number] = (
                 camera.linear(where_light_is(frame, dark))(one)[0]
                 if size is None
                 else camera.by_network(one, size, white=white, dark=dark, cancel=cancel)[0]
             )
         if progress is not None:
             progress(number + 1, count)
-    np.maximum(found, 0, out=found)
+    np.maximum(pictures, 0, out=pictures)
     if camera.stage.floor > 0:
-        for picture, frame in zip(found, frames, strict=True):
+        for picture, frame in zip(pictures, frames, strict=True):
             np.maximum(picture, least_light(camera, frame, dark), out=picture)
-    return found
+    return pictures
 
 
 def least_light(

@@ -80,36 +80,36 @@ class Decay:
             lifetime_ps: (p,) > 0.
         """
         u, tau = self.axis.edges_ps - mu_ps[:, None], lifetime_ps[:, None]
-        held, by_log = self._held(u, tau)
-        out = self.pulse.cdf(u) - held
+        delayed, by_log = self._delayed(u, tau)
+        out = self.pulse.cdf(u) - delayed
         if self.period_ps is not None:
-            more, more_by_log = self._held(u + self.period_ps, tau)
+            more, more_by_log = self._delayed(u + self.period_ps, tau)
             q = np.exp(-self.period_ps / tau)
             by_log = by_log + (more_by_log + more * q * self.period_ps / tau / (1 - q)) / (1 - q)
-            held = held + more / (1 - q)
+            delayed = delayed + more / (1 - q)
             out = out + self.pulse.cdf(u + self.period_ps) - more / (1 - q)
         return Shapes(
             shares=np.maximum(np.diff(out, axis=1), 0.0),
-            by_time=-np.diff(held, axis=1) / tau,
+            by_time=-np.diff(delayed, axis=1) / tau,
             by_log=-np.diff(by_log, axis=1),
         )
 
-    def _held(self, u: Floats, tau: Floats) -> tuple[Floats, Floats]:
+    def _delayed(self, u: Floats, tau: Floats) -> tuple[Floats, Floats]:
         """Return T, and its derivative by the logarithm of tau."""
         if isinstance(self.pulse, GaussianPulse):
             sigma = self.pulse.sigma_ps
-            held = pending(u, sigma, tau)
+            delayed = pending(u, sigma, tau)
             bell = np.exp(-0.5 * (u / sigma) ** 2) / np.sqrt(2 * np.pi)
-            return held, held * (u / tau - (sigma / tau) ** 2) + bell * sigma / tau
+            return delayed, delayed * (u / tau - (sigma / tau) ** 2) + bell * sigma / tau
         if not isinstance(self.pulse, SampledPulse):
             raise UnsupportedError("lifetimes need a Gaussian or a measured pulse")
-        ahead, behind = (
-            _held_of_samples(self.pulse, u, tau * factor) for factor in (1 + NUDGE, 1 - NUDGE)
+        high, low = (
+            _delayed_of_samples(self.pulse, u, tau * factor) for factor in (1 + NUDGE, 1 - NUDGE)
         )
-        return _held_of_samples(self.pulse, u, tau), (ahead - behind) / (2 * NUDGE)
+        return _delayed_of_samples(self.pulse, u, tau), (high - low) / (2 * NUDGE)
 
 
-def _held_of_samples(pulse: SampledPulse, u: Floats, tau: Floats) -> Floats:
+def _delayed_of_samples(pulse: SampledPulse, u: Floats, tau: Floats) -> Floats:
     """Return T of straight lines between samples, exactly; u (p, n), tau (p, 1)."""
     t, f = pulse.times_ps, pulse.density(pulse.times_ps)
     steps, slopes = np.diff(t), np.diff(f) / np.diff(t)
@@ -119,10 +119,10 @@ def _held_of_samples(pulse: SampledPulse, u: Floats, tau: Floats) -> Floats:
         faded = rest * np.exp(-step / tau[:, 0])
         density[:, i + 1] = f[i + 1] - slope * tau[:, 0] + faded
     at = np.clip(np.searchsorted(t, u, side="right") - 1, 0, len(steps) - 1)
-    own = np.take_along_axis(density, at, axis=1)
-    into = np.clip(u - t[at], 0.0, None)
-    inside = np.minimum(into, steps[at])
-    rest = (own - f[at] + slopes[at] * tau) * np.exp(-inside / tau)
-    found = f[at] + slopes[at] * inside - slopes[at] * tau + rest
-    found = found * np.exp(-(into - inside) / tau)
-    return np.asarray(np.where(u < t[0], 0.0, found * tau))
+    start_density = np.take_along_axis(density, at, axis=1)
+    offset = np.clip(u - t[at], 0.0, None)
+    inside = np.minimum(offset, steps[at])
+    rest = (start_density - f[at] + slopes[at] * tau) * np.exp(-inside / tau)
+    delayed = f[at] + slopes[at] * inside - slopes[at] * tau + rest
+    delayed = delayed * np.exp(-(offset - inside) / tau)
+    return np.asarray(np.where(u < t[0], 0.0, delayed * tau))

@@ -51,7 +51,8 @@ class Lifetimes:
         background: Counts of a bin.
         sigma_ps: Standard deviation that the lifetime should have.
         evidence: Twice the log likelihood over background alone.
-        known: Whether the lifetime lies within the limits, not on them, and above twice its sigma.
+        is_determined: Whether the lifetime lies within the limits, not on them, and above twice its
+            sigma.
     """
 
     lifetime_ps: Floats
@@ -60,7 +61,7 @@ class Lifetimes:
     background: Floats
     sigma_ps: Floats
     evidence: Floats
-    known: NDArray[np.bool_]
+    is_determined: NDArray[np.bool_]
 
 
 class LifetimeFitter:
@@ -115,7 +116,7 @@ class LifetimeFitter:
         evidence = 2 * (height - photons * np.log(even) + even * n.shape[1])
         low, high = np.log(self.limits_ps)
         relative = np.sqrt(np.maximum(inverse[:, 0, 0], 0.0))
-        within = (values[0] > low + ENOUGH) & (values[0] < high - ENOUGH)
+        inside = (values[0] > low + ENOUGH) & (values[0] < high - ENOUGH)
         return Lifetimes(
             lifetime_ps=np.exp(values[0]),
             time_of_flight_ps=values[1],
@@ -123,22 +124,22 @@ class LifetimeFitter:
             background=values[3],
             sigma_ps=np.exp(values[0]) * relative,
             evidence=np.where(photons > 0, np.maximum(evidence, 0.0), 0.0),
-            known=within & (relative < LEAST_KNOWN),
+            is_determined=inside & (relative < LEAST_KNOWN),
         )
 
     def _start(self, counts: FloatArray, n: Floats) -> Floats:
         """Return parameters (4, p) to begin from."""
         starts = self._starts
-        found, most = np.empty((4, len(n))), np.full(len(n), -np.inf)
+        best, most = np.empty((4, len(n))), np.full(len(n), -np.inf)
         for template in starts.best(counts):
             check_wish()
             shares = starts.shares(template)
             a, b = _shared_out(n, shares)
             height = _height(n, a[:, None] * shares + b[:, None])
-            tried = np.stack([np.log(starts.lifetime_ps[template]), starts.mu_ps[template], a, b])
-            found = np.where(height > most, tried, found)
+            values = np.stack([np.log(starts.lifetime_ps[template]), starts.mu_ps[template], a, b])
+            best = np.where(height > most, values, best)
             most = np.maximum(height, most)
-        return found
+        return best
 
     def _model(self, values: Floats) -> tuple[Floats, Floats]:
         """Return mean counts (p, bins) and their derivatives (p, 4, bins) at (4, p) parameters."""
@@ -155,28 +156,28 @@ class LifetimeFitter:
         values = start.copy()
         mean, gradients = self._model(values)
         height = _height(counts, mean)
-        going = np.arange(len(counts))
+        active = np.arange(len(counts))
         for _ in range(STEPS):
             check_wish()
-            step = self._step(counts[going], mean, gradients, values[:, going])
-            left, risen = np.arange(len(going)), np.zeros(len(going))
+            step = self._step(counts[active], mean, gradients, values[:, active])
+            pending, risen = np.arange(len(active)), np.zeros(len(active))
             for cut in range(CUTS):
-                at = going[left]
-                tried = self._kept(values[:, at] + step[:, left] / 3**cut)
-                new_mean, new_gradients = self._model(tried)
+                at = active[pending]
+                new_values = self._limited(values[:, at] + step[:, pending] / 3**cut)
+                new_mean, new_gradients = self._model(new_values)
                 rise = _height(counts[at], new_mean) - height[at]
                 better = rise > 0
-                values[:, at[better]] = tried[:, better]
+                values[:, at[better]] = new_values[:, better]
                 height[at[better]] += rise[better]
-                risen[left[better]] = rise[better]
-                mean[left[better]] = new_mean[better]
-                gradients[left[better]] = new_gradients[better]
-                left = left[~better]
-                if not len(left):
+                risen[pending[better]] = rise[better]
+                mean[pending[better]] = new_mean[better]
+                gradients[pending[better]] = new_gradients[better]
+                pending = pending[~better]
+                if not len(pending):
                     break
-            on = risen > ENOUGH
-            going, mean, gradients = going[on], mean[on], gradients[on]
-            if not len(going):
+            is_rising = risen > ENOUGH
+            active, mean, gradients = active[is_rising], mean[is_rising], gradients[is_rising]
+            if not len(active):
                 break
         return values, height
 
@@ -193,7 +194,7 @@ class LifetimeFitter:
         step[1] = np.clip(step[1], -reach, reach)
         return np.asarray(step)
 
-    def _kept(self, values: Floats) -> Floats:
+    def _limited(self, values: Floats) -> Floats:
         values[0] = np.clip(values[0], *np.log(self.limits_ps))
         edges = self.decay.axis.edges_ps
         values[1] = np.clip(values[1], edges[0] - self.decay.pulse.end_ps, edges[-1])
@@ -206,11 +207,11 @@ def _shared_out(counts: Floats, shares: Floats) -> tuple[Floats, Floats]:
     """Return photons of a decay and counts of a bin that come near the likeliest, (p,) each."""
     photons, bins = counts.sum(axis=1), counts.shape[1]
     a, b = 0.8 * photons, 0.2 * photons / bins
-    seen = np.maximum(shares.sum(axis=1), 1e-6)
+    visible = np.maximum(shares.sum(axis=1), 1e-6)
     for _ in range(SHARED):
         of_decay = a[:, None] * shares
         part = counts / np.maximum(of_decay + b[:, None], FLOOR)
-        a = (part * of_decay).sum(axis=1) / seen
+        a = (part * of_decay).sum(axis=1) / visible
         b = (part * b[:, None]).sum(axis=1) / bins
     return np.maximum(a, LEAST_AMPLITUDE), np.maximum(b, FLOOR)
 
@@ -218,10 +219,10 @@ def _shared_out(counts: Floats, shares: Floats) -> tuple[Floats, Floats]:
 def _fisher(mean: Floats, gradients: Floats) -> Floats:
     """Return the information (p, 4, 4), a little of its diagonal added so that it can be solved."""
     scaled = gradients / np.sqrt(mean)[:, None]
-    found = scaled @ scaled.transpose(0, 2, 1)
-    diagonal = np.einsum("pii->pi", found)
+    information = scaled @ scaled.transpose(0, 2, 1)
+    diagonal = np.einsum("pii->pi", information)
     diagonal += 1e-9 * diagonal + 1e-15
-    return np.asarray(found)
+    return np.asarray(information)
 
 
 def _height(counts: Floats, mean: Floats) -> Floats:

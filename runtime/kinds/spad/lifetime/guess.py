@@ -15,7 +15,7 @@ from camkit.runtime.kinds.spad.time_axis import TimeAxis
 NARROWEST: Final = 0.4
 WIDEST: Final = 0.05
 """Standard deviations that are tried: from so much of a bin to so much of the axis."""
-APART: Final = 1.3
+SIGMA_STEP: Final = 1.3
 LEAST_PHOTONS: Final = 2000
 MOST_PHOTONS: Final = 1e6
 """More tell of a second lifetime before they tell more of the pulse."""
@@ -41,8 +41,8 @@ def guess_width(counts: FloatArray, axis: TimeAxis, period_ps: float | None) -> 
         )
     whole = (whole * min(1.0, MOST_PHOTONS / photons)).astype(np.float32)
     low, high = NARROWEST * axis.step_ps, WIDEST * axis.step_ps * axis.bins
-    count = max(3, int(np.log(max(high / low, APART)) / np.log(APART)) + 1)
-    sigmas = np.geomspace(low, max(high, low * APART), count)
+    count = max(3, int(np.log(max(high / low, SIGMA_STEP)) / np.log(SIGMA_STEP)) + 1)
+    sigmas = np.geomspace(low, max(high, low * SIGMA_STEP), count)
     likely = np.array([_evidence(whole, axis, sigma, period_ps) for sigma in sigmas])
     at = int(np.clip(likely.argmax(), 1, count - 2))
     left, top, right = likely[at - 1 : at + 2]

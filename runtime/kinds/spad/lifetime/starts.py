@@ -13,7 +13,7 @@ from camkit.contracts import FloatArray
 from camkit.runtime.kinds.spad.lifetime.decay import Decay, Floats
 from camkit.runtime.kinds.spad.time_axis import TimeAxis
 
-APART: Final = 1.7
+LIFETIME_STEP: Final = 1.7
 """Factor between two lifetimes."""
 STEP_SIGMAS: Final = 2.0
 """Of the pulse's edge: between two times, a bin at least."""
@@ -41,7 +41,7 @@ class Starts:
         self._first = np.arange(0, axis.bins, group)
         edges = axis.edges_ps[np.append(self._first, axis.bins)]
         coarse = replace(decay, axis=TimeAxis(orientation=axis.orientation, edges_ps=edges))
-        count = max(2, int(np.ceil(np.log(most_ps / least_ps) / np.log(APART))) + 1)
+        count = max(2, int(np.ceil(np.log(most_ps / least_ps) / np.log(LIFETIME_STEP))) + 1)
         lifetimes = np.geomspace(least_ps, most_ps, count)
         span = float(axis.centres_ps[-1] - axis.centres_ps[0])
         step = max(STEP_SIGMAS * decay.pulse.finest_ps, axis.step_ps, span / MOST_TIMES)
@@ -51,10 +51,10 @@ class Starts:
         shares = np.concatenate(
             [coarse.shapes(times, np.full(len(times), tau)).shares for tau in lifetimes]
         )
-        seen = np.maximum(shares.sum(axis=1, keepdims=True), 1e-9)
+        visible = np.maximum(shares.sum(axis=1, keepdims=True), 1e-9)
         even = np.diff(np.append(self._first, axis.bins)) / axis.bins
         self._logs = [
-            np.log((1 - dark) * shares / seen + dark * even).T.astype(np.float32)
+            np.log((1 - dark) * shares / visible + dark * even).T.astype(np.float32)
             for dark in DARK_SHARES
         ]
         self.length = sum(_turned(part) for part in np.split(shares, count))

@@ -11,7 +11,7 @@ from camkit.runtime.kinds.spad.stages.super_resolve import camera_of, size_of_ne
 from camkit.runtime.plan.decision import Work
 from camkit.runtime.plan.planner import asked_work
 
-Told = tuple[str, str, str]
+Choice = tuple[str, str, str]
 """What is decided, what is chosen, why."""
 
 
@@ -42,7 +42,7 @@ def know_photons(job: Job) -> Job:
     return replace(job, white_balance=(1.0,), work=work)
 
 
-def _decisions(job: Job, capture: PhotonCapture) -> Iterator[Told]:
+def _decisions(job: Job, capture: PhotonCapture) -> Iterator[Choice]:
     settings, timing = capture.settings, capture.timing
     of_file = (
         "the capture holds counts" if capture.axis is None else "the capture holds times of photons"
@@ -61,27 +61,27 @@ def _decisions(job: Job, capture: PhotonCapture) -> Iterator[Told]:
     yield "pile-up", "corrected" if cycles else "left as it is", reason
 
 
-def _depth(capture: PhotonCapture, *, is_finer: bool) -> Iterator[Told]:
+def _depth(capture: PhotonCapture, *, is_finer: bool) -> Iterator[Choice]:
     way, is_stated = capture.settings.way, capture.timing.pulse() is not None
     if is_stated:
         yield "pulse", "stated", "a pulse is stated"
     else:
         yield "pulse", "estimated", "none is stated"
-    is_asked = "method" in capture.settings.chosen
+    is_asked = "method" in capture.settings.depth_options
     yield "method", way.method, "asked" if is_asked else "default"
     if is_finer:
-        told = "the estimate of the fine grid takes as many as the light demands"
-        yield "neighbours", "weighed", told
+        reason = "the estimate of the fine grid takes as many as the light demands"
+        yield "neighbours", "weighed", reason
     else:
-        told = "only where one pixel has too few photons" if way.pool == "auto" else "asked"
-        yield "neighbours", way.pool, told
+        reason = "only where one pixel has too few photons" if way.pool == "auto" else "asked"
+        yield "neighbours", way.pool, reason
     if way.returns == 2:
         yield "second return", "sought", "only where the residual of one asks for it"
     else:
         yield "second return", "left out", "not asked"
 
 
-def _finer(job: Job, stage: SuperResolve, capture: PhotonCapture) -> Iterator[Told]:
+def _finer(job: Job, stage: SuperResolve, capture: PhotonCapture) -> Iterator[Choice]:
     """Yield how pictures become finer behind a plate, as the capture's light will decide."""
     camera = camera_of(stage, job)
     size, is_asked = size_of_network(camera, capture), capture.settings.finer is not None

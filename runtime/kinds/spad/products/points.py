@@ -38,8 +38,8 @@ def directions(
     )
     y, x = np.meshgrid(down, across, indexing="ij")
     focal_px = focal_length_mm * UM_PER_MM / pitch_um
-    towards = np.stack([x, y, np.full(shape, focal_px)], axis=-1)
-    return np.asarray(towards / np.linalg.norm(towards, axis=-1, keepdims=True))
+    vectors = np.stack([x, y, np.full(shape, focal_px)], axis=-1)
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
 
 
 def write_points(
@@ -64,17 +64,17 @@ def write_points(
         phase: Likewise.
     """
     shape = (depth_m.shape[1], depth_m.shape[2])
-    towards = directions(shape, pitch_um, focal_length_mm, scale=scale, phase=phase)
-    kept = np.isfinite(depth_m)
-    which, y, x = np.nonzero(kept)
-    places = towards[y, x] * depth_m[kept][:, None]
+    vectors = directions(shape, pitch_um, focal_length_mm, scale=scale, phase=phase)
+    valid = np.isfinite(depth_m)
+    which, y, x = np.nonzero(valid)
+    places = vectors[y, x] * depth_m[valid][:, None]
     rows = np.empty(
         len(places),
         dtype=[("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("intensity", "<f4"), ("return", "u1")],
     )
     for column, name in enumerate("xyz"):
         rows[name] = places[:, column]
-    rows["intensity"] = intensity[kept]
+    rows["intensity"] = intensity[valid]
     rows["return"] = which + 1
     header = (
         "ply\nformat binary_little_endian 1.0\ncomment camkit, metres, +z along the light\n"

@@ -13,7 +13,7 @@ Codes = NDArray[np.uint8]
 UNKNOWN: Final = 48
 """Grey of a pixel that is not valid."""
 LEAST_SIDE_PX: Final = 256
-SHOWN: Final = (2.0, 98.0)
+PERCENTILES: Final = (2.0, 98.0)
 """Percentiles of depth between which colours run."""
 BRIGHTEST: Final = 99.5
 """Percentile of photons that is white."""
@@ -26,15 +26,15 @@ MOST_CLIPPED: Final = 30.0
 
 def depth_picture(depth_m: NDArray[np.float64]) -> Codes:
     """Return depth (h, w) as colours (h, w, 3) BGR: near is red, far blue, not known grey."""
-    known = np.isfinite(depth_m)
-    if not known.any():
+    valid = np.isfinite(depth_m)
+    if not valid.any():
         return np.full((*depth_m.shape, 3), UNKNOWN, np.uint8)
-    near, far = np.percentile(depth_m[known], SHOWN)
-    place = (far - np.where(known, depth_m, far)) / max(far - near, 1e-9)
+    near, far = np.percentile(depth_m[valid], PERCENTILES)
+    place = (far - np.where(valid, depth_m, far)) / max(far - near, 1e-9)
     codes = np.round(np.clip(place, 0, 1) * 255).astype(np.uint8)
-    found = cv2.applyColorMap(codes, cv2.COLORMAP_TURBO)
-    found[~known] = UNKNOWN
-    return np.asarray(found, dtype=np.uint8)
+    colours = cv2.applyColorMap(codes, cv2.COLORMAP_TURBO)
+    colours[~valid] = UNKNOWN
+    return np.asarray(colours, dtype=np.uint8)
 
 
 def grey_picture(photons: NDArray[np.floating], white: float) -> Codes:
@@ -68,10 +68,12 @@ def enlarged(codes: Codes, *, even: bool = False) -> Codes:
     """
     times = max(1, -(-LEAST_SIDE_PX // max(codes.shape[:2])))
     times += times % 2 if even and times > 1 else 0
-    found = codes.repeat(times, axis=0).repeat(times, axis=1)
+    picture = codes.repeat(times, axis=0).repeat(times, axis=1)
     if even:
-        found = np.pad(found, ((0, found.shape[0] % 2), (0, found.shape[1] % 2), (0, 0)), "edge")
-    return np.asarray(found, dtype=np.uint8)
+        picture = np.pad(
+            picture, ((0, picture.shape[0] % 2), (0, picture.shape[1] % 2), (0, 0)), "edge"
+        )
+    return np.asarray(picture, dtype=np.uint8)
 
 
 def write_preview(path: Path, codes: Codes) -> None:
@@ -80,7 +82,7 @@ def write_preview(path: Path, codes: Codes) -> None:
     Raises:
         ContractError: If it cannot be encoded.
     """
-    done, data = cv2.imencode(".png", enlarged(codes))
-    if not done:
+    is_encoded, data = cv2.imencode(".png", enlarged(codes))
+    if not is_encoded:
         raise ContractError(f"cannot write a PNG of {codes.shape[1]}x{codes.shape[0]}")
     path.write_bytes(data.tobytes())

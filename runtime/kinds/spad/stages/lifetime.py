@@ -56,7 +56,7 @@ class Decays:
         self.pulse: Pulse | None = None
         self.fitter: LifetimeFitter | None = None
         self.arrays: dict[str, NDArray[Any]] = {
-            field.name: np.zeros(shape, bool if field.name == "known" else float)
+            field.name: np.zeros(shape, bool if field.name == "is_determined" else float)
             for field in fields(Lifetimes)
         } | {"intensity": np.zeros(shape)}
 
@@ -64,8 +64,8 @@ class Decays:
 def prepare(entry: Lifetime, job: Job) -> StageWork:
     """Make ready; nothing is fitted before the first row is asked for."""
 
-    def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
-        (photons,) = taken
+    def run(inputs: Sequence[Stream]) -> tuple[Stream, ...]:
+        (photons,) = inputs
         decays = Decays(_window(photons_of(job)), photons)
         bands = _fitted(entry, job, photons, decays)
         plane = photons.plane.model_copy(update={"axes": "y x", "domain": "lifetime"})
@@ -81,16 +81,16 @@ def _window(capture: PhotonCapture) -> Window:
     Raises:
         ContractError: If too few are left.
     """
-    axis, told = capture.an_axis, capture.timing.lifetime
-    low = -np.inf if told.from_ps is None else told.from_ps
-    high = np.inf if told.to_ps is None else told.to_ps
-    kept = np.flatnonzero((axis.centres_ps >= low) & (axis.centres_ps <= high))
-    if len(kept) < LEAST_BINS:
+    axis, limits = capture.an_axis, capture.timing.lifetime
+    low = -np.inf if limits.from_ps is None else limits.from_ps
+    high = np.inf if limits.to_ps is None else limits.to_ps
+    inside = np.flatnonzero((axis.centres_ps >= low) & (axis.centres_ps <= high))
+    if len(inside) < LEAST_BINS:
         raise ContractError(
-            f"[lifetime] from_ps and to_ps leave {len(kept)} time bins; expected at least "
+            f"[lifetime] from_ps and to_ps leave {len(inside)} time bins; expected at least "
             f"{LEAST_BINS}"
         )
-    bins = slice(int(kept[0]), int(kept[-1]) + 1)
+    bins = slice(int(inside[0]), int(inside[-1]) + 1)
     edges = axis.edges_ps[bins.start : bins.stop + 1]
     return Window(bins=bins, axis=TimeAxis(orientation=axis.orientation, edges_ps=edges))
 
@@ -99,7 +99,7 @@ def _fitted(entry: Lifetime, job: Job, photons: Stream, decays: Decays) -> Itera
     """Fit the pixels of strip after strip."""
     capture, window, arrays = photons_of(job), decays.window, decays.arrays
     period_ps = capture.timing.lifetime.period_ps
-    guess = partial(_guessed, window=window, period_ps=period_ps)
+    guess = partial(_guess, window=window, period_ps=period_ps)
     decays.pulse = pulse_of(job, entry.takes[0], guess)
     decay = Decay(axis=window.axis, pulse=decays.pulse, period_ps=period_ps)
     decays.fitter = fitter = LifetimeFitter(decay)
@@ -124,5 +124,5 @@ def _fitted(entry: Lifetime, job: Job, photons: Stream, decays: Decays) -> Itera
         yield arrays["lifetime_ps"][None, inside].copy()
 
 
-def _guessed(sample: NDArray[Any], *, window: Window, period_ps: float | None) -> Pulse:
+def _guess(sample: NDArray[Any], *, window: Window, period_ps: float | None) -> Pulse:
     return guess_width(np.ascontiguousarray(sample[:, window.bins]), window.axis, period_ps)

@@ -56,11 +56,13 @@ class Depths:
 def prepare(entry: Sharpen, job: Job) -> StageWork:
     """Make ready; the bank is made when the first row is asked for."""
 
-    def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
-        (photons,) = taken
+    def run(inputs: Sequence[Stream]) -> tuple[Stream, ...]:
+        (photons,) = inputs
         depths = Depths(pixels=Pixels.of(photons))
-        own = isinstance(photons.beside, TimedBins)
-        bands = _fine(entry, job, photons, depths) if own else _strips(entry, job, photons, depths)
+        is_finer = isinstance(photons.beside, TimedBins)
+        bands = (
+            _fine(entry, job, photons, depths) if is_finer else _strips(entry, job, photons, depths)
+        )
         plane = photons.plane.model_copy(update={"axes": "y x", "domain": "depth"})
         shape = photons_of(job).settings.way.returns, *photons.shape[1:]
         return (replace(photons.with_bands(bands), plane=plane, shape=shape, beside=depths),)
@@ -68,9 +70,9 @@ def prepare(entry: Sharpen, job: Job) -> StageWork:
     return StageWork(run=run)
 
 
-def _depth_of(found: Sharpened, offset_ps: float) -> Rows:
+def _depth_of(sharpened: Sharpened, offset_ps: float) -> Rows:
     """Return the depth in metres of every pixel, believed or not, (returns, rows, w)."""
-    return (found.time_of_flight_ps - offset_ps) * LIGHT_M_PER_PS / 2
+    return (sharpened.time_of_flight_ps - offset_ps) * LIGHT_M_PER_PS / 2
 
 
 def _strips(entry: Sharpen, job: Job, photons: Stream, depths: Depths) -> Iterator[Rows]:
@@ -93,28 +95,28 @@ def _strips(entry: Sharpen, job: Job, photons: Stream, depths: Depths) -> Iterat
         check_wish()
         counts = by_pixel(rows.read(piece.first, piece.end))
         near = slice(piece.first, piece.end)
-        found = sharpener.strip(
+        sharpened = sharpener.strip(
             counts,
             hot=pixels.hot[near],
             blind=pixels.blind[near],
             core=piece.core,
             growth=growth_of(sharpener, capture, counts, pixels.worst[near]),
         )
-        depths.strips.append(found)
-        yield _depth_of(found, capture.timing.correction.offset_ps)
+        depths.strips.append(sharpened)
+        yield _depth_of(sharpened, capture.timing.correction.offset_ps)
 
 
 def _fine(entry: Sharpen, job: Job, photons: Stream, depths: Depths) -> Iterator[Rows]:
     """Fit bins that were made finer."""
-    capture, beside = photons_of(job), photons.beside
-    assert isinstance(beside, TimedBins)
+    capture, timed_bins = photons_of(job), photons.beside
+    assert isinstance(timed_bins, TimedBins)
     rows = photons.rows().read(0, photons.shape[1])
-    depths.bins = bins = beside.made
+    depths.bins = bins = timed_bins.fine_bins
     assert bins is not None  # its rows were read
     depths.pixels = bins.pixels
     depths.pulse = pulse_of(job, entry.takes[0])
     sharpener = fine_sharpener(capture.an_axis, depths.pulse, capture.settings.way)
     depths.templates = len(sharpener.fitter.bank.mu_ps)
-    found = fitted_bins(rows if photons.gives_own_rows else rows.copy(), bins, sharpener)
-    depths.strips.append(found)
-    yield _depth_of(found, capture.timing.correction.offset_ps)
+    sharpened = fitted_bins(rows if photons.gives_own_rows else rows.copy(), bins, sharpener)
+    depths.strips.append(sharpened)
+    yield _depth_of(sharpened, capture.timing.correction.offset_ps)

@@ -35,8 +35,8 @@ def prepare(entry: SuperResolve, job: Job) -> StageWork:
     """Make ready; an array behind a plate is small, and made finer whole."""
     capture, camera = photons_of(job), camera_of(entry, job)
 
-    def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
-        (photons,) = taken
+    def run(inputs: Sequence[Stream]) -> tuple[Stream, ...]:
+        (photons,) = inputs
         count, height, width = photons.shape
         has_times = capture.product == "depth"
         shape = 1 if is_summed(capture) else count, camera.scale * height, camera.scale * width
@@ -45,8 +45,8 @@ def prepare(entry: SuperResolve, job: Job) -> StageWork:
         if has_times:
             bins = TimedBins(entry, job, photons)
             return (replace(fine, source=RowsMadeWhole(shape, bins.rows), beside=bins),)
-        made = RowsMadeWhole(shape, lambda: _frames(entry, job, photons))
-        return (replace(fine, source=made),)
+        source = RowsMadeWhole(shape, lambda: _frames(entry, job, photons))
+        return (replace(fine, source=source),)
 
     return StageWork(run=run)
 
@@ -60,13 +60,13 @@ def size_of_network(camera: FineCamera, capture: PhotonCapture) -> str | None:
     """Return the network that makes a capture finer; None for the linear estimate."""
     if capture.settings.finer == "linear" or not camera.sizes:
         return None
-    asked = capture.settings.size
-    return camera.size_of_bins(asked) if capture.product == "depth" else camera.size(asked)
+    size = capture.settings.size
+    return camera.size_of_bins(size) if capture.product == "depth" else camera.size(size)
 
 
-def given_rows(_entry: SuperResolve, job: Job, taken: Sequence[Stream]) -> RowSource:
+def given_rows(_entry: SuperResolve, job: Job, inputs: Sequence[Stream]) -> RowSource:
     """Return light and noise of the photons of all times, as a network is given them."""
-    (photons,) = taken
+    (photons,) = inputs
     frames, dark = _frames_and_dark(photons, photons_of(job))
     light = frames.sum(axis=0)
     return ArrayRows(network_planes(light, white_of(light), dark))
@@ -76,11 +76,11 @@ class TimedBins:
     """Bins that are made finer when their first row is asked for (`Stream.beside`).
 
     Attributes:
-        made: How; None before.
+        fine_bins: How; None before.
     """
 
     def __init__(self, entry: SuperResolve, job: Job, photons: Stream) -> None:
-        self.made: FineBins | None = None
+        self.fine_bins: FineBins | None = None
         self._entry, self._job, self._photons = entry, job, photons
 
     def rows(self) -> FloatArray:
@@ -93,7 +93,7 @@ class TimedBins:
         rows = photons.rows()
         counts, pixels = by_pixel(rows.read(0, height)), Pixels.of(photons)
         camera = camera_of(self._entry, self._job)
-        self.made = made = finer_bins(
+        self.fine_bins = fine_bins = finer_bins(
             camera,
             coarse,
             counts,
@@ -102,7 +102,7 @@ class TimedBins:
             always=capture.settings.finer == "net",
             growth=growth_of(coarse, capture, counts, pixels.worst),
         )
-        return made.fine
+        return fine_bins.fine
 
 
 def _frames(entry: SuperResolve, job: Job, photons: Stream) -> FloatArray:
@@ -116,7 +116,7 @@ def _frames(entry: SuperResolve, job: Job, photons: Stream) -> FloatArray:
         frames,
         dark,
         size_of_network(camera, capture),
-        progress=lambda done, total: job.log.meter.reach(entry.gives[0], done / total),
+        progress=lambda finished, total: job.log.meter.reach(entry.gives[0], finished / total),
         cancel=job.cancel,
     )
 

@@ -1,10 +1,10 @@
 """The digital twin of a bundle's array: sharp scenes to counts, histograms and their files.
 
-scene      pictures, depth and albedo, light in flight: the light of every sub-pixel and time bin
-array      what of it every pixel sees, through the plate, at its own sub-pixel
-counting   photons of it: Poisson, dark counts, hot pixels, blind times
-working    the working points of the prototype
-simulate   all of it as a bundle asks for it
-laws       laws of its pictures: even scenes stay even, no black where light was counted
-write      files that `camkit process` reads
+scene        pictures, depth and albedo, light in flight: the light of sub-pixels and time bins
+array        what of it every pixel sees, through the plate, at its own sub-pixel
+counting     photons of it: Poisson, dark counts, hot pixels, blind times
+working      the working points of the prototype
+photon_twin  all of it as a bundle asks for it
+laws         laws of its pictures: even scenes stay even, no black where light was counted
+write        files that `camkit process` reads
 """

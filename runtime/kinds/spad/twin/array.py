@@ -35,12 +35,12 @@ def see_through(fine: FloatArray, kernel: FloatArray, grid: Grid) -> FloatArray:
         )
     half = kernel.shape[0] // 2
     wide = np.pad(fine, ((0, 0), (half, half), (half, half)), mode="edge")
-    found = np.zeros((len(fine), height // scale, width // scale), np.float32)
+    pixels = np.zeros((len(fine), height // scale, width // scale), np.float32)
     for (dy, dx), share in np.ndenumerate(kernel):
         if share == 0:
             continue
         # light of a point moves by (dy, dx) - half, so a pixel sees what lies that far before it
         rows = slice(2 * half - dy + grid.phase, 2 * half - dy + height, scale)
         columns = slice(2 * half - dx + grid.phase, 2 * half - dx + width, scale)
-        found += np.float32(share) * wide[:, rows, columns]
-    return found
+        pixels += np.float32(share) * wide[:, rows, columns]
+    return pixels

@@ -53,11 +53,11 @@ class Disturbances:
 
     def added(self, mean: NDArray[np.float64]) -> NDArray[np.float64]:
         """Add what comes without light to mean counts (n, h, w)."""
-        found = mean + self.dark
+        counts = mean + self.dark
         if self.hot is not None:
             extra = HOT_TIMES * self.dark if self.hot_counts is None else self.hot_counts
-            found[:, self.hot] += extra
-        return found
+            counts[:, self.hot] += extra
+        return counts
 
 
 def count_frames(
@@ -94,12 +94,12 @@ def count_times(
     answered = -np.expm1(-expected / cycles)
     if orientation == "gate":
         return np.asarray(rng.binomial(cycles, answered), dtype=np.uint32)
-    found = np.empty(expected.shape, np.uint32)
-    left = np.full(expected.shape[1:], cycles)
+    counts = np.empty(expected.shape, np.uint32)
+    free_cycles = np.full(expected.shape[1:], cycles)
     for place, share in enumerate(answered):
-        found[place] = rng.binomial(left, share)
-        left -= found[place]
-    return found
+        counts[place] = rng.binomial(free_cycles, share)
+        free_cycles -= counts[place]
+    return counts
 
 
 def _check_most(expected: NDArray[np.float64]) -> None:

@@ -16,7 +16,7 @@ from camkit.contracts import FloatArray
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from camkit.runtime.kinds.spad.finer.pictures import SURE, finer_frames
 from camkit.runtime.kinds.spad.twin.counting import Disturbances, count_frames
-from camkit.runtime.kinds.spad.twin.simulate import fitted, luminance, seen_by
+from camkit.runtime.kinds.spad.twin.photon_twin import fitted, luminance, seen_by
 from camkit.runtime.proof.laws.law import SHARE, Law
 from camkit.scenes.named import named_scene
 
@@ -67,20 +67,20 @@ def _fine_shape(camera: FineCamera) -> tuple[int, int]:
 
 def _even(camera: FineCamera, size: str | None) -> tuple[Law, Law]:
     """Photograph even scenes: the mean, and the spread of sub-pixels over that of their photons."""
-    off, uneven = 0.0, 0.0
+    worst_shift, uneven = 0.0, 0.0
     where = ["", ""]
     for photons in PHOTONS:
         counts = _counts(camera, np.full(_fine_shape(camera), 0.5, np.float32), photons, FRAMES)
-        made = finer_frames(camera, counts, 0.0, size)
+        pictures = finer_frames(camera, counts, 0.0, size)
         mean = float(counts.mean())
-        shift = abs(float(made.mean()) - mean) / mean
-        spread = float(made.std(axis=0).mean() / np.sqrt(mean))
-        if shift > off:
-            off, where[0] = shift, f"{photons:g} photons of white"
+        shift = abs(float(pictures.mean()) - mean) / mean
+        spread = float(pictures.std(axis=0).mean() / np.sqrt(mean))
+        if shift > worst_shift:
+            worst_shift, where[0] = shift, f"{photons:g} photons of white"
         if spread > uneven:
             uneven, where[1] = spread, f"{photons:g} photons of white"
     return (
-        Law(name="even_mean", worst=off, limit=EVEN, unit=SHARE, where=where[0]),
+        Law(name="even_mean", worst=worst_shift, limit=EVEN, unit=SHARE, where=where[0]),
         Law(name="even_spread", worst=uneven, limit=UNEVEN, unit="times", where=where[1]),
     )
 
@@ -92,10 +92,10 @@ def _black(camera: FineCamera, size: str | None) -> Law:
         light = fitted(luminance(named_scene(name, *_fine_shape(camera))), camera)
         for photons in PHOTONS:
             counts = _counts(camera, light, photons)
-            made = finer_frames(camera, counts, 0.0, size)[0]
+            picture = finer_frames(camera, counts, 0.0, size)[0]
             sure = counts[0] > SURE * np.sqrt(counts[0] + 1)
             lit = np.kron(_all_around(sure), np.ones((camera.scale,) * 2)).astype(bool)
-            share = float(np.mean(made[lit] <= 0)) if lit.any() else 0.0
+            share = float(np.mean(picture[lit] <= 0)) if lit.any() else 0.0
             if share > worst:
                 worst, where = share, f"{name}, {photons:g} photons of white"
     return Law(name="black", worst=worst, limit=BLACK, unit=SHARE, where=where)
@@ -117,8 +117,8 @@ def _double(camera: FineCamera, size: str | None) -> Law:
         _blocks(finer_frames(camera, mean * np.float32(photons), 0.0, size)[0])
         for photons in (2e4, 4e4)
     )
-    off = np.abs(twice - 2 * once) / (2 * once)
-    return Law(name="double", worst=float(np.quantile(off, 0.95)), limit=DOUBLE, unit=SHARE)
+    error = np.abs(twice - 2 * once) / (2 * once)
+    return Law(name="double", worst=float(np.quantile(error, 0.95)), limit=DOUBLE, unit=SHARE)
 
 
 def _blocks(picture: FloatArray) -> FloatArray:

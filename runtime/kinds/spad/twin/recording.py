@@ -40,9 +40,9 @@ class Recorded:
     Attributes:
         name: What its array is called in files.
         values: The array.
-        stated: What a file should say of it, by name.
+        attributes: What a file should say of it, by name.
     """
 
     name: str
     values: NDArray[Any]
-    stated: Mapping[str, Any]
+    attributes: Mapping[str, Any]

@@ -45,13 +45,13 @@ def light_of_depth(
     times_ps = (np.asarray(depth_m, np.float64) * 2 / LIGHT_M_PER_PS).ravel()
     bright = np.where(np.isnan(times_ps), 0.0, albedo.ravel())
     times_ps = np.nan_to_num(times_ps)
-    found = np.empty((axis.bins, len(times_ps)), np.float32)
+    light = np.empty((axis.bins, len(times_ps)), np.float32)
     every = np.arange(axis.bins)
     for start in range(0, len(times_ps), AT_ONCE):
         some = times_ps[start : start + AT_ONCE]
         shares = axis.shares(pulse, some, np.broadcast_to(every, (len(some), axis.bins)))
-        found[:, start : start + AT_ONCE] = (shares * bright[start : start + AT_ONCE, None]).T
-    return found.reshape(axis.bins, *depth_m.shape)
+        light[:, start : start + AT_ONCE] = (shares * bright[start : start + AT_ONCE, None]).T
+    return light.reshape(axis.bins, *depth_m.shape)
 
 
 def light_in_flight(frames: NDArray[np.floating], bins: int) -> FloatArray:

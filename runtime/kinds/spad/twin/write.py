@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from camkit.bundle.reader import Bundle
 from camkit.errors import ContractError, UnsupportedError
+from camkit.runtime.kinds.spad.files.bundle_name import NAME
 from camkit.runtime.kinds.spad.files.counts_file import EXTRA
-from camkit.runtime.kinds.spad.files.named import NAME
 from camkit.runtime.kinds.spad.timing import TABLE_OF, timing_beside
 from camkit.runtime.kinds.spad.twin.recording import Recorded
 from camkit.runtime.output.part_file import atomic_output
@@ -37,12 +37,12 @@ def write_recorded(path: Path, recorded: Recorded, _bundle: Bundle | None = None
     suffix = path.suffix.lower()
     with atomic_output(path) as part:
         _WRITERS[suffix](part, recorded)
-    *_, beside = files_of(path)
-    if beside == path:
+    *_, timing_path = files_of(path)
+    if timing_path == path:
         return
     axes = {".mat": "yxt"}.get(suffix) if recorded.values.ndim == 3 else None
-    with atomic_output(beside) as part:
-        text = timing_text(recorded.stated, axes=axes, bundle=recorded.stated.get(NAME))
+    with atomic_output(timing_path) as part:
+        text = timing_text(recorded.attributes, axes=axes, bundle=recorded.attributes.get(NAME))
         part.write_text(text, encoding="utf-8")
 
 
@@ -54,22 +54,22 @@ def files_of(path: Path) -> tuple[Path, ...]:
 
 
 def timing_text(
-    stated: Mapping[str, Any], *, axes: str | None = None, bundle: str | None = None
+    values: Mapping[str, Any], *, axes: str | None = None, bundle: str | None = None
 ) -> str:
     """Return a timing file of what is stated."""
     tables: dict[str, list[str]] = {}
     for name, value in (("axes", axes), ("bundle", bundle)):
         if value is not None:
             tables.setdefault("array", []).append(f'{name} = "{value}"')
-    for name, value in stated.items():
+    for name, value in values.items():
         if name in TABLE_OF:
-            told = f'"{value}"' if isinstance(value, str) else repr(value)
-            tables.setdefault(TABLE_OF[name], []).append(f"{name} = {told}")
+            literal = f'"{value}"' if isinstance(value, str) else repr(value)
+            tables.setdefault(TABLE_OF[name], []).append(f"{name} = {literal}")
     return "\n\n".join("\n".join([f"[{n}]", *lines]) for n, lines in tables.items()) + "\n"
 
 
 def _write_npz(path: Path, recorded: Recorded) -> None:
-    arrays: dict[str, Any] = {recorded.name: _small(recorded.values), **recorded.stated}
+    arrays: dict[str, Any] = {recorded.name: _small(recorded.values), **recorded.attributes}
     with path.open("wb") as file:
         np.savez_compressed(file, **arrays)
 
@@ -81,8 +81,8 @@ def _write_hdf5(path: Path, recorded: Recorded) -> None:
         raise UnsupportedError(f"writing HDF5 needs h5py: {EXTRA}") from error
     with h5py.File(path, "w") as file:
         values = _small(recorded.values)
-        made = file.create_dataset(recorded.name, data=values, compression="gzip")
-        made.attrs.update(dict(recorded.stated))
+        data_set = file.create_dataset(recorded.name, data=values, compression="gzip")
+        data_set.attrs.update(dict(recorded.attributes))
 
 
 def _write_tiff(path: Path, recorded: Recorded) -> None:
@@ -91,8 +91,8 @@ def _write_tiff(path: Path, recorded: Recorded) -> None:
 
 def _write_mat(path: Path, recorded: Recorded) -> None:
     values = _small(recorded.values)
-    shown = values.transpose(1, 2, 0) if values.ndim == 3 else values
-    scipy.io.savemat(path, {recorded.name: shown}, do_compression=True, appendmat=False)
+    array = values.transpose(1, 2, 0) if values.ndim == 3 else values
+    scipy.io.savemat(path, {recorded.name: array}, do_compression=True, appendmat=False)
 
 
 def _write_ptu(path: Path, recorded: Recorded) -> None:
@@ -100,7 +100,7 @@ def _write_ptu(path: Path, recorded: Recorded) -> None:
         import ptufile
     except ImportError as error:
         raise UnsupportedError(f"writing PTU needs ptufile: {EXTRA}") from error
-    bin_ps = recorded.stated.get("time_bin_ps")
+    bin_ps = recorded.attributes.get("time_bin_ps")
     if recorded.values.ndim != 3 or bin_ps is None:
         raise ContractError("a PTU holds times of photons; write counts as NPZ, HDF5, TIFF or MAT")
     stamps = int(recorded.values.sum(dtype=np.int64))

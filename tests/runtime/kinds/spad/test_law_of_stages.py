@@ -17,8 +17,8 @@ from camkit.bundle.writer import write_bundle
 from camkit.errors import BundleError, ContractError
 from camkit.runtime.capture_result import Result
 from camkit.runtime.kinds.spad.golden_captures import GOLDEN
+from camkit.runtime.kinds.spad.twin.photon_twin import record
 from camkit.runtime.kinds.spad.twin.recording import PhotonOptions
-from camkit.runtime.kinds.spad.twin.simulate import record
 from camkit.runtime.kinds.spad.twin.write import write_recorded
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline

@@ -15,7 +15,7 @@ from camkit.report.kinds.spad.scenes import coded_luminance
 from camkit.report.quality import list_set, read_picture
 from camkit.report.stress.scene import SCENE_SEED
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
-from camkit.runtime.kinds.spad.twin.simulate import fitted
+from camkit.runtime.kinds.spad.twin.photon_twin import fitted
 from camkit.scenes import procedural_scene
 
 

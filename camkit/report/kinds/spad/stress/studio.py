@@ -30,8 +30,8 @@ from camkit.runtime.kinds.spad.twin.counting import (
     count_times,
     scaled_to,
 )
+from camkit.runtime.kinds.spad.twin.photon_twin import times_of
 from camkit.runtime.kinds.spad.twin.scene import light_of_depth
-from camkit.runtime.kinds.spad.twin.simulate import times_of
 
 DARKEST: Final = 0.2
 """Albedo of black: what sends nothing back has no depth."""

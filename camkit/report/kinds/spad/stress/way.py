@@ -71,7 +71,7 @@ class Ways:
         def finer(camera: FineCamera, size: str | None) -> Sharpened:
             fine = FineSharpener(camera, shot.axis, shot.pulse, way, size=size, always=True)
             cube = fine.cube(shot.counts, no_dark, hot=nothing, blind=shot.blind, growth=grown)
-            return cube.found
+            return cube.sharpened
 
         alone = coarse.strip(shot.counts, blind=shot.blind, growth=grown)
         found = {BICUBIC: self._upsampled(alone), LINEAR: finer(self.camera, None)}

@@ -15,8 +15,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from camkit.errors import CamkitError, ContractError, DecodeError
+from camkit.runtime.kinds.spad.files.bundle_name import named_bundle
 from camkit.runtime.kinds.spad.files.counts_file import Hints
-from camkit.runtime.kinds.spad.files.named import named_bundle
 from camkit.runtime.kinds.spad.files.open_counts import open_counts
 from tests.spad_files import AXES, STAMPS, WRITERS, small_cube
 

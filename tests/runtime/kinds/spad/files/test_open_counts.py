@@ -148,8 +148,8 @@ def test_what_a_file_states_of_its_times_is_taken(tmp_path: Path) -> None:
         remark="nothing",
     )
     with open_counts(tmp_path / "a.npz", Hints()) as file:
-        edges = file.stated["bin_edges_ps"]
-        rest = {name: value for name, value in file.stated.items() if name != "bin_edges_ps"}
+        edges = file.stated_times["bin_edges_ps"]
+        rest = {name: value for name, value in file.stated_times.items() if name != "bin_edges_ps"}
     assert rest == {"time_bin_ps": 20.0, "orientation": "gate", "cycles": 78000}
     np.testing.assert_array_equal(edges, np.arange(41.0))
     write_h5(tmp_path / "a.h5", small_cube())
@@ -157,15 +157,19 @@ def test_what_a_file_states_of_its_times_is_taken(tmp_path: Path) -> None:
         made.attrs["orientation"] = "histogram"
         made["first_ps"] = 12.5
     with open_counts(tmp_path / "a.h5", Hints()) as file:
-        assert file.stated == {"time_bin_ps": 20.0, "orientation": "histogram", "first_ps": 12.5}
+        assert file.stated_times == {
+            "time_bin_ps": 20.0,
+            "orientation": "histogram",
+            "first_ps": 12.5,
+        }
     scipy.io.savemat(tmp_path / "a.mat", {"histogram": small_cube(), "time_bin_ps": 4.0})
     with open_counts(tmp_path / "a.mat", Hints()) as file:
-        assert file.stated == {"time_bin_ps": 4.0}
+        assert file.stated_times == {"time_bin_ps": 4.0}
     for name in ("scan.ptu", "scan.sdt"):
         WRITERS[name](tmp_path / name, small_cube())
         with open_counts(tmp_path / name, Hints()) as file:
-            assert file.stated["time_bin_ps"] == pytest.approx(20.0, rel=1e-6)
-            assert "orientation" not in file.stated
+            assert file.stated_times["time_bin_ps"] == pytest.approx(20.0, rel=1e-6)
+            assert "orientation" not in file.stated_times
             assert file.assumed == {"orientation": "histogram"}
 
 
@@ -176,7 +180,7 @@ def test_null_data_sets_beside_a_cube_are_left_out(tmp_path: Path) -> None:
         made["first_ps"] = h5py.Empty("f8")
         made.attrs["cycles"] = h5py.Empty("f8")
     with open_counts(tmp_path / "a.h5", Hints()) as file:
-        assert file.stated == {"time_bin_ps": 20.0}
+        assert file.stated_times == {"time_bin_ps": 20.0}
         np.testing.assert_array_equal(file.rows(0, HEIGHT), small_cube().transpose(1, 2, 0))
 
 
@@ -321,7 +325,7 @@ def test_the_step_of_a_stream_stands_beside_it(tmp_path: Path) -> None:
     ):
         (tmp_path / "a.set").write_bytes(text)
         with open_counts(tmp_path / "a.spc", Hints()) as file:
-            assert file.stated.get("stamp_ps") == (stated and pytest.approx(stated))
+            assert file.stated_times.get("stamp_ps") == (stated and pytest.approx(stated))
             assert file.rows(0, 1, np.array([2855.5, 2856.5])).tolist() == [[[1.0]]]
 
 

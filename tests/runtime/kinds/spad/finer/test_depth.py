@@ -10,8 +10,8 @@ from camkit.runtime.kinds.spad.golden_captures import stage_set
 from camkit.runtime.kinds.spad.sharpen import Sharpener, Way
 from camkit.runtime.kinds.spad.timing import LIGHT_M_PER_PS
 from camkit.runtime.kinds.spad.twin.counting import Disturbances, count_times, scaled_to
+from camkit.runtime.kinds.spad.twin.photon_twin import seen_by, times_of
 from camkit.runtime.kinds.spad.twin.scene import light_of_depth
-from camkit.runtime.kinds.spad.twin.simulate import seen_by, times_of
 from tests.spad_bundle import HEIGHT, SCALE, WIDTH
 
 NOTHING = np.zeros((HEIGHT, WIDTH), dtype=bool)
@@ -46,7 +46,7 @@ def test_bins_made_finer_beat_maps_that_are_enlarged(
     own, enlarged = [], []
     for seed in range(3):
         depth, counts = _scan(camera, photons, sbr, seed)
-        found = fine.cube(counts, DARK, hot=NOTHING, blind=NOTHING).found
+        found = fine.cube(counts, DARK, hot=NOTHING, blind=NOTHING).sharpened
         own.append(np.abs(_metres(found.time_of_flight_ps[0]) - depth))
         small = _metres(coarse.strip(counts).time_of_flight_ps[0]).astype(np.float32)
         # a sample lies at sub-pixel 2 of its 4
@@ -64,7 +64,7 @@ def test_sigma_holds_two_thirds_of_the_errors(camera: FineCamera, photons: float
     ratios = []
     for seed in range(4):
         depth, counts = _scan(camera, photons, 3.0, seed)
-        found = fine.cube(counts, DARK, hot=NOTHING, blind=NOTHING).found
+        found = fine.cube(counts, DARK, hot=NOTHING, blind=NOTHING).sharpened
         error = np.abs(found.time_of_flight_ps[0] - 2 * depth / LIGHT_M_PER_PS)
         ratios.append((error / found.sigma_ps[0])[found.valid[0]])
     assert 0.88 < np.quantile(np.concatenate(ratios), 0.6827) < 1.12
@@ -80,7 +80,7 @@ def test_background_alone_is_believed_nowhere(camera: FineCamera) -> None:
             DARK,
             hot=NOTHING,
             blind=NOTHING,
-        ).found.valid.mean()
+        ).sharpened.valid.mean()
         for _ in range(6)
     ]
     assert np.mean(alarms) <= 2e-3
@@ -91,7 +91,7 @@ def test_a_hot_pixel_is_painted_over_and_not_believed(camera: FineCamera) -> Non
     depth, counts = _scan(camera, 300.0, 10.0, 1)
     counts[7, 9] += np.random.default_rng(0).poisson(40.0, axis.bins)
     fine = FineSharpener(camera, axis, pulse, Way())
-    found = fine.cube(counts, DARK, hot=NOTHING, blind=NOTHING).found
+    found = fine.cube(counts, DARK, hot=NOTHING, blind=NOTHING).sharpened
     block = np.s_[28:32, 36:40]
     assert found.hot[0][block].all()
     assert found.hot[0].sum() == SCALE**2
@@ -109,7 +109,7 @@ def test_amplitude_and_intensity_are_photons_of_a_pixel(camera: FineCamera) -> N
     found = (
         FineSharpener(camera, axis, pulse, Way())
         .cube(np.ascontiguousarray(counts), DARK, hot=NOTHING, blind=NOTHING)
-        .found
+        .sharpened
     )
     assert found.intensity.mean() == pytest.approx(counts.sum(axis=2).mean(), rel=0.01)
     assert found.amplitude.mean() == pytest.approx(500.0, rel=0.02)
@@ -137,7 +137,7 @@ def test_stated_dark_counts_are_noise_too(camera: FineCamera) -> None:
         depth, counts = _scan(camera, 300.0, 10.0, seed)
         counts = counts + rng.poisson(4.0, counts.shape).astype(np.float32)
         for stated, of_stated in ratios.items():
-            found = fine.cube(counts, DARK + stated, hot=NOTHING, blind=NOTHING).found
+            found = fine.cube(counts, DARK + stated, hot=NOTHING, blind=NOTHING).sharpened
             error = np.abs(found.time_of_flight_ps[0] - 2 * depth / LIGHT_M_PER_PS)
             of_stated.append((error / found.sigma_ps[0])[found.valid[0]])
     unstated, told = (np.quantile(np.concatenate(ratios[dark]), 0.6827) for dark in (0.0, 4.0))
@@ -159,7 +159,7 @@ def test_dark_sky_beside_a_wall_is_believed_nowhere(
     for seed in range(8):
         counts = np.random.default_rng(seed).poisson(mean).transpose(1, 2, 0).astype(np.float32)
         counts = np.ascontiguousarray(counts)
-        found = fine.cube(counts, DARK + dark, hot=NOTHING, blind=NOTHING).found
+        found = fine.cube(counts, DARK + dark, hot=NOTHING, blind=NOTHING).sharpened
         assert found.valid[0][:, : shape[1] // 4 - 8].mean() > 0.9
         alarms.append(found.valid[0][:, shape[1] // 2 :].mean())
     assert np.mean(alarms) <= 2e-3
@@ -174,9 +174,9 @@ def test_a_blind_pixel_does_not_reach_its_neighbours(camera: FineCamera) -> None
     blind = NOTHING.copy()
     blind[8, 10] = True
     fine = FineSharpener(camera, axis, pulse, Way())
-    found = fine.cube(spoilt, DARK, hot=NOTHING, blind=blind).found
+    found = fine.cube(spoilt, DARK, hot=NOTHING, blind=blind).sharpened
     assert not found.valid[0][32:36, 40:44].any()
     error = np.abs(_metres(found.time_of_flight_ps[0]) - depth)[24:44, 32:52]
-    sound = fine.cube(counts, DARK, hot=NOTHING, blind=NOTHING).found
+    sound = fine.cube(counts, DARK, hot=NOTHING, blind=NOTHING).sharpened
     usual = np.abs(_metres(sound.time_of_flight_ps[0]) - depth)[24:44, 32:52]
     assert np.quantile(error, 0.9) < 2 * np.quantile(usual, 0.9) + 0.002

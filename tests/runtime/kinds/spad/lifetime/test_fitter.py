@@ -49,7 +49,7 @@ def test_lifetimes_of_a_thousand_photons_reach_the_bound(
     counts, mu, bound = _drawn(tau, 1000, even)
     found = fitter.fit(counts)
     assert (found.evidence > fitter.threshold()).all()
-    assert found.known.all()
+    assert found.is_determined.all()
     errors = found.lifetime_ps - tau
     assert np.sqrt(np.mean(errors**2)) < 1.1 * bound
     assert abs(errors.mean()) < 0.2 * bound
@@ -63,13 +63,13 @@ def test_background_alone_is_no_decay(fitter: LifetimeFitter) -> None:
     for even in (0.05, 1.0, 10.0):
         counts = np.random.default_rng(3).poisson(even, (4000, AXIS.bins)).astype(np.float32)
         found = fitter.fit(counts)
-        assert np.mean((found.evidence > fitter.threshold()) & found.known) <= 1e-3
+        assert np.mean((found.evidence > fitter.threshold()) & found.is_determined) <= 1e-3
 
 
 def test_much_background_is_not_read_as_a_slow_decay(fitter: LifetimeFitter) -> None:
     counts, _, bound = _drawn(500, 100, 1.0)
     found = fitter.fit(counts)
-    valid = (found.evidence > fitter.threshold()) & found.known
+    valid = (found.evidence > fitter.threshold()) & found.is_determined
     assert valid.mean() > 0.9
     assert np.sqrt(np.mean((found.lifetime_ps[valid] - 500) ** 2)) < 1.25 * bound
 
@@ -85,7 +85,7 @@ def test_dark_pixels_and_prompt_light_are_not_known(fitter: LifetimeFitter) -> N
     found = fitter.fit(rng.poisson(prompt).astype(np.float32))
     # light that does not fade has no lifetime: what is found is short, and mostly marked
     assert np.median(found.lifetime_ps) < 60
-    assert found.known.mean() < 0.5
+    assert found.is_determined.mean() < 0.5
     assert fitter.fit(np.zeros((0, AXIS.bins), np.float32)).lifetime_ps.shape == (0,)
 
 
@@ -102,7 +102,7 @@ def test_many_bins_are_searched_as_few_are() -> None:
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 200e6
-    assert found.known.all()
+    assert found.is_determined.all()
     assert np.median(found.lifetime_ps) == pytest.approx(900, rel=0.02)
     assert np.sqrt(np.mean((found.lifetime_ps - 900) ** 2)) < 1.4 * np.median(found.sigma_ps)
 

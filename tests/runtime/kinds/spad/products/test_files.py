@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from camkit.errors import ContractError
 from camkit.runtime.kinds.spad.captures.strips import KEPT_BYTES, check_room, pieces
 from camkit.runtime.kinds.spad.products.archive import write_archive
-from camkit.runtime.kinds.spad.products.picture import write_exr, write_tiff
+from camkit.runtime.kinds.spad.products.float_pictures import write_exr, write_tiff
 from camkit.runtime.kinds.spad.products.points import directions, write_points
 from camkit.runtime.kinds.spad.products.preview import (
     UNKNOWN,

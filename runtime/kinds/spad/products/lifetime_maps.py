@@ -9,7 +9,7 @@ from camkit.runtime.capture_result import Result
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.kinds.spad.captures.photon_capture import PhotonCapture
 from camkit.runtime.kinds.spad.products.archive import write_archive
-from camkit.runtime.kinds.spad.products.picture import write_exr, write_tiff
+from camkit.runtime.kinds.spad.products.float_pictures import write_exr, write_tiff
 from camkit.runtime.kinds.spad.products.preview import depth_picture, write_preview
 from camkit.runtime.kinds.spad.products.record import told_axis, told_pulse
 from camkit.runtime.kinds.spad.pulse import FWHM_PER_SIGMA, GaussianPulse
@@ -34,25 +34,25 @@ def make_lifetime(work: Reconstruction, capture: PhotonCapture, product: str) ->
     assert pulse is not None  # its rows were read
     assert fitter is not None
     arrays = _arrays(decays)
-    shown = np.where(arrays["valid"], arrays["lifetime_ps"], np.nan)
+    lifetime_ps = np.where(arrays["valid"], arrays["lifetime_ps"], np.nan)
     is_guessed = capture.timing.pulse() is None
-    told = []
+    notes = []
     if is_guessed and isinstance(pulse, GaussianPulse):
-        told.append(
+        notes.append(
             f"no pulse is stated: a Gaussian of {FWHM_PER_SIGMA * pulse.sigma_ps:.3g} ps full "
             "width before one decay is estimated; state [laser] fwhm_ps or [irf] if you know it"
         )
     if not arrays["valid"].any():
-        told.append("no pixel has enough photons for a reliable lifetime")
+        notes.append("no pixel has enough photons for a reliable lifetime")
     return Result(
         arrays=arrays,
         writers={
             ".npz": lambda path: write_archive(path, arrays),
-            ".png": lambda path: write_preview(path, depth_picture(-shown)),
+            ".png": lambda path: write_preview(path, depth_picture(-lifetime_ps)),
         },
         pictures={
-            "exr": (".exr", lambda path: write_exr(path, shown[None], "Y")),
-            "tiff": (".tif", lambda path: write_tiff(path, shown[None])),
+            "exr": (".exr", lambda path: write_exr(path, lifetime_ps[None], "Y")),
+            "tiff": (".tif", lambda path: write_tiff(path, lifetime_ps[None])),
         },
         record={
             "product": "lifetime",
@@ -62,24 +62,24 @@ def make_lifetime(work: Reconstruction, capture: PhotonCapture, product: str) ->
             "limits_ps": [round(limit, 2) for limit in fitter.limits_ps],
         },
         seconds=work.seconds,
-        warnings=(*told, *work.warnings, *capture.late_notes()),
-        sections={"spad": {"pixels": int(shown.size), "valid": [int(arrays["valid"].sum())]}},
+        warnings=(*notes, *work.warnings, *capture.late_notes()),
+        sections={"spad": {"pixels": int(lifetime_ps.size), "valid": [int(arrays["valid"].sum())]}},
     )
 
 
 def _arrays(decays: Decays) -> dict[str, NDArray[Any]]:
     """Return the arrays of the archive."""
-    found, pixels, fitter = decays.arrays, decays.pixels, decays.fitter
+    arrays, pixels, fitter = decays.arrays, decays.pixels, decays.fitter
     assert fitter is not None
-    believed = found["evidence"] > fitter.threshold()
-    valid = believed & found["known"] & ~pixels.hot & ~pixels.blind
+    is_proved = arrays["evidence"] > fitter.threshold()
+    valid = is_proved & arrays["is_determined"] & ~pixels.hot & ~pixels.blind
     return {
-        "lifetime_ps": np.where(valid, found["lifetime_ps"], np.nan),
-        "time_of_flight_ps": found["time_of_flight_ps"],
-        "amplitude": found["amplitude"].astype(np.float32),
-        "background": np.maximum(found["background"] - pixels.dark, 0.0).astype(np.float32),
-        "sigma_ps": found["sigma_ps"].astype(np.float32),
-        "evidence": found["evidence"].astype(np.float32),
-        "intensity": found["intensity"].astype(np.float32),
+        "lifetime_ps": np.where(valid, arrays["lifetime_ps"], np.nan),
+        "time_of_flight_ps": arrays["time_of_flight_ps"],
+        "amplitude": arrays["amplitude"].astype(np.float32),
+        "background": np.maximum(arrays["background"] - pixels.dark, 0.0).astype(np.float32),
+        "sigma_ps": arrays["sigma_ps"].astype(np.float32),
+        "evidence": arrays["evidence"].astype(np.float32),
+        "intensity": arrays["intensity"].astype(np.float32),
         "valid": valid,
     }

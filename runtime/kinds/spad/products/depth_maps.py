@@ -11,7 +11,7 @@ from camkit.runtime.capture_result import Result
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.kinds.spad.captures.photon_capture import PhotonCapture
 from camkit.runtime.kinds.spad.products.archive import write_archive
-from camkit.runtime.kinds.spad.products.picture import write_exr, write_tiff
+from camkit.runtime.kinds.spad.products.float_pictures import write_exr, write_tiff
 from camkit.runtime.kinds.spad.products.points import write_points
 from camkit.runtime.kinds.spad.products.preview import depth_picture, write_preview
 from camkit.runtime.kinds.spad.products.record import told_pulse, told_way
@@ -42,14 +42,14 @@ def make_depth(work: Reconstruction, capture: PhotonCapture, product: str) -> Re
     depths = stream.beside
     assert isinstance(depths, Depths)
     assert depths.pulse is not None  # its rows were read
-    found, scale = depths.whole(), 1 if depths.bins is None else depths.bins.scale
-    arrays = _arrays(found, depths, capture, scale)
-    hot = [[int(x), int(y)] for y, x in np.argwhere(found.hot[0][::scale, ::scale])]
-    layers = arrays["depth_m"].reshape(found.valid.shape)
-    intensity = arrays["intensity"].reshape(found.valid.shape)
+    sharpened, scale = depths.whole(), 1 if depths.bins is None else depths.bins.scale
+    arrays = _arrays(sharpened, depths, capture, scale)
+    hot = [[int(x), int(y)] for y, x in np.argwhere(sharpened.hot[0][::scale, ::scale])]
+    layers = arrays["depth_m"].reshape(sharpened.valid.shape)
+    intensity = arrays["intensity"].reshape(sharpened.valid.shape)
     lens = _lens(capture, scale)
     phase = _phase(work) if scale > 1 else 0
-    guessed = None if capture.timing.pulse() is not None else depths.pulse
+    guess = None if capture.timing.pulse() is not None else depths.pulse
     return Result(
         arrays=arrays,
         writers={
@@ -67,16 +67,16 @@ def make_depth(work: Reconstruction, capture: PhotonCapture, product: str) -> Re
             "product": "depth",
             **told_way(capture.settings.way),
             **_told_finer(depths),
-            **told_pulse(depths.pulse, is_guessed=guessed is not None),
+            **told_pulse(depths.pulse, is_guessed=guess is not None),
             "templates": depths.templates,
         },
         seconds=work.seconds,
         warnings=(
-            *_warnings(found, depths, capture, guessed, hot),
+            *_warnings(sharpened, depths, capture, guess, hot),
             *work.warnings,
             *capture.late_notes(),
         ),
-        sections={"spad": _section(found, depths, hot)},
+        sections={"spad": _section(sharpened, depths, hot)},
     )
 
 
@@ -106,68 +106,70 @@ def _told_finer(depths: Depths) -> Mapping[str, Any]:
 
 
 def _arrays(
-    found: Sharpened, depths: Depths, capture: PhotonCapture, scale: int
+    sharpened: Sharpened, depths: Depths, capture: PhotonCapture, scale: int
 ) -> dict[str, NDArray[Any]]:
     """Return the arrays of the archive; the leading axis goes where there is one return."""
     dark = depths.pixels.dark.repeat(scale, axis=0).repeat(scale, axis=1)
-    depth = (found.time_of_flight_ps - capture.timing.correction.offset_ps) * LIGHT_M_PER_PS / 2
+    depth = (sharpened.time_of_flight_ps - capture.timing.correction.offset_ps) * LIGHT_M_PER_PS / 2
     arrays: dict[str, NDArray[Any]] = {
-        "depth_m": np.where(found.valid, depth, np.nan),
-        "time_of_flight_ps": found.time_of_flight_ps,
-        "amplitude": found.amplitude.astype(np.float32),
-        "background": np.maximum(found.background - dark, 0.0).astype(np.float32),
-        "sigma_ps": found.sigma_ps.astype(np.float32),
-        "evidence": found.evidence.astype(np.float32),
-        "intensity": (found.intensity - dark * capture.bins).astype(np.float32),
-        "valid": found.valid,
-        "pooled": found.pooled.astype(np.uint8),
+        "depth_m": np.where(sharpened.valid, depth, np.nan),
+        "time_of_flight_ps": sharpened.time_of_flight_ps,
+        "amplitude": sharpened.amplitude.astype(np.float32),
+        "background": np.maximum(sharpened.background - dark, 0.0).astype(np.float32),
+        "sigma_ps": sharpened.sigma_ps.astype(np.float32),
+        "evidence": sharpened.evidence.astype(np.float32),
+        "intensity": (sharpened.intensity - dark * capture.bins).astype(np.float32),
+        "valid": sharpened.valid,
+        "pooled": sharpened.pooled.astype(np.uint8),
     }
     if capture.settings.way.returns == 1:
         return {name: values[0] for name, values in arrays.items()}
     return arrays
 
 
-def _section(found: Sharpened, depths: Depths, hot: list[list[int]]) -> Mapping[str, Any]:
-    sides, counts = np.unique(found.pooled[found.valid], return_counts=True)
+def _section(sharpened: Sharpened, depths: Depths, hot: list[list[int]]) -> Mapping[str, Any]:
+    sides, counts = np.unique(sharpened.pooled[sharpened.valid], return_counts=True)
     return {
-        "pixels": int(found.hot[0].size),
-        "valid": [int(layer.sum()) for layer in found.valid],
+        "pixels": int(sharpened.hot[0].size),
+        "valid": [int(layer.sum()) for layer in sharpened.valid],
         "hot": hot,
         "blind": int(depths.pixels.blind.sum()),
         "pile_up": round(float(depths.pixels.worst.max(initial=0.0)), 4),
         "pooled": {str(s): int(n) for s, n in zip(sides.tolist(), counts.tolist(), strict=True)},
-        "photons": float(np.round(found.intensity[0].sum(), 1)),
+        "photons": float(np.round(sharpened.intensity[0].sum(), 1)),
     }
 
 
 def _warnings(
-    found: Sharpened,
+    sharpened: Sharpened,
     depths: Depths,
     capture: PhotonCapture,
-    guessed: Pulse | None,
+    guess: Pulse | None,
     hot: list[list[int]],
 ) -> list[str]:
-    told = []
-    if isinstance(guessed, GaussianPulse):
-        told.append(
-            f"no pulse is stated: a Gaussian of {FWHM_PER_SIGMA * guessed.sigma_ps:.3g} ps full "
+    notes = []
+    if isinstance(guess, GaussianPulse):
+        notes.append(
+            f"no pulse is stated: a Gaussian of {FWHM_PER_SIGMA * guess.sigma_ps:.3g} ps full "
             "width is estimated; state [laser] fwhm_ps, [gate] or [irf] if you know it"
         )
     if hot:
         places = ", ".join(f"({x}, {y})" for x, y in hot[:NAMED_HOT])
         more = f" and {len(hot) - NAMED_HOT} more" if len(hot) > NAMED_HOT else ""
-        told.append(f"hot pixels at {places}{more}: filled from their neighbours, marked not valid")
+        notes.append(
+            f"hot pixels at {places}{more}: filled from their neighbours, marked not valid"
+        )
     if depths.pixels.blind.any():
-        told.append(
+        notes.append(
             f"pile-up is too strong to correct in {int(depths.pixels.blind.sum())} pixels: they "
             "are marked not valid"
         )
-    if not found.valid.any():
-        told.append("no pixel has enough photons for a reliable distance")
+    if not sharpened.valid.any():
+        notes.append("no pixel has enough photons for a reliable distance")
     array = capture.timing.array
     if array.pitch_um is None or array.focal_length_mm is None:
-        told.append(
+        notes.append(
             "the lens is not stated: the point cloud assumes a focal length equal to the width of "
             "the array; state [array] pitch_um and focal_length_mm"
         )
-    return told
+    return notes

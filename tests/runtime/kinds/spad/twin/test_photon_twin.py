@@ -17,13 +17,13 @@ from camkit.bundle.sensor import SpadSensor
 from camkit.bundle.stages import Correct, Sharpen, SuperResolve
 from camkit.cli.app import run
 from camkit.errors import ContractError, DecodeError
-from camkit.runtime.kinds.spad.files.named import named_bundle
+from camkit.runtime.kinds.spad.files.bundle_name import named_bundle
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from camkit.runtime.kinds.spad.golden_captures import stage_set
 from camkit.runtime.kinds.spad.timing import LIGHT_M_PER_PS
+from camkit.runtime.kinds.spad.twin.photon_twin import record, times_of
 from camkit.runtime.kinds.spad.twin.recording import PhotonOptions
 from camkit.runtime.kinds.spad.twin.scene import light_in_flight, light_of_depth
-from camkit.runtime.kinds.spad.twin.simulate import record, times_of
 from camkit.runtime.kinds.spad.twin.working import GATE_WIDTH_PS, STEP_PS, WORKING_POINTS
 from tests.spad_bundle import BINS, HEIGHT, SCALE, TIMES, WIDTH, write_spad_bundle
 

@@ -25,17 +25,17 @@ def chosen_name(path: Path, names: Iterable[str], hints: Hints, what: str = "arr
         ContractError: If the choice is none of them, or nobody chose among several.
         DecodeError: If there are none.
     """
-    known = sorted(names)
-    if not known:
+    variables = sorted(names)
+    if not variables:
         raise DecodeError(f"{path.name} holds no {what} of counts, histograms or time stamps")
     if hints.key is not None:
-        if hints.key not in known:
+        if hints.key not in variables:
             raise ContractError(
-                f"{path.name} holds no {hints.key!r} ([array] key); it holds {', '.join(known)}"
+                f"{path.name} holds no {hints.key!r} ([array] key); it holds {', '.join(variables)}"
             )
         return hints.key
-    telling = [name for name in known if name.rsplit("/", 1)[-1] in KEYS]
-    candidates = telling or known
+    telling = [name for name in variables if name.rsplit("/", 1)[-1] in KEYS]
+    candidates = telling or variables
     if len(candidates) > 1:
         raise ContractError(
             f"{path.name} holds several {what}: {', '.join(candidates)}; choose one by [array] key "
@@ -46,14 +46,14 @@ def chosen_name(path: Path, names: Iterable[str], hints: Hints, what: str = "arr
 
 def stated_values(values: Mapping[str, Any]) -> dict[str, object]:
     """Return what small values say of times, those of other names left out."""
-    found: dict[str, object] = {}
+    times: dict[str, object] = {}
     for name, value in values.items():
         if name not in TABLE_OF:
             continue
         plain = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
         array = np.asarray(plain)
         if array.dtype.kind in "US":
-            found[name] = str(array.ravel()[0]) if array.size == 1 else plain
+            times[name] = str(array.ravel()[0]) if array.size == 1 else plain
         elif array.dtype.kind in "biuf":
-            found[name] = array.ravel()[0].item() if array.size == 1 else array.ravel()
-    return found
+            times[name] = array.ravel()[0].item() if array.size == 1 else array.ravel()
+    return times

@@ -12,7 +12,7 @@ from camkit.runtime.kinds.spad.bank import Bank
 Floats = NDArray[np.float64]
 
 
-class Between:
+class TemplateCubics:
     """The coefficients of cubics between the templates of a bank, side by side."""
 
     def __init__(self, bank: Bank) -> None:
@@ -21,14 +21,14 @@ class Between:
         ahead = np.diff(starts)
         self._width = bank.bins.shape[1] + int(ahead.max(initial=0))
         count = len(starts) - 1
-        here = np.zeros((2, count, self._width))
-        after = np.zeros((2, count, self._width))
-        own = np.arange(bank.bins.shape[1])
+        begins = np.zeros((2, count, self._width))
+        ends = np.zeros((2, count, self._width))
+        columns = np.arange(bank.bins.shape[1])
         for index, values in enumerate((bank.shares, bank.slopes * bank.step_ps)):
-            here[index, :, : len(own)] = values[:-1]
+            begins[index, :, : len(columns)] = values[:-1]
             rows = np.arange(count)[:, None]
-            after[index, rows, ahead[:, None] + own] = values[1:]
-        self._here, self._after, self._starts = here, after, starts[:-1]
+            ends[index, rows, ahead[:, None] + columns] = values[1:]
+        self._begins, self._ends, self._starts = begins, ends, starts[:-1]
 
     def shapes(self, mu_ps: Floats) -> tuple[Floats, Floats]:
         """Return shares, and their slopes by time (1/ps), of every bin.
@@ -43,8 +43,8 @@ class Between:
         place = (mu_ps - bank.mu_ps[0]) / bank.step_ps
         m = np.clip(place.astype(np.int64), 0, len(self._starts) - 1)
         t = (place - m)[:, None]
-        s0, d0 = self._here[0, m], self._here[1, m]
-        s1, d1 = self._after[0, m], self._after[1, m]
+        s0, d0 = self._begins[0, m], self._begins[1, m]
+        s1, d1 = self._ends[0, m], self._ends[1, m]
         rise = s1 - s0
         c2, c3 = 3 * rise - 2 * d0 - d1, d0 + d1 - 2 * rise
         values = s0 + t * (d0 + t * (c2 + t * c3))

@@ -117,16 +117,16 @@ def read_scene(path: Path) -> dict[str, NDArray[Any]]:
         DecodeError: If the file is no NPZ of numbers, or too large.
     """
     try:
-        found = read_npz(path, max_bytes=MOST_BYTES)
+        arrays = read_npz(path, max_bytes=MOST_BYTES)
     except DecodeError as error:
         raise DecodeError(f"cannot read the scene {path}: {error}") from error
-    for name in SCENE_ARRAYS & found.keys():
-        if found[name].dtype.kind not in "biuf":
+    for name in SCENE_ARRAYS & arrays.keys():
+        if arrays[name].dtype.kind not in "biuf":
             raise DecodeError(
-                f"cannot read the scene {path}: {name} holds {found[name].dtype}; expected real "
+                f"cannot read the scene {path}: {name} holds {arrays[name].dtype}; expected real "
                 "numbers"
             )
-    return found
+    return arrays
 
 
 def _fine_shape(camera: FineCamera) -> tuple[int, int]:
@@ -177,7 +177,7 @@ def _counted(
     point = "intensity"
     added = Disturbances(dark=dark_counts(camera, point), dead_share=dead_share(camera, point))
     counts = count_frames(mean, added, rng)[0]
-    return Recorded(name="counts", values=counts, stated=_stated(camera))
+    return Recorded(name="counts", values=counts, attributes=_attributes(camera))
 
 
 def _timed(
@@ -192,9 +192,9 @@ def _timed(
     mean += photons / options.sbr / axis.bins
     dark = dark_counts(camera, "depth")
     counts = count_times(mean, axis.orientation, Disturbances(dark=dark), rng)
-    stated = {**_stated(camera), **times_of_bundle(camera.bundle.manifest)}
-    return Recorded(name="histogram", values=counts, stated=stated)
+    attributes = {**_attributes(camera), **times_of_bundle(camera.bundle.manifest)}
+    return Recorded(name="histogram", values=counts, attributes=attributes)
 
 
-def _stated(camera: FineCamera) -> Mapping[str, Any]:
+def _attributes(camera: FineCamera) -> Mapping[str, Any]:
     return {"pitch_um": camera.sensor.pixel_pitch_um, "bundle": camera.bundle.manifest.name}

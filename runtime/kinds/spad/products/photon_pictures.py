@@ -14,7 +14,7 @@ from camkit.runtime.kinds.spad.captures.frames import frames_of
 from camkit.runtime.kinds.spad.captures.photon_capture import PhotonCapture
 from camkit.runtime.kinds.spad.pixels import Pixels
 from camkit.runtime.kinds.spad.products.archive import write_archive
-from camkit.runtime.kinds.spad.products.picture import write_exr, write_tiff
+from camkit.runtime.kinds.spad.products.float_pictures import write_exr, write_tiff
 from camkit.runtime.kinds.spad.products.preview import (
     grey_picture,
     white_of,
@@ -35,10 +35,10 @@ def make_intensity(work: Reconstruction, capture: PhotonCapture, product: str) -
     record = {"product": "intensity", "frames": len(frames), **told_finer(work.job)}
     if capture.axis is None and capture.bins > 1:
         # one picture of a film: all its photons
-        shown, film, arrays = frames.mean(axis=0), white, {"frames": frames}
+        picture, film, arrays = frames.mean(axis=0), white, {"frames": frames}
     else:
-        shown, film, arrays = frames[0], None, {"intensity": frames[0]}
-    return _result(work, frames, arrays, shown, film, record, warnings)
+        picture, film, arrays = frames[0], None, {"intensity": frames[0]}
+    return _result(work, frames, arrays, picture, film, record, warnings)
 
 
 def make_transient(work: Reconstruction, capture: PhotonCapture, product: str) -> Result:
@@ -59,26 +59,26 @@ def _photons(
     with cancellable(work.job.cancel):
         frames = _whole(stream, capture)
     work.job.log.meter.finish()
-    told = list[str]()
+    notes = list[str]()
     if isinstance(stream.beside, Pixels) and (blind := int(stream.beside.blind.sum())):
-        told.append(
+        notes.append(
             f"pile-up is too strong to correct in {blind} pixels: their photons are a lower bound"
         )
-    return frames, (*told, *work.warnings, *capture.late_notes())
+    return frames, (*notes, *work.warnings, *capture.late_notes())
 
 
 def _whole(stream: Stream, capture: PhotonCapture) -> FloatArray:
     if stream.plane.grid.pitch_ratio == 1:
         return frames_of(stream, capture)
-    made: FloatArray = stream.rows().read(0, stream.shape[1])
-    return made
+    frames: FloatArray = stream.rows().read(0, stream.shape[1])
+    return frames
 
 
 def _result(
     work: Reconstruction,
     frames: FloatArray,
     arrays: dict[str, NDArray[Any]],
-    shown: NDArray[np.floating],
+    picture: NDArray[np.floating],
     film_white: float | None,
     record: dict[str, Any],
     warnings: tuple[str, ...],
@@ -86,7 +86,7 @@ def _result(
     """Return frames with their writers; photons of white of a film, None for no film."""
     writers: dict[str, Write] = {
         ".npz": lambda path: write_archive(path, arrays),
-        ".png": lambda path: write_preview(path, grey_picture(shown, white_of(shown))),
+        ".png": lambda path: write_preview(path, grey_picture(picture, white_of(picture))),
     }
     if film_white is not None:
         writers[".mp4"] = lambda path: write_video(path, frames, film_white)

@@ -24,22 +24,22 @@ def named_bundle(path: Path) -> str | None:
 
     Reading the capture tells what is wrong with a file.
     """
-    read = _READERS.get(path.suffix.lower(), _beside)
+    read = _READERS.get(path.suffix.lower(), _of_timing_file)
     try:
-        found = np.asarray(read(path))
+        value = np.asarray(read(path))
     except (CamkitError, ImportError, MemoryError, *BROKEN):
         return None
-    if found.dtype.kind not in "US" or found.size != 1:
+    if value.dtype.kind not in "US" or value.size != 1:
         return None
-    name = found.item()
+    name = value.item()
     if isinstance(name, bytes):
         name = name.decode("utf-8", "replace")
     return name if 0 < len(name) <= LONGEST else None
 
 
-def _beside(path: Path) -> str:
-    beside = timing_beside(path)
-    return (read_timing(beside).array.bundle or "") if beside.is_file() else ""
+def _of_timing_file(path: Path) -> str:
+    timing_path = timing_beside(path)
+    return (read_timing(timing_path).array.bundle or "") if timing_path.is_file() else ""
 
 
 def _of_npz(path: Path) -> Any:
@@ -47,8 +47,8 @@ def _of_npz(path: Path) -> Any:
 
 
 def _of_hdf5(path: Path) -> Any:
-    found = attribute_of(path, NAME)
-    return "" if found is None else found
+    name = attribute_of(path, NAME)
+    return "" if name is None else name
 
 
 _READERS: Final[Mapping[str, Callable[[Path], Any]]] = {
