@@ -219,7 +219,7 @@ class Pipeline:
             know=self.part.know,
             progress=progress,
             cancel=cancel,
-            known=known,
+            ready_planes=known,
             reserved_bytes=reserved_bytes,
         )
 

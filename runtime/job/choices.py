@@ -54,14 +54,14 @@ def check_choices(
             to any stage, the unit is of another bundle, or the PSF does not reach the depth.
     """
     stages = usual if bundle is None else bundle.manifest.stages
-    known = known_options(stages) | (_of_capture(bundle) & of_capture)
+    valid_names = known_options(stages) | (_of_capture(bundle) & of_capture)
     where = f"to captures of the kind {kind.name}" if kind != BAYER else "without a bundle"
     if bundle is not None:
         where = f"to bundle {bundle.manifest.name}"
     check_kind_options(options, kind, where)
-    own = {name for name, _ in options.of_kind}
-    given = [name for name in given_options(options) if name not in own]
-    if foreign := [name for name in given if name not in known]:
+    kind_names = {name for name, _ in options.of_kind}
+    names = [name for name in given_options(options) if name not in kind_names]
+    if foreign := [name for name in names if name not in valid_names]:
         raise ContractError(
             f"{option_list(foreign)} does not apply {where}: "
             f"{'nothing' if bundle is None else 'none of its stages'} uses it; leave it out"
@@ -116,8 +116,8 @@ def check_idle(bundle: Bundle | None, options: Options) -> None:
     ]
     others = [stage for stage in stages if stage not in left_out]
     idle = known_options(left_out) - known_options(others)
-    if said := [name for name in given_options(options) if name in idle]:
+    if names := [name for name in given_options(options) if name in idle]:
         raise ContractError(
-            f"{option_list(said)} does not apply with {option_text('method', options.method)}, "
+            f"{option_list(names)} does not apply with {option_text('method', options.method)}, "
             "which runs no stage that uses it; leave it out"
         )

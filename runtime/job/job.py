@@ -44,13 +44,13 @@ class Job:
         log: What is found on the way.
         prober: Makes rows of planes by another walk; see `probe`.
         cancel: The caller's wish to stop.
-        known: Planes of this capture that were made before; what gives them does not run.
-        kept: What stages found of the capture and need not seek again in another walk over it, by
+        ready_planes: Planes of this capture that were made before; what gives them does not run.
+        cache: What stages found of the capture and need not seek again in another walk over it, by
             a key of theirs.
         reserved_bytes: Of the memory cap, what somebody else needs for what becomes of the bands.
-        before: Number of a stage; planes that it and those behind it give cannot be probed. None
+        probe_end: Number of a stage; planes that it and those behind it give cannot be probed. None
             for all planes.
-        placed: Where the capture lies on the sensor; None for captures that have no place.
+        sensor_place: Where the capture lies on the sensor; None for captures that have no place.
         measured_noise: Noise of the raw signal; None where no stage needs it.
         white_balance: Gains in use; ones where the stages balance nothing.
         color: From the colour of the stages to that asked for; None where no stage makes one.
@@ -65,11 +65,11 @@ class Job:
     log: Log
     prober: "Callable[[Job, Sequence[str]], tuple[RowSource, ...]]"
     cancel: Cancel | None = None
-    known: dict[str, Stream] = field(default_factory=dict)
-    kept: dict[Hashable, Any] = field(default_factory=dict)
+    ready_planes: dict[str, Stream] = field(default_factory=dict)
+    cache: dict[Hashable, Any] = field(default_factory=dict)
     reserved_bytes: int = 0
-    before: int | None = None
-    placed: Placement | None = None
+    probe_end: int | None = None
+    sensor_place: Placement | None = None
     measured_noise: NoiseModel | None = None
     white_balance: Gains = ()
     color: ColorStage | None = None
@@ -102,8 +102,8 @@ class Job:
         """Return XYZ (D65) to camera, of the file before that of the bundle; None if not known."""
         sensor = None if self.bundle is None else self.bundle.manifest.sensor
         if self.capture.color_matrix is not None or self.capture.cfa is None:
-            found: Matrix | None = self.capture.color_matrix
-            return found
+            file_matrix: Matrix | None = self.capture.color_matrix
+            return file_matrix
         if sensor is None or sensor.type != "bayer":
             return None
         return np.array(sensor.color_matrix)
@@ -120,9 +120,9 @@ class Job:
         Raises:
             ContractError: If captures of its kind have no place.
         """
-        if self.placed is None:
+        if self.sensor_place is None:
             raise ContractError("captures of this kind have no place on a sensor")
-        return self.placed
+        return self.sensor_place
 
     @property
     def noise(self) -> NoiseModel:
@@ -178,13 +178,13 @@ class Job:
             ContractError: If it is called earlier, or a plane does not lie before that stage.
         """
         if not self.log.is_ready:
-            named = ", ".join(map(repr, planes))
+            names = ", ".join(map(repr, planes))
             raise ContractError(
-                f"the plane {named} is asked for too early: stages look at planes when their "
+                f"the plane {names} is asked for too early: stages look at planes when their "
                 "first row is asked for, not while they are made ready"
             )
         return self.prober(self, planes)
 
-    def unheard(self, before: int | None = None) -> "Job":
+    def with_new_log(self, probe_end: int | None = None) -> "Job":
         """Return the same job for a walk whose counts and notes nobody hears."""
-        return replace(self, log=Log(meter=Meter(None, self.cancel)), before=before)
+        return replace(self, log=Log(meter=Meter(None, self.cancel)), probe_end=probe_end)

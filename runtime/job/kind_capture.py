@@ -36,8 +36,8 @@ class KindCapture(Protocol):
     @property
     def sha256(self) -> str | None: ...  # noqa: D102
 
-    def plane(self, stated: Plane | None) -> Plane:
-        """Return what the samples are; `stated` is the plane of a bundle's sensor."""
+    def plane(self, sensor_plane: Plane | None) -> Plane:
+        """Return what the samples are; `sensor_plane` is the plane of a bundle's sensor."""
 
     def rows(self) -> RowSource:
         """Return the samples as the file holds them."""

@@ -17,13 +17,13 @@ class Meter:
     def __init__(self, progress: Progress | None, cancel: Cancel | None) -> None:
         self._progress = progress
         self._cancel = cancel
-        self._reached: dict[str, float] = {}
-        self._told = -1
+        self._shares: dict[str, float] = {}
+        self._reported_steps = -1
 
     def expect(self, keys: Sequence[str]) -> None:
         """Start anew; these are the stages that will give rows."""
-        self._reached = dict.fromkeys(keys, 0.0)
-        self._told = -1
+        self._shares = dict.fromkeys(keys, 0.0)
+        self._reported_steps = -1
 
     def reach(self, key: str, share: float) -> None:
         """Record that a stage has given a share of its rows.
@@ -32,20 +32,20 @@ class Meter:
             Cancelled: If the caller asked to stop.
         """
         check_cancelled(self._cancel)
-        if share > self._reached.get(key, 1.0):
-            self._reached[key] = share
+        if share > self._shares.get(key, 1.0):
+            self._shares[key] = share
             self._tell()
 
     def finish(self) -> None:
         """Record that all is done, rows that nobody asked for included."""
-        self._reached = dict.fromkeys(self._reached, 1.0)
+        self._shares = dict.fromkeys(self._shares, 1.0)
         self._tell()
 
     def _tell(self) -> None:
-        done = int(STEPS * sum(self._reached.values()))
-        if self._progress is not None and done > self._told:
-            self._told = done
-            self._progress(done, STEPS * len(self._reached))
+        steps = int(STEPS * sum(self._shares.values()))
+        if self._progress is not None and steps > self._reported_steps:
+            self._reported_steps = steps
+            self._progress(steps, STEPS * len(self._shares))
 
     def bands(self, key: str, bands: Iterator[Rows], height: int) -> Iterator[Rows]:
         """Yield bands, each counted."""

@@ -34,11 +34,11 @@ def know_photograph(job: Job) -> Job:
     job.log.clipped_fraction = 0.0
     job.log.notes += _first_notes(job)
     extent = None if job.bundle is None else job.bundle.manifest.sensor.extent
-    placed = place(job.capture, extent, job.options.assume)
+    placement = place(job.capture, extent, job.options.assume)
     ones = (1.0,) * job.capture.channels
-    job = looked_at(replace(job, placed=placed, white_balance=ones), job.setup.stages)
-    if placed.note and job.bundle is not None:
-        job.log.notes.append(placed.note)
+    job = looked_at(replace(job, sensor_place=placement, white_balance=ones), job.setup.stages)
+    if placement.note and job.bundle is not None:
+        job.log.notes.append(placement.note)
     job = _planned(job)
     ways = ways_of(job.setup.stages, job.work)
     job.log.record["stages"] = {
@@ -99,13 +99,13 @@ def _planned(job: Job) -> Job:
 
 
 def _method_below(bundle: Bundle) -> str | None:
-    below = without_networks(bundle.manifest, Work())
-    if below is None:
+    work = without_networks(bundle.manifest, Work())
+    if work is None:
         raise ContractError(
             f"bundle {bundle.manifest.name} has nothing to fall back to: its networks "
             f"cannot be left out; use {option_text('on_unsafe', 'warn')}"
         )
-    return below.method
+    return work.method
 
 
 def _first_notes(job: Job) -> list[str]:
@@ -125,15 +125,15 @@ def _first_notes(job: Job) -> list[str]:
     manifest = bundle.manifest
     notes = notes_behind(capture, bundle.haze) if manifest.has_haze else list(capture.notes)
     notes += _camera_notes(capture, bundle, job.options)
-    wanted = manifest.sensor.inputs
-    if capture.contract not in wanted:
+    inputs = manifest.sensor.inputs
+    if capture.contract not in inputs:
         raise ContractError(
-            f"bundle {manifest.name} takes {' or '.join(wanted)}, the capture is "
+            f"bundle {manifest.name} takes {' or '.join(inputs)}, the capture is "
             f"{capture.contract}; use another bundle or {option_text('bundle', 'none')}"
         )
     if isinstance(manifest.sensor, BayerSensor):
         _check_cfa(capture, manifest.sensor.cfa, job.options)
-    if capture.contract != wanted[0]:
+    if capture.contract != inputs[0]:
         notes.append("the capture has full colour instead of a mosaic: demosaicking is skipped")
     return notes
 
@@ -147,12 +147,12 @@ def _camera_notes(capture: Capture, bundle: Bundle, options: Options) -> list[st
     if manifest.optics is None and manifest.sensor.extent is None:
         return notes
     if capture.bundle_name not in (None, manifest.name):
-        told = f"the capture names bundle {capture.bundle_name}, not {manifest.name}"
+        text = f"the capture names bundle {capture.bundle_name}, not {manifest.name}"
         if not options.force_bundle:
             raise ContractError(
-                f"{told}; leave {option_text('bundle')} out, or add {option_text('force_bundle')}"
+                f"{text}; leave {option_text('bundle')} out, or add {option_text('force_bundle')}"
             )
-        notes.append(f"{told}: the result is right only if both have the same lens")
+        notes.append(f"{text}: the result is right only if both have the same lens")
     is_file = capture.sha256 is not None
     if capture.bundle_name is None and manifest.has_kernels and (capture.camera or is_file):
         camera = capture.camera
@@ -166,13 +166,13 @@ def _camera_notes(capture: Capture, bundle: Bundle, options: Options) -> list[st
 
 def _check_cfa(capture: Capture, cfa: CfaPattern, options: Options) -> None:
     """Refuse a mosaic that does not begin as the sensor does at the place of the capture."""
-    found, origin = capture.cfa, capture.origin_px
-    if found is None or origin is None or options.assume is not None:
+    capture_cfa, origin = capture.cfa, capture.origin_px
+    if capture_cfa is None or origin is None or options.assume is not None:
         return
     expected = shifted_cfa(cfa, origin)
-    if found != expected:
+    if capture_cfa != expected:
         raise ContractError(
-            f"the mosaic begins with {found}, the sensor (CFA {cfa}) has {expected} at "
+            f"the mosaic begins with {capture_cfa}, the sensor (CFA {cfa}) has {expected} at "
             f"{origin}: the place of the crop ({option_text('origin_px')}) or the "
             "pattern is wrong"
         )

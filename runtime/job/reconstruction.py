@@ -54,7 +54,7 @@ class Reconstruction:
         know: Callable[[Job], Job] = know_photograph,
         progress: Progress | None = None,
         cancel: Cancel | None = None,
-        known: Mapping[str, Stream] | None = None,
+        ready_planes: Mapping[str, Stream] | None = None,
         reserved_bytes: int = 0,
     ) -> None:
         """Plan everything that is known before the first row.
@@ -65,7 +65,7 @@ class Reconstruction:
             know: How its kind completes what is known of it, and plans.
             progress: Called with (work done, work in all).
             cancel: Asked ten times a second; true raises `Cancelled`.
-            known: Planes of this capture that another reconstruction kept, by name.
+            ready_planes: Planes of this capture that another reconstruction kept, by name.
             reserved_bytes: Of the memory cap, what the caller needs for what becomes of the bands.
 
         Raises:
@@ -80,7 +80,7 @@ class Reconstruction:
                 log=Log(meter=Meter(progress, cancel)),
                 prober=probed,
                 cancel=cancel,
-                known=dict(known or {}),
+                ready_planes=dict(ready_planes or {}),
                 reserved_bytes=reserved_bytes,
             )
         )
@@ -113,10 +113,12 @@ class Reconstruction:
         """
         plane = self._plane_of(product)
         bundle = self._setup.bundle
-        stated = None if bundle is None else bundle.manifest.all_planes[plane]
-        if stated is None or "t" in stated.axes:  # its samples of time are the capture's
+        listed_plane = None if bundle is None else bundle.manifest.all_planes[plane]
+        if (
+            listed_plane is None or "t" in listed_plane.axes
+        ):  # its samples of time are the capture's
             return self._walk.stream(plane).shape
-        return len(stated.channels), *self.job.grid_px(stated)
+        return len(listed_plane.channels), *self.job.grid_px(listed_plane)
 
     def _plane_of(self, product: str) -> str:
         if product not in self.products:
@@ -195,9 +197,9 @@ class Reconstruction:
     @property
     def seconds(self) -> dict[str, float]:
         """Return the seconds per stage so far, in the order of the data."""
-        spent = self.clock.seconds
+        clock_seconds = self.clock.seconds
         order = (*BEFORE_STAGES, *self._walk.keys)
-        return {name: spent[name] for name in sorted(spent, key=order.index)}
+        return {name: clock_seconds[name] for name in sorted(clock_seconds, key=order.index)}
 
     @property
     def clock(self) -> StageClock:
@@ -261,10 +263,10 @@ class Reconstruction:
         """
         for number, stage in enumerate(self._setup.stages):
             if getattr(stage, "role", None) == role:
-                taken = [s for s in self._walk.taken_by(number) if s.plane.domain != "mask"]
-                rows = module_of(stage).given_rows(stage, self.job, taken)
-                made: FloatArray = rows.read(0, rows.shape[1])
-                return made
+                inputs = [s for s in self._walk.taken_by(number) if s.plane.domain != "mask"]
+                rows = module_of(stage).given_rows(stage, self.job, inputs)
+                samples: FloatArray = rows.read(0, rows.shape[1])
+                return samples
         raise ContractError(f"no stage has a network of the role {role!r}")
 
     def fill(self, out: FloatArray | None = None, product: str = IMAGE) -> FloatArray:
@@ -293,20 +295,20 @@ class Reconstruction:
 
         Times the machine for a moment when first asked. None without a bundle.
         """
-        made = self.plan
-        if made is None:
+        plan = self.plan
+        if plan is None:
             return None
-        if made.subject.content is None:
+        if plan.subject.content is None:
             content = content_of(self.job.with_noise())
-            made = replace(made, subject=replace(made.subject, content=content))
-        speed = self._setup.speed(made.sizes())
-        self.record["decisions"] = [decision.to_json() for decision in made.decisions(speed)]
+            plan = replace(plan, subject=replace(plan.subject, content=content))
+        speed = self._setup.speed(plan.sizes())
+        self.record["decisions"] = [decision.to_json() for decision in plan.decisions(speed)]
         window_mp = {role: windows.window_mp() for role, windows in self.windows.items()}
-        taken = stage_seconds(made.subject, made.work, speed, window_mp or None)
-        for stage, expected_s in zip(self.record["stages"].values(), taken, strict=True):
+        expected = stage_seconds(plan.subject, plan.work, speed, window_mp or None)
+        for stage, expected_s in zip(self.record["stages"].values(), expected, strict=True):
             stage["expected_s"] = round(expected_s, 4)
         estimate = Estimate(
-            seconds=estimate_seconds(made.subject, made.work, speed, window_mp or None),
+            seconds=estimate_seconds(plan.subject, plan.work, speed, window_mp or None),
             peak_mb=self._walk.needed_bytes() / 1e6,
         )
         self.record["estimate"] = estimate.to_json()

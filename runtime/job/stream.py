@@ -25,11 +25,12 @@ class Stream:
         shape: (channel, h, w).
         gains: What the light of each channel of the sensor was multiplied by so far.
         source: Rows that may be read from any row on; None for bands.
-        made: Bands from top to bottom, each an array that nobody else reads; None for a source.
+        band_iterator: Bands from top to bottom, each an array that nobody else reads; None for a
+            source.
         owned: Whether what the source reads is the reader's own to change.
         noise_rise: Gives what the variance of the noise of every channel was multiplied by besides,
             on average; to be asked when the first row is, as `Job.probe`. None for nothing.
-        beside: What the giver knows of the rows besides, for stages of its kind; what is known of
+        facts: What the giver knows of the rows besides, for stages of its kind; what is known of
             single rows is complete once they are read. None for nothing.
     """
 
@@ -37,13 +38,13 @@ class Stream:
     shape: Shape
     gains: tuple[float, ...]
     source: RowSource | None = None
-    made: Iterator[Rows] | None = None
+    band_iterator: Iterator[Rows] | None = None
     owned: bool = True
     noise_rise: Callable[[], tuple[float, ...]] | None = None
-    beside: Any = None
+    facts: Any = None
 
     def __post_init__(self) -> None:
-        if (self.source is None) == (self.made is None):
+        if (self.source is None) == (self.band_iterator is None):
             raise ContractError("a stream is either a source or bands")
 
     @property
@@ -65,23 +66,23 @@ class Stream:
 
     def bands(self) -> Iterator[Rows]:
         """Yield the rows from top to bottom, each band an array that nobody else reads."""
-        if self.made is not None:
-            return self.made
+        if self.band_iterator is not None:
+            return self.band_iterator
         assert self.source is not None
         bands = read_bands(self.source)
         return bands if self.owned else (band.copy() for band in bands)
 
     def timed(self, clock: StageClock, name: str) -> "Stream":
         """Return the stream whose making is charged to a stage."""
-        if self.made is not None:
-            return replace(self, made=clock.bands(name, self.made))
+        if self.band_iterator is not None:
+            return replace(self, band_iterator=clock.bands(name, self.band_iterator))
         assert self.source is not None
         return replace(self, source=TimedRows(self.source, clock, name))
 
     def metered(self, meter: Meter, key: str) -> "Stream":
         """Return the stream whose rows are counted."""
-        if self.made is not None:
-            return replace(self, made=meter.bands(key, self.made, self.shape[1]))
+        if self.band_iterator is not None:
+            return replace(self, band_iterator=meter.bands(key, self.band_iterator, self.shape[1]))
         assert self.source is not None
         return replace(self, source=MeteredRows(self.source, meter, key))
 
@@ -91,13 +92,14 @@ class Stream:
             return [self][:takers]
         rolling = RollingRows(self.shape, self.bands())
         return [
-            replace(self, source=rolling.reader(), made=None, owned=False) for _ in range(takers)
+            replace(self, source=rolling.reader(), band_iterator=None, owned=False)
+            for _ in range(takers)
         ]
 
-    def with_bands(self, made: Iterator[Rows]) -> "Stream":
+    def with_bands(self, bands: Iterator[Rows]) -> "Stream":
         """Return what a stage made of this stream, of the same shape and meaning."""
-        return replace(self, made=made, source=None, owned=True)
+        return replace(self, band_iterator=bands, source=None, owned=True)
 
     def with_source(self, source: RowSource) -> "Stream":
         """Return what a stage makes of this stream, readable from any row on."""
-        return replace(self, source=source, made=None, shape=source.shape, owned=True)
+        return replace(self, source=source, band_iterator=None, shape=source.shape, owned=True)

@@ -65,17 +65,17 @@ class Walk:
         running = [work for work, way in zip(self._works, self.ways, strict=True) if way]
         flexible = [work for work in running if work.fit is not None]
         cap = job.options.max_mem_bytes or DEFAULT_MAX_MEM_BYTES
-        spent, first = self._fixed_bytes(running), self._first_bytes(running)
-        if first > cap or (spent > cap and not flexible):
+        planned, first = self._fixed_bytes(running), self._first_bytes(running)
+        if first > cap or (planned > cap and not flexible):
             raise ContractError(
-                f"this takes about {max(spent, first) // 10**6} MB, the cap is "
+                f"this takes about {max(planned, first) // 10**6} MB, the cap is "
                 f"{cap // 10**6} MB; raise {option_text('max_mem_bytes')}"
             )
         for number, work in enumerate(flexible):
             assert work.fit is not None
-            share = max(cap - spent, 1) // (len(flexible) - number)
-            work.fit(cap, spent if len(flexible) == 1 else cap - share)
-            spent += work.planned_bytes()
+            share = max(cap - planned, 1) // (len(flexible) - number)
+            work.fit(cap, planned if len(flexible) == 1 else cap - share)
+            planned += work.planned_bytes()
 
     def needed_bytes(self) -> int:
         """Return the memory of the whole walk."""
@@ -92,80 +92,82 @@ class Walk:
         return self._fixed_bytes(running) - self._job.reserved_bytes + max(more, 0)
 
     def _fixed_bytes(self, running: list[StageWork]) -> int:
-        held = sum(work.held_bytes for work in running)
+        held_bytes = sum(work.held_bytes for work in running)
         job = self._job
         stored = 0 if job.bundle is None else max(job.bundle.stored_bytes - USUAL_BYTES, 0)
         resident: int = job.capture.resident_bytes
-        return FIXED_BYTES + stored + resident + job.reserved_bytes + held
+        return FIXED_BYTES + stored + resident + job.reserved_bytes + held_bytes
 
     def warnings(self) -> tuple[str, ...]:
         """Return what the stages have to say once the last row is out."""
         return tuple(text for work in self._works for text in work.warnings())
 
-    def stream(self, wanted: str) -> Stream:
+    def stream(self, name: str) -> Stream:
         """Return the rows of a plane; every call walks anew.
 
         Args:
-            wanted: Name of the plane.
+            name: Name of the plane.
 
         Raises:
             ContractError: If no stage gives it.
         """
-        (made,) = self.streams(wanted)
-        return made
+        (stream,) = self.streams(name)
+        return stream
 
-    def streams(self, *wanted: str) -> tuple[Stream, ...]:
+    def streams(self, *names: str) -> tuple[Stream, ...]:
         """Return the rows of several planes by one walk, to be read band by band in turns.
 
         Args:
-            wanted: Names of planes, no two alike.
+            names: Names of planes, no two alike.
 
         Raises:
             ContractError: If no stage gives one of them.
         """
-        for name in wanted:
+        for name in names:
             _giver_of(name, self.stages)
-        job, lasts = self._job, [self._instead.get(name, name) for name in wanted]
-        needed = self._needed(lasts)
-        takers = Counter([*lasts, *(name for number in needed for name in self._taken(number))])
-        there = {CAPTURE: _capture_stream(job, self._planes[CAPTURE]), **job.known}
-        ready = {name: stream.shared(takers[name]) for name, stream in there.items()}
-        job.log.meter.expect([name for number in needed for name in self.stages[number].gives])
-        for number in needed:
-            taken = [ready[name].pop() for name in self._taken(number)]
-            made = self._works[number].run(taken)
-            for name, given in zip(self.stages[number].gives, made, strict=True):
-                if name not in job.known:
-                    counted = given.timed(job.log.clock, self.keys[number]).metered(
+        job, lasts = self._job, [self._instead.get(name, name) for name in names]
+        numbers = self._stages_behind(lasts)
+        takers = Counter(
+            [*lasts, *(name for number in numbers for name in self._inputs_of(number))]
+        )
+        sources = {CAPTURE: _capture_stream(job, self._planes[CAPTURE]), **job.ready_planes}
+        ready = {name: stream.shared(takers[name]) for name, stream in sources.items()}
+        job.log.meter.expect([name for number in numbers for name in self.stages[number].gives])
+        for number in numbers:
+            inputs = [ready[name].pop() for name in self._inputs_of(number)]
+            outputs = self._works[number].run(inputs)
+            for name, output in zip(self.stages[number].gives, outputs, strict=True):
+                if name not in job.ready_planes:
+                    counted = output.timed(job.log.clock, self.keys[number]).metered(
                         job.log.meter, name
                     )
                     ready[name] = counted.shared(takers[name])
         return tuple(ready[last].pop() for last in lasts)
 
-    def keep(self, wanted: str) -> Stream:
+    def keep(self, name: str) -> Stream:
         """Read a plane whole; from now on it is known, and what gives it does not run again."""
-        stream = self.stream(wanted)
+        stream = self.stream(name)
         rows = stream.rows()
         whole = ArrayRows(rows.read(0, rows.shape[1]))
-        kept = replace(stream, source=whole, made=None, owned=False)
-        self._job.known[self._instead.get(wanted, wanted)] = kept
-        return kept
+        whole_stream = replace(stream, source=whole, band_iterator=None, owned=False)
+        self._job.ready_planes[self._instead.get(name, name)] = whole_stream
+        return whole_stream
 
     def taken_by(self, number: int) -> list[Stream]:
         """Return the streams that a stage takes; every call walks anew."""
         return [self.stream(name) for name in self.stages[number].takes]
 
-    def _needed(self, wanted: Sequence[str]) -> list[int]:
-        """Return the stages, in order, whose planes the wanted are made of and are not known."""
-        planes, needed, known = set(wanted), [], self._job.known.keys()
+    def _stages_behind(self, names: Sequence[str]) -> list[int]:
+        """Return the stages, in order, that make some planes from those that are ready."""
+        planes, numbers, ready = set(names), [], self._job.ready_planes.keys()
         for number in range(len(self.stages) - 1, -1, -1):
-            made = planes.intersection(self.stages[number].gives) - known
-            if made and self.ways[number] != LEFT_OUT:
-                planes.update(self._taken(number))
-                needed.append(number)
-        return needed[::-1]
+            outputs = planes.intersection(self.stages[number].gives) - ready
+            if outputs and self.ways[number] != LEFT_OUT:
+                planes.update(self._inputs_of(number))
+                numbers.append(number)
+        return numbers[::-1]
 
-    def _taken(self, number: int) -> tuple[str, ...]:
+    def _inputs_of(self, number: int) -> tuple[str, ...]:
         """Return the names of the planes that a stage takes; stand-ins for what is left out."""
         return tuple(self._instead.get(name, name) for name in self.stages[number].takes)
 
@@ -193,9 +195,9 @@ def probed(job: Job, planes: Sequence[str]) -> tuple[RowSource, ...]:
     """
     numbers = [_giver_of(plane, job.setup.stages) for plane in planes]
     for plane, number in zip(planes, numbers, strict=True):
-        if job.before is not None and number >= job.before:
+        if job.probe_end is not None and number >= job.probe_end:
             raise ContractError(f"the plane {plane!r} is asked for by a stage that it is made from")
-    walk = Walk(job.unheard(before=max(numbers)))
+    walk = Walk(job.with_new_log(probe_end=max(numbers)))
     return tuple(stream.rows() for stream in walk.streams(*planes))
 
 
@@ -207,12 +209,12 @@ def _planes_of(job: Job) -> dict[str, Plane]:
     return {CAPTURE: plane}
 
 
-def _capture_stream(job: Job, stated: Plane) -> Stream:
+def _capture_stream(job: Job, sensor_plane: Plane) -> Stream:
     """Return the capture as it is."""
     capture = job.capture
     rows = capture.rows()
     return Stream(
-        plane=capture.plane(stated),
+        plane=capture.plane(sensor_plane),
         shape=rows.shape,
         gains=(1.0,) * capture.channels,
         source=rows,

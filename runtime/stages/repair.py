@@ -38,7 +38,7 @@ Places = tuple[NDArray[np.intp], ...]
 def prepare(entry: Repair, job: Job) -> StageWork:
     """Prepare the repair; nothing is decided here."""
     made: list[SoundRows] = []
-    mended = job.kept.setdefault(("repair", entry.takes), Mended())
+    mended = job.cache.setdefault(("repair", entry.takes), Mended())
 
     def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
         light, mask = taken[0], taken[1] if len(taken) > 1 else None
@@ -47,7 +47,7 @@ def prepare(entry: Repair, job: Job) -> StageWork:
         made.append(sound)
         given = [light.with_source(sound)]
         if mask is not None:
-            given.append(replace(mask, source=UnknownRows(mask.rows(), sound), made=None))
+            given.append(replace(mask, source=UnknownRows(mask.rows(), sound), band_iterator=None))
         return tuple(given[: len(entry.gives)])
 
     def warnings() -> tuple[str, ...]:

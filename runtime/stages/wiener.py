@@ -125,7 +125,7 @@ def prepare(entry: Wiener, job: Job) -> StageWork:
         job.log.record[FOCUS] = job.options.focus_um
 
     def warnings() -> tuple[str, ...]:
-        found = job.kept.get(_nearness_key(entry))
+        found = job.cache.get(_nearness_key(entry))
         return () if found is None else (found.describe(),)
 
     def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
@@ -235,9 +235,9 @@ def _scene_kernels(
 ) -> KernelsOfScene:
     """Compute the distance of every part of the capture, and return the kernels of it."""
     key = _nearness_key(entry)
-    if (found := job.kept.get(key)) is None:
+    if (found := job.cache.get(key)) is None:
         seen = cells_of(job, entry.takes, CELL_PX)
-        found = job.kept[key] = find_nearness(
+        found = job.cache[key] = find_nearness(
             seen.means,
             seen.clipped,
             kernels,

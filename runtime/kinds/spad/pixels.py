@@ -13,7 +13,7 @@ from camkit.runtime.rows import Rows
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pixels:
-    """Pixels of photons that are on their way through stages (`Stream.beside`).
+    """Pixels of photons that are on their way through stages (`Stream.facts`).
 
     Attributes:
         dark: (h, w) dark counts of a bin that the photons hold.
@@ -47,7 +47,7 @@ class Pixels:
     @classmethod
     def of(cls, photons: Stream) -> Self:
         """Return the pixels of photons; those that no stage corrected are not known."""
-        pixels = photons.beside
+        pixels = photons.facts
         return pixels if isinstance(pixels, cls) else cls.unknown(photons.shape[1:])
 
 

@@ -59,7 +59,7 @@ def test_an_assumed_place_is_noted_and_a_wrong_size_is_refused(bundle: Bundle) -
 
 def test_a_walk_that_nobody_hears_adds_no_section(bundle: Bundle) -> None:
     job = made_job(made_mosaic(), bundle)
-    job.unheard().log.sections["hdr"] = {"regions": 1}
+    job.with_new_log().log.sections["hdr"] = {"regions": 1}
     assert job.log.sections == {}
 
 

@@ -82,7 +82,7 @@ def test_a_source_or_bands_but_never_both_or_none() -> None:
     with pytest.raises(ContractError, match="either"):
         Stream(**fields)  # type: ignore[arg-type]
     with pytest.raises(ContractError, match="either"):
-        Stream(**fields, source=ArrayRows(PICTURE), made=_made())  # type: ignore[arg-type]
+        Stream(**fields, source=ArrayRows(PICTURE), band_iterator=_made())  # type: ignore[arg-type]
 
 
 def test_only_a_source_of_own_rows_gives_rows_to_change() -> None:

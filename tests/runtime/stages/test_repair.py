@@ -168,7 +168,7 @@ def test_a_second_walk_seeks_only_where_the_first_did_not(
             f"camkit.runtime.stages.repair.{name}",
             lambda light, mend=mend: sought.append(light.shape[-2]) or mend(light),
         )
-    other = job.unheard()
+    other = job.with_new_log()
     sound, unknown = run_stage(Repair(), other, *run_stage(Linearise(), other, captured(capture)))
     np.testing.assert_array_equal(read_all(sound.rows(), 7), wanted)
     np.testing.assert_array_equal(read_all(unknown.rows(), 7), clipped & ~broken)

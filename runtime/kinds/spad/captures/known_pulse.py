@@ -37,12 +37,12 @@ def pulse_of(job: Job, plane: str, guess: Callable[[FloatArray], Pulse] | None =
     stated_pulse = capture.timing.pulse()
     if stated_pulse is not None:
         return stated_pulse
-    if CACHE_KEY not in job.kept:
+    if CACHE_KEY not in job.cache:
         sample = _sample(job, plane)
-        job.kept[CACHE_KEY] = (
+        job.cache[CACHE_KEY] = (
             guess_pulse(sample, capture.an_axis) if guess is None else guess(sample)
         )
-    pulse: Pulse = job.kept[CACHE_KEY]
+    pulse: Pulse = job.cache[CACHE_KEY]
     return pulse
 
 

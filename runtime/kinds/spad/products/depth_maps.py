@@ -39,7 +39,7 @@ def make_depth(work: Reconstruction, capture: PhotonCapture, product: str) -> Re
     stream = work.stream_of(product)
     for _ in work.metered(stream.bands()):
         pass
-    depths = stream.beside
+    depths = stream.facts
     assert isinstance(depths, Depths)
     assert depths.pulse is not None  # its rows were read
     sharpened, scale = depths.whole(), 1 if depths.bins is None else depths.bins.scale

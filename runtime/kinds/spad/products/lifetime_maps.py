@@ -28,7 +28,7 @@ def make_lifetime(work: Reconstruction, capture: PhotonCapture, product: str) ->
     stream = work.stream_of(product)
     for _ in work.metered(stream.bands()):
         pass
-    decays = stream.beside
+    decays = stream.facts
     assert isinstance(decays, Decays)
     pulse, fitter = decays.pulse, decays.fitter
     assert pulse is not None  # its rows were read

@@ -60,7 +60,7 @@ def _photons(
         frames = _whole(stream, capture)
     work.job.log.meter.finish()
     notes = list[str]()
-    if isinstance(stream.beside, Pixels) and (blind := int(stream.beside.blind.sum())):
+    if isinstance(stream.facts, Pixels) and (blind := int(stream.facts.blind.sum())):
         notes.append(
             f"pile-up is too strong to correct in {blind} pixels: their photons are a lower bound"
         )

@@ -23,6 +23,6 @@ def prepare(_entry: Correct, job: Job) -> StageWork:
         (counts,) = inputs
         rows = CorrectedRows(counts.rows(), capture, owned=counts.gives_own_rows)
         plane = counts.plane.model_copy(update={"type": "float32"})
-        return (replace(counts.with_source(rows), plane=plane, beside=rows.pixels),)
+        return (replace(counts.with_source(rows), plane=plane, facts=rows.pixels),)
 
     return StageWork(run=run)

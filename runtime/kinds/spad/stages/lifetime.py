@@ -40,7 +40,7 @@ class Window:
 
 
 class Decays:
-    """The decays of every pixel, complete once all rows of lifetimes are out (`Stream.beside`).
+    """The decays of every pixel, complete once all rows of lifetimes are out (`Stream.facts`).
 
     Attributes:
         window: The bins that are fitted.
@@ -70,7 +70,7 @@ def prepare(entry: Lifetime, job: Job) -> StageWork:
         bands = _fitted(entry, job, photons, decays)
         plane = photons.plane.model_copy(update={"axes": "y x", "domain": "lifetime"})
         shape = 1, *photons.shape[1:]
-        return (replace(photons.with_bands(bands), plane=plane, shape=shape, beside=decays),)
+        return (replace(photons.with_bands(bands), plane=plane, shape=shape, facts=decays),)
 
     return StageWork(run=run)
 

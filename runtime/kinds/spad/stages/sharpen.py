@@ -32,7 +32,7 @@ PIXEL_BYTES: Final = 150
 
 @dataclass(slots=True, kw_only=True)
 class Depths:
-    """The surfaces of every pixel, complete once all rows of depth are out (`Stream.beside`).
+    """The surfaces of every pixel, complete once all rows of depth are out (`Stream.facts`).
 
     Attributes:
         pixels: What is known of the array's own pixels.
@@ -59,13 +59,13 @@ def prepare(entry: Sharpen, job: Job) -> StageWork:
     def run(inputs: Sequence[Stream]) -> tuple[Stream, ...]:
         (photons,) = inputs
         depths = Depths(pixels=Pixels.of(photons))
-        is_finer = isinstance(photons.beside, TimedBins)
+        is_finer = isinstance(photons.facts, TimedBins)
         bands = (
             _fine(entry, job, photons, depths) if is_finer else _strips(entry, job, photons, depths)
         )
         plane = photons.plane.model_copy(update={"axes": "y x", "domain": "depth"})
         shape = photons_of(job).settings.way.returns, *photons.shape[1:]
-        return (replace(photons.with_bands(bands), plane=plane, shape=shape, beside=depths),)
+        return (replace(photons.with_bands(bands), plane=plane, shape=shape, facts=depths),)
 
     return StageWork(run=run)
 
@@ -108,7 +108,7 @@ def _strips(entry: Sharpen, job: Job, photons: Stream, depths: Depths) -> Iterat
 
 def _fine(entry: Sharpen, job: Job, photons: Stream, depths: Depths) -> Iterator[Rows]:
     """Fit bins that were made finer."""
-    capture, timed_bins = photons_of(job), photons.beside
+    capture, timed_bins = photons_of(job), photons.facts
     assert isinstance(timed_bins, TimedBins)
     rows = photons.rows().read(0, photons.shape[1])
     depths.bins = bins = timed_bins.fine_bins

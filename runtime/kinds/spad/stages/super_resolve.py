@@ -41,10 +41,10 @@ def prepare(entry: SuperResolve, job: Job) -> StageWork:
         has_times = capture.product == "depth"
         shape = 1 if is_summed(capture) else count, camera.scale * height, camera.scale * width
         plane = job.known_bundle.manifest.all_planes[entry.gives[0]]
-        fine = replace(photons, plane=plane, shape=shape, made=None, owned=True)
+        fine = replace(photons, plane=plane, shape=shape, band_iterator=None, owned=True)
         if has_times:
             bins = TimedBins(entry, job, photons)
-            return (replace(fine, source=RowsMadeWhole(shape, bins.rows), beside=bins),)
+            return (replace(fine, source=RowsMadeWhole(shape, bins.rows), facts=bins),)
         source = RowsMadeWhole(shape, lambda: _frames(entry, job, photons))
         return (replace(fine, source=source),)
 
@@ -73,7 +73,7 @@ def given_rows(_entry: SuperResolve, job: Job, inputs: Sequence[Stream]) -> RowS
 
 
 class TimedBins:
-    """Bins that are made finer when their first row is asked for (`Stream.beside`).
+    """Bins that are made finer when their first row is asked for (`Stream.facts`).
 
     Attributes:
         fine_bins: How; None before.
