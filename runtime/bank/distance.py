@@ -7,7 +7,7 @@
 A block's cells are taken for light that all colours share, of a power that falls with frequency,
 and a little light of each colour's own, seen through the kernels of one distance:
 
-    Y_c = a_c H_c (x + e_c) + n_c,   power of x: s F,   of e_c: OWN s F
+    Y_c = a_c H_c (x + e_c) + n_c,   power of x: s F,   of e_c: COLOUR_POWER s F
     F = (f^2 + f0^2)^(-EXPONENT / 2), scaled to 1 at POWER_AT
 
 and what kernels cannot promise has the power MISTRUST s F. A lens blurs its colours differently at

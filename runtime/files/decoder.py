@@ -1,7 +1,7 @@
 """The decoding child: started with its order, or ahead of it while its parent still imports.
 
-    decoder_ahead()  a child makes itself ready beside this process; the first order goes to it
-    decoder_of(order) that child, or a fresh one
+    decoder_ahead()    a child makes itself ready beside this process; the first order goes to it
+    decoder_of(order)  that child, or a fresh one
 
 What a child imports takes a quarter of a second, which one photograph need not wait for. Imports
 the standard library alone, since the command line does so before anything else.
