@@ -249,7 +249,7 @@ class Reconstruction:
         """Read a plane of the manifest whole and make it known.
 
         What gives it does not run again, neither here nor in another reconstruction of the same
-        capture that is told of it (`known` of `Pipeline.start`).
+        capture that is told of it (`known_planes` of `Pipeline.start`).
         """
         return self._walk.keep(plane)
 

@@ -77,13 +77,13 @@ def _stem(path: Path) -> str:
 
 
 def _beside(options: Options) -> tuple[str, ...]:
-    return BESIDE[options.chosen("product")]
+    return BESIDE[options.kind_choice("product")]
 
 
 OUTPUTS: Final = product_outputs(
     make,
     suffix=".npz",
-    beside=_beside,
+    extra_suffixes=_beside,
     formats={"exr": ".exr", "tiff": ".tif"},
     identity=identity,
     stem=_stem,
