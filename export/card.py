@@ -14,7 +14,7 @@ from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray, depth_name
 from camkit.export.energy import energy_diameter_px, modulation
 from camkit.runtime.proof.laws.law import number_text
-from camkit.runtime.proof.laws.proof import Found
+from camkit.runtime.proof.laws.proof import MeasuredLaws
 
 BORDER_PX: Final = 16
 _LAWS: Final = "\n## Laws of a picture"
@@ -84,7 +84,7 @@ def card_text(
     return "\n".join(lines)
 
 
-def laws_text(found: Found) -> str:
+def laws_text(found: MeasuredLaws) -> str:
     """Return the part of the card that states which laws of a picture its networks keep."""
     if isinstance(found, str):
         return f"\nLaws of a picture: {found}.\n"
@@ -93,7 +93,7 @@ def laws_text(found: Found) -> str:
     for size, laws in found.items():
         for law in laws:
             front = "" if law.front is None else number_text(law.front, law.unit)
-            kept = "kept" if law.kept else f"BROKEN: {law.where}"
+            kept = "kept" if law.is_kept else f"BROKEN: {law.where}"
             lines.append(
                 f"| {size or ''} | {law.name.replace('_', ' ')} | "
                 f"{number_text(law.worst, law.unit)} | {number_text(law.limit, law.unit)} | "
@@ -102,7 +102,7 @@ def laws_text(found: Found) -> str:
     return "\n".join([*lines, ""])
 
 
-def with_laws_text(card: str, manifest: Manifest, found: Found) -> str:
+def with_laws_text(card: str, manifest: Manifest, found: MeasuredLaws) -> str:
     """Return a card that names another version of its bundle, and other laws.
 
     Args:

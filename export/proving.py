@@ -58,7 +58,7 @@ def write_proved(
     with tempfile.TemporaryDirectory() as folder:
         trial = Path(folder) / out.name
         write_bundle(trial, manifest, members)
-        report = check_bundle(trial, run=case_work, without=("laws",))
+        report = check_bundle(trial, run=case_work, left_out=("laws",))
     if not report.passed:
         raise ParityError("the bundle fails its own check: " + "; ".join(report.lines()))
     return write_bundle(out, manifest, members), report

@@ -81,11 +81,11 @@ def capture_of_array(
 
 def _check_float_mosaic(mosaic: NDArray[np.float32], white_level: float) -> None:
     """Refuse a mosaic that seems to be linear light already, which would come out black."""
-    known = mosaic[np.isfinite(mosaic)]
-    if white_level >= _LEAST_DN_WHITE and 0 < known.max() <= _MOST_LIGHT:
+    finite = mosaic[np.isfinite(mosaic)]
+    if white_level >= _LEAST_DN_WHITE and 0 < finite.max() <= _MOST_LIGHT:
         raise ContractError(
             f"a float mosaic is in DN as the sensor gives it (white {white_level:g}); this one "
-            f"reaches {known.max():g}: multiply light by white - black and add black"
+            f"reaches {finite.max():g}: multiply light by white - black and add black"
         )
 
 

@@ -49,8 +49,8 @@ def check_iso(iso: Any) -> None:
     Raises:
         ContractError: If it is neither None nor a number that can be.
     """
-    known: Any = iso if isinstance(iso, Real) else math.nan
-    if iso is not None and not 0 < known <= MAX_ISO:
+    number: Any = iso if isinstance(iso, Real) else math.nan
+    if iso is not None and not 0 < number <= MAX_ISO:
         raise ContractError(f"iso must be a number in 0..{MAX_ISO:g}; got {repr(iso)[:20]}")
 
 
@@ -79,15 +79,15 @@ class MosaicOptions:
             )
         lower = 0.0 if black is None else black
         if not 0 <= lower < (np.inf if white is None else white) or white == np.inf:
-            known = (("black", black), ("white", white))
-            given = ", ".join(f"{name} {value}" for name, value in known if value is not None)
-            raise ContractError(f"levels must be 0 <= black < white; got {given}")
+            levels = (("black", black), ("white", white))
+            text = ", ".join(f"{name} {value}" for name, value in levels if value is not None)
+            raise ContractError(f"levels must be 0 <= black < white; got {text}")
 
     @property
     def levels(self) -> frozenset[str]:
         """Name the levels that are said: "black", "white"."""
-        said = {"black": self.black_level, "white": self.white_level}
-        return frozenset(name for name, level in said.items() if level is not None)
+        levels = {"black": self.black_level, "white": self.white_level}
+        return frozenset(name for name, level in levels.items() if level is not None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,17 +157,17 @@ class Capture:
         if self.cfa is not None and self.cfa not in CFA_PATTERNS:
             raise ContractError(f"CFA must be one of {CFA_PATTERNS}; got {self.cfa!r}")
         if len(shape) != (2 if mosaic else 3):
-            wanted = "(h, w) for a mosaic" if mosaic else "(c, h, w) for planes (cfa is None)"
-            raise ContractError(f"samples must be {wanted}; got {shape}")
+            expected = "(h, w) for a mosaic" if mosaic else "(c, h, w) for planes (cfa is None)"
+            raise ContractError(f"samples must be {expected}; got {shape}")
         if 0 in shape:
             raise ContractError(f"samples must not be empty; got {shape}")
 
     def _check_levels(self) -> None:
-        wanted = (self.samples.shape[0],) if self.cfa is None else (2, 2)
+        shape = (self.samples.shape[0],) if self.cfa is None else (2, 2)
         black = self.black_level
-        if black.shape != wanted or black.dtype != np.float32 or not np.isfinite(black).all():
+        if black.shape != shape or black.dtype != np.float32 or not np.isfinite(black).all():
             raise ContractError(
-                f"black level must be finite float32 {wanted}; got {black.dtype} {black.shape}"
+                f"black level must be finite float32 {shape}; got {black.dtype} {black.shape}"
             )
         if not (np.isfinite(self.white_level) and self.white_level > black.max()):
             raise ContractError(
@@ -206,19 +206,19 @@ class Capture:
         """Return (channel, h, w) of the samples; a mosaic is one channel."""
         return 1 if self.cfa is not None else self.channels, self.height, self.width
 
-    def plane(self, stated: Plane | None) -> Plane:
+    def plane(self, sensor_plane: Plane | None) -> Plane:
         """Return what the samples are.
 
         Args:
-            stated: The plane of a bundle's sensor; planes that come in place of a mosaic have their
-                own channels.
+            sensor_plane: The plane of a bundle's sensor; planes that come in place of a mosaic have
+                their own channels.
         """
         channels = MOSAIC if self.cfa is not None else RGB
-        if stated is None:
+        if sensor_plane is None:
             return Plane(type="uint16", channels=channels, domain="dn")
-        if self.cfa is None and stated.channels == MOSAIC:
-            return stated.model_copy(update={"channels": RGB})
-        return stated
+        if self.cfa is None and sensor_plane.channels == MOSAIC:
+            return sensor_plane.model_copy(update={"channels": RGB})
+        return sensor_plane
 
     def rows(self) -> RowSource:
         """Return the samples as the file holds them."""

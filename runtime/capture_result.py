@@ -65,14 +65,14 @@ class Result:
         Raises:
             ContractError: If this product has no picture of that format.
         """
-        found = dict(self.writers)
+        writers = dict(self.writers)
         if format_ is not None:
             if format_ not in self.pictures:
-                offered = ", ".join(sorted(self.pictures)) or "none"
+                names = ", ".join(sorted(self.pictures)) or "none"
                 raise ContractError(
                     f"this product has no picture as {format_}; {option_text('format')} may be: "
-                    f"{offered}"
+                    f"{names}"
                 )
             suffix, write = self.pictures[format_]
-            found[suffix] = write
-        return found
+            writers[suffix] = write
+        return writers

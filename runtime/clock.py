@@ -22,8 +22,8 @@ class StageClock:
         self.seconds: dict[str, float] = {}
         self.cpu_seconds: dict[str, float] = {}
         self._running: list[str] = []
-        self._since = 0.0
-        self._cpu_since = 0.0
+        self._start_s = 0.0
+        self._cpu_start_s = 0.0
 
     @property
     def running(self) -> str | None:
@@ -56,9 +56,9 @@ class StageClock:
         now, cpu = time.perf_counter(), time.process_time()
         if self._running:
             name = self._running[-1]
-            self.seconds[name] = self.seconds.get(name, 0.0) + now - self._since
-            self.cpu_seconds[name] = self.cpu_seconds.get(name, 0.0) + cpu - self._cpu_since
-        self._since, self._cpu_since = now, cpu
+            self.seconds[name] = self.seconds.get(name, 0.0) + now - self._start_s
+            self.cpu_seconds[name] = self.cpu_seconds.get(name, 0.0) + cpu - self._cpu_start_s
+        self._start_s, self._cpu_start_s = now, cpu
 
 
 class TimedRows:

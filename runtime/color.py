@@ -68,8 +68,8 @@ def color_stage(
         ContractError: If the space is unknown or the matrix is singular.
     """
     if output not in get_args(OutputColor):
-        known = ", ".join(get_args(OutputColor))
-        raise ContractError(f"colour must be one of {known}; got {output!r}")
+        names = ", ".join(get_args(OutputColor))
+        raise ContractError(f"colour must be one of {names}; got {output!r}")
     to_rec709 = rec709_of_planes(color_matrix)
     primaries: Primaries = REC709_PRIMARIES
     white, matrix = D65, to_rec709

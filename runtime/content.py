@@ -72,11 +72,11 @@ class Content:
     lights: NDArray[np.bool_]
 
     def __post_init__(self) -> None:
-        wanted = lattice_shape(self.height_px, self.width_px)
+        shape = lattice_shape(self.height_px, self.width_px)
         for name in ("level", "detail", "noise", "clipped", "field"):
             got = getattr(self, name)
-            if got.shape != wanted or not np.isfinite(got).all():
-                raise ContractError(f"{name} must be finite {wanted} cells; got {got.shape}")
+            if got.shape != shape or not np.isfinite(got).all():
+                raise ContractError(f"{name} must be finite {shape} cells; got {got.shape}")
         places = -(-self.height_px // LIGHT_PX), -(-self.width_px // LIGHT_PX)
         if self.lights.shape != places:
             raise ContractError(f"lights must be {places} squares; got {self.lights.shape}")
@@ -98,8 +98,8 @@ class Content:
         """Return detail (row, column) that blur leaves in a cell: its own and its neighbours'."""
         import scipy.ndimage
 
-        around = scipy.ndimage.maximum_filter(self.detail, size=3, mode="nearest")
-        return np.asarray(self.detail + SPILL * around)
+        largest = scipy.ndimage.maximum_filter(self.detail, size=3, mode="nearest")
+        return np.asarray(self.detail + SPILL * largest)
 
     @property
     def clipped_fraction(self) -> float:
@@ -209,12 +209,12 @@ def light_squares(capture: Capture) -> NDArray[np.bool_]:
     """Return (row, column) of the squares of LIGHT_PX, true where any sample is clipped."""
     height, width = capture.height, capture.width
     lefts = np.arange(0, width, LIGHT_PX)
-    found = np.zeros((-(-height // LIGHT_PX), lefts.size), dtype=np.bool_)
+    squares = np.zeros((-(-height // LIGHT_PX), lefts.size), dtype=np.bool_)
     for row, top in enumerate(range(0, height, LIGHT_PX)):
         clipped = capture.saturated_rows(top, min(top + LIGHT_PX, height))
         columns = clipped.reshape(-1, width).any(axis=0)
-        found[row] = np.logical_or.reduceat(columns, lefts)
-    return found
+        squares[row] = np.logical_or.reduceat(columns, lefts)
+    return squares
 
 
 class _Sums:
@@ -243,13 +243,13 @@ class _Sums:
         expected = variance / (2 * np.maximum(lifted, np.float32(BLACK)))
         # The first column has no left neighbour: its step counts as 0.
         across = np.square(np.diff(curved, axis=2, prepend=curved[:, :, :1]))
-        self._put(0, row, bins[self._level])
-        self._put(1, row, across)
-        self._put(2, row, np.square(np.diff(curved, axis=1)))
-        self._put(3, row, expected)
-        self._put(4, row, clipped[None])
+        self._add_row(0, row, bins[self._level])
+        self._add_row(1, row, across)
+        self._add_row(2, row, np.square(np.diff(curved, axis=1)))
+        self._add_row(3, row, expected)
+        self._add_row(4, row, clipped[None])
 
-    def _put(self, which: int, row: int, values: FloatArray) -> None:
+    def _add_row(self, which: int, row: int, values: FloatArray) -> None:
         columns = values.sum(axis=(0, 1), dtype=np.float64)
         self._totals[which, row] += np.add.reduceat(columns, self._starts)
         widths = np.diff(np.append(self._starts, values.shape[2]))

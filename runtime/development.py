@@ -150,9 +150,9 @@ def make_file(
         _check_free(source, paths, write)
         with atomic_outputs(sidecar_path(target), *paths) as (proof, *parts):
             write_s = files.write(parts)
-            main, *beside = (file_sha256(part) for part in parts)
-            made = files.result()
-            seconds = {"decode": decode_s, **made.seconds, "write": write_s}
+            main, *extra_hashes = (file_sha256(part) for part in parts)
+            product = files.result()
+            seconds = {"decode": decode_s, **product.seconds, "write": write_s}
             result = FileResult(
                 input=source,
                 output=target,
@@ -161,7 +161,7 @@ def make_file(
                 size=work.size,
                 seconds=seconds,
                 peak_rss_mb=max(peak_rss_mb(), decoded_mb),
-                warnings=made.warnings,
+                warnings=product.warnings,
                 beside=tuple(paths[1:]),
             )
             if estimate is not None:
@@ -172,12 +172,12 @@ def make_file(
                 **result.to_json(),
                 **identity_of(source, input_sha256, pipeline, write, mosaic),
                 "output_sha256": main,
-                "beside_sha256": dict(zip(files.suffixes[1:], beside, strict=True)),
-                "plan": dict(made.record),
+                "beside_sha256": dict(zip(files.suffixes[1:], extra_hashes, strict=True)),
+                "plan": dict(product.record),
                 "clipped_fraction": work.clipped_fraction,
                 **outputs.facts(work, write),
             }
-            proof.write_text(sidecar_text(record, made.sections), encoding="utf-8")
+            proof.write_text(sidecar_text(record, product.sections), encoding="utf-8")
     return result
 
 
@@ -210,8 +210,8 @@ def proved_done(
     if not (source.is_file() and target.is_file() and sidecar_path(target).is_file()):
         return False
     record = read_sidecar(target)
-    wanted = identity_of(source, file_sha256(source), pipeline, write, mosaic)
-    if record is None or any(record.get(key) != value for key, value in wanted.items()):
+    identity = identity_of(source, file_sha256(source), pipeline, write, mosaic)
+    if record is None or any(record.get(key) != value for key, value in identity.items()):
         return False
     if record.get("output_sha256") != file_sha256(target):
         return False
@@ -222,8 +222,8 @@ def _are_whole(target: Path, hashes: Any) -> bool:
     """Return whether the files beside a main one are those of its sidecar."""
     if not isinstance(hashes, dict):
         return False
-    beside = {target.with_suffix(str(suffix)): sha256 for suffix, sha256 in hashes.items()}
-    return all(path.is_file() and file_sha256(path) == sha for path, sha in beside.items())
+    extra_files = {target.with_suffix(str(suffix)): sha256 for suffix, sha256 in hashes.items()}
+    return all(path.is_file() and file_sha256(path) == sha for path, sha in extra_files.items())
 
 
 def identity_of(
@@ -237,18 +237,18 @@ def identity_of(
     from camkit import __version__
 
     free = ("threads", "max_mem_bytes", "tile_px")
-    chosen = {k: v for k, v in asdict(pipeline.options).items() if k not in free}
-    if chosen["depth_m"] == math.inf:
-        chosen["depth_m"] = "inf"  # JSON knows no infinity
-    chosen["unit"] = None if pipeline.options.unit is None else asdict(pipeline.options.unit)
+    settings = {k: v for k, v in asdict(pipeline.options).items() if k not in free}
+    if settings["depth_m"] == math.inf:
+        settings["depth_m"] = "inf"  # JSON knows no infinity
+    settings["unit"] = None if pipeline.options.unit is None else asdict(pipeline.options.unit)
     outputs = pipeline.part.outputs
-    chosen["format"] = outputs.format(write)
-    chosen["linear"] = write.linear
-    chosen |= {"jpeg_quality": write.quality if write.format == "jpeg" else None}
-    chosen |= {"strip_metadata": write.strip_metadata}
-    chosen |= {"preview": True} if write.preview else {}
-    chosen["mosaic"] = None if mosaic is None else asdict(mosaic)
-    chosen["of_kind"] = {
+    settings["format"] = outputs.format(write)
+    settings["linear"] = write.linear
+    settings |= {"jpeg_quality": write.quality if write.format == "jpeg" else None}
+    settings |= {"strip_metadata": write.strip_metadata}
+    settings |= {"preview": True} if write.preview else {}
+    settings["mosaic"] = None if mosaic is None else asdict(mosaic)
+    settings["of_kind"] = {
         **dict(pipeline.options.of_kind),
         **outputs.identity(pipeline.options, source),
     }
@@ -256,7 +256,7 @@ def identity_of(
         "camkit": __version__,
         "input_sha256": input_sha256,
         "bundle_sha256": None if pipeline.bundle is None else pipeline.bundle.sha256,
-        "options": chosen,
+        "options": settings,
     }
     return dict(json.loads(json.dumps(identity)))
 

@@ -50,12 +50,15 @@ def observe(capture: Capture, noise: NoiseModel) -> dict[str, float]:
     Returns:
         Name -> value of `QUANTITIES`; a float capture has no `bit_depth`.
     """
-    seen = {"grey_noise": grey_noise(noise), "side_px": float(min(capture.height, capture.width))}
-    seen |= _sampled(capture)
+    conditions = {
+        "grey_noise": grey_noise(noise),
+        "side_px": float(min(capture.height, capture.width)),
+    }
+    conditions |= _sampled(capture)
     if np.issubdtype(capture.samples.dtype, np.integer):
         span = capture.white_level - float(capture.black_level.max())
-        seen["bit_depth"] = float(np.log2(span + 1))
-    return {name: seen[name] for name in QUANTITIES if name in seen}
+        conditions["bit_depth"] = float(np.log2(span + 1))
+    return {name: conditions[name] for name in QUANTITIES if name in conditions}
 
 
 def _sampled(capture: Capture) -> dict[str, float]:
@@ -92,31 +95,31 @@ def _repair(capture: Capture, rows: FloatArray) -> tuple[FloatArray, np.ndarray]
     return repair_planes(rows) if capture.cfa is None else repair_mosaic(rows)
 
 
-def findings(envelope: Mapping[str, Range], seen: Mapping[str, float]) -> tuple[str, ...]:
+def findings(envelope: Mapping[str, Range], conditions: Mapping[str, float]) -> tuple[str, ...]:
     """Return the properties of a capture that lie outside.
 
     Args:
         envelope: The manifest's ranges; names that this version does not know are passed over.
-        seen: From `observe`.
+        conditions: From `observe`.
 
     Returns:
         One phrase per quantity outside its range, in the order of `QUANTITIES`.
     """
     return tuple(
-        f"{meaning} ({name}) is {seen[name]:.3g}, outside {envelope[name].low:.3g} to "
+        f"{meaning} ({name}) is {conditions[name]:.3g}, outside {envelope[name].low:.3g} to "
         f"{envelope[name].high:.3g}"
         for name, meaning in QUANTITIES.items()
         if name in envelope
-        and name in seen
-        and not envelope[name].low <= seen[name] <= envelope[name].high
+        and name in conditions
+        and not envelope[name].low <= conditions[name] <= envelope[name].high
     )
 
 
-def verdict(found: tuple[str, ...], bundle: str, on_unsafe: OnUnsafe) -> str | None:
+def verdict(outside: tuple[str, ...], bundle: str, on_unsafe: OnUnsafe) -> str | None:
     """Return the warning of findings.
 
     Args:
-        found: From `findings`.
+        outside: From `findings`.
         bundle: Name for the message.
         on_unsafe: What the caller wants done.
 
@@ -126,9 +129,9 @@ def verdict(found: tuple[str, ...], bundle: str, on_unsafe: OnUnsafe) -> str | N
     Raises:
         ContractError: If something was found and the caller wants that to fail.
     """
-    if not found:
+    if not outside:
         return None
-    text = f"outside the measured range of bundle {bundle}: {'; '.join(found)}"
+    text = f"outside the measured range of bundle {bundle}: {'; '.join(outside)}"
     if on_unsafe == "fail":
         raise ContractError(
             f"{text}; use {option_text('on_unsafe', 'warn')} or fallback, or another "

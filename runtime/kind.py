@@ -74,7 +74,7 @@ class RuntimePart:
         outputs: What captures become, in memory and as files.
         of_capture: What a caller may say of how a capture was taken: names of options, and of
             parameters of `Pipeline.run`.
-        named: A capture's file -> the bundle that it names; None if it names none.
+        bundle_of: A capture's file -> the bundle that it names; None if it names none.
         describe: (a capture's file, how to read a headerless mosaic) -> what it is, as plain JSON
             values.
         simulate: (scene, bundle, its `simulation`) -> what the camera records; a scene is (3, h, w)
@@ -95,7 +95,7 @@ class RuntimePart:
     know: Callable[[Job], Job] = know_photograph
     outputs: Outputs = PICTURES
     of_capture: frozenset[str] = OF_PHOTOGRAPHS
-    named: Callable[[Path], str | None] = named_bundle
+    bundle_of: Callable[[Path], str | None] = named_bundle
     describe: Callable[[Path, MosaicOptions | None], Mapping[str, Any]] = describe_photograph
     simulate: Callable[[Any, Bundle, Any], Any] = photograph
     simulation: type = SimulationOptions

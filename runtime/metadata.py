@@ -72,21 +72,21 @@ class Metadata:
     altitude_m: float | None = None
 
     def __post_init__(self) -> None:
-        told = asdict(self)
-        for name, value in told.items():
+        values = asdict(self)
+        for name, value in values.items():
             if value != _cleaned(name, value):
                 raise ContractError(f"{name} of a photograph cannot be {value!r}")
-        if _without_half_a_place(told) != told:
+        if _without_half_a_place(values) != values:
             raise ContractError("a place needs latitude and longitude, or neither")
 
     @classmethod
-    def believable(cls, **told: Any) -> Self:
+    def believable(cls, **values: Any) -> Self:
         """Return what can be believed of foreign values; an odd one counts as not stated.
 
         Args:
-            **told: Fields by name, of any type and content.
+            **values: Fields by name, of any type and content.
         """
-        cleaned = {name: _cleaned(name, value) for name, value in told.items()}
+        cleaned = {name: _cleaned(name, value) for name, value in values.items()}
         empty = {f.name: f.default for f in fields(cls)}
         return cls(**_without_half_a_place(empty | cleaned))
 
@@ -97,25 +97,25 @@ class Metadata:
             return self.model
         return f"{self.make} {self.model}".strip()
 
-    def completed(self, **told: Any) -> "Metadata":
+    def completed(self, **values: Any) -> "Metadata":
         """Return the same with further values where none is stated, as far as they can be believed.
 
         Args:
-            **told: Fields by name.
+            **values: Fields by name.
         """
-        more = asdict(Metadata.believable(**told))
-        mine = self.stated()
+        more = asdict(Metadata.believable(**values))
+        mine = self.to_json()
         return replace(self, **{k: v for k, v in more.items() if k not in mine})
 
-    def stated(self) -> dict[str, str | float]:
+    def to_json(self) -> dict[str, str | float]:
         """Return what is stated, by name, as plain JSON values."""
         return {name: value for name, value in asdict(self).items() if value not in ("", None)}
 
 
-def _without_half_a_place(told: dict[str, Any]) -> dict[str, Any]:
-    if told["latitude_deg"] is None or told["longitude_deg"] is None:
-        return told | dict.fromkeys(("latitude_deg", "longitude_deg", "altitude_m"))
-    return told
+def _without_half_a_place(values: dict[str, Any]) -> dict[str, Any]:
+    if values["latitude_deg"] is None or values["longitude_deg"] is None:
+        return values | dict.fromkeys(("latitude_deg", "longitude_deg", "altitude_m"))
+    return values
 
 
 def _cleaned(name: str, value: Any) -> Any:
@@ -137,15 +137,15 @@ def clean_text(value: Any) -> str:
     """Return foreign text without what does not print, and not too long; empty for other values."""
     if not isinstance(value, str):
         return ""
-    shown = (c if c.isprintable() else " " for c in value[: 4 * MAX_TEXT])
-    return " ".join("".join(shown).split())[:MAX_TEXT].strip()
+    printable = (c if c.isprintable() else " " for c in value[: 4 * MAX_TEXT])
+    return " ".join("".join(printable).split())[:MAX_TEXT].strip()
 
 
 def _date(text: str) -> str:
-    found = _DATE.match(text)
-    if not found:
+    match = _DATE.match(text)
+    if not match:
         return ""
-    year, month, day, time = found.groups()
+    year, month, day, time = match.groups()
     try:
         datetime.fromisoformat(f"{year}-{month}-{day} {time}")
     except ValueError:

@@ -126,7 +126,7 @@ class Options:
                 f"got {self.max_mem_bytes // 10**6} MB"
             )
 
-    def chosen(self, name: str) -> str | None:
+    def kind_choice(self, name: str) -> str | None:
         """Return the caller's value of a kind's own option; None if there is none."""
         return dict(self.of_kind).get(name)
 
@@ -166,12 +166,12 @@ def with_choices(options: Options, choices: Mapping[str, object]) -> Options:
         ContractError: If one is unknown, or cannot be what it was given.
     """
     check_value("options", options, Options)
-    own = kind_option_names()
-    check_names(choices, {*plain_names(), *own})
-    plain = {name: value for name, value in choices.items() if name not in own}
+    kind_names = kind_option_names()
+    check_names(choices, {*plain_names(), *kind_names})
+    plain = {name: value for name, value in choices.items() if name not in kind_names}
     of_kind = dict(options.of_kind)
     of_kind |= {
-        name: _text_of(name, choices[name]) for name in own if choices.get(name) is not None
+        name: _text_of(name, choices[name]) for name in kind_names if choices.get(name) is not None
     }
     return replace(options, **{"of_kind": tuple(sorted(of_kind.items())), **plain})  # type: ignore[arg-type]
 
@@ -181,17 +181,17 @@ def plain_names() -> list[str]:
     return [name for name in Options.__dataclass_fields__ if name != "of_kind"]
 
 
-def check_names(choices: Mapping[str, object], known: Set[str]) -> None:
+def check_names(choices: Mapping[str, object], names: Set[str]) -> None:
     """Refuse names that are no options.
 
     Raises:
         ContractError: Names them, and near names or all there are.
     """
-    if unknown := sorted(set(choices) - known):
-        near = {n for name in unknown for n in difflib.get_close_matches(name, known, n=2)}
+    if unknown := sorted(set(choices) - names):
+        near = {n for name in unknown for n in difflib.get_close_matches(name, names, n=2)}
         hint = f"did you mean {' or '.join(sorted(near))}? " if near else ""
         raise ContractError(
-            f"unknown option(s) {', '.join(unknown)}; {hint}known are {', '.join(sorted(known))}"
+            f"unknown option(s) {', '.join(unknown)}; {hint}known are {', '.join(sorted(names))}"
         )
 
 
@@ -219,8 +219,10 @@ def with_absolute_files(options: Options) -> Options:
 def given_options(options: Options) -> list[str]:
     """Return the options that differ from the defaults, those of kinds by their own names."""
     plain = Options()
-    given = [f.name for f in fields(Options) if getattr(options, f.name) != getattr(plain, f.name)]
-    return [name for name in given if name != "of_kind"] + [name for name, _ in options.of_kind]
+    changed = [
+        f.name for f in fields(Options) if getattr(options, f.name) != getattr(plain, f.name)
+    ]
+    return [name for name in changed if name != "of_kind"] + [name for name, _ in options.of_kind]
 
 
 def check_kind_options(options: Options, kind: Kind, where: str) -> None:
@@ -234,8 +236,8 @@ def check_kind_options(options: Options, kind: Kind, where: str) -> None:
     Raises:
         ContractError: Names them and the kind that they are for.
     """
-    own = {option.name for option in kind.options}
-    if foreign := [name for name, _ in options.of_kind if name not in own]:
+    names = {option.name for option in kind.options}
+    if foreign := [name for name, _ in options.of_kind if name not in names]:
         makers = [k for k in all_kinds() if any(o.name == foreign[0] for o in k.options)]
         raise ContractError(
             f"{option_list(foreign)} does not apply {where}: it is for cameras of the "

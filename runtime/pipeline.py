@@ -50,9 +50,6 @@ from camkit.runtime.plan.planner import asked_work, default_size
 from camkit.runtime.plan.speed import Speed, measure_speed
 from camkit.runtime.stage_finder import check_stages
 
-Picture = Summary = Made = Result
-"""Names by which results of `process`, `stream` and `make` have been known."""
-
 
 class Pipeline:
     """A bundle with options, ready to reconstruct captures; safe to share between threads.
@@ -110,8 +107,8 @@ class Pipeline:
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle what the pipeline was made from; the bundle is opened again by its hash."""
         bundle = self.bundle
-        known = None if bundle is None else (bundle.path, bundle.manifest.name, bundle.sha256)
-        return _reopened, (known, self.options, self.kind)
+        origin = None if bundle is None else (bundle.path, bundle.manifest.name, bundle.sha256)
+        return _reopened, (origin, self.options, self.kind)
 
     def network(self, role: str, size: str) -> NetworkEngine:
         """Return the network of a role and size, made when first asked for.
@@ -123,8 +120,8 @@ class Pipeline:
             raise ContractError("without a bundle there is no network")
         with self._lock:
             if (role, size) not in self._engines:
-                made = _engine(self.bundle, (role, size), self.options, self.threads)
-                self._engines[role, size] = made
+                engine = _engine(self.bundle, (role, size), self.options, self.threads)
+                self._engines[role, size] = engine
             return self._engines[role, size]
 
     def speed(self, sizes: Sequence[str]) -> Speed:
@@ -140,9 +137,9 @@ class Pipeline:
         with self._lock:
             if self._speed is None or new:
                 stage = None if bundle is None else bundle.manifest.stage(Wiener)
-                made = measure_speed(new, stage, threads=self.threads)
-                self._speeds.update(made.network_s_per_mp)
-                self._speed = self._speed or made
+                measured = measure_speed(new, stage, threads=self.threads)
+                self._speeds.update(measured.network_s_per_mp)
+                self._speed = self._speed or measured
             return replace(self._speed, network_s_per_mp=dict(self._speeds))
 
     def read(
@@ -189,7 +186,7 @@ class Pipeline:
         *,
         progress: Progress | None = None,
         cancel: Cancel | None = None,
-        known: Mapping[str, Stream] | None = None,
+        known_planes: Mapping[str, Stream] | None = None,
         reserved_bytes: int = 0,
     ) -> Reconstruction:
         """Plan the reconstruction of one capture; its bands do the work.
@@ -198,7 +195,7 @@ class Pipeline:
             capture: What the sensor gave.
             progress: Called with (work done, work in all), over all stages.
             cancel: Asked ten times a second; true raises `Cancelled`.
-            known: Planes of this capture that another reconstruction kept, by name.
+            known_planes: Planes of this capture that another reconstruction kept, by name.
             reserved_bytes: Of the memory cap, what the caller needs for what becomes of the bands.
 
         Raises:
@@ -219,7 +216,7 @@ class Pipeline:
             know=self.part.know,
             progress=progress,
             cancel=cancel,
-            ready_planes=known,
+            ready_planes=known_planes,
             reserved_bytes=reserved_bytes,
         )
 
@@ -325,9 +322,9 @@ class Pipeline:
         Raises:
             ContractError: If something is said that captures of this kind do not have.
         """
-        given = {"mosaic": mosaic, "origin_px": origin_px}
-        said = [name for name, value in given.items() if value is not None]
-        if foreign := [name for name in said if name not in self.part.of_capture]:
+        facts = {"mosaic": mosaic, "origin_px": origin_px}
+        names = [name for name, value in facts.items() if value is not None]
+        if foreign := [name for name in names if name not in self.part.of_capture]:
             raise ContractError(
                 f"{option_list(foreign)} does not apply to captures of the kind "
                 f"{self.kind.name}; leave it out"
@@ -460,23 +457,23 @@ def load(
     """
     check_value("bundle", bundle, str | PathLike | None)
     check_value("kind", kind, str | None)
-    chosen = with_choices(Options() if options is None else options, choices)
+    settings = with_choices(Options() if options is None else options, choices)
     if bundle is None or str(bundle).lower() == "none":
-        return Pipeline(None, chosen, None if kind is None else find_kind(kind))
+        return Pipeline(None, settings, None if kind is None else find_kind(kind))
     if kind is not None:
         raise ContractError("a bundle is of a kind of its own; leave kind out")
-    return Pipeline(open_bundle(find_bundle(str(bundle))), chosen)
+    return Pipeline(open_bundle(find_bundle(str(bundle))), settings)
 
 
-def _reopened(known: tuple[Path, str, str] | None, options: Options, kind: Kind) -> Pipeline:
+def _reopened(origin: tuple[Path, str, str] | None, options: Options, kind: Kind) -> Pipeline:
     """Return the pipeline that was pickled.
 
     Raises:
         BundleError: If neither the path nor the name leads to the same bundle.
     """
-    if known is None:
+    if origin is None:
         return Pipeline(None, options, kind)
-    path, name, sha256 = known
+    path, name, sha256 = origin
     bundle = open_bundle(path if path.is_file() else find_bundle(name))
     if bundle.sha256 != sha256:
         raise BundleError(
@@ -486,10 +483,8 @@ def _reopened(known: tuple[Path, str, str] | None, options: Options, kind: Kind)
     return Pipeline(bundle, options)
 
 
-def _engine(
-    bundle: Bundle, chosen: tuple[str, str], options: Options, threads: int
-) -> NetworkEngine:
-    (role, size), networks = chosen, bundle.manifest.networks
+def _engine(bundle: Bundle, key: tuple[str, str], options: Options, threads: int) -> NetworkEngine:
+    (role, size), networks = key, bundle.manifest.networks
     if bundle.manifest.border != "edge":
         raise UnsupportedError(
             f"bundle {bundle.manifest.name} continues pictures by {bundle.manifest.border}; "

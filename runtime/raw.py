@@ -28,7 +28,7 @@ from camkit.regular_file import check_regular
 from camkit.runtime.cancel import current_wish, watched
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.files import raw_checks
-from camkit.runtime.files.decoder import given
+from camkit.runtime.files.decoder import decoder_of
 from camkit.runtime.files.formats import foreign
 from camkit.runtime.files.in_memory import Source, stored
 from camkit.runtime.files.raw_tags import sensor_place
@@ -111,12 +111,12 @@ def _read(
                 f"a pattern is for headerless PNG or TIFF; {file.name} has its own, omit "
                 f"{option_text('cfa')}"
             )
-        said = mosaic or MosaicOptions()
+        options = mosaic or MosaicOptions()
         if limits is not None:
-            return _read_isolated(file, limits, said)
+            return _read_isolated(file, limits, options)
         from camkit.runtime.raw_worker import decode_raw
 
-        return replace(decode_raw(file, said), sha256=file_sha256(file))
+        return replace(decode_raw(file, options), sha256=file_sha256(file))
     except OSError as error:
         raise DecodeError(f"cannot read {file}: {error.strerror or error}") from error
     except DecodeError as error:
@@ -175,15 +175,15 @@ def _read_picture(path: Path, mosaic: MosaicOptions | None, *, keep_codes: bool)
     return read_mosaic(path, mosaic)
 
 
-def _read_isolated(path: Path, limits: _Limits, said: MosaicOptions) -> Capture:
+def _read_isolated(path: Path, limits: _Limits, options: MosaicOptions) -> Capture:
     """Decode in a child; the hash is computed here while it works."""
     order = [
         str(path.resolve()),
         str(limits.max_memory_mb),
         str(os.getpid()),
-        json.dumps([said.black_level, said.white_level]),
+        json.dumps([options.black_level, options.white_level]),
     ]
-    with given(order) as decoder:
+    with decoder_of(order) as decoder:
         child = decoder.child
         expired = threading.Event()
         timer = threading.Timer(limits.timeout_s, _expire, (child, expired))

@@ -42,12 +42,12 @@ WRITE_ROWS: Final = 256
 PR_SET_PDEATHSIG: Final = 1
 
 
-def decode_raw(path: Path, said: MosaicOptions = NOTHING_SAID) -> Capture:
+def decode_raw(path: Path, options: MosaicOptions = NOTHING_SAID) -> Capture:
     """Decode a RAW or DNG file in this process.
 
     Args:
         path: The file.
-        said: Levels that the caller says in place of the file's.
+        options: Levels that the caller says in place of the file's.
 
     Returns:
         The visible area in sensor orientation. Planes of a monochrome sensor are one plane seen
@@ -57,7 +57,7 @@ def decode_raw(path: Path, said: MosaicOptions = NOTHING_SAID) -> Capture:
         DecodeError: If the file is refused or what was decoded is not believable.
         OSError: If the file cannot be read.
     """
-    with _decoded(path, said) as capture:
+    with _decoded(path, options) as capture:
         samples = capture.samples
         if _is_repeated(samples):
             return replace(capture, samples=np.broadcast_to(samples[0].copy(), samples.shape))
@@ -65,7 +65,7 @@ def decode_raw(path: Path, said: MosaicOptions = NOTHING_SAID) -> Capture:
 
 
 @contextmanager
-def _decoded(path: Path, said: MosaicOptions) -> Iterator[Capture]:
+def _decoded(path: Path, options: MosaicOptions) -> Iterator[Capture]:
     """Yield a capture whose samples lie in LibRaw's memory, which ends with the block."""
     import rawpy
 
@@ -76,13 +76,13 @@ def _decoded(path: Path, said: MosaicOptions) -> Iterator[Capture]:
         if picture is not None:
             check_readable(picture)
         if picture is not None and is_plain(picture):
-            yield to_capture(plain_decode(path, tags, picture, said), tags, picture, said)
+            yield to_capture(plain_decode(path, tags, picture, options), tags, picture, options)
             return
         with _named_in_utf8(path) as name, rawpy.imread(name) as raw:
-            decode = decode_with_libraw(raw, tags, picture, said)
+            decode = decode_with_libraw(raw, tags, picture, options)
             if picture is not None:
                 decode = noted(decode, frame_doubt(path, picture))
-            yield to_capture(decode, tags, picture, said)
+            yield to_capture(decode, tags, picture, options)
     except (rawpy.LibRawError, rawpy.NotSupportedError) as error:
         text = error.args[0].decode() if error.args and isinstance(error.args[0], bytes) else error
         raise DecodeError(f"LibRaw cannot decode the file: {text}") from error
@@ -199,14 +199,14 @@ def main(arguments: Sequence[str]) -> int:
             return 0
     path, max_memory_mb = Path(arguments[0]), int(arguments[1])
     black, white = json.loads(arguments[3])
-    said = MosaicOptions(black_level=black, white_level=white)
+    options = MosaicOptions(black_level=black, white_level=white)
     end_with(int(arguments[2]))
     # LibRaw may print: keep the pipe to ourselves and send strays to stderr
     with os.fdopen(os.dup(1), "wb", buffering=1 << 20) as out:
         os.dup2(2, 1)
         _limit_memory(max_memory_mb)
         try:
-            with _decoded(path, said) as capture:
+            with _decoded(path, options) as capture:
                 _send(capture, out)
         except BrokenPipeError:
             return 1  # the parent is gone or gave up

@@ -86,8 +86,8 @@ def changed_bands(
     top = 0
     for band in bands:
 
-        def work(first: int, last: int, whole: FloatArray = band, above: int = top) -> None:
-            change(whole[:, first:last], above + first)
+        def work(first: int, last: int, whole: FloatArray = band, first_row: int = top) -> None:
+            change(whole[:, first:last], first_row + first)
 
         run_chunks(work, band.shape[1], band.shape[2], threads=threads)
         top += band.shape[1]
@@ -112,7 +112,7 @@ class RollingRows:
     def __init__(self, shape: tuple[int, int, int], bands: Iterator[Rows]) -> None:
         self.shape = shape
         self._bands = bands
-        self._kept: list[tuple[int, Rows]] = []
+        self._bands_read: list[tuple[int, Rows]] = []
         self._end = 0
         self._readers: list[weakref.ref[RowReader]] = []
 
@@ -129,28 +129,30 @@ class RollingRows:
         if top < reader.top:
             raise ContractError(f"rows are read downwards; got {top} after {reader.top}")
         reader.top = top
-        living = [other for known in self._readers if (other := known()) is not None]
-        needed = min(other.top for other in living)
-        self._kept = [
-            _without_stale(y, b, needed) for y, b in self._kept if y + b.shape[1] > needed
+        living = [other for reference in self._readers if (other := reference()) is not None]
+        first_row = min(other.top for other in living)
+        self._bands_read = [
+            _without_stale(y, b, first_row)
+            for y, b in self._bands_read
+            if y + b.shape[1] > first_row
         ]
         while self._end < bottom:
             band = next(self._bands, None)
             if band is None:
                 raise ContractError(f"row {bottom} asked for, but the bands end at {self._end}")
-            if self._end + band.shape[1] > needed:
-                self._kept.append((self._end, band))
+            if self._end + band.shape[1] > first_row:
+                self._bands_read.append((self._end, band))
             self._end += band.shape[1]
-        pieces = [b[:, max(top - y, 0) : bottom - y] for y, b in self._kept if y < bottom]
+        pieces = [b[:, max(top - y, 0) : bottom - y] for y, b in self._bands_read if y < bottom]
         return [p for p in pieces if p.shape[1]]
 
 
-def _without_stale(top: int, band: Rows, needed: int) -> tuple[int, Rows]:
+def _without_stale(top: int, band: Rows, first_row: int) -> tuple[int, Rows]:
     """Copy the rows that are still needed, if so many are not that the band is worth freeing."""
-    stale = needed - top
+    stale = first_row - top
     if stale < max(STALE_ROWS, band.shape[1] // 2):
         return top, band
-    return needed, band[:, stale:].copy()
+    return first_row, band[:, stale:].copy()
 
 
 class RowReader:
@@ -195,10 +197,10 @@ class RowsMadeWhole:
         """
         self.shape = shape
         self._make = make
-        self._made: Rows | None = None
+        self._rows: Rows | None = None
 
     def read(self, top: int, bottom: int) -> Rows:
         """Return rows top..bottom as a view."""
-        if self._made is None:
-            self._made = self._make()
-        return self._made[:, top:bottom]
+        if self._rows is None:
+            self._rows = self._make()
+        return self._rows[:, top:bottom]

@@ -71,13 +71,13 @@ class Unit:
         if bundle is None:
             raise ContractError(f"camera body {self.name} belongs to a bundle, and there is none")
         self._check_identity(bundle)
-        known = known_facts(bundle.manifest.stages)
-        if foreign := [name for name in self.facts if name not in known]:
-            near = {n for name in foreign for n in difflib.get_close_matches(name, known, n=2)}
+        names = known_facts(bundle.manifest.stages)
+        if foreign := [name for name in self.facts if name not in names]:
+            near = {n for name in foreign for n in difflib.get_close_matches(name, names, n=2)}
             hint = f"did you mean {' or '.join(sorted(near))}?" if near else "leave them out;"
             raise ContractError(
                 f"camera body {self.name} states {', '.join(foreign)}, which no stage of bundle "
-                f"{bundle.manifest.name} knows; {hint} known are: {', '.join(known) or 'none'}"
+                f"{bundle.manifest.name} knows; {hint} known are: {', '.join(names) or 'none'}"
             )
         if self.focus_um:
             # a stage that knows of focus never joins without optics
@@ -96,12 +96,12 @@ class Unit:
                 f"camera body {self.name} is of a lens, and bundle {bundle.manifest.name} does not "
                 "state which lens it has; measure it with the bundle itself"
             )
-        found = lens_hash(bundle.member(PRESCRIPTION))
-        if found != self.lens_sha256:
+        lens_sha256 = lens_hash(bundle.member(PRESCRIPTION))
+        if lens_sha256 != self.lens_sha256:
             raise ContractError(
                 f"camera body {self.name} has the lens of sha256 {self.lens_sha256[:16]}, bundle "
-                f"{bundle.manifest.name} that of {found[:16]}: it is another camera's, or the lens "
-                "was designed anew; measure it again"
+                f"{bundle.manifest.name} that of {lens_sha256[:16]}: it is another camera's, or "
+                "the lens was designed anew; measure it again"
             )
 
 
@@ -146,17 +146,17 @@ def _is_finite(value: float) -> bool:
 
 def _identity(table: Mapping[str, Any], path: Path) -> dict[str, str]:
     """Return the one hash of the bundle or the lens that a camera body belongs to."""
-    given = {key: table[key] for key in _HASHES if key in table}
-    if len(given) != 1:
+    hashes = {key: table[key] for key in _HASHES if key in table}
+    if len(hashes) != 1:
         raise ContractError(
             f"{path}: one of {' and '.join(_HASHES)} must state where the body belongs; got "
-            f"{' and '.join(given) or 'none'}"
+            f"{' and '.join(hashes) or 'none'}"
         )
-    for key, digest in given.items():
+    for key, digest in hashes.items():
         if not isinstance(digest, str) or not re.fullmatch("[0-9a-f]{64}", digest):
             what = key.removesuffix("_sha256")
             raise ContractError(f"{path}: {key} must be the hash of a {what}; got {digest!r}")
-    return given
+    return hashes
 
 
 def format_unit(name: str, identity: Mapping[str, str], measured: Mapping[str, float]) -> str:

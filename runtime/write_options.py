@@ -44,8 +44,8 @@ class WriteOptions:
     jobs: int = 1
 
     def __post_init__(self) -> None:
-        named = OTHER_NAMES.get(str(self.format), self.format)
-        object.__setattr__(self, "format", named)  # one name from here on
+        format_ = OTHER_NAMES.get(str(self.format), self.format)
+        object.__setattr__(self, "format", format_)  # one name from here on
         check_fields(self)
         if self.linear and self.picture in LINEAR_FORMATS:
             raise ContractError(

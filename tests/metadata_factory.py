@@ -25,7 +25,7 @@ FULL = Metadata(
 
 def assert_like(found: Metadata, expected: Metadata, rel: float = 1e-6) -> None:
     """Compare text exactly and numbers nearly."""
-    mine, wanted = found.stated(), expected.stated()
+    mine, wanted = found.to_json(), expected.to_json()
     assert mine.keys() == wanted.keys()
     for name, value in wanted.items():
         assert mine[name] == (value if isinstance(value, str) else pytest.approx(value, rel=rel))

@@ -1,4 +1,4 @@
-"""The Wiener filter of all colours together, in torch: twin of `camkit.runtime.bank.together`.
+"""The Wiener filter of all colours together, in torch: twin of `camkit.runtime.bank.joint_colours`.
 
     x_c = a_c l + d_c        l: light that all colours share, of power S; d_c: what c has of its own
     S = scale m^2 (f^2 + f0^2)^(-exponent / 2) k^follow,   power of d_c: own S a_c^2

@@ -10,6 +10,7 @@ haze                 the coarse band: the scene in cells, and the capture cleare
 blocks               the grid of overlapping windowed blocks, and the sum of them
 spectrum             Fourier transforms of blocks
 wiener               the Wiener filter of one block
+joint_colours        the same for all colours of it together
 richardson_lucy      the Richardson-Lucy rounds of one block
 total_variation      least squares with total variation of one block, by ADMM
 cross_channel        the same with edges of all colours in the same places

@@ -129,8 +129,12 @@ def richardson_lucy_filter(
     def restore(block: Block) -> FloatArray:
         level = np.maximum(block.samples.mean(axis=(-2, -1), dtype=np.float64), 0)
         deviation = np.sqrt(np.maximum(shot * level + read_variance, 1e-20))
-        wanted = rounds_per_snr * float((level / deviation).mean())
-        count = int(np.clip(wanted, RL_LEAST_ROUNDS, RL_MOST_ROUNDS)) if rounds is None else rounds
+        ideal_rounds = rounds_per_snr * float((level / deviation).mean())
+        count = (
+            int(np.clip(ideal_rounds, RL_LEAST_ROUNDS, RL_MOST_ROUNDS))
+            if rounds is None
+            else rounds
+        )
         clipped = None if block.unknown is None else spread_clipped(block.unknown)
         return richardson_lucy(block.samples, block.otf, background, count, clipped)
 

@@ -50,14 +50,14 @@ class Block:
         otf: (c, b, b // 2 + 1) complex64, the local PSF's; its centre is the origin.
         unknown: (1 or c, b, b), true where the sensor clipped; None if nowhere.
         height_mm: Field height of its place.
-        known: What `PlaceKnowledge` gave for that place, where the bank has one.
+        knowledge: What `PlaceKnowledge` gave for that place, where the bank has one.
     """
 
     samples: FloatArray
     otf: ComplexArray
     unknown: NDArray[np.bool_] | None = None
     height_mm: float = 0.0
-    known: object = None
+    knowledge: object = None
 
 
 BlockFilter = Callable[[Block], FloatArray]
@@ -220,8 +220,8 @@ def to_otf(kernel: FloatArray, block_px: int) -> ComplexArray:
 
 def _halves(length: int, middle: int) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
     """Return (in the block, in the kernel) of what lies from the centre on, and before it."""
-    before = slice(-middle, None) if middle else slice(0, 0)
-    return (slice(0, length - middle), slice(middle, None)), (before, slice(0, middle))
+    tail = slice(-middle, None) if middle else slice(0, 0)
+    return (slice(0, length - middle), slice(middle, None)), (tail, slice(0, middle))
 
 
 def mirror_otf(otf: ComplexArray, *, flip_x: bool, flip_y: bool) -> ComplexArray:
@@ -283,10 +283,10 @@ def _grow(small: FloatArray, factor: int, rows: slice, cols: slice) -> FloatArra
 
 def _shrink(planes: FloatArray, factor: int, *, axis: int) -> FloatArray:
     """Average every `factor` rows (axis 1) or columns (axis 2)."""
-    before = (slice(None),) * axis
-    total = np.array(planes[(*before, slice(None, None, factor))])
+    leading_axes = (slice(None),) * axis
+    total = np.array(planes[(*leading_axes, slice(None, None, factor))])
     for i in range(1, factor):
-        total += planes[(*before, slice(i, None, factor))]
+        total += planes[(*leading_axes, slice(i, None, factor))]
     total *= np.float32(1 / factor)
     return total
 
@@ -373,22 +373,25 @@ class BlockBank:
             )
         tops = [int(span.index.min()) for span in self._rows]
         total = np.zeros((channels, 0, width), dtype=np.float32)
-        done = 0
+        first_row = 0
         for i, span in enumerate(self._rows):
             top, bottom = min(tops[i:]), int(span.index.max()) + 1
             index = span.index - top
-            rows = _taken(source.read(top, bottom), index, axis=1)
+            rows = _select(source.read(top, bottom), index, axis=1)
             mask = None if saturated is None else saturated(top, bottom)
-            mask = None if mask is None else _taken(mask, index, axis=mask.ndim - 2)
+            mask = None if mask is None else _select(mask, index, axis=mask.ndim - 2)
             strip = _Strip(rows, mask, span, plain)
-            total = _lengthened(total, span.start + span.inner.stop - done)
-            self._add_blocks(strip, total[:, span.start + span.inner.start - done :], cancel)
+            total = _lengthened(total, span.start + span.inner.stop - first_row)
+            self._add_blocks(strip, total[:, span.start + span.inner.start - first_row :], cancel)
             # What is not needed again must not wait here while the network works.
             del strip, rows, mask
             last = i + 1 == len(self._rows)
             ready = height if last else self._rows[i + 1].start + self._rows[i + 1].inner.start
-            finished, total = total[:, : ready - done].copy(), total[:, ready - done :].copy()
-            done = ready
+            finished, total = (
+                total[:, : ready - first_row].copy(),
+                total[:, ready - first_row :].copy(),
+            )
+            first_row = ready
             yield finished
             del finished
 
@@ -422,14 +425,14 @@ class BlockBank:
 
         keys = sorted({key_of(place) for place in filtered})
         # The pool takes tasks in order: no block waits for a place that nobody is making.
-        made = {key: pool.submit(self._place, key) for key in keys}
+        futures = {key: pool.submit(self._place, key) for key in keys}
 
         def restore(column: Span, place: _Numbered) -> FloatArray:
             check_cancelled(cancel)
             window = strip.span.weights[:, None] * column.weights
             if strip.is_plain(column):
                 return strip.cut(column)[0][:, strip.span.inner, column.inner] * window
-            sharp = self._filtered(strip.cut(column), made[key_of(place)].result(), place[1])
+            sharp = self._filtered(strip.cut(column), futures[key_of(place)].result(), place[1])
             return sharp[:, strip.span.inner, column.inner] * window
 
         return pool.map(restore, self._columns, places)
@@ -441,7 +444,7 @@ class BlockBank:
         # Kernels of one field are those of many heights.
         if self._knowledge is None or self._psf.kernels.field_heights_mm.size == 1:
             return _Place(otf=otf)
-        return _Place(otf=otf, known=self._knowledge(otf, float(np.hypot(*place_mm))))
+        return _Place(otf=otf, knowledge=self._knowledge(otf, float(np.hypot(*place_mm))))
 
     def _filtered(self, cut: "_Cut", place: "_Place", place_mm: tuple[float, float]) -> FloatArray:
         """Filter what was cut for a block, with the OTF of its place or of one that mirrors it."""
@@ -449,14 +452,14 @@ class BlockBank:
         across, down = (self._psf.kernels.turns and along_mm < 0 for along_mm in place_mm)
         mirrored = np.s_[..., :: -1 if down else 1, :: -1 if across else 1]
         otf = place.otf
-        if place.known is None:
+        if place.knowledge is None:
             otf, mirrored = mirror_otf(otf, flip_x=across, flip_y=down), np.s_[..., ::1, ::1]
         block = Block(
             samples=taper_edges(samples[mirrored], otf, self._guard_px),
             otf=otf,
             unknown=None if unknown is None else unknown[mirrored],
             height_mm=float(np.hypot(*place_mm)),
-            known=place.known,
+            knowledge=place.knowledge,
         )
         return self._filter(block)[mirrored]
 
@@ -473,7 +476,7 @@ class _Place:
     """The OTF of a place, and what the filter knows of it."""
 
     otf: ComplexArray
-    known: object = None
+    knowledge: object = None
 
 
 _Numbered = tuple[int, tuple[float, float]]
@@ -496,15 +499,15 @@ class _Strip:
 
     def cut(self, column: Span) -> _Cut:
         """Return samples and clipped samples of one block."""
-        samples = _taken(self.rows, column.index, axis=2)
+        samples = _select(self.rows, column.index, axis=2)
         if self.saturated is None:
             return samples, None
         mask = self.saturated if self.saturated.ndim == 3 else self.saturated[None]
-        unknown = _taken(mask, column.index, axis=2)
+        unknown = _select(mask, column.index, axis=2)
         return samples, unknown if unknown.any() else None
 
 
-def _taken(planes: NDArray[Any], index: NDArray[np.intp], *, axis: int) -> NDArray[Any]:
+def _select(planes: NDArray[Any], index: NDArray[np.intp], *, axis: int) -> NDArray[Any]:
     """Select some rows or columns: a view where they follow each other."""
     first, last = int(index[0]), int(index[-1])
     if last - first == index.size - 1 and (np.diff(index) == 1).all():

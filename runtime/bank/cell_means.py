@@ -40,7 +40,7 @@ def cell_means(
     channels = count if cfa is None else COLOURS
     rows, columns = cell_count(height, cell_px), cell_count(width, cell_px)
     means = np.empty((channels, rows, columns), np.float32)
-    over = np.zeros(means.shape, np.bool_)
+    clipped_cells = np.zeros(means.shape, np.bool_)
     for row in range(rows):
         top, bottom = row * cell_px, height if row + 1 == rows else (row + 1) * cell_px
         band = np.nan_to_num(samples.read(top, bottom), nan=0.0, posinf=1.0, neginf=0.0)
@@ -54,9 +54,9 @@ def cell_means(
                 number += tall * _gathered(np.ones(line.size), columns, cell_px, across)
                 if mask is not None:
                     hit = np.asarray(mask[min(plane, len(mask) - 1), down, across].any(axis=0))
-                    over[channel, row] |= _gathered(hit, columns, cell_px, across) > 0
+                    clipped_cells[channel, row] |= _gathered(hit, columns, cell_px, across) > 0
             means[channel, row] = total / np.maximum(number, 1)
-    return means, over
+    return means, clipped_cells
 
 
 def _sites(cfa: CfaPattern | None, channels: int) -> Iterator[list[tuple[int, slice, slice]]]:
@@ -75,10 +75,10 @@ def _sites(cfa: CfaPattern | None, channels: int) -> Iterator[list[tuple[int, sl
 
 
 def _gathered(
-    line: NDArray[np.float64] | NDArray[np.bool_], columns: int, cell_px: int, across: slice
+    line: NDArray[np.float64] | NDArray[np.bool_], columns: int, cell_px: int, sites: slice
 ) -> NDArray[np.float64]:
     """Return the sums over cells of samples along a row; the last cell takes the rest."""
     if not line.size:  # a colour without a column in a capture one pixel wide
         return np.zeros(columns)
-    first = np.arange(columns) * cell_px // (across.step or 1)
+    first = np.arange(columns) * cell_px // (sites.step or 1)
     return np.asarray(np.add.reduceat(line.astype(np.float64), first))

@@ -71,8 +71,8 @@ class Other:
 
     def back(self, lines: FloatArray) -> FloatArray:
         """Return the adjoint of `compared`, (b, b)."""
-        along = np.einsum("dij,dij->ij", lines, self.steps)
-        return np.asarray(backward(*(lines * self.light)) - along)
+        products = np.einsum("dij,dij->ij", lines, self.steps)
+        return np.asarray(backward(*(lines * self.light)) - products)
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -114,8 +114,8 @@ class Colour:
     @property
     def weights(self) -> FloatArray:
         """Return the largest length of each dual, (1 + others, 1, 1)."""
-        found = [self.tv, *(self.cross for _ in self.others)]
-        return np.array(found, dtype=np.float32)[:, None, None]
+        limits = [self.tv, *(self.cross for _ in self.others)]
+        return np.array(limits, dtype=np.float32)[:, None, None]
 
     def applied(self, plane: FloatArray) -> FloatArray:
         """Return K x, (1 + others, 2, b, b)."""
@@ -124,10 +124,10 @@ class Colour:
 
     def back(self, duals: FloatArray) -> FloatArray:
         """Return K^T p, (b, b)."""
-        found = backward(*duals[0])
+        plane = backward(*duals[0])
         for other, lines in zip(self.others, duals[1:], strict=True):
-            found = found + other.back(lines)
-        return found
+            plane = plane + other.back(lines)
+        return plane
 
     def cost(self, plane: FloatArray) -> float:
         """Return F of x (b, b), times V."""
@@ -158,14 +158,14 @@ def solved(colour: Colour, rounds: int) -> FloatArray:
     data = np.conj(colour.otf) * transform(colour.samples[None])[0]
     damping = 1 / (np.square(np.abs(colour.otf)) + metric)
     spectrum, plane = np.zeros_like(data), np.zeros_like(colour.samples)
-    duals = before = np.zeros((len(weights), 2, side, side), dtype=np.float32)
+    duals = old_duals = np.zeros((len(weights), 2, side, side), dtype=np.float32)
     for _ in range(rounds):
-        pull = transform(colour.back(2 * duals - before)[None])[0]
+        pull = transform(colour.back(2 * duals - old_duals)[None])[0]
         spectrum = (data + metric * spectrum - pull) * damping
         plane = inverse(spectrum[None], side)[0]
         raised = duals + np.float32(colour.rho) * colour.applied(plane)
         keep = np.minimum(weights / np.maximum(_lengths(raised), np.float32(1e-30)), 1)
-        before, duals = duals, raised * keep[:, None]
+        old_duals, duals = duals, raised * keep[:, None]
     return plane
 
 
@@ -187,15 +187,15 @@ def cross_channel_filter(
     light = light_of_block(noise)
 
     def restore(block: Block) -> FloatArray:
-        seen = light(block)
-        threshold, rho = (values[:, 0, 0] for values in seen.splitting(tv_weight))
+        block_light = light(block)
+        threshold, rho = (values[:, 0, 0] for values in block_light.splitting(tv_weight))
         # the weights of F times V, and of x in place of u
-        cross = cross_weight * seen.variance / seen.level
-        planes = np.empty_like(seen.samples)
+        cross = cross_weight * block_light.variance / block_light.level
+        planes = np.empty_like(block_light.samples)
         sharper: list[Other] = []
         for c in sharpest_first(block.otf):
             colour = Colour(
-                samples=seen.samples[c],
+                samples=block_light.samples[c],
                 otf=block.otf[c],
                 rho=float(rho[c]),
                 tv=float(rho[c] * threshold[c]),
@@ -204,7 +204,7 @@ def cross_channel_filter(
             )
             planes[c] = solved(colour, rounds)
             if cross_weight > 0:
-                sharper.append(compared_with(planes[c] / np.float32(seen.level[c])))
+                sharper.append(compared_with(planes[c] / np.float32(block_light.level[c])))
         return planes
 
     return restore

@@ -7,7 +7,7 @@
 A block's cells are taken for light that all colours share, of a power that falls with frequency,
 and a little light of each colour's own, seen through the kernels of one distance:
 
-    Y_c = a_c H_c (x + e_c) + n_c,   power of x: s F,   of e_c: OWN s F
+    Y_c = a_c H_c (x + e_c) + n_c,   power of x: s F,   of e_c: COLOUR_POWER s F
     F = (f^2 + f0^2)^(-EXPONENT / 2), scaled to 1 at POWER_AT
 
 and what kernels cannot promise has the power MISTRUST s F. A lens blurs its colours differently at
@@ -48,7 +48,7 @@ EVERY: Final = 3
 """One in so many frequencies: the window of a block blurs its spectrum anyway."""
 CORNER_FREQUENCY: Final = 1 / 512
 EXPONENT: Final = 2.7
-OWN: Final = 15.0
+COLOUR_POWER: Final = 15.0
 MISTRUST: Final = 0.002
 FREEDOM: Final = 1.0
 """Degrees of freedom of Student's distribution."""
@@ -56,7 +56,7 @@ POWERS: Final = tuple(10.0 ** (np.arange(9) * 0.67 - 5))
 """Powers s at a frequency of `POWER_AT`, over the squared level."""
 POWER_AT: Final = 0.03
 TEMPER: Final = 0.06
-BESIDE: Final = (0.25, 0.5, 0.25)
+STEP_WEIGHTS: Final = (0.25, 0.5, 0.25)
 """Weights of the steps beside a step: every other one may be of a known depth."""
 EVEN_ODDS: Final = 0.5
 """Spread over the steps, in that of even odds, from which on nothing tells the distance."""
@@ -98,7 +98,7 @@ def find_nearness(
     """
     spectrum = _spectrum(cfa, len(cells))
     coarse = _coarse(kernels)
-    rows, columns = (_laid(side) for side in cells.shape[1:])
+    rows, columns = (_block_starts(side) for side in cells.shape[1:])
 
     def look(place: tuple[int, int]) -> FloatGrid:
         top, left = place
@@ -111,8 +111,8 @@ def find_nearness(
         return _likelihoods(_filled(cells[part]), otf, kernels.weights, spectrum, noise)
 
     with ThreadPoolExecutor(threads) as pool:
-        found = list(pool.map(look, ((top, left) for top in rows for left in columns)))
-    likely = np.array(found).reshape(len(rows), len(columns), kernels.nearness.size)
+        likelihoods = list(pool.map(look, ((top, left) for top in rows for left in columns)))
+    likely = np.array(likelihoods).reshape(len(rows), len(columns), kernels.nearness.size)
     middles = [CELL_PX * (starts[0] + BLOCK_CELLS / 2) - 0.5 for starts in (rows, columns)]
     steps = [CELL_PX * float(s[-1] - s[0]) / max(len(s) - 1, 1) or 1.0 for s in (rows, columns)]
     return NearnessMap(
@@ -124,7 +124,7 @@ def find_nearness(
 
 def search_blocks(size_px: tuple[int, int]) -> int:
     """Return the number of blocks of a capture of (height, width) that are searched."""
-    rows, columns = (len(_laid(cell_count(side, CELL_PX))) for side in size_px)
+    rows, columns = (len(_block_starts(cell_count(side, CELL_PX))) for side in size_px)
     return rows * columns
 
 
@@ -138,7 +138,7 @@ def _means(likely: FloatGrid, nearness: FloatGrid) -> FloatGrid:
     everywhere = EVERYWHERE * likely.mean(axis=(0, 1))
     for axis in (0, 1):
         likely = scipy.ndimage.convolve1d(likely, NEIGHBOURS, axis=axis, mode="constant")
-    likely = scipy.ndimage.convolve1d(likely + everywhere, BESIDE, axis=-1, mode="nearest")
+    likely = scipy.ndimage.convolve1d(likely + everywhere, STEP_WEIGHTS, axis=-1, mode="nearest")
     odds = np.exp(TEMPER * (likely - likely.max(axis=-1, keepdims=True)))
     odds /= odds.sum(axis=-1, keepdims=True)
     means = odds @ nearness
@@ -149,7 +149,7 @@ def _means(likely: FloatGrid, nearness: FloatGrid) -> FloatGrid:
 @lru_cache(maxsize=1)
 def _coarse(kernels: KernelsByDistance) -> tuple[FieldKernels, ...]:
     """Return the kernels of every depth as seen in cells; kept for the next capture."""
-    return tuple(replace(k, kernels=_in_cells(k.kernels)) for k in kernels.known)
+    return tuple(replace(k, kernels=_in_cells(k.kernels)) for k in kernels.depth_kernels)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -160,20 +160,20 @@ class _Spectrum:
         places: (n,) in the flattened half plane.
         weight: (n,) 2 where a frequency stands for its mirror image too.
         fall: (n,) F, 1 at `POWER_AT`.
-        moved: (c, n) what the places of a colour's samples in a cell do to its phase.
+        phases: (c, n) what the places of a colour's samples in a cell do to its phase.
         samples: (c, 1) of every colour in a cell.
     """
 
     places: NDArray[np.intp]
     weight: FloatArray
     fall: FloatArray
-    moved: Complex
+    phases: Complex
     samples: FloatArray
 
     def of(self, planes: Complex) -> Complex:
         """Select these frequencies of (..., c, b, b // 2 + 1) transfers, phases included."""
         flat = planes.reshape(*planes.shape[:-2], -1)
-        return np.asarray(flat[..., self.places] * self.moved)
+        return np.asarray(flat[..., self.places] * self.phases)
 
 
 @lru_cache(maxsize=4)
@@ -199,7 +199,7 @@ def _spectrum(cfa: CfaPattern | None, channels: int) -> _Spectrum:
         weight=np.where(fx == 0, 1, 2).astype(np.float32),
         fall=(((f2 + corner) / (POWER_AT**2 + corner)) ** (-EXPONENT / 2)).astype(np.float32),
         # a sample that lies further on sees the scene earlier
-        moved=np.exp(2j * np.pi * turns).astype(np.complex64),
+        phases=np.exp(2j * np.pi * turns).astype(np.complex64),
         samples=samples.astype(np.float32),
     )
 
@@ -212,7 +212,7 @@ def _block_window() -> FloatArray:
     return np.asarray(window / np.sqrt(np.square(window).mean()), np.float32)
 
 
-def _laid(cells: int) -> NDArray[np.intp]:
+def _block_starts(cells: int) -> NDArray[np.intp]:
     """Return the first cells of blocks along a side, evenly; the last block ends with the cells."""
     last = max(cells - BLOCK_CELLS, 0)
     return np.linspace(0, last, 1 + -(-last // BLOCK_CELLS)).round().astype(np.intp)
@@ -242,15 +242,15 @@ def _likelihoods(
     variance = np.array(noise.shot) * level.ravel() + np.array(noise.read_variance)
     variance = variance[:, None] / (spectrum.samples * np.square(level[..., 0]))
     whole = np.fft.rfft2((block / level - 1) * _block_window()).reshape(len(block), -1)
-    seen = (whole[:, spectrum.places] / BLOCK_CELLS).astype(np.complex64)
+    coefficients = (whole[:, spectrum.places] / BLOCK_CELLS).astype(np.complex64)
     transfer = np.tensordot(weights.astype(np.float32), otf, axes=1)
     power = np.square(transfer.real) + np.square(transfer.imag)
-    crossed = transfer.conj() * seen
-    squared = np.square(seen.real) + np.square(seen.imag)
+    crossed = transfer.conj() * coefficients
+    squared = np.square(coefficients.real) + np.square(coefficients.imag)
     best = np.full(len(weights), -np.inf)
     for scale in POWERS:
         fall = np.float32(scale) * spectrum.fall
-        alone = (OWN * power + np.float32(MISTRUST)) * fall + variance.astype(np.float32)
+        alone = (COLOUR_POWER * power + np.float32(MISTRUST)) * fall + variance.astype(np.float32)
         inverse = 1 / alone
         shared = 1 + (power * inverse).sum(axis=1) * fall
         joint = (crossed * inverse).sum(axis=1)

@@ -107,7 +107,7 @@ class Lit:
 
     def light_at(self, x_mm: float, y_mm: float) -> FloatArray:
         """Return the light (c,) of an image point, interpolated as the kernels are."""
-        return self.kernels.between(self.light, x_mm, y_mm)
+        return self.kernels.interpolate(self.light, x_mm, y_mm)
 
     def scaled(self, ratio: float) -> "Lit":
         """Return the kernels scaled about their centres; see `FieldKernels.scaled`."""
@@ -172,12 +172,12 @@ def enlarged(
     below -= above
     below *= lower[:, None]
     above += below
-    made = above.take(left, axis=1)
+    picture = above.take(left, axis=1)
     step = above.take(np.minimum(left + 1, cells.shape[1] - 1), axis=1)
-    step -= made
+    step -= picture
     step *= right
-    made += step
-    return np.asarray(made)
+    picture += step
+    return np.asarray(picture)
 
 
 def _middles(at: NDArray[np.intp], cells: int, cell_px: int) -> tuple[NDArray[np.intp], FloatArray]:
@@ -305,31 +305,31 @@ def solve_coarse(
     Raises:
         Cancelled: If the caller of what this thread works at wished so.
     """
-    laid = cell_window(window, kernels.cell_px, MARGIN_CELLS)
+    margin_window = cell_window(window, kernels.cell_px, MARGIN_CELLS)
     inner = np.s_[MARGIN_CELLS:-MARGIN_CELLS, MARGIN_CELLS:-MARGIN_CELLS]
-    nodes = lay_nodes(kernels.core, laid)
+    nodes = lay_nodes(kernels.core, margin_window)
     wide = few_of(kernels.coarse, terms)
     narrow = few_of(kernels.coarse_core, CORE_TERMS)
     filters = filters_of(kernels.coarse, terms) if kernels.differ else None
     gain, veil, picture = (np.empty(cells.shape, np.float32) for _ in range(3))
-    for channel, (seen, over) in enumerate(zip(cells, clipped, strict=True)):
+    for channel, (plane, mask) in enumerate(zip(cells, clipped, strict=True)):
         blur = PlaceBlur(wide[channel], nodes, threads=threads)
-        ones = np.ones(laid.size_px[::-1], np.float32)
+        ones = np.ones(margin_window.size_px[::-1], np.float32)
         even = np.maximum(blur(ones)[inner], np.float32(LEAST_RESPONSE))
         undo: Callable[[FloatArray], FloatArray]
         if filters is None:
             undo = blur.solver(DAMPING)
         else:
             undo = PlaceBlur(filters[channel], nodes, threads=threads)
-        scene = _mirrored(seen)
+        scene = _mirrored(plane)
         for _ in range(rounds):
-            left = seen - blur(scene)[inner] / even
-            np.maximum(left, 0, out=left, where=over)
-            scene += undo(_mirrored(left))
+            residual = plane - blur(scene)[inner] / even
+            np.maximum(residual, 0, out=residual, where=mask)
+            scene += undo(_mirrored(residual))
         core = PlaceBlur(narrow[channel], nodes, threads=threads)
-        own = np.maximum(core(ones)[inner], np.float32(LEAST_RESPONSE))
-        gain[channel] = even / own
-        veil[channel] = core(scene)[inner] / own - gain[channel] * seen
+        core_response = np.maximum(core(ones)[inner], np.float32(LEAST_RESPONSE))
+        gain[channel] = even / core_response
+        veil[channel] = core(scene)[inner] / core_response - gain[channel] * plane
         picture[channel] = scene[inner]
     return CoarseBand(gain=gain, veil=veil, picture=picture, cell_px=kernels.cell_px)
 
@@ -373,10 +373,10 @@ def kept_bytes(entry: Dehaze, haze: Haze, channels: int, kernel_scale: float = 1
     """Return memory of what is kept of optics, see `few_of`; arguments as of `solving_bytes`."""
     side = int(haze.kernels.shape[-1] * kernel_scale) + 3
     fields = 2 * haze.kernels.shape[0]
-    kept = side**2 * (entry.terms + fields)
+    samples = side**2 * (entry.terms + fields)
     if cores_differ(haze):
-        kept += filter_side(side) ** 2 * entry.terms
-    return int(4 * kept * channels)
+        samples += filter_side(side) ** 2 * entry.terms
+    return int(4 * samples * channels)
 
 
 def solving_bytes(
@@ -399,12 +399,12 @@ def solving_bytes(
     # a quarter of all places in every colour, and twice those of one colour while few are found
     places = 4 * nodes * side**2 * (2.25 + channels / 4)
     terms = max(entry.terms, CORE_TERMS)
-    laid = terms * (4 * spectrum + 16 * cells)
-    laid += 4 * spectrum * -(-terms // TERMS_AT_ONCE)
+    blur_bytes = terms * (4 * spectrum + 16 * cells)
+    blur_bytes += 4 * spectrum * -(-terms // TERMS_AT_ONCE)
     if cores_differ(haze):
         wide = filter_side(side)
-        laid += entry.terms * (4 * (sides[0] + wide) * (sides[1] + wide) + 16 * cells)
+        blur_bytes += entry.terms * (4 * (sides[0] + wide) * (sides[1] + wide) + 16 * cells)
         places += 12 * nodes * wide**2
     # the kernels of all places are gone before few of them are laid over the picture
-    most = max(places, laid + BYTES_PER_CELL * cells)
+    most = max(places, blur_bytes + BYTES_PER_CELL * cells)
     return int(kept_bytes(entry, haze, channels, kernel_scale) + most)

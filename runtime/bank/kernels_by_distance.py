@@ -49,10 +49,10 @@ class NearnessMap:
         """
         places = zip((y_px, x_px), self.first_px, self.step_px, strict=True)
         where = [[(at - first) / step] for at, first, step in places]
-        told = np.isfinite(self.values)
+        finite = np.isfinite(self.values)
         share, value = (
             float(scipy.ndimage.map_coordinates(plane, where, order=1, mode="nearest")[0])
-            for plane in (told.astype(np.float64), np.where(told, self.values, 0.0))
+            for plane in (finite.astype(np.float64), np.where(finite, self.values, 0.0))
         )
         return value / share if share > 0.5 else np.nan
 
@@ -61,10 +61,10 @@ class NearnessMap:
 
         Empty where nothing tells any.
         """
-        known = self.values[np.isfinite(self.values)]
-        if not known.size:
+        finite = self.values[np.isfinite(self.values)]
+        if not finite.size:
             return {}
-        far, middle, near = np.quantile(known, (0, 0.5, 1))
+        far, middle, near = np.quantile(finite, (0, 0.5, 1))
         return {
             name: float(1 / max(nearness, LEAST_NEARNESS)) / MM_PER_M
             for name, nearness in (("nearest_m", near), ("median_m", middle), ("farthest_m", far))
@@ -72,14 +72,14 @@ class NearnessMap:
 
     def describe(self) -> str:
         """Return for people how far the scene was found to be."""
-        found = self.to_json()
-        if not found:
+        distances = self.to_json()
+        if not distances:
             return (
                 "the object distance cannot be estimated from the capture: the mean kernels of all "
                 f"distances are used; if you know the distance, add {option_text('depth_m')}"
             )
         near, middle, far = (
-            f"{found[name]:.3g}" for name in ("nearest_m", "median_m", "farthest_m")
+            f"{distances[name]:.3g}" for name in ("nearest_m", "median_m", "farthest_m")
         )
         spread = "" if near == far else f" ({near} to {far} m over the picture)"
         return f"object distance estimated from the capture: {middle} m{spread}"
@@ -99,14 +99,17 @@ class KernelsByDistance:
             depths_mm: (depth,), increasing; inf is allowed.
             kernels: Of every depth, of one shape.
         """
-        known = 1 / np.asarray(depths_mm, np.float64)
-        self.nearness: FloatGrid = steps_between(known[::-1])
+        depth_nearness = 1 / np.asarray(depths_mm, np.float64)
+        self.nearness: FloatGrid = steps_between(depth_nearness[::-1])
         """(step,), increasing."""
-        hats = [np.interp(self.nearness, known[::-1], unit) for unit in np.eye(known.size)[::-1]]
+        hats = [
+            np.interp(self.nearness, depth_nearness[::-1], unit)
+            for unit in np.eye(depth_nearness.size)[::-1]
+        ]
         self.weights: FloatGrid = np.stack(hats, axis=1)
         """(step, depth): the share of every depth in the kernels of a step."""
         self._kernels = tuple(kernels)
-        self.of = lru_cache(maxsize=KEPT_STEPS)(self._of)
+        self.at_step = lru_cache(maxsize=KEPT_STEPS)(self._at_step)
         """Cached: the `FieldKernels` of a step, or of `MEAN`."""
 
     def step_of(self, nearness: float) -> int:
@@ -115,23 +118,23 @@ class KernelsByDistance:
             return MEAN
         return int(np.abs(self.nearness - nearness).argmin())
 
-    def over(self, scene: NearnessMap) -> "KernelsOfScene":
+    def of_scene(self, scene: NearnessMap) -> "KernelsOfScene":
         """Return the kernels of the places of a capture, for a bank."""
         return KernelsOfScene(kernels=self, scene=scene)
 
     @property
-    def known(self) -> tuple[FieldKernels, ...]:
+    def depth_kernels(self) -> tuple[FieldKernels, ...]:
         """Return the kernels of every depth."""
         return self._kernels
 
-    def _of(self, step: int) -> FieldKernels:
+    def _at_step(self, step: int) -> FieldKernels:
         even = np.full(len(self._kernels), 1 / len(self._kernels))
         weights = even if step == MEAN else self.weights[step]
-        used = [(w, k) for w, k in zip(weights, self._kernels, strict=True) if w > 0]
-        if len(used) == 1:
-            return used[0][1]
-        mixed = sum(np.float32(weight) * kernels.kernels for weight, kernels in used)
-        return replace(used[0][1], kernels=np.asarray(mixed, np.float32))
+        parts = [(w, k) for w, k in zip(weights, self._kernels, strict=True) if w > 0]
+        if len(parts) == 1:
+            return parts[0][1]
+        mixed = sum(np.float32(weight) * kernels.kernels for weight, kernels in parts)
+        return replace(parts[0][1], kernels=np.asarray(mixed, np.float32))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -147,19 +150,19 @@ class KernelsOfScene:
 
     def kernels_of(self, number: int) -> FieldKernels:
         """Return the kernels of a step."""
-        return self.kernels.of(number)
+        return self.kernels.at_step(number)
 
 
-def steps_between(known: FloatGrid) -> FloatGrid:
+def steps_between(nearness: FloatGrid) -> FloatGrid:
     """Return steps of 1 / distance, even between neighbouring known ones, which are steps too.
 
     Args:
-        known: (depth,), increasing.
+        nearness: (depth,), increasing.
     """
-    share = np.diff(known) / (known[-1] - known[0])
+    share = np.diff(nearness) / (nearness[-1] - nearness[0])
     counts = np.maximum(np.rint(INTERVALS * share), 1).astype(int)
     parts = [
         np.linspace(first, last, count, endpoint=False)
-        for first, last, count in zip(known[:-1], known[1:], counts, strict=True)
+        for first, last, count in zip(nearness[:-1], nearness[1:], counts, strict=True)
     ]
-    return np.concatenate([*parts, known[-1:]])
+    return np.concatenate([*parts, nearness[-1:]])

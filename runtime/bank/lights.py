@@ -100,39 +100,39 @@ def explain_lights(
     rounds, reach_px = settings.clip_iterations, settings.clip_reach_px
     power = settings.clip_power
     rule = RULES[settings.clip_windows]
-    chosen = choose_windows(
+    windows = choose_windows(
         np.asarray(clipped.any(axis=0)), side, fitted_px(settings, kernel_px), rule
     )
-    if chosen is None or reach_px is None:
+    if windows is None or reach_px is None:
         near = nearness(clipped, reach_px)
-        found = richardson_lucy(samples, block.otf, background, rounds, unknown, power=power)
-        return found * near, _unexplained(block, found, unknown, near) / side**2
-    size, cells = chosen
+        light = richardson_lucy(samples, block.otf, background, rounds, unknown, power=power)
+        return light * near, _unexplained(block, light, unknown, near) / side**2
+    size, cells = windows
     core, step = size - 2 * rule.margin_px, side // size
     otf: ComplexArray = np.ascontiguousarray(block.otf[:, ::step, ::step])
     lights = np.zeros_like(samples)
     weight = np.zeros(clipped.shape, dtype=np.float32)
-    left = np.zeros(len(samples))
+    unexplained = np.zeros(len(samples))
     parts = []
     waiting = clipped.copy()
     for row, column in cells:
-        own = np.zeros_like(clipped)
+        cell_mask = np.zeros_like(clipped)
         cell = np.s_[:, row : row + core, column : column + core]
-        own[cell] = waiting[cell]
+        cell_mask[cell] = waiting[cell]
         waiting[cell] = False
         top, first = (int(np.clip(i - rule.margin_px, 0, side - size)) for i in (row, column))
         place = np.s_[:, top : top + size, first : first + size]
-        near = nearness(own[place], reach_px)
+        near = nearness(cell_mask[place], reach_px)
         cut = np.ascontiguousarray(unknown[place])
         window = Block(samples=taper_edges(samples[place], otf, rule.ring_px), otf=otf)
-        found = richardson_lucy(window.samples, otf, background, rounds, cut, power=power)
-        left += _unexplained(window, found, cut, near)
+        light = richardson_lucy(window.samples, otf, background, rounds, cut, power=power)
+        unexplained += _unexplained(window, light, cut, near)
         weight[place] += near
-        parts.append((place, found * near))
+        parts.append((place, light * near))
     np.maximum(weight, 1, out=weight)
     for place, part in parts:
         lights[place] += part / weight[place]
-    return lights, left / side**2
+    return lights, unexplained / side**2
 
 
 def choose_windows(
@@ -189,10 +189,10 @@ def light_share(
 ) -> float:
     """Return the work of explaining as a share of that in the whole block; see `choose_windows`."""
     rule = RULES[settings.clip_windows]
-    chosen = choose_windows(clipped, side_px, kernel_px, rule, step_px=step_px)
-    if chosen is None:
+    windows = choose_windows(clipped, side_px, kernel_px, rule, step_px=step_px)
+    if windows is None:
         return 1.0
-    size, cells = chosen
+    size, cells = windows
     return len(cells) * (size * size * rule.sample_cost + rule.extra) / side_px**2
 
 
@@ -215,8 +215,8 @@ def nearness(clipped: Mask, reach_px: int | None) -> FloatArray:
     near, fade = np.zeros(clipped.shape, dtype=np.float32), _fade(reach_px)
     for mask, plane in zip(clipped, near, strict=True):
         if mask.any():
-            apart = (~mask).astype(np.uint8)
-            distance = cv2.distanceTransform(apart, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+            unclipped = (~mask).astype(np.uint8)
+            distance = cv2.distanceTransform(unclipped, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
             # OpenCV's last bits change from call to call; a squared distance is a whole number
             square = np.minimum(np.rint(np.square(distance)), reach_px**2)
             plane[:] = fade[square.astype(np.intp)]
@@ -231,10 +231,10 @@ def _fade(reach_px: int) -> FloatArray:
 
 
 def _unexplained(
-    block: Block, found: FloatArray, unknown: Mask, near: FloatArray
+    block: Block, light: FloatArray, unknown: Mask, near: FloatArray
 ) -> NDArray[np.float64]:
     """Return (c,): the sum of squares near the lights that are left unexplained."""
-    residual = block.samples - apply_transfer(found, block.otf)
+    residual = block.samples - apply_transfer(light, block.otf)
     np.copyto(residual, 0, where=unknown)
     np.square(residual, out=residual)
     residual *= near

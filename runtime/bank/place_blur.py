@@ -75,9 +75,11 @@ def lay_nodes(kernels: FieldKernels, window: SensorWindow) -> Nodes:
     x_mm, y_mm = window.to_mm(np.arange(width)[None, :], np.arange(height)[:, None])
     if kernels.grid_x_mm is not None and kernels.grid_y_mm is not None:
         columns, rows = kernels.grid_x_mm, kernels.grid_y_mm
-        low, up = _between(rows, np.broadcast_to(y_mm, (height, width)))
-        left, right = _between(columns, np.broadcast_to(x_mm, (height, width)))
-        return _crossed(places, (low, up), (left, right), lambda r, c: r * columns.size + c)
+        row, row_share = _interpolation(rows, np.broadcast_to(y_mm, (height, width)))
+        column, column_share = _interpolation(columns, np.broadcast_to(x_mm, (height, width)))
+        return _crossed(
+            places, (row, row_share), (column, column_share), lambda r, c: r * columns.size + c
+        )
     if not kernels.turns:
         single = np.zeros((height, width, 1))
         return Nodes(
@@ -91,13 +93,13 @@ def lay_nodes(kernels: FieldKernels, window: SensorWindow) -> Nodes:
     azimuth = (first, turn - first)
     return _crossed(
         places,
-        _between(heights, np.hypot(x_mm, y_mm)),
+        _interpolation(heights, np.hypot(x_mm, y_mm)),
         azimuth,
         lambda ring, at: np.where(ring == 0, 0, 1 + (ring - 1) * AZIMUTHS + at % AZIMUTHS),
     )
 
 
-def _between(knots_mm: FloatGrid, at_mm: FloatGrid) -> tuple[NDArray[np.intp], FloatGrid]:
+def _interpolation(knots_mm: FloatGrid, at_mm: FloatGrid) -> tuple[NDArray[np.intp], FloatGrid]:
     """Return the knot below places, and the share of the one above; the ends hold beyond them."""
     if knots_mm.size == 1:
         return np.zeros(at_mm.shape, np.intp), np.zeros(at_mm.shape)
@@ -147,26 +149,26 @@ class NodeKernels:
             fields = (fields + AZIMUTHS - 1) // AZIMUTHS
         self._light = light[fields]
         self._turns = kernels.turns
-        self._made: dict[tuple[float, float], FloatArray] = {}
+        self._rotated: dict[tuple[float, float], FloatArray] = {}
         for place in self._places_mm:
             key = self._key(place)
-            if key not in self._made:
+            if key not in self._rotated:
                 check_wish()
-                self._made[key] = kernels.at(*key)
+                self._rotated[key] = kernels.at(*key)
 
     def of(self, channel: int) -> FloatArray:
         """Return the kernels (node, n, n) of a channel."""
-        found = []
+        node_kernels = []
         for place, light in zip(self._places_mm, self._light, strict=True):
-            kernel = self._made[self._key(place)][channel]
+            kernel = self._rotated[self._key(place)][channel]
             if self._turns:
                 kernel = kernel[:: -1 if place[1] < 0 else 1, :: -1 if place[0] < 0 else 1]
-            found.append(kernel * np.float32(light[channel]))
-        return np.stack(found)
+            node_kernels.append(kernel * np.float32(light[channel]))
+        return np.stack(node_kernels)
 
     def _key(self, place_mm: FloatGrid) -> tuple[float, float]:
         """Return the place, or of turned kernels that which mirrors it."""
-        x, y = (round(float(along), 9) for along in place_mm)
+        x, y = (round(float(coordinate), 9) for coordinate in place_mm)
         return (abs(x), abs(y)) if self._turns else (x, y)
 
 
@@ -207,12 +209,12 @@ class PlaceBlur:
         check_wish()
         height, width = nodes.near.shape[:2]
         self._size = height, width
-        between = np.zeros((height, width, len(kernels)), np.float32)
+        blend = np.zeros((height, width, len(kernels)), np.float32)
         for near, share in zip(
             np.moveaxis(nodes.near, -1, 0), np.moveaxis(nodes.share, -1, 0), strict=True
         ):
-            between += share[..., None] * weights.take(near, axis=0)
-        self._weights = np.ascontiguousarray(np.moveaxis(between, -1, 0))
+            blend += share[..., None] * weights.take(near, axis=0)
+        self._weights = np.ascontiguousarray(np.moveaxis(blend, -1, 0))
         half = kernels.shape[-1] // 2
         # what comes round from the other side falls beside the picture
         self._full = tuple(scipy.fft.next_fast_len(side + half, real=True) for side in self._size)
@@ -258,15 +260,15 @@ class PlaceBlur:
         import scipy.fft
 
         height, width = self._size
-        made = scipy.fft.irfft2(spectrum, self._full)[:height, :width]
-        return np.ascontiguousarray(made, np.float32)
+        picture = scipy.fft.irfft2(spectrum, self._full)[:height, :width]
+        return np.ascontiguousarray(picture, np.float32)
 
     def _spectrum(self, kernel: FloatArray) -> NDArray[np.complex64]:
         rows, columns = self._full
         place = np.arange(kernel.shape[-1]) - kernel.shape[-1] // 2
-        laid = np.zeros(self._full, np.float32)
-        np.add.at(laid, (place[:, None] % rows, place % columns), kernel)
-        return self._transform(laid)
+        padded = np.zeros(self._full, np.float32)
+        np.add.at(padded, (place[:, None] % rows, place % columns), kernel)
+        return self._transform(padded)
 
 
 def few_kernels(kernels: FloatArray, terms: int) -> FewKernels:
@@ -291,8 +293,8 @@ def few_kernels(kernels: FloatArray, terms: int) -> FewKernels:
         products += _products(squares)
     check_wish()
     lengths, directions = np.linalg.eigh(products)
-    kept = _whole_pairs(lengths[::-1], terms)
-    weights = np.ascontiguousarray(directions[:, : -kept - 1 : -1], np.float32)
+    rank = _whole_pairs(lengths[::-1], terms)
+    weights = np.ascontiguousarray(directions[:, : -rank - 1 : -1], np.float32)
     few = np.tensordot(weights.T, kernels, axes=1)
     return FewKernels(kernels=np.asarray(few, np.float32), weights=weights)
 
@@ -303,10 +305,10 @@ def _whole_pairs(lengths: FloatGrid, most: int) -> int:
     Two equally long directions, as sine and cosine of the azimuth are, may be any two of their
     plane: which of them the last bits of the kernels would decide.
     """
-    kept = most
-    while kept > 1 and lengths[kept - 1] - lengths[kept] < EQUAL * lengths[kept - 1]:
-        kept -= 1
-    return kept
+    rank = most
+    while rank > 1 and lengths[rank - 1] - lengths[rank] < EQUAL * lengths[rank - 1]:
+        rank -= 1
+    return rank
 
 
 def _products(kernels: FloatArray) -> FloatGrid:

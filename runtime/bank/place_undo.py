@@ -60,13 +60,13 @@ def undoing_kernels(kernels: FloatArray) -> FloatArray:
     full = scipy.fft.next_fast_len(3 * side, real=True)
     place = np.arange(side) - side // 2
     wide = filter_side(side)
-    kept = np.arange(wide) - wide // 2
-    made = np.empty((len(kernels), wide, wide), np.float32)
-    for kernel, filtered in zip(kernels, made, strict=True):
+    taps = np.arange(wide) - wide // 2
+    filters = np.empty((len(kernels), wide, wide), np.float32)
+    for kernel, filtered in zip(kernels, filters, strict=True):
         check_wish()
-        laid = np.zeros((full, full))
-        laid[np.ix_(place, place)] = kernel / max(float(kernel.sum()), 1e-12)
-        spectrum: NDArray[np.complex128] = scipy.fft.rfft2(laid)
+        padded = np.zeros((full, full))
+        padded[np.ix_(place, place)] = kernel / max(float(kernel.sum()), 1e-12)
+        spectrum: NDArray[np.complex128] = scipy.fft.rfft2(padded)
         gain = np.conj(spectrum) / (np.square(np.abs(spectrum)) + DAMPING)
-        filtered[:] = scipy.fft.irfft2(gain, (full, full))[np.ix_(kept, kept)]
-    return made
+        filtered[:] = scipy.fft.irfft2(gain, (full, full))[np.ix_(taps, taps)]
+    return filters

@@ -119,7 +119,7 @@ class FieldKernels:
             (c, h, w) float32, each kernel sums to 1.
         """
         if self.grid_x_mm is not None and self.grid_y_mm is not None:
-            return _normalised(self.between(self.kernels, x_mm, y_mm))
+            return _normalised(self.interpolate(self.kernels, x_mm, y_mm))
         return _kernel_at(self.kernels, self.field_heights_mm, x_mm, y_mm, turns=self.turns)
 
     def outward(self, x_mm: float, y_mm: float) -> FloatArray:
@@ -140,7 +140,7 @@ class FieldKernels:
             return kernels
         return _normalised(_turn(kernels, -x_mm / height_mm, y_mm / height_mm))
 
-    def between(self, values: FloatArray | FloatGrid, x_mm: float, y_mm: float) -> FloatArray:
+    def interpolate(self, values: FloatArray | FloatGrid, x_mm: float, y_mm: float) -> FloatArray:
         """Return what else is known at the fields at an image point: linear, as the kernels are.
 
         Args:
@@ -227,10 +227,10 @@ def _in_focus(psf: FrozenPsf, focus_um: float) -> FloatArray | FloatGrid:
 
 def _at_depth(kernels: FloatArray | FloatGrid, shares: FloatGrid) -> FloatArray | FloatGrid:
     """Blend the depths; (field, wavelength, h, w)."""
-    used = np.flatnonzero(shares)
-    if used.size == 1:
-        return kernels[:, used[0]]
-    return np.tensordot(kernels[:, used], shares[used], axes=([1], [0]))
+    depths = np.flatnonzero(shares)
+    if depths.size == 1:
+        return kernels[:, depths[0]]
+    return np.tensordot(kernels[:, depths], shares[depths], axes=([1], [0]))
 
 
 def _kernel_at(
@@ -318,7 +318,7 @@ def _turn(kernel: FloatArray, out_x: float, out_y: float) -> FloatArray:
     dx = np.arange(-(w // 2), w // 2 + 1, dtype=np.float64)
     rows = dx * out_x + dy * out_y + h // 2
     cols = dx * out_y - dy * out_x + w // 2
-    lit = np.flatnonzero(_reached(rows, kernel, axis=1) & _reached(cols, kernel, axis=2))
+    lit = np.flatnonzero(_has_taps(rows, kernel, axis=1) & _has_taps(cols, kernel, axis=2))
     rows, cols = rows.take(lit), cols.take(lit)
     row0, col0 = np.floor(rows), np.floor(cols)
     row_weights, col_weights = (_catmull_rom(t) for t in (rows - row0, cols - col0))
@@ -328,26 +328,26 @@ def _turn(kernel: FloatArray, out_x: float, out_y: float) -> FloatArray:
     first = (row0.astype(np.intp) + (PAD_PX - 1)) * width + col0.astype(np.intp) + (PAD_PX - 1)
     first = first + np.arange(0, padded.size, padded[0].size)[:, None]
     flat = padded.reshape(-1)
-    found = np.zeros((c, lit.size), dtype=np.float32)
+    samples = np.zeros((c, lit.size), dtype=np.float32)
     for i in range(4):
-        line = np.zeros_like(found)
+        line = np.zeros_like(samples)
         for j in range(4):
             tap = flat[i * width + j :].take(first)
             tap *= col_weights[j]
             line += tap
         line *= row_weights[i]
-        found += line
+        samples += line
     turned = np.zeros_like(kernel)
-    turned.reshape(c, -1)[:, lit] = found
+    turned.reshape(c, -1)[:, lit] = samples
     return turned
 
 
-def _reached(places: FloatGrid, kernel: FloatArray, *, axis: int) -> NDArray[np.bool_]:
+def _has_taps(places: FloatGrid, kernel: FloatArray, *, axis: int) -> NDArray[np.bool_]:
     """Return a mask of a kernel's axis: positions with taps between its first and last light."""
     light = np.flatnonzero(kernel.any(axis=(0, 3 - axis)))
     below, above = (light[0], light[-1]) if light.size else (0, kernel.shape[axis] - 1)
-    reached = (places >= below - 2) & (places < above + 2)
-    return np.asarray(reached, dtype=np.bool_)
+    mask = (places >= below - 2) & (places < above + 2)
+    return np.asarray(mask, dtype=np.bool_)
 
 
 def _catmull_rom(t: FloatGrid) -> list[FloatArray]:

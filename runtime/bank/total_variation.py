@@ -36,9 +36,9 @@ def admm_tv_filter(
     light = light_of_block(noise)
 
     def restore(block: Block) -> FloatArray:
-        seen = light(block)
-        threshold, rho = seen.splitting(weight)
-        return _admm_tv(seen.samples, block.otf, threshold, rho, iterations)
+        block_light = light(block)
+        threshold, rho = block_light.splitting(weight)
+        return _admm_tv(block_light.samples, block.otf, threshold, rho, iterations)
 
     return restore
 

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from camkit.bundle.stages import Together, Wiener
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.runtime.bank.blocks import Block, BlockFilter, PlaceKnowledge
+from camkit.runtime.bank.joint_colours import Transfer, restore_together, transfer_of
 from camkit.runtime.bank.lights import explain_lights
 from camkit.runtime.bank.richardson_lucy import background_of, spread_clipped
 from camkit.runtime.bank.spectrum import ComplexArray, apply_transfer
-from camkit.runtime.bank.together import Transfer, restore_together, transfer_of
 
 CORNER_FREQUENCY: Final = 1 / 512
 """f0 in cycles/pixel: below it the prior no longer rises."""
@@ -57,10 +57,10 @@ def wiener_filter(settings: Wiener, noise: NoiseModel, kernel_px: int | None = N
             if settings.together is not None:
                 return restore_together(
                     samples,
-                    _known(block, settings.together),
+                    _transfer(block, settings.together),
                     level=np.sqrt(power),
                     variance=variance,
-                    together=settings.together,
+                    model=settings.together,
                 )
             rise = _prior_rise(samples.shape[-1], settings.prior_exponent)
             gain = _gain(block.otf, rise, variance / (settings.prior_scale * power))
@@ -80,15 +80,15 @@ def wiener_filter(settings: Wiener, noise: NoiseModel, kernel_px: int | None = N
 
 def place_knowledge(settings: Wiener) -> PlaceKnowledge | None:
     """Return the terms of the filter for all blocks of a place; None if there are none."""
-    if (together := settings.together) is None:
+    if (model := settings.together) is None:
         return None
-    return lambda otf, height_mm: transfer_of(otf, height_mm, together)
+    return lambda otf, height_mm: transfer_of(otf, height_mm, model)
 
 
-def _known(block: Block, together: Together) -> Transfer:
-    if isinstance(block.known, Transfer):
-        return block.known
-    return transfer_of(block.otf, block.height_mm, together)
+def _transfer(block: Block, model: Together) -> Transfer:
+    if isinstance(block.knowledge, Transfer):
+        return block.knowledge
+    return transfer_of(block.otf, block.height_mm, model)
 
 
 @lru_cache(maxsize=4)

@@ -23,13 +23,13 @@ class PictureCount:
         self._results = 0
         self._shares: dict[Path, float] = {}
 
-    def progress(self, file: Path, done: int, total: int) -> None:
+    def progress(self, file: Path, steps: int, total: int) -> None:
         """Record the finished share of a picture, and report it."""
         with self._lock:
-            self._shares[file] = done / max(total, 1)
+            self._shares[file] = steps / max(total, 1)
             self._show(file)
         if self._on_progress is not None:
-            self._on_progress(file, done, total)
+            self._on_progress(file, steps, total)
 
     def result(self, result: FileResult) -> None:
         """Record that a picture is done, skipped or failed."""

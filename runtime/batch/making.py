@@ -41,7 +41,7 @@ class Pipelines:
 
     def __init__(self, options: Options) -> None:
         self._options = options
-        self._made: dict[tuple[str, str | None], Pipeline] = {}
+        self._pipelines: dict[tuple[str, str | None], Pipeline] = {}
         self._lock = threading.Lock()
 
     def get(self, bundle: str, source: Path | None = None) -> Pipeline:
@@ -58,12 +58,12 @@ class Pipelines:
         is_bare = bundle.lower() == NO_BUNDLE
         kind = kind_without_bundle(source, self._options).name if is_bare else None
         with self._lock:
-            if (bundle, kind) not in self._made:
+            if (bundle, kind) not in self._pipelines:
                 name = None if is_bare else bundle
-                made = load(name, kind=kind, options=self._options)
-                check_idle(made.bundle, self._options)
-                self._made[bundle, kind] = made
-            return self._made[bundle, kind]
+                pipeline = load(name, kind=kind, options=self._options)
+                check_idle(pipeline.bundle, self._options)
+                self._pipelines[bundle, kind] = pipeline
+            return self._pipelines[bundle, kind]
 
 
 def run_task(task: Task, pipelines: Pipelines, common: Common) -> FileResult:
@@ -87,7 +87,7 @@ def try_task(task: Task, pipelines: Pipelines, common: Common) -> FileResult | N
     """
     if task.refusal is not None:
         return FileResult.failure(task.source, None, task.refusal)
-    named = None if task.bundle.lower() == NO_BUNDLE else task.bundle
+    bundle = None if task.bundle.lower() == NO_BUNDLE else task.bundle
     try:
         pipeline = pipelines.get(task.bundle, task.source)
         with claimed(task.target) as ours:
@@ -96,16 +96,16 @@ def try_task(task: Task, pipelines: Pipelines, common: Common) -> FileResult | N
         raise
     except (CamkitError, OSError) as error:
         logger.debug("%s failed", task.source, exc_info=error)
-        told = f"{error}"
+        text = f"{error}"
         if isinstance(error, OSError) and error.strerror is not None:
-            told = f"cannot write {task.target}: {error.strerror}"
-        return FileResult.failure(task.source, named, told)
+            text = f"cannot write {task.target}: {error.strerror}"
+        return FileResult.failure(task.source, bundle, text)
     except MemoryError as error:
         logger.debug("%s failed", task.source, exc_info=error)
-        return FileResult.failure(task.source, named, f"not enough memory: {error}".rstrip(": "))
+        return FileResult.failure(task.source, bundle, f"not enough memory: {error}".rstrip(": "))
     except Exception as error:
         logger.debug("%s failed", task.source, exc_info=error)
-        return FileResult.failure(task.source, named, unexpected(error))
+        return FileResult.failure(task.source, bundle, unexpected(error))
 
 
 def _make(task: Task, pipeline: Pipeline, common: Common) -> FileResult:
@@ -115,7 +115,7 @@ def _make(task: Task, pipeline: Pipeline, common: Common) -> FileResult:
         ContractError: If somebody put another file in its place since the run began.
     """
     write = common.write
-    appeared = state_of(task.target) != task.before
+    appeared = state_of(task.target) != task.target_state
     if write.resume or appeared:
         if proved_done(task.source, task.target, pipeline, write, common.mosaic):
             return FileResult.skip(task.source, task.target, pipeline, *[ELSEWHERE][:appeared])
@@ -134,4 +134,4 @@ def _make(task: Task, pipeline: Pipeline, common: Common) -> FileResult:
 
 
 def _tick(progress: FileProgress, source: Path) -> Callable[[int, int], None]:
-    return lambda done, total: progress(source, done, total)
+    return lambda count, total: progress(source, count, total)

@@ -101,13 +101,13 @@ def process(  # noqa: PLR0913 - each says one thing to its caller
         options = replace(options, color="camera")
     if client is not None and write.jobs > 1:
         raise ContractError("jobs are those of one process; leave them out with a client")
-    named = None if bundle is None else str(bundle)
+    bundle_name = None if bundle is None else str(bundle)
     pipelines = Pipelines(_shared(options, write.jobs))
-    kind = kind_of_run(named, options, pipelines)
+    kind = kind_of_run(bundle_name, options, pipelines)
     sources = expand(list_paths(files), kind)
     if not sources:
         return []
-    tasks = list_tasks(sources, bundle=named, write=write, options=options, kind=kind)
+    tasks = list_tasks(sources, bundle=bundle_name, write=write, options=options, kind=kind)
     write.out_dir.mkdir(parents=True, exist_ok=True)
     for folder in {task.target.parent for task in tasks}:
         folder.mkdir(parents=True, exist_ok=True)

@@ -30,28 +30,28 @@ def expand(files: Sequence[FilePath], kind: Kind | None = None) -> list[Path]:
         kind: Of the captures, where that is known: a folder stands for its types of files alone.
     """
     suffixes = _suffixes(kind)
-    found: dict[Path, None] = {}
+    paths: dict[Path, None] = {}
     for item in files:
         path = Path(item)
         if _is_unreachable(path):
-            found[path] = None
+            paths[path] = None
         elif path.is_dir():
             inside = sorted(p for p in path.iterdir() if p.suffix.lower() in suffixes)
-            found.update(dict.fromkeys(p for p in inside if p.is_file() and not is_result(p)))
+            paths.update(dict.fromkeys(p for p in inside if p.is_file() and not is_result(p)))
         elif not path.exists() and glob.has_magic(str(item)):
             # pathlib has no glob that takes an absolute pattern
             matches = sorted(Path(m) for m in glob.glob(str(item), recursive=True))  # noqa: PTH207
-            found.update(dict.fromkeys(p for p in matches if p.is_file()))
+            paths.update(dict.fromkeys(p for p in matches if p.is_file()))
         else:
-            found[path] = None
-    return list(found)
+            paths[path] = None
+    return list(paths)
 
 
 def _suffixes(kind: Kind | None) -> frozenset[str]:
     if kind is None:
-        return CAPTURE_SUFFIXES.union(*(known.file_types for known in all_kinds()))
-    own = frozenset({*kind.file_types, *kind.shared_types})
-    return own or CAPTURE_SUFFIXES
+        return CAPTURE_SUFFIXES.union(*(each.file_types for each in all_kinds()))
+    suffixes = frozenset({*kind.file_types, *kind.shared_types})
+    return suffixes or CAPTURE_SUFFIXES
 
 
 def _is_unreachable(path: Path) -> bool:
@@ -70,8 +70,8 @@ def is_result(path: Path) -> bool:
     record = read_sidecar(path)
     if record is None:
         return False
-    beside = record.get("beside", [])
-    names = [record["output"], *(beside if isinstance(beside, list) else [])]
+    extra_names = record.get("beside", [])
+    names = [record["output"], *(extra_names if isinstance(extra_names, list) else [])]
     return path.name in {Path(str(name)).name for name in names}
 
 

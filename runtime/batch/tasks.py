@@ -30,24 +30,24 @@ class Task:
         target: The picture to write.
         bundle: Name or path of the bundle; "none" only develops.
         refusal: Why the file cannot be done, when that is known beforehand.
-        before: State of the target then; None without one.
-        beside: Further files that may appear.
+        target_state: State of the target then; None without one.
+        extra_files: Further files that may appear.
     """
 
     source: Path
     target: Path
     bundle: str
     refusal: str | None = None
-    before: tuple[int, int] | None = None
-    beside: tuple[Path, ...] = ()
+    target_state: tuple[int, int] | None = None
+    extra_files: tuple[Path, ...] = ()
 
     @property
     def files(self) -> tuple[Path, ...]:
         """Return every file that may appear, the main one first."""
-        return (self.target, *self.beside)
+        return (self.target, *self.extra_files)
 
     @property
-    def own(self) -> tuple[Path, ...]:
+    def own_files(self) -> tuple[Path, ...]:
         """Return the files among these that are the capture itself."""
         source = self.source.resolve()
         return tuple(path for path in self.files if path.resolve() == source)
@@ -78,9 +78,9 @@ def list_tasks(
             bundle.
     """
     folders = _folders(sources, write)
-    made = options or Options()
-    parts = [runtime_part((kind or kind_without_bundle(s, made)).name) for s in sources]
-    outputs = [_outputs(s, p, made, write) for s, p in zip(sources, parts, strict=True)]
+    settings = options or Options()
+    parts = [runtime_part((kind or kind_without_bundle(s, settings)).name) for s in sources]
+    outputs = [_outputs(s, p, settings, write) for s, p in zip(sources, parts, strict=True)]
     if outputs and all(isinstance(names, ContractError) for names in outputs):
         raise next(names for names in outputs if isinstance(names, ContractError))
     tasks = [
@@ -97,7 +97,7 @@ def list_tasks(
         raise ContractError(
             f"no file names a bundle ({names}); name one by {_bundle_options()} to develop only"
         )
-    existing = [p for t in sound for p in t.files if p.exists() and p not in t.own]
+    existing = [p for t in sound for p in t.files if p.exists() and p not in t.own_files]
     if existing and not (write.resume or write.overwrite):
         listed = ", ".join(map(str, existing[:5]))
         raise ContractError(
@@ -140,24 +140,24 @@ def _make_task(
     refusal = refusal_of(source)
     if isinstance(names, ContractError):
         names, refusal = (source.stem,), refusal or str(names)
-    target, *beside = (folder / name for name in names)
-    chosen = bundle
-    if chosen is None and refusal is None:
+    target, *extra_files = (folder / name for name in names)
+    bundle_name = bundle
+    if bundle_name is None and refusal is None:
         try:
-            chosen = part.named(source)
+            bundle_name = part.bundle_of(source)
         except Exception as error:
             logger.debug("%s failed", source, exc_info=error)
             refusal = f"cannot read {source}: {unexpected(error)}"
         else:
-            if chosen is None:
+            if bundle_name is None:
                 refusal = f"{source} {_NAMELESS}; name one by {_bundle_options()}"
     return Task(
         source=source,
         target=target,
-        bundle=chosen or NO_BUNDLE,
+        bundle=bundle_name or NO_BUNDLE,
         refusal=refusal,
-        before=state_of(target),
-        beside=tuple(beside),
+        target_state=state_of(target),
+        extra_files=tuple(extra_files),
     )
 
 
@@ -167,15 +167,15 @@ def state_of(path: Path) -> tuple[int, int] | None:
     Its inode does too, but every machine may see another one.
     """
     try:
-        found = path.stat()
+        status = path.stat()
     except (OSError, ValueError):
         return None
-    return found.st_mtime_ns, found.st_size
+    return status.st_mtime_ns, status.st_size
 
 
 def _refuse_themselves(tasks: Sequence[Task]) -> None:
     for task in tasks:
-        if task.own:
+        if task.own_files:
             raise ContractError(
                 f"{task.source} would overwrite itself; choose another {option_text('out_dir')}"
             )

@@ -1,7 +1,7 @@
 """The decoding child: started with its order, or ahead of it while its parent still imports.
 
-    decoder_ahead()  a child makes itself ready beside this process; the first order goes to it
-    given(order)     that child, or a fresh one
+    decoder_ahead()    a child makes itself ready beside this process; the first order goes to it
+    decoder_of(order)  that child, or a fresh one
 
 What a child imports takes a quarter of a second, which one photograph need not wait for. Imports
 the standard library alone, since the command line does so before anything else.
@@ -75,7 +75,7 @@ def decoder_ahead() -> Iterator[None]:
 
 
 @contextmanager
-def given(order: Sequence[str]) -> Iterator[Decoder]:
+def decoder_of(order: Sequence[str]) -> Iterator[Decoder]:
     """Yield a child that has its order; it ends with the block.
 
     Args:
@@ -134,6 +134,6 @@ def child_environment() -> dict[str, str]:
     environment = {"OMP_NUM_THREADS": "4", **os.environ, "OPENBLAS_NUM_THREADS": "1", "TZ": "UTC"}
     root = str(Path(camkit.__file__).resolve().parents[1])
     if not root.endswith(("site-packages", "dist-packages")):
-        known = environment.get("PYTHONPATH")
-        environment["PYTHONPATH"] = os.pathsep.join([*([known] if known else []), root])
+        search_path = environment.get("PYTHONPATH")
+        environment["PYTHONPATH"] = os.pathsep.join([*([search_path] if search_path else []), root])
     return environment

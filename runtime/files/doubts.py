@@ -80,7 +80,7 @@ def find_doubts(
     if min(samples.shape[-2:]) < LEAST_SIDE_PX:
         return []
     cells = _cells(samples, levels, cfa)
-    found = (
+    doubts = (
         *_level_doubts(samples, levels),
         _masked_doubt(masked, levels),
         _green_doubt(samples, levels, cfa),
@@ -90,7 +90,7 @@ def find_doubts(
         _noise_doubt(cells),
         _edge_doubt(cells),
     )
-    return [doubt for doubt in found if doubt]
+    return [doubt for doubt in doubts if doubt]
 
 
 def notes_behind(capture: Capture, haze: Haze) -> list[str]:
@@ -121,8 +121,8 @@ def is_noise(samples: Samples, levels: Levels, cfa: CfaPattern | None) -> bool:
     """
     if min(samples.shape[-2:]) < LEAST_SIDE_PX:
         return False
-    reached = replace(levels, white=float(max(samples.max(), levels.black.max() + 1)))
-    return _noise_share(_cells(samples, reached, cfa)) > 0.5
+    widened = replace(levels, white=float(max(samples.max(), levels.black.max() + 1)))
+    return _noise_share(_cells(samples, widened, cfa)) > 0.5
 
 
 def _level_doubts(samples: Samples, levels: Levels) -> list[str]:
@@ -132,36 +132,36 @@ def _level_doubts(samples: Samples, levels: Levels) -> list[str]:
         for value in np.quantile(_thinned(samples), (DARKEST_SHARE, 1 - DARKEST_SHARE))
     )
     top = (float(samples.max()) - black) / span
-    found = [_above_white_doubt(samples, levels)]
-    apart = float(np.ptp(levels.black))
-    if levels.black.ndim == 2 and apart > BLACKS_APART * span:
-        found.append(
-            f"the black levels of the CFA differ by {apart:g}: the black level is damaged "
+    doubts = [_above_white_doubt(samples, levels)]
+    spread = float(np.ptp(levels.black))
+    if levels.black.ndim == 2 and spread > BLACKS_APART * span:
+        doubts.append(
+            f"the black levels of the CFA differ by {spread:g}: the black level is damaged "
             f"(set it with {option_text('black_level')})"
         )
     if low > FAR_ABOVE_BLACK and high - low > LEAST_CONTRAST:
-        found.append(
+        doubts.append(
             f"{NOTHING_DARK} {low:.0%} of the range above black {black:g}: a "
             f"bright scene, fog, veiling glare, or a stated black level that is too low "
             f"(set it with {option_text('black_level')})"
         )
     middle, least = float(np.median(_thinned(samples))), float(levels.black.min())
     if middle < least - BELOW_BLACK * span:
-        found.append(
+        doubts.append(
             f"half of the samples lie at or below {middle:g}, black is {least:g}: the black level "
             f"or the pixel data are damaged (set it with {option_text('black_level')})"
         )
     elif low < -FAR_BELOW_BLACK:
-        found.append(
+        doubts.append(
             f"the darkest samples lie {-low:.0%} of the range below black {black:g}: the black "
             f"level or the pixel data are damaged (set it with {option_text('black_level')})"
         )
     if top < NEVER_BRIGHT:
-        found.append(
+        doubts.append(
             f"nothing is brighter than {top:.1%} of white {levels.white:g}: a dark picture, or a "
             f"stated white level that is too high (set it with {option_text('white_level')})"
         )
-    return found
+    return doubts
 
 
 def _thinned(samples: NDArray[Any]) -> NDArray[Any]:
@@ -175,14 +175,14 @@ def _above_white_doubt(samples: Samples, levels: Levels) -> str:
     top = int(samples.max())
     if top <= levels.white * ABOVE_WHITE:
         return ""
-    above = int(np.count_nonzero(samples > levels.white * ABOVE_WHITE))
+    count = int(np.count_nonzero(samples > levels.white * ABOVE_WHITE))
     piled = int(np.count_nonzero(samples >= 0.99 * top))
-    if above < max(LEAST_ABOVE_WHITE, ABOVE_WHITE_SHARE * samples.size):
+    if count < max(LEAST_ABOVE_WHITE, ABOVE_WHITE_SHARE * samples.size):
         return ""
-    if piled > PILE_SHARE * above:
+    if piled > PILE_SHARE * count:
         return ""
     return (
-        f"{above} samples lie above white {levels.white:g}, up to {top}: the white level or the "
+        f"{count} samples lie above white {levels.white:g}, up to {top}: the white level or the "
         f"pixel data are damaged (set it with {option_text('white_level')})"
     )
 
@@ -216,16 +216,16 @@ def _green_doubt(samples: Samples, levels: Levels, cfa: CfaPattern | None) -> st
         ]
         for places in (greens, [place for place in np.ndindex(2, 2) if place not in greens])
     )
-    apart, level = np.median(np.abs(pair[0] - pair[1])), np.median(pair[0] + pair[1]) / 2
+    difference, level = np.median(np.abs(pair[0] - pair[1])), np.median(pair[0] + pair[1]) / 2
     bias = abs(float(np.median(pair[0] - pair[1])))
     bright = level > LEAST_GREEN * (levels.white - float(levels.black.mean()))
     # red and blue that go together better than the greens are the greens
-    swapped = apart > GREEN_OFFSET * level and apart > SWAPPED_GREENS * np.median(
+    swapped = difference > GREEN_OFFSET * level and difference > SWAPPED_GREENS * np.median(
         np.abs(others[0] - others[1])
     )
-    biased = bias > GREEN_OFFSET * level and bias > 0.5 * apart
+    biased = bias > GREEN_OFFSET * level and bias > 0.5 * difference
     if bright and (biased or swapped):
-        share = (bias if biased else float(apart)) / level
+        share = (bias if biased else float(difference)) / level
         return f"the two greens of the CFA {cfa} differ by {share:.0%}: the CFA is damaged"
     return ""
 
@@ -275,8 +275,8 @@ def _wraps(samples: Samples, levels: Levels, cfa: CfaPattern | None) -> Cells:
     Where a stream broke, the end of a row and the next are neighbours in what was photographed;
     those of a mosaic that are two samples apart then have one colour.
     """
-    plane, apart = (samples, 2) if cfa is not None else (samples[len(samples) // 2], 1)
-    ends, starts = plane[:-1, -apart:].astype(np.float32), plane[1:, :apart].astype(np.float32)
+    plane, period = (samples, 2) if cfa is not None else (samples[len(samples) // 2], 1)
+    ends, starts = plane[:-1, -period:].astype(np.float32), plane[1:, :period].astype(np.float32)
     steps = np.abs(starts - ends).mean(axis=1) / (levels.white - float(levels.black.mean()))
     steps = np.concatenate([steps[:1], steps])
     return steps if cfa is None else steps[: len(steps) // 2 * 2].reshape(-1, 2).mean(axis=1)
@@ -311,11 +311,11 @@ def _breaks_off(rows: Samples, levels: Levels) -> bool:
     lit = np.flatnonzero(rows[-1])
     gaps = np.diff(np.append(lit, lit[0] + width))  # some cameras turn their rows
     longest = int(np.argmax(gaps))
-    lost = np.zeros(width, dtype=bool)
-    lost[np.arange(lit[longest] + 1, lit[longest] + gaps[longest]) % width] = True
+    gap = np.zeros(width, dtype=bool)
+    gap[np.arange(lit[longest] + 1, lit[longest] + gaps[longest]) % width] = True
     black = float(levels.black.mean())
     least = black + LEAST_LIGHT * (levels.white - black)
-    sides = rows[-1][~lost], rows[0][lost]
+    sides = rows[-1][~gap], rows[0][gap]
     return all(len(side) >= LEAST_BREAK_PX and float(np.median(side)) > least for side in sides)
 
 
@@ -330,12 +330,12 @@ def _noise_share(cells: Cells) -> float:
     noisy = []
     for top in range(0, len(cells) - _BAND_CELLS + 1, _BAND_CELLS):
         rows = cells[top : top + _BAND_CELLS : 2]
-        here, away = rows[:, : half - _LAGS : step], rows[:, half : 2 * half - _LAGS : step]
+        here, distant = rows[:, : half - _LAGS : step], rows[:, half : 2 * half - _LAGS : step]
         # a fine pattern has something in common with itself one period on, noise never has
-        below = cells[top + 1 : top + _BAND_CELLS : 2, : half - _LAGS : step]
+        next_rows = cells[top + 1 : top + _BAND_CELLS : 2, : half - _LAGS : step]
         others = [rows[:, lag : half - _LAGS + lag : step] for lag in range(1, _LAGS + 1)]
-        near = min(float(np.median(np.abs(other - here))) for other in (*others, below))
-        far = float(np.median(np.abs(away - here)))
+        near = min(float(np.median(np.abs(other - here))) for other in (*others, next_rows))
+        far = float(np.median(np.abs(distant - here)))
         noisy.append(near > max(_NOISE_LEVEL, _NOISE_RATIO * far))
     return float(np.mean(noisy)) if noisy else 0.0
 

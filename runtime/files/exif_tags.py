@@ -55,17 +55,17 @@ def exif_of_picture(data: bytes) -> TiffTags:
 def orientation_of(tags: TiffTags) -> int:
     """Return the EXIF orientation of the first picture, 1 where none is stated that exists."""
     first = tags.directories[0].get(ORIENTATION) if tags.directories else None
-    stated = first[0] if first else 1
-    return int(stated) if stated in range(1, 9) else 1
+    number = first[0] if first else 1
+    return int(number) if number in range(1, 9) else 1
 
 
 def metadata_of(tags: TiffTags) -> Metadata:
     """Return the metadata in the tags of a photograph."""
-    told: dict[str, object] = {name: tags.text(tag) for name, tag in TEXT_TAGS.items()}
-    told |= {name: (tags.numbers(tag) or (None,))[0] for name, tag in NUMBER_TAGS.items()}
-    if told["iso"] == ISO_IN_OTHER_TAG:
-        told["iso"] = (tags.numbers(RECOMMENDED_EXPOSURE_INDEX) or (told["iso"],))[0]
-    return Metadata.believable(**told, **_place(tags))
+    fields: dict[str, object] = {name: tags.text(tag) for name, tag in TEXT_TAGS.items()}
+    fields |= {name: (tags.numbers(tag) or (None,))[0] for name, tag in NUMBER_TAGS.items()}
+    if fields["iso"] == ISO_IN_OTHER_TAG:
+        fields["iso"] = (tags.numbers(RECOMMENDED_EXPOSURE_INDEX) or (fields["iso"],))[0]
+    return Metadata.believable(**fields, **_place(tags))
 
 
 def is_stated(tags: TiffTags, name: str) -> bool:
@@ -77,17 +77,17 @@ def is_stated(tags: TiffTags, name: str) -> bool:
 def _place(tags: TiffTags) -> dict[str, float | None]:
     """Return latitude, longitude and altitude with their signs."""
     height = (tags.numbers(ALTITUDE) or (math.nan,))[0]
-    below = _is_below(tags)
+    is_below = _is_below(tags)
     return {
         "latitude_deg": _degrees(tags, LATITUDE, LATITUDE_REF, "NS"),
         "longitude_deg": _degrees(tags, LONGITUDE, LONGITUDE_REF, "EW"),
-        "altitude_m": -height if below else height,
+        "altitude_m": -height if is_below else height,
     }
 
 
 def _is_below(tags: TiffTags) -> bool:
-    told = tags.numbers(ALTITUDE_REF)
-    return told is not None and told[0] == BELOW_SEA_LEVEL
+    reference = tags.numbers(ALTITUDE_REF)
+    return reference is not None and reference[0] == BELOW_SEA_LEVEL
 
 
 def _degrees(tags: TiffTags, tag: int, reference: int, signs: str) -> float | None:

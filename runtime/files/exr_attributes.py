@@ -34,21 +34,21 @@ _HALF_MINUTE_S: Final = 30
 
 def exr_attributes(metadata: Metadata) -> dict[str, bytes | float]:
     """Return the attributes of what is stated, text as UTF-8."""
-    told = metadata.stated()
-    found: dict[str, bytes | float] = {
-        name: str(told[key]).encode() for key, name in TEXTS.items() if key in told
+    fields = metadata.to_json()
+    attributes: dict[str, bytes | float] = {
+        name: str(fields[key]).encode() for key, name in TEXTS.items() if key in fields
     }
-    found |= {name: float(told[key]) for key, name in NUMBERS.items() if key in told}
+    attributes |= {name: float(fields[key]) for key, name in NUMBERS.items() if key in fields}
     if metadata.utc_offset:
-        found[UTC_OFFSET] = -_seconds(metadata.utc_offset)
-    return found
+        attributes[UTC_OFFSET] = -_seconds(metadata.utc_offset)
+    return attributes
 
 
 def metadata_of_exr(header: Mapping[str, Any]) -> Metadata:
     """Return the metadata of the photograph in a header."""
-    told: dict[str, Any] = {key: header.get(name) for key, name in TEXTS.items()}
-    told |= {key: _short(header.get(name)) for key, name in NUMBERS.items()}
-    return Metadata.believable(**told, utc_offset=_offset(header.get(UTC_OFFSET)))
+    fields: dict[str, Any] = {key: header.get(name) for key, name in TEXTS.items()}
+    fields |= {key: _short(header.get(name)) for key, name in NUMBERS.items()}
+    return Metadata.believable(**fields, utc_offset=_offset(header.get(UTC_OFFSET)))
 
 
 def _short(value: Any) -> Any:

@@ -71,14 +71,14 @@ def list_paths(files: Any) -> Sequence[FilePath]:
     alone = is_path(files) or isinstance(files, bytes | bytearray) or hasattr(files, "read")
     if not alone and not isinstance(files, Iterable):
         raise ContractError(f"expected paths of captures; got {type(files).__name__}")
-    found = [files] if alone else list(files)
-    for item in found:
+    paths = [files] if alone else list(files)
+    for item in paths:
         if not is_path(item):
             raise ContractError(
                 f"pictures are named after their files; got {type(item).__name__}: give paths, or "
                 "hand data in memory to Pipeline.process"
             )
-    return found
+    return paths
 
 
 def _copy(source: Any, file: IO[bytes]) -> None:
@@ -92,15 +92,15 @@ def _copy(source: Any, file: IO[bytes]) -> None:
 
 def _file_name(source: Any, path: Path) -> str:
     """Return a name whose suffix tells pictures from RAW files: the object's own, if it has one."""
-    own = getattr(source, "name", None)
-    if isinstance(own, str) and Path(own).suffix:
-        return Path(own).name
+    name = getattr(source, "name", None)
+    if isinstance(name, str) and Path(name).suffix:
+        return Path(name).name
     with path.open("rb") as file:
         head = file.read(4)
-    found = [suffix for magic, suffix in _MAGIC_SUFFIXES if head.startswith(magic)]
-    if not found and head in _TIFF_STARTS and _is_plain(read_tiff_tags(path)):
-        found = [".tif"]
-    return "data in memory" + (found[0] if found else ".raw")
+    suffixes = [suffix for magic, suffix in _MAGIC_SUFFIXES if head.startswith(magic)]
+    if not suffixes and head in _TIFF_STARTS and _is_plain(read_tiff_tags(path)):
+        suffixes = [".tif"]
+    return "data in memory" + (suffixes[0] if suffixes else ".raw")
 
 
 def _is_plain(tags: TiffTags) -> bool:

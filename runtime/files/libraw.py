@@ -30,7 +30,7 @@ DEVELOPED: Final = "not a Bayer mosaic: LibRaw demosaicked it and cut the values
 
 
 def decode_with_libraw(
-    raw: Any, tags: TiffTags, picture: DngPicture | None, said: MosaicOptions
+    raw: Any, tags: TiffTags, picture: DngPicture | None, options: MosaicOptions
 ) -> RawDecode:
     """Decode a file with LibRaw, and apply the tags of a DNG that it leaves out.
 
@@ -38,7 +38,7 @@ def decode_with_libraw(
         raw: The file as rawpy opened it.
         tags: Of the file.
         picture: Its sensor picture, if it is a DNG.
-        said: Levels that the caller says in place of the file's.
+        options: Levels that the caller says in place of the file's.
 
     Raises:
         DecodeError: If LibRaw's answer is not believable.
@@ -53,21 +53,21 @@ def decode_with_libraw(
         )
     cfa = _cfa(raw)
     # black levels are read before any postprocess, which subtracts and overwrites them
-    levels = _levels(raw, cfa, said)
+    levels = _levels(raw, cfa, options)
     raw_checks.check_levels(levels)
-    dng_checks.check_dng(tags, cfa, levels, said.levels)
+    dng_checks.check_dng(tags, cfa, levels, options.levels)
     if cfa is None and dng_checks.states_cells(tags):
         notes.append("the file states a CFA of 2x2, LibRaw found none: its header is damaged")
-    samples, levels = _samples(raw, cfa, levels, notes, said)
+    samples, levels = _samples(raw, cfa, levels, notes, options)
     if picture is not None:
-        samples, levels = _with_tags(raw, picture, (samples, cfa, levels), said, notes)
-    stated = stated_orientation(tags)
+        samples, levels = _with_tags(raw, picture, (samples, cfa, levels), options, notes)
+    orientation = stated_orientation(tags)
     red, green, blue, *_ = (float(gain) for gain in raw.camera_whitebalance)
     return RawDecode(
         samples=samples,
         cfa=cfa,
         levels=levels,
-        orientation=1 if stated == 1 else FLIP_TO_EXIF.get(sizes.flip, 1),
+        orientation=1 if orientation == 1 else FLIP_TO_EXIF.get(sizes.flip, 1),
         metadata=raw_metadata(raw, tags),
         gains=(red, green, blue),
         table_matrix=np.array(raw.rgb_xyz_matrix, dtype=np.float64)[:3],
@@ -87,7 +87,7 @@ def _with_tags(
     raw: Any,
     picture: DngPicture,
     decoded: tuple[NDArray[Any], CfaPattern | None, raw_checks.Levels],
-    said: MosaicOptions,
+    options: MosaicOptions,
     notes: list[str],
 ) -> tuple[NDArray[Any], raw_checks.Levels]:
     """Apply the tags of a DNG, or note them where LibRaw has demosaicked the picture already."""
@@ -95,13 +95,15 @@ def _with_tags(
     if samples.ndim == 3 and DEVELOPED in notes:
         notes += dng_checks.unapplied(picture)
         return samples, levels
-    seen = SeenPixels(
+    pixels = SeenPixels(
         samples=samples,
         cfa=cfa,
         whole=raw.raw_image if raw.raw_image is not None else np.empty((0, 0)),
         first=(raw.sizes.top_margin, raw.sizes.left_margin),
     )
-    samples, levels, more = apply_tags(picture, seen, said, levels if picture.is_rescaled else None)
+    samples, levels, more = apply_tags(
+        picture, pixels, options, levels if picture.is_rescaled else None
+    )
     notes += more
     return samples, levels
 
@@ -129,13 +131,13 @@ def _black_level(raw: Any, cfa: CfaPattern | None) -> NDArray[np.float32]:
     return np.asarray(by_color[np.array(cell)])
 
 
-def _levels(raw: Any, cfa: CfaPattern | None, said: MosaicOptions) -> raw_checks.Levels:
+def _levels(raw: Any, cfa: CfaPattern | None, options: MosaicOptions) -> raw_checks.Levels:
     """Return the levels of the file where the caller says no others."""
     black, white = _black_level(raw, cfa), float(raw.white_level)
-    if said.black_level is not None:
-        black = np.full_like(black, said.black_level)
+    if options.black_level is not None:
+        black = np.full_like(black, options.black_level)
     return raw_checks.Levels(
-        black=black, white=white if said.white_level is None else said.white_level
+        black=black, white=white if options.white_level is None else options.white_level
     )
 
 
@@ -155,7 +157,7 @@ def _samples(
     cfa: CfaPattern | None,
     levels: raw_checks.Levels,
     notes: list[str],
-    said: MosaicOptions,
+    options: MosaicOptions,
 ) -> tuple[NDArray[Any], raw_checks.Levels]:
     """Return the samples, as far as possible in LibRaw's own memory, and their levels."""
     import rawpy
@@ -170,11 +172,11 @@ def _samples(
         notes.append("monochrome sensor: its plane is used as red, green and blue")
         plane = raw.raw_image_visible
         return np.broadcast_to(plane, (3, *plane.shape)), levels
-    return develop_linear(raw, notes, said)
+    return develop_linear(raw, notes, options)
 
 
 def develop_linear(
-    raw: Any, notes: list[str], said: MosaicOptions = NOTHING_SAID
+    raw: Any, notes: list[str], options: MosaicOptions = NOTHING_SAID
 ) -> tuple[NDArray[Any], raw_checks.Levels]:
     """Demosaic with LibRaw what is no Bayer mosaic (X-Trans, sRAW, four colours).
 
@@ -200,8 +202,8 @@ def develop_linear(
         adjust_maximum_thr=0.0,
         user_wb=[1.0, 1.0, 1.0, 1.0],
         user_flip=0,
-        user_black=None if said.black_level is None else round(said.black_level),
-        user_sat=None if said.white_level is None else round(said.white_level),
+        user_black=None if options.black_level is None else round(options.black_level),
+        user_sat=None if options.white_level is None else round(options.white_level),
     )
     notes.append(DEVELOPED)
     black = np.zeros(3, dtype=np.float32)

@@ -43,11 +43,11 @@ def _lone(band: Samples, cell: int, step: int) -> int:
     if not rows.size:
         return 0
     light = band.astype(np.float32)
-    around = neighbours(light, rows, cols, cell)
-    high, low = around.max(axis=0), around.min(axis=0)
+    ring = neighbours(light, rows, cols, cell)
+    high, low = ring.max(axis=0), ring.min(axis=0)
     value = light[rows + MARGIN_PX, cols + MARGIN_PX]
-    beyond = np.maximum(value - high, low - value)
-    lone = beyond > np.maximum(OUTLIER_SPREADS * (high - low), step)
+    distance = np.maximum(value - high, low - value)
+    lone = distance > np.maximum(OUTLIER_SPREADS * (high - low), step)
     if cell == 2:
         lone &= ~glows(light, rows, cols)
     return int(np.count_nonzero(lone))
@@ -59,16 +59,16 @@ def _apart_from_four(band: Samples, cell: int, step: int) -> NDArray[np.bool_]:
         band = band.astype(np.uint16)
     height, width = (side - 2 * MARGIN_PX for side in band.shape)
 
-    def moved(dy: int, dx: int) -> NDArray[Any]:
+    def shifted(dy: int, dx: int) -> NDArray[Any]:
         top, left = MARGIN_PX + dy, MARGIN_PX + dx
         return band[top : top + height, left : left + width]
 
-    inner = moved(0, 0)
-    beside = (moved(-cell, 0), moved(cell, 0), moved(0, -cell), moved(0, cell))
-    above = np.maximum(beside[0], beside[1])
-    np.maximum(above, np.maximum(beside[2], beside[3]), out=above)
-    below = np.minimum(beside[0], beside[1])
-    np.minimum(below, np.minimum(beside[2], beside[3]), out=below)
+    inner = shifted(0, 0)
+    sides = (shifted(-cell, 0), shifted(cell, 0), shifted(0, -cell), shifted(0, cell))
+    above = np.maximum(sides[0], sides[1])
+    np.maximum(above, np.maximum(sides[2], sides[3]), out=above)
+    below = np.minimum(sides[0], sides[1])
+    np.minimum(below, np.minimum(sides[2], sides[3]), out=below)
     # unsigned numbers wrap, so each difference is taken from a bound that is never crossed
     high = np.maximum(inner, above) - above > step
     low = below - np.minimum(inner, below) > step

@@ -132,20 +132,20 @@ def _is_mosaic(samples: NDArray[Any]) -> bool:
             return False
     high, wide = (side // 2 * 2 for side in middle.shape)
     cells = middle[:high, :wide].reshape(high // 2, 2, wide // 2, 2)
-    apart = cells - cells.mean(axis=(1, 3), keepdims=True)
-    steady = np.abs(apart.mean(axis=(0, 2))).mean()
-    return bool(steady > _STEADY * np.abs(apart).mean())
+    offsets = cells - cells.mean(axis=(1, 3), keepdims=True)
+    steady = np.abs(offsets.mean(axis=(0, 2))).mean()
+    return bool(steady > _STEADY * np.abs(offsets).mean())
 
 
 def _linear_codes(decoded: Decoded) -> NDArray[np.uint16]:
     """Return light of codes of up to 8 bits in 16 bits, cut to 0..1."""
     space, samples = decoded.space or SRGB, decoded.samples
-    found = np.empty(samples.shape, dtype=np.uint16)
+    codes = np.empty(samples.shape, dtype=np.uint16)
     for top in range(0, samples.shape[-2], _LINEAR_ROWS):
         rows = np.s_[..., top : top + _LINEAR_ROWS, :]
         light = space.light_of(samples[rows], decoded.top)
-        found[rows] = np.round(np.clip(light, 0, 1) * 65535)
-    return found
+        codes[rows] = np.round(np.clip(light, 0, 1) * 65535)
+    return codes
 
 
 def _full_codes(decoded: Decoded) -> NDArray[np.uint8]:
@@ -296,8 +296,8 @@ def read_light(path: Path) -> FloatArray:
     """
     scene, space = read_scene_and_space(path)
     from_rec709 = np.linalg.inv(space.to_rec709).astype(np.float64)
-    own = scene if space.is_rec709 else apply_matrix(from_rec709, scene)
-    if own.min() >= -FAINT * own.max():
+    native = scene if space.is_rec709 else apply_matrix(from_rec709, scene)
+    if native.min() >= -FAINT * native.max():
         np.maximum(scene, 0, out=scene)
     return scene
 

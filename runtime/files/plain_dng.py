@@ -22,14 +22,16 @@ from camkit.runtime.files.tiff_tags import TiffTags
 LINEARIZATION: Final = 50712
 
 
-def plain_decode(path: Path, tags: TiffTags, picture: DngPicture, said: MosaicOptions) -> RawDecode:
+def plain_decode(
+    path: Path, tags: TiffTags, picture: DngPicture, options: MosaicOptions
+) -> RawDecode:
     """Read a DNG of floats, of deflated samples or of planes that lie apart.
 
     Args:
         path: The file.
         tags: Of the file.
         picture: Its sensor picture, which `check_readable` has passed.
-        said: Levels that the caller says in place of the file's.
+        options: Levels that the caller says in place of the file's.
 
     Raises:
         DecodeError: If its data are damaged.
@@ -52,19 +54,21 @@ def plain_decode(path: Path, tags: TiffTags, picture: DngPicture, said: MosaicOp
     else:
         notes.append("linear RGB file: already demosaicked, so demosaicking is skipped")
         samples = np.moveaxis(visible, -1, 0)
-    seen = SeenPixels(samples=samples, cfa=cfa, whole=whole, first=(top, left))
-    samples, levels, more = apply_tags(picture, seen, said)
+    pixels = SeenPixels(samples=samples, cfa=cfa, whole=whole, first=(top, left))
+    samples, levels, more = apply_tags(picture, pixels, options)
     if picture.is_float:
         notes.insert(
             0, f"floating-point DNG: samples are used as stored, white is {levels.white:g}"
         )
-    found = metadata_of(tags)
+    metadata = metadata_of(tags)
     return RawDecode(
         samples=samples,
         cfa=cfa,
         levels=levels,
         orientation=stated_orientation(tags) or 1,
-        metadata=found if found.camera else found.completed(model=tags.text(UNIQUE_CAMERA_MODEL)),
+        metadata=metadata
+        if metadata.camera
+        else metadata.completed(model=tags.text(UNIQUE_CAMERA_MODEL)),
         notes=notes + more,
     )
 

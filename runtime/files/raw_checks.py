@@ -163,10 +163,10 @@ def check_content(samples: Samples, levels: Levels) -> None:
             f"no pixel exceeds the black level {levels.black.min():g} (largest is {high}); "
             "the black level or the pixel data are damaged"
         )
-    over = share_over_white(samples, levels.white) if high > levels.white else 0.0
-    if over > OVER_WHITE_SHARE:
+    share = share_over_white(samples, levels.white) if high > levels.white else 0.0
+    if share > OVER_WHITE_SHARE:
         raise DecodeError(
-            f"{over:.0%} of the pixels lie above the white level {levels.white:g}; "
+            f"{share:.0%} of the pixels lie above the white level {levels.white:g}; "
             f"the white level or the pixel data are damaged "
             f"(set it with {option_text('white_level')})"
         )
@@ -197,8 +197,8 @@ def _check_unread(samples: Samples, levels: Levels) -> None:
             )
     elif tail >= 2:
         # black at 0 lets a dark foreground be 0; a cut shows as a bright row before the zeros
-        before = samples[..., -tail - 3 : -tail - 1, :]
-        if before.size and float(np.median(before)) > LIVE_SIGNAL * levels.white:
+        last_rows = samples[..., -tail - 3 : -tail - 1, :]
+        if last_rows.size and float(np.median(last_rows)) > LIVE_SIGNAL * levels.white:
             raise DecodeError(
                 f"the last {tail} rows are 0 after a bright row: the data are cut off"
             )

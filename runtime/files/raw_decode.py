@@ -69,7 +69,7 @@ def noted(decode: RawDecode, doubt: str) -> RawDecode:
 
 
 def to_capture(
-    decode: RawDecode, tags: TiffTags, picture: DngPicture | None, said: MosaicOptions
+    decode: RawDecode, tags: TiffTags, picture: DngPicture | None, options: MosaicOptions
 ) -> Capture:
     """Return the capture of a decode that can be believed.
 
@@ -77,13 +77,13 @@ def to_capture(
         decode: Of the file.
         tags: Of the file.
         picture: Its sensor picture, if it is a DNG.
-        said: Levels that the caller says in place of the file's.
+        options: Levels that the caller says in place of the file's.
 
     Raises:
         DecodeError: If the decode cannot be true.
     """
     notes = [*decode.notes, *dng_checks.find_doubts(tags), *_exposure_note(picture)]
-    levels = _judged(decode, raw_tags.sample_bits(tags), said, notes)
+    levels = _judged(decode, raw_tags.sample_bits(tags), options, notes)
     place = raw_tags.sensor_place(tags)
     iso = decode.metadata.iso
     return Capture(
@@ -112,29 +112,29 @@ def stated_orientation(tags: TiffTags) -> int | None:
 
     Programs that do not know it write 0, which LibRaw takes for a quarter turn.
     """
-    stated = tags.numbers(_ORIENTATION)
-    if stated is None:
+    numbers = tags.numbers(_ORIENTATION)
+    if numbers is None:
         return None
-    return int(stated[0]) if stated[0] in range(1, 9) else 1
+    return int(numbers[0]) if numbers[0] in range(1, 9) else 1
 
 
-def _judged(decode: RawDecode, bits: int, said: MosaicOptions, notes: list[str]) -> Levels:
+def _judged(decode: RawDecode, bits: int, options: MosaicOptions, notes: list[str]) -> Levels:
     """Check samples against their levels; return the levels, white corrected, and add notes."""
     samples, levels, cfa = decode.samples, decode.levels, decode.cfa
     if samples.dtype.kind == "f":
         raw_checks.check_levels(levels, largest_possible=np.inf)
-        seen, seen_levels = _codes(samples, levels, notes)
+        codes, code_levels = _codes(samples, levels, notes)
     else:
         raw_checks.check_levels(levels)
-        if said.white_level is None:
+        if options.white_level is None:
             levels, note = believable_white(samples, levels, cfa, bits)
             notes += [note] if note else []
         else:
             check_said_white(samples, levels.white)
         raw_checks.check_content(samples, levels)
-        seen, seen_levels = samples, levels
-    _note_lone(seen, seen_levels, cfa, notes)
-    notes += find_doubts(seen, seen_levels, cfa, decode.masked, decode.grid)
+        codes, code_levels = samples, levels
+    _note_lone(codes, code_levels, cfa, notes)
+    notes += find_doubts(codes, code_levels, cfa, decode.masked, decode.grid)
     return levels
 
 
@@ -156,10 +156,10 @@ def _codes(
         notes.append(
             f"{np.count_nonzero(~finite)} samples are NaN or infinite: they count as invalid"
         )
-    above = np.count_nonzero(samples > levels.white)
-    if above:
+    count = np.count_nonzero(samples > levels.white)
+    if count:
         notes.append(
-            f"{above} samples lie above white {levels.white:g}, up to {high:.4g}: they are kept"
+            f"{count} samples lie above white {levels.white:g}, up to {high:.4g}: they are kept"
         )
     floor = min(low, float(levels.black.min()), 0.0)
     scale = CODES_WHITE / (levels.white - floor)
@@ -210,9 +210,9 @@ def _color_matrix(
     decode: RawDecode, tags: TiffTags, notes: list[str]
 ) -> NDArray[np.float64] | None:
     """Return XYZ (D65) to camera, from the DNG tags or else from LibRaw's table of cameras."""
-    stated = white_point.color_matrix(tags)
-    if stated is not None:
-        matrix, note = stated
+    tagged = white_point.color_matrix(tags)
+    if tagged is not None:
+        matrix, note = tagged
         notes.extend([note] if note else [])
         return matrix
     table = decode.table_matrix

@@ -26,11 +26,11 @@ def raw_metadata(raw: Any, tags: TiffTags) -> Metadata:
         tags: Its directories; none where it is no TIFF.
     """
     mine = metadata_of(tags)
-    told = {k: v for k, v in _of_libraw(raw).items() if v and not is_stated(tags, k)}
-    found = mine.completed(**told)
+    decoded = {k: v for k, v in _of_libraw(raw).items() if v and not is_stated(tags, k)}
+    metadata = mine.completed(**decoded)
     if not tags.directories:
-        return found.completed(**_of_preview(raw).stated())
-    return found if found.camera else found.completed(model=tags.text(UNIQUE_CAMERA_MODEL))
+        return metadata.completed(**_of_preview(raw).to_json())
+    return metadata if metadata.camera else metadata.completed(model=tags.text(UNIQUE_CAMERA_MODEL))
 
 
 def _of_libraw(raw: Any) -> dict[str, Any]:

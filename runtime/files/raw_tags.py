@@ -43,8 +43,8 @@ def camera_name(tags: TiffTags, metadata: Metadata) -> str:
 
 def sample_bits(tags: TiffTags) -> int:
     """Return the bits of a sample of the sensor picture; 0 if not stated or not believable."""
-    stated = [d.get(BITS_PER_SAMPLE, b"") for d in sensor_directories(tags.directories)]
-    bits = [value[0] for value in stated if value and not isinstance(value, bytes)]
+    values = [d.get(BITS_PER_SAMPLE, b"") for d in sensor_directories(tags.directories)]
+    bits = [value[0] for value in values if value and not isinstance(value, bytes)]
     return int(max(bits)) if bits and 1 <= max(bits) <= 16 else 0
 
 
@@ -88,15 +88,15 @@ def _pairs_by_color(
 def sensor_place(tags: TiffTags) -> SensorPlace:
     """Return camkit's record in ImageDescription, else the bundle of UniqueCameraModel."""
     match = _BUNDLE_IN_MODEL.fullmatch(tags.text(UNIQUE_CAMERA_MODEL) or "")
-    named = match.group(1) if match else None
+    model_bundle = match.group(1) if match else None
     try:
         record = json.loads(tags.text(IMAGE_DESCRIPTION) or "")["camkit"]
-        bundle = record.get("bundle", named)
+        bundle = record.get("bundle", model_bundle)
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
-        return SensorPlace(bundle_name=named)
+        return SensorPlace(bundle_name=model_bundle)
     pitch = record.get("pixel_pitch_um")
     return SensorPlace(
-        bundle_name=bundle if isinstance(bundle, str) else named,
+        bundle_name=bundle if isinstance(bundle, str) else model_bundle,
         origin_px=_whole_pair(record.get("origin_px"), least=0),
         sensor_size_px=_whole_pair(record.get("sensor_size_px"), least=1),
         pixel_pitch_um=float(pitch) if isinstance(pitch, int | float) and 0 < pitch < 1e4 else None,

@@ -79,8 +79,8 @@ class _Reader:
     big: bool
     entries_left: int = MAX_ALL_ENTRIES
     bytes_left: int = MAX_ALL_BYTES
-    seen: set[int] = field(default_factory=set)
-    found: dict[int, Mapping[int, TagValue]] = field(default_factory=dict)
+    visited: set[int] = field(default_factory=set)
+    directories: dict[int, Mapping[int, TagValue]] = field(default_factory=dict)
     interoperability: str = ""
 
     def unpack(self, code: str, offset: int) -> tuple[float, ...] | None:
@@ -95,13 +95,13 @@ class _Reader:
     def walk(self, offset: int) -> None:
         """Read a chain of directories with their children."""
         pending = [offset]
-        while pending and len(self.seen) < MAX_DIRECTORIES:
+        while pending and len(self.visited) < MAX_DIRECTORIES:
             at = pending.pop(0)
-            if at <= 0 or at in self.seen:
+            if at <= 0 or at in self.visited:
                 continue
-            self.seen.add(at)
+            self.visited.add(at)
             tags, following = self.directory(at)
-            self.found[at] = tags
+            self.directories[at] = tags
             pointers = (SUB_IFDS, EXIF_POINTER, GPS_POINTER)
             children = [at for tag in pointers for at in _whole(tags.get(tag))]
             for place in _whole(tags.get(INTEROPERABILITY_POINTER))[:1]:
@@ -176,9 +176,9 @@ def _read(file: BinaryIO, file_bytes: int) -> TiffTags:
     )
     reader.walk(first)
     return TiffTags(
-        directories=tuple(reader.found.values()),
+        directories=tuple(reader.directories.values()),
         file_bytes=file_bytes,
-        starts=tuple(reader.found),
+        starts=tuple(reader.directories),
         interoperability=reader.interoperability,
     )
 

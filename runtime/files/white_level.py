@@ -24,10 +24,10 @@ def check_said_white(samples: Samples, white: float) -> None:
     Raises:
         DecodeError: If they do.
     """
-    over = share_over_white(samples, white)
-    if over > OVER_WHITE_SHARE:
+    share = share_over_white(samples, white)
+    if share > OVER_WHITE_SHARE:
         raise DecodeError(
-            f"{over:.0%} of the samples lie above {option_text('white_level', white)} "
+            f"{share:.0%} of the samples lie above {option_text('white_level', white)} "
             f"(largest {samples.max()}); give the true white level"
         )
 
@@ -46,8 +46,8 @@ def believable_white(
     Returns:
         The same levels and no note where they fit the data, or where the samples are pure noise.
     """
-    over = share_over_white(samples, levels.white)
-    if over <= OVER_WHITE_SHARE or is_noise(samples, levels, cfa):
+    share = share_over_white(samples, levels.white)
+    if share <= OVER_WHITE_SHARE or is_noise(samples, levels, cfa):
         return levels, ""
     largest = int(samples.max())
     # planes whose samples exceed what the file holds were spread over 16 bits by LibRaw
@@ -55,7 +55,7 @@ def believable_white(
     fitting = [n for n in (bits, *usual) if 2**n > largest]
     white = float(2 ** fitting[0] - 1) if fitting else float(np.iinfo(samples.dtype).max)
     note = (
-        f"{over:.0%} of the pixels lie above the stated white {levels.white:g}, which is damaged "
+        f"{share:.0%} of the pixels lie above the stated white {levels.white:g}, which is damaged "
         f"or of another scale: {white:g} is used (set it with {option_text('white_level')})"
     )
     return replace(levels, white=white), note

@@ -224,7 +224,7 @@ def _spans(length: int, step: int) -> list[tuple[int, int, FloatArray]]:
         if index == count - 1:
             distance = np.minimum(distance, 0.0)
         weight = np.where(np.abs(distance) < 1, 0.5 + 0.5 * np.cos(np.pi * distance), 0.0)
-        used = np.flatnonzero(weight)
-        first, last = int(used[0]), int(used[-1]) + 1
+        places = np.flatnonzero(weight)
+        first, last = int(places[0]), int(places[-1]) + 1
         spans.append((first, last, weight[first:last].astype(np.float32)))
     return spans

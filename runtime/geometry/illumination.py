@@ -49,10 +49,10 @@ def _on_grid(psf: FrozenPsf, x_mm: FloatGrid, y_mm: FloatGrid) -> FloatArray:
     """Return illumination (row, column) between the positions of a grid; its rim holds beyond."""
     assert psf.grid_x_mm is not None
     assert psf.grid_y_mm is not None
-    known = psf.relative_illumination.reshape(psf.grid_y_mm.size, psf.grid_x_mm.size)
-    across = np.stack([np.interp(x_mm, psf.grid_x_mm, row) for row in known])
+    table = psf.relative_illumination.reshape(psf.grid_y_mm.size, psf.grid_x_mm.size)
+    rows = np.stack([np.interp(x_mm, psf.grid_x_mm, row) for row in table])
     hats = np.stack([np.interp(y_mm, psf.grid_y_mm, unit) for unit in np.eye(psf.grid_y_mm.size)])
-    return np.asarray(hats.T @ across, dtype=np.float32)
+    return np.asarray(hats.T @ rows, dtype=np.float32)
 
 
 def divide_illumination(

@@ -104,10 +104,10 @@ def _scaled(size: tuple[int, int], extent: Extent) -> Placement:
 
 
 def _check_pitch(capture: Capture, pitch_um: float) -> None:
-    stated = capture.pixel_pitch_um
-    if stated is not None and abs(stated / pitch_um - 1) > PITCH_TOLERANCE:
+    capture_um = capture.pixel_pitch_um
+    if capture_um is not None and abs(capture_um / pitch_um - 1) > PITCH_TOLERANCE:
         raise ContractError(
-            f"the capture states a pixel pitch of {stated:g} um, the bundle's sensor has "
+            f"the capture states a pixel pitch of {capture_um:g} um, the bundle's sensor has "
             f"{pitch_um:g} um; use another bundle or {option_text('assume', 'scale')}"
         )
 

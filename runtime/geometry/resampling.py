@@ -70,16 +70,16 @@ def resampled_limited(
     """
     out = resampled(plane, maps, interpolation=interpolation)
     side, places = SIDES_PX[interpolation], maps[0]
-    before = side // 2 - 1
+    anchor_px = side // 2 - 1
     wrong = out < FLOOR
     if plane.max() > WHITE:
         square = np.ones((side, side), np.uint8)
         lit = (plane > WHITE).view(np.uint8)
-        rim = cv2.morphologyEx(lit, cv2.MORPH_GRADIENT, square, anchor=(before, before))
+        rim = cv2.morphologyEx(lit, cv2.MORPH_GRADIENT, square, anchor=(anchor_px, anchor_px))
         near = cv2.remap(rim, places, None, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
         wrong |= near.view(np.bool_)
     at = np.flatnonzero(wrong)
-    low, high = _range(plane, places.reshape(-1, 2)[at].astype(np.intp) - before, side)
+    low, high = _range(plane, places.reshape(-1, 2)[at].astype(np.intp) - anchor_px, side)
     values = out.reshape(-1)
     values[at] = np.clip(values[at], low, high)
     return out

@@ -153,10 +153,10 @@ class Warp:
         """
         points = np.stack(self.window.to_mm(x_px - self._margin_px, y_px - self._margin_px), -1)
         if self._to_sensor:
-            found = undistort_points(points, self.distortion, channel=channel) - self._shift_mm
+            source_mm = undistort_points(points, self.distortion, channel=channel) - self._shift_mm
         else:
-            found = distort_points(points + self._shift_mm, self.distortion, channel=channel)
-        return np.stack(self.window.to_px(found[..., 0], found[..., 1]), axis=-1)
+            source_mm = distort_points(points + self._shift_mm, self.distortion, channel=channel)
+        return np.stack(self.window.to_px(source_mm[..., 0], source_mm[..., 1]), axis=-1)
 
     def lattice(self, channel: int, top: int, bottom: int) -> FloatGrid:
         """Return positions on the lattice nodes around rows top..bottom (top on the lattice)."""

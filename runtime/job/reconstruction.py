@@ -251,7 +251,7 @@ class Reconstruction:
         """Read a plane of the manifest whole and make it known.
 
         What gives it does not run again, neither here nor in another reconstruction of the same
-        capture that is told of it (`known` of `Pipeline.start`).
+        capture that is told of it (`known_planes` of `Pipeline.start`).
         """
         return self._walk.keep(plane)
 
@@ -263,8 +263,8 @@ class Reconstruction:
         """
         for number, stage in enumerate(self._setup.stages):
             if getattr(stage, "role", None) == role:
-                inputs = [s for s in self._walk.taken_by(number) if s.plane.domain != "mask"]
-                rows = module_of(stage).given_rows(stage, self.job, inputs)
+                streams = [s for s in self._walk.taken_by(number) if s.plane.domain != "mask"]
+                rows = module_of(stage).given_rows(stage, self.job, streams)
                 samples: FloatArray = rows.read(0, rows.shape[1])
                 return samples
         raise ContractError(f"no stage has a network of the role {role!r}")

@@ -32,7 +32,7 @@ def describe_photograph(path: Path, mosaic: MosaicOptions | None) -> Mapping[str
         "orientation": capture.orientation,
         "iso": capture.iso,
         "exposure_time_s": capture.exposure_time_s,
-        "metadata": capture.metadata.stated(),
+        "metadata": capture.metadata.to_json(),
         "noise": None if noise is None else [noise.shot, noise.read_variance],
         "origin_px": capture.origin_px,
         "sensor_size_px": capture.sensor_size_px,

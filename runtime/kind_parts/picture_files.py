@@ -28,9 +28,9 @@ def _files(work: Reconstruction, write: WriteOptions) -> FileSet:
     def written(parts: Sequence[Path]) -> float:
         return _write_picture(parts[0], work, write, *parts[1:])
 
-    beside = (PREVIEW_SUFFIX,) if write.preview else ()
+    extra = (PREVIEW_SUFFIX,) if write.preview else ()
     return FileSet(
-        suffixes=(write.suffix, *beside), write=written, result=lambda: result_of(work, {})
+        suffixes=(write.suffix, *extra), write=written, result=lambda: result_of(work, {})
     )
 
 
@@ -56,8 +56,8 @@ def _finish(work: Reconstruction, products: Sequence[str] | None, out: FloatArra
 
 def _reserved_bytes(capture: Capture, write: WriteOptions) -> int:
     pixels, turned = capture.height * capture.width, capture.orientation
-    held = held_bytes(write.picture, pixels=pixels, orientation=turned)
-    return held + PREVIEW_BYTES * write.preview
+    picture_bytes = held_bytes(write.picture, pixels=pixels, orientation=turned)
+    return picture_bytes + PREVIEW_BYTES * write.preview
 
 
 def _facts(work: Reconstruction, write: WriteOptions) -> Mapping[str, Any]:
@@ -67,7 +67,7 @@ def _facts(work: Reconstruction, write: WriteOptions) -> Mapping[str, Any]:
         "camera": capture.camera,
         "iso": capture.iso,
         "exposure_time_s": capture.exposure_time_s,
-        "metadata": {} if write.strip_metadata else work.origin.metadata.stated(),
+        "metadata": {} if write.strip_metadata else work.origin.metadata.to_json(),
     }
 
 

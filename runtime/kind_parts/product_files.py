@@ -27,7 +27,7 @@ def product_outputs(
     make: Callable[[Reconstruction], Result],
     *,
     suffix: str,
-    beside: Callable[[Options], tuple[str, ...]],
+    extra_suffixes: Callable[[Options], tuple[str, ...]],
     formats: Mapping[str, str],
     identity: Callable[[Options, Path], Mapping[str, Any]] = _no_identity,
     stem: Callable[[Path], str] = _stem,
@@ -37,7 +37,7 @@ def product_outputs(
     Args:
         make: A capture on its way -> its products.
         suffix: Of the main file, with its dot.
-        beside: Options -> suffixes of the files that may appear beside it.
+        extra_suffixes: Options -> suffixes of the files that may appear beside it.
         formats: What may be asked for as a picture besides, each with its suffix.
         identity: See `Outputs`.
         stem: A capture's file -> the name of its products, without suffix.
@@ -55,14 +55,14 @@ def product_outputs(
                 f"such captures; got {write.format}"
             )
         picture = () if write.format is None else (formats[write.format],)
-        return tuple(stem(source) + end for end in (suffix, *beside(options), *picture))
+        return tuple(stem(source) + end for end in (suffix, *extra_suffixes(options), *picture))
 
     def finish(
         work: Reconstruction, products: Sequence[str] | None, out: FloatArray | None
     ) -> Result:
         if out is not None:
             raise ContractError("out is filled with a picture; these captures become products")
-        return _chosen(make(work), products)
+        return _check_products(make(work), products)
 
     return Outputs(
         names=names,
@@ -73,8 +73,8 @@ def product_outputs(
     )
 
 
-def _files(made: Result, write: WriteOptions) -> FileSet:
-    writers = made.files(write.format)
+def _files(product: Result, write: WriteOptions) -> FileSet:
+    writers = product.files(write.format)
 
     def written(parts: Sequence[Path]) -> float:
         began = time.perf_counter()
@@ -82,17 +82,17 @@ def _files(made: Result, write: WriteOptions) -> FileSet:
             write_to(part)
         return time.perf_counter() - began
 
-    return FileSet(suffixes=tuple(writers), write=written, result=lambda: made)
+    return FileSet(suffixes=tuple(writers), write=written, result=lambda: product)
 
 
-def _chosen(made: Result, products: Sequence[str] | None) -> Result:
+def _check_products(product: Result, products: Sequence[str] | None) -> Result:
     """Refuse products that a capture does not give.
 
     Raises:
         ContractError: Names those there are.
     """
-    if foreign := [name for name in products or () if name not in made.arrays]:
+    if foreign := [name for name in products or () if name not in product.arrays]:
         raise ContractError(
-            f"there is no product {foreign[0]!r}; there are {', '.join(made.arrays)}"
+            f"there is no product {foreign[0]!r}; there are {', '.join(product.arrays)}"
         )
-    return made
+    return product

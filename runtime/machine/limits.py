@@ -50,30 +50,30 @@ class Limit:
             )
         return number
 
-    def check(self, wanted: float, what: str) -> None:
+    def check(self, amount: float, what: str) -> None:
         """Refuse a bundle that asks for more.
 
         Args:
-            wanted: What it asks for.
+            amount: What it asks for.
             what: Names the part of the bundle, for the message.
 
         Raises:
             BundleError: If it asks for more than the limit.
         """
         most = self.value()
-        if not wanted <= most:
+        if not amount <= most:
             raise BundleError(
-                f"{what} takes {wanted:.4g} {self.unit}; at most {most:.4g} are admitted. "
-                f"If you trust the bundle, set {self.variable}={_rounded_up(wanted)}"
+                f"{what} takes {amount:.4g} {self.unit}; at most {most:.4g} are admitted. "
+                f"If you trust the bundle, set {self.variable}={_rounded_up(amount)}"
             )
 
 
-def _rounded_up(wanted: float) -> str:
+def _rounded_up(amount: float) -> str:
     """Return a number of two digits that is not below."""
-    if not math.isfinite(wanted) or wanted <= 0:
+    if not math.isfinite(amount) or amount <= 0:
         return "inf"
-    step = 10.0 ** (math.floor(math.log10(wanted)) - 1)
-    return f"{math.ceil(wanted / step) * step:.6g}"
+    step = 10.0 ** (math.floor(math.log10(amount)) - 1)
+    return f"{math.ceil(amount / step) * step:.6g}"
 
 
 NETWORK_WORK: Final = Limit(

@@ -53,15 +53,17 @@ class Average:
             precision=np.zeros(shape, dtype=np.float32),
         )
 
-    def add(self, top: int, bottom: int, seen: Exposed) -> None:
+    def add(self, top: int, bottom: int, exposed: Exposed) -> None:
         """Add rows top..bottom of the next shorter frame."""
         value, precision = self.value[:, top:bottom], self.precision[:, top:bottom]
         settled = precision > 0
-        first = seen.usable & ~settled
-        bound = ~settled & (seen.clipped | np.isnan(value)) & ~np.isnan(seen.value)
-        np.copyto(value, seen.value, where=first | bound)
-        np.copyto(precision, seen.precision, where=first)
-        again = seen.usable & settled
-        total = precision[again] + seen.precision[again]
-        value[again] += seen.precision[again] / total * (seen.value[again] - value[again])
-        precision[again] = total
+        first = exposed.usable & ~settled
+        bound = ~settled & (exposed.clipped | np.isnan(value)) & ~np.isnan(exposed.value)
+        np.copyto(value, exposed.value, where=first | bound)
+        np.copyto(precision, exposed.precision, where=first)
+        repeated = exposed.usable & settled
+        total = precision[repeated] + exposed.precision[repeated]
+        value[repeated] += (
+            exposed.precision[repeated] / total * (exposed.value[repeated] - value[repeated])
+        )
+        precision[repeated] = total

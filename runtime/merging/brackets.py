@@ -87,26 +87,26 @@ def merged_paths(brackets: Sequence[Bracket], out: Path) -> list[Path]:
             f"{len(brackets)} brackets need a folder for their pictures as {option_text('out')}; "
             f"got {out}"
         )
-    found = [out / f"{bracket.folder.resolve().name}.exr" for bracket in brackets if bracket.folder]
-    for path in found:
-        if found.count(path) > 1:
+    paths = [out / f"{bracket.folder.resolve().name}.exr" for bracket in brackets if bracket.folder]
+    for path in paths:
+        if paths.count(path) > 1:
             raise ContractError(
                 f"two brackets would both give {path}; merge them into different folders"
             )
-    return found
+    return paths
 
 
 def _brackets_in(folder: Path) -> list[Bracket]:
     if files := _frames_in(folder):
         return [Bracket(files=files, folder=folder)]
     inner = [path for path in sorted(folder.iterdir()) if path.is_dir()]
-    found = [Bracket(files=files, folder=path) for path in inner if (files := _frames_in(path))]
-    if not found:
+    brackets = [Bracket(files=files, folder=path) for path in inner if (files := _frames_in(path))]
+    if not brackets:
         raise ContractError(
             f"{folder} holds no frames; expected RAW files or pictures ("
             f"{', '.join(sorted(FRAME_SUFFIXES))}), or folders of them"
         )
-    return found
+    return brackets
 
 
 def _frames_in(folder: Path) -> tuple[Path, ...]:

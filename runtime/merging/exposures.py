@@ -37,15 +37,15 @@ def exposure_factors(
         response: Of the codes.
     """
     steps = np.log(times_s[:-1] / times_s[1:])
-    found = [_ratio(codes[n], codes[n + 1], response) for n in range(steps.size)]
-    usable = np.isfinite(found) & (steps > _LEAST_STEP)
+    ratios = [_ratio(codes[n], codes[n + 1], response) for n in range(steps.size)]
+    usable = np.isfinite(ratios) & (steps > _LEAST_STEP)
     if np.count_nonzero(usable) < LEAST_PAIRS:
         return np.ones(times_s.size)
-    excess = np.where(usable, found, steps) - steps
+    excess = np.where(usable, ratios, steps) - steps
     excess -= np.where(usable, steps * np.median(excess[usable] / steps[usable]), 0)
     limit = max(_LEAST_EXCESS, _SPREADS * _MAD_TO_SIGMA * float(np.median(np.abs(excess[usable]))))
-    beyond = np.clip(np.abs(excess) - limit, 0, _MOST_EXCESS) * np.sign(excess)
-    logs = np.append(np.cumsum(beyond[::-1])[::-1], 0.0)
+    surplus = np.clip(np.abs(excess) - limit, 0, _MOST_EXCESS) * np.sign(excess)
+    logs = np.append(np.cumsum(surplus[::-1])[::-1], 0.0)
     return np.asarray(np.exp(logs - np.median(logs)))
 
 
@@ -55,8 +55,8 @@ def _ratio(longer: NDArray[np.uint8], shorter: NDArray[np.uint8], response: Resp
     inside = (longer >= low) & (longer <= high) & (shorter >= low) & (shorter <= high)
     if np.count_nonzero(inside) < _LEAST_SAMPLES:
         return float("nan")
-    seen = [
+    differences = [
         table[one[both]] - table[other[both]]
         for table, one, other, both in zip(response.log_light, longer, shorter, inside, strict=True)
     ]
-    return float(np.median(np.concatenate(seen)))
+    return float(np.median(np.concatenate(differences)))

@@ -36,14 +36,14 @@ def known_curve(codes: Codes, times_s: Times) -> tuple[Response, str] | None:
     plain = srgb_response(CODES)
     if misfit_codes(codes, times_s, plain) <= MOST_MISFIT_CODES:
         return plain, "sRGB"
-    found = minimize_scalar(
+    fit = minimize_scalar(
         lambda gamma: misfit_codes(codes, times_s, power_response(gamma)),
         bounds=GAMMAS,
         method="bounded",
         options={"xatol": 0.005},
     )
-    if found.fun <= MOST_MISFIT_CODES:
-        return power_response(float(found.x)), f"a gamma of {found.x:.2f}"
+    if fit.fun <= MOST_MISFIT_CODES:
+        return power_response(float(fit.x)), f"a gamma of {fit.x:.2f}"
     return None
 
 
@@ -64,8 +64,8 @@ def misfit_codes(codes: Codes, times_s: Times, response: Response) -> float:
         response: The response that is judged.
     """
     medians: list[float] = []
-    for own, residual in residuals_codes(codes, times_s, response):
-        bins = own // _BIN_CODES
+    for channel_codes, residual in residuals_codes(codes, times_s, response):
+        bins = channel_codes // _BIN_CODES
         filled = np.flatnonzero(np.bincount(bins) >= _LEAST_SAMPLES)
         medians.extend(float(np.median(residual[bins == number])) for number in filled)
     return float(np.sqrt(np.mean(np.square(medians)))) if medians else np.inf

@@ -59,7 +59,7 @@ class Merged:
     times_s: tuple[float, ...]
 
 
-def choose_response(survey: Survey, wanted: ResponseName | None) -> tuple[Response | None, str]:
+def choose_response(survey: Survey, wish: ResponseName | None) -> tuple[Response | None, str]:
     """Return what codes stand for, None for linear samples, and a note where it was a choice.
 
     Without a wish, pictures of 8 bits are estimated and all others are linear, as captures are
@@ -72,70 +72,70 @@ def choose_response(survey: Survey, wanted: ResponseName | None) -> tuple[Respon
         DecodeError: If too little is there to estimate from.
     """
     codes, coded = survey.codes, np.issubdtype(survey.like.samples.dtype, np.integer)
-    if wanted in ("srgb", "estimate") and (survey.is_raw or not coded):
+    if wish in ("srgb", "estimate") and (survey.is_raw or not coded):
         raise ContractError(
-            f"RAW and float frames are linear; leave {option_text('response', wanted)} out"
+            f"RAW and float frames are linear; leave {option_text('response', wish)} out"
         )
-    if wanted == "estimate" and codes is None:
+    if wish == "estimate" and codes is None:
         raise ContractError(
             f"a response is estimated from 8-bit pictures; use {option_text('response', 'srgb')}"
         )
-    if wanted == "linear" or (wanted is None and codes is None):
-        is_choice = wanted is None and coded and not survey.is_raw
+    if wish == "linear" or (wish is None and codes is None):
+        is_choice = wish is None and coded and not survey.is_raw
         cure = option_text("response", "srgb")
         note = f"frames of 16 bits are taken as linear light; if they are coded, add {cure}"
         return None, note if is_choice else ""
     plain = srgb_response(int(survey.like.white_level) + 1)
-    if wanted == "srgb" or codes is None:
+    if wish == "srgb" or codes is None:
         return plain, ""
-    known = known_curve(codes, survey.times_s)
-    if known is not None:
-        curve, name = known
+    match = known_curve(codes, survey.times_s)
+    if match is not None:
+        curve, name = match
         return curve, f"the response {name} fits the frames to within rounding"
     try:
-        found = _estimated(codes, survey.times_s)
+        estimate = _estimated(codes, survey.times_s)
     except DecodeError:
-        if wanted == "estimate":
+        if wish == "estimate":
             raise
         return (
             plain,
             "too few pixels are unclipped in two frames to estimate a response: sRGB is used",
         )
-    misses = [disagreement(codes, survey.times_s, r) for r in (found, plain)]
-    if wanted is None and misses[0] >= misses[1]:
+    misses = [disagreement(codes, survey.times_s, r) for r in (estimate, plain)]
+    if wish is None and misses[0] >= misses[1]:
         return plain, "sRGB fits the frames as well as an estimate: sRGB is used"
-    return found, _exposure_note(survey, found)
+    return estimate, _exposure_note(survey, estimate)
 
 
 def _estimated(codes: NDArray[np.uint8], times_s: NDArray[np.float64]) -> Response:
     """Return the response, with the exposures on which the frames agree under it."""
-    found = estimate_response(codes, times_s)
+    response = estimate_response(codes, times_s)
     factors = np.ones(times_s.size)
     for _ in range(_EXPOSURE_ROUNDS):
-        before, factors = factors, exposure_factors(codes, times_s, found)
-        if np.allclose(factors, before, rtol=_SAME_FACTOR):
+        old_factors, factors = factors, exposure_factors(codes, times_s, response)
+        if np.allclose(factors, old_factors, rtol=_SAME_FACTOR):
             break
-        found = estimate_response(codes, times_s * factors)
-    return replace(found, factors=() if (factors == 1).all() else tuple(factors.tolist()))
+        response = estimate_response(codes, times_s * factors)
+    return replace(response, factors=() if (factors == 1).all() else tuple(factors.tolist()))
 
 
 def _exposure_note(survey: Survey, response: Response) -> str:
     pairs = list(zip(survey.frames, response.factors, strict=False))
-    off = sorted(
+    outliers = sorted(
         ((f.path.name, x) for f, x in pairs if abs(x - 1) > _NOTED_FACTOR),
         key=lambda pair: -abs(np.log(pair[1])),
     )
-    if not off:
+    if not outliers:
         return ""
-    named = ", ".join(f"{name} {factor:.2f} times" for name, factor in off[:_NAMED_FRAMES])
+    text = ", ".join(f"{name} {factor:.2f} times" for name, factor in outliers[:_NAMED_FRAMES])
     more = (
-        f", and {len(off) - _NAMED_FRAMES} more by smaller factors"
-        if len(off) > _NAMED_FRAMES
+        f", and {len(outliers) - _NAMED_FRAMES} more by smaller factors"
+        if len(outliers) > _NAMED_FRAMES
         else ""
     )
     return (
         "exposures were corrected, since frames are brighter or darker than their stated times: "
-        f"{named}{more}"
+        f"{text}{more}"
     )
 
 
@@ -170,10 +170,10 @@ def merge(survey: Survey, response: Response | None, dark: DarkRows | None = Non
         clipped_samples = 0
         for top in range(0, capture.height, BAND_ROWS):
             bottom = min(top + BAND_ROWS, capture.height)
-            before = average.value[:, top:bottom], average.precision[:, top:bottom]
-            seen = expose.rows(capture, top, bottom, share, before)
-            average.add(top, bottom, seen)
-            clipped_samples += int(np.count_nonzero(seen.clipped & (before[1] == 0)))
+            state = average.value[:, top:bottom], average.precision[:, top:bottom]
+            exposed = expose.rows(capture, top, bottom, share, state)
+            average.add(top, bottom, exposed)
+            clipped_samples += int(np.count_nonzero(exposed.clipped & (state[1] == 0)))
     light = average.value
     if response is not None:
         np.exp(light, out=light)
@@ -198,7 +198,7 @@ class _Coded:
         top: int,
         bottom: int,
         share: float,
-        _before: tuple[FloatArray, FloatArray],
+        _state: tuple[FloatArray, FloatArray],
     ) -> Exposed:
         """Return what rows say, exposed by a share of the longest time."""
         codes, tables = capture.samples[:, top:bottom], self._response
@@ -221,8 +221,8 @@ def _certainty(codes: NDArray[Any], count: int) -> FloatArray:
     the others of its pixel doubtful too.
     """
     top = count - 1
-    far = np.minimum(codes, top - codes).mean(axis=0, dtype=np.float32) / np.float32(top / 2)
-    return np.asarray(np.maximum(far, np.float32(_LEAST_CERTAINTY)))
+    margin = np.minimum(codes, top - codes).mean(axis=0, dtype=np.float32) / np.float32(top / 2)
+    return np.asarray(np.maximum(margin, np.float32(_LEAST_CERTAINTY)))
 
 
 class _Linear:
@@ -243,7 +243,7 @@ class _Linear:
         top: int,
         bottom: int,
         share: float,
-        before: tuple[FloatArray, FloatArray],
+        state: tuple[FloatArray, FloatArray],
     ) -> Exposed:
         """Return what rows say, exposed by a share of the longest time."""
         shape = (-1, bottom - top, capture.width)
@@ -253,11 +253,11 @@ class _Linear:
         shot, read = (_rows_of(part, bottom - top) for part in (self._shot, self._read))
         hidden: FloatArray | np.float32 = np.float32(0)
         if self._dark is not None:
-            taken, broken = self._dark(self._frame, top, bottom)
-            light, hidden = light - taken, taken
+            dark, broken = self._dark(self._frame, top, bottom)
+            light, hidden = light - dark, dark
             usable &= ~broken
             clipped &= ~broken
-        value, precision = before
+        value, precision = state
         expected = np.where(precision > 0, value * np.float32(share), light) + hidden
         variance = shot * np.maximum(expected, 0) + read
         return Exposed(

@@ -71,8 +71,8 @@ def disagreement(codes: Codes, times_s: NDArray[np.float64], response: Response)
     Returns:
         The median over unclipped samples; infinite where no pixel is unclipped twice.
     """
-    found = [np.abs(residual) for _, residual in residuals_codes(codes, times_s, response)]
-    every = np.concatenate(found)
+    residuals = [np.abs(residual) for _, residual in residuals_codes(codes, times_s, response)]
+    every = np.concatenate(residuals)
     return float(np.median(every)) if every.size else np.inf
 
 
@@ -87,13 +87,13 @@ def residuals_codes(
         response: The response that is judged.
     """
     for channel in range(codes.shape[1]):
-        own = codes[:, channel].astype(np.intp).T
+        channel_codes = codes[:, channel].astype(np.intp).T
         table = response.log_light[channel].astype(np.float64)
-        trust = _trusted(own, response.clipped_from)
-        weights = trust * response.precision[channel].astype(np.float64)[own]
-        residual = _residual(table, own, np.log(times_s), weights)
+        trust = _trusted(channel_codes, response.clipped_from)
+        weights = trust * response.precision[channel].astype(np.float64)[channel_codes]
+        residual = _residual(table, channel_codes, np.log(times_s), weights)
         slope = np.maximum(np.gradient(np.maximum(table, table[1])), _LEAST_STEP)
-        yield own[trust], (residual / slope[own])[trust]
+        yield channel_codes[trust], (residual / slope[channel_codes])[trust]
 
 
 def _trusted(codes: NDArray[np.intp], clipped_from: int) -> NDArray[np.bool_]:
@@ -142,9 +142,9 @@ def _solve(
     matrix = np.diag(diagonal) - shared
     unit = np.trace(matrix) / CODES
     bends = np.diff(np.eye(CODES), 2, axis=0)
-    held = unit * (_SMOOTH * bends.T @ bends + _NEAR * np.eye(CODES))
-    held[MIDDLE_CODE, MIDDLE_CODE] += _TIED * unit
-    curve = np.linalg.solve(matrix + held, pulls + held @ prior)
+    penalty = unit * (_SMOOTH * bends.T @ bends + _NEAR * np.eye(CODES))
+    penalty[MIDDLE_CODE, MIDDLE_CODE] += _TIED * unit
+    curve = np.linalg.solve(matrix + penalty, pulls + penalty @ prior)
     return np.asarray(np.maximum.accumulate(curve + _LEAST_STEP * np.arange(CODES)))
 
 
@@ -152,6 +152,8 @@ def _residual(
     curve: FloatTable, codes: NDArray[np.intp], log_times: FloatTable, weights: FloatTable
 ) -> FloatTable:
     """Return the (pixel, frame) residuals of the log light against its mean over frames."""
-    seen = np.where(weights > 0, np.where(np.isfinite(curve), curve, 0)[codes] - log_times, 0)
+    differences = np.where(
+        weights > 0, np.where(np.isfinite(curve), curve, 0)[codes] - log_times, 0
+    )
     total = np.maximum(weights.sum(axis=1, keepdims=True), 1e-300)
-    return np.asarray(seen - (weights * seen).sum(axis=1, keepdims=True) / total)
+    return np.asarray(differences - (weights * differences).sum(axis=1, keepdims=True) / total)

@@ -97,21 +97,23 @@ def merge_to_exr(
     frame = reference_frame(survey, reference)
     curve, note = choose_response(survey, response)
     merged = merge(survey, curve)
-    seen = _Seen(None if preview is None else ToneMappedPreview(*survey.like.plane_shape[1:]))
+    luminance = _Luminance(
+        None if preview is None else ToneMappedPreview(*survey.like.plane_shape[1:])
+    )
     warnings: tuple[str, ...] = ()
     with atomic_outputs(out, *([] if preview is None else [preview])) as (part, *parts):
         if survey.is_raw:
-            warnings = _develop(part, survey, merged, frame, seen)
+            warnings = _develop(part, survey, merged, frame, luminance)
         else:
-            _write_picture(part, survey, merged, frame, seen)
-        if seen.preview is not None:
-            seen.preview.write(parts[0], color_stage(None), survey.like.orientation)
+            _write_picture(part, survey, merged, frame, luminance)
+        if luminance.preview is not None:
+            luminance.preview.write(parts[0], color_stage(None), survey.like.orientation)
     return Report(
         frames=tuple(one.path.name for one in survey.frames),
         times_s=tuple(one.time_s for one in survey.frames),
         response=merged.response,
         reference=frame.path.name,
-        range_stops=seen.stops,
+        range_stops=luminance.stops,
         clipped_fraction=merged.clipped_fraction,
         notes=tuple(dict.fromkeys((*survey.notes, *([note] if note else []), *warnings))),
     )
@@ -125,22 +127,24 @@ def reference_frame(survey: Survey, name: str | None) -> Frame:
     """
     if name is None:
         return survey.frames[len(survey.frames) // 2]
-    found = [frame for frame in survey.frames if name in (frame.path.name, str(frame.path))]
-    if len(found) != 1:
+    matches = [frame for frame in survey.frames if name in (frame.path.name, str(frame.path))]
+    if len(matches) != 1:
         raise ContractError(
-            f"{option_text('reference')} must name one of the frames; {name!r} names {len(found)} "
-            "of them"
+            f"{option_text('reference')} must name one of the frames; {name!r} names "
+            f"{len(matches)} of them"
         )
-    return found[0]
+    return matches[0]
 
 
-def _write_picture(path: Path, survey: Survey, merged: Merged, frame: Frame, seen: "_Seen") -> None:
+def _write_picture(
+    path: Path, survey: Survey, merged: Merged, frame: Frame, luminance: "_Luminance"
+) -> None:
     gain = np.float32(merged.times_s[survey.frames.index(frame)] / merged.times_s[0])
     light, like = merged.light, survey.like
     bands = (light[:, top : top + _ROWS] * gain for top in range(0, like.height, _ROWS))
     origin = Origin(
         camera=like.camera,
-        metadata=replace(like.metadata, exposure_time_s=_stated(frame.time_s)),
+        metadata=replace(like.metadata, exposure_time_s=_metadata_time_s(frame.time_s)),
         orientation=like.orientation,
         window=like.window,
     )
@@ -153,11 +157,11 @@ def _write_picture(path: Path, survey: Survey, merged: Merged, frame: Frame, see
         origin=origin,
     )
     with open_writer(path, "exr", picture) as writer:
-        _write(writer, bands, seen)
+        _write(writer, bands, luminance)
 
 
 def _develop(
-    path: Path, survey: Survey, merged: Merged, frame: Frame, seen: "_Seen"
+    path: Path, survey: Survey, merged: Merged, frame: Frame, luminance: "_Luminance"
 ) -> tuple[str, ...]:
     """Develop light of a sensor; return the warnings."""
     longest_s, shortest_s = survey.frames[0].time_s, survey.frames[-1].time_s
@@ -173,9 +177,9 @@ def _develop(
         color_matrix=like.color_matrix,
         orientation=like.orientation,
         iso=like.iso,
-        exposure_time_s=_stated(frame.time_s),
+        exposure_time_s=_metadata_time_s(frame.time_s),
         camera=like.camera,
-        metadata=replace(like.metadata, exposure_time_s=_stated(frame.time_s)),
+        metadata=replace(like.metadata, exposure_time_s=_metadata_time_s(frame.time_s)),
     )
     options = Options(exposure_ev=math.log2(frame.time_s / shortest_s))
     work = Pipeline(None, options).start(capture)
@@ -188,22 +192,22 @@ def _develop(
         origin=work.origin,
     )
     with open_writer(path, "exr", picture) as writer:
-        _write(writer, work.bands(), seen)
+        _write(writer, work.bands(), luminance)
     return work.warnings
 
 
-def _write(writer: PictureWriter, bands: Iterator[FloatArray], seen: "_Seen") -> None:
+def _write(writer: PictureWriter, bands: Iterator[FloatArray], luminance: "_Luminance") -> None:
     for band in bands:
-        seen.add(band)
+        luminance.add(band)
         writer.write(band)
 
 
-def _stated(time_s: float) -> float | None:
+def _metadata_time_s(time_s: float) -> float | None:
     """Return a time as metadata can hold it; relative exposures may be beyond."""
     return time_s if 1e-7 <= time_s <= 1e6 else None
 
 
-class _Seen:
+class _Luminance:
     """A histogram of the luminance over stops, and the preview."""
 
     def __init__(self, preview: ToneMappedPreview | None) -> None:

@@ -99,12 +99,12 @@ def survey(
     """
     _check_files(files, 1 if alike else 2)
     may_lack_time, is_timed = alike and len(files) == 1, True
-    found: list[tuple[Frame, Capture, NDArray[np.uint8] | None]] = []
+    records: list[tuple[Frame, Capture, NDArray[np.uint8] | None]] = []
     untimed: list[str] = []
     for number, path in enumerate(files):
         capture = read_frame(path, mosaic)
-        told = capture.metadata.exposure_time_s or capture.exposure_time_s
-        time_s = told if times_s is None else times_s[number]
+        file_time_s = capture.metadata.exposure_time_s or capture.exposure_time_s
+        time_s = file_time_s if times_s is None else times_s[number]
         if time_s is None:
             untimed.append(path.name)
             time_s, is_timed = _UNSTATED_S, False
@@ -113,20 +113,20 @@ def survey(
             time_s=time_s,
             sha256=capture.sha256,
             noise=capture.noise,
-            file_time_s=told,
+            file_time_s=file_time_s,
             window=capture.window,
         )
-        if found:
-            check_alike(found[0][1], found[0][0].path, capture, path)
-        found.append((frame, without_pixels(capture), _lattice(capture)))
+        if records:
+            check_alike(records[0][1], records[0][0].path, capture, path)
+        records.append((frame, without_pixels(capture), _lattice(capture)))
     if untimed and not may_lack_time:
         _refuse_untimed(untimed, len(files))
     if times_s is None:
-        _check_settings([(frame.path, capture) for frame, capture, _ in found])
-    found.sort(key=lambda one: (-one[0].time_s, str(one[0].path)))
+        _check_settings([(frame.path, capture) for frame, capture, _ in records])
+    records.sort(key=lambda one: (-one[0].time_s, str(one[0].path)))
     if not alike:
-        _check_exposures([frame for frame, _, _ in found])
-    return _joined(found, mosaic, is_timed=is_timed)
+        _check_exposures([frame for frame, _, _ in records])
+    return _joined(records, mosaic, is_timed=is_timed)
 
 
 def read_frame(path: Path, mosaic: MosaicOptions | None) -> Capture:
@@ -145,16 +145,16 @@ def read_frame(path: Path, mosaic: MosaicOptions | None) -> Capture:
     return capture
 
 
-def check_alike(one: Capture, named: Path, other: Capture, path: Path) -> None:
+def check_alike(one: Capture, one_path: Path, other: Capture, path: Path) -> None:
     """Refuse a frame that differs from another in kind, size or levels.
 
     Raises:
         DecodeError: If it does.
     """
-    placed = one.window is not None and other.window is not None
+    are_placed = one.window is not None and other.window is not None
     aspects = [1.0 if c.window is None else c.window.pixel_aspect for c in (one, other)]
     for what, mine, its in (
-        *([] if placed else [("size", (one.width, one.height), (other.width, other.height))]),
+        *([] if are_placed else [("size", (one.width, one.height), (other.width, other.height))]),
         ("shape of pixels", aspects[0], aspects[1]),
         ("mosaic", one.cfa, other.cfa),
         ("type of samples", one.samples.dtype.name, other.samples.dtype.name),
@@ -164,7 +164,7 @@ def check_alike(one: Capture, named: Path, other: Capture, path: Path) -> None:
     ):
         if mine != its:
             raise DecodeError(
-                f"frames differ in {what}: {named.name} has {mine}, {path.name} {its}; "
+                f"frames differ in {what}: {one_path.name} has {mine}, {path.name} {its}; "
                 "give frames of one camera and one scene"
             )
 
@@ -172,11 +172,11 @@ def check_alike(one: Capture, named: Path, other: Capture, path: Path) -> None:
 def _check_files(files: Sequence[Path], least: int) -> None:
     if not least <= len(files) <= _MOST_FRAMES:
         raise ContractError(f"a bracket has {least} to {_MOST_FRAMES} frames; got {len(files)}")
-    seen: set[Path] = set()
+    resolved: set[Path] = set()
     for path in files:
-        if path.resolve() in seen:
+        if path.resolve() in resolved:
             raise ContractError(f"{path} is given twice; give every frame once")
-        seen.add(path.resolve())
+        resolved.add(path.resolve())
 
 
 def _refuse_untimed(names: Sequence[str], count: int) -> NoReturn:
@@ -192,8 +192,8 @@ def _refuse_untimed(names: Sequence[str], count: int) -> NoReturn:
 def _check_settings(frames: Sequence[tuple[Path, Capture]]) -> None:
     """Refuse times alone where aperture or sensitivity changed too."""
     for name, what in (("f_number", "f-number"), ("iso", "ISO")):
-        stated = [(path, getattr(c.metadata, name)) for path, c in frames]
-        values = {value for _, value in stated if value is not None}
+        entries = [(path, getattr(c.metadata, name)) for path, c in frames]
+        values = {value for _, value in entries if value is not None}
         if len(values) > 1:
             raise ContractError(
                 f"frames differ in {what} ({', '.join(f'{v:g}' for v in sorted(values))}), so "
@@ -213,22 +213,22 @@ def _check_exposures(frames: Sequence[Frame]) -> None:
 
 
 def _joined(
-    found: list[tuple[Frame, Capture, NDArray[np.uint8] | None]],
+    records: list[tuple[Frame, Capture, NDArray[np.uint8] | None]],
     mosaic: MosaicOptions | None,
     *,
     is_timed: bool,
 ) -> Survey:
-    frames = tuple(frame for frame, _, _ in found)
-    like, registered = _registered(found[0][1], frames)
+    frames = tuple(frame for frame, _, _ in records)
+    like, registered = _registered(records[0][1], frames)
     is_raw = not is_picture(frames[0].path) or like.cfa is not None
-    lattices = [codes for _, _, codes in found if codes is not None]
+    lattices = [codes for _, _, codes in records if codes is not None]
     return Survey(
         frames=frames,
         like=like,
         is_raw=is_raw,
         codes=np.stack(lattices) if lattices else None,
         mosaic=mosaic,
-        notes=(*_notes([(f.path, capture.notes) for f, capture, _ in found]), *registered),
+        notes=(*_notes([(f.path, capture.notes) for f, capture, _ in records]), *registered),
         is_timed=is_timed,
     )
 
@@ -262,19 +262,19 @@ def _registered(like: Capture, frames: Sequence[Frame]) -> tuple[Capture, tuple[
 
 def cropped(capture: Capture, window: PictureWindow | None) -> Capture:
     """Return the part of a capture that lies in a window; all of it where windows are unknown."""
-    own = capture.window
-    if own is None or window is None or own.data == window.data:
+    frame_window = capture.window
+    if frame_window is None or window is None or frame_window.data == window.data:
         return capture
-    left, top = (window.data[n] - own.data[n] for n in (0, 1))
+    left, top = (window.data[n] - frame_window.data[n] for n in (0, 1))
     wide, high = window.size_px
     samples = capture.samples[..., top : top + high, left : left + wide]
     return replace(capture, samples=samples, window=window)
 
 
-def _notes(told: Sequence[tuple[Path, tuple[str, ...]]]) -> tuple[str, ...]:
+def _notes(frames: Sequence[tuple[Path, tuple[str, ...]]]) -> tuple[str, ...]:
     """Return each note once, with the frame or the number of frames that it is about."""
     by_note: dict[str, list[str]] = {}
-    for path, notes in told:
+    for path, notes in frames:
         for note in notes:
             by_note.setdefault(note, []).append(path.name)
     return tuple(

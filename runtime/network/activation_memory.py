@@ -104,10 +104,10 @@ def activation_memory(
     (source, target), extents = ends, activations.extents
     last = {name: index for index, node in enumerate(nodes) for name in node.inputs}
     last[target] = len(nodes)
-    alive, block, peak = set(named(extents, [source])), _Block(), 0.0
+    alive, block, peak = set(tensor_names(extents, [source])), _Block(), 0.0
     for index, node in enumerate(nodes):
-        dying = [name for name in named(extents, node.inputs) if last.get(name) == index]
-        outputs = named(extents, node.outputs)
+        dying = [name for name in tensor_names(extents, node.inputs) if last.get(name) == index]
+        outputs = tensor_names(extents, node.outputs)
         if node.op in ELEMENTWISE and dying:
             alive.discard(max(dying, key=activations.values))
         alive |= set(outputs)
@@ -115,8 +115,8 @@ def activation_memory(
         peak = max(peak, room + sum(map(activations.values, alive)))
         if target in outputs and target in activations.blocked:
             room += activations.block_values(target)
-        made = {name: activations.block_values(name) for name in outputs if name != target}
-        _lay(block, made, dying if node.op in ELEMENTWISE else [], room)
+        sizes = {name: activations.block_values(name) for name in outputs if name != target}
+        _lay(block, sizes, dying if node.op in ELEMENTWISE else [], room)
         for name in (*dying, *(name for name in outputs if name not in last)):
             alive.discard(name)
             block.places.pop(name, None)
@@ -127,12 +127,12 @@ def activation_memory(
     )
 
 
-def _lay(block: _Block, made: Mapping[str, float], dying: Sequence[str], room: float) -> None:
+def _lay(block: _Block, sizes: Mapping[str, float], dying: Sequence[str], room: float) -> None:
     """Place the outputs of a node, over a dying tensor of their size, and its work memory."""
-    for name, size in made.items():
-        over = [one for one in dying if one in block.places and block.places[one][1] >= size]
-        if over:
-            block.rename(over[0], name)
+    for name, size in sizes.items():
+        reusable = [one for one in dying if one in block.places and block.places[one][1] >= size]
+        if reusable:
+            block.rename(reusable[0], name)
         else:
             block.add(name, size)
     if room:
@@ -140,6 +140,6 @@ def _lay(block: _Block, made: Mapping[str, float], dying: Sequence[str], room: f
         del block.places[""]
 
 
-def named(extents: Mapping[str, Extent], names: Iterable[str]) -> list[str]:
+def tensor_names(extents: Mapping[str, Extent], names: Iterable[str]) -> list[str]:
     """Return those of some names that are tensors, not constants."""
     return [name for name in names if name in extents]

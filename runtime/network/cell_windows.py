@@ -141,12 +141,14 @@ class CellLayout:
         width = self.padded_px[1]
         strips = STRIPS_HELD * self.strip_cells * self.cell_px
         ends = costs[0] if costs else PixelCost()
-        held = _FLOAT_BYTES * (ends.channels * self.buffer_rows + ends.outputs * strips) * width
+        row_bytes = (
+            _FLOAT_BYTES * (ends.channels * self.buffer_rows + ends.outputs * strips) * width
+        )
         largest = [0] * len(costs)
         for windows in self.strips:
             for window in windows:
                 largest[window.network] = max(largest[window.network], window.area_px)
-        return held + int(
+        return row_bytes + int(
             sum(
                 area * (cost.arena_bytes + _FLOAT_BYTES * (cost.channels + cost.outputs))
                 for area, cost in zip(largest, costs, strict=True)
@@ -176,10 +178,10 @@ def lay_cells(
         ContractError: If the labels do not fit the picture, or the cap is too small for one cell.
     """
     cell = limits.cell_px
-    wanted = tuple(-(-side // cell) for side in size_px)
-    if labels.shape != wanted or labels.min() < 0 or labels.max() > len(networks):
+    lattice = tuple(-(-side // cell) for side in size_px)
+    if labels.shape != lattice or labels.min() < 0 or labels.max() > len(networks):
         raise ContractError(
-            f"a picture of {size_px} px has {wanted} cells with labels 0..{len(networks)}; "
+            f"a picture of {size_px} px has {lattice} cells with labels 0..{len(networks)}; "
             f"got {labels.shape}"
         )
     stride = int(np.lcm.reduce([n.stride_px for n in networks] or [1]))
@@ -188,7 +190,7 @@ def lay_cells(
     frame = _Frame(cell=cell, stride=stride, padded=padded)
     strip, most_px = _strip_cells(frame, networks, halo, limits)
     strips = []
-    for top in range(0, wanted[0], strip):
+    for top in range(0, lattice[0], strip):
         part = labels[top : top + strip]
         windows = [
             frame.window(i, (top + a, b, top + c, d), _ceil_to(network.halo_px, stride))
@@ -243,42 +245,42 @@ def infer_cells(
     if (height, width) != layout.size_px:
         raise ContractError(f"the layout is for {layout.size_px}, the picture {height, width}")
     buffer = RowBuffer(source, layout.buffer_rows, layout.padded_px)
-    done = 0
+    count = 0
     for number, windows in enumerate(layout.strips):
         top = number * layout.strip_cells * layout.cell_px
         bottom = min(top + layout.strip_cells * layout.cell_px, height)
         first = max(0, min(top - layout.halo_px, layout.padded_px[0] - layout.buffer_rows))
-        held = buffer.move_to(first)
-        band = held[stand_in, top - first : bottom - first, :width].copy()
+        rows = buffer.move_to(first)
+        band = rows[stand_in, top - first : bottom - first, :width].copy()
         for window in windows:
             check_cancelled(cancel)
             y0, x0, y1, x1 = window.pixels
-            given = np.ascontiguousarray(held[None, :, y0 - first : y1 - first, x0:x1])
-            output = networks[window.network].run(given)
+            inputs = np.ascontiguousarray(rows[None, :, y0 - first : y1 - first, x0:x1])
+            output = networks[window.network].run(inputs)
             if finish is not None:
-                finish(output[0], given[0], _kept_box(window, layout))
-            made = _checked(output, given, window, guard)
-            _place(made, window, layout, band, top)
-            done += 1
+                finish(output[0], inputs[0], _kept_box(window, layout))
+            planes = _checked(output, inputs, window, guard)
+            _place(planes, window, layout, band, top)
+            count += 1
             if progress is not None:
-                progress(done, layout.window_count)
+                progress(count, layout.window_count)
         yield band
         del band  # the rows of the next windows are made before their band is
 
 
 def _checked(
-    made: FloatArray, given: FloatArray, window: CellWindow, guard: TileGuard | None
+    output: FloatArray, inputs: FloatArray, window: CellWindow, guard: TileGuard | None
 ) -> FloatArray:
     """Return (3, h, w) of a window's output if it is sound."""
     describe = partial(_describe, window)
     if guard is not None:
-        return guard.check(made[0], given[0], describe)
-    if not is_finite(made[0]):
+        return guard.check(output[0], inputs[0], describe)
+    if not is_finite(output[0]):
         raise ContractError(
             f"the network gave NaN or inf in {describe()}; the input must be finite: repair dead "
             "pixels first"
         )
-    return np.asarray(made[0])
+    return np.asarray(output[0])
 
 
 def _kept_box(window: CellWindow, layout: CellLayout) -> tuple[int, int, int, int]:
@@ -295,7 +297,7 @@ def _describe(window: CellWindow) -> str:
 
 
 def _place(
-    made: FloatArray, window: CellWindow, layout: CellLayout, band: FloatArray, band_top: int
+    planes: FloatArray, window: CellWindow, layout: CellLayout, band: FloatArray, band_top: int
 ) -> None:
     """Copy the cells of a window into the band, with a ramp where a neighbour has no network."""
     top, left, bottom, right = window.cells
@@ -308,32 +310,32 @@ def _place(
                 continue
             y0, x0 = i * cell, j * cell
             y1, x1 = min(y0 + cell, height), min(x0 + cell, width)
-            new = made[:, y0 - origin_y : y1 - origin_y, x0 - origin_x : x1 - origin_x]
+            new = planes[:, y0 - origin_y : y1 - origin_y, x0 - origin_x : x1 - origin_x]
             old = band[:, y0 - band_top : y1 - band_top, x0:x1]
-            around = active[i : i + 3, j : j + 3]
-            if around.all():
+            neighbours = active[i : i + 3, j : j + 3]
+            if neighbours.all():
                 old[...] = new
                 continue
-            weight = _ramp(tuple(map(bool, around.ravel())), cell)[: y1 - y0, : x1 - x0]
+            weight = _ramp(tuple(map(bool, neighbours.ravel())), cell)[: y1 - y0, : x1 - x0]
             # Where the weight is 1 the network's own bits are kept.
             old[...] = np.where(weight < 1, old + weight * (new - old), new)
 
 
 @lru_cache(maxsize=256)
-def _ramp(around: tuple[bool, ...], cell_px: int) -> FloatArray:
+def _ramp(neighbours: tuple[bool, ...], cell_px: int) -> FloatArray:
     """Return (cell, cell) weights: distance to the nearest cell without network over RAMP_PX.
 
     Args:
-        around: Which of the 3x3 cells have a network, in reading order.
+        neighbours: Which of the 3x3 cells have a network, in reading order.
         cell_px: Side of a cell.
     """
     at = np.arange(cell_px, dtype=np.float32) + np.float32(0.5)
-    away = {-1: at, 0: np.zeros_like(at), 1: at[::-1]}
+    distances = {-1: at, 0: np.zeros_like(at), 1: at[::-1]}
     distance = np.full((cell_px, cell_px), np.inf, dtype=np.float32)
-    for index, has_network in enumerate(around):
+    for index, has_network in enumerate(neighbours):
         dy, dx = index // 3 - 1, index % 3 - 1
         if not has_network:
-            distance = np.minimum(distance, np.maximum(away[dy][:, None], away[dx]))
+            distance = np.minimum(distance, np.maximum(distances[dy][:, None], distances[dx]))
     ramp = np.clip(distance / np.float32(RAMP_PX), 0, 1)
     weights = np.asarray(ramp * ramp * (3 - 2 * ramp), dtype=np.float32)
     weights.flags.writeable = False
@@ -377,9 +379,9 @@ def _strip_cells(
         cells = min(max(1, -(-limits.tile_px // cell)), rows)
         return cells, _padded_px(cell, cells, cells, halo)
     for cells in range(min(_MOST_STRIP_CELLS, rows), 0, -1):
-        held = min(height, cells * cell + 2 * halo) * width * in_bytes
-        held += cells * cell * width * out_bytes
-        most_px = int((limits.max_bytes - held) / max(per_px, 1))
+        row_bytes = min(height, cells * cell + 2 * halo) * width * in_bytes
+        row_bytes += cells * cell * width * out_bytes
+        most_px = int((limits.max_bytes - row_bytes) / max(per_px, 1))
         if most_px >= _padded_px(cell, cells, min(2, cells), halo):
             return cells, most_px
     need = (cell + 2 * halo) * width * in_bytes + _padded_px(cell, 1, 1, halo) * per_px
@@ -400,15 +402,15 @@ def _cover(
     box = _box(mask, (0, 0, *mask.shape))
     if box is None:
         return []
-    done, open_boxes = [], [box]
+    boxes, open_boxes = [], [box]
     while open_boxes:
         box = open_boxes.pop()
         parts = _best_cut(mask, box, cell, halo, most_px)
         if parts:
             open_boxes.extend(reversed(parts))
         else:
-            done.append(box)
-    return done
+            boxes.append(box)
+    return boxes
 
 
 def _best_cut(

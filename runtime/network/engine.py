@@ -38,7 +38,7 @@ PROVIDER_NAMES: Final = {
     "openvino": "OpenVINOExecutionProvider",
 }
 """What a caller may ask for, and what onnxruntime calls it."""
-_BEHIND: Final = {"tensorrt": ("cuda", "cpu"), "cuda": ("cpu",), "openvino": ("cpu",)}
+_FALLBACKS: Final = {"tensorrt": ("cuda", "cpu"), "cuda": ("cpu",), "openvino": ("cpu",)}
 _CREATION: Final = threading.Lock()
 _CGROUP: Final = Path("/sys/fs/cgroup")
 _ORT_ERRORS: Final = (
@@ -252,7 +252,7 @@ def _check_version(version: str) -> None:
 def _create_session(
     model: bytes, threads: int, provider: str = "cpu", *, in_block: bool = False
 ) -> Any:
-    chosen = _chosen_providers(provider)
+    candidates = _chosen_providers(provider)
     options = ort.SessionOptions()
     options.intra_op_num_threads = threads
     options.inter_op_num_threads = 1
@@ -263,7 +263,7 @@ def _create_session(
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     options.log_severity_level = 4  # errors reach the caller as exceptions, not on stderr
     try:
-        session = ort.InferenceSession(model, options, providers=chosen)
+        session = ort.InferenceSession(model, options, providers=candidates)
     except _ORT_ERRORS as error:
         raise BundleError(f"onnxruntime refused the network: {error}; export it again") from error
     # onnxruntime goes on without a provider whose libraries do not load.
@@ -287,7 +287,7 @@ def _chosen_providers(provider: str) -> list[str | tuple[str, dict[str, str]]]:
             f"the installed onnxruntime computes on {', '.join(usable)}; got {provider!r}: "
             "install an onnxruntime built with it, or use one of these"
         )
-    names = [name for name in (provider, *_BEHIND.get(provider, ())) if name in usable]
+    names = [name for name in (provider, *_FALLBACKS.get(provider, ())) if name in usable]
     # TF32 would round float32 to 10 bits and still be called fp32.
     settings = {"cuda": {"use_tf32": "0"}}
     return [
@@ -306,8 +306,8 @@ def _check_contract(session: Any) -> tuple[int, int]:
             f'a network has one float "input" and one float "output"; got {names}, {types}'
         )
     shape, out_shape = inputs[0].shape, outputs[0].shape
-    known = all(len(s) == 4 and s[0] == 1 and isinstance(s[1], int) for s in (shape, out_shape))
-    if not known:
+    is_valid = all(len(s) == 4 and s[0] == 1 and isinstance(s[1], int) for s in (shape, out_shape))
+    if not is_valid:
         raise BundleError(
             "a network maps (1, channels, h, w) to (1, channels, h, w), channels stated; "
             f"got {shape} to {out_shape}"

@@ -145,9 +145,11 @@ def _check_tensors(tensors: Sequence[Any]) -> None:
                 f"tensor {tensor.name!r} lies outside the ONNX (external data); "
                 "export with the weights inside"
             )
-        declared, held = math.prod(tensor.dims), _held_values(tensor)
-        if not 0 <= declared <= held:
-            raise BundleError(f"tensor {tensor.name!r} declares {declared} values, it holds {held}")
+        declared, stored = math.prod(tensor.dims), _held_values(tensor)
+        if not 0 <= declared <= stored:
+            raise BundleError(
+                f"tensor {tensor.name!r} declares {declared} values, it holds {stored}"
+            )
 
 
 def _held_values(tensor: Any) -> int:
@@ -172,8 +174,8 @@ def _check_node(proto: Any, label: str) -> None:
             raise BundleError(f"{label}: sparse constants are refused")
         if attribute.ref_attr_name:
             raise BundleError(f"{label}: attribute refers to a function; refused")
-        own = [attribute.t] if attribute.HasField("t") else []
-        _check_tensors([*own, *attribute.tensors])
+        tensors = [attribute.t] if attribute.HasField("t") else []
+        _check_tensors([*tensors, *attribute.tensors])
     if proto.op_type not in ALLOWED_OPERATORS:
         raise BundleError(f"{label}: operator {proto.op_type} is not on the list of admitted ones")
 
@@ -286,36 +288,36 @@ def check_graph(data: bytes, facts: NetworkFacts) -> GraphFacts:
             channels, scale, stride or global operators, reaches further or holds more memory than
             it says, or computes more than is admitted.
     """
-    found = inspect_graph(data)
+    graph = inspect_graph(data)
     pairs = {
-        "input name": (found.input_name, facts.input_name),
-        "input channels": (found.input_channels, facts.input_channels),
-        "output name": (found.output_name, facts.output_name),
-        "output channels": (found.output_channels, facts.output_channels),
-        "output scale": (found.output_scale, facts.output_scale),
-        "stride": (found.stride_px, facts.stride_px),
-        "global operators": (found.global_operators, facts.global_operators),
+        "input name": (graph.input_name, facts.input_name),
+        "input channels": (graph.input_channels, facts.input_channels),
+        "output name": (graph.output_name, facts.output_name),
+        "output channels": (graph.output_channels, facts.output_channels),
+        "output scale": (graph.output_scale, facts.output_scale),
+        "stride": (graph.stride_px, facts.stride_px),
+        "global operators": (graph.global_operators, facts.global_operators),
     }
-    for what, (got, said) in pairs.items():
-        if got != said:
+    for what, (got, expected) in pairs.items():
+        if got != expected:
             raise BundleError(
-                f"{facts.member}: {what} of the graph is {got!r}, the manifest says {said!r}; "
+                f"{facts.member}: {what} of the graph is {got!r}, the manifest says {expected!r}; "
                 "export the bundle again"
             )
     # More memory than the walk counts may have been measured; less cannot be.
-    if found.bytes_per_pixel > facts.bytes_per_pixel * (1 + COST_RTOL):
+    if graph.bytes_per_pixel > facts.bytes_per_pixel * (1 + COST_RTOL):
         raise BundleError(
-            f"{facts.member}: bytes_per_pixel is {found.bytes_per_pixel:g}, the manifest says "
+            f"{facts.member}: bytes_per_pixel is {graph.bytes_per_pixel:g}, the manifest says "
             f"{facts.bytes_per_pixel:g}; too little memory would be planned. Export the bundle "
             "again"
         )
-    NETWORK_WORK.check(found.work_per_pixel, f"the network {facts.member}")
-    if found.receptive_field_radius_px > facts.reach_px:
+    NETWORK_WORK.check(graph.work_per_pixel, f"the network {facts.member}")
+    if graph.receptive_field_radius_px > facts.reach_px:
         raise BundleError(
-            f"{facts.member}: the graph reaches {found.receptive_field_radius_px} px, the manifest "
+            f"{facts.member}: the graph reaches {graph.receptive_field_radius_px} px, the manifest "
             f"says {facts.reach_px}; tiles would show seams. Export the bundle again"
         )
-    return found
+    return graph
 
 
 def with_node_outputs(data: bytes) -> tuple[bytes, tuple[str, ...]]:

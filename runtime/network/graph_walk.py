@@ -13,7 +13,7 @@ from camkit.errors import BundleError
 from camkit.runtime.network.activation_memory import (
     Activations,
     activation_memory,
-    named,
+    tensor_names,
 )
 from camkit.runtime.network.operators import (
     ELEMENTWISE,
@@ -123,7 +123,7 @@ class _Walk:
     def pass_through(self, node: Node, channels: int, windows: Windows) -> Extent:
         """Return the extent behind a node with windows, and remember them for the way back."""
         self.windows[node.outputs[0]] = windows
-        return self.extent(node).through(channels, windows)
+        return self.extent(node).output_of(channels, windows)
 
     def mark_global(self, node: Node) -> None:
         self.global_operators.append(f"{node.label} ({node.op})")
@@ -161,7 +161,7 @@ def walk_graph(
     read = sum(
         walk.extents[name].samples_per_pixel
         for node in nodes
-        for name in named(walk.extents, node.inputs)
+        for name in tensor_names(walk.extents, node.inputs)
     )
     memory = activation_memory(
         nodes,
@@ -234,11 +234,11 @@ def _reach(
         ends: Names of input and output.
         samples: n, and how many samples of the output a pixel has.
     """
-    (source, target), (kept, scale) = ends, samples
+    (source, target), (pixels, scale) = ends, samples
     woven = _interleavings(nodes, walk, target)
     reach = 0
     for axis in range(2):
-        runs = {target: (0, kept * scale - 1)}
+        runs = {target: (0, pixels * scale - 1)}
         for node in reversed(nodes):
             for output in node.outputs:
                 if output not in runs:
@@ -246,15 +246,15 @@ def _reach(
                 run = runs[output]
                 if output in walk.windows:
                     run = walk.windows[output][axis].reads(*run)
-                for index, name in enumerate(named(walk.extents, node.inputs)):
-                    own = run
+                for index, name in enumerate(tensor_names(walk.extents, node.inputs)):
+                    input_run = run
                     if output in woven:
                         fine, block = woven[output]
-                        own = place_run(runs[fine], block, divmod(index, block)[axis])
-                    old = runs.get(name, own)
-                    runs[name] = min(old[0], own[0]), max(old[1], own[1])
-        first, last = runs.get(source, (0, kept - 1))
-        reach = max(reach, -first, last - kept + 1)
+                        input_run = place_run(runs[fine], block, divmod(index, block)[axis])
+                    old = runs.get(name, input_run)
+                    runs[name] = min(old[0], input_run[0]), max(old[1], input_run[1])
+        first, last = runs.get(source, (0, pixels - 1))
+        reach = max(reach, -first, last - pixels + 1)
     return reach
 
 
@@ -267,7 +267,7 @@ def _interleavings(nodes: Sequence[Node], walk: _Walk, target: str) -> dict[str,
     Returns:
         Output of the Concat -> output of the DepthToSpace, side of a block.
     """
-    found = {}
+    woven = {}
     for node in nodes:
         if node.op != "DepthToSpace" or node.text("mode", "DCR") != "DCR":
             continue
@@ -276,8 +276,8 @@ def _interleavings(nodes: Sequence[Node], walk: _Walk, target: str) -> dict[str,
         parts = next((n.inputs for n in nodes if n.op == "Concat" and source in n.outputs), ())
         alike = len({walk.extents[name].channels for name in parts}) == 1
         if len(readers) == 1 and source != target and alike and len(parts) == block * block:
-            found[source] = node.outputs[0], block
-    return found
+            woven[source] = node.outputs[0], block
+    return woven
 
 
 def _check_inputs(walk: _Walk, node: Node) -> None:
@@ -390,10 +390,10 @@ def _elementwise(walk: _Walk, node: Node) -> Extent:
         }
     if len(channels - {1}) > 1:
         raise BundleError(f"{node.label}: {sorted(channels)} channels do not go together")
-    return _together(node, extents, max(channels))
+    return _common_extent(node, extents, max(channels))
 
 
-def _together(node: Node, extents: Sequence[Extent], channels: int) -> Extent:
+def _common_extent(node: Node, extents: Sequence[Extent], channels: int) -> Extent:
     """Return the extent of a tensor computed sample by sample from several."""
     axes = {extent.axes for extent in extents if extent.axes is not None}
     if len(axes) > 1:
@@ -426,7 +426,7 @@ def _regroup(walk: _Walk, node: Node) -> list[Extent]:
         raise BundleError(f"{node.label}: {node.op} is admitted along the channels only")
     if node.op == "Concat":
         extents = [walk.extent(node, index) for index in range(len(node.inputs))]
-        return [_together(node, extents, sum(extent.channels for extent in extents))]
+        return [_common_extent(node, extents, sum(extent.channels for extent in extents))]
     extent, count = walk.extent(node), len(node.outputs)
     if len(node.inputs) > 1 and node.inputs[1]:
         sizes = walk.integers(node, 1)
@@ -435,7 +435,7 @@ def _regroup(walk: _Walk, node: Node) -> list[Extent]:
         sizes = [size] * (count - 1) + [extent.channels - size * (count - 1)]
     if len(sizes) != count or min(sizes) < 1 or sum(sizes) != extent.channels:
         raise BundleError(f"{node.label}: parts {sizes} do not make {extent.channels} channels")
-    return [extent.through(size) for size in sizes]
+    return [extent.output_of(size) for size in sizes]
 
 
 def _slice(walk: _Walk, node: Node) -> Extent:
@@ -451,7 +451,7 @@ def _slice(walk: _Walk, node: Node) -> Extent:
     channels = len(range(extent.channels)[starts[0] : ends[0] : steps[0]])
     if channels == 0:
         raise BundleError(f"{node.label}: the Slice is empty")
-    return extent.through(channels)
+    return extent.output_of(channels)
 
 
 def _global(walk: _Walk, node: Node) -> Extent:
@@ -473,6 +473,6 @@ def _global(walk: _Walk, node: Node) -> Extent:
         return (
             Extent(channels=channels, axes=None)
             if reduces_space(axes)
-            else extent.through(channels)
+            else extent.output_of(channels)
         )
     raise BundleError(f"{node.label}: {node.op} that drops axes is refused; keep dimensions")

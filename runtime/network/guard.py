@@ -53,27 +53,27 @@ class TileGuard:
         self.replaced: list[str] = []
 
     def check(
-        self, output: FloatArray, given: FloatArray, describe: Callable[[], str]
+        self, output: FloatArray, inputs: FloatArray, describe: Callable[[], str]
     ) -> FloatArray:
         """Return the output of a tile if it is sound, else the planes that stand in for it.
 
         Args:
             output: (k, s h, s w) float32 that the network made of the tile.
-            given: (c, h, w) float32 that it got.
+            inputs: (c, h, w) float32 that it got.
             describe: Names the tile; called only when it is bad.
 
         Raises:
             ContractError: If the tile is bad and there is no fallback, or the planes that stand in
                 are not finite either.
         """
-        trouble = _trouble(output, given[: self._inputs], self._bound)
+        trouble = _trouble(output, inputs[: self._inputs], self._bound)
         if trouble is None:
             return output
         tile = describe()
         if not self._fallback or self._stand_in is None:
             hint = "" if self._stand_in is None else _hint()
             raise ContractError(f"the network gave {trouble} in {tile}{hint}")
-        instead = given[self._stand_in]
+        instead = inputs[self._stand_in]
         if not is_finite(instead):
             raise ContractError(
                 f"the network gave {trouble} in {tile}, and what came before it is not finite "
@@ -126,19 +126,19 @@ def light_bound(most_light: float, noise: NoiseModel, *, scale: float) -> Bound:
         least, most = plain(largest)
         light_e = max((largest * scale) ** 2 - square, 0.0)
         high = math.sqrt(most_light * light_e + dark_e + square) / scale
-        below = square - light_e - dark_e
-        return (math.sqrt(below) / scale if below > 0 else least), min(high, most)
+        least_square = square - light_e - dark_e
+        return (math.sqrt(least_square) / scale if least_square > 0 else least), min(high, most)
 
     return bound
 
 
-def _trouble(output: FloatArray, given: FloatArray, bound: Bound) -> str | None:
+def _trouble(output: FloatArray, inputs: FloatArray, bound: Bound) -> str | None:
     """Return the fault of a tile; None if there is none."""
     low, high = float(output.min()), float(output.max())
     if not (math.isfinite(low) and math.isfinite(high)):
         return "NaN or inf"
     # A sound tile is told by some of its rows: the bound of all rows can only be wider.
-    for rows in (given[:, ::_SPARSE], given):
+    for rows in (inputs[:, ::_SPARSE], inputs):
         least, most = bound(max(float(rows.max()), -float(rows.min())))
         if least <= low and high <= most:
             return None

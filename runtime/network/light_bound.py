@@ -36,7 +36,7 @@ from camkit.runtime.rows import RowSource
 
 MASK_ROWS: Final = max(NEAR_PX)
 """Rows of the mask above and below those that it decides."""
-FAR: Final = 0.2
+LARGE_CHANGE: Final = 0.2
 """Share of the light; who moves more of it makes another picture."""
 _TINY: Final = np.float32(1e-6)
 _PHASES: Final = tuple((k + 0.5) / CELL_PX - 0.5 for k in range(CELL_PX))
@@ -77,11 +77,11 @@ def keep_share(unknown: NDArray[Any]) -> FloatArray | None:
     if not plane.any():
         return None
     clipped = plane.astype(np.uint8)
-    kept = np.ones(plane.shape, np.float32)
+    share = np.ones(plane.shape, np.float32)
     for reach in NEAR_PX:
         square = np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)
-        kept -= np.float32(1 / len(NEAR_PX)) * cv2.dilate(clipped, square)
-    return kept
+        share -= np.float32(1 / len(NEAR_PX)) * cv2.dilate(clipped, square)
+    return share
 
 
 class KeptRows:
@@ -101,16 +101,16 @@ class KeptRows:
         _, height, _ = self.shape
         above, below = max(top - MASK_ROWS, 0), min(bottom + MASK_ROWS, height)
         unknown = self._mask.read(above, below)
-        kept = keep_share(unknown)
-        if kept is None:
+        share = keep_share(unknown)
+        if share is None:
             return np.ones((1, bottom - top, unknown.shape[2]), np.float32)
-        return kept[None, top - above : bottom - above]
+        return share[None, top - above : bottom - above]
 
 
 def added_light(
     front: FloatArray,
     output: FloatArray,
-    kept: FloatArray | None,
+    kept_share: FloatArray | None,
     bound: LightBound,
     *,
     scale: float,
@@ -121,7 +121,7 @@ def added_light(
         front: (c, h, w) float32, stabilised: the plane that the network improves on; h, w multiples
             of the side of a cell.
         output: (c, h, w) float32, stabilised; what lies below 0 becomes 0 in place.
-        kept: (h, w) of `keep_share`; None for 1 everywhere.
+        kept_share: (h, w) of `keep_share`; None for 1 everywhere.
         bound: Of the manifest.
         scale: Divisor of the stabilising transform; the noise there is 0.5 / scale.
 
@@ -130,7 +130,9 @@ def added_light(
     """
     channels, height, width = _checked(front, output)
     rows, columns = height // CELL_PX, width // CELL_PX
-    moved, weight, level = (np.empty((channels, rows, columns), np.float32) for _ in range(3))
+    light_change, weight, level = (
+        np.empty((channels, rows, columns), np.float32) for _ in range(3)
+    )
 
     both, more = np.empty((2, CELL_PX * _STEP_CELLS, width), np.float32)
     with _quiet():
@@ -142,13 +144,13 @@ def added_light(
                 np.maximum(after, 0, out=after)  # below it lies no light
                 np.add(after, before, out=sums)
                 np.subtract(after, before, out=changes)
-                if kept is not None:
-                    sums *= kept[pixels]
+                if kept_share is not None:
+                    sums *= kept_share[pixels]
                 changes *= sums
-                _cell_means(changes, moved[channel, top:bottom])
+                _cell_means(changes, light_change[channel, top:bottom])
                 _cell_means(sums, weight[channel, top:bottom])
                 _cell_means(before, level[channel, top:bottom])
-        return _judged(moved, weight, level, bound, scale)
+        return _judged(light_change, weight, level, bound, scale)
 
 
 def _steps(rows: int) -> Iterator[tuple[int, int]]:
@@ -163,28 +165,30 @@ def _quiet() -> np.errstate:
 
 
 def _judged(
-    moved: FloatArray, weight: FloatArray, level: FloatArray, bound: LightBound, scale: float
+    light_change: FloatArray, weight: FloatArray, level: FloatArray, bound: LightBound, scale: float
 ) -> AddedLight:
     """Compute what is beyond the bounds from the means of cells."""
-    change = _smoothed(moved)
+    change = _smoothed(light_change)
     change /= np.maximum(_smoothed(weight), _TINY)
     mean = _smoothed(level)
-    known = mean, np.maximum(_smoothed(np.square(level)) - np.square(mean), 0)
-    usual = _limit(*known, USUAL_BOUND, scale)
-    limit = usual if bound == USUAL_BOUND else _limit(*known, bound, scale)
+    moments = mean, np.maximum(_smoothed(np.square(level)) - np.square(mean), 0)
+    usual = _limit(*moments, USUAL_BOUND, scale)
+    limit = usual if bound == USUAL_BOUND else _limit(*moments, bound, scale)
     moved_by = np.abs(change)
-    left = moved_by > np.maximum(usual, limit)
+    unexplained = moved_by > np.maximum(usual, limit)
     return AddedLight(
         excess=change - np.clip(change, -limit, limit),
-        unexplained=np.asarray(left.any(axis=0)),
-        large=np.asarray((left & (moved_by > np.float32(FAR / 2) * mean)).any(axis=0)),
+        unexplained=np.asarray(unexplained.any(axis=0)),
+        large=np.asarray(
+            (unexplained & (moved_by > np.float32(LARGE_CHANGE / 2) * mean)).any(axis=0)
+        ),
     )
 
 
 def take_back(
     front: FloatArray,
     output: FloatArray,
-    kept: FloatArray | None,
+    kept_share: FloatArray | None,
     excess: FloatArray | None,
     *,
     strength: float = 1.0,
@@ -194,14 +198,16 @@ def take_back(
     Args:
         front: (c, h, w) float32, stabilised.
         output: (c, h, w) float32, stabilised; changed.
-        kept: (h, w) of `keep_share`; None for 1 everywhere.
+        kept_share: (h, w) of `keep_share`; None for 1 everywhere.
         excess: (c, h / 4, w / 4) of `added_light`; None for nothing, with sides of any length.
         strength: How much of what is left of the change is kept, 0..1.
     """
     channels, height, _ = front.shape if excess is None else _checked(front, output)
-    shares = kept
+    shares = kept_share
     if strength != 1.0:
-        shares = np.float32(strength) * (np.ones(1, np.float32) if kept is None else kept)
+        shares = np.float32(strength) * (
+            np.ones(1, np.float32) if kept_share is None else kept_share
+        )
 
     for top, bottom in _steps(-(-height // CELL_PX)):
         pixels = slice(CELL_PX * top, CELL_PX * bottom)
@@ -259,7 +265,7 @@ def _mix(rows: FloatArray, front: FloatArray, shares: FloatArray) -> None:
 def _subtract(rows: FloatArray, excess: FloatArray, top: int, bottom: int) -> None:
     """Subtract cells top..bottom, interpolated, from their pixels."""
     above, below = max(top - 1, 0), min(bottom + 1, len(excess))
-    columns = _across(excess[above:below])
+    columns = _enlarge_columns(excess[above:below])
     if above == top:
         columns = np.concatenate([columns[:1], columns])
     if below == bottom:
@@ -275,14 +281,14 @@ def _subtract(rows: FloatArray, excess: FloatArray, top: int, bottom: int) -> No
         rows[far::CELL_PX] -= part[2:]
 
 
-def _across(cells: FloatArray) -> FloatArray:
+def _enlarge_columns(cells: FloatArray) -> FloatArray:
     """Return (rows, 4 w) of (rows, w) cells, interpolated between their centres along rows."""
     padded = np.pad(cells, ((0, 0), (1, 1)), mode="edge")
     fine = np.empty((len(cells), cells.shape[1], CELL_PX), np.float32)
     for phase, at in enumerate(_PHASES):
-        far = padded[:, :-2] if at < 0 else padded[:, 2:]
+        neighbour = padded[:, :-2] if at < 0 else padded[:, 2:]
         np.multiply(cells, np.float32(1 - abs(at)), out=fine[:, :, phase])
-        fine[:, :, phase] += np.float32(abs(at)) * far
+        fine[:, :, phase] += np.float32(abs(at)) * neighbour
     return fine.reshape(len(cells), -1)
 
 
@@ -311,8 +317,8 @@ def _smoothed(cells: FloatArray) -> FloatArray:
 def _limit(mean: FloatArray, spread: FloatArray, bound: LightBound, scale: float) -> FloatArray:
     """Return the most by which a smoothed cell may leave the front end, of mean and variance."""
     cell = (0.5 / scale / CELL_PX) ** 2
-    beyond = np.maximum(spread - np.float32(NOISE_OF_CELLS * cell), 0)
-    variance = np.float32(bound.spread**2) * beyond
+    excess = np.maximum(spread - np.float32(NOISE_OF_CELLS * cell), 0)
+    variance = np.float32(bound.spread**2) * excess
     variance += np.float32(bound.noise**2 * cell / CELLS_AVERAGED)
     if bound.light:
         variance += np.square(np.float32(bound.light / 2) * mean)

@@ -32,7 +32,7 @@ class LightKeeper:
 
     Attributes:
         front: Channels of what is given that the network improves on.
-        kept: Channel that says how much is kept beside clipped samples; None for all.
+        kept_channel: Channel that says how much is kept beside clipped samples; None for all.
         bound: What is taken back; None where the light is only measured.
         measured: Whether the light is measured; without it and a bound only `strength` counts.
         strength: How much of what the network adds is kept, 0..1.
@@ -45,7 +45,7 @@ class LightKeeper:
     """
 
     front: slice
-    kept: int | None
+    kept_channel: int | None
     bound: LightBound | None
     measured: bool
     strength: float
@@ -56,27 +56,27 @@ class LightKeeper:
     unexplained: int = 0
     large: int = 0
 
-    def __call__(self, output: FloatArray, given: FloatArray, box: Box) -> None:
+    def __call__(self, output: FloatArray, inputs: FloatArray, box: Box) -> None:
         """Change the output of a window.
 
         Args:
             output: (c, h, w) float32, stabilised.
-            given: (channels, h, w) float32: inputs of the network, and what is kept.
+            inputs: (channels, h, w) float32: inputs of the network, and what is kept.
             box: Pixels that the window keeps.
         """
-        front = given[self.front]
-        kept = None if self.kept is None else given[self.kept]
-        if kept is not None and float(kept.min()) == 1:
-            kept = None
+        front = inputs[self.front]
+        share = None if self.kept_channel is None else inputs[self.kept_channel]
+        if share is not None and float(share.min()) == 1:
+            share = None
         excess = None
         if self.bound is not None:
-            added = self._added(front, output, kept, self.bound)
+            added = self._added(front, output, share, self.bound)
             self._count(added, box)
             excess = added.excess
         elif self.measured:
             self._measure(front, output)
-        if excess is not None or kept is not None or self.strength != 1:
-            take_back(front, output, kept, excess, strength=self.strength)
+        if excess is not None or share is not None or self.strength != 1:
+            take_back(front, output, share, excess, strength=self.strength)
         if self.bright is not None:
             keep_bright(front, output, self.bright, scale=self.scale)
         if self.white is not None:
@@ -97,15 +97,15 @@ class LightKeeper:
         height, width = (_floor(side) for side in output.shape[1:])
         for top in range(0, height, LOOK_EVERY * LOOK_ROWS):
             rows = np.s_[:, top : min(top + LOOK_ROWS, height), :width]
-            seen = output[rows].copy()
-            if seen.size:
-                added = self._added(front[rows], seen, None, USUAL_BOUND)
-                self._count(added, (0, 0, *seen.shape[1:]))
+            crop = output[rows].copy()
+            if crop.size:
+                added = self._added(front[rows], crop, None, USUAL_BOUND)
+                self._count(added, (0, 0, *crop.shape[1:]))
 
     def _added(
-        self, front: FloatArray, output: FloatArray, kept: FloatArray | None, bound: LightBound
+        self, front: FloatArray, output: FloatArray, share: FloatArray | None, bound: LightBound
     ) -> AddedLight:
-        return added_light(front, output, kept, bound, scale=self.scale)
+        return added_light(front, output, share, bound, scale=self.scale)
 
     def _count(self, added: AddedLight, box: Box) -> None:
         top, left, bottom, right = box

@@ -97,7 +97,7 @@ class Axis:
     step: Fraction = Fraction(1)
     extra: int = 0
 
-    def through(self, window: Window) -> "Axis":
+    def output_of(self, window: Window) -> "Axis":
         """Return this axis behind an operator.
 
         Raises:
@@ -123,11 +123,11 @@ class Extent:
             return 0.0
         return self.channels / float(self.axes[0].step * self.axes[1].step)
 
-    def through(self, channels: int, windows: Windows | None = None) -> "Extent":
+    def output_of(self, channels: int, windows: Windows | None = None) -> "Extent":
         """Return the extent behind an operator with the given windows."""
         axes = self.axes
         if axes is not None and windows is not None:
-            axes = axes[0].through(windows[0]), axes[1].through(windows[1])
+            axes = axes[0].output_of(windows[0]), axes[1].output_of(windows[1])
         return Extent(channels=channels, axes=axes)
 
 

@@ -35,9 +35,9 @@ class RowBuffer:
 
     def move_to(self, top: int) -> FloatArray:
         """Return the rows from `top` on, (c, rows, padded w); never above an earlier `top`."""
-        kept = self._end - top
-        if 0 < kept < self._rows.shape[1]:
-            self._rows[:, :kept] = self._rows[:, top - self._top : self._end - self._top]
+        overlap = self._end - top
+        if 0 < overlap < self._rows.shape[1]:
+            self._rows[:, :overlap] = self._rows[:, top - self._top : self._end - self._top]
         self._top = top
         bottom = top + self._rows.shape[1]
         _, height, width = self._source.shape

@@ -321,28 +321,28 @@ def infer_bands(
     window = np.empty(shape, np.float32) if len(layout.columns) > 1 else None
     padded = layout.padded_height_px, layout.padded_width_px
     buffer = RowBuffer(source, layout.window_height_px, padded)
-    done = 0
+    count = 0
     for i, row in enumerate(layout.rows):
-        held = buffer.move_to(row.origin_px)
+        rows = buffer.move_to(row.origin_px)
         pieces: list[FloatArray] = []
         for j, column in enumerate(layout.columns):
             check_cancelled(cancel)
-            filled = _filled(window, held, column.origin_px)
+            filled = _filled(window, rows, column.origin_px)
             output = run(filled)
             if finish is not None:
                 finish(output[0], filled[0], _box(row, column, (height, width)))
-            kept = _kept(output, row, column, (height, width), scale)
+            crop = _crop(output, row, column, (height, width), scale)
             if guard is not None:
-                given = _kept(filled, row, column, (height, width))
-                kept = guard.check(kept, given, partial(_describe, i, j, row, column))
-            elif not is_finite(kept):
+                inputs = _crop(filled, row, column, (height, width))
+                crop = guard.check(crop, inputs, partial(_describe, i, j, row, column))
+            elif not is_finite(crop):
                 raise ContractError(_not_finite_message(i, j, row, column))
-            pieces = pieces or _pieces(kept.shape[0], kept.shape[1], scale * width)
-            _fill(pieces, kept, scale * column.start_px)
-            done += 1
+            pieces = pieces or _pieces(crop.shape[0], crop.shape[1], scale * width)
+            _fill(pieces, crop, scale * column.start_px)
+            count += 1
             if progress is not None:
-                progress(done, layout.window_count)
-        del kept, output
+                progress(count, layout.window_count)
+        del crop, output
         while pieces:  # the rows of the next windows are made before their band is
             yield pieces.pop(0)
 
@@ -353,24 +353,24 @@ def _pieces(outputs: int, rows: int, width: int) -> list[FloatArray]:
     return [np.empty((outputs, b - a, width), np.float32) for a, b in pairwise(cuts)]
 
 
-def _fill(pieces: list[FloatArray], kept: FloatArray, left: int) -> None:
+def _fill(pieces: list[FloatArray], crop: FloatArray, column: int) -> None:
     """Copy what a window keeps to its columns of a band."""
     top = 0
     for piece in pieces:
         bottom = top + piece.shape[1]
-        piece[:, :, left : left + kept.shape[2]] = kept[:, top:bottom]
+        piece[:, :, column : column + crop.shape[2]] = crop[:, top:bottom]
         top = bottom
 
 
-def _filled(window: FloatArray | None, held: FloatArray, left: int) -> FloatArray:
+def _filled(window: FloatArray | None, rows: FloatArray, column: int) -> FloatArray:
     """Copy the columns of a window; a window as wide as the picture is the row buffer itself."""
     if window is None:
-        return held[None]
-    np.copyto(window[0], held[:, :, left : left + window.shape[3]])
+        return rows[None]
+    np.copyto(window[0], rows[:, :, column : column + window.shape[3]])
     return window
 
 
-def _kept(
+def _crop(
     output: FloatArray, row: Span, column: Span, size: tuple[int, int], scale: int = 1
 ) -> FloatArray:
     """Crop the pixels that a window contributes; none lies in the padding."""

@@ -50,15 +50,15 @@ class WhiteKeeper:
         rows, columns = np.nonzero((front >= self.bright).any(axis=0))
         if not rows.size:
             return
-        before = self.colours.of(self._light(front[:, rows, columns]))
-        lamp = (before >= 1).any(axis=0)
+        front_light = self.colours.of(self._light(front[:, rows, columns]))
+        lamp = (front_light >= 1).any(axis=0)
         at = np.s_[:, rows[lamp], columns[lamp]]
         # what a network that explodes gives is looked at elsewhere
         with np.errstate(over="ignore", invalid="ignore"):
             light = self._light(output[at])
-            raised = self.colours.raised(light, np.minimum(before[:, lamp], 1))
-            kept = stabilise(raised[:, None], self.noise, scale=self.scale)[:, 0]
-        output[at] = np.where((raised != light) & np.isfinite(kept), kept, output[at])
+            raised = self.colours.raised(light, np.minimum(front_light[:, lamp], 1))
+            stabilised = stabilise(raised[:, None], self.noise, scale=self.scale)[:, 0]
+        output[at] = np.where((raised != light) & np.isfinite(stabilised), stabilised, output[at])
 
     def _light(self, stable: FloatArray) -> FloatArray:
         """Return the light of (c, n) stabilised values."""

@@ -74,9 +74,9 @@ class SizedNetwork:
     @property
     def cost(self) -> PixelCost:
         """Return the memory of the network per pixel."""
-        behind = STEP_BYTES if self.extra_reach_px else 0.0
+        step_bytes = STEP_BYTES if self.extra_reach_px else 0.0
         return PixelCost(
-            arena_bytes=max(self.facts.bytes_per_pixel, self.block_bytes) + behind,
+            arena_bytes=max(self.facts.bytes_per_pixel, self.block_bytes) + step_bytes,
             channels=self.facts.input_channels + self.masks,
             outputs=self.facts.output_channels,
             scale=self.facts.output_scale,
@@ -179,11 +179,11 @@ class NetworkWindows:
     def notes(self) -> tuple[str, ...]:
         """Return notes on windows of a network that looks at whole pictures."""
         count = self.to_json().get("windows", 0)
-        seen = next((one.facts.global_text for one in self.networks if one.is_global), "")
-        if count < 2 or not seen:
+        operators = next((one.facts.global_text for one in self.networks if one.is_global), "")
+        if count < 2 or not operators:
             return ()
         return (
-            f"the network looks at the whole picture ({seen}), and mode {self.mode} processes "
+            f"the network looks at the whole picture ({operators}), and mode {self.mode} processes "
             f"{count} windows separately: brightness or contrast may change between them",
         )
 
@@ -213,13 +213,13 @@ class NetworkWindows:
     def to_json(self) -> dict[str, Any]:
         """Return the windows in a few numbers, for the sidecar."""
         if self.tiles is not None:
-            seen = list(self.networks[0].facts.global_operators)
+            operators = list(self.networks[0].facts.global_operators)
             return {
                 "mode": self.mode,
                 "halo_px": self.tiles.halo_px,
                 "windows": self.tiles.window_count,
                 "work_ratio": round(self.tiles.work_ratio, 3),
-            } | ({"global_operators": seen} if seen else {})
+            } | ({"global_operators": operators} if operators else {})
         if self.cells is None:
             return {}
         height, width = self.cells.size_px
@@ -304,12 +304,12 @@ def _check_one_window(
 ) -> None:
     """Refuse to tile a network that looks at the whole picture."""
     layout = lay_windows(*size_px, replace(tile_limits, max_bytes=sys.maxsize))
-    needed = layout.needed_bytes(network.cost)
-    if layout.window_count == 1 and needed <= limits.max_bytes:
+    window_bytes = layout.needed_bytes(network.cost)
+    if layout.window_count == 1 and window_bytes <= limits.max_bytes:
         return
     height, width = size_px
-    cure = f"one window of {width}x{height} px takes {needed // 10**6} MB"
-    cure += f": raise {option_text('max_mem_bytes', limits.spent_bytes + needed)}"
+    cure = f"one window of {width}x{height} px takes {window_bytes // 10**6} MB"
+    cure += f": raise {option_text('max_mem_bytes', limits.spent_bytes + window_bytes)}"
     if layout.window_count > 1:
         cure = f"leave out the tile size, which makes {layout.window_count} windows"
     elif _has_fast(network.facts):

@@ -65,8 +65,8 @@ def _directory(tags: Tags, *, big: bool) -> Any:
     directory = ImageFileDirectory_v2(header_bytes(0, big=big))
     for tag, (kind, value) in tags.items():
         directory.tagtype[tag] = int(kind)
-        given = _rationals(value) if kind in {Kind.RATIONAL, Kind.SRATIONAL} else value
-        directory[tag] = 0 if tag == STRIP_OFFSETS else given
+        content = _rationals(value) if kind in {Kind.RATIONAL, Kind.SRATIONAL} else value
+        directory[tag] = 0 if tag == STRIP_OFFSETS else content
     return directory
 
 

@@ -185,8 +185,8 @@ class DngFile:
         start = len(header_bytes(0))
         sensor_at = start + directory_length(main)
         below_at = sensor_at + directory_length(sensor)
-        pointers, below = sub_directories(metadata, below_at)
-        samples_at = below_at + len(below)
+        pointers, sub_bytes = sub_directories(metadata, below_at)
+        samples_at = below_at + len(sub_bytes)
         main |= {
             273: (Kind.LONG, samples_at + samples_bytes),  # StripOffsets
             330: (Kind.LONG, sensor_at),  # SubIFDs
@@ -197,7 +197,7 @@ class DngFile:
             header_bytes(start)
             + directory_bytes(main, start)
             + directory_bytes(sensor, sensor_at)
-            + below
+            + sub_bytes
         )
 
 
@@ -265,19 +265,19 @@ def _preview_of_mosaic(mosaic: NDArray[np.uint16], cfa: CfaPattern, tags: DngTag
     """Return (3, h, w) float32 DN above black: averages over the positions of the cell."""
     height, width = (max(side // 2, 1) for side in mosaic.shape)
     black = np.broadcast_to(np.asarray(tags.black, dtype=np.float32), (2, 2))
-    found: list[list[FloatArray]] = [[], [], []]
+    channels: list[list[FloatArray]] = [[], [], []]
     for y, row in enumerate(cfa_channels(cfa)):
         for x, channel in enumerate(row):
             averages = Averages(height, width)
             averages.add(mosaic[None, y::2, x::2][:, :height, :width])
-            found[channel].append(averages.planes()[0] - black[y, x])
-    return np.stack([np.mean(planes, axis=0) for planes in found])
+            channels[channel].append(averages.planes()[0] - black[y, x])
+    return np.stack([np.mean(planes, axis=0) for planes in channels])
 
 
 def _main(tags: DngTags) -> dict[int, tuple[Kind, Any]]:
     """Return the tags about the photograph as a whole."""
     make, _, model = tags.camera_model.partition(" ")
-    found: dict[int, tuple[Kind, Any]] = {
+    entries: dict[int, tuple[Kind, Any]] = {
         271: (Kind.ASCII, make.encode()),  # Make
         272: (Kind.ASCII, (model or make).encode()),  # Model
         **main_tags(tags.metadata),
@@ -292,12 +292,12 @@ def _main(tags: DngTags) -> dict[int, tuple[Kind, Any]]:
         50970: (Kind.LONG, _SRGB_PREVIEW),  # PreviewColorSpace
     }
     if tags.description:
-        found[270] = Kind.ASCII, tags.description.encode()  # ImageDescription
+        entries[270] = Kind.ASCII, tags.description.encode()  # ImageDescription
     if tags.color_matrix is not None:
         values = np.asarray(tags.color_matrix, dtype=np.float64).ravel().tolist()
-        found[50721] = Kind.SRATIONAL, _ratios(values)  # ColorMatrix1
-        found[50778] = Kind.SHORT, ILLUMINANT_D65  # CalibrationIlluminant1
-    return found
+        entries[50721] = Kind.SRATIONAL, _ratios(values)  # ColorMatrix1
+        entries[50778] = Kind.SHORT, ILLUMINANT_D65  # CalibrationIlluminant1
+    return entries
 
 
 def _preview(size: tuple[int, int], preview_bytes: int) -> Tags:

@@ -38,20 +38,20 @@ class Averages:
         self._step_y, self._step_x = min(step, height), min(step, width)
         self._columns = width // self._step_x
         self._waiting: NDArray[Any] | None = None
-        self._made: list[FloatArray] = []
+        self._averages: list[FloatArray] = []
 
     def add(self, band: NDArray[Any]) -> None:
         """Add the next rows: (c, rows, w) uint16 or float32."""
         rows = band if self._waiting is None else np.concatenate([self._waiting, band], axis=1)
         count = rows.shape[1] // self._step_y
         if count:
-            used = rows[:, : count * self._step_y, : self._columns * self._step_x]
-            self._made.append(np.stack([self._shrunk(plane, count) for plane in used]))
+            whole_blocks = rows[:, : count * self._step_y, : self._columns * self._step_x]
+            self._averages.append(np.stack([self._shrunk(plane, count) for plane in whole_blocks]))
         self._waiting = rows[:, count * self._step_y :].copy()
 
     def planes(self) -> FloatArray:
         """Return (c, h, w) float32 of what has come, at most `longest_px` each way."""
-        return np.concatenate(self._made, axis=1)
+        return np.concatenate(self._averages, axis=1)
 
     def _shrunk(self, plane: NDArray[Any], rows: int) -> FloatArray:
         small = cv2.resize(

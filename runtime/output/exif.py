@@ -41,14 +41,14 @@ def exif_block(metadata: Metadata, *, main: Tags, exif: Tags) -> bytes:
     Returns:
         The structure; empty where no metadata are stated.
     """
-    if not metadata.stated():
+    if not metadata.to_json():
         return b""
     start = len(header_bytes(0))
     main = {**main, **main_tags(metadata), exif_tags.ORIENTATION: (Kind.SHORT, UPRIGHT)}
     pointers, _ = sub_directories(metadata, 0, exif=exif)
     end = start + directory_length({**main, **pointers})
-    pointers, below = sub_directories(metadata, end, exif=exif)
-    return header_bytes(start) + directory_bytes({**main, **pointers}, start) + below
+    pointers, sub_bytes = sub_directories(metadata, end, exif=exif)
+    return header_bytes(start) + directory_bytes({**main, **pointers}, start) + sub_bytes
 
 
 def color_tags(picture: PictureFormat) -> Tags:
@@ -81,45 +81,45 @@ def sub_directories(
         no metadata are stated.
     """
     pointers: dict[int, tuple[Kind, int]] = {}
-    found = b""
-    more = exif if metadata.stated() else NOTHING
+    data = b""
+    more = exif if metadata.to_json() else NOTHING
     for pointer, tags in ((EXIF_POINTER, _exif(metadata, more)), (GPS_POINTER, _gps(metadata))):
         if tags:
-            pointers[pointer] = Kind.LONG8 if big else Kind.LONG, offset + len(found)
-            found += directory_bytes(tags, offset + len(found), big=big)
-    return pointers, found
+            pointers[pointer] = Kind.LONG8 if big else Kind.LONG, offset + len(data)
+            data += directory_bytes(tags, offset + len(data), big=big)
+    return pointers, data
 
 
 def _texts(metadata: Metadata, names: tuple[str, ...]) -> Tags:
-    told = ((exif_tags.TEXT_TAGS[name], getattr(metadata, name)) for name in names)
-    return {tag: (Kind.ASCII, text.encode()) for tag, text in told if text}
+    texts = ((exif_tags.TEXT_TAGS[name], getattr(metadata, name)) for name in names)
+    return {tag: (Kind.ASCII, text.encode()) for tag, text in texts if text}
 
 
 def _exif(metadata: Metadata, more: Tags) -> Tags:
-    found = {**more, **_texts(metadata, _IN_EXIF)}
+    entries = {**more, **_texts(metadata, _IN_EXIF)}
     for name in _NUMBERS:
         value = getattr(metadata, name)
         if value is not None:
-            found[exif_tags.NUMBER_TAGS[name]] = Kind.RATIONAL, nearest_ratio(value)
+            entries[exif_tags.NUMBER_TAGS[name]] = Kind.RATIONAL, nearest_ratio(value)
     if metadata.iso is not None:
-        found |= _sensitivity(max(1, round(metadata.iso)))
-    return {_EXIF_VERSION: (Kind.UNDEFINED, EXIF_VERSION), **found} if found else {}
+        entries |= _sensitivity(max(1, round(metadata.iso)))
+    return {_EXIF_VERSION: (Kind.UNDEFINED, EXIF_VERSION), **entries} if entries else {}
 
 
 def _sensitivity(iso: int) -> dict[int, tuple[Kind, int]]:
     """Return the ISO speed, in the tag for large numbers too where it needs that."""
-    found = {exif_tags.NUMBER_TAGS["iso"]: (Kind.SHORT, min(iso, MAX_SHORT))}
+    entries = {exif_tags.NUMBER_TAGS["iso"]: (Kind.SHORT, min(iso, MAX_SHORT))}
     if iso >= MAX_SHORT:
-        found[_SENSITIVITY_TYPE] = Kind.SHORT, 2  # recommended exposure index
-        found[exif_tags.RECOMMENDED_EXPOSURE_INDEX] = Kind.LONG, iso
-    return found
+        entries[_SENSITIVITY_TYPE] = Kind.SHORT, 2  # recommended exposure index
+        entries[exif_tags.RECOMMENDED_EXPOSURE_INDEX] = Kind.LONG, iso
+    return entries
 
 
 def _gps(metadata: Metadata) -> Tags:
     latitude, longitude = metadata.latitude_deg, metadata.longitude_deg
     if latitude is None or longitude is None:
         return {}
-    found: dict[int, tuple[Kind, object]] = {
+    entries: dict[int, tuple[Kind, object]] = {
         _GPS_VERSION: (Kind.BYTE, GPS_VERSION),
         exif_tags.LATITUDE_REF: (Kind.ASCII, b"S" if latitude < 0 else b"N"),
         exif_tags.LATITUDE: (Kind.RATIONAL, _sexagesimal(latitude)),
@@ -128,9 +128,9 @@ def _gps(metadata: Metadata) -> Tags:
     }
     height = metadata.altitude_m
     if height is not None:
-        found[exif_tags.ALTITUDE_REF] = Kind.BYTE, bytes((int(height < 0),))
-        found[exif_tags.ALTITUDE] = Kind.RATIONAL, nearest_ratio(abs(height))
-    return found
+        entries[exif_tags.ALTITUDE_REF] = Kind.BYTE, bytes((int(height < 0),))
+        entries[exif_tags.ALTITUDE] = Kind.RATIONAL, nearest_ratio(abs(height))
+    return entries
 
 
 def _sexagesimal(degrees: float) -> tuple[Fraction, ...]:

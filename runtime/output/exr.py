@@ -90,9 +90,9 @@ class ExrWriter(PictureWriter):
     def _promote(self) -> None:
         _log.info("%s: values beyond half; written as float", self.path.name)
         _, height = self.picture.file_size
-        done, width = self._stored, self.picture.file_size[0]
+        row_count, width = self._stored, self.picture.file_size[0]
         filler = np.zeros((COPY_ROWS, width), dtype=np.float16)
-        for top in range(done, height, COPY_ROWS):
+        for top in range(row_count, height, COPY_ROWS):
             rows = min(COPY_ROWS, height - top)
             self._file.writePixels(dict.fromkeys("RGB", filler[:rows]), rows)
         self._file.close()
@@ -102,7 +102,7 @@ class ExrWriter(PictureWriter):
         self._stored = 0
         self._file = self._open()
         try:
-            self._copy_rows(draft, done)
+            self._copy_rows(draft, row_count)
         finally:
             draft.unlink()
 

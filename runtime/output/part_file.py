@@ -41,8 +41,8 @@ def stale_parts(path: Path) -> list[Path]:
 def _part_prefix(path: Path) -> str:
     whole = os.fsencode(path.name)
     name = whole.decode("utf-8", "backslashreplace")
-    shown = name.encode()[:MOST_NAME_BYTES].decode("utf-8", "ignore")
-    return f"{shown}.{hashlib.sha256(whole).hexdigest()[:HASH_LETTERS]}."
+    short = name.encode()[:MOST_NAME_BYTES].decode("utf-8", "ignore")
+    return f"{short}.{hashlib.sha256(whole).hexdigest()[:HASH_LETTERS]}."
 
 
 @contextmanager
@@ -99,34 +99,36 @@ def _rename(parts: Sequence[Path], paths: Sequence[Path]) -> None:
     older: list[tuple[Path, Path | None]] = []
     try:
         for part, path in zip(parts, paths, strict=True):
-            older.append((path, _kept(path)))
+            older.append((path, _link_backup(path)))
             part.replace(path)
         if os.name == "posix":
             for folder in {path.parent for path in paths}:
                 _sync(folder)
     except BaseException:
-        for (path, kept), part in zip(reversed(older), reversed(parts[: len(older)]), strict=True):
-            if kept is not None:
-                kept.replace(path)
+        for (path, backup), part in zip(
+            reversed(older), reversed(parts[: len(older)]), strict=True
+        ):
+            if backup is not None:
+                backup.replace(path)
             elif not part.exists():
                 path.unlink(missing_ok=True)
         raise
     finally:
-        for _, kept in older:
-            if kept is not None:
-                kept.unlink(missing_ok=True)
+        for _, backup in older:
+            if backup is not None:
+                backup.unlink(missing_ok=True)
 
 
-def _kept(path: Path) -> Path | None:
+def _link_backup(path: Path) -> Path | None:
     """Link an older file under a second name; None if there is none to replace."""
     if not path.is_file():
         return None
-    kept = part_path(path)
+    backup = part_path(path)
     try:
-        os.link(path, kept)
+        os.link(path, backup)
     except OSError:  # a file system without second names
-        path.rename(kept)
-    return kept
+        path.rename(backup)
+    return backup
 
 
 def _sync(path: Path) -> None:

@@ -24,7 +24,7 @@ def _encoded(suffix: str, codes: NDArray[Any], dtype: Any) -> bytes:
         raise ContractError(
             f"expected (h, w, 3) of {np.dtype(dtype)}; got {codes.dtype} {codes.shape}"
         )
-    done, data = cv2.imencode(suffix, np.ascontiguousarray(codes[..., ::-1]))
-    if not done:
+    is_coded, data = cv2.imencode(suffix, np.ascontiguousarray(codes[..., ::-1]))
+    if not is_coded:
         raise ContractError(f"a picture of {codes.shape} cannot be coded as {suffix}")
     return data.tobytes()

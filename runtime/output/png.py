@@ -32,7 +32,7 @@ class PngWriter(PictureWriter):
         super().__init__(path, picture)
         self._bits = bits
         width, height = picture.file_size
-        self._above = np.zeros(width * 3 * bits // 8, dtype=np.uint8)
+        self._last_line = np.zeros(width * 3 * bits // 8, dtype=np.uint8)
         self._packer = zlib.compressobj(ZLIB_LEVEL)
         self._file = path.open("wb")
         self._file.write(SIGNATURE)
@@ -54,9 +54,9 @@ class PngWriter(PictureWriter):
         lines: NDArray[np.uint8] = big_endian.view(np.uint8).reshape(rows.shape[1], -1)
         filtered = np.empty((lines.shape[0], lines.shape[1] + 1), dtype=np.uint8)
         filtered[:, 0] = UP_FILTER
-        np.subtract(lines[0], self._above, out=filtered[0, 1:])
+        np.subtract(lines[0], self._last_line, out=filtered[0, 1:])
         np.subtract(lines[1:], lines[:-1], out=filtered[1:, 1:])
-        self._above = lines[-1].copy()
+        self._last_line = lines[-1].copy()
         self._data(self._packer.compress(filtered.data))
 
     def finish(self) -> None:

@@ -48,13 +48,13 @@ def sidecar_text(record: Mapping[str, Any], sections: Mapping[str, Any] | None =
     if missing:
         raise ContractError(f"the sidecar lacks {', '.join(missing)}")
     whole = {"sidecar_version": SIDECAR_VERSION, **record}
-    found = dict(sections or {})
-    if taken := sorted(whole.keys() & found.keys()):
+    extra = dict(sections or {})
+    if clashes := sorted(whole.keys() & extra.keys()):
         raise ContractError(
-            f"a section of the sidecar needs a name of its own; taken: {', '.join(taken)}"
+            f"a section of the sidecar needs a name of its own; taken: {', '.join(clashes)}"
         )
     try:
-        text = json.dumps(whole | found, indent=2, allow_nan=False)
+        text = json.dumps(whole | extra, indent=2, allow_nan=False)
     except (TypeError, ValueError) as error:
         raise ContractError(f"the sidecar must hold plain JSON values: {error}") from error
     return text + "\n"

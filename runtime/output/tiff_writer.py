@@ -82,6 +82,6 @@ def _front(picture: PictureFormat) -> bytes:
         **pointers,
     }
     middle = start + directory_length(tags, big=big)
-    pointers, below = sub_directories(metadata, middle, exif=exif, big=big)
-    tags = {**tags, **pointers, 273: (where, middle + len(below))}
-    return header_bytes(start, big=big) + directory_bytes(tags, start, big=big) + below
+    pointers, sub_bytes = sub_directories(metadata, middle, exif=exif, big=big)
+    tags = {**tags, **pointers, 273: (where, middle + len(sub_bytes))}
+    return header_bytes(start, big=big) + directory_bytes(tags, start, big=big) + sub_bytes

@@ -67,7 +67,7 @@ def tone_mapped(light: FloatArray) -> FloatArray:
     # OpenCV takes the least sample off and divides by what is left of each pixel. One that is black
     # in all colours becomes NaN, and the picture then comes out nearly black. A row in front, with
     # one colour that is 0, keeps every pixel above that.
-    given = np.concatenate([pixels[:1], pixels]).astype(np.float32)
-    given[0, 0] = (0, given.mean(), given.mean())
-    shown = np.asarray(operator.process(given), dtype=np.float32)[1:]
-    return np.ascontiguousarray(shown.transpose(2, 0, 1))
+    padded = np.concatenate([pixels[:1], pixels]).astype(np.float32)
+    padded[0, 0] = (0, padded.mean(), padded.mean())
+    mapped = np.asarray(operator.process(padded), dtype=np.float32)[1:]
+    return np.ascontiguousarray(mapped.transpose(2, 0, 1))

@@ -37,14 +37,14 @@ def front_end(network: Network, stages: Sequence[Stage]) -> Wiener | None:
 
 def broken_laws(manifest: Manifest, sizes: Sequence[str]) -> tuple[str, ...]:
     """Return the laws of a picture that a bundle states as broken by one of some sizes."""
-    stated = manifest.laws or {}
-    named = (
+    laws_by_size = manifest.laws or {}
+    names = (
         name.replace("_", " ")
         for size in sizes
-        for name, law in stated.get(size, {}).items()
+        for name, law in laws_by_size.get(size, {}).items()
         if not law.kept
     )
-    return tuple(dict.fromkeys(named))
+    return tuple(dict.fromkeys(names))
 
 
 def _bounded(stage: Stage, manifest: Manifest) -> Stage:
@@ -61,6 +61,6 @@ def _bounded(stage: Stage, manifest: Manifest) -> Stage:
 def _stands_for(network: Network, manifest: Manifest) -> bool:
     """Return whether the last plane of a network is of the kind that it gives."""
     planes = manifest.all_planes
-    given = [planes[name] for name in network.gives]
+    outputs = [planes[name] for name in network.gives]
     last = planes[network.takes[-1]]
-    return network.transform == "stabilise" and len(given) == 1 and last.stands_for(given[0])
+    return network.transform == "stabilise" and len(outputs) == 1 and last.stands_for(outputs[0])

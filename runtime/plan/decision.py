@@ -73,8 +73,8 @@ class Subject:
     def global_text(self, sizes: Iterable[str]) -> str:
         """Return the operators that see the whole picture, of networks of some sizes."""
         networks = self.bundle.manifest.networks.values()
-        seen = (one[size].global_text for size in sizes for one in networks if size in one)
-        return next(filter(None, seen), "")
+        texts = (one[size].global_text for size in sizes for one in networks if size in one)
+        return next(filter(None, texts), "")
 
     @property
     def megapixels(self) -> float:

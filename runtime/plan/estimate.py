@@ -70,18 +70,18 @@ def stage_seconds(
         window_mp: Role -> size -> megapixels that its windows compute, once they are planned.
     """
     stages = subject.bundle.manifest.stages
-    taken: list[float] = []
+    seconds: list[float] = []
     for stage, way in zip(stages, ways_of(stages, work), strict=True):
         windows = None
         if isinstance(stage, Network) and window_mp is not None:
             windows = window_mp.get(stage.role)
         if way == LEFT_OUT:
-            taken.append(0.0)
+            seconds.append(0.0)
         elif isinstance(stage, Network) and windows is not None:
-            taken.append(network_seconds(stage.role, windows, speed))
+            seconds.append(network_seconds(stage.role, windows, speed))
         else:
-            taken.append(module_of(stage).seconds(stage, subject, work, speed))
-    return tuple(taken)
+            seconds.append(module_of(stage).seconds(stage, subject, work, speed))
+    return tuple(seconds)
 
 
 def network_seconds(role: str, window_mp: Mapping[str, float], speed: Speed) -> float:
@@ -98,7 +98,7 @@ def nominal_window_mp(subject: Subject, work: Work) -> dict[str, float]:
         return {work.size: computed}
     areas = subject.content.cell_px
     tier_work = tier_work_of(subject, work)
-    found = {}
+    window_mp = {}
     for tier, size in ((FULL, work.size), (SMALL, work.small)):
         if size is None or not (work.labels == tier).any():
             continue
@@ -107,8 +107,8 @@ def nominal_window_mp(subject: Subject, work: Work) -> dict[str, float]:
         _, share = work_shares(only, areas, tier_work)
         full = tier_work.per_px()
         ratio = (full[FULL] - full[1]) / (full[tier] - full[1])
-        found[size] = min(share * ratio, 1.0) * computed
-    return found
+        window_mp[size] = min(share * ratio, 1.0) * computed
+    return window_mp
 
 
 def role_window_mp(role: str, subject: Subject, work: Work) -> dict[str, float]:
@@ -117,8 +117,8 @@ def role_window_mp(role: str, subject: Subject, work: Work) -> dict[str, float]:
         return nominal_window_mp(subject, work)
     manifest = subject.bundle.manifest
     stage = next(s for s in manifest.stages_of(Network) if s.role == role)
-    taken = manifest.planes.get(stage.takes[0])
-    finer = 1.0 if taken is None else taken.grid.pitch_ratio**-2
+    plane = manifest.planes.get(stage.takes[0])
+    finer = 1.0 if plane is None else plane.grid.pitch_ratio**-2
     return {work.size: subject.megapixels * WINDOW_OVERLAP * finer}
 
 

@@ -72,9 +72,9 @@ class LossModel:
     def predict(self, content: Content) -> CellLosses:
         """Return the predicted errors of every cell."""
         area = content.cell_px
-        made = {name: area * _line(line, content) for name, line in self.lines.items()}
-        exact = made.pop(EXACT)
-        return CellLosses(exact=exact, extra=made)
+        errors = {name: area * _line(line, content) for name, line in self.lines.items()}
+        exact = errors.pop(EXACT)
+        return CellLosses(exact=exact, extra=errors)
 
     def budget_db(self, max_error_db: float) -> float:
         """Return the predicted loss to spend so that the true one stays below a limit at worst."""

@@ -56,8 +56,8 @@ class Plan:
     def sizes(self) -> list[str]:
         """Return the sizes of the networks whose speed the savings need."""
         works = [self.work, *(w for before, _, after in self.steps for w in (before, after))]
-        named = {size for work in works for size in (work.size, work.small)}
-        return [s for s in self.subject.bundle.manifest.sizes if s in named | {REFERENCE}]
+        names = {size for work in works for size in (work.size, work.small)}
+        return [s for s in self.subject.bundle.manifest.sizes if s in names | {REFERENCE}]
 
     def decisions(self, speed: Speed | None = None) -> list[Decision]:
         """Return the decisions; with a speed, with the seconds they save.
@@ -65,24 +65,24 @@ class Plan:
         What a size costs is that of the subject as it is known now: it may have been looked at
         since the plan was made.
         """
-        made = [
+        decisions = [
             replace(decision, cost_db=size_cost_db(self.subject, decision.choice))
             if decision.what == SIZE
             else decision
             for _, decision, _ in self.steps
         ]
         if speed is None:
-            return made
+            return decisions
         return [
             replace(decision, saving_s=self._saving_s(number, speed))
-            for number, decision in enumerate(made)
+            for number, decision in enumerate(decisions)
         ]
 
     def _saving_s(self, step: int, speed: Speed) -> float:
         """Return the seconds that a step saves; the size, the first, against the reference."""
         before, _, after = self.steps[step]
-        chosen = step == 0 and before is after and after.size != REFERENCE
-        if chosen and any(size == REFERENCE for _, size in speed.network_s_per_mp):
+        is_saving = step == 0 and before is after and after.size != REFERENCE
+        if is_saving and any(size == REFERENCE for _, size in speed.network_s_per_mp):
             before = replace(before, size=REFERENCE)
         if before is after:
             return 0.0
@@ -216,11 +216,11 @@ def _within_seconds(subject: Subject, work: Work, model: LossModel | None, speed
     ordered = sorted(plans, key=lambda plan: plan.cost_db)
     ordered += [] if last is None else [_ruled(subject, last)]
     cheapest = min(plans, key=seconds) if last is None else ordered[-1]
-    chosen = next((plan for plan in ordered if seconds(plan) <= limit), cheapest)
+    best = next((plan for plan in ordered if seconds(plan) <= limit), cheapest)
     note = ""
-    if seconds(chosen) > limit:
+    if seconds(best) > limit:
         least = "the least work" if last is None else "the filter bank alone"
         note = f"even {least} is expected to take more than {limit:g} s"
-    elif most_db is not None and model is not None and chosen.cost_db > model.budget_db(most_db):
+    elif most_db is not None and model is not None and best.cost_db > model.budget_db(most_db):
         note = f"no plan keeps within both {limit:g} s and {most_db:g} dB"
-    return replace(chosen, note=note)
+    return replace(best, note=note)

@@ -36,22 +36,22 @@ def find_rules() -> tuple[Rule, ...]:
     Raises:
         ContractError: If a module of `rules/` has no ORDER or no `decide`.
     """
-    found = []
+    loaded_rules = []
     for module in pkgutil.iter_modules(rules.__path__):
         loaded = import_module(f"{rules.__name__}.{module.name}")
         order, decide = getattr(loaded, "ORDER", None), getattr(loaded, "decide", None)
         if not isinstance(order, int) or not callable(decide):
             raise ContractError(f"the rule {module.name} needs an int ORDER and a function decide")
-        found.append(Rule(name=module.name, order=order, decide=decide))
-    return tuple(sorted(found, key=lambda rule: (rule.order, rule.name)))
+        loaded_rules.append(Rule(name=module.name, order=order, decide=decide))
+    return tuple(sorted(loaded_rules, key=lambda rule: (rule.order, rule.name)))
 
 
 def apply_rules(subject: Subject, work: Work) -> list[tuple[Work, Decision, Work]]:
     """Apply all rules; return (work before, decision, work after) of those that apply."""
     steps = []
     for rule in find_rules():
-        after, decision = rule.decide(subject, work)
+        next_work, decision = rule.decide(subject, work)
         if decision is not None:
-            steps.append((work, decision, after))
-        work = after
+            steps.append((work, decision, next_work))
+        work = next_work
     return steps

@@ -26,7 +26,7 @@ REFERENCE_BLOCK_PX: Final = 384
 LARGE_WINDOW: Final = 1.25
 """A pixel of the windows of a picture, stabilised and taken back, over one of the timed window,
 which stays in the cache (measured)."""
-TOGETHER: Final = 1.4
+CROWDING: Final = 1.4
 """Lights explained by all threads at once over one alone (measured: the memory is shared)."""
 
 
@@ -81,7 +81,7 @@ def measure_speed(
             key: LARGE_WINDOW * _seconds_per_mp(*network) for key, network in networks.items()
         },
         block_s=block_s * larger,
-        clipped_block_s=(block_s + TOGETHER * max(clipped_s - block_s, 0)) * larger,
+        clipped_block_s=(block_s + CROWDING * max(clipped_s - block_s, 0)) * larger,
         rest_s_per_mp=REST_BLOCKS_PER_MP * block_s * (REFERENCE_BLOCK_PX / side) ** 2,
         threads=threads,
     )
@@ -106,19 +106,19 @@ def _block_seconds(settings: Wiener, block_px: int, *, clipped: bool) -> float:
         unknown = np.zeros((1, block_px, block_px), dtype=np.bool_)
         unknown[0, block_px // 2] = True
     know = place_knowledge(settings)
-    known = None if know is None else know(otf, 0.0)
+    knowledge = None if know is None else know(otf, 0.0)
 
     def block() -> object:
         tapered = taper_edges(samples, otf, ring)
-        return restore(Block(samples=tapered, otf=otf, unknown=unknown, known=known))
+        return restore(Block(samples=tapered, otf=otf, unknown=unknown, knowledge=knowledge))
 
     return _best(block)
 
 
 def _best(call: Callable[[], object]) -> float:
-    taken = []
+    seconds = []
     for _ in range(ROUNDS):
         began = time.perf_counter()
         call()
-        taken.append(time.perf_counter() - began)
-    return max(min(taken), 1e-6)
+        seconds.append(time.perf_counter() - began)
+    return max(min(seconds), 1e-6)

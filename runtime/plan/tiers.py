@@ -105,10 +105,10 @@ def choose_tiers(
     unit = everything / max(allowed, 1e-30)
     for weight in unit * np.logspace(3, -3, _WEIGHTS):
         labels = _settle(costs + weight * bounded + forbidden, borders)
-        spent = float(np.take_along_axis(bounded, labels[None], axis=0).sum())
-        made = total_work(labels, costs, borders)
-        if spent <= allowed and made <= least:
-            best, least = labels, made
+        loss = float(np.take_along_axis(bounded, labels[None], axis=0).sum())
+        amount = total_work(labels, costs, borders)
+        if loss <= allowed and amount <= least:
+            best, least = labels, amount
     return None if best is None else best.astype(np.int8)
 
 
@@ -142,21 +142,21 @@ def _settle(unary: FloatGrid, borders: FloatGrid) -> NDArray[np.intp]:
     rows, columns = np.indices(labels.shape)
     parity = (rows + columns) % 2
     for _ in range(_SWEEPS):
-        before = labels.copy()
+        old_labels = labels.copy()
         for turn in (0, 1):
             energy = unary + _pull(labels, borders)
             labels = np.where(parity == turn, energy.argmin(axis=0), labels)
-        if (labels == before).all():
+        if (labels == old_labels).all():
             break
     return np.asarray(labels)
 
 
 def _pull(labels: NDArray[np.intp], borders: FloatGrid) -> FloatGrid:
     """Return (tier, row, column): work of the borders that a tier would have to its neighbours."""
-    to = borders[:, labels]
-    pull = np.zeros_like(to)
-    pull[:, 1:] += to[:, :-1]
-    pull[:, :-1] += to[:, 1:]
-    pull[:, :, 1:] += to[:, :, :-1]
-    pull[:, :, :-1] += to[:, :, 1:]
+    neighbour_work = borders[:, labels]
+    pull = np.zeros_like(neighbour_work)
+    pull[:, 1:] += neighbour_work[:, :-1]
+    pull[:, :-1] += neighbour_work[:, 1:]
+    pull[:, :, 1:] += neighbour_work[:, :, :-1]
+    pull[:, :, :-1] += neighbour_work[:, :, 1:]
     return pull

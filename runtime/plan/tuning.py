@@ -34,14 +34,14 @@ def stage_tuning(stages: Sequence[Stage], method: str) -> Tuning | None:
     A stage whose module defines `tuning(entry, method)` says it itself; of any other the numbers
     that the bundle states for it are told.
     """
-    found = [stage for stage in stages if method in module_of(stage).METHODS]
-    if not found:
+    restoring = [stage for stage in stages if method in module_of(stage).METHODS]
+    if not restoring:
         return None
-    stage = found[-1]
-    own = getattr(module_of(stage), "tuning", None)
-    if own is not None:
-        told: Tuning = own(stage, method)
-        return told
+    stage = restoring[-1]
+    tuning_of = getattr(module_of(stage), "tuning", None)
+    if tuning_of is not None:
+        tuning: Tuning = tuning_of(stage, method)
+        return tuning
     values = stated_numbers(stage)
     if not values:
         return Tuning(source=f"stage {stage.type} states no parameter; its constants are camkit's")

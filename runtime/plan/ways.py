@@ -68,8 +68,8 @@ def without_networks(manifest: Manifest, work: Work) -> Work | None:
     """Return the work by the best method that runs no network; None if they cannot be left out."""
     stages = manifest.stages
     methods = offered_methods(stages, manifest.all_planes)
-    tried = (planned(stages, replace(work, method=method)) for method in methods)
-    return next((other for other in tried if not other.networks), None)
+    works = (planned(stages, replace(work, method=method)) for method in methods)
+    return next((other for other in works if not other.networks), None)
 
 
 def offered_methods(stages: Sequence[StageEntry], planes: Mapping[str, Plane]) -> tuple[str, ...]:
@@ -100,9 +100,9 @@ def _last_with(stages: Sequence[StageEntry], method: str) -> int:
     """Return the number of the last stage that has a method; -1 where nothing is restored."""
     if method == DEVELOP:
         return -1
-    found = [n for n, stage in enumerate(stages) if method in module_of(stage).METHODS]
-    if found:
-        return found[-1]
+    numbers = [n for n, stage in enumerate(stages) if method in module_of(stage).METHODS]
+    if numbers:
+        return numbers[-1]
     if not methods_of(stages):
         return -1
     raise ContractError(
@@ -152,9 +152,9 @@ def stand_in(stage: StageEntry, planes: Mapping[str, Plane]) -> str:
 
 def known_stand_in(stage: StageEntry, planes: Mapping[str, Plane]) -> str | None:
     """Return the plane that replaces the output of a stage; None if there is none."""
-    given = planes[stage.gives[0]]
+    output = planes[stage.gives[0]]
     if len(stage.gives) == 1:
         for name in reversed(stage.takes):
-            if planes[name].stands_for(given):
+            if planes[name].stands_for(output):
                 return name
     return None

@@ -85,7 +85,7 @@ def check_bundle(
     *,
     run: GoldenRun | None = None,
     threads: int = 1,
-    without: Collection[str] = (),
+    left_out: Collection[str] = (),
 ) -> CheckReport:
     """Check a bundle.
 
@@ -95,14 +95,14 @@ def check_bundle(
             graph).
         run: The pipeline, for the golden cases; without it networks are proved on noise alone.
         threads: Threads per run of a network.
-        without: Layers that are left out of "all".
+        left_out: Layers that are left out of "all".
 
     Raises:
         ContractError: If the level is unknown.
     """
     if level not in ("all", *LAYERS):
         raise ContractError(f"level must be all or one of {', '.join(LAYERS)}; got {level!r}")
-    wanted = LAYERS if level == "all" else _needed(level)
+    selected = LAYERS if level == "all" else _layers_to(level)
     proofs: dict[str, Callable[[Bundle], Result]] = {
         "hash": _prove_hashes,
         "graph": _prove_graphs,
@@ -113,7 +113,7 @@ def check_bundle(
     }
     layers = [_layer("schema", lambda: (True, _describe(Path(path))))]
     opened: list[Bundle] = []
-    names = [name for name in wanted[1:] if name not in without]
+    names = [name for name in selected[1:] if name not in left_out]
     with working(f"checking {Path(path).name}", len(names), is_even=False) as task:
         for number, name in enumerate(names):
             task.count(number)
@@ -126,9 +126,9 @@ def check_bundle(
     return CheckReport(path=Path(path), layers=tuple(layers))
 
 
-def _needed(level: str) -> tuple[str, ...]:
-    below = _GROUND[: _GROUND.index(level)] if level in _GROUND else _GROUND
-    return (*below, level)
+def _layers_to(level: str) -> tuple[str, ...]:
+    ground = _GROUND[: _GROUND.index(level)] if level in _GROUND else _GROUND
+    return (*ground, level)
 
 
 def _prove(proof: Callable[[Bundle], Result], path: Path, opened: list[Bundle]) -> Result:
@@ -166,10 +166,10 @@ def _describe(path: Path) -> str:
 
 
 def _prove_hashes(bundle: Bundle) -> tuple[bool, str]:
-    found = f"{len(bundle.names)} members as stated; bundle sha256 {bundle.sha256[:16]}"
+    text = f"{len(bundle.names)} members as stated; bundle sha256 {bundle.sha256[:16]}"
     if PSF in bundle.names:
-        found += f"; objects at {', '.join(map(depth_name, bundle.psf.depths_mm))}"
-    return True, found
+        text += f"; objects at {', '.join(map(depth_name, bundle.psf.depths_mm))}"
+    return True, text
 
 
 def _prove_graphs(bundle: Bundle) -> tuple[bool, str]:
@@ -185,20 +185,22 @@ def _prove_graphs(bundle: Bundle) -> tuple[bool, str]:
 
 
 def _prove_graph(bundle: Bundle, which: tuple[str, str], facts: NetworkFacts) -> str:
-    found = check_graph(bundle.network_bytes(*which), facts)
+    graph = check_graph(bundle.network_bytes(*which), facts)
     costs = {
-        "mac_per_pixel": (found.mac_per_pixel, facts.mac_per_pixel),
-        "parameters": (float(found.parameters), float(facts.parameters)),
+        "mac_per_pixel": (graph.mac_per_pixel, facts.mac_per_pixel),
+        "parameters": (float(graph.parameters), float(facts.parameters)),
     }
-    for name, (got, said) in costs.items():
-        if abs(got - said) > COST_RTOL * said:
-            raise ContractError(f"{facts.member}: {name} is {got:g}, the manifest says {said:g}")
+    for name, (got, expected) in costs.items():
+        if abs(got - expected) > COST_RTOL * expected:
+            raise ContractError(
+                f"{facts.member}: {name} is {got:g}, the manifest says {expected:g}"
+            )
     if facts.fp16_member is not None:
         check_graph(bundle.network_bytes(*which, fp16=True), facts)
     text = (
-        f"halo {found.receptive_field_radius_px} px, stride {found.stride_px}, "
-        f"{found.mac_per_pixel / 1000:.3g} kMAC/px"
+        f"halo {graph.receptive_field_radius_px} px, stride {graph.stride_px}, "
+        f"{graph.mac_per_pixel / 1000:.3g} kMAC/px"
     )
-    if found.unblocked_convolutions:
-        text += f", off the blocked path: {', '.join(found.unblocked_convolutions)}"
+    if graph.unblocked_convolutions:
+        text += f", off the blocked path: {', '.join(graph.unblocked_convolutions)}"
     return text

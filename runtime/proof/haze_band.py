@@ -35,17 +35,17 @@ def prove_haze(bundle: Bundle) -> str | None:
         raise BundleError(
             f"{HAZE_GOLDEN} has cells {case.cells.shape}, the sensor {_shape(bundle)}"
         )
-    band = _found(bundle, case.cells)
+    band = _solve(bundle, case.cells)
     worst = 0.0
     for name, got in (("picture", band.picture), ("gain", band.gain)):
         stored = getattr(case, name)
-        off = float(np.abs(got - stored).max()) / max(1.0, float(np.abs(stored).max()))
-        if not off <= ALLOWED:
+        error = float(np.abs(got - stored).max()) / max(1.0, float(np.abs(stored).max()))
+        if not error <= ALLOWED:
             raise ParityError(
-                f"the haze: {name} differs from the stored one by {off:.3g}, allowed is "
+                f"the haze: {name} differs from the stored one by {error:.3g}, allowed is "
                 f"{ALLOWED:g}; the bundle or a library under it changed"
             )
-        worst = max(worst, off)
+        worst = max(worst, error)
     return f"the haze of {case.cells.shape[2]} x {case.cells.shape[1]} cells, off by {worst:.2g}"
 
 
@@ -58,9 +58,9 @@ def make_haze_golden(bundle: Bundle, scene: str) -> HazeGolden:
     """
     channels, height, width = _shape(bundle)
     colours = named_scene(scene, height, width)
-    made = np.stack([colours[channel % len(colours)] for channel in range(channels)])
-    cells = np.clip(made, 0, 1).astype(np.float16).astype(np.float32)
-    band = _found(bundle, cells)
+    planes = np.stack([colours[channel % len(colours)] for channel in range(channels)])
+    cells = np.clip(planes, 0, 1).astype(np.float16).astype(np.float32)
+    band = _solve(bundle, cells)
     return HazeGolden(cells=cells, picture=band.picture, gain=band.gain)
 
 
@@ -91,7 +91,7 @@ def _shape(bundle: Bundle) -> tuple[int, int, int]:
     return channels, cell_count(height, cell_px), cell_count(width, cell_px)
 
 
-def _found(bundle: Bundle, cells: FloatArray) -> CoarseBand:
+def _solve(bundle: Bundle, cells: FloatArray) -> CoarseBand:
     stage, sensor = _stage(bundle), bundle.manifest.light_sensor
     kernels = hazy_kernels(bundle.psf, bundle.haze, *sensor.response_arrays())
     clipped = np.zeros(cells.shape, np.bool_)

@@ -58,9 +58,9 @@ def prove_golden(bundle: Bundle, *, run: GoldenRun | None) -> Result:
         ParityError: If a result is further from the stored one than its case allows.
     """
     coarse = prove_haze(bundle) if bundle.manifest.has_haze else None
-    shown, what = _prove_cases(bundle, run)
+    is_proved, what = _prove_cases(bundle, run)
     if coarse is None:
-        return shown, what
+        return is_proved, what
     return True, f"{coarse}; {what}"
 
 
@@ -198,19 +198,19 @@ def _layouts(facts: NetworkFacts) -> Iterator[tuple[TileLayout, TileLayout]]:
         yield tiled, lay_windows(*size, limits)
 
 
-def _admit_tiling(found: GraphFacts, facts: NetworkFacts, what: str) -> None:
+def _admit_tiling(graph: GraphFacts, facts: NetworkFacts, what: str) -> None:
     """Refuse a proof of tiling that would take too much."""
     ends = 4 * (facts.input_channels + 4 * facts.output_channels * facts.output_scale**2)
     probe_px = _probe_px(facts) ** 2
     pictures = [math.prod(_picture_px(facts, tile)) for tile in _tiles_px(facts.stride_px)]
     proof = f"proving that size {what} of the network is tiled exactly"
-    held = max(found.bytes_per_pixel, found.block_bytes_per_pixel) + ends
-    PROOF_MB.check(max(*pictures, probe_px) * held / 1e6, proof)
+    pixel_bytes = max(graph.bytes_per_pixel, graph.block_bytes_per_pixel) + ends
+    PROOF_MB.check(max(*pictures, probe_px) * pixel_bytes / 1e6, proof)
     runs_px = probe_runs(facts.stride_px) * probe_px
     for tiled, whole in _layouts(facts):
         area = tiled.height_px * tiled.width_px
         runs_px += _SAMPLES * round(area * (tiled.work_ratio + whole.work_ratio))
-    PROOF_WORK.check(runs_px * (found.work_per_pixel + 1), proof)
+    PROOF_WORK.check(runs_px * (graph.work_per_pixel + 1), proof)
 
 
 def _prove_equal(engine: NetworkEngine, facts: NetworkFacts, sample: FloatArray, what: str) -> int:
@@ -259,20 +259,20 @@ def prove_range(bundle: Bundle, *, run: GoldenRun | None) -> Result:
         graph = inspect_graph(bundle.network_bytes(role, size))
         area = max(math.prod(window.shape[2:]) for window in windows)
         PROOF_MB.check(4e-6 * area * graph.values_per_pixel, f"measuring the range of size {what}")
-        found = node_activations(bundle.network_bytes(role, size), windows)
-        largest = max(found.values())
+        activations = node_activations(bundle.network_bytes(role, size), windows)
+        largest = max(activations.values())
         if not math.isfinite(largest):
             raise ParityError(f"size {what}: activations are not finite")
-        known = run is not None and bundle.manifest.golden
-        if known and largest > facts.max_activation * (1 + _RANGE_RTOL):
+        is_comparable = run is not None and bundle.manifest.golden
+        if is_comparable and largest > facts.max_activation * (1 + _RANGE_RTOL):
             raise ParityError(
                 f"size {what}: activations reach {largest:.4g} on the golden cases, the manifest "
                 f"says {facts.max_activation:.4g}; export the bundle again"
             )
-        stated = facts.node_activation | {"stated": facts.max_activation}
-        if facts.fp16_safe and not fits_fp16(found | stated, headroom=facts.fp16_headroom):
+        limits = facts.node_activation | {"stated": facts.max_activation}
+        if facts.fp16_safe and not fits_fp16(activations | limits, headroom=facts.fp16_headroom):
             raise ParityError(
-                f"size {what}: fp16 is claimed, but {max(largest, *stated.values()):.4g} x "
+                f"size {what}: fp16 is claimed, but {max(largest, *limits.values()):.4g} x "
                 f"{facts.fp16_headroom:g} is not below {FP16_LIMIT:g}"
             )
         safe = "fp16 safe" if facts.fp16_safe else "fp32 only"
@@ -301,11 +301,11 @@ def _windows(bundle: Bundle, role: str, size: str, run: GoldenRun | None) -> lis
     facts = bundle.network_facts(role, size)
     if run is not None and bundle.manifest.golden:
         arrays = _golden(bundle)
-        given = [
+        inputs = [
             run(bundle, case, arrays[case.name], size).network_input(role)
             for case in bundle.manifest.golden
         ]
-        return [np.ascontiguousarray(_whole_cells(planes, facts.stride_px)) for planes in given]
+        return [np.ascontiguousarray(_whole_cells(planes, facts.stride_px)) for planes in inputs]
     return [_noise(facts)]
 
 

@@ -39,9 +39,9 @@ def prove_one_window(bundle: Bundle, role: str, size: str) -> str:
     pixels = f"{sensor.extent.width_px}x{sensor.extent.height_px} px of the sensor"
     pipeline = Pipeline(bundle, Options(size=size, threads=1))
     grey = _grey(sensor, (sensor.extent.height_px, sensor.extent.width_px))
-    given = pipeline.capture_of(grey, iso=sensor.noise[0].iso, white_balance=None, origin_px=None)
+    capture = pipeline.capture_of(grey, iso=sensor.noise[0].iso, white_balance=None, origin_px=None)
     try:
-        pipeline.start(given)
+        pipeline.start(capture)
     except ContractError as error:
         raise ParityError(
             f"size {size}: {cannot}, and the {pixels} do not fit in one window: {error}; or export "

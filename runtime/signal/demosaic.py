@@ -171,20 +171,20 @@ def _malvar(mosaic: FloatArray, cfa: CfaPattern) -> FloatArray:
     planes = np.empty((3, *mosaic.shape), dtype=np.float32)
     cells = cfa_channels(cfa)
     for dy, row in enumerate(cells):
-        for dx, own in enumerate(row):
+        for dx, channel in enumerate(row):
             at = (slice(dy, None, 2), slice(dx, None, 2))
-            for wanted in range(3):
-                name = _kernel_name(own, wanted, row)
-                planes[wanted][at] = (mosaic if name is None else filtered[name])[at]
+            for target in range(3):
+                name = _kernel_name(channel, target, row)
+                planes[target][at] = (mosaic if name is None else filtered[name])[at]
     return planes
 
 
-def _kernel_name(own: int, wanted: int, row: tuple[int, int]) -> str | None:
-    """Return the name of the kernel for a pixel of colour `own` in a row of the colours `row`."""
-    if own == wanted:
+def _kernel_name(channel: int, target: int, row: tuple[int, int]) -> str | None:
+    """Return the name of the kernel of a pixel of colour `channel` in a row of colours `row`."""
+    if channel == target:
         return None
-    if wanted == 1:
+    if target == 1:
         return "green"
-    if own == 1:
-        return "along_row" if wanted in row else "along_column"
+    if channel == 1:
+        return "along_row" if target in row else "along_column"
     return "diagonal"

@@ -55,7 +55,7 @@ class _Colours(NamedTuple):
     blue: FloatArray
 
 
-class _Beside(NamedTuple):
+class _GreenPair(NamedTuple):
     """A value of the green pixels beside those of one colour: in their rows, in their columns."""
 
     in_row: FloatArray
@@ -74,12 +74,12 @@ def demosaic_tile(samples: FloatArray) -> FloatArray:
     """
     tile = _Lattices(*(samples[y::2, x::2].copy() for y in (0, 1) for x in (0, 1)))
     green, weight = _green_less_own(tile)
-    beside = [_sums_beside(plane) for plane in green]
-    less_blue = [_QUARTER * sums for sums in _red_less_blue(beside, weight)]
-    green = _Colours(*map(_mean_of_three, green, map(_along_edges, beside, weight)))
-    beside = [_sums_beside(plane) for plane in green]
-    less_blue = list(map(_mean_of_three, less_blue, _red_less_blue(beside, weight)))
-    return _planes(tile, green, beside, _Colours(*less_blue))
+    pairs = [_sums_beside(plane) for plane in green]
+    less_blue = [_QUARTER * sums for sums in _red_less_blue(pairs, weight)]
+    green = _Colours(*map(_mean_of_three, green, map(_along_edges, pairs, weight)))
+    pairs = [_sums_beside(plane) for plane in green]
+    less_blue = list(map(_mean_of_three, less_blue, _red_less_blue(pairs, weight)))
+    return _planes(tile, green, pairs, _Colours(*less_blue))
 
 
 def _green_less_own(tile: _Lattices) -> tuple[_Colours, _Colours]:
@@ -94,8 +94,8 @@ def _green_less_own(tile: _Lattices) -> tuple[_Colours, _Colours]:
     across = _changes_around(by_column, shapes, _COLUMN)
     along = _changes_around(by_row, shapes, _ROW)
     weight = _Colours(*map(_share, across, along))
-    beside = _Beside(red_row[0], red_column[0]), _Beside(blue_row[0], blue_column[0])
-    return _Colours(*(_QUARTER * sums for sums in map(_along_edges, beside, weight))), weight
+    pairs = _GreenPair(red_row[0], red_column[0]), _GreenPair(blue_row[0], blue_column[0])
+    return _Colours(*(_QUARTER * sums for sums in map(_along_edges, pairs, weight))), weight
 
 
 def _bends(green: FloatArray, other: FloatArray, axis: int) -> tuple[FloatArray, FloatArray]:
@@ -147,12 +147,12 @@ def _share(part: FloatArray, rest: FloatArray) -> FloatArray:
     return share
 
 
-def _sums_beside(plane: FloatArray) -> _Beside:
+def _sums_beside(plane: FloatArray) -> _GreenPair:
     """Return sums of the two neighbours of one colour at the green pixels beside it."""
-    return _Beside(_pairs(plane, _ROW), _pairs(plane, _COLUMN))
+    return _GreenPair(_pairs(plane, _ROW), _pairs(plane, _COLUMN))
 
 
-def _along_edges(green: _Beside, row_weight: FloatArray) -> FloatArray:
+def _along_edges(green: _GreenPair, row_weight: FloatArray) -> FloatArray:
     """Return sums of the two green neighbours of pixels, mixed by the weight of their rows."""
     by_row, by_column = _pairs(green.in_row, _ROW), _pairs(green.in_column, _COLUMN)
     planes = (by_row, by_column, row_weight)
@@ -164,46 +164,48 @@ def _along_edges(green: _Beside, row_weight: FloatArray) -> FloatArray:
     return mixed
 
 
-def _red_less_blue(beside: Sequence[_Beside], row_weight: _Colours) -> list[FloatArray]:
+def _red_less_blue(pairs: Sequence[_GreenPair], row_weight: _Colours) -> list[FloatArray]:
     """Return four times red less blue at red and at blue pixels, of green less each, doubled."""
-    red, blue = beside
+    red, blue = pairs
     at_red_rows = _difference(blue.in_column, red.in_row)
     at_blue_rows = _difference(blue.in_row, red.in_column)
     return [
-        _along_edges(_Beside(at_red_rows, at_blue_rows), row_weight.red),
-        _along_edges(_Beside(at_blue_rows, at_red_rows), row_weight.blue),
+        _along_edges(_GreenPair(at_red_rows, at_blue_rows), row_weight.red),
+        _along_edges(_GreenPair(at_blue_rows, at_red_rows), row_weight.blue),
     ]
 
 
-def _mean_of_three(own: FloatArray, neighbours: FloatArray) -> FloatArray:
+def _mean_of_three(differences: FloatArray, neighbours: FloatArray) -> FloatArray:
     """Return the mean of differences and of two neighbours each, of which the sum is doubled."""
     mean = _HALF * neighbours
-    mean += _inner(own, mean.shape)
+    mean += _inner(differences, mean.shape)
     mean *= _THIRD
     return mean
 
 
 def _planes(
-    tile: _Lattices, green: _Colours, beside: Sequence[_Beside], less_blue: _Colours
+    tile: _Lattices, green: _Colours, pairs: Sequence[_GreenPair], less_blue: _Colours
 ) -> FloatArray:
     """Return the colours (3, h, w) of samples and of the differences beside them."""
     height, width = (2 * side - 1 for side in less_blue.red.shape)
     planes = np.empty((3, height, width), np.float32)
     at = [np.s_[y::2, x::2] for y in (0, 1) for x in (0, 1)]
-    own = _Lattices(*(_inner(plane, planes[0][s].shape) for plane, s in zip(tile, at, strict=True)))
-    red, blue = beside
+    inner = _Lattices(
+        *(_inner(plane, planes[0][s].shape) for plane, s in zip(tile, at, strict=True))
+    )
+    red, blue = pairs
     for place, samples, of_red, of_blue in (
-        (at[1], own.green_of_red, red.in_row, blue.in_column),
-        (at[2], own.green_of_blue, red.in_column, blue.in_row),
+        (at[1], inner.green_of_red, red.in_row, blue.in_column),
+        (at[2], inner.green_of_blue, red.in_column, blue.in_row),
     ):
         planes[1][place] = samples
         for colour, twice in ((0, of_red), (2, of_blue)):
             planes[colour][place] = samples - _HALF * _inner(twice, samples.shape)
-    for place, samples, more in ((at[0], own.red, green.red), (at[3], own.blue, green.blue)):
+    for place, samples, more in ((at[0], inner.red, green.red), (at[3], inner.blue, green.blue)):
         planes[1][place] = samples + _inner(more, samples.shape)
-    planes[0][at[0]], planes[2][at[3]] = own.red, own.blue
-    planes[2][at[0]] = own.red - less_blue.red
-    planes[0][at[3]] = own.blue + _inner(less_blue.blue, own.blue.shape)
+    planes[0][at[0]], planes[2][at[3]] = inner.red, inner.blue
+    planes[2][at[0]] = inner.red - less_blue.red
+    planes[0][at[3]] = inner.blue + _inner(less_blue.blue, inner.blue.shape)
     return planes
 
 

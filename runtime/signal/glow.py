@@ -57,8 +57,8 @@ def glows(padded: FloatArray, rows: Places, cols: Places) -> NDArray[np.bool_]:
     def at(dy: int, dx: int) -> FloatArray:
         return np.asarray(padded[rows + MARGIN_PX + dy, cols + MARGIN_PX + dx])
 
-    beside = at(0, -1) + at(0, 1) - 0.5 * (at(-2, -1) + at(-2, 1) + at(2, -1) + at(2, 1))
-    above = at(-1, 0) + at(1, 0) - 0.5 * (at(-1, -2) + at(-1, 2) + at(1, -2) + at(1, 2))
+    row_rise = at(0, -1) + at(0, 1) - 0.5 * (at(-2, -1) + at(-2, 1) + at(2, -1) + at(2, 1))
+    column_rise = at(-1, 0) + at(1, 0) - 0.5 * (at(-1, -2) + at(-1, 2) + at(1, -2) + at(1, 2))
     same = np.median(neighbours(padded, rows, cols, 2), axis=0)
     excess = at(0, 0) - same
-    return np.asarray((beside + above) * np.sign(excess) > _GLOW_SHARE * np.abs(excess))
+    return np.asarray((row_rise + column_rise) * np.sign(excess) > _GLOW_SHARE * np.abs(excess))

@@ -109,9 +109,9 @@ def _repair(plane: FloatArray, step: int) -> tuple[FloatArray, BoolArray]:
     if not broken.any():
         return plane, broken
     rows, cols = places_of(broken)
-    around = neighbours(padded, rows, cols, step)
+    neighbour_values = neighbours(padded, rows, cols, step)
     repaired = plane.copy()
-    repaired[rows, cols] = _median(around)
+    repaired[rows, cols] = _median(neighbour_values)
     return repaired, broken
 
 
@@ -126,14 +126,14 @@ def _outliers(plane: FloatArray, padded: FloatArray, step: int) -> BoolArray:
     alone = np.empty(plane.shape, dtype=bool)
     for top in range(0, len(plane), _CACHED_ROWS):
         bottom = min(top + _CACHED_ROWS, len(plane))
-        alone[top:bottom] = _apart(plane[top:bottom], padded[top : bottom + 4], step)
+        alone[top:bottom] = _lone_samples(plane[top:bottom], padded[top : bottom + 4], step)
     if step == 2 and alone.any():
         rows, cols = places_of(alone)
         alone[rows, cols] = ~glows(padded, rows, cols)
     return alone
 
 
-def _apart(plane: FloatArray, padded: FloatArray, step: int) -> BoolArray:
+def _lone_samples(plane: FloatArray, padded: FloatArray, step: int) -> BoolArray:
     """Find samples that lie far outside all their neighbours."""
     high = _extreme(padded, step, np.maximum)
     low = _extreme(padded, step, np.minimum)
@@ -152,18 +152,18 @@ def _extreme(padded: FloatArray, step: int, choose: np.ufunc) -> FloatArray:
     inner = padded[2 - step : padded.shape[0] - 2 + step, :]
     centre = inner[:, 2:-2]
     right = inner.shape[1] - 2 + step
-    beside = choose(inner[:, 2 - step : right - 2 * step], inner[:, 2 + step : right])
-    row = choose(beside, centre)
+    pair = choose(inner[:, 2 - step : right - 2 * step], inner[:, 2 + step : right])
+    row = choose(pair, centre)
     result: FloatArray = choose(row[: -2 * step], row[2 * step :])
-    return np.asarray(choose(result, beside[step:-step], out=result))
+    return np.asarray(choose(result, pair[step:-step], out=result))
 
 
-def _median(around: FloatArray) -> FloatArray:
+def _median(neighbour_values: FloatArray) -> FloatArray:
     """Return the median of the valid ones of (8, n); 0 where none is."""
-    valid = np.isfinite(around)
+    valid = np.isfinite(neighbour_values)
     count = valid.sum(axis=0)
-    ordered = np.sort(np.where(valid, around, np.inf), axis=0)
-    pick = np.arange(around.shape[1])
+    ordered = np.sort(np.where(valid, neighbour_values, np.inf), axis=0)
+    pick = np.arange(neighbour_values.shape[1])
     low, high = ordered[np.maximum(count - 1, 0) // 2, pick], ordered[count // 2 % 8, pick]
     middle = np.where(
         count % 2 == 1, low, 0.5 * (np.where(count > 0, low, 0) + np.where(count > 0, high, 0))
@@ -222,8 +222,8 @@ def _block_statistics(plane: FloatArray) -> tuple[NDArray[np.float64], NDArray[n
     high, wide = ((n - 2) // _BLOCK * _BLOCK for n in plane.shape)
     if high <= 0 or wide <= 0:
         return np.zeros(0), np.zeros(0)
-    across = plane[:, :-2] - 2 * plane[:, 1:-1] + plane[:, 2:]
-    detail = across[:-2] - 2 * across[1:-1] + across[2:]
+    curved = plane[:, :-2] - 2 * plane[:, 1:-1] + plane[:, 2:]
+    detail = curved[:-2] - 2 * curved[1:-1] + curved[2:]
 
     def blocks(values: FloatArray) -> FloatArray:
         tiled = values[:high, :wide].reshape(high // _BLOCK, _BLOCK, wide // _BLOCK, _BLOCK)

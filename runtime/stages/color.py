@@ -40,8 +40,8 @@ def prepare(_entry: Color, job: Job) -> StageWork:
     assert job.color is not None  # it has looked
     color = job.color
 
-    def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
-        (light,) = taken
+    def run(streams: Sequence[Stream]) -> tuple[Stream, ...]:
+        (light,) = streams
         plane = light.plane.model_copy(update={"channels": RGB, "domain": "output"})
         shape = (len(RGB), *light.shape[1:])
         # a product of matrices may differ in its last bit with the rows that it gets

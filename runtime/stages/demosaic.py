@@ -34,8 +34,8 @@ def prepare(entry: Demosaic, job: Job) -> StageWork:
     method = job.options.demosaic or entry.method
     cfa = job.capture.cfa
 
-    def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
-        (mosaic,) = taken
+    def run(streams: Sequence[Stream]) -> tuple[Stream, ...]:
+        (mosaic,) = streams
         if mosaic.plane.channels != MOSAIC or cfa is None:
             return (mosaic,)
         rows = ColorRows(mosaic.rows(), cfa, method, threads=job.threads)

@@ -69,8 +69,8 @@ def check(entry: Dehaze, manifest: Manifest, _max_bytes: int) -> None:
 def prepare(entry: Dehaze, job: Job) -> StageWork:
     """Return the coarse picture of the haze."""
 
-    def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
-        picture = taken[0]
+    def run(streams: Sequence[Stream]) -> tuple[Stream, ...]:
+        picture = streams[0]
 
         @cache
         def band() -> CoarseBand:
@@ -107,11 +107,11 @@ def coarse_band(entry: Dehaze, picture: Stream, job: Job) -> CoarseBand:
         job: The capture; what lies before the stage is read once.
     """
     bundle = job.known_bundle
-    seen = cells_of(job, entry.takes, entry.shrink)
+    cells = cells_of(job, entry.takes, entry.shrink)
     with cancellable(job.cancel):
         return solve_coarse(
-            seen.means,
-            seen.clipped,
+            cells.means,
+            cells.clipped,
             _kernels(bundle, job.options.depth_mm, job.placement.kernel_scale),
             job.window_of(picture.plane),
             terms=entry.terms,
@@ -130,5 +130,5 @@ def _kernels(bundle: Bundle, depth_mm: float | None, scale: float) -> HazyKernel
 
 def _cleared(picture: Stream, band: Callable[[], CoarseBand], threads: int) -> Iterator[Rows]:
     """Yield the bands of a picture without its haze; finds it when the first is asked for."""
-    found = band()
-    yield from changed_bands(picture.bands(), found.clear, threads=threads)
+    coarse = band()
+    yield from changed_bands(picture.bands(), coarse.clear, threads=threads)

@@ -27,8 +27,8 @@ def is_left_out(options: Options) -> bool:
 def prepare(_entry: Illumination, job: Job) -> StageWork:
     """Prepare the gain; nothing is decided here."""
 
-    def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
-        (light,) = taken
+    def run(streams: Sequence[Stream]) -> tuple[Stream, ...]:
+        (light,) = streams
         gain = IlluminationGain(job.known_bundle.illumination, job.window_of(light.plane))
 
         def even(rows: FloatArray, top: int) -> None:

@@ -26,15 +26,15 @@ REST_SHARE: Final = 0.06
 def prepare(entry: Linearise, job: Job) -> StageWork:
     """Prepare the scaling; nothing is decided here."""
 
-    def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
-        (capture,) = taken
+    def run(streams: Sequence[Stream]) -> tuple[Stream, ...]:
+        (capture,) = streams
         light = LinearRows(job)
         mask = MaskRows(job.capture)
-        given = (
+        outputs = (
             _renamed(capture, light, "linear", "float32"),
             _renamed(capture, mask, "mask", "bool"),
         )
-        return given[: len(entry.gives)]
+        return outputs[: len(entry.gives)]
 
     return StageWork(run=run, held_bytes=BYTES_PER_COLUMN * job.capture.width)
 

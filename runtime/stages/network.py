@@ -23,7 +23,7 @@ from camkit.runtime.job.walker import USUAL_BYTES
 from camkit.runtime.machine.memory import trim_heap
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.guard import TileGuard, light_bound, plain_bound
-from camkit.runtime.network.light_bound import FAR, KeptRows
+from camkit.runtime.network.light_bound import LARGE_CHANGE, KeptRows
 from camkit.runtime.network.light_keeper import LightKeeper
 from camkit.runtime.network.tiling import Run
 from camkit.runtime.network.white_keeper import white_keeper
@@ -87,16 +87,16 @@ def prepare(entry: Network, job: Job) -> StageWork:
 def _compared(job: Job) -> Job:
     """Return the job that knows whether the capture lies too far outside the bundle's envelope."""
     bundle, options = job.known_bundle, job.options
-    asked = planned(bundle.manifest.stages, Work(method=options.method))
-    if bundle.manifest.envelope is None or not asked.networks:
+    plan = planned(bundle.manifest.stages, Work(method=options.method))
+    if bundle.manifest.envelope is None or not plan.networks:
         return job
     job = job.with_noise()
     with job.log.clock.stage("envelope"):
-        seen = observe(job.capture, job.noise)
-    found = findings(bundle.manifest.envelope, seen)
-    warning = verdict(found, bundle.manifest.name, options.on_unsafe)
+        conditions = observe(job.capture, job.noise)
+    outside = findings(bundle.manifest.envelope, conditions)
+    warning = verdict(outside, bundle.manifest.name, options.on_unsafe)
     falls_back = warning is not None and options.on_unsafe == "fallback"
-    job.log.record["envelope"] = {"seen": seen, "outside": found, "fallback": falls_back}
+    job.log.record["envelope"] = {"seen": conditions, "outside": outside, "fallback": falls_back}
     if warning is not None:
         job.log.notes.append(warning)
     return replace(job, falls_back=falls_back)
@@ -107,12 +107,12 @@ def seconds(entry: Network, subject: Subject, work: Work, speed: Speed) -> float
     return network_seconds(entry.role, role_window_mp(entry.role, subject, work), speed)
 
 
-def given_rows(entry: Network, job: Job, taken: Sequence[Stream]) -> RowSource:
+def given_rows(entry: Network, job: Job, streams: Sequence[Stream]) -> RowSource:
     """Return the rows that the network of a stage is given: its planes stacked and stabilised.
 
     Behind them come those that say where it is kept, if the stage takes a mask.
     """
-    planes, masks = _parted(taken)
+    planes, masks = _parted(streams)
     noises = None
     if entry.transform == "stabilise":
         noises = [_familiar_noise(job, stream) for stream in planes]
@@ -125,10 +125,10 @@ def given_rows(entry: Network, job: Job, taken: Sequence[Stream]) -> RowSource:
     )
 
 
-def _parted(taken: Sequence[Stream]) -> tuple[list[Stream], list[Stream]]:
+def _parted(streams: Sequence[Stream]) -> tuple[list[Stream], list[Stream]]:
     """Return the streams of the inputs of a network, and the masks behind them."""
-    planes = [stream for stream in taken if stream.plane.domain != "mask"]
-    return planes, [stream for stream in taken if stream.plane.domain == "mask"]
+    planes = [stream for stream in streams if stream.plane.domain != "mask"]
+    return planes, [stream for stream in streams if stream.plane.domain == "mask"]
 
 
 def _familiar_noise(job: Job, stream: Stream) -> NoiseModel:
@@ -178,8 +178,10 @@ class _NetworkStage:
             )
             for size, one, engine in zip(work.sizes(), facts, engines, strict=True)
         ]
-        taken = bundle.manifest.planes[entry.takes[0]]
-        self._windows = lay_network(job.grid_px(taken), networks, limits, work.network_labels())
+        input_plane = bundle.manifest.planes[entry.takes[0]]
+        self._windows = lay_network(
+            job.grid_px(input_plane), networks, limits, work.network_labels()
+        )
         log = job.log
         log.windows[entry.role] = self._windows
         log.notes.extend(self._windows.notes())
@@ -227,24 +229,24 @@ class _NetworkStage:
         keeper = self._keeper
         if keeper is None or not keeper.measured or keeper.large_fraction <= NOTED_FRACTION:
             return ()
-        moved = (
+        text = (
             f"in {keeper.large_fraction:.1%} of the picture the network and the filter differ in "
-            f"brightness by more than {FAR:.0%}"
+            f"brightness by more than {LARGE_CHANGE:.0%}"
         )
         if keeper.bound is not None:
-            moved += "; the brightness of the filter was kept there"
+            text += "; the brightness of the filter was kept there"
         else:
-            moved += f" ({option_text('laws', 'enforce')} keeps that of the filter)"
+            text += f" ({option_text('laws', 'enforce')} keeps that of the filter)"
         is_own = self._job.capture.bundle_name == self._job.known_bundle.manifest.name
-        return (f"{moved}. {_USUAL}{'' if is_own else _OTHER_CAUSES}",)
+        return (f"{text}. {_USUAL}{'' if is_own else _OTHER_CAUSES}",)
 
-    def run(self, taken: Sequence[Stream]) -> tuple[Stream, ...]:
+    def run(self, streams: Sequence[Stream]) -> tuple[Stream, ...]:
         """Return the outputs of the network."""
         if self._windows is None:
             raise ContractError("the windows of a network are planned before it runs")
         job, entry = self._job, self._entry
         facts = self._facts()
-        planes, masks = _parted(taken)
+        planes, masks = _parted(streams)
         stand_in = self._stand_in(planes)
         noise = self._noise(planes[-1], len(facts.outputs))
         self._keeper = self._light_keeper(stand_in, masked=bool(masks), noise=noise)
@@ -257,8 +259,8 @@ class _NetworkStage:
             else light_bound(entry.most_light, noise, scale=entry.scale),
         )
         bands = self._windows.bands(
-            given_rows(entry, job, taken),
-            progress=lambda done, total: job.log.meter.reach(entry.gives[0], done / total),
+            given_rows(entry, job, streams),
+            progress=lambda count, total: job.log.meter.reach(entry.gives[0], count / total),
             cancel=job.cancel,
             guard=self._guard,
             stand_in=stand_in,
@@ -297,7 +299,7 @@ class _NetworkStage:
             return None
         return LightKeeper(
             front=stand_in,
-            kept=self._facts().input_channels if masked else None,
+            kept_channel=self._facts().input_channels if masked else None,
             bound=entry.light,
             measured=measured,
             strength=options.strength,
@@ -332,15 +334,15 @@ class _NetworkStage:
 
         return changed_bands(bands, undo, threads=self._job.threads)
 
-    def _stand_in(self, taken: Sequence[Stream]) -> slice | None:
+    def _stand_in(self, streams: Sequence[Stream]) -> slice | None:
         """Return the channels of the input that stand for the output where it is not had."""
         planes = self._job.known_bundle.manifest.planes
         if len(self._entry.gives) != 1:
             return None
-        given = planes[self._entry.gives[0]]
-        ends = np.cumsum([stream.shape[0] for stream in taken])
-        for end, stream in zip(ends[::-1], reversed(taken), strict=True):
-            if stream.plane.stands_for(given):
+        output_plane = planes[self._entry.gives[0]]
+        ends = np.cumsum([stream.shape[0] for stream in streams])
+        for end, stream in zip(ends[::-1], reversed(streams), strict=True):
+            if stream.plane.stands_for(output_plane):
                 return slice(int(end) - stream.shape[0], int(end))
         return None
 
@@ -351,11 +353,11 @@ class _NetworkStage:
         entry, planes = self._entry, self._job.known_bundle.manifest.planes
         height, width = (side * self._scale() for side in last.shape[1:])
         shape = sum(channels), height, width
-        made = replace(last.with_bands(bands), shape=shape, noise_rise=None)
+        joined = replace(last.with_bands(bands), shape=shape, noise_rise=None)
         if len(channels) == 1:
-            return (replace(made, plane=planes[entry.gives[0]]),)
+            return (replace(joined, plane=planes[entry.gives[0]]),)
         starts = np.cumsum([0, *channels])
-        streams = made.shared(len(channels))
+        streams = joined.shared(len(channels))
         return tuple(
             replace(
                 stream,

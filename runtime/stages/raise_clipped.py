@@ -21,8 +21,8 @@ REST_SHARE: Final = 0.03
 def prepare(_entry: RaiseClipped, job: Job) -> StageWork:
     """Prepare the work; planes that come as such have no known level at which they clip."""
 
-    def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
-        (light,) = taken
+    def run(streams: Sequence[Stream]) -> tuple[Stream, ...]:
+        (light,) = streams
         if job.capture.cfa is None:
             return (light,)
         red, green, blue = light.gains

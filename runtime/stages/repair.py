@@ -37,22 +37,24 @@ Places = tuple[NDArray[np.intp], ...]
 
 def prepare(entry: Repair, job: Job) -> StageWork:
     """Prepare the repair; nothing is decided here."""
-    made: list[SoundRows] = []
+    repairs: list[SoundRows] = []
     mended = job.cache.setdefault(("repair", entry.takes), Mended())
 
-    def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
-        light, mask = taken[0], taken[1] if len(taken) > 1 else None
+    def run(streams: Sequence[Stream]) -> tuple[Stream, ...]:
+        light, mask = streams[0], streams[1] if len(streams) > 1 else None
         mosaic = job.capture.cfa is not None
         sound = SoundRows(light.rows(), mosaic=mosaic, threads=job.threads, mended=mended)
-        made.append(sound)
-        given = [light.with_source(sound)]
+        repairs.append(sound)
+        outputs = [light.with_source(sound)]
         if mask is not None:
-            given.append(replace(mask, source=UnknownRows(mask.rows(), sound), band_iterator=None))
-        return tuple(given[: len(entry.gives)])
+            outputs.append(
+                replace(mask, source=UnknownRows(mask.rows(), sound), band_iterator=None)
+            )
+        return tuple(outputs[: len(entry.gives)])
 
     def warnings() -> tuple[str, ...]:
         # every product walks anew, over the same samples
-        count = max((sound.repaired for sound in made), default=0)
+        count = max((sound.repaired for sound in repairs), default=0)
         return (f"{count} dead or invalid pixels were repaired",) if count else ()
 
     return StageWork(run=run, held_bytes=BYTES_PER_COLUMN * job.capture.width, warnings=warnings)
@@ -91,7 +93,7 @@ class Mended:
         if self._count > MOST_KEPT:
             self._span, self._places, self._values = (0, 0), [], []
 
-    def within(self, top: int, bottom: int) -> tuple[Places, FloatArray]:
+    def of_rows(self, top: int, bottom: int) -> tuple[Places, FloatArray]:
         """Return places and values in rows top..bottom, which it must hold."""
         if len(self._places) > 1:
             self._places = [_joined(self._places)]
@@ -135,7 +137,7 @@ class SoundRows:
     def places(self, top: int, bottom: int) -> Places:
         """Return the replaced samples of rows top..bottom."""
         if self._mended.hold(top, bottom):
-            return self._mended.within(top, bottom)[0]
+            return self._mended.of_rows(top, bottom)[0]
         return self._mend(top, bottom)[1]
 
     def _mend(self, top: int, bottom: int) -> tuple[Rows, Places]:
@@ -144,18 +146,18 @@ class SoundRows:
         light = self._source.read(above, below)
         if self._mended.hold(top, bottom):
             sound = light[:, top - above : bottom - above].copy()
-            places, values = self._mended.within(top, bottom)
+            places, values = self._mended.of_rows(top, bottom)
             sound[places[0], places[1] - top, places[2]] = values
             return sound, places
-        sound, places = self._sought(light, above, top, bottom)
+        sound, places = self._search(light, above, top, bottom)
         self._mended.add(top, bottom, places, sound[places[0], places[1] - top, places[2]])
         return sound, places
 
-    def _sought(self, light: Rows, above: int, top: int, bottom: int) -> tuple[Rows, Places]:
+    def _search(self, light: Rows, above: int, top: int, bottom: int) -> tuple[Rows, Places]:
         """Replace what is broken in rows top..bottom of light, whose first row is `above`."""
         margin, (channels, height, width) = REPAIR_MARGIN_PX, self.shape
         sound = np.empty((channels, bottom - top, width), dtype=np.float32)
-        found: dict[int, Places] = {}
+        broken_places: dict[int, Places] = {}
 
         def fill(first: int, last: int) -> None:
             begin = max(top + first - margin, 0) - above
@@ -169,10 +171,10 @@ class SoundRows:
                 part, mask = repair_planes(part)
             sound[:, first:last] = part[:, inside]
             channel, row, column = places_of(mask[:, inside])
-            found[first] = channel, row + top + first, column
+            broken_places[first] = channel, row + top + first, column
 
         run_slices(fill, bottom - top, threads=self._threads)
-        ordered = [found[first] for first in sorted(found)]
+        ordered = [broken_places[first] for first in sorted(broken_places)]
         return sound, _joined(ordered)
 
 

@@ -32,8 +32,8 @@ def is_left_out(options: Options) -> bool:
 def prepare(entry: Undistort, job: Job) -> StageWork:
     """Prepare the warp; nothing is decided here."""
 
-    def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
-        (light,) = taken
+    def run(streams: Sequence[Stream]) -> tuple[Stream, ...]:
+        (light,) = streams
         bands = undistort_bands(
             light.pieced(),
             job.known_bundle.distortion,

@@ -31,8 +31,8 @@ def prepare(_entry: WhiteBalance, job: Job) -> StageWork:
     """Make ready; nothing is decided here."""
     cfa, gains = job.capture.cfa, job.white_balance
 
-    def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
-        (light,) = taken
+    def run(streams: Sequence[Stream]) -> tuple[Stream, ...]:
+        (light,) = streams
         is_mosaic = light.shape[0] == 1
         rows = BalancedRows(
             light.rows(), gains, cfa if is_mosaic else None, owned=light.gives_own_rows
@@ -48,9 +48,9 @@ def seconds(_entry: WhiteBalance, subject: Subject, _work: Work, speed: Speed) -
 
 
 def _choose(job: Job) -> Gains:
-    chosen = job.options.white_balance or job.capture.white_balance
-    if chosen is not None:
-        return chosen
+    gains = job.options.white_balance or job.capture.white_balance
+    if gains is not None:
+        return gains
     if job.capture.cfa is None:
         return (1.0, 1.0, 1.0)
     sensor = None if job.bundle is None else job.bundle.manifest.sensor

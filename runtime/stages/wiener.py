@@ -118,24 +118,24 @@ def prepare(entry: Wiener, job: Job) -> StageWork:
     bundle, depth_mm = job.known_bundle, job.options.depth_mm
     depths_mm = bundle.psf.depths_mm
     if depths_mm.size > 1:
-        known = ", ".join(map(depth_name, depths_mm))
-        untold = ESTIMATED if entry.depth == ESTIMATED else f"mean of {known}"
-        job.log.record["depth"] = untold if depth_mm is None else depth_name(depth_mm)
+        distances = ", ".join(map(depth_name, depths_mm))
+        default = ESTIMATED if entry.depth == ESTIMATED else f"mean of {distances}"
+        job.log.record["depth"] = default if depth_mm is None else depth_name(depth_mm)
     if job.options.unit is not None and FOCUS in job.options.unit.facts:
         job.log.record[FOCUS] = job.options.focus_um
 
     def warnings() -> tuple[str, ...]:
-        found = job.cache.get(_nearness_key(entry))
-        return () if found is None else (found.describe(),)
+        nearness = job.cache.get(_nearness_key(entry))
+        return () if nearness is None else (nearness.describe(),)
 
-    def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
-        return (replace(taken[0].with_bands(_restored(entry, job, taken)), noise_rise=None),)
+    def run(streams: Sequence[Stream]) -> tuple[Stream, ...]:
+        return (replace(streams[0].with_bands(_restored(entry, job, streams)), noise_rise=None),)
 
     size_px = job.capture.width, job.capture.height
     block_px = cut_block_px(entry.block_px, entry.overlap_px, size_px)
     columns = len(lay_spans(job.capture.width, block_px, entry.overlap_px))
     threads = min(job.threads, columns)
-    held = max(
+    held_bytes = max(
         BYTES_PER_BLOCK_ROW * block_px * job.capture.width,
         block_bytes(block_px, len(bundle.manifest.sensor.channels), threads=threads),
     )
@@ -143,13 +143,13 @@ def prepare(entry: Wiener, job: Job) -> StageWork:
         fields, depths, _, *sides = bundle.psf.kernels.shape
         colours = len(bundle.manifest.sensor.channels)
         # those of all depths once more in cells are smaller than one
-        held += 4 * fields * colours * math.prod(sides) * (depths + KEPT_STEPS + 1)
-    return StageWork(run=run, held_bytes=held, warnings=warnings)
+        held_bytes += 4 * fields * colours * math.prod(sides) * (depths + KEPT_STEPS + 1)
+    return StageWork(run=run, held_bytes=held_bytes, warnings=warnings)
 
 
-def _restored(entry: Wiener, job: Job, taken: Sequence[Stream]) -> Iterator[Rows]:
+def _restored(entry: Wiener, job: Job, streams: Sequence[Stream]) -> Iterator[Rows]:
     """Yield the restored bands; makes the bank when the first is asked for."""
-    planes, mask = taken[0], taken[1] if len(taken) > 1 else None
+    planes, mask = streams[0], streams[1] if len(streams) > 1 else None
     bank = make_bank(entry, job, planes)
     unknown = None if mask is None else mask.rows().read
     yield from bank.restore_bands(planes.rows(), unknown, _plain(job), job.cancel)
@@ -188,14 +188,14 @@ def make_bank(entry: Wiener, job: Job, planes: Stream) -> BlockBank:
     if _finds_distance(entry, bundle, job.options):
         by_distance = _kernels_by_distance(*camera)
         scene = _scene_kernels(entry, job, planes, by_distance)
-        local = LocalPsf(kernels=by_distance.of(MEAN), window=window, choice=scene)
+        local = LocalPsf(kernels=by_distance.at_step(MEAN), window=window, choice=scene)
     else:
         local = LocalPsf(kernels=_kernels(bundle, job.options.depth_mm, *camera[1:]), window=window)
     method = job.work.method if job.work.method in METHODS else METHODS[0]
     noise = job.noise.with_gains(planes.gains)
     if entry.together is not None and method == METHODS[0]:
         # its numbers were fitted to noise of this sensor; with less it would trust its kernels more
-        least = sensor.noise_at(min(known.iso for known in sensor.noise))
+        least = sensor.noise_at(min(one.iso for one in sensor.noise))
         noise = noise.at_least(least.with_gains(planes.gains))
     if planes.noise_rise is not None:
         noise = noise.raised(planes.noise_rise())
@@ -235,19 +235,19 @@ def _scene_kernels(
 ) -> KernelsOfScene:
     """Compute the distance of every part of the capture, and return the kernels of it."""
     key = _nearness_key(entry)
-    if (found := job.cache.get(key)) is None:
-        seen = cells_of(job, entry.takes, CELL_PX)
-        found = job.cache[key] = find_nearness(
-            seen.means,
-            seen.clipped,
+    if (nearness := job.cache.get(key)) is None:
+        cells = cells_of(job, entry.takes, CELL_PX)
+        nearness = job.cache[key] = find_nearness(
+            cells.means,
+            cells.clipped,
             kernels,
             job.window_of(planes.plane),
             noise=job.noise.with_gains(planes.gains),
-            cfa=seen.cfa,
+            cfa=cells.cfa,
             threads=job.threads,
         )
-    job.log.sections["distance"] = found.to_json()
-    return kernels.over(found)
+    job.log.sections["distance"] = nearness.to_json()
+    return kernels.of_scene(nearness)
 
 
 def _nearness_key(entry: Wiener) -> tuple[str, tuple[str, ...]]:
@@ -287,8 +287,8 @@ def seconds(entry: Wiener, subject: Subject, work: Work, speed: Speed) -> float:
 
 def _search_seconds(subject: Subject, speed: Speed) -> float:
     """Return the seconds of finding the distance; the first capture pays for the kernels."""
-    kept = _kernels_by_distance.cache_info().currsize > 0
-    made_mp = 0.0 if kept else KERNELS_SHARE * subject.bundle.psf.kernels.size / 1e6
+    is_cached = _kernels_by_distance.cache_info().currsize > 0
+    made_mp = 0.0 if is_cached else KERNELS_SHARE * subject.bundle.psf.kernels.size / 1e6
     rest_mp = CELLS_SHARE * subject.megapixels + made_mp
     blocks = search_blocks((subject.height_px, subject.width_px))
     return rest_mp * speed.rest_s_per_mp + SEARCH_BLOCKS * blocks * speed.block_s / speed.threads
@@ -311,7 +311,7 @@ def _light_work(
     """Return (row, column): what clipped samples cost a block, 1 where all is explained."""
     rows, columns = spans
     block_px = rows[0].index.size
-    found = np.zeros((len(rows), len(columns)))
+    work = np.zeros((len(rows), len(columns)))
     for i, row in enumerate(rows):
         down = slice(row.index.min() // LIGHT_PX, row.index.max() // LIGHT_PX + 1)
         for j, column in enumerate(columns):
@@ -322,5 +322,5 @@ def _light_work(
                 share = light_share(
                     squares[:side, :side], block_px, kernel_px, entry, step_px=LIGHT_PX
                 )
-                found[i, j] = LIGHTS_AT_LEAST + (1 - LIGHTS_AT_LEAST) * min(share, 1.0)
-    return found
+                work[i, j] = LIGHTS_AT_LEAST + (1 - LIGHTS_AT_LEAST) * min(share, 1.0)
+    return work

@@ -81,11 +81,11 @@ def expose(light: Light, sensor: ColorSensor, setting: Setting) -> NDArray[np.ui
 
 def noise_of(sensor: ColorSensor, setting: Setting) -> NoiseModel:
     """Return the noise that a setting really makes."""
-    stated = sensor.noise_at(setting.iso)
+    noise = sensor.noise_at(setting.iso)
     power = setting.noise_factor**2
     return NoiseModel(
-        shot=tuple(shot * power for shot in stated.shot),
-        read_variance=tuple(read * power for read in stated.read_variance),
+        shot=tuple(shot * power for shot in noise.shot),
+        read_variance=tuple(read * power for read in noise.read_variance),
     )
 
 

@@ -77,18 +77,18 @@ def hazed(
     wide = cells[:, down[:, None], across]
     first = around_px // cell
     # whole cells from the first of the margin on, which may end beside the window's last
-    laid = window.resampled(cell, (columns, rows))
-    laid = SensorWindow(
+    cell_window = window.resampled(cell, (columns, rows))
+    cell_window = SensorWindow(
         size_px=(columns, rows),
-        origin_px=(laid.origin_px[0] - first, laid.origin_px[1] - first),
-        sensor_size_px=laid.sensor_size_px,
-        pitch_um=laid.pitch_um,
-        axis_px=laid.axis_px,
+        origin_px=(cell_window.origin_px[0] - first, cell_window.origin_px[1] - first),
+        sensor_size_px=cell_window.sensor_size_px,
+        pitch_um=cell_window.pitch_um,
+        axis_px=cell_window.axis_px,
     )
     spread = scatter_light(
         wide,
         lens.haze_at,
-        laid,
+        cell_window,
         margin_px=reach,
         step_px=max(BLOCK_PX // cell, 1),
         workers=workers,
@@ -99,18 +99,18 @@ def hazed(
 
 
 def mirrored_cells(
-    count: int, beyond: int, cell_px: int, scene_px: tuple[int, int]
+    count: int, margin: int, cell_px: int, scene_px: tuple[int, int]
 ) -> NDArray[np.intp]:
     """Return the index of each cell of a line that mirrors its scene at the border.
 
     Args:
         count: Cells of the line, which stand for themselves.
-        beyond: Cells to add at either end.
+        margin: Cells to add at either end.
         cell_px: Side of a cell.
         scene_px: First pixel of the scene on the line, and one past its last.
     """
     first, end = scene_px
-    cells = np.arange(-beyond, count + beyond)
+    cells = np.arange(-margin, count + margin)
     length = end - first
     place = ((cells + 0.5) * cell_px - first) % (2 * length)
     mirror = first + np.minimum(place, 2 * length - place)

@@ -129,8 +129,10 @@ def lens_of(
             depth or focus.
     """
     if depth_mm is None and psf.depths_mm.size > 1:
-        known = ", ".join(map(depth_name, psf.depths_mm))
-        raise ContractError(f"light comes from one depth: give one of those the PSF knows, {known}")
+        depths = ", ".join(map(depth_name, psf.depths_mm))
+        raise ContractError(
+            f"light comes from one depth: give one of those the PSF knows, {depths}"
+        )
     weights = sensor.response_arrays() if response is None else response
     if haze is not None:
         return _hazy_lens(psf, haze, weights, depth_mm)
@@ -177,13 +179,15 @@ def with_axis_moved(lens: Lens, x_mm: float, y_mm: float) -> Lens:
 def with_places(lens: Lens, place: PlaceChange) -> Lens:
     """Return a lens whose kernels at (x, y) mm are those that another has at `place(x, y)`."""
 
-    def moved(lookup: KernelLookup) -> KernelLookup:
+    def placed_lookup(lookup: KernelLookup) -> KernelLookup:
         return lambda x, y: lookup(*place(x, y))
 
     haze = lens.haze
     if haze is not None:
-        haze = replace(haze, haze_at=moved(haze.haze_at), share_at=moved(haze.share_at))
-    return replace(lens, kernels_at=moved(lens.kernels_at), haze=haze)
+        haze = replace(
+            haze, haze_at=placed_lookup(haze.haze_at), share_at=placed_lookup(haze.share_at)
+        )
+    return replace(lens, kernels_at=placed_lookup(lens.kernels_at), haze=haze)
 
 
 def camera_space(sensor: ColorSensor) -> tuple[NDArray[np.float64], Gains]:
@@ -215,34 +219,36 @@ def light_of(
         window: Place on the sensor, see `scene_window`.
         options: Exposure and which effects to apply.
     """
-    chosen = options or LightOptions()
+    settings = options or LightOptions()
     matrix, gains = camera_space(sensor)
-    matrix, margin = matrix * chosen.exposure, lens.margin_px
-    seen = shrunk(scene, chosen.scale)
+    matrix, margin = matrix * settings.exposure, lens.margin_px
+    pixels = shrunk(scene, settings.scale)
     if lens.haze is None:
-        extended = _on_sensor(seen, matrix, lens.psf, window, chosen, margin)
-        planes = _spread(extended, lens, window, chosen.workers)
+        extended = _on_sensor(pixels, matrix, lens.psf, window, settings, margin)
+        planes = _spread(extended, lens, window, settings.workers)
     else:
-        around = margin_px(lens.haze, max(margin, chosen.surround_px))
-        wide = _on_sensor(seen, matrix, lens.psf, window, chosen, around)
-        cut = slice(around - margin, margin - around or None)
+        haze_margin = margin_px(lens.haze, max(margin, settings.surround_px))
+        wide = _on_sensor(pixels, matrix, lens.psf, window, settings, haze_margin)
+        cut = slice(haze_margin - margin, margin - haze_margin or None)
         extended = np.ascontiguousarray(wide[:, cut, cut])
-        planes = _spread_hazy(wide, extended, lens, window, chosen)
+        planes = _spread_hazy(wide, extended, lens, window, settings)
     # The FFT leaves a black scene some 1e-8 below zero, which no photon counts can follow.
     np.maximum(planes, 0, out=planes)
     width, height = window.size_px
-    if chosen.scale == 1:
+    if settings.scale == 1:
         clean = extended[:, margin : margin + height, margin : margin + width].copy()
     else:
-        fine = window.resampled(1 / chosen.scale, (chosen.scale * width, chosen.scale * height))
-        ring = chosen.scale * chosen.surround_px
-        clean = _on_sensor(scene, matrix, lens.psf, fine, replace(chosen, surround_px=ring), 0)
+        fine = window.resampled(
+            1 / settings.scale, (settings.scale * width, settings.scale * height)
+        )
+        ring = settings.scale * settings.surround_px
+        clean = _on_sensor(scene, matrix, lens.psf, fine, replace(settings, surround_px=ring), 0)
     return Light(
         planes=planes,
         clean=clean,
         window=window,
         gains=lens.gains or gains,
-        vignetting=lens.psf if chosen.vignette else None,
+        vignetting=lens.psf if settings.vignette else None,
     )
 
 
@@ -270,8 +276,8 @@ def _spread_hazy(
     core, ones = scatter_light(
         extended, lit_core(lens), window, margin_px=lens.margin_px, workers=options.workers
     )
-    around, ring = (wide.shape[1] - window.size_px[1]) // 2, options.surround_px
-    veil, even = hazed(wide, haze, window, around_px=around, ring_px=ring, workers=options.workers)
+    margin, ring = (wide.shape[1] - window.size_px[1]) // 2, options.surround_px
+    veil, even = hazed(wide, haze, window, around_px=margin, ring_px=ring, workers=options.workers)
     core += veil
     core /= ones + even
     return core
@@ -367,12 +373,12 @@ def _on_sensor(
     The margin is the surround of the scene as far as that reaches, and mirrored beyond it.
     """
     ring = options.surround_px
-    beyond = max(margin_px - ring, 0)
+    mirror_px = max(margin_px - ring, 0)
     planes = _apply(matrix, scene)
     if options.distort:
-        planes = distort_array(planes, psf.distortion, window.widened(ring), margin_px=beyond)
+        planes = distort_array(planes, psf.distortion, window.widened(ring), margin_px=mirror_px)
     else:
-        pad = ((0, 0), (beyond, beyond), (beyond, beyond))
+        pad = ((0, 0), (mirror_px, mirror_px), (mirror_px, mirror_px))
         planes = np.pad(planes, pad, mode="reflect" if min(planes.shape[1:]) > 1 else "edge")
     if ring > margin_px:
         inner = slice(ring - margin_px, margin_px - ring)

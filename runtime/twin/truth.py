@@ -40,8 +40,8 @@ def picture_scale(manifest: Manifest) -> int:
             pixel.
     """
     if IMAGE not in manifest.products:
-        made = ", ".join(manifest.products)
-        raise UnsupportedError(f"bundle {manifest.name} makes {made}, and no product {IMAGE!r}")
+        names = ", ".join(manifest.products)
+        raise UnsupportedError(f"bundle {manifest.name} makes {names}, and no product {IMAGE!r}")
     ratio = manifest.planes[manifest.products[IMAGE]].grid.pitch_ratio
     scale = max(round(1 / ratio), 1)
     if scale * ratio != 1:

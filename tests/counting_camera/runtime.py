@@ -90,7 +90,7 @@ def know(job: Job) -> Job:
 
 def factor_of(options: Options) -> int:
     """Give what every count is multiplied by."""
-    weights = options.chosen("weights")
+    weights = options.kind_choice("weights")
     return 1 if weights is None else int(Path(weights).read_text(encoding="utf-8"))
 
 
@@ -122,7 +122,7 @@ def _told(path: Path, text: str) -> None:
 
 
 def _identity(options: Options, _: Path) -> Mapping[str, Any]:
-    weights = options.chosen("weights")
+    weights = options.kind_choice("weights")
     return {} if weights is None else {"weights": Path(weights).read_text(encoding="utf-8")}
 
 
@@ -135,7 +135,7 @@ PART: Final = RuntimePart(
     outputs=product_outputs(
         make,
         suffix=".npz",
-        beside=lambda _: (".txt",),
+        extra_suffixes=lambda _: (".txt",),
         formats={"tiff": ".tif"},
         identity=_identity,
     ),

@@ -15,7 +15,7 @@ OPTIONS: Final[tuple[str, ...]] = ()
 
 def prepare(_entry: Weigh, job: Job) -> StageWork:
     """Look at the weights."""
-    sign = -1 if job.options.chosen("sign") == "minus" else 1
+    sign = -1 if job.options.kind_choice("sign") == "minus" else 1
 
     def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
         (counts,) = taken

@@ -62,7 +62,7 @@ def test_what_is_stated_is_not_replaced() -> None:
     known = Metadata(make="Canon", iso=100.0)
     found = known.completed(make="Nikon", iso=None, f_number=4.0, model="\0")
     assert found == Metadata(make="Canon", iso=100.0, f_number=4.0)
-    assert found.stated() == {"make": "Canon", "iso": 100.0, "f_number": 4.0}
+    assert found.to_json() == {"make": "Canon", "iso": 100.0, "f_number": 4.0}
 
 
 def test_camera_does_not_repeat_its_maker() -> None:

@@ -53,7 +53,7 @@ def print_plans(
         facts: dict[str, Any] = {"input": str(task.source), "output": str(task.target)}
         try:
             facts |= _planned(task, pipelines, write, headerless)
-            if task.own:
+            if task.own_files:
                 facts["warnings"].append(OVERWRITES)
         except CamkitError as error:
             if bundle is not None and isinstance(error, BundleError):

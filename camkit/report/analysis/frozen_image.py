@@ -73,7 +73,7 @@ def frozen_images(
                 cell_px,
                 height_mm=float(height_mm),
                 angle_rad=angle_at(float(height_mm)),
-                illumination=float(kernels.between(psf.relative_illumination, *place)),
+                illumination=float(kernels.interpolate(psf.relative_illumination, *place)),
             )
         )
     return images

@@ -266,7 +266,7 @@ class Rig:
             if source not in shared:
                 shared[source] = self._shared(method.bundle, capture)
             try:
-                work = method.pipeline.start(capture, known=shared[source])
+                work = method.pipeline.start(capture, known_planes=shared[source])
                 kept = None if method.plane is None else work.keep(method.plane).rows()
                 pictures[method.name] = work.fill()
                 if kept is not None:
@@ -283,7 +283,7 @@ class Rig:
         if first is None or method is None:
             return known
         for plane in first.takes:
-            known[plane] = method.pipeline.start(capture, known=known).keep(plane)
+            known[plane] = method.pipeline.start(capture, known_planes=known).keep(plane)
         return known
 
 

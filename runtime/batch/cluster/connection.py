@@ -30,18 +30,18 @@ class NoAnswer(CamkitError):  # noqa: N818 - says what it is
     """No answer came in time."""
 
 
-def within(seconds: float, ask: Callable[[], T]) -> T:
+def answer_within(seconds: float, ask: Callable[[], T]) -> T:
     """Return the result of a call; a call that takes longer is abandoned.
 
     Raises:
         NoAnswer: If it does.
     """
-    found: list[T] = []
+    answers: list[T] = []
     trouble: list[BaseException] = []
 
     def run() -> None:
         try:
-            found.append(ask())
+            answers.append(ask())
         except BaseException as error:  # noqa: BLE001 - raised again by who waits
             trouble.append(error)
 
@@ -50,9 +50,9 @@ def within(seconds: float, ask: Callable[[], T]) -> T:
     thread.join(seconds)
     if trouble:
         raise trouble[0]
-    if not found:
+    if not answers:
         raise NoAnswer(f"no answer within {seconds:.0f} s")
-    return found[0]
+    return answers[0]
 
 
 @contextmanager
@@ -162,7 +162,7 @@ def _trouble(address: str, security: "Security") -> str | None:
     Asked before a client is made: one that finds no scheduler does not let go for many seconds.
     """
     try:
-        kind = within(ANSWER_S, lambda: asyncio.run(_kind(address, security)))
+        kind = answer_within(ANSWER_S, lambda: asyncio.run(_kind(address, security)))
     except (NoAnswer, TimeoutError):
         return f"no answer within {CONNECT_S:.0f} s"
     except TypeError as error:
@@ -198,7 +198,7 @@ def _one_line(error: Exception) -> str:
 def close_client(client: "Client") -> None:
     """Close a client; a scheduler that is gone is not waited for."""
     try:
-        within(ANSWER_S, lambda: client.close(timeout=2))
+        answer_within(ANSWER_S, lambda: client.close(timeout=2))
     except Exception:
         logger.debug("a client did not close", exc_info=True)
 

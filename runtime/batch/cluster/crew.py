@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any, Final
 
 from camkit.runtime.batch.cluster import remote
-from camkit.runtime.batch.cluster.connection import NoAnswer, within
+from camkit.runtime.batch.cluster.connection import NoAnswer, answer_within
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -56,7 +56,7 @@ class Crew:
         self._looked_s = float("-inf")
         self._took_s = 0.0
         self._silent_s: dict[str, float] = {}
-        self._told: set[tuple[str, str]] = set()
+        self._notices: set[tuple[str, str]] = set()
 
     @property
     def flag(self) -> str:
@@ -90,26 +90,30 @@ class Crew:
         began = time.monotonic()
         if not now and began - self._looked_s < max(LOOK_S, self._took_s / LOOK_SHARE):
             return False
-        told = within(REPLY_S, lambda: _workers(client))
+        workers = answer_within(REPLY_S, lambda: _workers(client))
         if not now:
             self._looked_s = time.monotonic()
             self._took_s = self._looked_s - began
         # a worker that is started again may have its address again, its folder is another one
-        found = {address: str(worker.get("local_directory")) for address, worker in told.items()}
-        for gone in [a for a in {**self.slots, **self.unfit} if found.get(a) != self._folders[a]]:
-            if self.slots.pop(gone, None) is not None:
+        folders = {
+            address: str(worker.get("local_directory")) for address, worker in workers.items()
+        }
+        for missing in [
+            a for a in {**self.slots, **self.unfit} if folders.get(a) != self._folders[a]
+        ]:
+            if self.slots.pop(missing, None) is not None:
                 self.has_losses = True
-                self._notice(f"worker {gone} is lost; its files are made again")
-            self.unfit.pop(gone, None)
-        for silent in [a for a, since in self._silent_s.items() if began - since > SILENT_S]:
+                self._notice(f"worker {missing} is lost; its files are made again")
+            self.unfit.pop(missing, None)
+        for silent in [a for a, start_s in self._silent_s.items() if began - start_s > SILENT_S]:
             del self._silent_s[silent]
             self.unfit.pop(silent, None)
-        self._folders = found
-        if new := [address for address in found if address not in {**self.slots, **self.unfit}]:
+        self._folders = folders
+        if new := [address for address in folders if address not in {**self.slots, **self.unfit}]:
             self._take_in(client, new)
         return True
 
-    def placed(self, client: "Client") -> dict[str, frozenset[str]]:
+    def tasks_by_worker(self, client: "Client") -> dict[str, frozenset[str]]:
         """Return the tasks that every worker has got, by its address.
 
         Raises:
@@ -117,37 +121,37 @@ class Crew:
             OSError: If it is lost.
         """
         began = time.monotonic()
-        found = within(REPLY_S, client.processing)
+        tasks = answer_within(REPLY_S, client.processing)
         self._took_s += time.monotonic() - began
-        return {address: frozenset(map(str, keys)) for address, keys in found.items()}
+        return {address: frozenset(map(str, keys)) for address, keys in tasks.items()}
 
     def _take_in(self, client: "Client", new: Sequence[str]) -> None:
         """Query new workers in turn; each question goes to those that are left."""
         from camkit import __version__
 
         # asked with what every worker has: it may hold no camkit to ask with
-        left = self._asked(client, new, importlib.metadata.version, "camkit")
-        left = self._keep(
-            left, lambda got: got == __version__, f"has camkit {{}}, not {__version__}"
+        workers = self._answers(client, new, importlib.metadata.version, "camkit")
+        workers = self._keep(
+            workers, lambda got: got == __version__, f"has camkit {{}}, not {__version__}"
         )
         here = platform.machine()
-        left = self._asked(client, left, platform.machine)
-        left = self._keep(
-            left, lambda got: got == here, f"is {{}}, this machine {here}: other bits"
+        workers = self._answers(client, workers, platform.machine)
+        workers = self._keep(
+            workers, lambda got: got == here, f"is {{}}, this machine {here}: other bits"
         )
-        looked = self._asked(client, left, remote.look, self._needs)
-        left = {address: lacks for address, (reason, lacks) in looked.items() if reason is None}
+        looked = self._answers(client, workers, remote.look, self._needs)
+        workers = {address: lacks for address, (reason, lacks) in looked.items() if reason is None}
         for address, (reason, _) in looked.items():
             if reason is not None:
                 self._leave_out(address, reason)
         for sha256, read in self._bundles.items():
-            lacking = [address for address, lacks in left.items() if sha256 in lacks]
-            got = self._asked(client, lacking, remote.take_bundle, sha256, read, seconds=TRAVEL_S)
+            lacking = [address for address, lacks in workers.items() if sha256 in lacks]
+            got = self._answers(client, lacking, remote.take_bundle, sha256, read, seconds=TRAVEL_S)
             for address in set(lacking) - set(got):
-                del left[address]
-        self.slots |= self._asked(client, left, remote.offer, self._needs)
+                del workers[address]
+        self.slots |= self._answers(client, workers, remote.offer, self._needs)
 
-    def _asked(
+    def _answers(
         self,
         client: "Client",
         workers: Sequence[str] | Mapping[str, Any],
@@ -160,30 +164,31 @@ class Crew:
             return {}
         ready = [arg() if callable(arg) else arg for arg in args]
 
-        def ask(asked: list[str]) -> dict[str, Any]:
+        def ask(addresses: list[str]) -> dict[str, Any]:
             try:
-                return within(
-                    seconds, lambda: client.run(function, *ready, workers=asked, on_error="return")
+                return answer_within(
+                    seconds,
+                    lambda: client.run(function, *ready, workers=addresses, on_error="return"),
                 )
             except NoAnswer:
                 return {}
 
-        asked = list(workers)
-        answers = ask(asked)
-        if not answers and len(asked) > 1:  # one that is silent keeps the answers of all
+        addresses = list(workers)
+        answers = ask(addresses)
+        if not answers and len(addresses) > 1:  # one that is silent keeps the answers of all
             with ThreadPoolExecutor(ASKED_AT_ONCE) as pool:
-                for answer in pool.map(lambda address: ask([address]), asked):
+                for answer in pool.map(lambda address: ask([address]), addresses):
                     answers |= answer
-        kept = {}
-        for address in asked:
+        results = {}
+        for address in addresses:
             if address not in answers:
                 self._silent_s[address] = time.monotonic()
                 self._leave_out(address, f"does not answer within {seconds:.0f} s")
             elif isinstance(answers[address], BaseException):
                 self._leave_out(address, _trouble(answers[address]))
             else:
-                kept[address] = answers[address]
-        return kept
+                results[address] = answers[address]
+        return results
 
     def _keep(
         self, answers: Mapping[str, Any], fits: Callable[[Any], bool], reason: str
@@ -195,14 +200,14 @@ class Crew:
 
     def _leave_out(self, address: str, reason: str) -> None:
         self.unfit[address] = reason
-        if (address, reason) not in self._told:
-            self._told.add((address, reason))
+        if (address, reason) not in self._notices:
+            self._notices.add((address, reason))
             self._notice(f"worker {address} is left out: {reason}")
 
     def dismiss(self, client: "Client") -> None:
         """End the run on all workers."""
         workers = list(self.slots)
-        within(
+        answer_within(
             REPLY_S,
             lambda: client.run(remote.forget, self._needs.run, workers=workers, on_error="ignore"),
         )
@@ -210,7 +215,7 @@ class Crew:
     def busy(self, client: "Client") -> int:
         """Return the number of files of the run that are in the making."""
         workers = list(self.slots)
-        answers = within(
+        answers = answer_within(
             REPLY_S,
             lambda: client.run(remote.busy, self._needs.run, workers=workers, on_error="ignore"),
         )
@@ -224,8 +229,8 @@ def _workers(client: "Client") -> dict[str, dict[str, Any]]:
     after itself meanwhile.
     """
     scheduler: Any = client.scheduler
-    told: dict[str, dict[str, Any]] = client.sync(scheduler.identity, n_workers=-1)["workers"]
-    return told
+    workers: dict[str, dict[str, Any]] = client.sync(scheduler.identity, n_workers=-1)["workers"]
+    return workers
 
 
 def _trouble(error: BaseException) -> str:

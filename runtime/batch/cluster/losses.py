@@ -23,7 +23,7 @@ class Losses:
         self._unplaced: set[str] = set()
 
     def follow(
-        self, placed: Mapping[str, frozenset[str]], under_way: Mapping[str, int]
+        self, tasks_by_worker: Mapping[str, frozenset[str]], under_way: Mapping[str, int]
     ) -> list[str]:
         """Update the places of files, and count their losses since the last time.
 
@@ -31,17 +31,17 @@ class Losses:
         is given later (`remote.offer`) makes it look no more. So a task may be left with nobody.
 
         Args:
-            placed: Address of a worker -> keys of the tasks that it has got.
+            tasks_by_worker: Address of a worker -> keys of the tasks that it has got.
             under_way: Key -> number of the file.
 
         Returns:
             Keys of tasks to take back: nobody has got them, or they want to be tried alone.
         """
-        at = {key: address for address, keys in placed.items() for key in keys}
+        at = {key: address for address, keys in tasks_by_worker.items() for key in keys}
         back = []
         for key, number in under_way.items():
             was = self._at.get(key)
-            its_worker_died = was is not None and was not in placed
+            its_worker_died = was is not None and was not in tasks_by_worker
             nobody_has_it = key not in at and key in self._unplaced
             died = its_worker_died or (nobody_has_it and was_claimed(self._tasks[number].target))
             self._counts[number] += died

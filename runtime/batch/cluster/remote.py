@@ -101,10 +101,10 @@ def look(needs: Needs, dask_worker: "Worker") -> tuple[str | None, tuple[str, ..
 
 
 def _unfit(needs: Needs, dask_worker: "Worker") -> str | None:
-    held, folder = _memory_bytes(dask_worker), needs.token.parent
-    if held < needs.file_bytes:
+    memory, folder = _memory_bytes(dask_worker), needs.token.parent
+    if memory < needs.file_bytes:
         return (
-            f"has {held // 10**6} MB for files, one may take {needs.file_bytes // 10**6} MB: "
+            f"has {memory // 10**6} MB for files, one may take {needs.file_bytes // 10**6} MB: "
             f"give it more or lower {option_text('max_mem_bytes')}"
         )
     if not needs.token.is_file():
@@ -136,9 +136,9 @@ async def offer(needs: Needs, dask_worker: "Worker") -> int:
     """Offer this worker to a run; return how many files it makes at once."""
     keep_freed_memory()
     memory = _memory_bytes(dask_worker)
-    wanted = {MEMORY: float(memory), needs.flag: 1e9}
-    if any(dask_worker.state.total_resources.get(k) != v for k, v in wanted.items()):
-        await dask_worker.set_resources(**wanted)
+    resources = {MEMORY: float(memory), needs.flag: 1e9}
+    if any(dask_worker.state.total_resources.get(k) != v for k, v in resources.items()):
+        await dask_worker.set_resources(**resources)
     return _slots(needs.file_bytes, dask_worker)
 
 
@@ -219,12 +219,12 @@ def _teller(worker: "Worker", topic: str, number: int) -> Callable[[Path, int, i
     """Return a progress that tells the caller, once a second."""
     last = 0.0
 
-    def tell(_: Path, done: int, total: int) -> None:
+    def tell(_: Path, count: int, total: int) -> None:
         nonlocal last
         now = time.monotonic()
-        if now - last >= _TICK_S or done >= total:
+        if now - last >= _TICK_S or count >= total:
             last = now
-            worker.log_event(topic, (number, done, total))
+            worker.log_event(topic, (number, count, total))
 
     return tell
 

@@ -104,10 +104,10 @@ def _token(folder: Path, run: str) -> Iterator[Path]:
     It is a claim, so that those of callers that were killed are told from those of callers at work.
     """
     folder = folder.absolute()
-    for left in folder.glob(f"{MARK}*{CLAIM_SUFFIX}"):
+    for mark in folder.glob(f"{MARK}*{CLAIM_SUFFIX}"):
         with contextlib.suppress(OSError):
-            if time.time() - left.stat().st_mtime > MARK_KEPT_S:
-                with claimed(left.with_suffix("")):
+            if time.time() - mark.stat().st_mtime > MARK_KEPT_S:
+                with claimed(mark.with_suffix("")):
                     pass  # removes it if its caller is no more
     path = folder / f"{MARK}{run}"
     with claimed(path):
@@ -127,7 +127,7 @@ class _Run:
         self._later: deque[tuple[float, int]] = deque()
         self._alone: deque[int] = deque()
         self._open: dict[Future[FileResult | None], int] = {}
-        self._done: queue.SimpleQueue[Future[FileResult | None]] = queue.SimpleQueue()
+        self._finished: queue.SimpleQueue[Future[FileResult | None]] = queue.SimpleQueue()
         self._losses = Losses(tasks)
         self._tries = [0] * len(tasks)
         self._lone: int | None = None
@@ -214,12 +214,12 @@ class _Run:
         Returns:
             SHA-256 -> gives the bytes.
         """
-        found: dict[str, Callable[[], bytes]] = {}
+        readers: dict[str, Callable[[], bytes]] = {}
         trouble: dict[str, str] = {}
         for number, task in enumerate(self._tasks):
             name = task.bundle
-            known = name in self._shas or name in trouble or name.lower() == NO_BUNDLE
-            if task.refusal is None and not known:
+            is_settled = name in self._shas or name in trouble or name.lower() == NO_BUNDLE
+            if task.refusal is None and not is_settled:
                 try:
                     path = find_bundle(name)
                     sha256 = open_bundle(path).sha256
@@ -227,10 +227,10 @@ class _Run:
                     trouble[name] = str(error)
                 else:
                     self._shas[name] = sha256
-                    found[sha256] = path.read_bytes
+                    readers[sha256] = path.read_bytes
             if task.refusal is None and name in trouble:
                 self._settle(number, FileResult.failure(task.source, name, trouble[name]))
-        return found
+        return readers
 
     # ------------------------------------------------------------------------------- files
 
@@ -277,17 +277,17 @@ class _Run:
             self._waiting.appendleft(number)
             raise
         self._open[future] = number
-        future.add_done_callback(self._done.put)
+        future.add_done_callback(self._finished.put)
 
     def _collect(self) -> None:
         """Collect finished files; wait a moment if there are none."""
         try:
-            ready = [self._done.get(timeout=POLL_S)]
+            ready = [self._finished.get(timeout=POLL_S)]
         except queue.Empty:
             return
         with contextlib.suppress(queue.Empty):
             while True:
-                ready.append(self._done.get_nowait())
+                ready.append(self._finished.get_nowait())
         for future in ready:
             number = self._open.pop(future, None)
             if number is not None:
@@ -301,7 +301,7 @@ class _Run:
             try:
                 result = future.result(timeout=STOP_S)
             except Exception:  # noqa: BLE001 - its worker went with the result: it is made or proved again
-                self._again(number)
+                self._requeue(number)
                 return
             self._idle_since = None
             if result is None:
@@ -314,11 +314,11 @@ class _Run:
             self._losses.add_all(number, was_alone=number == self._lone)
             self._send_again(number)
         elif error is None or isinstance(error, Cancelled):
-            self._again(number)
+            self._requeue(number)
         else:
             self._after_error(number, error)
 
-    def _again(self, number: int) -> None:
+    def _requeue(self, number: int) -> None:
         """Queue a file again that was lost for no reason of its own."""
         self._crew.has_losses = True
         self._claimed_s.pop(number, None)
@@ -327,8 +327,8 @@ class _Run:
     def _wait_for_claim(self, number: int) -> None:
         """Try a file again that another process makes: it may be a worker that was lost."""
         task, now = self._tasks[number], time.monotonic()
-        since = self._claimed_s.setdefault(number, now)
-        if now - since < (LEASE_S if self._crew.has_losses else CLAIMED_S):
+        start_s = self._claimed_s.setdefault(number, now)
+        if now - start_s < (LEASE_S if self._crew.has_losses else CLAIMED_S):
             self._later.append((now + RETRY_S, number))
         elif self._crew.has_losses:
             self._fail(
@@ -351,8 +351,8 @@ class _Run:
         task = self._tasks[number]
         with contextlib.suppress(OSError), claimed(task.target):
             pass  # sweeps up what workers that died have left
-        named = None if task.bundle.lower() == NO_BUNDLE else task.bundle
-        self._settle(number, FileResult.failure(task.source, named, error))
+        bundle = None if task.bundle.lower() == NO_BUNDLE else task.bundle
+        self._settle(number, FileResult.failure(task.source, bundle, error))
 
     def _as_asked(self, number: int, result: FileResult) -> FileResult:
         """Return a result under the names that the caller gave."""
@@ -361,8 +361,10 @@ class _Run:
         if bundle is not None and result.status == "failed":
             bundle = task.bundle
         output = None if result.output is None else task.target
-        beside = tuple(task.target.with_name(path.name) for path in result.beside)
-        result = replace(result, input=task.source, output=output, beside=beside, bundle=bundle)
+        extra_files = tuple(task.target.with_name(path.name) for path in result.beside)
+        result = replace(
+            result, input=task.source, output=output, beside=extra_files, bundle=bundle
+        )
         return self._told_late(result) if ELSEWHERE in result.warnings else result
 
     def _told_late(self, result: FileResult) -> FileResult:
@@ -394,7 +396,7 @@ class _Run:
         """Withdraw files that no worker has, or that should be tried alone."""
         pending = {str(f.key): f for f in self._open if f.status == "pending"}
         under_way = {key: self._open[future] for key, future in pending.items()}
-        for key in self._losses.follow(self._crew.placed(self._link.client), under_way):
+        for key in self._losses.follow(self._crew.tasks_by_worker(self._link.client), under_way):
             number = self._open.pop(pending[key])
             pending[key].release()
             self._send_again(number)
@@ -446,12 +448,12 @@ class _Run:
             self._idle_since = now
         elif now - self._idle_since > TELL_S and self._told_since != self._idle_since:
             self._told_since = self._idle_since
-            lost = "no worker of" if self._link.is_up else "the scheduler at"
-            self._wishes.notice(f"{lost} {self._link.address} answers; waiting for it")
+            subject = "no worker of" if self._link.is_up else "the scheduler at"
+            self._wishes.notice(f"{subject} {self._link.address} answers; waiting for it")
         if now - self._idle_since > WAIT_S:
-            left = len(self._waiting) + len(self._later) + len(self._alone) + len(self._open)
+            count = len(self._waiting) + len(self._later) + len(self._alone) + len(self._open)
             raise CamkitError(
-                f"neither scheduler nor workers came back within {WAIT_S:.0f} s; {left} file(s) "
+                f"neither scheduler nor workers came back within {WAIT_S:.0f} s; {count} file(s) "
                 f"are left: run again with {option_text('resume')}"
             )
 
@@ -466,7 +468,7 @@ class _Run:
     # ---------------------------------------------------------------------------- progress
 
     def _tell(self, event: tuple[float, Any]) -> None:
-        number, done, total = event[1]
+        number, count, total = event[1]
         progress = self._wishes.common.progress
         if progress is not None and self._results[number] is None:
-            progress(self._tasks[number].source, done, total)
+            progress(self._tasks[number].source, count, total)

@@ -37,61 +37,64 @@ class SeenPixels:
 
 
 def apply_tags(
-    picture: DngPicture, seen: SeenPixels, said: MosaicOptions, decoded: Levels | None = None
+    picture: DngPicture, pixels: SeenPixels, options: MosaicOptions, decoded: Levels | None = None
 ) -> tuple[NDArray[Any], Levels, list[str]]:
     """Return samples and levels as the tags of the DNG ask for, and notes.
 
     Args:
         picture: The sensor picture.
-        seen: Its decoded samples.
-        said: Levels that the caller says in place of the file's.
+        pixels: Its decoded samples.
+        options: Levels that the caller says in place of the file's.
         decoded: Levels where the decoder made other numbers of the samples; None for the tags'.
     """
     top, left, bottom, right = picture.active_area
-    height, width = seen.samples.shape[-2:]
-    offset = seen.first[0] - top, seen.first[1] - left
+    height, width = pixels.samples.shape[-2:]
+    offset = pixels.first[0] - top, pixels.first[1] - left
     if min(offset) < 0 or offset[0] + height > bottom - top or offset[1] + width > right - left:
         offset = 0, 0  # LibRaw shows another area, as it does for some cameras
-    repeated = seen.samples.ndim == 3 and picture.planes == 1
-    samples = seen.samples[:1] if repeated else seen.samples
-    black, notes = _black(picture, seen, said, decoded, offset)
+    repeated = pixels.samples.ndim == 3 and picture.planes == 1
+    samples = pixels.samples[:1] if repeated else pixels.samples
+    black, notes = _black(picture, pixels, options, decoded, offset)
     whites = white_levels(picture)
     if decoded is not None:
         whites = np.full(picture.planes, decoded.white, dtype=np.float32)
-    if said.white_level is not None:
-        whites = np.full_like(whites, said.white_level)
-    gains, asked = field_gains(picture)
-    correction = Correction(black=black, gains=gains, whites=whites, cfa=seen.cfa, offset=offset)
-    levels = Levels(black=black.mean(mosaic=seen.cfa is not None), white=float(whites.max()))
+    if options.white_level is not None:
+        whites = np.full_like(whites, options.white_level)
+    gains, gain_notes = field_gains(picture)
+    correction = Correction(black=black, gains=gains, whites=whites, cfa=pixels.cfa, offset=offset)
+    levels = Levels(black=black.mean(mosaic=pixels.cfa is not None), white=float(whites.max()))
     if correction and levels.black.max() < whites.min():
         samples, levels = correction.apply(samples)
     if repeated:
-        samples = np.broadcast_to(samples, seen.samples.shape)
+        samples = np.broadcast_to(samples, pixels.samples.shape)
         levels = replace(levels, black=np.repeat(levels.black, len(samples)))
-    return samples, levels, notes + asked
+    return samples, levels, notes + gain_notes
 
 
 def _black(
     picture: DngPicture,
-    seen: SeenPixels,
-    said: MosaicOptions,
+    pixels: SeenPixels,
+    options: MosaicOptions,
     decoded: Levels | None,
     offset: tuple[int, int],
 ) -> tuple[BlackMap, list[str]]:
     """Return black of every pixel: said, as the decoder has it, measured, or as the tags state."""
-    height, width = seen.samples.shape[-2:]
+    height, width = pixels.samples.shape[-2:]
     flat = BlackMap(
         pattern=np.zeros((1, 1, picture.planes)), columns=np.zeros(width), rows=np.zeros(height)
     )
-    if said.black_level is not None:
-        return replace(flat, pattern=flat.pattern + said.black_level), []
+    if options.black_level is not None:
+        return replace(flat, pattern=flat.pattern + options.black_level), []
     if decoded is not None:
         return replace(flat, pattern=_as_pattern(decoded.black, picture.planes)), []
     black, notes = black_map(picture, (height, width), offset)
     if not black.is_of_cells:
         return black, notes
-    stated, white = black.mean(mosaic=seen.cfa is not None), float(white_levels(picture).max())
-    measured, more = masked_black(picture, seen.whole, stated, white, seen.first)
+    mean_black, white = (
+        black.mean(mosaic=pixels.cfa is not None),
+        float(white_levels(picture).max()),
+    )
+    measured, more = masked_black(picture, pixels.whole, mean_black, white, pixels.first)
     return replace(black, pattern=_as_pattern(measured, picture.planes)), notes + more
 
 

@@ -74,8 +74,8 @@ class Correction:
         light = stored - self.black.of_rows(top, top + height, plane)
         base = self._base(cells, top, plane, (height, width))
         span = white - base
-        own = float(self.whites[min(plane, len(self.whites) - 1)])
-        light *= span / (own - base)
+        plane_white = float(self.whites[min(plane, len(self.whites) - 1)])
+        light *= span / (plane_white - base)
         gain = self._gain(top, plane, (height, width))
         lifted = light * gain
         if stored.dtype.kind != "f":

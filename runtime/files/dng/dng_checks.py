@@ -49,7 +49,7 @@ def check_dng(
     tags: TiffTags,
     cfa: CfaPattern | None,
     levels: Levels,
-    said: frozenset[str] = frozenset(),
+    overrides: frozenset[str] = frozenset(),
 ) -> None:
     """Compare a decode with the tags of its DNG; other files pass.
 
@@ -57,23 +57,23 @@ def check_dng(
         tags: The directories of the file.
         cfa: The pattern that LibRaw found; None for planes.
         levels: The levels that LibRaw found.
-        said: Which levels ("black", "white") the caller says, so that the file's do not matter.
+        overrides: Levels ("black", "white") that the caller states; the file's do not matter.
 
     Raises:
         DecodeError: If they contradict each other.
     """
     if not is_dng(tags):
         return
-    found = sensor_picture(tags)
-    if found is None:
+    sensor = sensor_picture(tags)
+    if sensor is None:
         raise DecodeError("the DNG holds no sensor picture (CFA or LinearRaw); header damaged?")
-    check_layout(found)
-    picture = found.directory
+    check_layout(sensor)
+    picture = sensor.directory
     if numbers_of(picture, _CFA_REPEAT) == (2, 2) and cfa is None:
         raise DecodeError("the DNG states a 2x2 CFA, LibRaw found none; its header is damaged")
-    if "black" not in said:
+    if "black" not in overrides:
         _check_black(picture, levels)
-    if "white" not in said:
+    if "white" not in overrides:
         _check_white(picture, levels)
 
 
@@ -88,25 +88,27 @@ def states_cells(tags: TiffTags) -> bool:
 def unapplied(picture: DngPicture) -> list[str]:
     """Return notes on tags that are left out where LibRaw demosaics a picture."""
     names = {DELTA_V: "BlackLevelDeltaV", DELTA_H: "BlackLevelDeltaH"} | LISTS
-    left = [name for tag, name in names.items() if tag in picture.directory]
-    return [f"not applied, since LibRaw demosaicked the file: {', '.join(left)}"] if left else []
+    ignored = [name for tag, name in names.items() if tag in picture.directory]
+    return (
+        [f"not applied, since LibRaw demosaicked the file: {', '.join(ignored)}"] if ignored else []
+    )
 
 
 def find_doubts(tags: TiffTags) -> list[str]:
     """Return the contradictions in the sensor picture of a DNG, and the parts without data."""
     directories = [d for d in sensor_directories(tags.directories) if numbers_of(d, _WIDTH)]
-    found = [
+    doubts = [
         "the header does not say where the pixels of the mosaic lie"
         for picture in directories
         if picture.get(_PHOTOMETRIC) == (CFA,) and not any(t in picture for _, t, *_ in _CHUNKS)
     ]
-    found += [_depth_doubt(picture) for picture in directories]
+    doubts += [_depth_doubt(picture) for picture in directories]
     if not is_dng(tags):
         directories = []
     for picture in directories:
-        found += [_chunk_doubt(picture), _area_doubt(picture), _curve_doubt(picture)]
-        found.append(_table_doubt(picture))
-    return [f"{doubt}: the header is damaged" for doubt in found if doubt]
+        doubts += [_chunk_doubt(picture), _area_doubt(picture), _curve_doubt(picture)]
+        doubts.append(_table_doubt(picture))
+    return [f"{doubt}: the header is damaged" for doubt in doubts if doubt]
 
 
 def _chunk_doubt(picture: Directory) -> str:
@@ -120,14 +122,17 @@ def _chunk_doubt(picture: Directory) -> str:
             continue
         if min(wide, high) < 1:
             return f"a {noun} of {wide:.0f}x{high:.0f} pixels holds nothing"
-        needed = math.ceil(width / wide) * math.ceil(height / high) * groups
-        if count != needed:
-            return f"{width:.0f}x{height:.0f} pixels need {needed} {noun}(s), there are {count}"
-    stated = sum(numbers_of(picture, _STRIP_BYTES))
-    if first_of(picture, _COMPRESSION) == UNCOMPRESSED and height and stated:
-        rest = stated % height
+        expected = math.ceil(width / wide) * math.ceil(height / high) * groups
+        if count != expected:
+            return f"{width:.0f}x{height:.0f} pixels need {expected} {noun}(s), there are {count}"
+    byte_count = sum(numbers_of(picture, _STRIP_BYTES))
+    if first_of(picture, _COMPRESSION) == UNCOMPRESSED and height and byte_count:
+        rest = byte_count % height
         if min(rest, height - rest) > ROW_PADDING_BYTES:
-            return f"{stated:.0f} bytes of pixels are no whole number for each of {height:.0f} rows"
+            return (
+                f"{byte_count:.0f} bytes of pixels are no whole number for each of {height:.0f} "
+                "rows"
+            )
     return ""
 
 
@@ -181,39 +186,39 @@ def _area_doubt(picture: Directory) -> str:
     return ""
 
 
-def check_layout(found: DngPicture) -> None:
+def check_layout(sensor: DngPicture) -> None:
     """Compare the strips of an uncompressed picture with its size.
 
     Raises:
         DecodeError: If they hold another number of bytes.
     """
-    picture = found.directory
-    stated = sum(numbers_of(picture, _STRIP_BYTES))
-    if first_of(picture, _COMPRESSION) != UNCOMPRESSED or not stated:
+    picture = sensor.directory
+    byte_count = sum(numbers_of(picture, _STRIP_BYTES))
+    if first_of(picture, _COMPRESSION) != UNCOMPRESSED or not byte_count:
         return
     rows = first_of(picture, _HEIGHT)
     row_bits = first_of(picture, _WIDTH) * first_of(picture, _SAMPLES, 1) * first_of(picture, _BITS)
     expected = rows * row_bits / 8
-    if not expected - ROW_PADDING_BYTES <= stated <= expected + rows * ROW_PADDING_BYTES:
+    if not expected - ROW_PADDING_BYTES <= byte_count <= expected + rows * ROW_PADDING_BYTES:
         raise DecodeError(
-            f"the DNG states {stated:.0f} bytes of uncompressed pixels, its size and depth need "
-            f"{expected:.0f}; its header is damaged"
+            f"the DNG states {byte_count:.0f} bytes of uncompressed pixels, its size and depth "
+            f"need {expected:.0f}; its header is damaged"
         )
 
 
 def _check_black(picture: Directory, levels: Levels) -> None:
-    stated = numbers_of(picture, BLACK)
-    if not stated and BLACK_REPEAT in picture:
+    blacks = numbers_of(picture, BLACK)
+    if not blacks and BLACK_REPEAT in picture:
         raise DecodeError("the DNG lays out black levels but gives none; its header is damaged")
     # LibRaw has means of deltas and masked areas, and a corner of large patterns
-    if not stated or any(tag in picture for tag in (DELTA_H, DELTA_V, MASKED_AREAS)):
+    if not blacks or any(tag in picture for tag in (DELTA_H, DELTA_V, MASKED_AREAS)):
         return
     if (numbers_of(picture, BLACK_REPEAT) or (1, 1)) not in _CELLS:
         return
-    found, said = float(np.mean(levels.black)), sum(stated) / len(stated)
-    if not abs(said - found) <= LEVEL_TOLERANCE:
+    decoded, mean = float(np.mean(levels.black)), sum(blacks) / len(blacks)
+    if not abs(mean - decoded) <= LEVEL_TOLERANCE:
         raise DecodeError(
-            f"the DNG states black {said:g}, LibRaw found {found:g}; its header is damaged"
+            f"the DNG states black {mean:g}, LibRaw found {decoded:g}; its header is damaged"
         )
 
 
@@ -222,13 +227,13 @@ def _check_white(picture: Directory, levels: Levels) -> None:
     rescaled = bits <= 8 or first_of(picture, _COMPRESSION) == LOSSY_JPEG
     if rescaled or first_of(picture, _SAMPLE_FORMAT, 1) != 1:
         return
-    stated = numbers_of(picture, WHITE)
+    whites = numbers_of(picture, WHITE)
     # LibRaw moves white by what the blacks of planes differ
     if len(set(numbers_of(picture, BLACK))) > 1 and picture.get(_PHOTOMETRIC) != (CFA,):
         return
-    if stated and abs(max(stated) - levels.white) > LEVEL_TOLERANCE:
+    if whites and abs(max(whites) - levels.white) > LEVEL_TOLERANCE:
         raise DecodeError(
-            f"the DNG states white {max(stated):g}, LibRaw found {levels.white:g}; "
+            f"the DNG states white {max(whites):g}, LibRaw found {levels.white:g}; "
             "its header is damaged"
         )
     if not numbers_of(picture, _LINEARIZATION) and levels.white > 2.0 ** min(bits, MOST_BITS) - 1:

@@ -60,10 +60,10 @@ class BlackMap:
         height, width, planes = len(self.rows), len(self.columns), self.pattern.shape[2]
         if not mosaic:
             rest = _level(self.columns) + _level(self.rows)
-            found = [
+            means = [
                 _mean_of(self.pattern[..., p], height, width, (0, 0), 1) for p in range(planes)
             ]
-            return np.array(np.array(found) + rest, dtype=np.float32)
+            return np.array(np.array(means) + rest, dtype=np.float32)
         cells = [
             [_mean_of(self.pattern[..., 0], height, width, (dy, dx), 2)
              + _level(self.columns[dx::2]) + _level(self.rows[dy::2]) for dx in (0, 1)]
@@ -137,8 +137,8 @@ def _pattern(picture: DngPicture) -> tuple[Floats, list[str]]:
         return values.reshape(rows, cols, planes), []
     if np.isfinite(values).all() and (values == values[0]).all():
         return np.full((1, 1, planes), values[0]), []
-    known = values[np.isfinite(values)]
-    return np.full((1, 1, planes), known.mean() if known.size else 0.0), [
+    finite = values[np.isfinite(values)]
+    return np.full((1, 1, planes), finite.mean() if finite.size else 0.0), [
         f"BlackLevel has {values.size} values for {rows}x{cols} pixels of {planes} sample(s), "
         "their mean is taken: the header is damaged"
     ]
@@ -146,8 +146,8 @@ def _pattern(picture: DngPicture) -> tuple[Floats, list[str]]:
 
 def white_levels(picture: DngPicture) -> FloatArray:
     """Return (plane,) white: WhiteLevel, else 1 of float samples and all bits of others."""
-    stated = [n for n in numbers_of(picture.directory, WHITE) if 0 < n <= MOST_LEVEL]
+    whites = [n for n in numbers_of(picture.directory, WHITE) if 0 < n <= MOST_LEVEL]
     default = 1.0 if picture.is_float else 2.0 ** min(picture.bits, 32) - 1
-    if len(stated) != picture.planes:
-        stated = [max(stated, default=default)] * picture.planes
-    return np.array(stated, dtype=np.float32)
+    if len(whites) != picture.planes:
+        whites = [max(whites, default=default)] * picture.planes
+    return np.array(whites, dtype=np.float32)

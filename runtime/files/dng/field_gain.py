@@ -99,17 +99,17 @@ class GainMap:
 
     def at(self, rows: Places, cols: Places, plane: int) -> Gains:
         """Return (row, col) gains of a plane; 1 where the map changes nothing."""
-        found = np.ones((rows.size, cols.size), dtype=np.float32)
+        gains = np.ones((rows.size, cols.size), dtype=np.float32)
         first, count = self.planes
         if not first <= plane < first + count:
-            return found
+            return gains
         top, left, bottom, right = self.area
         down = (rows >= top) & (rows < bottom) & ((rows - top) % self.pitch[0] == 0)
         across = (cols >= left) & (cols < right) & ((cols - left) % self.pitch[1] == 0)
         grid = self.gains[..., min(plane, self.gains.shape[2] - 1)]
-        by_row = _between(grid, self._points(rows[down], 0))
-        found[np.ix_(down, across)] = _between(by_row.T, self._points(cols[across], 1)).T
-        return found
+        by_row = _interpolate(grid, self._points(rows[down], 0))
+        gains[np.ix_(down, across)] = _interpolate(by_row.T, self._points(cols[across], 1)).T
+        return gains
 
     def _points(self, places: Places, axis: int) -> NDArray[np.float64]:
         """Return the positions of pixels between the points of the grid."""
@@ -120,7 +120,7 @@ class GainMap:
         return np.clip(where, 0, last)
 
 
-def _between(grid: Gains, points: NDArray[np.float64]) -> Gains:
+def _interpolate(grid: Gains, points: NDArray[np.float64]) -> Gains:
     """Return (point, n) rows between the rows of a grid (v, n)."""
     lower = np.minimum(points.astype(np.int64), len(grid) - 1)
     upper = np.minimum(lower + 1, len(grid) - 1)
@@ -156,11 +156,11 @@ class RadialGain:
         *terms, x, y = _RADIAL.unpack(data)
         if not (np.isfinite(terms).all() and 0 <= x <= 1 and 0 <= y <= 1):
             raise DecodeError("its FixVignetteRadial holds what is no gain")
-        made = cls(terms=tuple(terms), centre=(x, y), size=size)
-        gains = made._of_squares(np.linspace(0, 1, 65))
+        gain = cls(terms=tuple(terms), centre=(x, y), size=size)
+        gains = gain._of_squares(np.linspace(0, 1, 65))
         if gains.min() < 0 or gains.max() > MOST_GAIN:
             raise DecodeError("its FixVignetteRadial holds what is no gain")
-        return made
+        return gain
 
     @property
     def most(self) -> float:
@@ -171,8 +171,8 @@ class RadialGain:
         """Return (row, col) gains, alike for every plane."""
         (height, width), (x, y) = self.size, (self.centre[0], self.centre[1])
         down, across = rows + 0.5 - y * height, cols + 0.5 - x * width
-        far = (max(x, 1 - x) * width) ** 2 + (max(y, 1 - y) * height) ** 2
-        squares = (down[:, None] ** 2 + across**2) / far
+        corner_square = (max(x, 1 - x) * width) ** 2 + (max(y, 1 - y) * height) ** 2
+        squares = (down[:, None] ** 2 + across**2) / corner_square
         return self._of_squares(squares).astype(np.float32)
 
     def _of_squares(self, squares: NDArray[np.float64]) -> NDArray[np.float64]:

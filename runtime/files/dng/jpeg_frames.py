@@ -40,13 +40,13 @@ def frame_doubt(path: Path, picture: DngPicture) -> str:
     offsets = numbers_of(tags, 324 if tiled else 273)
     counts = numbers_of(tags, 325 if tiled else 279)
     empty = {number for number, count in enumerate(counts) if count == 0}
-    across = math.ceil(picture.width / wide)
+    per_row = math.ceil(picture.width / wide)
     with path.open("rb") as file:
         for number, offset in enumerate(offsets[:MOST_CHUNKS]):
             if number in empty:
                 continue
             frame = _frame(file, int(offset))
-            top, left = number // across * tall, number % across * wide
+            top, left = number // per_row * tall, number % per_row * wide
             # the last ones may be cut to the picture
             sizes = {
                 rows * columns * picture.planes

@@ -17,47 +17,51 @@ MASKED_AREAS: Final = 50830
 LEAST_SAMPLES: Final = 64
 """Of each colour, so that the mean is known to an eighth of the noise."""
 QUIET_SPREAD: Final = 0.02
-FAR: Final = 0.005
+BLACK_TOLERANCE: Final = 0.005
 """In shares of the range; nearer is the drift of black with temperature."""
 _DAMAGED: Final = ": the header is damaged, BlackLevel is used"
 
 
 def masked_black(
-    picture: DngPicture, whole: NDArray[Any], stated: FloatArray, white: float, first: Sequence[int]
+    picture: DngPicture,
+    whole: NDArray[Any],
+    stated_black: FloatArray,
+    white: float,
+    first: Sequence[int],
 ) -> tuple[FloatArray, list[str]]:
     """Return black as measured, or as stated where nothing can be measured, and notes.
 
     Args:
         picture: The sensor picture.
         whole: (h, w) or (h, w, plane) samples of the whole sensor.
-        stated: (2, 2) or (plane,) black by position in the cell, or by plane.
+        stated_black: (2, 2) or (plane,) black by position in the cell, or by plane.
         white: White level.
         first: Row and column of the first visible pixel on the whole sensor.
     """
     values = numbers_of(picture.directory, MASKED_AREAS)
     if not values:
-        return stated, []
+        return stated_black, []
     areas = [_rectangle(values[n : n + 4]) for n in range(0, len(values), 4)]
-    seen = picture.active_area
-    sound = [a for a in areas if a is not None and _inside(a, whole.shape) and not _meet(a, seen)]
+    active = picture.active_area
+    sound = [a for a in areas if a is not None and _inside(a, whole.shape) and not _meet(a, active)]
     if len(sound) < len(areas):
-        return stated, [
+        return stated_black, [
             f"MaskedAreas {tuple(int(n) if np.isfinite(n) else n for n in values)} lie outside "
             f"the sensor or on the picture{_DAMAGED}"
         ]
-    found = np.empty_like(stated)
-    for place in np.ndindex(stated.shape):
+    measured = np.empty_like(stated_black)
+    for place in np.ndindex(stated_black.shape):
         dark = np.concatenate([_samples(whole, area, place, first) for area in sound])
         if dark.size < LEAST_SAMPLES:
-            return stated, ["MaskedAreas are too small to measure black, BlackLevel is used"]
+            return stated_black, ["MaskedAreas are too small to measure black, BlackLevel is used"]
         low, high = np.quantile(dark, (0.05, 0.95))
         if high - low > QUIET_SPREAD * (white - low):
-            return stated, [f"MaskedAreas are not dark{_DAMAGED}"]
-        found[place] = dark.mean(dtype=np.float64)
-    black, was = float(found.mean()), float(stated.mean())
+            return stated_black, [f"MaskedAreas are not dark{_DAMAGED}"]
+        measured[place] = dark.mean(dtype=np.float64)
+    black, was = float(measured.mean()), float(stated_black.mean())
     note = f"black level {black:.1f}, measured in the masked areas, replaces the stated {was:g}"
-    far = abs(black - was) > FAR * (white - black)
-    return found, [note + (": the header is damaged" if far else "")]
+    is_far = abs(black - was) > BLACK_TOLERANCE * (white - black)
+    return measured, [note + (": the header is damaged" if is_far else "")]
 
 
 def _samples(

@@ -75,8 +75,8 @@ def field_gains(picture: DngPicture) -> tuple[FieldGains, list[str]]:
             notes.append(
                 f"corrections of {list_name} not applied: {', '.join(dict.fromkeys(missing))}"
             )
-    found = FieldGains(mosaic=tuple(gains["OpcodeList2"]), colours=tuple(gains["OpcodeList3"]))
-    return found, notes
+    combined = FieldGains(mosaic=tuple(gains["OpcodeList2"]), colours=tuple(gains["OpcodeList3"]))
+    return combined, notes
 
 
 def _opcodes(data: bytes) -> Iterator[tuple[int, bytes]]:

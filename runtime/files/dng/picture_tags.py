@@ -118,8 +118,8 @@ class DngPicture:
             return ""
         colours = octets_of(self.directory, 50710) or bytes((0, 1, 2))
         cell = octets_of(self.directory, 33422)
-        known = all(n < len(_COLOURS) for n in cell) and colours == bytes((0, 1, 2))
-        return "".join(_COLOURS[n] for n in cell) if known else "?" * len(cell)
+        is_rgb = all(n < len(_COLOURS) for n in cell) and colours == bytes((0, 1, 2))
+        return "".join(_COLOURS[n] for n in cell) if is_rgb else "?" * len(cell)
 
     @property
     def repeat(self) -> tuple[int, int]:
@@ -132,11 +132,13 @@ def sensor_picture(tags: TiffTags) -> DngPicture | None:
     """Return the sensor picture of a DNG: the full-size one, else the largest; None without one."""
     if not is_dng(tags):
         return None
-    found = [d for d in sensor_directories(tags.directories) if numbers_of(d, 256)]
-    if not found:
+    directories = [d for d in sensor_directories(tags.directories) if numbers_of(d, 256)]
+    if not directories:
         return None
     # an enhanced copy (NewSubfileType 16) may be larger than the picture itself
-    main = max(found, key=lambda d: (first_of(d, 254) == 0, first_of(d, 256) * first_of(d, 257)))
+    main = max(
+        directories, key=lambda d: (first_of(d, 254) == 0, first_of(d, 256) * first_of(d, 257))
+    )
     return DngPicture(
         directory=main,
         width=int(first_of(main, 256)),

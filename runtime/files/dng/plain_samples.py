@@ -64,7 +64,7 @@ def _chunks(picture: DngPicture) -> Iterator[_Chunk]:
     tall = int(first_of(tags, 323 if tiled else 278, height))
     wide = int(first_of(tags, 322, width)) if tiled else width
     tall = tall if tiled else min(tall, height)
-    together, groups = (1, picture.planes) if picture.is_planar else (picture.planes, 1)
+    per_chunk, groups = (1, picture.planes) if picture.is_planar else (picture.planes, 1)
     if min(tall, wide) < 1 or max(tall, wide) > 1 << 16:
         raise DecodeError(f"strips or tiles of {wide}x{tall} pixels cannot be; header damaged?")
     places = [
@@ -81,7 +81,7 @@ def _chunks(picture: DngPicture) -> Iterator[_Chunk]:
     for place, offset, count in zip(places, offsets, counts, strict=True):
         rows = tall if tiled else min(tall, height - place[0])
         yield _Chunk(
-            offset=int(offset), byte_count=int(count), place=place, shape=(rows, wide, together)
+            offset=int(offset), byte_count=int(count), place=place, shape=(rows, wide, per_chunk)
         )
 
 
@@ -90,26 +90,26 @@ def _numbers(
 ) -> NDArray[Any]:
     """Return (row, column, plane) numbers of a strip or tile."""
     rows, columns, planes = chunk.shape
-    needed = rows * columns * planes * picture.bits // 8
+    expected = rows * columns * planes * picture.bits // 8
     file.seek(chunk.offset)
     data = file.read(chunk.byte_count)
     deflated = picture.compression in DEFLATE
     if deflated:
         inflater = zlib.decompressobj()
         try:
-            data = inflater.decompress(data, needed)
+            data = inflater.decompress(data, expected)
             inflater.decompress(inflater.unconsumed_tail, 1)  # its end holds the checksum
         except zlib.error as error:
             raise DecodeError(f"the pixel data are damaged: {error}") from error
-        if len(data) == needed and not inflater.eof:
+        if len(data) == expected and not inflater.eof:
             raise DecodeError(
-                f"a strip or tile holds more than the {needed} bytes that its size and depth need; "
-                "it is damaged"
+                f"a strip or tile holds more than the {expected} bytes that its size and depth "
+                "need; it is damaged"
             )
-    if len(data) < needed:
+    if len(data) < expected:
         raise DecodeError(
-            f"a strip or tile holds {len(data)} bytes of pixels, its size and depth need {needed}; "
-            "it is damaged"
+            f"a strip or tile holds {len(data)} bytes of pixels, its size and depth need "
+            f"{expected}; it is damaged"
         )
     predictor = int(first_of(picture.directory, 317, 1)) if deflated else 1
     octets = unpredicted(data, chunk.shape, picture.bits, predictor, big_endian=big_endian)

@@ -37,8 +37,8 @@ _RECTANGULAR: Final = 1
 
 def is_plain(picture: DngPicture) -> bool:
     """Return whether the samples of a picture are read without LibRaw."""
-    apart = picture.is_planar and picture.compression == UNCOMPRESSED
-    return picture.is_float or picture.compression in DEFLATE or apart
+    plain_planar = picture.is_planar and picture.compression == UNCOMPRESSED
+    return picture.is_float or picture.compression in DEFLATE or plain_planar
 
 
 def check_readable(picture: DngPicture) -> None:
@@ -89,14 +89,14 @@ def _check_colours(picture: DngPicture) -> None:
     """Refuse mosaics that are neither Bayer nor, for LibRaw, X-Trans, and odd numbers of planes."""
     letters, repeat = picture.pattern, picture.repeat
     if letters:
-        stated = len(letters) == repeat[0] * repeat[1] > 0
-        known = letters in CFA_PATTERNS if repeat == BAYER else repeat == X_TRANS
+        is_stated = len(letters) == repeat[0] * repeat[1] > 0
+        is_read = letters in CFA_PATTERNS if repeat == BAYER else repeat == X_TRANS
         if is_plain(picture):
-            known = known and (*repeat, picture.planes) == (*BAYER, 1)
-        if known or not (stated or is_plain(picture)):
+            is_read = is_read and (*repeat, picture.planes) == (*BAYER, 1)
+        if is_read or not (is_stated or is_plain(picture)):
             return
-        shown = "other colours" if "?" in letters else letters[:8]
-        name = f"a CFA of {repeat[0]}x{repeat[1]} pixels ({shown})"
+        text = "other colours" if "?" in letters else letters[:8]
+        name = f"a CFA of {repeat[0]}x{repeat[1]} pixels ({text})"
     elif picture.planes in (1, 3):
         return
     else:

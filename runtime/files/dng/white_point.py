@@ -62,7 +62,7 @@ def light_matrices(tags: TiffTags) -> list[LightMatrix]:
     if balance.shape != (3,) or not ((balance > 0) & (balance < MAX_FACTOR)).all():
         balance = np.ones(3)
     signed = [tags.text(tag) or "" for tag in SIGNATURES]
-    found = []
+    matrices = []
     for matrix_tag, calibration_tag, light_tag in LIGHTS:
         matrix = _square(tags, matrix_tag)
         if matrix is None:
@@ -71,12 +71,12 @@ def light_matrices(tags: TiffTags) -> list[LightMatrix]:
         if calibration is not None:
             matrix = calibration @ matrix
         light = (tags.numbers(light_tag) or (0,))[0]
-        found.append(
+        matrices.append(
             LightMatrix(
                 matrix=balance[:, None] * matrix, light=int(light) if math.isfinite(light) else 0
             )
         )
-    return found
+    return matrices
 
 
 def color_matrix(tags: TiffTags) -> tuple[Matrix, str | None] | None:
@@ -86,10 +86,10 @@ def color_matrix(tags: TiffTags) -> tuple[Matrix, str | None] | None:
         The (3, 3) matrix with AnalogBalance and CameraCalibration applied, and a note if its light
         is not D65 or the file has a third light; None if the file has no believable matrix.
     """
-    found = light_matrices(tags)
-    if not found:
+    matrices = light_matrices(tags)
+    if not matrices:
         return None
-    one = min(found, key=lambda each: abs(each.kelvin - _D65_KELVIN))
+    one = min(matrices, key=lambda each: abs(each.kelvin - _D65_KELVIN))
     if abs(np.linalg.det(one.matrix)) < 1e-9:
         return None
     source = f"EXIF light source {one.light}" if one.light else "an unknown light source"
@@ -102,9 +102,9 @@ def color_matrix(tags: TiffTags) -> tuple[Matrix, str | None] | None:
 
 def neutral(tags: TiffTags) -> NDArray[np.float64] | None:
     """Return (3,) camera values of a grey in the light of the photograph; None if not stated."""
-    stated = np.array(tags.numbers(AS_SHOT_NEUTRAL) or ())
-    if stated.shape == (3,) and np.isfinite(stated).all() and stated.min() > 0:
-        return stated
+    values = np.array(tags.numbers(AS_SHOT_NEUTRAL) or ())
+    if values.shape == (3,) and np.isfinite(values).all() and values.min() > 0:
+        return values
     place = tags.numbers(AS_SHOT_WHITE_XY) or ()
     if len(place) != 2 or not (min(place) > 0 and sum(place) < 1):
         return None
@@ -125,21 +125,21 @@ def colour_temperature_k(light: Chromaticity) -> float:
     x, y = light
     u, v = 4 * x / (12 * y - 2 * x + 3), 6 * y / (12 * y - 2 * x + 3)
     t = 1e6 / np.linspace(40, 1000, 9601)
-    across = (0.860117757 + 1.54118254e-4 * t + 1.28641212e-7 * t**2) / (
+    locus_u = (0.860117757 + 1.54118254e-4 * t + 1.28641212e-7 * t**2) / (
         1 + 8.42420235e-4 * t + 7.08145163e-7 * t**2
     )
-    up = (0.317398726 + 4.22806245e-5 * t + 4.20481691e-8 * t**2) / (
+    locus_v = (0.317398726 + 4.22806245e-5 * t + 4.20481691e-8 * t**2) / (
         1 - 2.89741816e-5 * t + 1.61456053e-7 * t**2
     )
-    return float(t[np.argmin((across - u) ** 2 + (up - v) ** 2)])
+    return float(t[np.argmin((locus_u - u) ** 2 + (locus_v - v) ** 2)])
 
 
 def _mixed(matrices: list[LightMatrix], light: Chromaticity) -> Matrix | None:
     """Return the matrix of a light, between those of two others by inverse temperature."""
-    known = sorted((m for m in matrices if m.kelvin), key=lambda m: m.kelvin)
-    if len(known) < 2 or known[0].kelvin == known[1].kelvin:
+    ordered = sorted((m for m in matrices if m.kelvin), key=lambda m: m.kelvin)
+    if len(ordered) < 2 or ordered[0].kelvin == ordered[1].kelvin:
         return matrices[0].matrix if matrices else None
-    warm, cold = known
+    warm, cold = ordered
     inverse = 1 / colour_temperature_k(light)
     part = (1 / warm.kelvin - inverse) / (1 / warm.kelvin - 1 / cold.kelvin)
     part = min(max(part, 0.0), 1.0)

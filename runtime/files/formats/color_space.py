@@ -71,8 +71,11 @@ class ColorSpace:
 
     def has_curve(self, curve: Curve) -> bool:
         """Return whether every channel has a curve."""
-        wanted = curve(_TESTED)
-        return all(np.abs(own(_TESTED) - wanted).max() < _CURVE_ERROR for own in self.curves)
+        expected = curve(_TESTED)
+        return all(
+            np.abs(channel_curve(_TESTED) - expected).max() < _CURVE_ERROR
+            for channel_curve in self.curves
+        )
 
     def light_of(self, codes: NDArray[Any], top: int) -> FloatArray:
         """Convert codes to light.
@@ -89,8 +92,8 @@ class ColorSpace:
             planes = np.stack([eight] * 3) if codes.ndim == 2 else eight
             coded = self.tables(np.ascontiguousarray(np.moveaxis(planes, 0, -1)))
             light = decode_srgb(coded.astype(np.float32) / np.float32(255))
-            found = np.ascontiguousarray(np.moveaxis(light, -1, 0))
-            return found[1] if codes.ndim == 2 else found
+            linear = np.ascontiguousarray(np.moveaxis(light, -1, 0))
+            return linear[1] if codes.ndim == 2 else linear
         at = np.linspace(0, 1, top + 1)
         if codes.ndim == 2:
             return np.asarray(self.curves[0](at).astype(np.float32)[codes])

@@ -49,13 +49,13 @@ class _Part:
         number: From 0.
         header: Its attributes.
         channels: R, G, B; or Y; or Y, RY, BY, as the file names them.
-        left: Channels that are not read.
+        unread: Channels that are not read.
     """
 
     number: int
     header: Mapping[str, Any]
     channels: tuple[str, ...]
-    left: tuple[str, ...]
+    unread: tuple[str, ...]
 
 
 def decode_exr(path: Path) -> tuple[Decoded, Metadata]:
@@ -114,12 +114,12 @@ def _picture_of(headers: Sequence[Mapping[str, Any]]) -> _Part:
             continue
         names = [channel.name for channel in header["channels"]]
         try:
-            wanted = _wanted(names)
+            channels = _color_channels(names)
         except DecodeError as error:
             refusals.append(str(error))
             continue
-        left = tuple(name for name in names if name not in wanted)
-        return _Part(number=number, header=header, channels=wanted, left=left)
+        unread = tuple(name for name in names if name not in channels)
+        return _Part(number=number, header=header, channels=channels, unread=unread)
     raise DecodeError(refusals[0] if refusals else "the EXR has no part")
 
 
@@ -127,28 +127,28 @@ def _is_deep(header: Mapping[str, Any]) -> bool:
     return getattr(header.get("type"), "name", "") in _DEEP
 
 
-def _wanted(names: Sequence[str]) -> tuple[str, ...]:
+def _color_channels(names: Sequence[str]) -> tuple[str, ...]:
     """Return the channels of colour as they are named, of the plain layer if there is one."""
     layers: dict[str, dict[str, str]] = {}
     for name in names:
         layer, _, channel = name.rpartition(".")
         layers.setdefault(layer, {}).setdefault(channel.upper(), name)
-    found = {}
-    for layer, own in layers.items():
-        for wanted in (("R", "G", "B"), ("Y", "RY", "BY"), ("Y",)):
-            if own.keys() >= set(wanted):
-                found[layer] = tuple(own[channel] for channel in wanted)
+    complete = {}
+    for layer, members in layers.items():
+        for letters in (("R", "G", "B"), ("Y", "RY", "BY"), ("Y",)):
+            if members.keys() >= set(letters):
+                complete[layer] = tuple(members[channel] for channel in letters)
                 break
-    if "" in found or len(found) == 1:
-        return found.get("") or next(iter(found.values()))
+    if "" in complete or len(complete) == 1:
+        return complete.get("") or next(iter(complete.values()))
     for preferred in _PREFERRED:
-        named = [layer for layer in found if layer.rpartition(".")[2].lower() == preferred]
-        if len(named) == 1:
-            return found[named[0]]
-    if found:
+        matches = [layer for layer in complete if layer.rpartition(".")[2].lower() == preferred]
+        if len(matches) == 1:
+            return complete[matches[0]]
+    if complete:
         raise DecodeError(
-            f"the EXR has {len(found)} layers ({', '.join(list(found)[:5])}) and none is plain "
-            "R, G, B; save the one that is meant as such"
+            f"the EXR has {len(complete)} layers ({', '.join(list(complete)[:5])}) and none is "
+            "plain R, G, B; save the one that is meant as such"
         )
     raise DecodeError(f"expected EXR channels R, G, B or Y; got {sorted(names)[:12]}")
 
@@ -221,8 +221,8 @@ def _notes(
     headers: Sequence[Mapping[str, Any]], part: _Part, window: PictureWindow
 ) -> tuple[str, ...]:
     """Return notes on unread parts, and on the place of the pixels."""
-    plain = [name for name in part.left if name.upper() == "A"]
-    rest = [name for name in part.left if name not in plain]
+    plain = [name for name in part.unread if name.upper() == "A"]
+    rest = [name for name in part.unread if name not in plain]
     notes = ["alpha channel dropped"] if plain else []
     if rest:
         more = ", ..." if len(rest) > 5 else ""
@@ -239,8 +239,8 @@ def _notes(
     if others:
         more = ", ..." if len(others) > 5 else ""
         notes.append(f"parts not read: {', '.join(others[:5])}{more}")
-    stated = part.header.get("chromaticities")
-    if stated is not None and not np.any(np.asarray(stated)):
+    chromaticities = part.header.get("chromaticities")
+    if chromaticities is not None and not np.any(np.asarray(chromaticities)):
         notes.append("chromaticities of the EXR are all zero: Rec.709 is assumed")
     return (*notes, window.note) if window.note else tuple(notes)
 

@@ -97,15 +97,15 @@ def _tags(profile: bytes) -> dict[bytes, bytes]:
 def _name(tags: Mapping[bytes, bytes]) -> str:
     """Return the profile's own name."""
     data = tags.get(b"desc", b"")
-    found = ""
+    text = ""
     if data[:4] == b"mluc":
         size, start = struct.unpack_from(">II", data, 20)
-        found = data[start : start + size].decode("utf-16-be", "replace")
+        text = data[start : start + size].decode("utf-16-be", "replace")
     if data[:4] == b"desc":
         (size,) = struct.unpack_from(">I", data, 8)
-        found = data[12 : 12 + size].decode("latin-1")
-    shown = "".join(c if c.isprintable() else " " for c in found.split("\0")[0])[:60]
-    return shown.strip() or "without a name"
+        text = data[12 : 12 + size].decode("latin-1")
+    printable = "".join(c if c.isprintable() else " " for c in text.split("\0")[0])[:60]
+    return printable.strip() or "without a name"
 
 
 def _matrix(tags: Mapping[bytes, bytes]) -> Matrix:

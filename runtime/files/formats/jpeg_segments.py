@@ -81,15 +81,15 @@ def end_of_jpeg(data: bytes) -> int:
         _check_kind(segment, len(data))
         at = segment.end
         if segment.marker == _START_OF_SCAN:
-            found = _MARKER.search(data, at)
-            if found is None:
+            marker = _MARKER.search(data, at)
+            if marker is None:
                 break
-            if found[1][0] not in _OF_SCANS | {_END}:
+            if marker[1][0] not in _OF_SCANS | {_END}:
                 raise DecodeError(
-                    f"the JPEG is damaged: FF{found[1][0]:02X} at byte {found.start()} lies within "
-                    "a scan; copy the file again"
+                    f"the JPEG is damaged: FF{marker[1][0]:02X} at byte {marker.start()} lies "
+                    "within a scan; copy the file again"
                 )
-            at = found.start()
+            at = marker.start()
     raise DecodeError("the JPEG has no end marker: it is cut off, copy it again")
 
 

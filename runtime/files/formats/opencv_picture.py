@@ -28,35 +28,38 @@ def decode_picture(data: bytes, exif: TiffTags) -> Decoded:
     Raises:
         DecodeError: If it is damaged, cut off, or of a kind that is not read.
     """
-    stated, notes = NOTHING, list[str]()
+    statement, notes = NOTHING, list[str]()
     if data.startswith(radiance.MAGIC):
         radiance.check_header(data)
     elif data.startswith(jpeg_segments.MAGIC):
         data = data[: jpeg_segments.end_of_jpeg(data)]
-        stated = stated_space.space_of_jpeg(data, exif)
+        statement = stated_space.space_of_jpeg(data, exif)
     elif data.startswith(png_chunks.MAGIC):
         png_chunks.check_png_size(data)
-        stated = stated_space.space_of_png(data, exif)
+        statement = stated_space.space_of_png(data, exif)
         if any(name == b"acTL" for name, _ in png_chunks.png_chunks(data)):
             notes.append("animated PNG: only the first picture is read")
     samples, alpha = split_alpha(decode_array(data))
     notes += ["alpha channel dropped"] if alpha is not None else []
-    return decoded_samples(samples, stated, tuple(notes))
+    return decoded_samples(samples, statement, tuple(notes))
 
 
 def decoded_samples(
-    samples: NDArray[Any], stated: StatedSpace, notes: tuple[str, ...] = (), top: int | None = None
+    samples: NDArray[Any],
+    statement: StatedSpace,
+    notes: tuple[str, ...] = (),
+    top: int | None = None,
 ) -> Decoded:
     """Return samples with the space that their file states, white at the top of their type."""
     if top is None:
         is_code = np.issubdtype(samples.dtype, np.integer)
         top = int(np.iinfo(samples.dtype).max) if is_code else 0
-    stated = stated.of_channels(samples.ndim)
+    statement = statement.of_channels(samples.ndim)
     return Decoded(
         samples=samples,
         top=top,
-        space=stated.space,
-        doubt=stated.doubt,
+        space=statement.space,
+        doubt=statement.doubt,
         notes=notes,
     )
 

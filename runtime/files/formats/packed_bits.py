@@ -65,7 +65,7 @@ def read_packed(path: Path, page: TiffPage, codec: Codec | None) -> NDArray[np.u
     wide, high = page.size_px
     planes = page.samples if page.is_planar else 1
     each = page.samples // planes
-    found = np.zeros((planes, high, wide, each), dtype=np.uint16)
+    samples = np.zeros((planes, high, wide, each), dtype=np.uint16)
     count = grid.across * grid.down
     if min(len(grid.offsets), len(grid.lengths)) < planes * count:
         raise DecodeError(
@@ -81,10 +81,10 @@ def read_packed(path: Path, page: TiffPage, codec: Codec | None) -> NDArray[np.u
                 continue  # a sparse one, of which the page tells
             file.seek(grid.offsets[number])
             part = _unpacked(file.read(grid.lengths[number]), page, codec, (rows, grid.width, each))
-            found[plane, top : top + rows, left : left + grid.width] = part[
+            samples[plane, top : top + rows, left : left + grid.width] = part[
                 : high - top, : wide - left
             ]
-    return np.moveaxis(found, -1, 1).reshape(page.samples, high, wide)
+    return np.moveaxis(samples, -1, 1).reshape(page.samples, high, wide)
 
 
 def _grid(page: TiffPage) -> _Grid:

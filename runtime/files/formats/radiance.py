@@ -37,8 +37,8 @@ def check_header(data: bytes) -> None:
         raise DecodeError("the Radiance HDR has no end of its header: it is cut off or damaged")
     formats = re.findall(rb"(?m)^FORMAT=(.*)$", head)
     if formats != [FORMAT]:
-        told = b", ".join(formats).decode("ascii", "replace") or "none"
-        raise DecodeError(f"a Radiance HDR must have FORMAT={FORMAT.decode()}; got {told}")
+        text = b", ".join(formats).decode("ascii", "replace") or "none"
+        raise DecodeError(f"a Radiance HDR must have FORMAT={FORMAT.decode()}; got {text}")
     place = len(head) + len(end)
     size = _SIZE.match(data, place)
     if size is None:

@@ -106,22 +106,20 @@ def _of_profile(profile: bytes) -> StatedSpace:
 
 
 def _of_exif(exif: TiffTags) -> StatedSpace:
-    stated = (exif.numbers(_COLOR_SPACE) or (None,))[0]
-    adobe = stated == _EXIF_ADOBE or (
-        exif.interoperability == _ADOBE_INDEX and stated != _EXIF_SRGB
-    )
+    code = (exif.numbers(_COLOR_SPACE) or (None,))[0]
+    adobe = code == _EXIF_ADOBE or (exif.interoperability == _ADOBE_INDEX and code != _EXIF_SRGB)
     return StatedSpace(space=color_space.ADOBE_RGB) if adobe else NOTHING
 
 
 def _of_code_points(content: bytes) -> StatedSpace:
     primaries, curve, matrix, full = struct.unpack(">4B", content)
-    known = color_space.CODE_POINT_PRIMARIES.get(primaries)
+    named_primaries = color_space.CODE_POINT_PRIMARIES.get(primaries)
     bend = color_space.CODE_POINT_CURVES.get(curve)
-    if known is None or bend is None or matrix != 0 or full != 1:
+    if named_primaries is None or bend is None or matrix != 0 or full != 1:
         points = f"{primaries}/{curve}/{matrix}/{full}"
         return StatedSpace(doubt=f"the code points {points} of H.273 (cICP)")
-    name = f"{known[0]}, {bend[0]} (cICP)"
-    return StatedSpace(space=space_of_primaries(name, known[1], bend[1]))
+    name = f"{named_primaries[0]}, {bend[0]} (cICP)"
+    return StatedSpace(space=space_of_primaries(name, named_primaries[1], bend[1]))
 
 
 def _of_gamma(gamma: bytes | None, chromaticities: bytes | None) -> StatedSpace:

@@ -97,9 +97,9 @@ def light_of_lab(samples: NDArray[Any], page: TiffPage) -> FloatArray:
     roots = np.stack([y + a / 500, y, y - b / 200])
     edge = np.float32(_LAB_EDGE)
     relative = np.where(roots > edge, roots**3, 3 * edge**2 * (roots - np.float32(4 / 29)))
-    stated = page.tags.get(_WHITE_POINT)
+    white_point = page.tags.get(_WHITE_POINT)
     white = PCS_WHITE
-    if isinstance(stated, tuple) and len(stated) == 2 and min(stated) > 0:
-        white = (float(stated[0]), float(stated[1]))
+    if isinstance(white_point, tuple) and len(white_point) == 2 and min(white_point) > 0:
+        white = (float(white_point[0]), float(white_point[1]))
     to_rec709 = np.linalg.inv(rgb_to_xyz(REC709_PRIMARIES, D65)) @ adapt_white(white, D65)
     return apply_matrix(to_rec709 @ np.diag(white_xyz(white)), relative.astype(np.float32))

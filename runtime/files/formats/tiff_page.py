@@ -86,8 +86,8 @@ class TiffPage:
     @property
     def kind(self) -> int:
         """Return the kind of a sample's number: UNSIGNED, SIGNED, FLOAT."""
-        stated = self.number_of(339, UNSIGNED)
-        return UNSIGNED if stated == UNDEFINED else stated
+        kind = self.number_of(339, UNSIGNED)
+        return UNSIGNED if kind == UNDEFINED else kind
 
     @property
     def compression(self) -> int:
@@ -139,28 +139,30 @@ def picture_page(tags: TiffTags) -> tuple[TiffPage, tuple[str, ...]]:
         DecodeError: If no page is one, or it is of a kind that is not read; names it.
     """
     places = zip(tags.starts, tags.directories, strict=True)
-    found = [(start, directory) for start, directory in places if {256, 257} <= directory.keys()]
+    directories = [
+        (start, directory) for start, directory in places if {256, 257} <= directory.keys()
+    ]
     pages = [
         TiffPage(start=start, tags=directory, number=number)
-        for number, (start, directory) in enumerate(found, 1)
+        for number, (start, directory) in enumerate(directories, 1)
     ]
     if not pages:
         raise DecodeError("the TIFF has no page with a size: it is damaged, copy it again")
     full = [page for page in pages if not _is_beside(page)] or pages
-    chosen = max(full, key=lambda page: page.size_px[0] * page.size_px[1])
-    _check(chosen, tags.file_bytes)
+    main = max(full, key=lambda page: page.size_px[0] * page.size_px[1])
+    _check(main, tags.file_bytes)
     notes = []
-    if chosen.number > 1:
+    if main.number > 1:
         wide, high = pages[0].size_px
         first = "a mask or preview" if _is_beside(pages[0]) else "smaller"
         notes.append(
-            f"page {chosen.number} of the TIFF is read; page 1 is {first} ({wide}x{high} px)"
+            f"page {main.number} of the TIFF is read; page 1 is {first} ({wide}x{high} px)"
         )
-    if chosen.empty_chunks:
-        notes.append(f"{chosen.empty_chunks} strips or tiles hold no data: their samples are 0")
+    if main.empty_chunks:
+        notes.append(f"{main.empty_chunks} strips or tiles hold no data: their samples are 0")
     if len(full) > 1:
         notes.append(f"one page of the TIFF is read, {len(full) - 1} more are not")
-    return chosen, tuple(notes)
+    return main, tuple(notes)
 
 
 def _is_beside(page: TiffPage) -> bool:

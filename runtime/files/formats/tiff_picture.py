@@ -106,22 +106,22 @@ def decode_tiff(path: Path, tags: TiffTags) -> Decoded:
         DecodeError: If it is damaged, or of a kind that is not read; names it.
     """
     page, notes = picture_page(tags)
-    stated = space_of_tiff(tags)
+    statement = space_of_tiff(tags)
     mapped = map_plain_tiff(path) if page.number == 1 else None
     if mapped is not None:
         planes = mapped if mapped.ndim == 2 else np.moveaxis(mapped, -1, 0)
-        return decoded_samples(planes, stated, notes)
+        return decoded_samples(planes, statement, notes)
     ready = _by_opencv(path, page)
     if ready is not None:
         more = ("alpha channel dropped",) if page.samples > page.colours else ()
-        return decoded_samples(ready, stated, (*notes, *more))
+        return decoded_samples(ready, statement, (*notes, *more))
     stored = _read(path, page)
     if is_lab(page):
         return Decoded(samples=light_of_lab(stored, page), top=0, notes=notes)
-    samples, told = to_grey_or_rgb(stored, page)
+    samples, remarks = to_grey_or_rgb(stored, page)
     is_packed = page.kind != tiff_page.FLOAT and page.photometric != tiff_page.PALETTE
     top = (1 << page.bits) - 1 if is_packed else None
-    return decoded_samples(samples, stated, (*notes, *told), top)
+    return decoded_samples(samples, statement, (*notes, *remarks), top)
 
 
 def _by_opencv(path: Path, page: TiffPage) -> NDArray[Any] | None:
@@ -180,7 +180,7 @@ def _read(path: Path, page: TiffPage) -> NDArray[Any]:
         name = _UNREAD.get(page.compression, f"compression {page.compression}")
         raise DecodeError(f"a TIFF packed by {name} is not read; save it without compression")
     try:
-        found = _read_by_tifffile(path, page)
+        samples = _read_by_tifffile(path, page)
     except _INSIDE_TIFFFILE as error:
         if _EXTRA_PACKAGE in str(error) or isinstance(error, ImportError):
             name = _COMPRESSIONS.get(page.compression, f"compression {page.compression}")
@@ -191,7 +191,7 @@ def _read(path: Path, page: TiffPage) -> NDArray[Any]:
             ) from error
         words = " ".join(str(error).split())[:160]
         raise DecodeError(f"the TIFF is damaged or of an unknown kind: {words}") from error
-    return found.astype(np.float32) if np.issubdtype(found.dtype, np.floating) else found
+    return samples.astype(np.float32) if np.issubdtype(samples.dtype, np.floating) else samples
 
 
 def _read_by_tifffile(path: Path, page: TiffPage) -> NDArray[Any]:
@@ -199,21 +199,21 @@ def _read_by_tifffile(path: Path, page: TiffPage) -> NDArray[Any]:
 
     with tifffile.TiffFile(path) as file:
         file.filehandle.seek(page.start)
-        own = tifffile.TiffPage(file, index=0)
+        file_page = tifffile.TiffPage(file, index=0)
         packed = page.kind != tiff_page.FLOAT and page.bits not in (8, 16)
         if packed:
             return read_packed(path, page, _codec(page))
         if page.compression in (tiff_page.DEFLATE, tiff_page.OLD_DEFLATE, tiff_page.LZMA):
-            _check_inflated(file, own)
-        samples = own.asarray(maxworkers=1)
-        planes, depth, high, wide, each = own.shaped
+            _check_inflated(file, file_page)
+        samples = file_page.asarray(maxworkers=1)
+        planes, depth, high, wide, each = file_page.shaped
         if depth != 1 or (wide, high) != page.size_px or planes * each != page.samples:
-            raise DecodeError(f"expected {page.size_px} pixels; got shape {own.shaped}")
+            raise DecodeError(f"expected {page.size_px} pixels; got shape {file_page.shaped}")
         shaped = samples.reshape(planes, high, wide, each)
-        found = np.moveaxis(shaped, -1, 1).reshape(page.samples, high, wide)
-        if found.dtype.kind == "i":  # a and b of Lab
-            found = found.view(found.dtype.str.replace("i", "u"))
-        return np.ascontiguousarray(found, dtype=found.dtype.newbyteorder("="))
+        ordered = np.moveaxis(shaped, -1, 1).reshape(page.samples, high, wide)
+        if ordered.dtype.kind == "i":  # a and b of Lab
+            ordered = ordered.view(ordered.dtype.str.replace("i", "u"))
+        return np.ascontiguousarray(ordered, dtype=ordered.dtype.newbyteorder("="))
 
 
 def _codec(page: TiffPage) -> Codec | None:

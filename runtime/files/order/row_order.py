@@ -63,20 +63,20 @@ def _shift_doubt(cells: Cells, steps: "_Steps") -> str:
     """Find rows that go on at another place than the rows above them ended, to the end."""
     width = cells.shape[1]
     least = _least_rows(len(cells))
-    shifts = [(above, row, _shift(cells[above], cells[row])) for above, row in _gaps(cells)]
-    breaks = [(above, row, shift) for above, row, shift in shifts if shift]
-    found = [
+    shifts = [(upper, row, _shift(cells[upper], cells[row])) for upper, row in _gaps(cells)]
+    breaks = [(upper, row, shift) for upper, row, shift in shifts if shift]
+    jumps = [
         (row, shift)
-        for above, row, shift in breaks
+        for upper, row, shift in breaks
         if least <= row <= len(cells) - least
         and steps.below(row)[0] < _SMOOTH_WRAP
-        and _moves_border(cells[above], cells[row], shift)
+        and _moves_border(cells[upper], cells[row], shift)
         and not any(_alike(shift, other, width) for _, at, other in breaks if at != row)
     ]
-    found = found[:1] or steps.seam()
-    if not found:
+    jumps = jumps[:1] or steps.seam()
+    if not jumps:
         return ""
-    ((row, shift),) = found
+    ((row, shift),) = jumps
     return (
         f"from {row / len(cells):.0%} of the height on the rows are shifted by "
         f"{shift / width:.0%} of the width: the pixel data are damaged"
@@ -86,8 +86,8 @@ def _shift_doubt(cells: Cells, steps: "_Steps") -> str:
 def _moves_border(above: NDArray[np.float32], below: NDArray[np.float32], shift: int) -> bool:
     """Return whether the ends of a row are those of the one above it shifted, not as it lies."""
     ends = np.r_[:_BORDER_CELLS, -_BORDER_CELLS:0]
-    moved = np.abs(below - np.roll(above, shift))[ends].mean()
-    return bool(moved < _CLEARLY * np.abs(below - above)[ends].mean())
+    shifted = np.abs(below - np.roll(above, shift))[ends].mean()
+    return bool(shifted < _CLEARLY * np.abs(below - above)[ends].mean())
 
 
 def _least_rows(height: int) -> int:
@@ -97,8 +97,8 @@ def _least_rows(height: int) -> int:
 
 def _alike(shift: int, other: int, width: int) -> bool:
     """Return whether two shifts are the same or take each other back, as those of patterns do."""
-    apart = ((shift - other) % width, (shift + other) % width)
-    return min(min(n, width - n) for n in apart) < _SAME_SHIFT * width
+    distances = ((shift - other) % width, (shift + other) % width)
+    return min(min(n, width - n) for n in distances) < _SAME_SHIFT * width
 
 
 def _skew_doubt(cells: Cells, steps: "_Steps") -> str:
@@ -223,10 +223,10 @@ def _shift(above: NDArray[np.float32], below: NDArray[np.float32]) -> int:
     best = int(np.argmax(match))
     clear = match[best] > max(_SHIFT_MATCH, float(one @ two) + _SHIFT_GAIN)
     # a slanting edge moves by a little from row to row too
-    far = _LEAST_SHIFT * one.size < best < (1 - _LEAST_SHIFT) * one.size
-    if not (clear and far):
+    is_far = _LEAST_SHIFT * one.size < best < (1 - _LEAST_SHIFT) * one.size
+    if not (clear and is_far):
         return 0
-    around = np.roll(match, -best)
-    after, before = (int(np.argmax(np.diff(side) > 0)) for side in (around, around[::-1]))
-    rest = around[after + 1 : one.size - before - 1]
+    rolled = np.roll(match, -best)
+    after, before = (int(np.argmax(np.diff(side) > 0)) for side in (rolled, rolled[::-1]))
+    rest = rolled[after + 1 : one.size - before - 1]
     return 0 if rest.size and rest.max() > match[best] - _ONE_SHIFT else best

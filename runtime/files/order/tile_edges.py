@@ -46,8 +46,8 @@ class TileGrid:
         size, first = self.size[axis], self.first[axis]
         if size < _LEAST_TILE * step:
             return []
-        found = (-(-(place - first) // step) for place in range(size, first + length * step, size))
-        return [cell for cell in found if _LEAST_TILE <= cell <= length - _LEAST_TILE]
+        starts = (-(-(place - first) // step) for place in range(size, first + length * step, size))
+        return [cell for cell in starts if _LEAST_TILE <= cell <= length - _LEAST_TILE]
 
 
 def tile_doubt(cells: NDArray[np.float32], grid: TileGrid, step: tuple[int, int]) -> str:
@@ -58,16 +58,14 @@ def tile_doubt(cells: NDArray[np.float32], grid: TileGrid, step: tuple[int, int]
         grid: Tiles in pixels.
         step: Pixels from one cell to the next, down and across.
     """
-    across = np.abs(np.diff(cells, axis=1))
-    across = np.minimum(
-        across / (across.mean(axis=1, keepdims=True) + np.float32(1e-4)), _MOST_STEP
-    )
+    steps = np.abs(np.diff(cells, axis=1))
+    steps = np.minimum(steps / (steps.mean(axis=1, keepdims=True) + np.float32(1e-4)), _MOST_STEP)
     rows = [0, *grid.borders(0, cells.shape[0], step[0]), cells.shape[0]]
     columns = grid.borders(1, cells.shape[1], step[1])
-    beside = np.unique([c + n for c in columns for n in (-2, -1, 0)]).astype(np.int64)
+    border_columns = np.unique([c + n for c in columns for n in (-2, -1, 0)]).astype(np.int64)
     for column in columns:
         for top, bottom in pairwise(rows):
-            if _edge_begins(across[top:bottom], column - 1, beside):
+            if _edge_begins(steps[top:bottom], column - 1, border_columns):
                 return (
                     f"the tile at {column / cells.shape[1]:.0%} of the width and "
                     f"{top / cells.shape[0]:.0%} of the height has an edge along its border: the "
@@ -76,13 +74,13 @@ def tile_doubt(cells: NDArray[np.float32], grid: TileGrid, step: tuple[int, int]
     return ""
 
 
-def _edge_begins(steps: Steps, column: int, beside: NDArray[np.int64]) -> bool:
+def _edge_begins(steps: Steps, column: int, border_columns: NDArray[np.int64]) -> bool:
     """Return whether from some row on, to the end, a column is an edge and few others are.
 
     Args:
         steps: (h, w) steps across of the rows of a tile.
         column: At the border of the tile.
-        beside: Columns at the borders of all tiles, which say nothing against it.
+        border_columns: Columns at the borders of all tiles, which say nothing against it.
     """
     height, width = steps.shape
     if height < _LEAST_TILE_ROWS:
@@ -92,7 +90,7 @@ def _edge_begins(steps: Steps, column: int, beside: NDArray[np.int64]) -> bool:
     above, below = sums[rows] / rows[:, None], (sums[-1] - sums[rows]) / (height - rows)[:, None]
     rise = below - above
     best = int(np.argmax(rise[:, column] * np.sqrt(rows * (height - rows))))
-    rest = np.delete(rise[best], beside)
+    rest = np.delete(rise[best], border_columns)
     last = max(_LEAST_ROWS, int(height - rows[best]) // 4)
     to_the_end = (sums[-1, column] - sums[-1 - last, column]) / last
     return bool(

@@ -23,9 +23,9 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
     if work.labels is None:
         return work, Decision(what="blocks", choice=f"all {count}", reason="no plain cells")
     reach = max((subject.reach_px(s) for s in work.sizes()), default=0)
-    kept = count - round(plain_share(work.labels, reach, rows, columns) * count)
+    restored = count - round(plain_share(work.labels, reach, rows, columns) * count)
     return work, Decision(
         what="blocks",
-        choice=f"{kept} of {count}",
+        choice=f"{restored} of {count}",
         reason="blocks that only plain cells use are not restored",
     )

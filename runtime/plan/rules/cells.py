@@ -32,8 +32,8 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
     if subject.content is None:
         reason = f"quality {subject.options.quality} skips nothing"
         return work, Decision(what="cells", choice="all full", reason=reason)
-    if seen := subject.global_text(subject.bundle.manifest.sizes):
-        reason = f"a network looks at the whole picture ({seen})"
+    if operators := subject.global_text(subject.bundle.manifest.sizes):
+        reason = f"a network looks at the whole picture ({operators})"
         return work, Decision(what="cells", choice="all full", reason=reason)
     if model is None:
         reason = "the bundle carries no calibrated plan (tools/plan_report.py calibrate writes it)"
@@ -49,8 +49,8 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
     with_small = replace(work, small=small)
     grid = _losses(losses, work.size, small, subject.content.shape)
     base = losses.extra.get(work.size)
-    spent = 0.0 if base is None else float(base.sum())
-    allowed = losses.allowed(subject.loss_db) - spent
+    base_loss = 0.0 if base is None else float(base.sum())
+    allowed = losses.allowed(subject.loss_db) - base_loss
     labels = None
     if allowed > 0:
         labels = choose_tiers(
@@ -65,7 +65,7 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
         what="cells",
         choice=", ".join(c for c in counts if not c.startswith("0 ")),
         reason=f"flat, dark or out of focus; predicted within {subject.loss_db:.3f} dB",
-        cost_db=losses.loss_db(spent + added) - losses.loss_db(spent),
+        cost_db=losses.loss_db(base_loss + added) - losses.loss_db(base_loss),
     )
 
 
@@ -73,8 +73,8 @@ def _smaller(subject: Subject, work: Work, losses: CellLosses) -> str | None:
     """Return the smallest calibrated size below the one in use."""
     manifest = subject.bundle.manifest
     mac = {size: manifest.mac_per_pixel(size) for size in manifest.sizes}
-    known = [size for size in mac if size in losses.extra and mac[size] < mac[work.size]]
-    return min(known, key=lambda size: mac[size]) if known else None
+    calibrated = [size for size in mac if size in losses.extra and mac[size] < mac[work.size]]
+    return min(calibrated, key=lambda size: mac[size]) if calibrated else None
 
 
 def _losses(losses: CellLosses, size: str, small: str | None, shape: tuple[int, int]) -> FloatGrid:

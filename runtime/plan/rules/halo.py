@@ -14,8 +14,8 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
     With less, pixels near a window's border would depend on where the windows lie, that is on tile
     size and memory cap; for a few percent of the network's time that promise is not given up.
     """
-    if work.networks and work.mode == "exact" and (seen := subject.global_text(work.sizes())):
-        reason = f"the network looks at the whole picture ({seen})"
+    if work.networks and work.mode == "exact" and (operators := subject.global_text(work.sizes())):
+        reason = f"the network looks at the whole picture ({operators})"
         return work, Decision(what="halo", choice="one window", reason=reason)
     if not work.networks or subject.role is None:
         return work, None

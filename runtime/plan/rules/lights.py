@@ -37,11 +37,11 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
             what="lights", choice="no network", reason="nothing clipped"
         )
     labels = np.full(shape, FULL, np.int8) if work.labels is None else work.labels
-    kept = np.where(near, labels, PLAIN).astype(np.int8)
-    count = int((kept != PLAIN).sum())
-    return replace(work, labels=kept), Decision(
+    near_labels = np.where(near, labels, PLAIN).astype(np.int8)
+    count = int((near_labels != PLAIN).sum())
+    return replace(work, labels=near_labels), Decision(
         what="lights",
-        choice=f"{count} of {kept.size} cells",
+        choice=f"{count} of {near_labels.size} cells",
         reason=f"the network changes nothing farther than {reaches_px[0]} px from a light",
     )
 

@@ -28,8 +28,8 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
         reason = f"quality {subject.options.quality} skips nothing"
         return work, Decision(what="undistortion", choice="yes", reason=reason)
     if shift_px >= LEAST_SHIFT_PX:
-        by = CUBIC if stage.interpolation == "cubic" else ""
-        reason = f"pixels move by up to {shift_px:.1f} px{by}"
+        cause = CUBIC if stage.interpolation == "cubic" else ""
+        reason = f"pixels move by up to {shift_px:.1f} px{cause}"
         return work, Decision(what="undistortion", choice="yes", reason=reason)
     return replace(work, left_out=work.left_out | {stage.type}), Decision(
         what="undistortion",
@@ -45,8 +45,8 @@ def largest_shift_px(subject: Subject) -> float:
     x, y = np.meshgrid(
         np.linspace(0, subject.width_px - 1, _NODES), np.linspace(0, subject.height_px - 1, _NODES)
     )
-    moved = [
+    shifts = [
         np.hypot(*np.moveaxis(warp.positions(c, x, y) - np.stack([x, y], -1), -1, 0))
         for c in range(warp.channels)
     ]
-    return float(np.max(moved))
+    return float(np.max(shifts))

@@ -58,8 +58,8 @@ class Darkroom:
     @cached_property
     def isos(self) -> tuple[float, float]:
         """Lowest and highest ISO that the bundle states."""
-        known = [entry.iso for entry in light_sensor(self.bundle.manifest).noise]
-        return min(known), max(known)
+        isos = [entry.iso for entry in light_sensor(self.bundle.manifest).noise]
+        return min(isos), max(isos)
 
     @cached_property
     def depth_mm(self) -> float | None:
@@ -82,8 +82,8 @@ class Darkroom:
 
     def _undistorted(self) -> dict[str, Any]:
         """Return the options of pictures that lie where their scene does: without distortion."""
-        known = known_options(self.bundle.manifest.stages)
-        return {"undistort": False} if "undistort" in known else {}
+        names = known_options(self.bundle.manifest.stages)
+        return {"undistort": False} if "undistort" in names else {}
 
     def origin_px(self, place: str, size_px: tuple[int, int]) -> tuple[int, int] | None:
         """Return the place of a crop of (height, width); None for a sensor of any size."""

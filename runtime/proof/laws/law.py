@@ -33,7 +33,7 @@ class Law:
     where: str = ""
 
     @property
-    def kept(self) -> bool:
+    def is_kept(self) -> bool:
         """Return whether the law is kept; NaN breaks it."""
         return self.worst <= self.limit
 
@@ -45,21 +45,21 @@ class Law:
     def describe(self) -> str:
         """Return the law in words."""
         front = "" if self.front is None else f", front end {number_text(self.front, self.unit)}"
-        where = f", {self.where}" if self.where and not self.kept else ""
-        said = (
+        where = f", {self.where}" if self.where and not self.is_kept else ""
+        verdict = (
             ""
-            if self.kept
+            if self.is_kept
             else f" BROKEN (at most {number_text(self.limit, self.unit)}{front}{where})"
         )
-        return f"{self.name.replace('_', ' ')} {number_text(self.worst, self.unit)}{said}"
+        return f"{self.name.replace('_', ' ')} {number_text(self.worst, self.unit)}{verdict}"
 
-    def stated(self) -> StatedLaw:
+    def to_stated(self) -> StatedLaw:
         """Return the manifest's entry of the law."""
         return StatedLaw(
             worst=round(self.worst, 6),
             limit=round(self.limit, 6),
             unit=self.unit,
-            kept=self.kept,
+            kept=self.is_kept,
         )
 
     def to_json(self) -> dict[str, Any]:
@@ -71,7 +71,7 @@ class Law:
             "unit": self.unit,
             "front_end": None if self.front is None else round(self.front, 6),
             "where": self.where,
-            "kept": self.kept,
+            "kept": self.is_kept,
         }
 
 

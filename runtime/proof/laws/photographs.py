@@ -59,13 +59,13 @@ def picture_laws(bundle: Bundle, size: str | None, threads: int) -> tuple[Law, .
     room = Darkroom(bundle=bundle, size=size, threads=threads)
     ranges = _Ranges(bundle)
     scenes = list(_scenes(room))
-    ranges.add(exposed for _, exposed in scenes)
+    ranges.add(shot for _, shot in scenes)
     laws = (
         *_white(room, ranges),
         _flat(room, ranges),
         _double(room),
         _better(scenes),
-        _borders(exposed for _, exposed in scenes),
+        _borders(shot for _, shot in scenes),
     )
     return (*laws, *ranges.laws())
 
@@ -104,20 +104,20 @@ def _white(room: Darkroom, ranges: _Ranges) -> tuple[Law, ...]:
     chart = lamp_chart()
     worst: dict[str, Law] = {}
     for place in ("middle", "corner"):
-        seen = room.expose(chart.scene, place, iso=room.isos[0])
-        ranges.add([seen])
-        white = seen.truth.min(axis=0) >= 1
+        shot = room.expose(chart.scene, place, iso=room.isos[0])
+        ranges.add([shot])
+        white = shot.truth.min(axis=0) >= 1
         for number, name in enumerate(chart.names, start=1):
             lit = white & (chart.labels == number)
             if not lit.any():
                 continue
-            for law, (below, admitted) in DARK.items():
+            for law, (threshold, admitted) in DARK.items():
                 dark, front = (
-                    int(np.count_nonzero(picture.min(axis=0)[lit] < below))
-                    for picture in (seen.network, seen.front)
+                    int(np.count_nonzero(picture.min(axis=0)[lit] < threshold))
+                    for picture in (shot.network, shot.front)
                 )
                 pixels = int(np.count_nonzero(lit))
-                found = Law(
+                candidate = Law(
                     name=law,
                     worst=dark / pixels,
                     limit=max(admitted, (front + 1) / pixels),
@@ -125,8 +125,8 @@ def _white(room: Darkroom, ranges: _Ranges) -> tuple[Law, ...]:
                     front=front / pixels,
                     where=f"{name}, {place}",
                 )
-                if law not in worst or found.excess > worst[law].excess:
-                    worst[law] = found
+                if law not in worst or candidate.excess > worst[law].excess:
+                    worst[law] = candidate
     return tuple(worst.values())
 
 
@@ -138,18 +138,26 @@ def _flat(room: Darkroom, ranges: _Ranges) -> Law:
         inside = [chart.labels == number for number in range(1, len(chart.names) + 1)]
         for place in PLACES:
             for iso in room.isos:
-                seen = room.expose(chart.scene, place, iso=iso)
-                ranges.add([seen])
+                shot = room.expose(chart.scene, place, iso=iso)
+                ranges.add([shot])
                 for where, name in zip(inside, chart.names, strict=True):
-                    true, made, front = (
+                    true, network, front = (
                         picture[:, where].mean(axis=1)
-                        for picture in (seen.truth, seen.network, seen.front)
+                        for picture in (shot.truth, shot.network, shot.front)
                     )
-                    off, before = (np.abs(x - true).max() / true.max() for x in (made, front))
-                    found = float(off - before), float(before), f"{name}, {place}, ISO {iso:g}"
-                    worst = max(worst, found)
-    more, before, where = worst
-    return Law(name="flat", worst=max(more, 0.0), limit=FLAT, unit=SHARE, front=before, where=where)
+                    error, front_error = (
+                        np.abs(x - true).max() / true.max() for x in (network, front)
+                    )
+                    candidate = (
+                        float(error - front_error),
+                        float(front_error),
+                        f"{name}, {place}, ISO {iso:g}",
+                    )
+                    worst = max(worst, candidate)
+    more, front_error, where = worst
+    return Law(
+        name="flat", worst=max(more, 0.0), limit=FLAT, unit=SHARE, front=front_error, where=where
+    )
 
 
 def _double(room: Darkroom) -> Law:
@@ -159,11 +167,11 @@ def _double(room: Darkroom) -> Law:
         room.expose(scene * np.float32(share), "middle", iso=room.isos[0], noise=False)
         for share in (0.2, 0.4)
     ]
-    made, front = (
-        _most_unlike(*(_blocks(getattr(seen, name)) for seen in pair))
+    network, front = (
+        _most_unlike(*(_blocks(getattr(shot, name)) for shot in pair))
         for name in ("light", "front_light")
     )
-    return Law(name="double", worst=made, limit=max(DOUBLE, front), unit=SHARE, front=front)
+    return Law(name="double", worst=network, limit=max(DOUBLE, front), unit=SHARE, front=front)
 
 
 def _most_unlike(once: FloatArray, twice: FloatArray) -> float:
@@ -173,9 +181,9 @@ def _most_unlike(once: FloatArray, twice: FloatArray) -> float:
     much as a network.
     """
     level = 2 * once.max(axis=0)
-    off = np.abs(twice - 2 * once).max(axis=0)
+    error = np.abs(twice - 2 * once).max(axis=0)
     lit = level > 0.02
-    return float(np.quantile(off[lit] / level[lit], SURE))
+    return float(np.quantile(error[lit] / level[lit], SURE))
 
 
 def _blocks(light: FloatArray) -> FloatArray:
@@ -201,8 +209,8 @@ def _better(scenes: list[tuple[str, Exposed]]) -> Law:
     for place in PLACES:
         gains = np.array(
             [
-                _psnr(seen.network, seen.truth) - _psnr(seen.front, seen.truth)
-                for zone, seen in scenes
+                _psnr(shot.network, shot.truth) - _psnr(shot.front, shot.truth)
+                for zone, shot in scenes
                 if zone == place
             ]
         )
@@ -217,21 +225,21 @@ def _psnr(picture: FloatArray, truth: FloatArray) -> float:
 
 
 def _gap(picture: FloatArray, truth: FloatArray) -> FloatArray:
-    shown, wanted = (encode_srgb(np.clip(x, 0, 1)) for x in (picture, truth))
-    return np.asarray(shown - wanted, np.float64)
+    picture_codes, truth_codes = (encode_srgb(np.clip(x, 0, 1)) for x in (picture, truth))
+    return np.asarray(picture_codes - truth_codes, np.float64)
 
 
 def _borders(pictures: Iterable[Exposed]) -> Law:
     """Compare the error of the rim with that of the middle."""
     sums = np.zeros((2, 2))
-    for seen in pictures:
-        for row, picture in enumerate((seen.network, seen.front)):
-            squared = np.square(_gap(picture, seen.truth)).mean(axis=0)
+    for shot in pictures:
+        for row, picture in enumerate((shot.network, shot.front)):
+            squared = np.square(_gap(picture, shot.truth)).mean(axis=0)
             middle = squared[RIM_PX:-RIM_PX, RIM_PX:-RIM_PX]
             rim = (squared.sum() - middle.sum()) / (squared.size - middle.size)
             sums[row] += rim, middle.mean()
-    made, front = (float(np.sqrt(rim / max(middle, 1e-12))) for rim, middle in sums)
-    return Law(name="borders", worst=made, limit=max(BORDERS, front), unit="times", front=front)
+    network, front = (float(np.sqrt(rim / max(middle, 1e-12))) for rim, middle in sums)
+    return Law(name="borders", worst=network, limit=max(BORDERS, front), unit="times", front=front)
 
 
 LAWS: Final = picture_laws

@@ -28,35 +28,35 @@ class BrokenLawsError(ParityError):
         self.facts = facts
 
 
-Found = Mapping[str | None, tuple[Law, ...]] | str
+MeasuredLaws = Mapping[str | None, tuple[Law, ...]] | str
 """Size -> laws, None for a bundle without networks; or why none can be held."""
 
 
-def measure_laws(bundle: Bundle, *, threads: int = 1) -> Found:
+def measure_laws(bundle: Bundle, *, threads: int = 1) -> MeasuredLaws:
     """Measure the laws for every size of a bundle."""
     module = import_module(part_of(bundle.manifest).laws)
     laws = cast("Laws", module.LAWS)
-    found: dict[str | None, tuple[Law, ...]] = {}
+    laws_by_size: dict[str | None, tuple[Law, ...]] = {}
     for size in counted(bundle.manifest.sizes or (None,), "measuring laws", "sizes"):
-        made = laws(bundle, size, threads)
-        if isinstance(made, str):
-            return made
-        found[size] = made
-    return found
+        measured = laws(bundle, size, threads)
+        if isinstance(measured, str):
+            return measured
+        laws_by_size[size] = measured
+    return laws_by_size
 
 
-def with_laws(manifest: Manifest, found: Found) -> Manifest:
+def with_laws(manifest: Manifest, measured: MeasuredLaws) -> Manifest:
     """Return a manifest that states laws; as it is where none can be held."""
-    if isinstance(found, str):
+    if isinstance(measured, str):
         return manifest
-    stated = {
-        size: {law.name: law.stated() for law in laws}
-        for size, laws in found.items()
+    entries = {
+        size: {law.name: law.to_stated() for law in laws}
+        for size, laws in measured.items()
         if size is not None
     }
     version = max(manifest.version_pair, LIGHT_VERSION)
     return manifest.model_copy(
-        update={"laws": stated, "format_version": ".".join(map(str, version))}
+        update={"laws": entries, "format_version": ".".join(map(str, version))}
     )
 
 
@@ -68,26 +68,26 @@ def prove_laws(
     Raises:
         BrokenLawsError: If a law is broken that the bundle does not state as broken so far.
     """
-    found = measure_laws(bundle, threads=threads)
-    if isinstance(found, str):
-        return False, found
+    measured = measure_laws(bundle, threads=threads)
+    if isinstance(measured, str):
+        return False, measured
     facts, unstated, lines = [], [], []
-    for size, laws in found.items():
-        stated = (bundle.manifest.laws or {}).get(size or "", {})
+    for size, laws in measured.items():
+        entries = (bundle.manifest.laws or {}).get(size or "", {})
         facts += [{"size": size} | law.to_json() for law in laws]
-        unstated += [f"{size}: {law.describe()}" for law in laws if not _is_stated(law, stated)]
+        unstated += [f"{size}: {law.describe()}" for law in laws if not _is_stated(law, entries)]
         lines.append("".join([f"{size}: " if size else "", ", ".join(map(_line, laws))]))
     if unstated:
         raise BrokenLawsError("; ".join(unstated), facts)
     return True, "; ".join(lines), facts
 
 
-def _is_stated(law: Law, stated: Mapping[str, StatedLaw]) -> bool:
+def _is_stated(law: Law, entries: Mapping[str, StatedLaw]) -> bool:
     """Return whether a law is kept, or broken no further than is stated."""
-    if law.kept:
+    if law.is_kept:
         return True
-    known = stated.get(law.name)
-    return known is not None and not known.kept and law.worst <= SLACK * known.worst
+    entry = entries.get(law.name)
+    return entry is not None and not entry.kept and law.worst <= SLACK * entry.worst
 
 
 def _line(law: Law) -> str:

@@ -80,19 +80,19 @@ def _found(
 @pytest.mark.parametrize("step", [0, 3, 8, 12, 16])
 @pytest.mark.parametrize("cfa", [CFA, "GBRG", None])
 def test_the_distance_of_a_scene_is_found(step: int, cfa: CfaPattern | None) -> None:
-    planes = _blurred(_scene((512, 768), step), KNOWN.of(step))
+    planes = _blurred(_scene((512, 768), step), KNOWN.at_step(step))
     found = _found(planes, cfa)
     assert np.abs(found.values - KNOWN.nearness[step]).max() < 1.5 * np.diff(KNOWN.nearness)[0]
 
 
 def test_two_distances_in_one_scene_are_told_apart() -> None:
     scene = _scene((800, 1600), 3)
-    near, far = (_blurred(scene, KNOWN.of(step)) for step in (14, 2))
+    near, far = (_blurred(scene, KNOWN.at_step(step)) for step in (14, 2))
     found = _found(np.concatenate([near[..., :800], far[..., 800:]], axis=-1), CFA)
     step = np.diff(KNOWN.nearness)[0]
     assert abs(found.at(100, 400) - KNOWN.nearness[14]) < 2 * step
     assert abs(found.at(1500, 400) - KNOWN.nearness[2]) < 2 * step
-    choice = KNOWN.over(found)
+    choice = KNOWN.of_scene(found)
     assert choice.number_at(100, 400) > 11
     assert choice.number_at(1500, 400) < 5
 
@@ -108,7 +108,7 @@ def test_likelihoods_are_those_of_students_distribution_written_out() -> None:
         places=whole.places[:4],
         weight=whole.weight[:4],
         fall=whole.fall[:4],
-        moved=whole.moved[:, :4],
+        phases=whole.phases[:, :4],
     )
     otf = np.stack(
         [few.of(to_otf(k.at(0, 0), distance.BLOCK_CELLS)) for k in distance._coarse(KNOWN)]
@@ -128,7 +128,7 @@ def test_likelihoods_are_those_of_students_distribution_written_out() -> None:
             for k in range(4):
                 h, scale = transfer[:, k], power * few.fall[k]
                 covariance = scale * np.outer(h, h.conj()) + np.diag(
-                    scale * (distance.OWN * np.abs(h) ** 2 + distance.MISTRUST) + variance
+                    scale * (distance.COLOUR_POWER * np.abs(h) ** 2 + distance.MISTRUST) + variance
                 )
                 y = seen[:, k]
                 misfit = (y.conj() @ np.linalg.solve(covariance, y)).real
@@ -153,7 +153,7 @@ def test_a_wrong_kernel_of_a_known_depth_is_no_less_likely_than_the_mixtures_bes
 
 
 def test_a_few_frequencies_that_no_power_foresees_do_not_decide() -> None:
-    planes = _blurred(_scene((512, 768), 11), KNOWN.of(8))
+    planes = _blurred(_scene((512, 768), 11), KNOWN.at_step(8))
     across = np.arange(768, dtype=np.float32)
     grating = 0.15 * np.sin(2 * np.pi * 0.06 * across) * np.array([[[1.0]], [[-1.0]], [[0.3]]])
     found = _found((planes + grating).astype(np.float32), CFA)
@@ -161,7 +161,7 @@ def test_a_few_frequencies_that_no_power_foresees_do_not_decide() -> None:
 
 
 def test_what_clipped_is_not_asked_and_its_neighbours_answer() -> None:
-    planes = _blurred(_scene((512, 1600), 4), KNOWN.of(12))
+    planes = _blurred(_scene((512, 1600), 4), KNOWN.at_step(12))
     clipped = np.zeros((1, 512, 1600), np.bool_)
     clipped[..., :400] = True
     found = _found(np.where(clipped, 1, planes).astype(np.float32), CFA, clipped)
@@ -170,7 +170,7 @@ def test_what_clipped_is_not_asked_and_its_neighbours_answer() -> None:
 
 def test_a_capture_with_clipped_highlights_tells_its_distance() -> None:
     """A tenth of the samples clips, a few in every block."""
-    planes = _blurred(_scene((512, 768), 4), KNOWN.of(12))
+    planes = _blurred(_scene((512, 768), 4), KNOWN.at_step(12))
     white = np.quantile(planes[1], 0.9)
     clipped = (planes >= white).any(axis=0, keepdims=True)
     found = _found(np.minimum(planes, white).astype(np.float32), CFA, clipped)
@@ -181,7 +181,7 @@ def test_where_nothing_tells_the_distance_kernels_are_the_mean() -> None:
     everywhere = np.ones((1, 512, 512), np.bool_)
     found = _found(np.ones((3, 512, 512), np.float32), CFA, everywhere)
     assert np.isnan(found.values).all()
-    assert KNOWN.over(found).number_at(100, 400) == MEAN
+    assert KNOWN.of_scene(found).number_at(100, 400) == MEAN
 
 
 def test_even_odds_tell_nothing_and_one_sided_odds_do() -> None:
@@ -195,7 +195,7 @@ def test_even_odds_tell_nothing_and_one_sided_odds_do() -> None:
 def test_captures_of_any_size_have_a_distance(side: tuple[int, int]) -> None:
     found = _found(_scene(side, 6), CFA)
     for x_px, y_px in itertools.product((0, side[1] - 1), (0, side[0] - 1)):
-        assert MEAN <= KNOWN.over(found).number_at(x_px, y_px) < KNOWN.nearness.size
+        assert MEAN <= KNOWN.of_scene(found).number_at(x_px, y_px) < KNOWN.nearness.size
 
 
 @pytest.mark.parametrize(
@@ -206,5 +206,5 @@ def test_blocks_that_are_asked_cover_the_capture(size_px: tuple[int, int], block
 
 
 def test_threads_do_not_change_a_bit() -> None:
-    planes = _blurred(_scene((512, 900), 7), KNOWN.of(5))
+    planes = _blurred(_scene((512, 900), 7), KNOWN.at_step(5))
     np.testing.assert_array_equal(_found(planes, CFA).values, _found(planes, CFA, threads=3).values)

@@ -56,7 +56,7 @@ def test_every_known_distance_is_a_step_and_steps_between_are_even(
 
 def test_a_known_distance_has_its_own_kernels_and_no_mixture() -> None:
     for depth_mm in DEPTHS_MM:
-        found = KNOWN.of(KNOWN.step_of(1 / depth_mm))
+        found = KNOWN.at_step(KNOWN.step_of(1 / depth_mm))
         np.testing.assert_array_equal(found.kernels, _kernels(float(depth_mm)).kernels)
 
 
@@ -65,14 +65,14 @@ def test_kernels_of_a_step_are_linear_in_nearness_and_keep_their_light() -> None
         shares = depth_weights(DEPTHS_MM, 1 / nearness)
         np.testing.assert_allclose(KNOWN.weights[step], shares, atol=1e-12)
         mixed = sum(s * k.kernels for s, k in zip(shares, map(_kernels, DEPTHS_MM), strict=True))
-        np.testing.assert_allclose(KNOWN.of(step).kernels, mixed, atol=1e-7)
+        np.testing.assert_allclose(KNOWN.at_step(step).kernels, mixed, atol=1e-7)
 
 
 def test_kernels_where_nothing_tells_the_distance_are_the_mean() -> None:
     assert KNOWN.step_of(np.nan) == MEAN
     mean = np.mean([_kernels(float(d)).kernels for d in DEPTHS_MM], axis=0)
-    np.testing.assert_allclose(KNOWN.of(MEAN).kernels, mean, atol=1e-7)
-    beside = KNOWN.over(_map(1 / 500, np.nan))
+    np.testing.assert_allclose(KNOWN.at_step(MEAN).kernels, mean, atol=1e-7)
+    beside = KNOWN.of_scene(_map(1 / 500, np.nan))
     assert beside.number_at(0, 0) == KNOWN.nearness.size - 1
     assert beside.number_at(40, 0) == KNOWN.nearness.size - 1
     assert beside.number_at(60, 0) == beside.number_at(100, 0) == MEAN

@@ -14,7 +14,7 @@ def test_attributes_have_the_names_of_the_standard() -> None:
     assert found["capDate"] == b"2024:05:06 07:08:09"
     assert found["utcOffset"] == 12600.0, "what is added to local time gives UTC"
     assert found["isoSpeed"] == 3200.0
-    assert len(found) == len(FULL.stated()) - 1, "the artist has no attribute"
+    assert len(found) == len(FULL.to_json()) - 1, "the artist has no attribute"
     assert exr_attributes(Metadata()) == {}
 
 

@@ -91,4 +91,4 @@ def test_no_tags_end_in_anything_but_values_doubts_and_refusals(directories):
     assert place.origin_px is None or min(place.origin_px) >= 0
     metadata = metadata_of(tags)
     assert raw_tags.camera_name(tags, metadata).isprintable()
-    assert all(math.isfinite(v) for v in metadata.stated().values() if not isinstance(v, str))
+    assert all(math.isfinite(v) for v in metadata.to_json().values() if not isinstance(v, str))

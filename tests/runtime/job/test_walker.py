@@ -265,7 +265,7 @@ def test_from_a_plane_that_is_kept_on_the_walk_gives_the_same_bits(
     kept = first.keep(plane)
     ran = _ran(monkeypatch, *(stage.type for stage in bundle.manifest.stages))
     pipeline = Pipeline(bundle, Options(threads=2))
-    again = pipeline.start(_broken(), known={plane: kept})
+    again = pipeline.start(_broken(), known_planes={plane: kept})
     np.testing.assert_array_equal(again.fill(), wanted)
     types = [stage.type for stage in bundle.manifest.stages]
     giver = next((n for n, s in enumerate(bundle.manifest.stages) if plane in s.gives), -1)

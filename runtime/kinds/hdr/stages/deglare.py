@@ -40,8 +40,8 @@ def prepare(entry: Deglare, job: Job) -> StageWork:
     )
     glares: list[Glare] = []
 
-    def run(inputs: Sequence[Stream]) -> tuple[Stream, ...]:
-        (picture,) = inputs
+    def run(streams: Sequence[Stream]) -> tuple[Stream, ...]:
+        (picture,) = streams
         return (picture.with_bands(_cleared(picture, job, entry.takes[0], settings, glares)),)
 
     return StageWork(

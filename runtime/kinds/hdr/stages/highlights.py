@@ -67,13 +67,13 @@ def prepare(entry: Highlights, job: Job) -> StageWork:
             f"clipped lights are not restored: that needs {LEAST_PX} px on each side, and the "
             f"picture has {width} x {height}"
         )
-        return StageWork(run=lambda inputs: (inputs[0],), warnings=lambda: (note,))
+        return StageWork(run=lambda streams: (streams[0],), warnings=lambda: (note,))
     notes: list[str] = []
 
     method = job.options.demosaic or entry.method
 
-    def run(inputs: Sequence[Stream]) -> tuple[Stream, ...]:
-        picture, *samples = inputs
+    def run(streams: Sequence[Stream]) -> tuple[Stream, ...]:
+        picture, *samples = streams
         if not samples or samples[0].plane.channels != MOSAIC:
             bands = _painted(picture, job, (light, mask), notes)
         else:
@@ -136,7 +136,7 @@ def _bands_painted(picture: Stream, painter: Painter, job: Job) -> Iterator[Rows
 
 
 def _from_samples(
-    inputs: list[Stream],
+    streams: list[Stream],
     job: Job,
     looked_at: tuple[str, str],
     notes: list[str],
@@ -145,14 +145,14 @@ def _from_samples(
     """Yield the bands of a picture whose streaks are taken from its mosaic.
 
     Args:
-        inputs: The picture and its mosaic; emptied, since rows are kept for all who hold a stream.
+        streams: The picture and its mosaic; emptied, since rows are kept for all who hold a stream.
         job: The capture.
         looked_at: Planes of light and of what clipped.
         notes: For what the search has to say.
         method: Of the demosaic.
     """
     painter = _painter(job, looked_at, notes, least_samples=1)
-    mosaic, picture = inputs.pop(), inputs.pop()
+    mosaic, picture = streams.pop(), streams.pop()
     if painter.blind:
         del mosaic
         yield from _bands_painted(picture, painter, job)

@@ -54,14 +54,16 @@ class Settings:
         """
         file = _timing_file(options, capture)
         method: Method = next((m for m in METHODS if m == options.method), "log")
-        pool: Pool = options.chosen("pool") or "auto"  # type: ignore[assignment]
+        pool: Pool = options.kind_choice("pool") or "auto"  # type: ignore[assignment]
         finer: Finer | None = next((way for way in FINER if way == options.method), None)
-        depth_options = [name for name in ("pool", "returns") if options.chosen(name) is not None]
+        depth_options = [
+            name for name in ("pool", "returns") if options.kind_choice(name) is not None
+        ]
         if options.method is not None and finer is None:
             depth_options.insert(0, "method")
         return cls(
-            product=options.chosen("product"),  # type: ignore[arg-type]
-            way=Way(method=method, pool=pool, returns=int(options.chosen("returns") or 1)),
+            product=options.kind_choice("product"),  # type: ignore[arg-type]
+            way=Way(method=method, pool=pool, returns=int(options.kind_choice("returns") or 1)),
             depth_options=tuple(depth_options),
             timing=Timing() if file is None else read_timing(file),
             max_mem_bytes=options.max_mem_bytes or DEFAULT_MAX_MEM_BYTES,
@@ -108,7 +110,7 @@ def _digest(file: Path) -> str:
 
 def _timing_file(options: Options, capture: Path | None) -> Path | None:
     """Return the timing file that was named, else that beside the capture, if one lies there."""
-    name = options.chosen("timing")
+    name = options.kind_choice("timing")
     if name is not None:
         return Path(name)
     path = None if capture is None else timing_beside(capture)

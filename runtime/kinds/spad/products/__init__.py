@@ -79,13 +79,13 @@ def _stem(path: Path) -> str:
 
 
 def _side_suffixes(options: Options) -> tuple[str, ...]:
-    return SIDE_SUFFIXES[options.chosen("product")]
+    return SIDE_SUFFIXES[options.kind_choice("product")]
 
 
 OUTPUTS: Final = product_outputs(
     make,
     suffix=".npz",
-    beside=_side_suffixes,
+    extra_suffixes=_side_suffixes,
     formats={"exr": ".exr", "tiff": ".tif"},
     identity=identity,
     stem=_stem,

@@ -49,7 +49,7 @@ def _decisions(job: Job, capture: PhotonCapture) -> Iterator[Choice]:
     )
     yield "product", capture.product, of_file if settings.product is None else "asked"
     if (file := settings.timing_file) is not None:
-        is_named = job.options.chosen("timing") is not None
+        is_named = job.options.kind_choice("timing") is not None
         yield "timing", file.name, "asked" if is_named else "lies beside the capture"
     finer = [stage for stage in job.setup.stages if isinstance(stage, SuperResolve)]
     if capture.product == "depth":

@@ -19,8 +19,8 @@ def prepare(_entry: Correct, job: Job) -> StageWork:
     """Make ready; the maps of the capture are read with its first row."""
     capture = photons_of(job)
 
-    def run(inputs: Sequence[Stream]) -> tuple[Stream, ...]:
-        (counts,) = inputs
+    def run(streams: Sequence[Stream]) -> tuple[Stream, ...]:
+        (counts,) = streams
         rows = CorrectedRows(counts.rows(), capture, owned=counts.gives_own_rows)
         plane = counts.plane.model_copy(update={"type": "float32"})
         return (replace(counts.with_source(rows), plane=plane, facts=rows.pixels),)

@@ -64,8 +64,8 @@ class Decays:
 def prepare(entry: Lifetime, job: Job) -> StageWork:
     """Make ready; nothing is fitted before the first row is asked for."""
 
-    def run(inputs: Sequence[Stream]) -> tuple[Stream, ...]:
-        (photons,) = inputs
+    def run(streams: Sequence[Stream]) -> tuple[Stream, ...]:
+        (photons,) = streams
         decays = Decays(_window(photons_of(job)), photons)
         bands = _fitted(entry, job, photons, decays)
         plane = photons.plane.model_copy(update={"axes": "y x", "domain": "lifetime"})

@@ -56,8 +56,8 @@ class Depths:
 def prepare(entry: Sharpen, job: Job) -> StageWork:
     """Make ready; the bank is made when the first row is asked for."""
 
-    def run(inputs: Sequence[Stream]) -> tuple[Stream, ...]:
-        (photons,) = inputs
+    def run(streams: Sequence[Stream]) -> tuple[Stream, ...]:
+        (photons,) = streams
         depths = Depths(pixels=Pixels.of(photons))
         is_finer = isinstance(photons.facts, TimedBins)
         bands = (

@@ -35,8 +35,8 @@ def prepare(entry: SuperResolve, job: Job) -> StageWork:
     """Make ready; an array behind a plate is small, and made finer whole."""
     capture, camera = photons_of(job), camera_of(entry, job)
 
-    def run(inputs: Sequence[Stream]) -> tuple[Stream, ...]:
-        (photons,) = inputs
+    def run(streams: Sequence[Stream]) -> tuple[Stream, ...]:
+        (photons,) = streams
         count, height, width = photons.shape
         has_times = capture.product == "depth"
         shape = 1 if is_summed(capture) else count, camera.scale * height, camera.scale * width
@@ -64,9 +64,9 @@ def size_of_network(camera: FineCamera, capture: PhotonCapture) -> str | None:
     return camera.size_of_bins(size) if capture.product == "depth" else camera.size(size)
 
 
-def given_rows(_entry: SuperResolve, job: Job, inputs: Sequence[Stream]) -> RowSource:
+def given_rows(_entry: SuperResolve, job: Job, streams: Sequence[Stream]) -> RowSource:
     """Return light and noise of the photons of all times, as a network is given them."""
-    (photons,) = inputs
+    (photons,) = streams
     frames, dark = _frames_and_dark(photons, photons_of(job))
     light = frames.sum(axis=0)
     return ArrayRows(network_planes(light, white_of(light), dark))

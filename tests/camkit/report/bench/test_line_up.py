@@ -46,7 +46,7 @@ def test_a_dng_is_developed_without_its_bundle_and_other_captures_with_it(
     entrant = Entrant(label="tiny", bundle=bundle, camera="tiny")
     asked = Axes(methods=("develop",))
     assert [trial.path for trial in make_trials([entrant], asked, GROUND)[0]] == [None]
-    part = replace(part_of(bundle.manifest), suffix=".tif")
+    part = replace(part_of(bundle.manifest), suffixes=(".tif",))
     monkeypatch.setattr(common_rows, "part_of", lambda _manifest: part)
     assert [trial.path for trial in make_trials([entrant], asked, GROUND)[0]] == [bundle.path]
 

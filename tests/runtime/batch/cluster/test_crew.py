@@ -190,7 +190,7 @@ def test_looking_takes_a_small_share_of_the_time(tmp_path: Path) -> None:
     )
     workers, slow = crew.Crew(needs, {}, print), _Slow()
     assert workers.look(slow)  # type: ignore[arg-type]
-    workers.placed(slow)  # type: ignore[arg-type]
+    workers.tasks_by_worker(slow)  # type: ignore[arg-type]
     time.sleep(1.1)
     assert not workers.look(slow), "a second is not enough"  # type: ignore[arg-type]
     assert workers.look(slow, now=True)  # type: ignore[arg-type]

@@ -49,7 +49,7 @@ def test_the_probe_is_larger_than_a_window(bundle: Bundle) -> None:
 
 
 def test_a_bundle_of_photons_passes_its_check(bundle: Bundle) -> None:
-    report = check_bundle(bundle.path, run=case_work, without=("laws",))
+    report = check_bundle(bundle.path, run=case_work, left_out=("laws",))
     assert report.passed, report.lines()
 
 

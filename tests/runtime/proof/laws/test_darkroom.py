@@ -67,6 +67,6 @@ def test_duet_keeps_what_it_states(size: str) -> None:
     assert not isinstance(laws, str)
     stated = (bundle.manifest.laws or {})[size]
     assert {law.name for law in laws} == set(stated)
-    broken = {law.name for law in laws if not law.kept}
+    broken = {law.name for law in laws if not law.is_kept}
     assert broken <= {name for name, law in stated.items() if not law.kept}
     assert "flat" not in broken

@@ -90,7 +90,7 @@ def _with_a_rim(scene: Array) -> Array:
 
 
 def test_a_camera_that_gives_the_truth_keeps_every_law() -> None:
-    assert all(law.kept for law in _laws(lambda scene: scene).values())
+    assert all(law.is_kept for law in _laws(lambda scene: scene).values())
 
 
 @pytest.mark.parametrize(
@@ -107,13 +107,13 @@ def test_a_camera_that_gives_the_truth_keeps_every_law() -> None:
 )
 def test_a_camera_that_breaks_a_law_is_told_by_it(network: Camera, law: str) -> None:
     found = _laws(network)[law]
-    assert not found.kept
+    assert not found.is_kept
     assert "BROKEN" in found.describe()
 
 
 def test_a_front_end_that_is_as_bad_excuses_a_network() -> None:
     laws = _laws(_dark_lamps, _dark_lamps)
-    assert laws["white_below_half"].kept
+    assert laws["white_below_half"].is_kept
     assert laws["white_below_half"].front == laws["white_below_half"].worst > 0.4
 
 
@@ -130,9 +130,9 @@ def test_one_pixel_more_than_the_front_end_has_is_admitted() -> None:
         return camera
 
     front = with_dark_pixels(40)
-    assert _laws(with_dark_pixels(41), front)["white_below_half"].kept
+    assert _laws(with_dark_pixels(41), front)["white_below_half"].is_kept
     law = _laws(with_dark_pixels(42), front)["white_below_half"]
-    assert not law.kept
+    assert not law.is_kept
     assert law.excess > 0
 
 
@@ -154,12 +154,12 @@ def test_the_largest_and_least_light_are_those_of_all_pictures() -> None:
         exposed = Exposed(truth=light, network=made, front=light, light=made, front_light=light)
         ranges.add([exposed])
     below, above = ranges.laws()
-    assert (below.worst, below.kept) == (pytest.approx(0.2), False)
-    assert (above.worst, above.kept) == (pytest.approx(10.0), False)
+    assert (below.worst, below.is_kept) == (pytest.approx(0.2), False)
+    assert (above.worst, above.is_kept) == (pytest.approx(10.0), False)
 
 
 def test_what_is_no_number_breaks_a_law() -> None:
-    assert not Law(name="flat", worst=float("nan"), limit=0.01, unit="share").kept
+    assert not Law(name="flat", worst=float("nan"), limit=0.01, unit="share").is_kept
 
 
 def test_charts_hold_lamps_of_every_size_and_patches_of_every_ratio() -> None:

@@ -41,7 +41,7 @@ def test_a_law_that_is_broken_and_not_stated_fails(stated) -> None:  # type: ign
 
 
 def test_a_law_that_is_broken_as_stated_passes_and_says_so(stated) -> None:  # type: ignore[no-untyped-def]
-    layer = stated({"M": {"flat": BAD.stated()}})
+    layer = stated({"M": {"flat": BAD.to_stated()}})
     assert layer.status == "pass"
     assert "flat 5.00 % broken as stated" in layer.message
 
@@ -67,7 +67,7 @@ def test_export_states_laws_and_raises_the_format() -> None:
 
 
 def test_laws_in_an_older_format_are_refused(tmp_path) -> None:  # type: ignore[no-untyped-def]
-    manifest = tiny_manifest(laws={"M": {"double": GOOD.stated()}}, format_version="2.7")
+    manifest = tiny_manifest(laws={"M": {"double": GOOD.to_stated()}}, format_version="2.7")
     path = tmp_path / "old.camkit"
     with pytest.raises(BundleError, match=r"laws of a picture are stated, which format 2.8"):
         write_bundle(path, manifest, tiny_members())

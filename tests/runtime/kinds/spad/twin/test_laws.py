@@ -33,13 +33,13 @@ def _laws(bundle: Bundle, size: str | None = "S") -> dict[str, Law]:
 
 def test_the_built_in_array_keeps_every_law() -> None:
     laws = _laws(open_bundle(find_bundle(Path("spad-sr"))))
-    assert all(law.kept for law in laws.values()), laws
+    assert all(law.is_kept for law in laws.values()), laws
     assert set(laws) == {"even_mean", "even_spread", "black", "double"}
 
 
 def test_without_a_floor_there_is_black_where_light_was_counted() -> None:
     black = _laws(_with_floor(0.0))["black"]
-    assert not black.kept
+    assert not black.is_kept
     assert black.worst > 0.05
 
 

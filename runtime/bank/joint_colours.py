@@ -85,29 +85,29 @@ class Transfer:
 
     Attributes:
         otf: H.
-        seen: |H|^2 F.
+        power: |H|^2 F.
         doubt: (own |H|^2 + mistrust V) F.
-        band_seen: (c, n) of the frequencies that are measured.
+        band_power: (c, n) of the frequencies that are measured.
         band_doubt: Likewise.
     """
 
     otf: FloatArray
-    seen: FloatArray
+    power: FloatArray
     doubt: FloatArray
-    band_seen: FloatArray
+    band_power: FloatArray
     band_doubt: FloatArray
 
 
 @lru_cache(maxsize=4)
-def shapes_of(together: Together, block_px: int) -> Shapes:
+def shapes_of(model: Together, block_px: int) -> Shapes:
     """Return the shapes of a block."""
     fy, fx = np.fft.fftfreq(block_px)[:, None], np.fft.rfftfreq(block_px)[None, :]
     f2 = fy * fy + fx * fx
     samples = float(block_px) ** 2
-    fall = (samples * (f2 + CORNER_FREQUENCY**2) ** (-together.exponent / 2)).astype(np.float32)
-    lines = zip(together.noise, together.noise_rise, strict=True)
+    fall = (samples * (f2 + CORNER_FREQUENCY**2) ** (-model.exponent / 2)).astype(np.float32)
+    lines = zip(model.noise, model.noise_rise, strict=True)
     noise = samples * np.exp(np.stack([n + 4 * rise * f2 for n, rise in lines]))
-    places = np.array(together.spread.frequencies)
+    places = np.array(model.spread.frequencies)
     distinct, number = np.unique(f2, return_inverse=True)
     at = np.minimum(np.sqrt(distinct), places[-1])
     low = np.clip(np.searchsorted(places, at, side="right") - 1, 0, len(places) - 2)
@@ -131,27 +131,27 @@ def shapes_of(together: Together, block_px: int) -> Shapes:
     )
 
 
-def transfer_of(otf: ComplexArray, height_mm: float, together: Together) -> Transfer:
+def transfer_of(otf: ComplexArray, height_mm: float, model: Together) -> Transfer:
     """Return the terms of the filter for a place.
 
     Args:
         otf: (c, b, b // 2 + 1) complex64.
         height_mm: Its field height.
-        together: The model.
+        model: The model.
     """
     block_px = otf.shape[1]
-    shapes = shapes_of(together, block_px)
+    shapes = shapes_of(model, block_px)
     packed = packed_spectrum(otf, block_px)
-    seen = packed_power(packed)
-    doubt = _spread_at(together.spread, height_mm, shapes, np.float32(together.mistrust))
-    doubt += np.float32(together.own) * seen
+    power = packed_power(packed)
+    doubt = _spread_at(model.spread, height_mm, shapes, np.float32(model.mistrust))
+    doubt += np.float32(model.own) * power
     doubt *= shapes.fall
-    seen *= shapes.fall
+    power *= shapes.fall
     return Transfer(
         otf=packed,
-        seen=seen,
+        power=power,
         doubt=doubt,
-        band_seen=_at(seen, shapes.band[0]),
+        band_power=_at(power, shapes.band[0]),
         band_doubt=_at(doubt, shapes.band[0]),
     )
 
@@ -166,11 +166,11 @@ def _spread_at(
     above = min(below + 1, len(heights) - 1)
     lines = (table[below] + (place - below) * (table[above] - table[below])).astype(np.float32)
     steps = np.diff(lines, axis=1)
-    found: FloatArray = steps.take(shapes.low, axis=1)
-    found *= shapes.part
-    found += lines.take(shapes.low, axis=1)
-    found *= mistrust
-    return found.take(shapes.number, axis=1)
+    doubt: FloatArray = steps.take(shapes.low, axis=1)
+    doubt *= shapes.part
+    doubt += lines.take(shapes.low, axis=1)
+    doubt *= mistrust
+    return doubt.take(shapes.number, axis=1)
 
 
 @lru_cache(maxsize=4)
@@ -185,7 +185,7 @@ def restore_together(
     *,
     level: NDArray[np.float64],
     variance: NDArray[np.float64],
-    together: Together,
+    model: Together,
 ) -> FloatArray:
     """Deconvolve a periodic block.
 
@@ -194,39 +194,39 @@ def restore_together(
         transfer: Of its place.
         level: (c,) > 0, of the block.
         variance: (c,) of its noise.
-        together: The model.
+        model: The model.
 
     Returns:
         (c, b, b) float32.
     """
-    shapes = shapes_of(together, samples.shape[-1])
+    shapes = shapes_of(model, samples.shape[-1])
     mean = float(level.mean())
     share = np.maximum(level / mean, LEAST_SHARE)
-    scale = together.scale * mean * mean
+    scale = model.scale * mean * mean
     spectrum = to_packed(samples)
     crossed = multiply_conjugate(spectrum, transfer.otf)
     noise = variance / (share * share * scale)
-    if together.follow:
-        noise /= _measured(crossed, transfer, shapes, (share, noise, scale)) ** together.follow
-    zero, found = spectrum[:, 0, 0].copy(), spectrum
+    if model.follow:
+        noise /= _measured(crossed, transfer, shapes, (share, noise, scale)) ** model.follow
+    zero, planes = spectrum[:, 0, 0].copy(), spectrum
     light, rest = np.zeros_like(shapes.fall), np.ones_like(shapes.fall)
-    for c, seen in enumerate(found):  # plane by plane: what is at hand stays in cache
-        cv2.scaleAdd(shapes.noise[c], float(noise[c]), transfer.doubt[c], dst=seen)
-        np.reciprocal(seen, out=seen)
-        np.multiply(crossed[c], seen, out=crossed[c])
+    for c, buffer in enumerate(planes):  # plane by plane: what is at hand stays in cache
+        cv2.scaleAdd(shapes.noise[c], float(noise[c]), transfer.doubt[c], dst=buffer)
+        np.reciprocal(buffer, out=buffer)
+        np.multiply(crossed[c], buffer, out=crossed[c])
         cv2.scaleAdd(crossed[c], float(1 / share[c]), light, dst=light)
-        np.multiply(seen, transfer.seen[c], out=seen)
-        np.add(rest, seen, out=rest)
+        np.multiply(buffer, transfer.power[c], out=buffer)
+        np.add(rest, buffer, out=rest)
     light *= np.divide(shapes.fall, rest, out=rest)
-    own = np.multiply(shapes.fall, np.float32(together.own), out=rest)
-    for c, plane in enumerate(found):
-        np.multiply(plane, np.float32(-together.own * share[c]), out=plane)
+    prior = np.multiply(shapes.fall, np.float32(model.own), out=rest)
+    for c, plane in enumerate(planes):
+        np.multiply(plane, np.float32(-model.own * share[c]), out=plane)
         np.add(plane, np.float32(share[c]), out=plane)
         np.multiply(plane, light, out=plane)
-        np.multiply(crossed[c], own, out=crossed[c])
+        np.multiply(crossed[c], prior, out=crossed[c])
         np.add(plane, crossed[c], out=plane)
-    found[:, 0, 0] = zero
-    return from_packed(found)
+    planes[:, 0, 0] = zero
+    return from_packed(planes)
 
 
 def _measured(
@@ -246,12 +246,12 @@ def _measured(
     share, noise, scale = block
     weight = noise[:, None] * shapes.band_noise
     weight += transfer.band_doubt
-    seen = (transfer.band_seen / weight).sum(axis=0)
-    fall = shapes.band_fall / (1 + seen)
+    snr = (transfer.band_power / weight).sum(axis=0)
+    fall = shapes.band_fall / (1 + snr)
     weight *= share[:, None]
     lights = [(_at(crossed, places) / weight).sum(axis=0) * fall for places in shapes.band]
     measured = sum(np.dot(light, light) for light in lights)
-    expected = scale * np.dot(fall, seen)
+    expected = scale * np.dot(fall, snr)
     return max(float(measured / expected), LEAST_MEASURED) if expected > 0 else 1.0
 
 

@@ -11,7 +11,7 @@ from camkit.bundle.stages.together import BAND, BAND_STEP, Spread
 from camkit.contracts import FloatArray
 from camkit.runtime.bank.baselines import restoration_bank
 from camkit.runtime.bank.blocks import Block, BlockBank, to_otf
-from camkit.runtime.bank.together import CORNER_FREQUENCY, restore_together, transfer_of
+from camkit.runtime.bank.joint_colours import CORNER_FREQUENCY, restore_together, transfer_of
 from camkit.runtime.bank.wiener import wiener_filter
 from tests.psf_factory import (
     ISO_100,
@@ -87,7 +87,7 @@ def test_it_is_the_best_linear_estimate_of_its_model(height_mm: float) -> None:
         blur_periodic(texture(SIZE, SIZE, seed=1), _kernels()), ISO_100, np.random.default_rng(0)
     )
     known = transfer_of(otf, height_mm, TOGETHER)
-    found = restore_together(planes, known, level=LEVEL, variance=VARIANCE, together=TOGETHER)
+    found = restore_together(planes, known, level=LEVEL, variance=VARIANCE, model=TOGETHER)
     expected = _by_matrices(planes, otf, height_mm)
     np.testing.assert_allclose(found, expected, atol=2e-4 * np.abs(expected).max())
 
@@ -97,7 +97,7 @@ def test_a_height_beyond_the_table_is_that_of_its_end() -> None:
 
     def at(height_mm: float) -> FloatArray:
         known = transfer_of(otf, height_mm, TOGETHER)
-        return restore_together(planes, known, level=LEVEL, variance=VARIANCE, together=TOGETHER)
+        return restore_together(planes, known, level=LEVEL, variance=VARIANCE, model=TOGETHER)
 
     np.testing.assert_array_equal(at(10.0), at(25.0))
     assert np.abs(at(0.0) - at(10.0)).max() > 1e-5
