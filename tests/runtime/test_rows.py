@@ -49,7 +49,7 @@ def test_rows_behind_every_reader_are_forgotten() -> None:
     reader = rolling.reader()
     for top in range(0, 20, 2):
         reader.read(top, top + 2)
-        assert len(rolling._kept) <= 2
+        assert len(rolling._bands_read) <= 2
 
 
 def test_reading_upwards_is_refused() -> None:
@@ -134,7 +134,7 @@ def test_of_a_tall_band_only_the_rows_still_needed_are_kept() -> None:
     reader.read(0, 1)
     top = tall - 2
     np.testing.assert_array_equal(reader.read(top, tall + 1), picture[:, top : tall + 1])
-    kept = [band for _, band in rolling._kept]
+    kept = [band for _, band in rolling._bands_read]
     assert [band.shape[1] for band in kept] == [2, 1]
     assert kept[0].base is None
 
@@ -162,10 +162,10 @@ def test_for_a_reader_that_is_gone_nothing_is_kept() -> None:
     reader, slow = rolling.reader(), rolling.reader()
     reader.read(0, 12)
     reader.read(10, 12)
-    assert len(rolling._kept) == 6, "the slow one may still want them"
+    assert len(rolling._bands_read) == 6, "the slow one may still want them"
     del slow
     np.testing.assert_array_equal(reader.read(10, 14), picture[:, 10:14])
-    assert len(rolling._kept) <= 2
+    assert len(rolling._bands_read) <= 2
 
 
 def test_a_reader_that_is_gone_holds_up_nobody_who_reads_on() -> None:

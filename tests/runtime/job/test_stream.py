@@ -70,10 +70,10 @@ def test_for_a_taker_that_is_gone_no_row_is_kept() -> None:
     rolling = rows._rows  # type: ignore[attr-defined]
     rows.read(0, 100)
     rows.read(100, 250)
-    assert sum(band.shape[1] for _, band in rolling._kept) == 280
+    assert sum(band.shape[1] for _, band in rolling._bands_read) == 280
     del gone
     rows.read(250, 300)
-    assert sum(band.shape[1] for _, band in rolling._kept) <= 60
+    assert sum(band.shape[1] for _, band in rolling._bands_read) <= 60
 
 
 def test_a_source_or_bands_but_never_both_or_none() -> None:

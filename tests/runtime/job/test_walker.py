@@ -250,7 +250,7 @@ def test_for_a_branch_that_nobody_reads_nothing_is_kept(tmp_path: Path) -> None:
     rows.read(600, 640)
     # metered, timed, channels, reader
     rolling = rows._source._source._source._rows  # type: ignore[attr-defined]
-    assert sum(band.shape[1] for _, band in rolling._kept) < 200
+    assert sum(band.shape[1] for _, band in rolling._bands_read) < 200
 
 
 # ------------------------------------------------------------------------------- kept planes

@@ -15,7 +15,7 @@ import pytest
 import camkit
 from camkit.errors import ContractError, UnsupportedError
 from camkit.runtime.batch.cluster import connection, crew, remote
-from camkit.runtime.batch.cluster.connection import NoAnswer, within
+from camkit.runtime.batch.cluster.connection import NoAnswer, answer_within
 from tests.capture_factory import write_tiny_captures
 from tests.runtime.batch.cluster.farm import Farm
 
@@ -201,11 +201,11 @@ def test_who_takes_too_long_is_left_alone() -> None:
 
     ended = threading.Event()
     with pytest.raises(NoAnswer):
-        within(0.05, lambda: ended.wait(10))
+        answer_within(0.05, lambda: ended.wait(10))
     ended.set()
-    assert within(5, lambda: "here") == "here"
+    assert answer_within(5, lambda: "here") == "here"
     with pytest.raises(ZeroDivisionError):
-        within(5, lambda: 1 / 0)
+        answer_within(5, lambda: 1 / 0)
 
 
 @pytest.mark.slow

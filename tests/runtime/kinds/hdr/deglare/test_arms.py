@@ -108,9 +108,9 @@ def test_the_band_solves_what_dense_equations_say() -> None:
         dense[at, at] = equations.diagonal[c]
         if c + 1 < count:
             below = slice((c + 1) * runs, (c + 2) * runs)
-            dense[below, at] = equations.below[c]
-            dense[at, below] = equations.below[c].T
+            dense[below, at] = equations.coupling[c]
+            dense[at, below] = equations.coupling[c].T
     free = ~held.ravel()
     wanted = np.zeros(count * runs)
-    wanted[free] = np.linalg.solve(dense[np.ix_(free, free)], equations.wanted.ravel()[free])
+    wanted[free] = np.linalg.solve(dense[np.ix_(free, free)], equations.right_side.ravel()[free])
     np.testing.assert_allclose(equations.solved(held).ravel(), wanted, rtol=1e-6, atol=1e-9)
