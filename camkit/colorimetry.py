@@ -20,6 +20,7 @@ D65: Final[Chromaticity] = (0.3127, 0.3290)
 ACES_WHITE: Final[Chromaticity] = (0.32168, 0.33767)
 REC709_PRIMARIES: Final = ((0.640, 0.330), (0.300, 0.600), (0.150, 0.060))
 ACESCG_PRIMARIES: Final = ((0.713, 0.293), (0.165, 0.830), (0.128, 0.044))
+LUMA: Final[FloatArray] = np.array([0.299, 0.587, 0.114], np.float32)
 BRADFORD: Final[Matrix] = np.array(
     [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]]
 )
@@ -102,6 +103,11 @@ def decode_srgb(encoded: FloatArray) -> FloatArray:
     """Undo the sRGB curve for values in 0..1."""
     x = np.clip(encoded, 0.0, 1.0)
     return np.where(x <= 0.04045, x / 12.92, ((x + 0.055) / 1.055) ** 2.4).astype(np.float32)
+
+
+def luma(encoded: FloatArray) -> FloatArray:
+    """Return 0.299 R + 0.587 G + 0.114 B (h, w) of sRGB-coded planes (3, h, w), full range."""
+    return np.asarray(np.tensordot(LUMA, encoded, axes=1), np.float32)
 
 
 def apply_matrix(matrix: Matrix, planes: FloatArray) -> FloatArray:

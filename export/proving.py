@@ -1,4 +1,4 @@
-"""What a bundle in the making proves itself by: golden cases, activations, its check."""
+"""The proof of a bundle in the making: golden cases, activations, its check."""
 
 import tempfile
 from collections.abc import Mapping

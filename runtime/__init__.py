@@ -14,7 +14,6 @@
     options, job/                      one capture: what is decided, then the stages joined
     pipeline, development, batch       one capture in memory, its files, many captures
     capture_result, write_options      what became of a capture; how its files are written
-    picture_files, product_files       the files of photographs, and of all else
     merging/                           brackets to one picture
     proof/                             a bundle proves itself
     twin/                              the digital twin: a scene becomes a RAW file

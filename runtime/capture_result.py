@@ -1,4 +1,4 @@
-"""What became of one capture, of whatever kind: its products by name, and who writes each file."""
+"""The result of one capture, of whatever kind: products by name, and the writer of each file."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ Write = Callable[[Path], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """What became of one capture.
+    """The result of one capture.
 
     Attributes:
         arrays: The products by name. The `image` of a photograph is (3, h, w) float32, linear, in

@@ -119,7 +119,7 @@ def make_file(
     progress: Progress | None = None,
     cancel: Cancel | None = None,
 ) -> FileResult:
-    """Turn one capture into its files and a sidecar; either all appear or nothing changes.
+    """Process one capture to its files and a sidecar; either all appear or nothing changes.
 
     Args:
         source: The capture.

@@ -1,4 +1,4 @@
-"""What the runtime knows of a kind of camera: readers, usual stages, products, and the twin.
+"""The runtime part of a kind of camera: readers, usual stages, products, and the twin.
 
 A kind's part of the runtime (`camkit.runtime.kinds.NAME`, or the `runtime` of its own package)
 defines `PART`, a `RuntimePart`.
@@ -25,9 +25,9 @@ from camkit.runtime.job.photograph import know_photograph
 from camkit.runtime.job.setup import DEVELOPED, DEVELOPMENT
 from camkit.runtime.kind_parts.golden import GoldenCaptures
 from camkit.runtime.kind_parts.outputs import Outputs
+from camkit.runtime.kind_parts.photograph_facts import describe_photograph
+from camkit.runtime.kind_parts.picture_files import PICTURES
 from camkit.runtime.options import Options
-from camkit.runtime.photograph_facts import describe_photograph
-from camkit.runtime.picture_files import PICTURES
 from camkit.runtime.raw import named_bundle
 from camkit.runtime.twin.simulate import SimulationOptions, photograph
 

@@ -37,6 +37,7 @@ from camkit.runtime.job.reconstruction import Reconstruction, check_out
 from camkit.runtime.job.setup import Setup
 from camkit.runtime.job.stream import Stream
 from camkit.runtime.kind import kind_without_bundle, part_of, runtime_part
+from camkit.runtime.kind_parts.picture_files import result_of
 from camkit.runtime.network.engine import NetworkEngine, available_threads
 from camkit.runtime.network.tiling import Progress
 from camkit.runtime.options import (
@@ -45,7 +46,6 @@ from camkit.runtime.options import (
     checked_origin,
     with_choices,
 )
-from camkit.runtime.picture_files import result_of
 from camkit.runtime.plan.planner import asked_work, default_size
 from camkit.runtime.plan.speed import Speed, measure_speed
 from camkit.runtime.stage_finder import check_stages

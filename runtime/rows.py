@@ -187,7 +187,7 @@ class RowsMadeWhole:
     """A picture that is made whole when its first row is asked for."""
 
     def __init__(self, shape: tuple[int, int, int], make: Callable[[], Rows]) -> None:
-        """Note how it is made.
+        """Store the way it is made.
 
         Args:
             shape: (channel, h, w).

@@ -1,4 +1,4 @@
-"""Where and how the files of captures are written."""
+"""The place and the format of the files of captures."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +16,7 @@ LINEAR_FORMATS: Final = frozenset({"exr", "dng"})
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WriteOptions:
-    """Where and how pictures are written.
+    """The place and the format of pictures.
 
     Attributes:
         out_dir: Folder of pictures and sidecars, made if needed.

@@ -139,7 +139,7 @@ def _same_version(name: str, line: Line) -> str:
 
 
 def _tracked_files(root: Path) -> list[str]:
-    """Name the files that git tracks."""
+    """Return the names of the files that git tracks."""
     words = ["git", "-C", str(root), "ls-files", "-z"]
     told = subprocess.run(words, capture_output=True, text=True, check=True)
     return [name for name in told.stdout.split("\0") if name]

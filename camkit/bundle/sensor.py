@@ -244,7 +244,7 @@ class BayerSensor(LightSensor):
 
     @property
     def text(self) -> str:
-        """What it sees, in words."""
+        """Its colours and full well, in words."""
         return f"{self.cfa}, full well {self.full_well_e:g} e-"
 
     @property
@@ -308,7 +308,7 @@ class PlanesSensor(LightSensor):
 
     @property
     def text(self) -> str:
-        """What it sees, in words."""
+        """Its colours and full well, in words."""
         return f"{', '.join(self.channels)}, full well {self.full_well_e:g} e-"
 
     @property
@@ -381,7 +381,7 @@ class SpadSensor(PixelSensor):
 
     @property
     def text(self) -> str:
-        """What it sees, in words."""
+        """Its way of seeing, in words."""
         return "counting photons"
 
     @property

@@ -89,7 +89,7 @@ def check_choices(
 
 
 def _of_capture(bundle: Bundle | None) -> frozenset[str]:
-    """Name what may be said of how a photograph was taken."""
+    """Return the options that may tell how a photograph was taken."""
     if bundle is None:
         return ALWAYS
     if bundle.manifest.sensor.extent is None:

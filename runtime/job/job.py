@@ -1,4 +1,4 @@
-"""What is known of one capture, made once and never changed; what is found on the way is its log.
+"""The facts of one capture, made once and never changed; what is found on the way is its log.
 
     capture, bundle, options -> place on the sensor, noise, gains, colour, plan -> stages
 

@@ -1,4 +1,4 @@
-"""What is found of a capture while it is worked on: for people, for programs, and for how long."""
+"""The log of one capture: what is found while it is worked on, and the seconds of it."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -10,7 +10,7 @@ from camkit.runtime.network.windows import NetworkWindows
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class Log:
-    """What stages write down; nothing that is computed depends on it.
+    """The notes, clocks and records of one capture; nothing that is computed depends on them.
 
     Attributes:
         meter: How far the capture is.

@@ -1,4 +1,4 @@
-"""What is known of a photograph before its stages are made ready, and what is planned for it.
+"""The facts of a photograph before its stages are made ready, and its plan.
 
 checked against the sensor -> placed -> looked at by the stages -> planned
 """

@@ -13,7 +13,7 @@ Cases = Mapping[str, tuple[GoldenCase, GoldenArrays]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GoldenCaptures:
-    """How the golden captures of a kind are taken.
+    """The golden captures of a kind.
 
     Attributes:
         cases: Takes them with the camera of a bundle; what becomes of them is still missing.

@@ -38,7 +38,7 @@ def _nothing(*_: object) -> Mapping[str, Any]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outputs:
-    """What the captures of a kind become.
+    """The files and results of the captures of a kind.
 
     Attributes:
         names: (capture's file, options, how it is written) -> names of all files that may appear,

@@ -109,7 +109,7 @@ def block_bytes(block_px: int, channels: int, *, threads: int) -> int:
 
 
 def look(_entry: Wiener, job: Job) -> Job:
-    """Look for the noise."""
+    """Return the job with its noise."""
     return job.with_noise()
 
 

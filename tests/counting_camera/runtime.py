@@ -17,8 +17,8 @@ from camkit.runtime.capture_result import Result
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.kind import RuntimePart
+from camkit.runtime.kind_parts.product_files import product_outputs
 from camkit.runtime.options import Options
-from camkit.runtime.product_files import product_outputs
 from camkit.runtime.rows import ArrayRows, RowSource
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from camkit.calibration.dots import ACTIVE_UM, SPACING_UM, see_dots
+from camkit.calibration.dots import see_dots
 from camkit.models_def.kinds.spad.sampling import gaussian_psf
 from camkit.models_def.optics.diffraction.wave import PixelGrid
 from camkit.models_def.optics.dots.camera import DotCamera
@@ -23,10 +23,6 @@ ERRORS = {"as designed": (0.0, 0.0, 0.0), "deeper": (0.08, 0.08, 0.08), "mixed":
 @pytest.fixture(name="plate", scope="module")
 def eight_levels() -> DotPlate:
     return match_dots(TARGET, CAMERA, 8, np.random.default_rng(0), starts=1).plate
-
-
-def test_both_sides_speak_of_one_array() -> None:
-    assert (CAMERA.spacing_um, CAMERA.active_um) == (SPACING_UM, ACTIVE_UM)
 
 
 @pytest.mark.parametrize("errors", ERRORS.values(), ids=ERRORS)

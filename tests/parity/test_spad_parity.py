@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 import torch
 
-from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray
 from camkit.models_def.kinds.spad import sampling as trained
 from camkit.models_def.kinds.spad.counting import Exposure
 from camkit.models_def.kinds.spad.evaluation import bicubic as trained_bicubic
 from camkit.models_def.kinds.spad.evaluation import evaluate_each
-from camkit.models_def.kinds.spad.samples import luminance
 from camkit.models_def.networks.bicubic import PHASE, SCALE, Bicubic
 from camkit.models_def.training.losses import ssim as trained_ssim
 from camkit.report.kinds.spad.bicubic import bicubic
@@ -65,10 +63,6 @@ def test_scores_are_those_of_training() -> None:
     mse = float(((noisy.astype(np.float64) - picture) ** 2).mean())
     assert psnr_db(noisy, picture) == pytest.approx(-10 * math.log10(mse))
     assert psnr_db(picture, picture) == 100
-
-
-def test_luminance_is_that_of_training() -> None:
-    assert (PICTURES[0] == luminance(encode_srgb(SCENES[0]))).all()
 
 
 @pytest.mark.parametrize("mode", trained.MODES)

@@ -2,6 +2,7 @@
 
     spad     4.1 and 4.2: how an array of single photons samples, and what makes a picture of it
     hdr      5.4 and 5.5: which optics, read by which network, bring clipped lights back
+    losses   3.1: what a loss is worth where it was trained, and elsewhere
     lenses   6.1: which lens gives the best picture after recovery (it trains as it measures)
 
 A table is rows, which are data, and how one of them is trained, measured and written. What trains

@@ -55,6 +55,7 @@ class Trainee:
         recipe: Text of it.
         material: What the recipe's optics are.
         vgg: Weights of VGG-19, where its loss looks at them.
+        sharp: Sharp pictures, where its loss has a critic.
         valid: Pictures to validate on at the end; None for procedural ones.
     """
 
@@ -62,6 +63,7 @@ class Trainee:
     recipe: str
     material: Callable[[], Material]
     vgg: Path | None = None
+    sharp: Path | None = None
     valid: Path | None = None
 
 
@@ -124,6 +126,7 @@ def _train(one: Trainee, settings: EqualTime) -> dict[str, Any]:
         resume=checkpoint_of(settings.out_dir, one.run).exists(),
         workers=settings.workers,
         vgg=one.vgg,
+        sharp_folder=one.sharp,
         validate_s=AT_THE_END_S,
     )
     result = train(recipe, options, material=one.material())

@@ -74,7 +74,8 @@ class Table:
         measure: Measures its rows, as plain values.
         to_text: A record as tables in Markdown.
         add_options: Adds options of its own to `measure`.
-        rows: Its rows; empty for a table that trains as it measures.
+        rows: Its rows, once the options of `train` are known; None for a table that trains as it
+            measures.
         trainee: A network to train, or why it cannot be.
         add_train_options: Adds options of its own to `train`.
         steps: At which a schedule would end; None for the recipe's.
@@ -85,7 +86,7 @@ class Table:
     measure: Callable[[Request], Record]
     to_text: Callable[[Record], str]
     add_options: Callable[[ArgumentParser], None]
-    rows: Sequence[Row] = ()
+    rows: Callable[[Namespace], Sequence[Row]] | None = None
     trainee: Callable[[Run, Namespace], Trainee | str] | None = None
     add_train_options: Callable[[ArgumentParser], None] = lambda _: None
     steps: int | None = None
@@ -121,7 +122,7 @@ def _parser(tables: Mapping[str, Table]) -> ArgumentParser:
             train.add_argument("--cpu-minutes", type=float, default=15.0, help="with samples, each")
             train.add_argument("--vgg", type=Path, help="weights of VGG-19 (torchvision's vgg19)")
             train.add_argument("--workers", type=int, default=1, help="processes of samples")
-            train.add_argument("--rows", nargs="+", metavar="ROW", help="some of them, or ROW-SEED")
+            train.add_argument("--rows", nargs="*", metavar="ROW", help="some of them, or ROW-SEED")
             table.add_train_options(train)
         measure = commands.add_parser("measure", description=table.description, **form)
         measure.set_defaults(run=_measure)
@@ -133,6 +134,7 @@ def _parser(tables: Mapping[str, Table]) -> ArgumentParser:
 
 
 def _train(table: Table, options: Namespace) -> None:
+    assert table.rows is not None
     assert table.trainee is not None
     time = EqualTime(
         out_dir=options.out_dir,
@@ -141,7 +143,7 @@ def _train(table: Table, options: Namespace) -> None:
         steps=table.steps,
         workers=options.workers,
     )
-    for one in chosen_trainings(table.rows, options.rows):
+    for one in chosen_trainings(table.rows(options), options.rows):
         trainee = table.trainee(one, options)
         if isinstance(trainee, str):
             _tell(f"{one.training}: left out: {trainee}")

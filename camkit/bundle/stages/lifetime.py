@@ -9,7 +9,7 @@ from camkit.bundle.stages.entry import JoinError, Parts, StageEntry, need_counts
 
 
 class Lifetime(StageEntry):
-    """How long fluorescence takes to fade, of every pixel of an array (format 2.9)."""
+    """The lifetime of fluorescence in every pixel of an array (format 2.9)."""
 
     since: ClassVar[Since | None] = Since((2, 9), "it lists the stage lifetime")
     runtime: ClassVar[str] = "camkit.runtime.kinds.spad.stages.lifetime"

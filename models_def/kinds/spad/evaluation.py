@@ -15,9 +15,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from camkit.colorimetry import luma
 from camkit.contracts import FloatArray
 from camkit.models_def.kinds.spad.counting import Exposure
-from camkit.models_def.kinds.spad.samples import luminance, photograph
+from camkit.models_def.kinds.spad.samples import photograph
 from camkit.models_def.kinds.spad.sampling import Sampling
 from camkit.models_def.networks.bicubic import SCALE, Bicubic
 from camkit.models_def.training.kind import Restorer
@@ -52,7 +53,7 @@ def read_luminance(path: Path) -> FloatArray:
         DecodeError: If it cannot be decoded.
     """
     coded = np.asarray(read_picture(path).transpose(2, 0, 1) / 255, dtype=np.float32)
-    found = luminance(coded)
+    found = luma(coded)
     height, width = (n // SCALE * SCALE for n in found.shape)
     return np.ascontiguousarray(found[:height, :width])
 

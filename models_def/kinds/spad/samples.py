@@ -12,8 +12,7 @@ import torch
 from torch import Tensor
 
 from camkit.bundle.facts import Port
-from camkit.colorimetry import encode_srgb
-from camkit.contracts import FloatArray
+from camkit.colorimetry import encode_srgb, luma
 from camkit.models_def.kinds.spad.counting import Exposure, expose
 from camkit.models_def.kinds.spad.recipe import PLATE, SpadRecipe
 from camkit.models_def.kinds.spad.sampling import HALF, Sampling
@@ -21,17 +20,10 @@ from camkit.models_def.networks.bicubic import SCALE
 from camkit.models_def.training.pictures import SceneSource
 from camkit.models_def.training.sample import Sample, SampleLayout
 
-LUMINANCE: Final[FloatArray] = np.array([0.299, 0.587, 0.114], np.float32)
-"""Of sRGB-coded R, G, B: full range, no studio swing."""
 MARGIN_PX: Final = -(-HALF // SCALE)
 """Pixels of surroundings that a kernel sees."""
 
 Generator = np.random.Generator
-
-
-def luminance(coded: FloatArray) -> FloatArray:
-    """Return L (h, w) of sRGB-coded R, G, B (3, h, w)."""
-    return np.asarray(np.tensordot(LUMINANCE, coded, axes=1), dtype=np.float32)
 
 
 def layout_of(recipe: SpadRecipe, role: str) -> SampleLayout:
@@ -52,7 +44,7 @@ def layout_of(recipe: SpadRecipe, role: str) -> SampleLayout:
 
 def draw_luminance(source: SceneSource, rng: Generator, side_px: int) -> Tensor:
     """Cut a crop (1, 1, side, side) of L, turned and mirrored at random."""
-    crop = luminance(encode_srgb(source.draw_crop(rng, side_px)))
+    crop = luma(encode_srgb(source.draw_crop(rng, side_px)))
     turned = np.rot90(crop, int(rng.integers(4)))
     if rng.random() < 0.5:
         turned = turned[:, ::-1]

@@ -35,7 +35,6 @@ Mode = Literal["low_fill", "full_fill", "gaussian", "learned"]
 
 MODES: Final[tuple[str, ...]] = get_args(Mode)
 PITCH_UM: Final = 150.0
-ACTIVE_UM: Final = 30.0
 FINE_PITCH_UM: Final = PITCH_UM / SCALE
 PSF_SIDE: Final = 11
 HALF: Final = PSF_SIDE // 2

@@ -6,6 +6,7 @@ from typing import Final
 
 import torch
 
+from camkit.calibration.dots import ACTIVE_UM, SPACING_UM
 from camkit.errors import ContractError
 from camkit.models_def.optics.diffraction.fabrication import Etching
 from camkit.models_def.optics.glass.catalogue import find_glass
@@ -36,8 +37,8 @@ class DotCamera:
 
     wavelength_um: float = 0.655
     focal_length_mm: float = 50.0
-    spacing_um: float = 37.5
-    active_um: float = 30.0
+    spacing_um: float = SPACING_UM
+    active_um: float = ACTIVE_UM
     cells: int = 88
     tiles: int = 16
     glass: str = SILICA

@@ -1,16 +1,13 @@
 """Captures of single photons: pulses, banks of them, fits and their bounds; products.
 
-photon_capture an open capture with all that is known of its times
 files          readers of captures
-settings       what the caller chose, with the timing file
+captures       captures on their way to products
+pixels         what is known of pixels besides their counts
 timing         what is known of their times
 containers     what files hold, in bytes, before it is read
 pulse          the time of one photon, in closed form
 time_axis      bins of a histogram or delays of a gate: what each sees of a pulse
-corrected      rows of a capture, pile-up undone
-pixels         what is known of pixels besides their counts
 pile_up        counts as a detector that is never blind would have given them
-known_pulse    the pulse of a capture
 guess_pulse    a pulse where none is stated
 bank           templates at many times of flight, scored against counts
 bound          the Cramer-Rao bound of a time of flight
@@ -23,10 +20,7 @@ hot_pixels     pixels that count without light: found and painted over
 sharpen        all of it for the rows of a capture
 lifetime       decays of fluorescence behind a pulse
 finer          the fine grid behind the plate of a bundle
-strips         in how many rows at once a capture is worked through
-frames         photons by pixel and time, without dark counts and hot pixels
 stages         what its bundles list
-decisions      what would be done, and why
 twin           scenes recorded by the array of a bundle
 golden_captures   those that its bundles hold
 products       depth, intensity, light in flight, and their files
@@ -36,12 +30,12 @@ from typing import Final
 
 from camkit.bundle.stages import Correct, Lifetime, Sharpen
 from camkit.runtime.kind import RuntimePart
-from camkit.runtime.kinds.spad.decisions import know_photons
+from camkit.runtime.kinds.spad.captures.photon_capture import photons_of_array, read_photons
 from camkit.runtime.kinds.spad.files.described import describe
 from camkit.runtime.kinds.spad.files.named import named_bundle
 from camkit.runtime.kinds.spad.golden_captures import GOLDEN
-from camkit.runtime.kinds.spad.photon_capture import photons_of_array, read_photons
 from camkit.runtime.kinds.spad.products import OUTPUTS, PLANES
+from camkit.runtime.kinds.spad.products.decisions import know_photons
 from camkit.runtime.kinds.spad.twin.recording import PhotonOptions
 from camkit.runtime.kinds.spad.twin.simulate import record
 from camkit.runtime.kinds.spad.twin.write import SUFFIXES, files_of, write_recorded

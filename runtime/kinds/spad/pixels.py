@@ -1,4 +1,4 @@
-"""What is known of the pixels of an array besides their counts."""
+"""The pixels of an array: dark counts, hot and blind ones, beside their photons."""
 
 from dataclasses import dataclass
 from typing import Self

@@ -19,7 +19,7 @@ from camkit.report.stress.scene import stress_scenes
 from camkit.report.stress.score import judge_of
 from camkit.report.stress.verdict import Outcome, Verdict
 from camkit.runtime.kind import runtime_part
-from camkit.runtime.picture_files import PICTURES
+from camkit.runtime.kind_parts.picture_files import PICTURES
 
 
 @pytest.mark.parametrize("kind", KINDS)

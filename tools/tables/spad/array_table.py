@@ -223,7 +223,7 @@ def _options(measure: ArgumentParser) -> None:
 
 TABLE: Final = Table(
     description=__doc__,
-    rows=ROWS,
+    rows=lambda _: ROWS,
     trainee=trainee,
     add_train_options=_train_options,
     steps=STEPS,

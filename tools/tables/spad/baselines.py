@@ -33,7 +33,7 @@ from camkit.bundle.manifest import Manifest, planes_of
 from camkit.bundle.reader import CARD
 from camkit.bundle.stages import Correct, Parts, Stage, SuperResolve
 from camkit.bundle.writer import write_bundle
-from camkit.colorimetry import encode_srgb
+from camkit.colorimetry import encode_srgb, luma
 from camkit.contracts import FloatArray
 from camkit.errors import CamkitError, ContractError, ParityError
 from camkit.export.assemble import LICENCE, PACKAGES
@@ -43,7 +43,6 @@ from camkit.export.proving import write_proved
 from camkit.models_def.kinds.spad.counting import Exposure
 from camkit.models_def.kinds.spad.evaluation import evaluate, read_set
 from camkit.models_def.kinds.spad.recipe import SpadRecipe
-from camkit.models_def.kinds.spad.samples import luminance
 from camkit.models_def.kinds.spad.sampling import Sampling
 from camkit.models_def.kinds.spad.training import PART, sampling_of
 from camkit.models_def.training.checkpoint import load_network, read_checkpoint, recipe_of
@@ -220,7 +219,7 @@ def _pictures(folder: Path | None) -> tuple[FloatArray, ...]:
     if folder is not None:
         return read_set(folder)
     scenes = (procedural_scene(seed, 128, 256) for seed in range(SCENES))
-    return tuple(luminance(encode_srgb(scene)) for scene in scenes)
+    return tuple(luma(encode_srgb(scene)) for scene in scenes)
 
 
 def _slim(network: ExportedNetwork) -> ExportedNetwork:

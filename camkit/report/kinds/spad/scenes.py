@@ -8,13 +8,12 @@ from typing import Final
 
 import numpy as np
 
-from camkit.colorimetry import encode_srgb
+from camkit.colorimetry import encode_srgb, luma
 from camkit.contracts import FloatArray
 from camkit.report.quality import list_set, read_picture
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from camkit.scenes import procedural_scene
 
-LUMINANCE: Final[FloatArray] = np.array([0.299, 0.587, 0.114], np.float32)
 SCENES: Final = 4
 FIRST_SEED: Final = 40
 """Golden cases and probes have others."""
@@ -22,7 +21,7 @@ FIRST_SEED: Final = 40
 
 def coded_luminance(linear: FloatArray) -> FloatArray:
     """Return L (h, w) of a linear Rec.709 picture (3, h, w); what exceeds white is white."""
-    return np.asarray(np.tensordot(LUMINANCE, encode_srgb(linear), axes=1), np.float32)
+    return luma(encode_srgb(linear))
 
 
 def whole_pixels(picture: FloatArray, scale: int) -> FloatArray:

@@ -25,11 +25,11 @@ from camkit.contracts import FloatArray
 from camkit.report.bench.timed.process_run import Job, run_job
 from camkit.report.bench.trial import Skip
 from camkit.report.kinds.spad.scenes import drawn_pictures
+from camkit.runtime.kinds.spad.captures.photon_capture import times_of_bundle
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from camkit.runtime.kinds.spad.finer.depth import FineSharpener
 from camkit.runtime.kinds.spad.finer.pictures import finer_frames
 from camkit.runtime.kinds.spad.golden_captures import stage_set
-from camkit.runtime.kinds.spad.photon_capture import times_of_bundle
 from camkit.runtime.kinds.spad.sharpen import Way
 from camkit.runtime.kinds.spad.twin.counting import Disturbances, count_times, scaled_to
 from camkit.runtime.kinds.spad.twin.recording import Recorded

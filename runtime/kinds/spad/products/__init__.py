@@ -1,8 +1,9 @@
-"""What is made of photons: arrays first, and what people look at beside them.
+"""Products of counts: arrays first, and pictures for people beside them.
 
 depth      depth, time of flight, amplitude and what goes with them
 frames     pictures, films and light in flight
 lifetime   how long fluorescence takes to fade
+decisions  what would be done, and why
 record     what a sidecar and a plan say of how a capture is worked through
 archive    NAME.npz
 points     NAME.ply
@@ -19,14 +20,14 @@ from typing import Final
 from camkit.bundle.golden import IMAGE
 from camkit.runtime.capture_result import Result
 from camkit.runtime.job.reconstruction import Reconstruction
-from camkit.runtime.kinds.spad.photon_capture import PhotonCapture, photons_of
+from camkit.runtime.kind_parts.product_files import product_outputs
+from camkit.runtime.kinds.spad.captures.photon_capture import PhotonCapture, photons_of
+from camkit.runtime.kinds.spad.captures.settings import Product, identity
 from camkit.runtime.kinds.spad.products.depth import make_depth
 from camkit.runtime.kinds.spad.products.frames import make_intensity, make_transient
 from camkit.runtime.kinds.spad.products.lifetime import make_lifetime
 from camkit.runtime.kinds.spad.products.record import told_axis
-from camkit.runtime.kinds.spad.settings import Product, identity
 from camkit.runtime.options import Options
-from camkit.runtime.product_files import product_outputs
 
 MAKERS: Final[Mapping[Product, Callable[[Reconstruction, PhotonCapture, str], Result]]] = {
     "depth": make_depth,

@@ -10,8 +10,8 @@ from camkit.runtime.cancel import cancellable
 from camkit.runtime.capture_result import Result, Write
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.job.stream import Stream
-from camkit.runtime.kinds.spad.frames import frames_of
-from camkit.runtime.kinds.spad.photon_capture import PhotonCapture
+from camkit.runtime.kinds.spad.captures.frames import frames_of
+from camkit.runtime.kinds.spad.captures.photon_capture import PhotonCapture
 from camkit.runtime.kinds.spad.pixels import Pixels
 from camkit.runtime.kinds.spad.products.archive import write_archive
 from camkit.runtime.kinds.spad.products.picture import write_exr, write_tiff

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from camkit.runtime.capture_result import Result
 from camkit.runtime.job.reconstruction import Reconstruction
-from camkit.runtime.kinds.spad.photon_capture import PhotonCapture
+from camkit.runtime.kinds.spad.captures.photon_capture import PhotonCapture
 from camkit.runtime.kinds.spad.products.archive import write_archive
 from camkit.runtime.kinds.spad.products.picture import write_exr, write_tiff
 from camkit.runtime.kinds.spad.products.preview import depth_picture, write_preview

@@ -5,7 +5,7 @@ from typing import Any
 
 from camkit.bundle.stages import SuperResolve
 from camkit.runtime.job.job import Job
-from camkit.runtime.kinds.spad.photon_capture import photons_of
+from camkit.runtime.kinds.spad.captures.photon_capture import photons_of
 from camkit.runtime.kinds.spad.pulse import FWHM_PER_SIGMA, GatedPulse, GaussianPulse, Pulse
 from camkit.runtime.kinds.spad.sharpen import Way
 from camkit.runtime.kinds.spad.stages.super_resolve import camera_of, size_of_network

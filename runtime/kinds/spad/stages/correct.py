@@ -8,8 +8,8 @@ from camkit.bundle.stages import Correct
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
-from camkit.runtime.kinds.spad.corrected import CorrectedRows
-from camkit.runtime.kinds.spad.photon_capture import photons_of
+from camkit.runtime.kinds.spad.captures.corrected import CorrectedRows
+from camkit.runtime.kinds.spad.captures.photon_capture import photons_of
 
 METHODS: Final[tuple[str, ...]] = ()
 OPTIONS: Final[tuple[str, ...]] = ()

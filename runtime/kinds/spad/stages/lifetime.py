@@ -14,14 +14,14 @@ from camkit.runtime.cancel import check_wish
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
-from camkit.runtime.kinds.spad.known_pulse import pulse_of
+from camkit.runtime.kinds.spad.captures.known_pulse import pulse_of
+from camkit.runtime.kinds.spad.captures.photon_capture import PhotonCapture, photons_of
+from camkit.runtime.kinds.spad.captures.strips import pieces
 from camkit.runtime.kinds.spad.lifetime.decay import Decay
 from camkit.runtime.kinds.spad.lifetime.fitter import LifetimeFitter, Lifetimes
 from camkit.runtime.kinds.spad.lifetime.guess import guess_width
-from camkit.runtime.kinds.spad.photon_capture import PhotonCapture, photons_of
 from camkit.runtime.kinds.spad.pixels import Pixels, by_pixel
 from camkit.runtime.kinds.spad.pulse import Pulse
-from camkit.runtime.kinds.spad.strips import pieces
 from camkit.runtime.kinds.spad.time_axis import LEAST_BINS, TimeAxis
 from camkit.runtime.rows import Rows
 
@@ -40,7 +40,7 @@ class Window:
 
 
 class Decays:
-    """What was found of every pixel, complete once all rows of lifetimes are out (`Stream.beside`).
+    """The decays of every pixel, complete once all rows of lifetimes are out (`Stream.beside`).
 
     Attributes:
         window: The bins that are fitted.

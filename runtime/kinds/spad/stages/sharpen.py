@@ -9,17 +9,17 @@ from camkit.runtime.cancel import check_wish
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
+from camkit.runtime.kinds.spad.captures.known_pulse import growth_of, pulse_of
+from camkit.runtime.kinds.spad.captures.photon_capture import photons_of
+from camkit.runtime.kinds.spad.captures.strips import pieces
 from camkit.runtime.kinds.spad.finer.bins import FineBins
 from camkit.runtime.kinds.spad.finer.depth import fine_sharpener, fitted_bins
 from camkit.runtime.kinds.spad.hot_pixels import check_map
-from camkit.runtime.kinds.spad.known_pulse import growth_of, pulse_of
-from camkit.runtime.kinds.spad.photon_capture import photons_of
 from camkit.runtime.kinds.spad.pixels import Pixels, by_pixel
 from camkit.runtime.kinds.spad.pulse import Pulse
 from camkit.runtime.kinds.spad.sharpen import METHODS as FITS
 from camkit.runtime.kinds.spad.sharpen import Sharpened, Sharpener, stacked
 from camkit.runtime.kinds.spad.stages.super_resolve import TimedBins
-from camkit.runtime.kinds.spad.strips import pieces
 from camkit.runtime.kinds.spad.timing import LIGHT_M_PER_PS
 from camkit.runtime.rows import Rows
 
@@ -32,7 +32,7 @@ PIXEL_BYTES: Final = 150
 
 @dataclass(slots=True, kw_only=True)
 class Depths:
-    """What was found of every pixel, complete once all rows of depth are out (`Stream.beside`).
+    """The surfaces of every pixel, complete once all rows of depth are out (`Stream.beside`).
 
     Attributes:
         pixels: What is known of the array's own pixels.

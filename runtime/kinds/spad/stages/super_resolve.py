@@ -12,15 +12,15 @@ from camkit.contracts import FloatArray
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
+from camkit.runtime.kinds.spad.captures.frames import frames_of, is_summed
+from camkit.runtime.kinds.spad.captures.known_pulse import growth_of, pulse_of
+from camkit.runtime.kinds.spad.captures.photon_capture import PhotonCapture, photons_of
+from camkit.runtime.kinds.spad.captures.strips import check_room
 from camkit.runtime.kinds.spad.finer.bins import FineBins, finer_bins
 from camkit.runtime.kinds.spad.finer.camera import FineCamera, network_planes, white_of
 from camkit.runtime.kinds.spad.finer.depth import coarse_sharpener
 from camkit.runtime.kinds.spad.finer.pictures import finer_frames
-from camkit.runtime.kinds.spad.frames import frames_of, is_summed
-from camkit.runtime.kinds.spad.known_pulse import growth_of, pulse_of
-from camkit.runtime.kinds.spad.photon_capture import PhotonCapture, photons_of
 from camkit.runtime.kinds.spad.pixels import Pixels, by_pixel
-from camkit.runtime.kinds.spad.strips import check_room
 from camkit.runtime.rows import ArrayRows, RowsMadeWhole, RowSource
 
 METHODS: Final = ("net", "linear")

@@ -12,7 +12,7 @@ from camkit.errors import ContractError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PhotonOptions:
-    """How a scene is recorded.
+    """The options of recording a scene.
 
     Attributes:
         photons: That are counted, whatever the sensor's detection efficiency: of a pixel that sees

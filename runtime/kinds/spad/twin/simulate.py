@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from camkit.bundle.reader import Bundle
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError, DecodeError
+from camkit.runtime.kinds.spad.captures.photon_capture import times_of_bundle
 from camkit.runtime.kinds.spad.files.npz import read_npz
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from camkit.runtime.kinds.spad.finer.linear import Grid
 from camkit.runtime.kinds.spad.finer.sampling import light_of
-from camkit.runtime.kinds.spad.photon_capture import times_of_bundle
 from camkit.runtime.kinds.spad.pulse import Pulse
 from camkit.runtime.kinds.spad.time_axis import TimeAxis
 from camkit.runtime.kinds.spad.timing import Timing

@@ -12,7 +12,6 @@ from camkit.models_def.kinds.spad.samples import (
     SpadMaker,
     draw_luminance,
     layout_of,
-    luminance,
     photograph,
 )
 from camkit.models_def.kinds.spad.sampling import make_sampling
@@ -22,12 +21,6 @@ from camkit.models_def.training.pictures import SceneSource, open_source
 @pytest.fixture(scope="module")
 def source() -> SceneSource:
     return open_source(None, picture_share=0.0, scenes=2, scene_px=256)
-
-
-def test_luminance_is_that_of_coded_values_at_full_range() -> None:
-    coded = np.eye(3, dtype=np.float32).reshape(3, 1, 3)
-    np.testing.assert_allclose(luminance(coded), [[0.299, 0.587, 0.114]])
-    np.testing.assert_allclose(luminance(np.ones((3, 2, 2), np.float32)), np.ones((2, 2)))
 
 
 def test_a_sample_is_what_the_array_sees_of_its_target(

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import torch
 
+from camkit.calibration.dots import ACTIVE_UM
 from camkit.errors import ContractError
 from camkit.models_def.kinds.spad.sampling import (
-    ACTIVE_UM,
     FINE_PITCH_UM,
     GAUSSIAN_SIGMA,
     MODES,

@@ -2,9 +2,10 @@ import math
 
 import pytest
 
+from camkit.calibration.dots import ACTIVE_UM
 from camkit.errors import ContractError
 from camkit.models_def.kinds.spad.plate_psf import WAVELENGTH_UM
-from camkit.models_def.kinds.spad.sampling import ACTIVE_UM, FINE_PITCH_UM, PSF_SIDE
+from camkit.models_def.kinds.spad.sampling import FINE_PITCH_UM, PSF_SIDE
 from camkit.models_def.optics.dots.camera import ORDERS, DotCamera
 
 

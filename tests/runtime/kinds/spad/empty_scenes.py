@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.runtime.kinds.spad.known_pulse import LITTLE_LOST
+from camkit.runtime.kinds.spad.captures.known_pulse import LITTLE_LOST
 from camkit.runtime.kinds.spad.pile_up import without_pile_up
 from camkit.runtime.kinds.spad.pulse import GatedPulse
 from camkit.runtime.kinds.spad.scatter import growth

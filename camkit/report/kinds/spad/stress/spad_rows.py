@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Sharpen, SuperResolve
+from camkit.calibration.dots import ACTIVE_UM
 from camkit.contracts import FloatArray
 from camkit.errors import UnsupportedError
 from camkit.report.kinds.spad.stress.judge import SpadJudge
@@ -38,8 +39,6 @@ HOT_COUNTS: Final = 5 * PHOTONS
 HOT_COUNTS_OF_A_BIN: Final = 50.0
 FEW_PHOTONS: Final = 1000.0
 TWO_PHOTONS: Final = 4000.0
-ACTIVE_UM: Final = 30.0
-"""Of the prototype."""
 APERTURE_MM: Final = 14.0
 """Of the plate and of its stop: 16 units of 0.873 mm."""
 FOCAL_MM: Final = 50.0

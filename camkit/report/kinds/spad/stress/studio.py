@@ -15,10 +15,10 @@ from camkit.report.kinds.spad.stress.shot import (
     PictureSetting,
     PictureShot,
 )
+from camkit.runtime.kinds.spad.captures.known_pulse import LITTLE_LOST
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from camkit.runtime.kinds.spad.finer.sampling import point_kernel
 from camkit.runtime.kinds.spad.golden_captures import stage_set
-from camkit.runtime.kinds.spad.known_pulse import LITTLE_LOST
 from camkit.runtime.kinds.spad.pile_up import without_pile_up
 from camkit.runtime.kinds.spad.pulse import Pulse
 from camkit.runtime.kinds.spad.time_axis import TimeAxis

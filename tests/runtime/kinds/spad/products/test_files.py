@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camkit.errors import ContractError
+from camkit.runtime.kinds.spad.captures.strips import KEPT_BYTES, check_room, pieces
 from camkit.runtime.kinds.spad.products.archive import write_archive
 from camkit.runtime.kinds.spad.products.picture import write_exr, write_tiff
 from camkit.runtime.kinds.spad.products.points import directions, write_points
@@ -24,7 +25,6 @@ from camkit.runtime.kinds.spad.products.preview import (
     write_preview,
 )
 from camkit.runtime.kinds.spad.products.video import write_video
-from camkit.runtime.kinds.spad.strips import KEPT_BYTES, check_room, pieces
 
 
 def test_an_archive_is_numpys_and_equal_arrays_give_equal_bytes(tmp_path: Path) -> None:

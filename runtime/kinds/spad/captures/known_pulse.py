@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.runtime.job.job import Job
+from camkit.runtime.kinds.spad.captures.photon_capture import PhotonCapture, photons_of
 from camkit.runtime.kinds.spad.guess_pulse import guess_pulse
-from camkit.runtime.kinds.spad.photon_capture import PhotonCapture, photons_of
 from camkit.runtime.kinds.spad.pixels import by_pixel
 from camkit.runtime.kinds.spad.pulse import Pulse
 from camkit.runtime.kinds.spad.scatter import growth

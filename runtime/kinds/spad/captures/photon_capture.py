@@ -21,11 +21,11 @@ from camkit.caller import option_text
 from camkit.errors import ContractError, UnsupportedError
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.job.job import Job
+from camkit.runtime.kinds.spad.captures.settings import Product, Settings
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
 from camkit.runtime.kinds.spad.files.counts_file import CountsFile, Hints
 from camkit.runtime.kinds.spad.files.open_counts import open_counts
 from camkit.runtime.kinds.spad.finer.camera import size_of
-from camkit.runtime.kinds.spad.settings import Product, Settings
 from camkit.runtime.kinds.spad.time_axis import TimeAxis
 from camkit.runtime.kinds.spad.timing import Timing, timing_beside
 from camkit.runtime.options import Options
@@ -311,7 +311,7 @@ def _with_bundle(timing: Timing, manifest: Manifest) -> Timing:
 
 
 def _surprise(file: CountsFile, timing: Timing, manifest: Manifest) -> tuple[str, ...]:
-    """Tell that a bundle makes something else of a capture than is usual of such files."""
+    """Return a note where a bundle makes something else of a capture than is usual."""
     usual, own = file.assumed.get("orientation"), times_of_bundle(manifest).get("orientation")
     if timing.timing.orientation is not None or None in (usual, own) or usual == own:
         return ()

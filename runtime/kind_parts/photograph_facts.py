@@ -1,4 +1,4 @@
-"""What a photograph is and states of itself, for `camkit info`."""
+"""The facts that a photograph states of itself, for `camkit info`."""
 
 from collections.abc import Mapping
 from pathlib import Path

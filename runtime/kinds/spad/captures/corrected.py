@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from camkit.runtime.cancel import check_wish
-from camkit.runtime.kinds.spad.photon_capture import PhotonCapture
+from camkit.runtime.kinds.spad.captures.photon_capture import PhotonCapture
 from camkit.runtime.kinds.spad.pile_up import without_pile_up
 from camkit.runtime.kinds.spad.pixels import Pixels, by_pixel
 from camkit.runtime.kinds.spad.time_axis import Orientation
@@ -23,7 +23,7 @@ class CorrectedRows:
     """
 
     def __init__(self, counts: RowSource, capture: PhotonCapture, *, owned: bool) -> None:
-        """Look at the maps of a capture.
+        """Read the maps of a capture.
 
         Args:
             counts: Its rows.

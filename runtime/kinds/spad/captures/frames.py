@@ -9,10 +9,10 @@ import numpy as np
 from camkit.contracts import FloatArray
 from camkit.runtime.cancel import check_wish
 from camkit.runtime.job.stream import Stream
+from camkit.runtime.kinds.spad.captures.photon_capture import PhotonCapture
+from camkit.runtime.kinds.spad.captures.strips import KEPT_BYTES, pieces
 from camkit.runtime.kinds.spad.hot_pixels import check_map, painted_over
-from camkit.runtime.kinds.spad.photon_capture import PhotonCapture
 from camkit.runtime.kinds.spad.pixels import Pixels, by_pixel
-from camkit.runtime.kinds.spad.strips import KEPT_BYTES, pieces
 
 SHARE: Final = 0.4
 """Of the free memory: an array that takes more lies in a file while it is made."""

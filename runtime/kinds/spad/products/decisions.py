@@ -1,11 +1,11 @@
-"""What would be done to a capture of single photons, and why, without doing it."""
+"""The plan of a capture of single photons: what would be done, and why."""
 
 from collections.abc import Iterator
 from dataclasses import replace
 
 from camkit.bundle.stages import SuperResolve
 from camkit.runtime.job.job import Job
-from camkit.runtime.kinds.spad.photon_capture import PhotonCapture, photons_of
+from camkit.runtime.kinds.spad.captures.photon_capture import PhotonCapture, photons_of
 from camkit.runtime.kinds.spad.products.record import told_axis, told_way
 from camkit.runtime.kinds.spad.stages.super_resolve import camera_of, size_of_network
 from camkit.runtime.plan.decision import Work
