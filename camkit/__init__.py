@@ -4,18 +4,25 @@ The public face, free of torch and loaded only when touched:
 
     camkit.load(bundle)            a live Pipeline from a bundle's name or path
     camkit.process(files, ...)     captures in, pictures and sidecars out
+    camkit.simulate(scene, ...)    a sharp scene to a capture of a camera
+    camkit.calibrate               measurements of a camera: calibrate.noise(...), ...
+    camkit.freeze(optics, ...)     optics to a frozen PSF (needs torch)
+    camkit.train(recipe, ...)      a recipe to a checkpoint (needs torch)
+    camkit.export.bundle(...)      checkpoints and PSF to a bundle (needs torch)
     camkit.Pipeline                the type that `load` returns
     camkit.CamkitError, ...        the error tree of camkit.errors
 
 The folders, in the order in which data passes through them: `models_def` (design time: optics,
 sensors, networks, training), `export` (bundle out), `bundle` (the file both sides agree on),
-`runtime` (use time), `calibration` (what a camera is, measured), `report` and `cli` (for people).
+`runtime` (use time), `calibration` (what a camera is, measured), `report`, `calibrate` and `cli`
+(for people).
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from camkit import calibrate, export
     from camkit.errors import (
         BundleError,
         CamkitError,
@@ -24,10 +31,13 @@ if TYPE_CHECKING:
         ParityError,
         UnsupportedError,
     )
+    from camkit.models_def.face.network_training import train
+    from camkit.models_def.face.optics_freezing import freeze
     from camkit.runtime.batch import process
     from camkit.runtime.cancel import Cancelled
     from camkit.runtime.capture import MosaicOptions
     from camkit.runtime.development import FileResult
+    from camkit.runtime.face.simulation import simulate
     from camkit.runtime.pipeline import Pipeline, load
 
 __all__ = [
@@ -42,8 +52,13 @@ __all__ = [
     "Pipeline",
     "UnsupportedError",
     "__version__",
+    "calibrate",
+    "export",
+    "freeze",
     "load",
     "process",
+    "simulate",
+    "train",
 ]
 
 __version__ = "0.1.0"
@@ -55,12 +70,18 @@ _HOMES = {
     "FileResult": "camkit.runtime.development",
     "Cancelled": "camkit.runtime.cancel",
     "MosaicOptions": "camkit.runtime.capture",
+    "simulate": "camkit.runtime.face.simulation",
+    "freeze": "camkit.models_def.face.optics_freezing",
+    "train": "camkit.models_def.face.network_training",
 }
+_PACKAGES = {"calibrate": "camkit.calibrate", "export": "camkit.export"}
 
 
 def __getattr__(name: str) -> object:
     if name not in __all__:
         raise AttributeError(f"module 'camkit' has no attribute {name!r}")
+    if name in _PACKAGES:
+        return import_module(_PACKAGES[name])
     return getattr(import_module(_HOMES.get(name, "camkit.errors")), name)
 
 

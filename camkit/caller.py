@@ -28,7 +28,6 @@ FLAGS: Final = {
     "times_s": "--times",
     "darks": "--dark",
     "flats": "--flat",
-    "first": "--fine-tune",
 }
 """Options whose flag is not their name."""
 PARAMETERS: Final = {
@@ -91,6 +90,11 @@ def option_text(name: str, value: object = _Nothing.SAID) -> str:
     if isinstance(value, str):
         return f'{parameter}="{value}"'
     return f"{parameter}={_plain(value)}"
+
+
+def command_text(name: str) -> str:
+    """Return a command as the caller writes it: `camkit freeze`, or `camkit.freeze`."""
+    return f"camkit {name}" if language() == "command" else f"camkit.{name}"
 
 
 def option_list(names: list[str]) -> str:

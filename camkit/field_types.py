@@ -3,11 +3,22 @@
 import types
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
-from functools import cache
+from functools import cache, wraps
+from inspect import signature
 from numbers import Integral, Real
 from os import PathLike
 from pathlib import Path
-from typing import Any, Final, Literal, Union, get_args, get_origin, get_type_hints
+from typing import (
+    Any,
+    Final,
+    Literal,
+    ParamSpec,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 import numpy as np
 
@@ -24,6 +35,26 @@ _PLAIN: Final[dict[Any, tuple[tuple[type, ...], str]]] = {
     PathLike: ((PathLike,), "a path"),
 }
 """Annotation -> what may stand for it, and its name for people. A truth value is no number."""
+
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def checked(function: Callable[P, R]) -> Callable[P, R]:
+    """Return a function that checks its arguments against its annotations.
+
+    An annotation that is a text is not checked. A wrong argument is a ContractError.
+    """
+    hints, parameters = function.__annotations__, signature(function)
+
+    @wraps(function)
+    def call(*args: P.args, **kwargs: P.kwargs) -> R:
+        for name, value in parameters.bind(*args, **kwargs).arguments.items():
+            check_value(name, value, hints[name])
+        return function(*args, **kwargs)
+
+    return call
 
 
 def check_fields(record: Any) -> None:
@@ -67,6 +98,10 @@ def _fits(value: object, hint: Any) -> bool:
         return any(type(value) is type(part) and value == part for part in parts)
     if origin is tuple:
         return _fits_tuple(value, parts)
+    if origin is Sequence:
+        return _fits_tuple(value, (*parts, Ellipsis))
+    if origin is PathLike:
+        return isinstance(value, PathLike)
     if origin in (Callable, Mapping) or hint is Any or not isinstance(hint, type):
         return True
     allowed = _PLAIN[hint][0] if hint in _PLAIN else (hint,)
@@ -92,4 +127,8 @@ def _named(hint: Any) -> str:
         return f"one of {', '.join(map(str, parts))}"
     if origin is tuple:
         return f"({', '.join(_named(part) for part in parts)})"
+    if origin is Sequence:
+        return f"several of: {_named(*parts)}"
+    if origin is PathLike:
+        return "a path"
     return _PLAIN[hint][1] if hint in _PLAIN else getattr(hint, "__name__", str(hint))

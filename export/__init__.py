@@ -8,6 +8,22 @@
     remeasured      a bundle that is there, with parts that were measured
     energy, card    the card and the preview for people
     assemble        everything packed, proved, written
+    packing         `camkit.export.bundle` and `camkit export`
 
 Nothing is written when a proof fails.
 """
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from camkit.export.packing import bundle
+
+__all__ = ["bundle"]
+
+
+def __getattr__(name: str) -> object:
+    if name not in __all__:
+        raise AttributeError(f"module 'camkit.export' has no attribute {name!r}")
+    from camkit.export import packing
+
+    return packing.bundle

@@ -1,7 +1,15 @@
-"""The parts of a bundle."""
+"""The parts of a bundle, and the usual names of their files."""
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
+
+PSF_NAME: Final = "psf.safetensors"
+HAZE_NAME: Final = "haze.safetensors"
+STRESS_NAME: Final = "stress_psf.safetensors"
+STRESS_HAZE_NAME: Final = "stress_haze.safetensors"
+REPORT_NAME: Final = "freeze.json"
+PLAN_NAME: Final = "plan.json"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -111,18 +111,18 @@ class ToneFacts:
         }
 
 
-def levels_of(text: str, count: int) -> tuple[float, ...]:
+def levels_of(text: str | Sequence[float], count: int) -> tuple[float, ...]:
     """Read the levels of pictures.
 
     Args:
-        text: Numbers separated by commas, in the order of the pictures.
+        text: Numbers, or a text of them separated by commas, in the order of the pictures.
         count: Of the pictures.
 
     Raises:
         ContractError: If there is not one for each, one is no number >= 0, or one comes twice.
     """
     try:
-        levels = tuple(float(part) for part in text.split(","))
+        levels = tuple(map(float, text.split(",") if isinstance(text, str) else text))
     except ValueError:
         raise ContractError(
             f"{option_text('levels')} takes numbers separated by commas; got {text!r}"

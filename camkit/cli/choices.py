@@ -1,14 +1,11 @@
 """Options that several commands share."""
 
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated
 
 import typer
 
 from camkit.errors import ContractError
-
-INSTALLED_BY: Final = 'pip install -c constraints.txt -e ".[train]"'
-"""What the design side needs."""
 
 Debug = Annotated[bool, typer.Option("--debug", help="Show tracebacks and log messages on stderr.")]
 """Read by `camkit.cli.app.run`, which sees all arguments; commands only declare it."""

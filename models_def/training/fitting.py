@@ -90,7 +90,7 @@ def own_fitting(kind: str, request: FitRequest) -> OwnFitting | None:
         )
     for option, what, is_for_tuning in _FILES:
         if getattr(request, option) is not None:
-            instead = f", or add {option_text('first')} too" if is_for_tuning else ""
+            instead = f", or add {option_text('fine_tune')} too" if is_for_tuning else ""
             raise ContractError(
                 f"the loss of {whose} does not look at {what}: leave {option_text(option)} away"
                 f"{instead}"

@@ -30,6 +30,11 @@ _PHOTOMETRIC, _MAKE, _SUB_IFDS, _DNG_VERSION = 262, 271, 330, 50706
 _SENSOR_PHOTOMETRICS: Final = (32803, 34892)
 
 
+def optional_path(path: FilePath | None) -> Path | None:
+    """Return a path; None for none."""
+    return None if path is None else Path(path)
+
+
 def is_path(source: Any) -> TypeGuard[FilePath]:
     """Return whether a source is a path, not data."""
     return isinstance(source, str | os.PathLike)

@@ -1,25 +1,29 @@
 """Exposure times as people state them: seconds on the command line, or a list in a file."""
 
 import math
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
 from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError
+from camkit.runtime.files.in_memory import FilePath
 from camkit.side_file import read_side_text
 
 COMMENT: Final = "#"
 MOST_LIST_BYTES: Final = 1 << 20
 
 
-def stated_times(text: str, files: Sequence[Path], darks: Sequence[Path] = ()) -> tuple[float, ...]:
+def stated_times(
+    text: FilePath | Sequence[float], files: Sequence[Path], darks: Sequence[Path] = ()
+) -> tuple[float, ...]:
     """Return the exposure time of every file, then of every dark frame.
 
     Args:
-        text: Seconds separated by commas, in the order of the files; or the path of a list with
-            lines `NAME SECONDS`, of which further words, comments (`#`) and names that are not
-            among the files are skipped. Seconds may be fractions, 1/60.
+        text: Seconds, or a text of them separated by commas, in the order of the files; or the
+            path of a list with lines `NAME SECONDS`, of which further words, comments (`#`) and
+            names that are not among the files are skipped. Seconds may be fractions, 1/60.
         files: The frames.
         darks: Their dark frames.
 
@@ -30,7 +34,11 @@ def stated_times(text: str, files: Sequence[Path], darks: Sequence[Path] = ()) -
         ContractError: If a time is missing, is stated twice, or is no time.
         DecodeError: If the list cannot be read.
     """
-    seconds = [_seconds(part) for part in text.split(",")]
+    if isinstance(text, str | os.PathLike):
+        words = os.fspath(text).split(",")
+    else:
+        words = [str(seconds) for seconds in text]
+    seconds = [_seconds(word) for word in words]
     if all(s is not None for s in seconds):
         if len(seconds) != len(files) + len(darks):
             and_darks = f" and {len(darks)} dark frames" if darks else ""
@@ -39,7 +47,7 @@ def stated_times(text: str, files: Sequence[Path], darks: Sequence[Path] = ()) -
                 f"files{and_darks}; state one for each"
             )
         return tuple(_checked(s, option_text("times_s")) for s in seconds if s is not None)
-    listed = _read_list(Path(text))
+    listed = _read_list(Path(",".join(words)))
     missing = [path.name for path in (*files, *darks) if path.name not in listed]
     if missing:
         raise ContractError(

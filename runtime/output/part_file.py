@@ -6,16 +6,33 @@ Every writer has a part file of its own, so two processes never write into one a
 import hashlib
 import os
 import secrets
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
+
+from camkit.caller import option_text
+from camkit.errors import ContractError
 
 PART_SUFFIX: Final = ".part"
 MOST_NAME_BYTES: Final = 200
 """Of a file's name within that of its part; file systems allow 255 in all."""
 HASH_LETTERS: Final = 16
 """Of the hash of the whole name, which tells names apart that begin alike."""
+
+
+def refuse_existing(paths: Iterable[Path | None], *, overwrite: bool) -> None:
+    """Refuse to write over a file before any work, unless the caller asked for it.
+
+    Raises:
+        ContractError: Names those that exist.
+    """
+    existing = [str(path) for path in paths if path is not None and path.exists()]
+    if existing and not overwrite:
+        raise ContractError(
+            f"{', '.join(existing)} exists; add {option_text('overwrite', value=True)} or choose "
+            "another name"
+        )
 
 
 def part_path(path: Path) -> Path:

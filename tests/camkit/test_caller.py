@@ -33,7 +33,7 @@ from tests.dng_factory import dng_tags, scene_mosaic
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = (
     *(ROOT / "runtime", ROOT / "export", ROOT / "models_def"),
-    *(ROOT / "camkit" / name for name in ("bundle", "scenes", "calibration")),
+    *(ROOT / "camkit" / name for name in ("bundle", "scenes", "calibrate", "calibration")),
     *(
         ROOT / "camkit" / f"{name}.py"
         for name in ("contracts", "haze", "kinds", "colorimetry", "streaks")

@@ -21,8 +21,13 @@ PUBLIC = [
     "Pipeline",
     "UnsupportedError",
     "__version__",
+    "calibrate",
+    "export",
+    "freeze",
     "load",
     "process",
+    "simulate",
+    "train",
 ]
 
 

@@ -44,13 +44,13 @@ class Screen:
             )
 
     @classmethod
-    def read(cls, text: str) -> Self:
-        """Read a screen like 1920x1080.
+    def read(cls, text: str | tuple[int, int]) -> Self:
+        """Read a screen like 1920x1080, or (1920, 1080).
 
         Raises:
             ContractError: If the text is anything else.
         """
-        found = _TEXT.fullmatch(text)
+        found = _TEXT.fullmatch(text if isinstance(text, str) else "x".join(map(str, text)))
         if found is None:
             raise ContractError(f"a screen is WIDTHxHEIGHT in px, like 1920x1080; got {text!r}")
         return cls(width_px=int(found[1]), height_px=int(found[2]))

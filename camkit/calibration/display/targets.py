@@ -257,14 +257,14 @@ def fit_light(light: FloatArray, size: tuple[int, int]) -> FloatArray:
     return np.stack(planes).astype(np.float32)
 
 
-def levels_of_steps(text: str) -> tuple[int, ...]:
+def levels_of_steps(text: str | Sequence[int]) -> tuple[int, ...]:
     """Read the levels of grey steps.
 
     Raises:
         ContractError: If one is no whole number of 0..255 or comes twice.
     """
     try:
-        levels = tuple(int(part) for part in text.split(","))
+        levels = tuple(map(int, text.split(",") if isinstance(text, str) else text))
     except ValueError:
         raise ContractError(
             f"{option_text('levels')} takes whole numbers separated by commas; got {text!r}"

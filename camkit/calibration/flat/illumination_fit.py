@@ -98,7 +98,7 @@ class FlatFacts:
 
 def measure_flat(
     files: Sequence[Path],
-    shifts: Sequence[str] | None,
+    shifts: Sequence[str | tuple[float, float]] | None,
     turns: Sequence[float] | None,
     *,
     pixel_pitch_um: float | None = None,

@@ -57,12 +57,14 @@ def orientation_turn_deg(orientation: int) -> float:
 
 
 def poses_of(
-    shifts: Sequence[str] | None, turns: Sequence[float] | None, told: Sequence[float]
+    shifts: Sequence[str | tuple[float, float]] | None,
+    turns: Sequence[float] | None,
+    told: Sequence[float],
 ) -> list[Pose]:
     """Return the poses that a person states.
 
     Args:
-        shifts: "x,y" in pixels for each picture; None for no shifts.
+        shifts: (x, y) or "x,y" in pixels for each picture; None for no shifts.
         turns: Degrees for each picture; None for what the pictures tell.
         told: Turns in degrees that the pictures tell.
 
@@ -82,9 +84,9 @@ def poses_of(
     ]
 
 
-def _pair(text: str) -> tuple[float, float]:
+def _pair(text: str | tuple[float, float]) -> tuple[float, float]:
     try:
-        x, y = (float(part) for part in text.split(","))
+        x, y = map(float, text.split(",") if isinstance(text, str) else text)
     except ValueError:
         raise ContractError(
             f"{option_text('shift_px')} takes two numbers X,Y; got {text!r}"

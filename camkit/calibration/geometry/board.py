@@ -39,13 +39,13 @@ class Board:
             raise ContractError(f"the squares of a board must be > 0 mm; got {square:g}")
 
     @classmethod
-    def read(cls, text: str, square_mm: float | None = None) -> Self:
-        """Read a board like 9x6.
+    def read(cls, text: str | tuple[int, int], square_mm: float | None = None) -> Self:
+        """Read a board like 9x6, or (9, 6).
 
         Raises:
             ContractError: If the text is anything else.
         """
-        found = _TEXT.fullmatch(text)
+        found = _TEXT.fullmatch(text if isinstance(text, str) else "x".join(map(str, text)))
         if found is None:
             raise ContractError(
                 f"a board is COLUMNSxROWS of its inner corners, like 9x6; got {text!r}"

@@ -6,14 +6,14 @@ from typing import Annotated
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
-
-PSF_NAME = "psf.safetensors"
-HAZE_NAME = "haze.safetensors"
-STRESS_NAME = "stress_psf.safetensors"
-STRESS_HAZE_NAME = "stress_haze.safetensors"
-REPORT_NAME = "freeze.json"
-PLAN_NAME = "plan.json"
-NO_PLATE = "none"
+from camkit.export.parts import (
+    HAZE_NAME,
+    PLAN_NAME,
+    PSF_NAME,
+    REPORT_NAME,
+    STRESS_HAZE_NAME,
+    STRESS_NAME,
+)
 
 
 def export(
@@ -66,41 +66,21 @@ def export(
     _debug: Debug = False,
 ) -> None:
     """Pack checkpoints, PSF, lens or plate into a bundle and verify it (needs torch)."""
-    from camkit.cli.design.design_time import print_report, refuse_existing, require_torch
-    from camkit.errors import ContractError
+    from camkit.cli.design.design_time import print_report
+    from camkit.export import packing
 
-    require_torch("camkit export")
-    refuse_existing([out], overwrite=overwrite)
-    folder = checkpoints[0].parent
-    frozen = psf or _beside(folder, PSF_NAME)
-    if frozen is None:
-        raise ContractError(
-            f"there is no {folder / PSF_NAME}; make it with `camkit freeze`, or add --psf"
-        )
-    stress = stress_psf or _beside(folder, STRESS_NAME)
-    beside = None if stress is None else _beside(stress.parent, STRESS_HAZE_NAME)
-    from camkit.export.assemble import export_bundle
-    from camkit.export.parts import Parts
-
-    report = export_bundle(
-        Parts(
-            checkpoints=tuple(checkpoints),
-            psf=frozen,
-            haze=haze or _beside(frozen.parent, HAZE_NAME),
-            stress_psf=stress,
-            stress_haze=stress_haze or beside,
-            prescription=prescription,
-            plate=None if plate in (None, NO_PLATE) else Path(plate),
-            without_plate=plate == NO_PLATE,
-            freeze=freeze or _beside(folder, REPORT_NAME),
-            plan=plan or _beside(folder, PLAN_NAME),
-            version=version,
-        ),
+    report = packing.bundle(
+        checkpoints,
         out,
+        psf=psf,
+        haze=haze,
+        stress_psf=stress_psf,
+        stress_haze=stress_haze,
+        freeze=freeze,
+        plan=plan,
+        prescription=prescription,
+        plate=plate,
+        version=version,
+        overwrite=overwrite,
     )
     print_report(report, json_)
-
-
-def _beside(folder: Path, name: str) -> Path | None:
-    path = folder / name
-    return path if path.is_file() else None

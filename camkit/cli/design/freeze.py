@@ -1,21 +1,16 @@
 """`camkit freeze`: a lens, a plate, or a PSF that was measured, to a frozen PSF.
 
-With `--unit` it measures one camera body instead (unit.py).
+With `--unit` it measures one camera body instead, by `camkit.calibrate.camera_body`.
 """
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import Annotated, Final
 
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
-from camkit.errors import ContractError, UnsupportedError
-
-if TYPE_CHECKING:
-    from camkit.bundle.sensor import ColorSensor
-    from camkit.bundle.stages import Wiener
+from camkit.errors import ContractError
 
 LIMIT_DB: Final = 0.05
 
@@ -106,14 +101,14 @@ def freeze(
 
     With --unit nothing is frozen: the focus of the camera body that took CAPTURES is measured.
     """
-    from camkit.cli.design.design_time import print_report, refuse_existing, require_torch
+    from camkit.cli.design.design_time import print_report
 
-    refuse_existing([out, haze, stress_out, stress_haze, report], overwrite=overwrite)
     depths = _depths(depths_mm)
     if unit or captures:
         from camkit.bundle.reader import SUFFIX
+        from camkit.calibrate import body_focus
 
-        beside = {
+        options = {
             "--haze": haze,
             "--stress-out": stress_out,
             "--stress-haze": stress_haze,
@@ -123,64 +118,43 @@ def freeze(
             "--max-side-px": max_side_px,
             "--recipe": recipe if optics.suffix.lower() == SUFFIX else None,
         }
-        _check_unit(unit=unit, beside=[name for name, value in beside.items() if value is not None])
-    recipe = _default_recipe() if recipe is None else recipe
-    if unit or captures:
-        from camkit.cli.design.unit import measure_unit
-
-        print_report(measure_unit(optics, captures or [], out, recipe, depths, focus_um), json_)
-        return
-    require_torch("camkit freeze")
-    from camkit.bundle.frozen_optics import write_optics_files
-    from camkit.cli.design.unit import focus_range_um
-    from camkit.models_def.optics.freezer import FreezeRequest, freeze_optics
-    from camkit.models_def.optics.optics_file import read_optics
-
-    if (stress_haze is None) != (haze is None or stress_out is None):
-        raise ContractError(
-            "with --haze, --stress-out and --stress-haze go together; else omit --stress-haze"
+        _check_unit([name for name, value in options.items() if value is not None], unit=unit)
+        focus = body_focus.camera_body(
+            optics,
+            captures or (),
+            out,
+            recipe=recipe,
+            depths_mm=depths,
+            focus_um=focus_um,
+            overwrite=overwrite,
         )
-    sensor, bank = _camera_of(recipe)
-    found = read_optics(optics)
-    request = FreezeRequest(
-        sensor=sensor,
-        bank=bank,
+        print_report({**focus.to_json(), "out": str(out)}, json_)
+        return
+    from camkit.models_def.face import optics_freezing
+
+    facts = optics_freezing.freeze(
+        optics,
+        out,
+        recipe=recipe,
         depths_mm=depths,
         limit_db=None if limit_db == LIMIT_DB else limit_db,
         energy=energy,
         max_side_px=max_side_px,
-        focus_um=focus_range_um(found, focus_um),
-        haze=haze is not None,
-        stress=stress_out is not None,
+        focus_um=focus_um,
+        haze=haze,
+        stress_out=stress_out,
+        stress_haze=stress_haze,
+        report=report,
+        overwrite=overwrite,
     )
-    frozen = freeze_optics(found, request)
-    write_optics_files(frozen.optics, out, haze)
-    if stress_out is not None and frozen.stress is not None:
-        write_optics_files(frozen.stress, stress_out, stress_haze)
-    if report is not None:
-        report.parent.mkdir(parents=True, exist_ok=True)
-        report.write_text(json.dumps(frozen.facts, indent=2) + "\n", encoding="utf-8")
-    print_report(frozen.facts, json_)
+    print_report(facts, json_)
 
 
-def _camera_of(recipe: Path) -> "tuple[ColorSensor, Wiener | None]":
-    """Return the sensor of a recipe, and its bank."""
-    from camkit.bundle.sensor import ColorSensor
-    from camkit.bundle.stages import Wiener
-    from camkit.models_def.training.kind import read_recipe, training_kind
-
-    chosen = read_recipe(recipe)
-    stages = training_kind(chosen.kind).design(chosen).stages
-    if not isinstance(chosen.sensor, ColorSensor):
-        raise UnsupportedError(f"a {chosen.sensor.type} sensor has no response to freeze a PSF for")
-    return chosen.sensor, next((stage for stage in stages if isinstance(stage, Wiener)), None)
-
-
-def _check_unit(*, unit: bool, beside: Sequence[str]) -> None:
+def _check_unit(options: Sequence[str], *, unit: bool) -> None:
     if not unit:
         raise ContractError("captures are for --unit, which measures the camera that took them")
-    if beside:
-        raise ContractError(f"--unit freezes nothing; leave {', '.join(beside)} out")
+    if options:
+        raise ContractError(f"--unit freezes nothing; leave {', '.join(options)} out")
 
 
 def _depths(text: str | None) -> tuple[float, ...]:
@@ -188,9 +162,3 @@ def _depths(text: str | None) -> tuple[float, ...]:
         return tuple(float(part) for part in text.split(",")) if text is not None else ()
     except ValueError:
         raise ContractError(f"--depths-mm takes distances A,B,C in mm; got {text!r}") from None
-
-
-def _default_recipe() -> Path:
-    from importlib import resources
-
-    return Path(str(resources.files("camkit.models_def.recipes"))) / "duet.toml"

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
-from camkit.cli.design.export import HAZE_NAME, PSF_NAME
+from camkit.export.parts import HAZE_NAME, PSF_NAME
 from camkit.progress import note, working
 
 

@@ -1,23 +1,13 @@
 """`camkit train`: a recipe to a checkpoint."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.cli.say import say
-from camkit.errors import ContractError
 from camkit.stopwatch import Stopwatch
-
-WITHOUT_VGG = (
-    "no --vgg FILE: the perceptual term of eq. (6.12) compares sRGB values, not VGG-19 features"
-)
-
-SUBSTITUTE = "no --vgg FILE: features are those of random weights in place of VGG-19"
-
-if TYPE_CHECKING:
-    from camkit.models_def.training.refinement import Refinement
 
 
 def train(
@@ -90,71 +80,30 @@ def train(
     _debug: Debug = False,
 ) -> None:
     """Train one restoration network of a recipe (needs torch)."""
-    from camkit.cli.design.design_time import print_report, require_torch
+    from camkit.cli.design.design_time import print_report
+    from camkit.models_def.face import network_training
 
-    require_torch("camkit train")
-    from camkit.models_def.training.trainer import TrainOptions
-    from camkit.models_def.training.trainer import train as run
-
-    refinement: Refinement | None = None
-    if fine_tune is not None:
-        if sharp is not None:
-            raise ContractError("--sharp is for a critic; fine-tuning has none: leave it away")
-        refinement = _fine_tuning(recipe, fine_tune, size, vgg, pairs, device)
-    elif vgg is None:
-        _tell_substitute(recipe, size, role)
-    result = run(
+    result = network_training.train(
         recipe,
-        TrainOptions(
-            out_dir=out_dir,
-            size=size,
-            role=role,
-            data_folder=data,
-            valid_folder=valid,
-            steps=steps,
-            max_minutes=max_minutes,
-            max_cpu_minutes=max_cpu_minutes,
-            start=start,
-            resume=resume,
-            overwrite=overwrite,
-            threads=threads,
-            workers=workers,
-            device=device,
-            vgg=None if refinement is not None else vgg,
-            sharp_folder=sharp,
-            pairs=None if refinement is not None else pairs,
-        ),
-        refinement=refinement,
+        out_dir,
+        size=size,
+        role=role,
+        data=data,
+        valid=valid,
+        steps=steps,
+        max_minutes=max_minutes,
+        max_cpu_minutes=max_cpu_minutes,
+        start=start,
+        fine_tune=fine_tune,
+        vgg=vgg,
+        sharp=sharp,
+        pairs=pairs,
+        resume=resume,
+        overwrite=overwrite,
+        threads=threads,
+        workers=workers,
+        device=device,
+        on_note=lambda text: say(f"camkit: {text}", err=True),
         stopwatch=context.find_object(Stopwatch),
     )
     print_report(result.to_json(), json_)
-
-
-def _tell_substitute(recipe: Path, size: str, role: str | None) -> None:
-    """Report on stderr that features are a substitute, where a loss uses any."""
-    from camkit.models_def.training.kind import read_recipe
-    from camkit.models_def.training.recipe import PICTURE_LOSSES
-
-    schedule = read_recipe(recipe).network(size, role).schedule
-    if schedule.loss in PICTURE_LOSSES and schedule.content.looks:
-        say(f"camkit: {SUBSTITUTE}", err=True)
-
-
-def _fine_tuning(
-    recipe: Path, start: Path, size: str, vgg: Path | None, pairs: Path | None, device: str
-) -> "Refinement":
-    from camkit.models_def.training.kind import read_recipe
-    from camkit.models_def.training.refinement import FineTuningOptions, refining_kind
-
-    if vgg is None:
-        say(f"camkit: {WITHOUT_VGG}", err=True)
-    options = FineTuningOptions(
-        start=start,
-        size=size,
-        vgg=vgg,
-        pairs=pairs,
-        device=device,
-        recipe_folder=recipe.parent,
-    )
-    plan = read_recipe(recipe)
-    return refining_kind(plan.kind).refinement(plan, options)

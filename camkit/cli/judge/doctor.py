@@ -9,7 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from camkit.cli.choices import INSTALLED_BY, Debug, Json
+from camkit.cli.choices import Debug, Json
 from camkit.cli.say import say
 from camkit.errors import CamkitError
 
@@ -56,6 +56,7 @@ def examine() -> dict[str, Any]:
     from camkit import __version__
     from camkit.bundle.reader import built_in_bundles
     from camkit.bundle.stages.register import stages_of_packages
+    from camkit.models_def.face.torch_need import INSTALLED_BY
     from camkit.report.bench.machine import memory_mb, package_version, processor_name
     from camkit.runtime.network.engine import available_threads, providers
 

@@ -37,7 +37,7 @@ def test_it_simulates_files_of_its_own_format(capture: Path, toy: Path, camkit_c
     assert (samples.shape, samples.dtype) == ((HEIGHT_PX, WIDTH_PX), np.uint16)
     wrong = camkit_command("simulate", "procedural:5", "--bundle", toy, "-o", "a.dng")
     assert wrong.code == ExitCode.USAGE
-    assert "expected a name in .tif" in wrong.err
+    assert "is a file in .tif" in wrong.err
 
 
 def test_its_light_is_exposed_by_what_saturates_it(

@@ -1,14 +1,13 @@
-"""`camkit calibrate`: what a camera is, measured on photographs of something known.
+"""`camkit calibrate`: a camera measured on photographs of something known, by `camkit.calibrate`.
 
 app       the commands joined
-outputs   the files that a command leaves, and what it says
+outputs   options and printed text that they share
 psf       the point spread function, from a bracket of a point, of a disc, or from an edge
 geometry  focal length, optical centre and distortion, from photographs of a checkerboard
 flat      relative illumination, from pictures of an uneven display in several poses
 noise     gain, read noise and fixed patterns, from pairs of dark and flat frames
 targets   what a display shows to be photographed
 pairs     captures of it as pairs for training
-folder    the folder that those two fill, all or nothing
 bundle    what was measured, into a copy of a bundle
 lensfun_in    a lens of lensfun's database, to a bundle
 lensfun_out   distortion and vignetting, to an entry that lensfun reads

@@ -6,8 +6,7 @@ from typing import Annotated
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
-from camkit.cli.use.calibrate.outputs import Page, check_out, check_page, tell
-from camkit.errors import BundleError, ContractError, DecodeError
+from camkit.cli.use.calibrate.outputs import Page, print_result, with_files
 
 
 def bundle(
@@ -37,51 +36,19 @@ def bundle(
     _debug: Debug = False,
 ) -> None:
     """Store the measurements of a camera in a copy of a bundle and verify it."""
-    check_out(out, ".camkit", "a bundle", overwrite=overwrite)
-    check_page(page, overwrite=overwrite)
-    if keep_networks and psf is None:
-        raise ContractError("--keep-networks belongs to --psf; without it they stay")
-    if (geometry, flat, noise, psf) == (None, None, None, None):
-        raise ContractError("give what was measured: --geometry, --flat, --noise, --psf")
-    from camkit.bundle.psf_file import read_psf
-    from camkit.bundle.reader import find_bundle, open_bundle
-    from camkit.calibration.measured_files import read_flat, read_geometry, read_noise
-    from camkit.export.remeasured import Measured, remeasured
+    from camkit.calibrate import camera_bundles
 
-    before = open_bundle(find_bundle(source))
-    try:
-        kernels = None if psf is None else read_psf(psf)
-    except BundleError as error:  # a file that was measured, and no bundle, is refused here
-        raise DecodeError(str(error)) from error
-    measured = Measured(
-        geometry=None if geometry is None else read_geometry(geometry),
-        flat=None if flat is None else read_flat(flat),
-        noise=None if noise is None else read_noise(noise),
-        psf=kernels,
+    result = camera_bundles.bundle(
+        source,
+        out,
+        geometry=geometry,
+        flat=flat,
+        noise=noise,
+        psf=psf,
+        keep_networks=keep_networks,
+        page=page,
+        overwrite=overwrite,
     )
-    for path in (out, page or out):
-        path.parent.mkdir(parents=True, exist_ok=True)
-    made, notes = remeasured(before, measured, out, keep_networks=keep_networks)
-    files = {"geometry": geometry, "flat": flat, "noise": noise, "psf": psf}
-    given = {name: str(path) for name, path in files.items() if path is not None}
-    found = measured.geometry
-    record = {
-        "from": before.manifest.name,
-        "measured": given,
-        "model": None if found is None else found.model,
-        "residual_px": None if found is None else found.radial.residual_px,
-        "networks": list(made.manifest.sizes),
-        "golden": [case.name for case in made.manifest.golden],
-        "left_out": sorted({*before.names} - {*made.names}),
-        "notes": list(notes),
-        "out": str(out),
-    }
-    if page is not None:
-        from camkit.report.pages.calibration.bundle_page import bundle_html
-        from camkit.runtime.output.part_file import atomic_output
-
-        with atomic_output(page) as part:
-            part.write_text(bundle_html(before, made, record), encoding="utf-8")
-        record["page"] = str(page)
-    line = f"  {before.manifest.name} with {', '.join(given)} as measured"
-    tell(record, [line], as_json=json_)
+    record = with_files(result.to_record(), out, page)
+    line = f"  {record['from']} with {', '.join(record['measured'])} as measured"
+    print_result(record, [line], as_json=json_)

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
-from camkit.cli.use.calibrate.outputs import Out, Outputs, Page
+from camkit.cli.use.calibrate.outputs import Out, Page, print_result, with_files
 from camkit.cli.use.mosaic import BlackLevel, MosaicCfa, WhiteLevel, mosaic_options
 
 PixelPitchUm = Annotated[
@@ -51,26 +51,22 @@ def flat(
 
     --shift-px and --turn-deg are given once for each picture, in the order of FILES.
     """
-    outputs = Outputs.asked(out, page, overwrite=overwrite, as_json=json_)
-    from camkit.calibration.flat.illumination_fit import measure_flat
+    from camkit.calibrate import photographs
 
-    found = measure_flat(
+    facts = photographs.flat(
         files,
-        shift_px,
-        turn_deg,
+        out,
+        shift_px=shift_px,
+        turn_deg=turn_deg,
         pixel_pitch_um=pixel_pitch_um,
         mosaic=mosaic_options(mosaic, black_level, white_level),
+        page=page,
+        overwrite=overwrite,
     )
-
-    def shown() -> str:
-        from camkit.report.pages.calibration.flat_page import flat_html
-
-        return flat_html(found)
-
-    corner = f"{found.relative_illumination[-1]:.3f} at {found.heights_mm[-1]:.2f} mm"
-    told = "told from" if found.separated else "not told from"
-    lines = [
-        f"  relative illumination {corner}, {told} the display, which is uneven by "
-        f"{found.display:.1%}; {found.rest:.2%} are left"
-    ]
-    outputs.write(found.to_record(), lines, shown)
+    corner = f"{facts.relative_illumination[-1]:.3f} at {facts.heights_mm[-1]:.2f} mm"
+    separated = "told from" if facts.separated else "not told from"
+    line = (
+        f"  relative illumination {corner}, {separated} the display, which is uneven by "
+        f"{facts.display:.1%}; {facts.rest:.2%} are left"
+    )
+    print_result(with_files(facts.to_record(), out, page), [line], as_json=json_)

@@ -1,14 +1,12 @@
 """`camkit calibrate geometry`: photographs of a checkerboard to focal length and distortion."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
-from camkit.cli.use.calibrate.outputs import Out, Outputs, Page
-from camkit.errors import ContractError
+from camkit.cli.use.calibrate.outputs import Out, Page, print_result, with_files
 
 if TYPE_CHECKING:
     from camkit.calibration.geometry.geometry import Geometry
@@ -42,47 +40,30 @@ def geometry(
     _debug: Debug = False,
 ) -> None:
     """Measure focal length, optical centre and distortion from photographs of a checkerboard."""
-    outputs = Outputs.asked(out, page, overwrite=overwrite, as_json=json_)
-    found = _found(pictures, board, square_mm, focal_px)
-    outputs.write(found.to_record(), _lines(found), lambda: _page(found))
+    from camkit.calibrate import photographs
+
+    facts = photographs.geometry(
+        pictures,
+        out,
+        board=board,
+        square_mm=square_mm,
+        focal_px=focal_px,
+        page=page,
+        overwrite=overwrite,
+    )
+    print_result(with_files(facts.to_record(), out, page), _lines(facts), as_json=json_)
 
 
-def _found(
-    pictures: list[Path], board: str | None, square_mm: float | None, focal_px: float | None
-) -> "Geometry":
-    from camkit.calibration.geometry.board import Board
-    from camkit.calibration.geometry.corner_file import is_corner_file, read_corners
-    from camkit.calibration.geometry.geometry import calibrate_corners, calibrate_geometry
-
-    if not is_corner_file(pictures):
-        if board is None:
-            raise ContractError("--board is needed: COLUMNSxROWS of its inner corners, like 9x6")
-        return calibrate_geometry(pictures, Board.read(board, square_mm), focal_px)
-    given = read_corners(pictures[0])
-    asked = Board.read(str(given.board) if board is None else board, square_mm)
-    if str(asked) != str(given.board):
-        raise ContractError(f"{pictures[0]} holds corners of a board of {given.board}, not {asked}")
-    if square_mm is not None:
-        given = replace(given, board=asked)
-    return calibrate_corners(given, focal_px)
-
-
-def _lines(found: "Geometry") -> list[str]:
-    x, y = found.camera.centre_px
-    seen = sum(view.corners is not None for view in found.views)
-    chosen = found.chosen
+def _lines(facts: "Geometry") -> list[str]:
+    x, y = facts.camera.centre_px
+    seen_count = sum(view.corners is not None for view in facts.views)
+    fit = facts.chosen
     return [
-        f"  {found.camera.model.name}: focal length {found.camera.focal_px:.2f} px, centre "
-        f"({x:.2f}, {y:.2f}) of {found.size[0]}x{found.size[1]} px",
-        f"  error {chosen.fit.rms_px:.3f} px rms in {seen} of {len(found.views)} pictures; in "
-        f"pictures left out of the fit {chosen.rms_px:.3f} px, at worst {chosen.worst_px:.3f} px",
-        f"  corners reach {found.coverage.radius_px:.0f} px from the centre, of "
-        f"{found.coverage.corner_px:.0f} px to the picture's corner; the distortion polynomial "
-        f"fits the model to {found.radial.residual_px:.3f} px",
+        f"  {facts.camera.model.name}: focal length {facts.camera.focal_px:.2f} px, centre "
+        f"({x:.2f}, {y:.2f}) of {facts.size[0]}x{facts.size[1]} px",
+        f"  error {fit.fit.rms_px:.3f} px rms in {seen_count} of {len(facts.views)} pictures; in "
+        f"pictures left out of the fit {fit.rms_px:.3f} px, at worst {fit.worst_px:.3f} px",
+        f"  corners reach {facts.coverage.radius_px:.0f} px from the centre, of "
+        f"{facts.coverage.corner_px:.0f} px to the picture's corner; the distortion polynomial "
+        f"fits the model to {facts.radial.residual_px:.3f} px",
     ]
-
-
-def _page(found: "Geometry") -> str:
-    from camkit.report.pages.calibration.geometry_page import geometry_html
-
-    return geometry_html(found)

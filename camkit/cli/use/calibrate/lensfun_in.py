@@ -1,13 +1,12 @@
 """`camkit calibrate lensfun-in`: a lens of lensfun's database to a bundle of an ordinary camera."""
 
-from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
-from camkit.cli.use.calibrate.outputs import Page, check_out, check_page, tell
+from camkit.cli.use.calibrate.outputs import Page, print_result, with_files
 from camkit.cli.use.mosaic import BlackLevel, MosaicCfa, WhiteLevel, mosaic_options
 
 if TYPE_CHECKING:
@@ -53,36 +52,27 @@ def lensfun_in(
     _debug: Debug = False,
 ) -> None:
     """Make a bundle that corrects distortion and vignetting of a lens from a lensfun database."""
-    check_out(out, ".camkit", "a bundle", overwrite=overwrite)
-    check_page(page, overwrite=overwrite)
-    from camkit.bundle.writer import write_bundle
-    from camkit.calibration.lensfun.ordinary import CameraOptions, lensfun_bundle
-    from camkit.runtime.output.part_file import atomic_output
+    from camkit.calibrate import camera_bundles
 
-    options = CameraOptions(
-        focal_mm=focal_mm,
+    bundle = camera_bundles.lensfun_in(
+        database,
+        lens,
+        focal_mm,
+        capture,
+        out,
         aperture=aperture,
         distance_m=distance_m,
         crop_factor=crop_factor,
         scale=scale,
         mosaic=mosaic_options(mosaic, black_level, white_level),
+        page=page,
+        overwrite=overwrite,
     )
-    made = lensfun_bundle(database, lens, capture, options, name=out.stem)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    shown = {}
-    with ExitStack() as stack:
-        if page is not None:
-            from camkit.report.pages.calibration.lensfun_page import bundle_html
-
-            page.parent.mkdir(parents=True, exist_ok=True)
-            part = stack.enter_context(atomic_output(page))
-            part.write_text(bundle_html(made), encoding="utf-8")
-            shown["page"] = str(page)
-        write_bundle(out, made.manifest, {})
-    tell({**made.to_record(), "out": str(out), **shown}, [_line(made.found)], as_json=json_)
+    record = with_files(bundle.to_record(), out, page)
+    print_result(record, [_line(bundle.found)], as_json=json_)
 
 
-def _line(found: "Found") -> str:
-    entry, light = found.distortion, found.vignetting
+def _line(profile: "Found") -> str:
+    entry, light = profile.distortion, profile.vignetting
     evened = "" if light is None else f", light evened as at f/{light.aperture:g}"
-    return f"  {found.lens.name}, {entry.model} at {entry.focal_mm:g} mm{evened}"
+    return f"  {profile.lens.name}, {entry.model} at {entry.focal_mm:g} mm{evened}"

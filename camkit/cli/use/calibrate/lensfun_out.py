@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
-from camkit.cli.use.calibrate.outputs import Page, check_out, check_page, tell
+from camkit.cli.use.calibrate.outputs import Page, print_result, with_files
 
 
 def lensfun_out(
@@ -51,12 +51,11 @@ def lensfun_out(
     _debug: Debug = False,
 ) -> None:
     """Write distortion and vignetting of a bundle or a measured geometry for lensfun."""
-    check_out(out, ".xml", "an entry of lensfun", overwrite=overwrite)
-    check_page(page, overwrite=overwrite)
-    from camkit.calibration.lensfun.entry import EntryOptions, lensfun_entry
-    from camkit.runtime.output.part_file import write_together
+    from camkit.calibrate import camera_bundles
 
-    options = EntryOptions(
+    entry = camera_bundles.lensfun_out(
+        source,
+        out,
         focal_mm=focal_mm,
         lens_name=lens_name,
         maker=maker,
@@ -64,18 +63,12 @@ def lensfun_out(
         crop_factor=crop_factor,
         aperture=aperture,
         most_residual_px=most_residual_px,
+        page=page,
+        overwrite=overwrite,
     )
-    made = lensfun_entry(source, options)
-    files = {out: made.to_xml().encode()}
-    if page is not None:
-        from camkit.report.pages.calibration.lensfun_page import entry_html
-
-        files[page] = entry_html(made).encode()
-    write_together(files)
-    fit = made.fit
+    fit = entry.fit
     line = (
-        f"  {made.name.model}, {fit.distortion.model} at {fit.distortion.focal_mm:g} mm, misses by "
-        f"{fit.residual_px:.3f} px"
+        f"  {entry.name.model}, {fit.distortion.model} at {fit.distortion.focal_mm:g} mm, misses "
+        f"by {fit.residual_px:.3f} px"
     )
-    shown = {} if page is None else {"page": str(page)}
-    tell({**made.to_record(), "out": str(out), **shown}, [line], as_json=json_)
+    print_result(with_files(entry.to_record(), out, page), [line], as_json=json_)

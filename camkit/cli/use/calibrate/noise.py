@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
-from camkit.cli.use.calibrate.outputs import Out, Outputs, Page
+from camkit.cli.use.calibrate.outputs import Out, Page, print_result, with_files
 from camkit.cli.use.mosaic import BlackLevel, MosaicCfa, WhiteLevel, mosaic_options
-from camkit.errors import ContractError
 
 if TYPE_CHECKING:
     from camkit.calibration.noise.sensor_noise import IsoFacts
@@ -39,19 +38,19 @@ def noise(
     _debug: Debug = False,
 ) -> None:
     """Measure gain, read noise and fixed patterns of a sensor from pairs of RAW frames."""
-    outputs = Outputs.asked(out, page, overwrite=overwrite, as_json=json_)
-    if iso is not None and not 0 < iso < float("inf"):
-        raise ContractError(f"--iso must be > 0; got {iso:g}")
-    from camkit.calibration.noise.sensor_noise import measure_sensor
+    from camkit.calibrate import photographs
 
-    found = measure_sensor(dark, flat, mosaic_options(mosaic, black_level, white_level), iso)
-
-    def shown() -> str:
-        from camkit.report.pages.calibration.noise_page import noise_html
-
-        return noise_html(found)
-
-    outputs.write(found.to_record(), [_line(facts) for facts in found.isos], shown)
+    facts = photographs.noise(
+        dark,
+        flat,
+        out,
+        iso=iso,
+        mosaic=mosaic_options(mosaic, black_level, white_level),
+        page=page,
+        overwrite=overwrite,
+    )
+    lines = [_line(one) for one in facts.isos]
+    print_result(with_files(facts.to_record(), out, page), lines, as_json=json_)
 
 
 def _line(facts: "IsoFacts") -> str:

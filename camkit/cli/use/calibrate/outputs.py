@@ -1,125 +1,44 @@
-"""The outputs of a command of `camkit calibrate`: a TOML, a page if asked for, the printed text."""
+"""The options and the printed text that the commands of `camkit calibrate` share."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 import typer
 
 from camkit.cli.say import say
-from camkit.errors import ContractError
 
 Out = Annotated[Path, typer.Option("-o", "--out", help="Result to write (.toml).")]
 Page = Annotated[Path | None, typer.Option(help="Also write a self-contained page (.html).")]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Outputs:
-    """The files of the results; made by `asked`, before any work.
-
-    Attributes:
-        out: The TOML.
-        page: The page; None for none.
-        as_json: Print one object instead of lines.
-    """
-
-    out: Path
-    page: Path | None
-    as_json: bool
-
-    @classmethod
-    def asked(cls, out: Path, page: Path | None, *, overwrite: bool, as_json: bool) -> Self:
-        """Check the outputs that a caller asks for.
-
-        Raises:
-            ContractError: If a name is of another kind, or a file is there and may not be replaced.
-        """
-        if out.suffix.lower() != ".toml":
-            raise ContractError(f"a calibration is TOML; expected a name in .toml, got {out}")
-        check_page(page, overwrite=overwrite)
-        _check_free(out, overwrite=overwrite)
-        return cls(out=out, page=page, as_json=as_json)
-
-    def write(
-        self, record: Mapping[str, Any], lines: Sequence[str], page: Callable[[], str]
-    ) -> None:
-        """Write the files, all or none, and print the results.
-
-        Args:
-            record: What goes into the TOML and, with the names of the files, into the JSON; its
-                `notes`, if any, are said on stderr before the lines.
-            lines: What is said without --json, after the name of the TOML.
-            page: Gives the page's HTML; called only where one is asked for.
-
-        Raises:
-            ContractError: If the record holds what TOML cannot.
-        """
-        from camkit.calibration.record import to_toml
-        from camkit.runtime.output.part_file import write_together
-
-        contents = {self.out: to_toml(record).encode()}
-        if self.page is not None:
-            contents[self.page] = page().encode()
-        write_together(contents)
-        both = {"out": self.out, "page": self.page}
-        files = {name: str(path) for name, path in both.items() if path is not None}
-        if self.as_json:
-            say(json.dumps({**record, **files}, allow_nan=False))
-            return
-        for note in record.get("notes", ()):
-            say(f"note: {note}", err=True)
-        for line in (f"{named(self.out, self.page)}:", *lines):
-            say(line)
-
-
 def check_page(page: Path | None, *, overwrite: bool) -> None:
-    """Refuse a page that is no HTML, or is there and may not be replaced.
+    """Refuse a page that is no HTML, or exists and may not be replaced.
 
     Raises:
         ContractError: If so.
     """
-    if page is None:
-        return
-    if page.suffix.lower() != ".html":
-        raise ContractError(f"a page is HTML; expected a name in .html, got {page}")
-    _check_free(page, overwrite=overwrite)
+    from camkit.calibrate.result_files import check_result
+
+    check_result(page, ".html", overwrite=overwrite)
 
 
-def check_out(path: Path, suffix: str, what: str, *, overwrite: bool) -> None:
-    """Refuse a file of another kind, or one that is there and may not be replaced.
-
-    Args:
-        path: Where the result goes.
-        suffix: Of its kind, with the dot.
-        what: What it is, for the message.
-        overwrite: Whether it may be replaced.
-
-    Raises:
-        ContractError: If so.
-    """
-    if path.suffix.lower() != suffix:
-        raise ContractError(f"{what} is a file in {suffix}; got {path}")
-    _check_free(path, overwrite=overwrite)
+def with_files(record: Mapping[str, Any], out: Path, page: Path | None) -> dict[str, Any]:
+    """Return a record with the names of the written files."""
+    files = {"out": out, "page": page}
+    return {**record, **{name: str(path) for name, path in files.items() if path is not None}}
 
 
-def tell(record: Mapping[str, Any], lines: Sequence[str], *, as_json: bool) -> None:
-    """Print the results: one object, or notes on stderr and lines."""
+def print_result(
+    record: Mapping[str, Any], lines: Sequence[str], *, as_json: bool, summary: str = ""
+) -> None:
+    """Print the results: one object, or notes on stderr, the files with a summary, and lines."""
     if as_json:
         say(json.dumps(record, allow_nan=False))
         return
     for note in record.get("notes", ()):
         say(f"note: {note}", err=True)
-    for line in (f"{named(record['out'], record.get('page'))}:", *lines):
+    files = [record[name] for name in ("out", "page") if name in record]
+    for line in (f"{', '.join(files)}: {summary}".rstrip(), *lines):
         say(line)
-
-
-def named(out: Path | str, page: Path | str | None) -> str:
-    """Return the names of the written files."""
-    return ", ".join(str(path) for path in (out, page) if path is not None)
-
-
-def _check_free(path: Path, *, overwrite: bool) -> None:
-    if path.exists() and not overwrite:
-        raise ContractError(f"{path} exists; add --overwrite or choose another name")

@@ -1,22 +1,12 @@
 """`camkit calibrate pairs`: captures of shown pictures to pairs for training."""
 
-import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
-from camkit.cli.say import say
-from camkit.cli.use.calibrate.folder import Folder
-from camkit.cli.use.calibrate.outputs import Page, check_page, named
-from camkit.errors import ContractError
-
-if TYPE_CHECKING:
-    from camkit.calibration.display.pairs import Pairs
-
-SETTINGS = "pairs.toml"
-REGISTRATION = "registration.toml"
+from camkit.cli.use.calibrate.outputs import Page, print_result, with_files
 
 
 def pairs(
@@ -55,74 +45,25 @@ def pairs(
     _debug: Debug = False,
 ) -> None:
     """Align displayed pictures with their captures, as pairs for `camkit train --pairs`."""
-    check_page(page, overwrite=overwrite)
-    within = (".", "capture", "reference")
-    folder = Folder.asked(out, (SETTINGS,), within, overwrite=overwrite)
-    shots, shown_in = _apart(captures, targets)
-    from camkit.calibration.display.camera_file import Illumination, Lens, Tone
-    from camkit.calibration.display.pairs import Given, draw_pairs, find_pairs
-    from camkit.calibration.display.targets import Targets
-    from camkit.calibration.record import to_toml
-    from camkit.runtime.output.pixels import png_bytes, tiff_bytes
+    from camkit.calibrate import displays
 
-    lens = Lens.read(geometry)
-    given = Given(
-        folder=shown_in,
-        targets=Targets.read(shown_in),
-        lens=lens,
-        tone=Tone.read(tone),
-        flat=Illumination.read(flat, lens.size),
+    aligned = displays.pairs(
+        captures,
+        geometry,
+        out,
+        targets=targets,
+        tone=tone,
+        flat=flat,
         most_residual_px=most_residual_px,
+        page=page,
+        overwrite=overwrite,
     )
-    found = find_pairs(shots, given)
-    names = [pair.target.name for pair in found.pairs]
-    files = [f"{kind}/{n}{end}" for n in names for kind, end in (("capture", ".tiff"), ("reference", ".png"))]  # noqa: E501 # fmt: skip
-    shown = [] if page is None else [str(page.absolute())]
-    with folder.writing([*files, *shown, REGISTRATION, SETTINGS]) as parts:
-        for n, (counts, codes) in enumerate(draw_pairs(found, given)):
-            parts[2 * n].write_bytes(tiff_bytes(counts))
-            parts[2 * n + 1].write_bytes(png_bytes(codes))
-        if shown:
-            parts[-3].write_text(_html(found), encoding="utf-8")
-        parts[-2].write_text(to_toml(found.to_record()), encoding="utf-8")
-        parts[-1].write_text(to_toml(found.settings()), encoding="utf-8")
-    _tell(found, out, page, as_json=json_)
-
-
-def _apart(named: list[Path], targets: Path | None) -> tuple[list[Path], Path]:
-    """Return the captures, those of folders too, and the folder of the targets.
-
-    Raises:
-        ContractError: If nothing says what was shown.
-    """
-    from camkit.runtime.batch.sources import expand
-
-    if targets is None:
-        *named, targets = named
-        if not targets.is_dir():
-            raise ContractError("add --targets DIR, or its folder after the files")
-    inside = [expand([path]) if path.is_dir() else [path] for path in named]
-    shots = [path for paths in inside for path in paths]
-    if not shots:
-        raise ContractError(f"no capture is named beside {targets}")
-    return shots, targets
-
-
-def _tell(found: "Pairs", out: Path, page: Path | None, *, as_json: bool) -> None:
-    if as_json:
-        shown = {} if page is None else {"page": str(page)}
-        say(json.dumps({**found.to_record(), "out": str(out), **shown}, allow_nan=False))
-        return
-    for note in found.notes:
-        say(f"note: {note}", err=True)
-    say(f"{named(out, page)}: {len(found.pairs)} pairs at ISO {found.iso:g}")
-    worst = max(found.pairs, key=lambda pair: pair.residual_px)
-    say(f"  at worst {worst.residual_px:.3f} px RMS, in {worst.path.name}")
-    if found.primaries is not None:
-        say(f"  colours of the display to {100 * found.primaries.residual:.2g} % of white")
-
-
-def _html(found: "Pairs") -> str:
-    from camkit.report.pages.calibration.pairs_page import pairs_html
-
-    return pairs_html(found)
+    worst = max(aligned.pairs, key=lambda pair: pair.residual_px)
+    lines = [f"  at worst {worst.residual_px:.3f} px RMS, in {worst.path.name}"]
+    if aligned.primaries is not None:
+        lines.append(
+            f"  colours of the display to {100 * aligned.primaries.residual:.2g} % of white"
+        )
+    record = with_files(aligned.to_record(), out, page)
+    summary = f"{len(aligned.pairs)} pairs at ISO {aligned.iso:g}"
+    print_result(record, lines, as_json=json_, summary=summary)

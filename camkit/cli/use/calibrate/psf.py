@@ -1,23 +1,17 @@
 """`camkit calibrate psf`: a bracket of a small light, or an edge, to a frozen PSF."""
 
-import json
-from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
-from camkit.cli.say import say
-from camkit.cli.use.calibrate.outputs import Page, check_page
+from camkit.cli.use.calibrate.outputs import Page, print_result, with_files
 from camkit.cli.use.merge import Times
 from camkit.cli.use.mosaic import BlackLevel, MosaicCfa, WhiteLevel, mosaic_options
-from camkit.errors import ContractError
 
 if TYPE_CHECKING:
-    from camkit.calibration.dots import SeenDots
-    from camkit.calibration.measured import MeasuredPsf
-    from camkit.runtime.merging.survey import Survey
+    from camkit.calibrate.photographs import PsfFacts
 
 
 def psf(
@@ -70,116 +64,47 @@ def psf(
     _debug: Debug = False,
 ) -> None:
     """Merge a bracket of a point light, a disc or an edge into a PSF, every colour of sum 1."""
-    if out.suffix.lower() != ".safetensors":
-        raise ContractError(f"a PSF is safetensors; expected a name in .safetensors, got {out}")
-    if out.exists() and not overwrite:
-        raise ContractError(f"{out} exists; add --overwrite or choose another name")
-    check_page(page, overwrite=overwrite)
-    _check_target(disc_px, dots, edge=edge)
-    from camkit.bundle.psf_file import psf_to_bytes, read_psf
-    from camkit.calibration.darks import Darks
-    from camkit.calibration.dots import dots_psf
-    from camkit.calibration.edge_psf import measure_edge
-    from camkit.calibration.measured import PsfOptions
-    from camkit.calibration.psf import measure_psf
-    from camkit.runtime.merging.survey import survey
-    from camkit.runtime.output.part_file import write_together
+    from camkit.calibrate import photographs
 
-    designed = None if dots is None else read_psf(dots)
-    options = PsfOptions(
-        side_px=side_px, pixel_pitch_um=pixel_pitch_um, depth_m=depth_m, disc_px=disc_px
+    facts = photographs.psf(
+        files,
+        out,
+        times_s=times,
+        darks=dark or (),
+        disc_px=disc_px,
+        edge=edge,
+        side_px=side_px,
+        pixel_pitch_um=pixel_pitch_um,
+        depth_m=depth_m,
+        dots=dots,
+        mosaic=mosaic_options(mosaic, black_level, white_level),
+        page=page,
+        overwrite=overwrite,
     )
-    said = mosaic_options(mosaic, black_level, white_level)
-    times_s, dark_times_s = _times(times, files, dark or [])
-    bracket = survey(files, times_s, mosaic=said, alike=edge)
-    darks = Darks.read(dark, dark_times_s, bracket, said) if dark else None
-    found = (measure_edge if edge else measure_psf)(bracket, options, darks)
-    made, seen = (found.psf, None) if designed is None else dots_psf(found, designed)
-    contents = {out: psf_to_bytes(made)}
-    if page is not None:
-        from camkit.report.pages.calibration.psf_page import psf_html
-
-        contents[page] = psf_html(found).encode()
-    write_together(contents)
-    _tell(contents, bracket, found, seen, as_json=json_)
+    record = {**facts.to_record(), "out": str(out)}
+    if facts.dots is not None:
+        record["dots"] = facts.dots.to_json()
+    x, y = facts.measured.centre_px
+    summary = f"{facts.measured.side_px} px, the light at ({x:.2f}, {y:.2f})"
+    print_result(with_files(record, out, page), _lines(facts), as_json=json_, summary=summary)
 
 
-def _check_target(disc_px: float | None, dots: Path | None, *, edge: bool) -> None:
-    """Refuse options of two kinds of light at once.
-
-    Raises:
-        ContractError: If it is.
-    """
-    named = {"--disc-px": disc_px is not None, "--edge": edge, "--dots": dots is not None}
-    said = [name for name, is_said in named.items() if is_said]
-    if len(said) > 1:
-        raise ContractError(f"the light is one thing; use one of {' and '.join(said)}")
-
-
-def _times(
-    text: str | None, files: list[Path], darks: list[Path]
-) -> tuple[tuple[float, ...] | None, tuple[float, ...] | None]:
-    """Return the times of frames and dark frames; a list may omit those that files state."""
-    if text is None:
-        return None, None
-    from camkit.runtime.merging.times import stated_times
-
-    try:
-        every = stated_times(text, files, darks)
-    except ContractError as error:
-        try:
-            return stated_times(text, files), None
-        except ContractError:
-            raise error from None
-    return every[: len(files)], every[len(files) :]
-
-
-def _tell(
-    files: Iterable[Path],
-    bracket: "Survey",
-    found: "MeasuredPsf",
-    seen: "SeenDots | None",
-    *,
-    as_json: bool,
-) -> None:
-    (x, y), (out, *page) = found.centre_px, files
-    if as_json:
-        record: dict[str, Any] = {
-            "frames": [frame.path.name for frame in bracket.frames],
-            "times_s": [frame.time_s for frame in bracket.frames],
-            "centre_px": [round(x, 4), round(y, 4)],
-            "side_px": found.side_px,
-            "pixel_pitch_um": found.psf.pixel_pitch_um,
-            "colours": [colour.to_json() for colour in found.colours],
-            "fields": [field.to_json() for field in found.fields],
-            "filled_samples": found.filled_samples,
-            "notes": [*bracket.notes, *found.notes],
-            "out": str(out),
-        }
-        if seen is not None:
-            record["dots"] = seen.to_json()
-        if page:
-            record["page"] = str(page[0])
-        say(json.dumps(record))
-        return
-    for note in (*bracket.notes, *found.notes):
-        say(f"note: {note}", err=True)
-    say(f"{', '.join(map(str, (out, *page)))}: {found.side_px} px, the light at ({x:.2f}, {y:.2f})")
-    if seen is not None:
-        say(
-            f"  dots: {seen.share:.1%} of the light in active areas, like the design by "
-            f"{seen.likeness:.4f}"
-        )
-        return
-    for field in found.fields:
-        say(
-            f"  {field.peak_share:.2%} +- {field.peak_share_error:.2%} within 10 px, "
-            f"{field.height_mm:.2f} mm from the middle"
-        )
-    for colour in found.colours:
+def _lines(facts: "PsfFacts") -> list[str]:
+    if facts.dots is not None:
+        return [
+            f"  dots: {facts.dots.share:.1%} of the light in active areas, like the design by "
+            f"{facts.dots.likeness:.4f}"
+        ]
+    lines = [
+        f"  {field.peak_share:.2%} +- {field.peak_share_error:.2%} within 10 px, "
+        f"{field.height_mm:.2f} mm from the middle"
+        for field in facts.measured.fields
+    ]
+    for colour in facts.measured.colours:
         noise = (
             "" if colour.noise_floor is None else f", noise {colour.noise_floor:.1e} of the peak"
         )
         target = colour.reblurred
         rest = "" if target is None else f", blurred anew {target.rest:.2%} off"
-        say(f"  {colour.colour:<5}  {colour.core_share:.2%} within 3 px{noise}{rest}")
+        lines.append(f"  {colour.colour:<5}  {colour.core_share:.2%} within 3 px{noise}{rest}")
+    return lines

@@ -1,15 +1,12 @@
 """`camkit calibrate targets`: what a display shows while a camera is measured on it."""
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
-from camkit.cli.say import say
-from camkit.cli.use.calibrate.folder import Folder
-from camkit.cli.use.calibrate.outputs import Page, check_page, named
+from camkit.cli.use.calibrate.outputs import Page, print_result, with_files
 
 LEVELS = "0,16,32,48,64,96,128,160,192,224,255"
 
@@ -32,41 +29,22 @@ def targets(
     _debug: Debug = False,
 ) -> None:
     """Write pictures for a display: checkerboard, grey steps, colours, pictures with marks."""
-    check_page(page, overwrite=overwrite)
-    from camkit.calibration.display.screen import Screen
-    from camkit.calibration.display.targets import (
-        LIST,
-        draw_targets,
-        levels_of_steps,
-        plan_targets,
-    )
-    from camkit.calibration.geometry.board import Board
-    from camkit.calibration.record import to_toml
-    from camkit.report.pages.calibration.targets_page import shrunk, targets_html
-    from camkit.runtime.output.pixels import png_bytes
+    from camkit.calibrate import displays
 
-    given = pictures or []
-    asked = Screen.read(screen), Board.read(board), levels_of_steps(levels)
-    folder = Folder.asked(out, (LIST,), (".",), overwrite=overwrite)
-    planned = plan_targets(given, *asked)
-    names = [*(target.file for target in planned.targets), LIST]
-    shown = [] if page is None else [str(page.absolute())]
-    with folder.writing([*shown, *names]) as parts:
-        small = []
-        for part, codes in zip(parts[len(shown) :], draw_targets(planned, given), strict=False):
-            part.write_bytes(png_bytes(codes))
-            if shown:
-                small.append(shrunk(codes))
-        parts[-1].write_text(to_toml(planned.to_record()), encoding="utf-8")
-        if shown:
-            parts[0].write_text(targets_html(planned, small), encoding="utf-8")
-    if json_:
-        files = {"out": str(out), **({} if page is None else {"page": str(page)})}
-        say(json.dumps({**planned.to_record(), **files}))
-        return
-    kinds = [target.kind for target in planned.targets]
-    say(f"{named(out, page)}: {len(kinds)} targets of {planned.screen} px")
-    say(
-        f"  a board of {planned.board} corners, {kinds.count('grey')} grey steps, "
+    plan = displays.targets(
+        screen,
+        out,
+        pictures or (),
+        board=board,
+        levels=levels,
+        page=page,
+        overwrite=overwrite,
+    )
+    kinds = [target.kind for target in plan.targets]
+    line = (
+        f"  a board of {plan.board} corners, {kinds.count('grey')} grey steps, "
         f"{kinds.count('colour')} colours, {kinds.count('picture')} pictures"
     )
+    record = with_files(plan.to_record(), out, page)
+    summary = f"{len(kinds)} targets of {plan.screen} px"
+    print_result(record, [line], as_json=json_, summary=summary)

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
-from camkit.cli.use.calibrate.outputs import Out, Outputs, Page
+from camkit.cli.use.calibrate.outputs import Out, Page, print_result, with_files
 from camkit.cli.use.mosaic import BlackLevel, MosaicCfa, WhiteLevel, mosaic_options
 
 
@@ -28,19 +28,18 @@ def tone(
     _debug: Debug = False,
 ) -> None:
     """Measure the luminance of a display at each of its levels."""
-    outputs = Outputs.asked(out, page, overwrite=overwrite, as_json=json_)
-    from camkit.calibration.tone import levels_of, measure_tone
+    from camkit.calibrate import displays
 
-    said = mosaic_options(mosaic, black_level, white_level)
-    found = measure_tone(files, levels_of(levels, len(files)), said)
-
-    def shown() -> str:
-        from camkit.report.pages.calibration.tone_page import tone_html
-
-        return tone_html(found)
-
-    record = found.to_record()
-    line = f"  {len(files)} steps, black {found.luminance[0]:.3g} of the brightest"
+    facts = displays.tone(
+        files,
+        levels,
+        out,
+        mosaic=mosaic_options(mosaic, black_level, white_level),
+        page=page,
+        overwrite=overwrite,
+    )
+    record = facts.to_record()
+    line = f"  {len(files)} steps, black {facts.luminance[0]:.3g} of the brightest"
     if record["gamma"] is not None:
         line += f", gamma {record['gamma']:.3g} to {record['residual_percent']:.2g} %"
-    outputs.write(record, [line], shown)
+    print_result(with_files(record, out, page), [line], as_json=json_)

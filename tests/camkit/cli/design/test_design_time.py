@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from camkit.cli.choices import INSTALLED_BY
 from camkit.cli.exit_code import ExitCode
+from camkit.models_def.face.torch_need import INSTALLED_BY
 from camkit.stopwatch import Stopwatch
 
 RECIPE = Path(__file__).resolve().parents[4] / "models_def" / "recipes" / "duet.toml"

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from camkit.bundle.reader import PRESCRIPTION, Bundle, find_bundle, open_bundle
-from camkit.cli.design import unit as unit_module
+from camkit.calibrate import body_focus
 from camkit.cli.exit_code import ExitCode
 from camkit.models_def.optics import frozen, optics_file
 from camkit.models_def.optics.frozen import FreezeGrid, freeze
@@ -79,7 +79,7 @@ def test_a_camera_in_focus_and_one_without_kernels_are_refused(
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("--unit", "-o", "u.toml"), "--unit needs captures of a target"),
+        (("--unit", "-o", "u.toml"), "a camera body needs captures of a target"),
         (("--unit", "1.dng", "-o", "u.safetensors"), "a camera body is TOML"),
         (("1.dng", "-o", "u.toml"), "captures are for --unit"),
         (
@@ -122,7 +122,7 @@ def test_a_lens_is_traced_to_measure_with(
     few_rays = partial(LensOptics, rays=300)
     monkeypatch.setattr(optics_file, "LensOptics", few_rays)
     monkeypatch.setattr(frozen, "FINE_WAVELENGTHS", 7)
-    monkeypatch.setattr(unit_module, "STEPS", (-1.0, 1.0))
+    monkeypatch.setattr(body_focus, "STEPS", (-1.0, 1.0))
     bundle = open_bundle(find_bundle("duet"))
     lens = few_rays(lens=find_lens("duet")).refocused(35.0)
     sensor = bundle.manifest.sensor

@@ -9,14 +9,12 @@ import numpy as np
 import pytest
 
 from camkit.bundle.reader import open_bundle
-from camkit.bundle.sensor import Extent, SpadSensor
 from camkit.cli.exit_code import ExitCode
-from camkit.cli.use.simulate import _check_truth, _exposed, _metres
 from camkit.errors import ContractError
+from camkit.runtime.face.simulation import _check_truth, _metres
 from camkit.runtime.files.picture import read_scene
 from camkit.runtime.kinds.hdr.night import night_scene
 from camkit.runtime.raw import read_capture
-from camkit.runtime.twin.simulate import SimulationOptions
 from tests.deep_bundle import write_deep_bundle
 from tests.hdr_bundle import STREAK_SHARE, write_hdr_bundle
 
@@ -257,15 +255,6 @@ def test_a_distance_is_told_in_json_which_has_no_infinity(
     assert told["object_distance_m"] == pytest.approx(0.7)
     assert _metres(math.inf) == "inf"
     assert _metres(None) is None
-
-
-def test_a_sensor_that_counts_photons_has_no_white_to_exceed() -> None:
-    diodes = SpadSensor(extent=Extent(width_px=8, height_px=8, pixel_pitch_um=6.0))
-    scene = np.ones((3, 8, 8), np.float32)
-    options = SimulationOptions()
-    assert _exposed(scene, diodes, options, None) == (scene, None)
-    with pytest.raises(ContractError, match="this one counts photons"):
-        _exposed(scene, diodes, options, 0.015)
 
 
 def test_capture_and_truth_cannot_be_one_file(captures) -> None:

@@ -1,4 +1,4 @@
-"""A folder that a command of `camkit calibrate` fills: all of it or nothing."""
+"""A folder that a measurement fills: all of it or nothing."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -6,26 +6,28 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
+from camkit.caller import option_text
 from camkit.errors import ContractError
+from camkit.runtime.output.part_file import atomic_outputs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Folder:
-    """A folder to be filled; made by `asked`, before any work.
+    """A folder to be filled; made by `checked`, before any work.
 
     Attributes:
         path: The folder.
-        within: Folders of it that hold nothing but what is written, "." for itself.
+        owned_parts: Folders of it that hold nothing but what is written, "." for itself.
         overwrite: Whether what is there may be replaced.
     """
 
     path: Path
-    within: tuple[str, ...]
+    owned_parts: tuple[str, ...]
     overwrite: bool
 
     @classmethod
-    def asked(
-        cls, path: Path, marks: Sequence[str], within: Sequence[str], *, overwrite: bool
+    def checked(
+        cls, path: Path, marks: Sequence[str], owned_parts: Sequence[str], *, overwrite: bool
     ) -> Self:
         """Check the folder that a caller asks for.
 
@@ -33,7 +35,7 @@ class Folder:
             path: The folder.
             marks: Files that a former run of the command leaves: with none of them, what is in
                 the folder is somebody else's.
-            within: Its parts that must hold nothing else.
+            owned_parts: Its parts that must hold nothing else.
             overwrite: Whether files that are there may be replaced.
 
         Raises:
@@ -44,13 +46,14 @@ class Folder:
         if path.is_dir() and any(path.iterdir()):
             if not overwrite:
                 raise ContractError(
-                    f"{path} is not empty; add --overwrite or choose another folder"
+                    f"{path} is not empty; add {option_text('overwrite', value=True)} or choose "
+                    "another folder"
                 )
             if not any((path / mark).exists() for mark in marks):
                 raise ContractError(
                     f"{path} holds files of another kind, without {marks[0]}; give another folder"
                 )
-        return cls(path=path, within=tuple(within), overwrite=overwrite)
+        return cls(path=path, owned_parts=tuple(owned_parts), overwrite=overwrite)
 
     @contextmanager
     def writing(self, names: Sequence[str]) -> Iterator[tuple[Path, ...]]:
@@ -63,27 +66,25 @@ class Folder:
             ContractError: If a part of the folder holds pictures or lists of other names, which
                 would be mixed up with these.
         """
-        from camkit.runtime.output.part_file import atomic_outputs
-
         paths = [self.path / name for name in names]
-        for part in self.within:
+        for part in self.owned_parts:
             here = self.path / part
             if not here.is_dir():
                 continue
-            for found in sorted(here.iterdir()):
-                if found.is_file() and found not in paths:
+            for file in sorted(here.iterdir()):
+                if file.is_file() and file not in paths:
                     raise ContractError(
-                        f"{found} is none of the files to be written; remove it or give another "
+                        f"{file} is none of the files to be written; remove it or give another "
                         "folder"
                     )
-        made = _missing(paths)
+        folders = _missing(paths)
         try:
-            for folder in made:
+            for folder in folders:
                 folder.mkdir(exist_ok=True)
             with atomic_outputs(*paths) as parts:
                 yield parts
         except BaseException:
-            for folder in reversed(made):
+            for folder in reversed(folders):
                 if folder.is_dir() and not any(folder.iterdir()):
                     folder.rmdir()
             raise

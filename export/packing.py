@@ -1,0 +1,107 @@
+"""Checkpoints and the files beside them to a bundle: `camkit.export.bundle`, `camkit export`."""
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+from typing import Any, Final
+
+from camkit.caller import command_text, option_text
+from camkit.errors import ContractError
+from camkit.export.parts import (
+    HAZE_NAME,
+    PLAN_NAME,
+    PSF_NAME,
+    REPORT_NAME,
+    STRESS_HAZE_NAME,
+    STRESS_NAME,
+    Parts,
+)
+from camkit.field_types import checked
+from camkit.models_def.face.torch_need import require_torch
+from camkit.runtime.files.in_memory import FilePath
+from camkit.runtime.output.part_file import refuse_existing
+
+NO_PLATE: Final = "none"
+
+
+@checked
+def bundle(
+    checkpoints: FilePath | Sequence[FilePath],
+    out: FilePath,
+    *,
+    psf: FilePath | None = None,
+    haze: FilePath | None = None,
+    stress_psf: FilePath | None = None,
+    stress_haze: FilePath | None = None,
+    freeze: FilePath | None = None,
+    plan: FilePath | None = None,
+    prescription: FilePath | None = None,
+    plate: FilePath | None = None,
+    version: str = "0.1.0",
+    overwrite: bool = False,
+) -> dict[str, Any]:
+    """Pack checkpoints, PSF, lens or plate into a bundle and verify it (needs torch).
+
+    Args:
+        checkpoints: One per network size and role, of one camera.
+        out: Bundle to write (.camkit).
+        psf: PSF of `camkit.freeze`; None for psf.safetensors beside the first checkpoint.
+        haze: Veiling glare of the optics; None for haze.safetensors beside the PSF, if any.
+        stress_psf: Kernels off the design point; None for stress_psf.safetensors beside the
+            checkpoint, if any.
+        stress_haze: Veiling glare of those kernels; None for stress_haze.safetensors beside them,
+            if any.
+        freeze: Report of `camkit.freeze`; None for freeze.json beside the checkpoint, if any.
+        plan: Calibration of quality "adaptive"; None for plan.json there, if any.
+        prescription: Lens (.toml, .zmx); None for the checkpoint's.
+        plate: Plate (.toml or name), "none" for no plate; None for the checkpoint's.
+        version: Semantic version of the bundle.
+        overwrite: Whether a file that exists is replaced.
+
+    Returns:
+        Path, size, hash, sizes of network and the lines of the check, plain JSON values as
+        `camkit export --json` prints them.
+
+    Raises:
+        ContractError: If parts are missing or contradict each other, or `out` exists.
+        ParityError: If torch and ONNX, or the bundle and its golden cases, disagree.
+        UnsupportedError: If torch is not installed.
+    """
+    require_torch(command_text("export"))
+    refuse_existing([Path(out)], overwrite=overwrite)
+    several = [checkpoints] if isinstance(checkpoints, str | PathLike) else checkpoints
+    paths = tuple(map(Path, several))
+    if not paths:
+        raise ContractError("export needs at least one checkpoint")
+    folder = paths[0].parent
+    optics = _chosen(psf, folder, PSF_NAME)
+    if optics is None:
+        raise ContractError(
+            f"there is no {folder / PSF_NAME}; make it with `camkit freeze`, or add "
+            f"{option_text('psf')}"
+        )
+    stress = _chosen(stress_psf, folder, STRESS_NAME)
+    from camkit.export import assemble
+
+    parts = Parts(
+        checkpoints=paths,
+        psf=optics,
+        haze=_chosen(haze, optics.parent, HAZE_NAME),
+        stress_psf=stress,
+        stress_haze=_chosen(stress_haze, stress and stress.parent, STRESS_HAZE_NAME),
+        prescription=None if prescription is None else Path(prescription),
+        plate=None if plate in (None, NO_PLATE) else Path(plate),
+        without_plate=plate == NO_PLATE,
+        freeze=_chosen(freeze, folder, REPORT_NAME),
+        plan=_chosen(plan, folder, PLAN_NAME),
+        version=version,
+    )
+    return assemble.export_bundle(parts, Path(out))
+
+
+def _chosen(path: FilePath | None, folder: Path | None, name: str) -> Path | None:
+    """Return the file that is named, else that of the usual name in a folder, if it exists."""
+    if path is not None:
+        return Path(path)
+    usual = None if folder is None else folder / name
+    return usual if usual is not None and usual.is_file() else None

@@ -1,0 +1,148 @@
+"""Optics to a frozen PSF and its files: `camkit.freeze` and `camkit freeze`."""
+
+import json
+from collections.abc import Sequence
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from camkit.bundle.frozen_optics import write_optics_files
+from camkit.bundle.sensor import ColorSensor
+from camkit.bundle.stages import Wiener
+from camkit.caller import command_text, option_text
+from camkit.errors import ContractError, UnsupportedError
+from camkit.field_types import checked
+from camkit.models_def.face.torch_need import require_torch
+from camkit.runtime.files.in_memory import FilePath, optional_path
+from camkit.runtime.output.part_file import refuse_existing
+
+if TYPE_CHECKING:
+    from camkit.models_def.optics.optics import Optics
+
+AUTO: Final = "auto"
+DEFAULT_RECIPE: Final = "duet.toml"
+
+
+@checked
+def freeze(
+    optics: FilePath,
+    out: FilePath,
+    *,
+    recipe: FilePath | None = None,
+    depths_mm: Sequence[float] = (),
+    limit_db: float | None = None,
+    energy: float | None = None,
+    max_side_px: int | None = None,
+    focus_um: float | str | None = None,
+    haze: FilePath | None = None,
+    stress_out: FilePath | None = None,
+    stress_haze: FilePath | None = None,
+    report: FilePath | None = None,
+    overwrite: bool = False,
+) -> dict[str, Any]:
+    """Compute the PSF of a lens or a plate with as few samples as the loss allows (needs torch).
+
+    Args:
+        optics: A lens (.toml, .zmx), a plate (.toml, name, bundle) or a measured PSF
+            (.safetensors).
+        out: PSF to write (.safetensors).
+        recipe: Recipe (.toml) with the sensor and its Wiener bank; None for duet's.
+        depths_mm: Object distances, near to far; empty for those of the lens.
+        limit_db: Largest mean loss from storing fewer samples; None for 0.05.
+        energy: Least share of each colour's light inside the kernels; None for 0.995, of plates
+            0.999.
+        max_side_px: Largest kernel side, odd; None for 151, of plates 401.
+        focus_um: Also store kernels for a sensor shifted by up to this much, or "auto"; None for
+            none.
+        haze: Store only sharp peaks as kernels, and write the veiling glare to this file.
+        stress_out: Also write kernels off the design point to this file (.safetensors).
+        stress_haze: With `haze` and `stress_out`: write the veiling glare of those kernels.
+        report: Also write the facts to this file (.json), for `camkit.export.bundle`.
+        overwrite: Whether files that exist are replaced.
+
+    Returns:
+        What was kept and what it costs, plain JSON values as `camkit freeze --json` prints them.
+
+    Raises:
+        ContractError: If an option or the optics are wrong, or a file exists.
+        UnsupportedError: If torch is not installed, or the optics cannot be frozen so.
+    """
+    extra = (haze, stress_out, stress_haze, report)
+    haze_path, stress_path, stress_haze_path, report_path = map(optional_path, extra)
+    refuse_existing(map(optional_path, (out, *extra)), overwrite=overwrite)
+    require_torch(command_text("freeze"))
+    from camkit.models_def.optics.freezer import FreezeRequest, freeze_optics
+    from camkit.models_def.optics.optics_file import read_optics
+
+    if (stress_haze is None) != (haze is None or stress_out is None):
+        raise ContractError(
+            f"with {option_text('haze')}, {option_text('stress_out')} and "
+            f"{option_text('stress_haze')} go together; else omit {option_text('stress_haze')}"
+        )
+    sensor, bank = _camera_of(default_recipe() if recipe is None else Path(recipe))
+    source = read_optics(Path(optics))
+    request = FreezeRequest(
+        sensor=sensor,
+        bank=bank,
+        depths_mm=tuple(depths_mm),
+        limit_db=limit_db,
+        energy=energy,
+        max_side_px=max_side_px,
+        focus_um=focus_range_um(source, focus_um),
+        haze=haze is not None,
+        stress=stress_out is not None,
+    )
+    freezing = freeze_optics(source, request)
+    write_optics_files(freezing.optics, Path(out), haze_path)
+    if stress_path is not None and freezing.stress is not None:
+        write_optics_files(freezing.stress, stress_path, stress_haze_path)
+    if report_path is not None:
+        report_path.parent.mkdir(parents=True, exist_ok=True)
+        report_path.write_text(json.dumps(freezing.facts, indent=2) + "\n", encoding="utf-8")
+    return dict(freezing.facts)
+
+
+def focus_range_um(optics: "Optics", focus_um: float | str | None) -> float:
+    """Return the range of a moved sensor: a number > 0, or that of a lens for "auto"; 0 for none.
+
+    Raises:
+        ContractError: If it is neither.
+        UnsupportedError: If the optics are no lens, whose fabricated samples are known.
+    """
+    if focus_um is None:
+        return 0.0
+    if focus_um == AUTO:
+        from camkit.models_def.optics.lens_optics import LensOptics
+
+        if not isinstance(optics, LensOptics):
+            raise UnsupportedError(
+                "auto needs a lens, whose fabricated samples differ in focus; give a number in um"
+            )
+        return optics.focus_range_um()
+    try:
+        range_um = float(focus_um)
+    except ValueError:
+        range_um = np.nan
+    if not 0 < range_um < np.inf:
+        raise ContractError(
+            f"{option_text('focus_um')} takes a number > 0 or {AUTO}; got {focus_um!r}"
+        )
+    return range_um
+
+
+def default_recipe() -> Path:
+    """Return the recipe whose sensor is taken where none is named."""
+    return Path(str(resources.files("camkit.models_def.recipes"))) / DEFAULT_RECIPE
+
+
+def _camera_of(recipe: Path) -> tuple[ColorSensor, Wiener | None]:
+    """Return the sensor of a recipe, and its bank."""
+    from camkit.models_def.training.kind import read_recipe, training_kind
+
+    plan = read_recipe(recipe)
+    stages = training_kind(plan.kind).design(plan).stages
+    if not isinstance(plan.sensor, ColorSensor):
+        raise UnsupportedError(f"a {plan.sensor.type} sensor has no response to freeze a PSF for")
+    return plan.sensor, next((stage for stage in stages if isinstance(stage, Wiener)), None)
