@@ -74,32 +74,32 @@ def bundle(
     if not paths:
         raise ContractError("export needs at least one checkpoint")
     folder = paths[0].parent
-    optics = _chosen(psf, folder, PSF_NAME)
+    optics = _usual_file(psf, folder, PSF_NAME)
     if optics is None:
         raise ContractError(
             f"there is no {folder / PSF_NAME}; make it with `camkit freeze`, or add "
             f"{option_text('psf')}"
         )
-    stress = _chosen(stress_psf, folder, STRESS_NAME)
+    stress = _usual_file(stress_psf, folder, STRESS_NAME)
     from camkit.export import assemble
 
     parts = Parts(
         checkpoints=paths,
         psf=optics,
-        haze=_chosen(haze, optics.parent, HAZE_NAME),
+        haze=_usual_file(haze, optics.parent, HAZE_NAME),
         stress_psf=stress,
-        stress_haze=_chosen(stress_haze, stress and stress.parent, STRESS_HAZE_NAME),
+        stress_haze=_usual_file(stress_haze, stress and stress.parent, STRESS_HAZE_NAME),
         prescription=None if prescription is None else Path(prescription),
         plate=None if plate in (None, NO_PLATE) else Path(plate),
         without_plate=plate == NO_PLATE,
-        freeze=_chosen(freeze, folder, REPORT_NAME),
-        plan=_chosen(plan, folder, PLAN_NAME),
+        freeze=_usual_file(freeze, folder, REPORT_NAME),
+        plan=_usual_file(plan, folder, PLAN_NAME),
         version=version,
     )
     return assemble.export_bundle(parts, Path(out))
 
 
-def _chosen(path: FilePath | None, folder: Path | None, name: str) -> Path | None:
+def _usual_file(path: FilePath | None, folder: Path | None, name: str) -> Path | None:
     """Return the file that is named, else that of the usual name in a folder, if it exists."""
     if path is not None:
         return Path(path)

@@ -54,9 +54,9 @@ def noise(
 
 
 def _line(facts: "IsoFacts") -> str:
-    below = "" if facts.read.resolved else "below "
+    bound = "" if facts.read.resolved else "below "
     return (
         f"  ISO {facts.iso:g}: {facts.gain_e_per_dn:.4g} e-/DN ({100 * facts.gain_error:.2g} %), "
-        f"read noise {below}{facts.read_noise_e:.3g} e-, PRNU {100 * facts.prnu:.2g} %, "
+        f"read noise {bound}{facts.read_noise_e:.3g} e-, PRNU {100 * facts.prnu:.2g} %, "
         f"{facts.pairs} levels"
     )
