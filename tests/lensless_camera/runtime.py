@@ -16,6 +16,7 @@ from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.kind import RuntimePart
+from camkit.runtime.options import Options
 from camkit.runtime.output.part_file import atomic_output
 from camkit.runtime.raw import file_sha256
 from camkit.runtime.twin.simulate import Simulation
@@ -24,7 +25,9 @@ from camkit.runtime.twin.truth import light_sensor
 NAME: Final = "lensless"
 
 
-def read(file: Path, mosaic: MosaicOptions | None, manifest: Manifest | None) -> Capture:
+def read(
+    file: Path, mosaic: MosaicOptions | None, manifest: Manifest | None, _options: Options
+) -> Capture:
     """Read a capture; its levels are those of the bundle."""
     if mosaic is not None:
         raise ContractError("this camera has no mosaic; leave it out")
@@ -82,4 +85,4 @@ def write(path: Path, simulation: Simulation, bundle: Bundle) -> None:
         )
 
 
-PART: Final = RuntimePart(read=read, write=write, suffix=".tif")
+PART: Final = RuntimePart(read=read, write=write, suffixes=(".tif",))

@@ -96,7 +96,7 @@ def _bands(entry: LenslessAdmm, job: Job, taken: Stream, found: list[float]) -> 
     ]
     picture = np.stack([solved.scene[solved.window] for solved in scenes]) / np.float32(entry.white)
     found.append(max(solved.residual for solved in scenes))
-    job.sections[SECTION] = {
+    job.log.sections[SECTION] = {
         "iterations": entry.iterations,
         "residual": [round(solved.residual, 6) for solved in scenes],
         "scene_px": list(scenes[0].scene.shape[::-1]),
@@ -115,7 +115,7 @@ def _rounds(entry: LenslessAdmm, job: Job, channel: int) -> Iterator[None]:
     """Yield once for every round: each is counted, and ends if the caller wants to stop."""
     for number in range(entry.iterations):
         share = (channel + number / entry.iterations) / job.capture.channels
-        job.meter.reach(entry.gives[0], share)
+        job.log.meter.reach(entry.gives[0], share)
         yield
 
 

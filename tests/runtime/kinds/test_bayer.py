@@ -17,9 +17,9 @@ PART = runtime_part(BAYER.name)
 def test_what_is_photographed_and_written_is_read_again(bundle: Bundle, tmp_path: Path) -> None:
     scene = np.random.default_rng(0).random((3, 64, 96), dtype=np.float32)
     taken = PART.simulate(scene, bundle, SimulationOptions(iso=400, seed=3))
-    path = tmp_path / f"a{PART.suffix}"
+    path = tmp_path / f"a{PART.suffixes[0]}"
     PART.write(path, taken, bundle)
-    read = PART.read(path, None, bundle.manifest)
+    read = PART.read(path, None, bundle.manifest, Options())
     np.testing.assert_array_equal(read.samples, taken.samples)
     assert (read.bundle_name, read.iso) == ("tiny", 400)
     again = PART.from_array(
