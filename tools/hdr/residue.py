@@ -32,8 +32,8 @@ from camkit.report.kinds.hdr.capture import developer
 from camkit.report.kinds.hdr.judge import HdrJudge, hdr_judge_of
 from camkit.report.stress.rig import INPUT
 from camkit.report.stress.scene import Scene
-from camkit.scenes.named import named_scene
 from camkit.scenes.saturation import CEILING
+from camkit.scenes.scene_register import named_scene
 from tools.hdr.depths import picture_scenes
 from tools.hdr.record import in_one_line, new_parser, open_camera, origin_of, table, write_record
 

@@ -22,8 +22,8 @@ from camkit.runtime.network.engine import available_threads
 from camkit.runtime.proof.laws.darkroom import Darkroom
 from camkit.runtime.twin.saturation import exposure_for_share
 from camkit.runtime.twin.truth import light_sensor
-from camkit.scenes.named import named_scene
 from camkit.scenes.saturation import with_exposure
+from camkit.scenes.scene_register import named_scene
 
 SIZE_PX: Final = (512, 768)
 SATURATED: Final = 0.005

@@ -36,8 +36,8 @@ from camkit.runtime.rows import ArrayRows
 from camkit.runtime.twin.saturation import exposure_for_share
 from camkit.runtime.twin.simulate import SimulationOptions, photograph
 from camkit.runtime.twin.truth import ideal_picture
-from camkit.scenes.named import named_scene
 from camkit.scenes.saturation import with_exposure
+from camkit.scenes.scene_register import named_scene
 from tools.capture.simulated import captured, color_sensor
 from tools.comparison.compact_json import to_compact_json
 

@@ -15,9 +15,9 @@ class Correct(StageEntry):
     takes: tuple[Word, ...] = ("capture",)
     gives: tuple[Word, ...] = ("photons",)
 
-    def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
+    def join(self, planes: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Return the photons, over the axes of the capture."""
         del parts
-        need_count(taken, 1)
-        need_domain(taken[0], "counts")
-        return (taken[0].model_copy(update={"type": "float32"}),)
+        need_count(planes, 1)
+        need_domain(planes[0], "counts")
+        return (planes[0].model_copy(update={"type": "float32"}),)

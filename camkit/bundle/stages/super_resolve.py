@@ -60,10 +60,10 @@ class SuperResolve(StageEntry):
             raise ValueError("sigma belongs to the sampling gaussian, and to it alone")
         return self
 
-    def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
+    def join(self, planes: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Return the photons on the fine grid."""
-        need_count(taken, 1)
-        need_domain(taken[0], "counts")
+        need_count(planes, 1)
+        need_domain(planes[0], "counts")
         sensor, optics = parts.sensor, parts.need_optics("it undoes their blur")
         if not isinstance(sensor, SpadSensor) or sensor.sub_pixels < 2:
             raise JoinError("it takes an array that counts photons and states its sub_pixels")
@@ -84,7 +84,7 @@ class SuperResolve(StageEntry):
                     f"its network of size {size} makes {facts.output_scale} samples of a pixel, "
                     f"the sensor has {sensor.sub_pixels} sub-pixels"
                 )
-        plane = taken[0]
+        plane = planes[0]
         share = 1 / sensor.sub_pixels
         x, y = plane.grid.origin_px
         shift = sensor.phase * plane.grid.pitch_ratio * share

@@ -72,13 +72,13 @@ def export(
     require_torch("camkit export")
     refuse_existing([out], overwrite=overwrite)
     folder = checkpoints[0].parent
-    frozen = psf or _beside(folder, PSF_NAME)
+    frozen = psf or _existing(folder, PSF_NAME)
     if frozen is None:
         raise ContractError(
             f"there is no {folder / PSF_NAME}; make it with `camkit freeze`, or add --psf"
         )
-    stress = stress_psf or _beside(folder, STRESS_NAME)
-    beside = None if stress is None else _beside(stress.parent, STRESS_HAZE_NAME)
+    stress = stress_psf or _existing(folder, STRESS_NAME)
+    existing_haze = None if stress is None else _existing(stress.parent, STRESS_HAZE_NAME)
     from camkit.export.assemble import export_bundle
     from camkit.export.parts import Parts
 
@@ -86,14 +86,14 @@ def export(
         Parts(
             checkpoints=tuple(checkpoints),
             psf=frozen,
-            haze=haze or _beside(frozen.parent, HAZE_NAME),
+            haze=haze or _existing(frozen.parent, HAZE_NAME),
             stress_psf=stress,
-            stress_haze=stress_haze or beside,
+            stress_haze=stress_haze or existing_haze,
             prescription=prescription,
             plate=None if plate in (None, NO_PLATE) else Path(plate),
             without_plate=plate == NO_PLATE,
-            freeze=freeze or _beside(folder, REPORT_NAME),
-            plan=plan or _beside(folder, PLAN_NAME),
+            freeze=freeze or _existing(folder, REPORT_NAME),
+            plan=plan or _existing(folder, PLAN_NAME),
             version=version,
         ),
         out,
@@ -101,6 +101,6 @@ def export(
     print_report(report, json_)
 
 
-def _beside(folder: Path, name: str) -> Path | None:
+def _existing(folder: Path, name: str) -> Path | None:
     path = folder / name
     return path if path.is_file() else None

@@ -119,7 +119,7 @@ def freeze(
     if unit or captures:
         from camkit.bundle.reader import SUFFIX
 
-        beside = {
+        others = {
             "--haze": haze,
             "--stress-out": stress_out,
             "--stress-haze": stress_haze,
@@ -129,7 +129,9 @@ def freeze(
             "--max-side-px": max_side_px,
             "--recipe": recipe if optics.suffix.lower() == SUFFIX else None,
         }
-        _check_unit(unit=unit, beside=[name for name, value in beside.items() if value is not None])
+        _check_unit(
+            unit=unit, options=[name for name, value in others.items() if value is not None]
+        )
     recipe = _default_recipe() if recipe is None else recipe
     if unit or captures:
         from camkit.cli.design.unit import measure_unit
@@ -145,27 +147,27 @@ def freeze(
     from camkit.models_def.optics.optics_file import read_optics
 
     sensor, bank = _camera_of(recipe)
-    found = read_optics(optics)
+    source = read_optics(optics)
     if (stress_haze is None) != (haze is None or stress_out is None):
         raise ContractError(
             "with --haze, --stress-out and --stress-haze go together; else omit --stress-haze"
         )
     if haze is not None:
-        chosen = {
+        choices = {
             "--depths-mm": depths_mm is not None,
             "--limit-db": limit_db != LIMIT_DB,
             "--energy": energy is not None,
             "--max-side-px": max_side_px is not None,
             "--focus-um": focus_um is not None,
         }
-        if named := [name for name, said in chosen.items() if said]:
-            raise ContractError(f"--haze conflicts with {', '.join(named)}")
+        if conflicts := [name for name, is_set in choices.items() if is_set]:
+            raise ContractError(f"--haze conflicts with {', '.join(conflicts)}")
         stress = None if stress_out is None or stress_haze is None else (stress_out, stress_haze)
-        told = _freeze_hazy(found, (out, haze), stress, sensor)
-        _report(told, report, json_)
+        hazy_facts = _freeze_hazy(source, (out, haze), stress, sensor)
+        _report(hazy_facts, report, json_)
         return
-    moved_um = focus_range_um(found, focus_um)
-    base = WINDOW if isinstance(found, PlateOptics) else FreezeGrid()
+    moved_um = focus_range_um(source, focus_um)
+    base = WINDOW if isinstance(source, PlateOptics) else FreezeGrid()
     grid = replace(
         base,
         depths_mm=depths,
@@ -175,21 +177,21 @@ def freeze(
         least_energy=base.least_energy if energy is None else None,
     )
     out.parent.mkdir(parents=True, exist_ok=True)
-    facts = _freeze(found, out, _Wanted(sensor, bank, grid, limit_db, moved_um))
+    facts = _freeze(source, out, _FreezeSettings(sensor, bank, grid, limit_db, moved_um))
     if stress_out is not None:
         stress_out.parent.mkdir(parents=True, exist_ok=True)
-        write_psf(stress_out, freeze_stress(found, sensor, grid).psf)
+        write_psf(stress_out, freeze_stress(source, sensor, grid).psf)
     _report(facts.to_json(), report, json_)
 
 
-def _report(told: dict[str, int | float | str], report: Path | None, json_: bool) -> None:
+def _report(facts: dict[str, int | float | str], report: Path | None, json_: bool) -> None:
     """Write the report where it is wanted, and print it."""
     from camkit.cli.design.design_time import print_report
 
     if report is not None:
         report.parent.mkdir(parents=True, exist_ok=True)
-        report.write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
-    print_report(told, json_)
+        report.write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
+    print_report(facts, json_)
 
 
 @working("freezing peaks and haze of the lens")
@@ -211,13 +213,13 @@ def _freeze_hazy(
     if not isinstance(optics, LensOptics):
         raise UnsupportedError("--haze is for lenses only; leave it out")
     frozen, report = freeze_hazy(optics.lens, sensor, tell=note)
-    told = report.to_json()
+    facts = report.to_json()
     if stress is not None:
-        nearer = freeze_distances(optics.lens, sensor, tell=note)
-        _write_optics(nearer, *stress)
-        told["distances"] = ", ".join(map(depth_name, nearer.psf.depths_mm))
+        distances = freeze_distances(optics.lens, sensor, tell=note)
+        _write_optics(distances, *stress)
+        facts["distances"] = ", ".join(map(depth_name, distances.psf.depths_mm))
     _write_optics(frozen, *paths)
-    return told
+    return facts
 
 
 def _write_optics(frozen: "FrozenOptics", out: Path, haze_out: Path) -> None:
@@ -232,7 +234,7 @@ def _write_optics(frozen: "FrozenOptics", out: Path, haze_out: Path) -> None:
     write_haze(haze_out, frozen.haze)
 
 
-class _Wanted(NamedTuple):
+class _FreezeSettings(NamedTuple):
     """The settings of freezing."""
 
     sensor: "ColorSensor"
@@ -243,23 +245,23 @@ class _Wanted(NamedTuple):
 
 
 @working("freezing the optics")
-def _freeze(optics: "Optics", out: Path, wanted: _Wanted) -> "FreezeReport | PlateReport":
+def _freeze(optics: "Optics", out: Path, settings: _FreezeSettings) -> "FreezeReport | PlateReport":
     from camkit.models_def.optics.diffraction.freezing import freeze_plate
     from camkit.models_def.optics.diffraction.plate_optics import PlateOptics
     from camkit.models_def.optics.freeze import freeze_optics
 
     if isinstance(optics, PlateOptics):
-        if wanted.focus_um:
+        if settings.focus_um:
             raise UnsupportedError("a plate is frozen at its nominal focus; leave --focus-um out")
-        return freeze_plate(optics, out, sensor=wanted.sensor, grid=wanted.grid, tell=note)
+        return freeze_plate(optics, out, sensor=settings.sensor, grid=settings.grid, tell=note)
     return freeze_optics(
         optics,
         out,
-        sensor=wanted.sensor,
-        settings=wanted.bank,
-        limit_db=wanted.limit_db,
-        grid=wanted.grid,
-        focus_um=wanted.focus_um,
+        sensor=settings.sensor,
+        settings=settings.bank,
+        limit_db=settings.limit_db,
+        grid=settings.grid,
+        focus_um=settings.focus_um,
         tell=note,
     )
 
@@ -270,18 +272,18 @@ def _camera_of(recipe: Path) -> "tuple[ColorSensor, Wiener | None]":
     from camkit.bundle.stages import Wiener
     from camkit.models_def.training.kind import read_recipe, training_kind
 
-    chosen = read_recipe(recipe)
-    stages = training_kind(chosen.kind).design(chosen).stages
-    if not isinstance(chosen.sensor, ColorSensor):
-        raise UnsupportedError(f"a {chosen.sensor.type} sensor has no response to freeze a PSF for")
-    return chosen.sensor, next((stage for stage in stages if isinstance(stage, Wiener)), None)
+    plan = read_recipe(recipe)
+    stages = training_kind(plan.kind).design(plan).stages
+    if not isinstance(plan.sensor, ColorSensor):
+        raise UnsupportedError(f"a {plan.sensor.type} sensor has no response to freeze a PSF for")
+    return plan.sensor, next((stage for stage in stages if isinstance(stage, Wiener)), None)
 
 
-def _check_unit(*, unit: bool, beside: Sequence[str]) -> None:
+def _check_unit(*, unit: bool, options: Sequence[str]) -> None:
     if not unit:
         raise ContractError("captures are for --unit, which measures the camera that took them")
-    if beside:
-        raise ContractError(f"--unit freezes nothing; leave {', '.join(beside)} out")
+    if options:
+        raise ContractError(f"--unit freezes nothing; leave {', '.join(options)} out")
 
 
 def _depths(text: str | None) -> tuple[float, ...]:

@@ -55,8 +55,8 @@ def measure_unit(
         camera, identity = _of_bundle(optics, depths_mm)
     else:
         camera, identity = _of_lens(optics, recipe, depths_mm, focus_um)
-    found = measure_focus([(path.name, read_capture(path)) for path in captures], camera)
-    facts = found.to_json()
+    focus = measure_focus([(path.name, read_capture(path)) for path in captures], camera)
+    facts = focus.to_json()
     out.parent.mkdir(parents=True, exist_ok=True)
     with atomic_output(out) as part:
         part.write_text(format_unit(out.stem, identity, facts), encoding="utf-8")
@@ -81,12 +81,12 @@ def focus_range_um(optics: "Optics", text: str | None) -> float:
             )
         return optics.focus_range_um()
     try:
-        found = float(text)
+        range_um = float(text)
     except ValueError:
-        found = math.nan
-    if not 0 < found < math.inf:
+        range_um = math.nan
+    if not 0 < range_um < math.inf:
         raise ContractError(f"--focus-um takes a number > 0 or {AUTO}; got {text!r}")
-    return found
+    return range_um
 
 
 def _of_bundle(path: Path, depths_mm: tuple[float, ...]) -> "tuple[EdgeCamera, dict[str, str]]":

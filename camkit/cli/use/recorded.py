@@ -22,7 +22,7 @@ def simulate_recorded(
     bundle: "Bundle",
     out: Path,
     options: "RecordingOptions",
-    given: Mapping[str, Any],
+    flags: Mapping[str, Any],
     *,
     overwrite: bool,
     json_: bool,
@@ -34,7 +34,7 @@ def simulate_recorded(
         bundle: The camera, whose kind has a recording.
         out: The capture to write.
         options: How much light there is.
-        given: Flag -> value of the options of photographs alone; those that are not None or False
+        flags: Flag -> value of the options of photographs alone; those that are not None or False
             were given.
         overwrite: Whether files that exist are replaced.
         json_: Whether to print JSON.
@@ -43,9 +43,9 @@ def simulate_recorded(
         ContractError: If an option means nothing here, or the name is of no such file.
     """
     recording = _recording(bundle)
-    if said := [flag for flag, value in given.items() if value not in (None, False)]:
+    if set_flags := [flag for flag, value in flags.items() if value not in (None, False)]:
         raise ContractError(
-            f"{', '.join(said)} does not apply to bundle {bundle.manifest.name}, which counts "
+            f"{', '.join(set_flags)} does not apply to bundle {bundle.manifest.name}, which counts "
             "photons: use --photons, --sbr and --seed"
         )
     if out.suffix.lower() not in recording.suffixes:
@@ -66,8 +66,8 @@ def simulate_recorded(
         said_too = {"photons": options.photons, "seed": options.seed, "counts": counts}
         say(json.dumps(facts | {"shape": shape} | said_too, allow_nan=False))
     else:
-        beside = "".join(f", {file}" for file in files[1:])
-        say(f"{out}{beside}: {recorded.name} {'x'.join(map(str, shape))}, {counts} counts")
+        more_files = "".join(f", {file}" for file in files[1:])
+        say(f"{out}{more_files}: {recorded.name} {'x'.join(map(str, shape))}, {counts} counts")
 
 
 def light_of(
@@ -98,10 +98,10 @@ def _check_light_alone(photons: float | None, sbr: float | None, bundle: "Bundle
         ContractError: Names them.
     """
     options = (("--photons", photons), ("--sbr", sbr))
-    if said := [flag for flag, value in options if value is not None]:
+    if set_flags := [flag for flag, value in options if value is not None]:
         raise ContractError(
-            f"{', '.join(said)} does not apply to bundle {bundle.manifest.name}: its camera counts "
-            "no photons; use --exposure and --iso"
+            f"{', '.join(set_flags)} does not apply to bundle {bundle.manifest.name}: its camera "
+            "counts no photons; use --exposure and --iso"
         )
 
 

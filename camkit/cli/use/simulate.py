@@ -110,7 +110,7 @@ def simulate(
     part, sensor = part_of(opened.manifest), opened.manifest.sensor
     counted = light_of(photons, sbr, seed, opened)
     if counted is not None:
-        given = {
+        flags = {
             "--iso": iso,
             "--origin-px": origin_px,
             "--exposure": exposure,
@@ -123,7 +123,7 @@ def simulate(
             "--unit": unit,
             "--size-px": size_px,
         }
-        simulate_recorded(scene, opened, out, counted, given, overwrite=overwrite, json_=json_)
+        simulate_recorded(scene, opened, out, counted, flags, overwrite=overwrite, json_=json_)
         return
     if out.suffix.lower() != part.suffix:
         raise ContractError(
@@ -148,16 +148,16 @@ def simulate(
         focus_um=_focus_um(unit, opened),
         workers=available_threads(None),
     )
-    drawn = _scene(scene, size, surround_px, is_cut=size_px is not None)
-    drawn, saturation = _exposed(drawn, sensor, options, saturate)
+    picture = _scene(scene, size, surround_px, is_cut=size_px is not None)
+    picture, saturation = _exposed(picture, sensor, options, saturate)
     with working(f"photographing {scene}"):
-        simulation = part.simulate(drawn, opened, options)
-        shown = None if truth is None else ideal_picture(simulation, opened)
+        simulation = part.simulate(picture, opened, options)
+        ideal = None if truth is None else ideal_picture(simulation, opened)
     out.parent.mkdir(parents=True, exist_ok=True)
     part.write(out, simulation, opened)
-    if truth is not None and shown is not None:
+    if truth is not None and ideal is not None:
         truth.parent.mkdir(parents=True, exist_ok=True)
-        write_truth(truth, shown)
+        write_truth(truth, ideal)
     if json_:
         say(json.dumps(_facts(out, truth, simulation, saturation), allow_nan=False))
     else:
@@ -203,11 +203,11 @@ def _exposed(
             raise ContractError("--saturate is for sensors that clip; this one counts photons")
         return scene, None
     inner = slice(options.surround_px, -options.surround_px or None)
-    seen = scene[:, inner, inner]
+    inside = scene[:, inner, inner]
     if share is None:
-        return scene, saturation_of(seen, sensor, options.exposure)
-    found = exposure_for_share(seen, sensor, share)
-    return with_exposure(scene, found.exposure), found
+        return scene, saturation_of(inside, sensor, options.exposure)
+    saturation = exposure_for_share(inside, sensor, share)
+    return with_exposure(scene, saturation.exposure), saturation
 
 
 def _facts(

@@ -48,7 +48,7 @@ def bundle(
     from camkit.calibration.measured_files import read_flat, read_geometry, read_noise
     from camkit.export.remeasured import Measured, remeasured
 
-    before = open_bundle(find_bundle(source))
+    original = open_bundle(find_bundle(source))
     try:
         kernels = None if psf is None else read_psf(psf)
     except BundleError as error:  # a file that was measured, and no bundle, is refused here
@@ -61,18 +61,18 @@ def bundle(
     )
     for path in (out, page or out):
         path.parent.mkdir(parents=True, exist_ok=True)
-    made, notes = remeasured(before, measured, out, keep_networks=keep_networks)
+    copy, notes = remeasured(original, measured, out, keep_networks=keep_networks)
     files = {"geometry": geometry, "flat": flat, "noise": noise, "psf": psf}
-    given = {name: str(path) for name, path in files.items() if path is not None}
-    found = measured.geometry
+    sources = {name: str(path) for name, path in files.items() if path is not None}
+    lens = measured.geometry
     record = {
-        "from": before.manifest.name,
-        "measured": given,
-        "model": None if found is None else found.model,
-        "residual_px": None if found is None else found.radial.residual_px,
-        "networks": list(made.manifest.sizes),
-        "golden": [case.name for case in made.manifest.golden],
-        "left_out": sorted({*before.names} - {*made.names}),
+        "from": original.manifest.name,
+        "measured": sources,
+        "model": None if lens is None else lens.model,
+        "residual_px": None if lens is None else lens.radial.residual_px,
+        "networks": list(copy.manifest.sizes),
+        "golden": [case.name for case in copy.manifest.golden],
+        "left_out": sorted({*original.names} - {*copy.names}),
         "notes": list(notes),
         "out": str(out),
     }
@@ -81,7 +81,7 @@ def bundle(
         from camkit.runtime.output.part_file import atomic_output
 
         with atomic_output(page) as part:
-            part.write_text(bundle_html(before, made, record), encoding="utf-8")
+            part.write_text(bundle_html(original, copy, record), encoding="utf-8")
         record["page"] = str(page)
-    line = f"  {before.manifest.name} with {', '.join(given)} as measured"
+    line = f"  {original.manifest.name} with {', '.join(sources)} as measured"
     tell(record, [line], as_json=json_)

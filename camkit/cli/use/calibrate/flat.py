@@ -51,10 +51,10 @@ def flat(
 
     --shift-px and --turn-deg are given once for each picture, in the order of FILES.
     """
-    outputs = Outputs.asked(out, page, overwrite=overwrite, as_json=json_)
+    outputs = Outputs.checked(out, page, overwrite=overwrite, as_json=json_)
     from camkit.calibration.flat.illumination_fit import measure_flat
 
-    found = measure_flat(
+    facts = measure_flat(
         files,
         shift_px,
         turn_deg,
@@ -62,15 +62,15 @@ def flat(
         mosaic=mosaic_options(mosaic, black_level, white_level),
     )
 
-    def shown() -> str:
+    def html() -> str:
         from camkit.report.calibration.flat_page import flat_html
 
-        return flat_html(found)
+        return flat_html(facts)
 
-    corner = f"{found.relative_illumination[-1]:.3f} at {found.heights_mm[-1]:.2f} mm"
-    told = "told from" if found.separated else "not told from"
+    corner = f"{facts.relative_illumination[-1]:.3f} at {facts.heights_mm[-1]:.2f} mm"
+    origin = "told from" if facts.separated else "not told from"
     lines = [
-        f"  relative illumination {corner}, {told} the display, which is uneven by "
-        f"{found.display:.1%}; {found.rest:.2%} are left"
+        f"  relative illumination {corner}, {origin} the display, which is uneven by "
+        f"{facts.display:.1%}; {facts.rest:.2%} are left"
     ]
-    outputs.write(found.to_record(), lines, shown)
+    outputs.write(facts.to_record(), lines, html)

@@ -11,21 +11,21 @@ from camkit.errors import ContractError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Folder:
-    """A folder to be filled; made by `asked`, before any work.
+    """A folder to be filled; made by `checked`, before any work.
 
     Attributes:
         path: The folder.
-        within: Folders of it that hold nothing but what is written, "." for itself.
+        owned_parts: Folders of it that hold nothing but what is written, "." for itself.
         overwrite: Whether what is there may be replaced.
     """
 
     path: Path
-    within: tuple[str, ...]
+    owned_parts: tuple[str, ...]
     overwrite: bool
 
     @classmethod
-    def asked(
-        cls, path: Path, marks: Sequence[str], within: Sequence[str], *, overwrite: bool
+    def checked(
+        cls, path: Path, marks: Sequence[str], owned_parts: Sequence[str], *, overwrite: bool
     ) -> Self:
         """Check the folder that a caller asks for.
 
@@ -33,7 +33,7 @@ class Folder:
             path: The folder.
             marks: Files that a former run of the command leaves: with none of them, what is in
                 the folder is somebody else's.
-            within: Its parts that must hold nothing else.
+            owned_parts: Its parts that must hold nothing else.
             overwrite: Whether files that are there may be replaced.
 
         Raises:
@@ -50,7 +50,7 @@ class Folder:
                 raise ContractError(
                     f"{path} holds files of another kind, without {marks[0]}; give another folder"
                 )
-        return cls(path=path, within=tuple(within), overwrite=overwrite)
+        return cls(path=path, owned_parts=tuple(owned_parts), overwrite=overwrite)
 
     @contextmanager
     def writing(self, names: Sequence[str]) -> Iterator[tuple[Path, ...]]:
@@ -66,24 +66,24 @@ class Folder:
         from camkit.runtime.output.part_file import atomic_outputs
 
         paths = [self.path / name for name in names]
-        for part in self.within:
+        for part in self.owned_parts:
             here = self.path / part
             if not here.is_dir():
                 continue
-            for found in sorted(here.iterdir()):
-                if found.is_file() and found not in paths:
+            for path in sorted(here.iterdir()):
+                if path.is_file() and path not in paths:
                     raise ContractError(
-                        f"{found} is none of the files to be written; remove it or give another "
+                        f"{path} is none of the files to be written; remove it or give another "
                         "folder"
                     )
-        made = _missing(paths)
+        folders = _missing(paths)
         try:
-            for folder in made:
+            for folder in folders:
                 folder.mkdir(exist_ok=True)
             with atomic_outputs(*paths) as parts:
                 yield parts
         except BaseException:
-            for folder in reversed(made):
+            for folder in reversed(folders):
                 if folder.is_dir() and not any(folder.iterdir()):
                     folder.rmdir()
             raise

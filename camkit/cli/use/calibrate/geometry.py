@@ -42,12 +42,12 @@ def geometry(
     _debug: Debug = False,
 ) -> None:
     """Measure focal length, optical centre and distortion from photographs of a checkerboard."""
-    outputs = Outputs.asked(out, page, overwrite=overwrite, as_json=json_)
-    found = _found(pictures, board, square_mm, focal_px)
-    outputs.write(found.to_record(), _lines(found), lambda: _page(found))
+    outputs = Outputs.checked(out, page, overwrite=overwrite, as_json=json_)
+    measured = _measure(pictures, board, square_mm, focal_px)
+    outputs.write(measured.to_record(), _lines(measured), lambda: _page(measured))
 
 
-def _found(
+def _measure(
     pictures: list[Path], board: str | None, square_mm: float | None, focal_px: float | None
 ) -> "Geometry":
     from camkit.calibration.geometry.board import Board
@@ -58,32 +58,34 @@ def _found(
         if board is None:
             raise ContractError("--board is needed: COLUMNSxROWS of its inner corners, like 9x6")
         return calibrate_geometry(pictures, Board.read(board, square_mm), focal_px)
-    given = read_corners(pictures[0])
-    asked = Board.read(str(given.board) if board is None else board, square_mm)
-    if str(asked) != str(given.board):
-        raise ContractError(f"{pictures[0]} holds corners of a board of {given.board}, not {asked}")
+    corners = read_corners(pictures[0])
+    stated_board = Board.read(str(corners.board) if board is None else board, square_mm)
+    if str(stated_board) != str(corners.board):
+        raise ContractError(
+            f"{pictures[0]} holds corners of a board of {corners.board}, not {stated_board}"
+        )
     if square_mm is not None:
-        given = replace(given, board=asked)
-    return calibrate_corners(given, focal_px)
+        corners = replace(corners, board=stated_board)
+    return calibrate_corners(corners, focal_px)
 
 
-def _lines(found: "Geometry") -> list[str]:
-    x, y = found.camera.centre_px
-    seen = sum(view.corners is not None for view in found.views)
-    chosen = found.chosen
+def _lines(facts: "Geometry") -> list[str]:
+    x, y = facts.camera.centre_px
+    boards = sum(view.corners is not None for view in facts.views)
+    best = facts.chosen
     return [
-        f"  {found.camera.model.name}: focal length {found.camera.focal_px:.2f} px, centre "
-        f"({x:.2f}, {y:.2f}) of {found.size[0]}x{found.size[1]} px",
-        f"  error {chosen.fit.rms_px:.3f} px rms in {seen} of {len(found.views)} pictures; in "
-        f"pictures left out of the fit {chosen.rms_px:.3f} px, at worst {chosen.worst_px:.3f} px",
-        f"  corners reach {found.coverage.radius_px:.0f} px from the centre, of "
-        f"{found.coverage.corner_px:.0f} px to the picture's corner; the distortion polynomial "
-        f"fits the model to {found.radial.residual_px:.3f} px",
+        f"  {facts.camera.model.name}: focal length {facts.camera.focal_px:.2f} px, centre "
+        f"({x:.2f}, {y:.2f}) of {facts.size[0]}x{facts.size[1]} px",
+        f"  error {best.fit.rms_px:.3f} px rms in {boards} of {len(facts.views)} pictures; in "
+        f"pictures left out of the fit {best.rms_px:.3f} px, at worst {best.worst_px:.3f} px",
+        f"  corners reach {facts.coverage.radius_px:.0f} px from the centre, of "
+        f"{facts.coverage.corner_px:.0f} px to the picture's corner; the distortion polynomial "
+        f"fits the model to {facts.radial.residual_px:.3f} px",
     ]
 
 
-def _page(found: "Geometry") -> str:
+def _page(facts: "Geometry") -> str:
     from camkit.report.calibration.geometry import geometry_sections
     from camkit.report.calibration.page import to_html
 
-    return to_html("camkit calibrate geometry", geometry_sections(found))
+    return to_html("camkit calibrate geometry", geometry_sections(facts))

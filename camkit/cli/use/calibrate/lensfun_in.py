@@ -11,7 +11,7 @@ from camkit.cli.use.calibrate.outputs import Page, check_out, check_page, tell
 from camkit.cli.use.mosaic import BlackLevel, MosaicCfa, WhiteLevel, mosaic_options
 
 if TYPE_CHECKING:
-    from camkit.calibration.lensfun.profile import Found
+    from camkit.calibration.lensfun.profile import LensfunProfile
 
 
 def lensfun_in(
@@ -67,22 +67,22 @@ def lensfun_in(
         scale=scale,
         mosaic=mosaic_options(mosaic, black_level, white_level),
     )
-    made = lensfun_bundle(database, lens, capture, options, name=out.stem)
+    result = lensfun_bundle(database, lens, capture, options, name=out.stem)
     out.parent.mkdir(parents=True, exist_ok=True)
-    shown = {}
+    extra = {}
     with ExitStack() as stack:
         if page is not None:
             from camkit.report.calibration.lensfun_page import bundle_html
 
             page.parent.mkdir(parents=True, exist_ok=True)
             part = stack.enter_context(atomic_output(page))
-            part.write_text(bundle_html(made), encoding="utf-8")
-            shown["page"] = str(page)
-        write_bundle(out, made.manifest, {})
-    tell({**made.to_record(), "out": str(out), **shown}, [_line(made.found)], as_json=json_)
+            part.write_text(bundle_html(result), encoding="utf-8")
+            extra["page"] = str(page)
+        write_bundle(out, result.manifest, {})
+    tell({**result.to_record(), "out": str(out), **extra}, [_line(result.found)], as_json=json_)
 
 
-def _line(found: "Found") -> str:
-    entry, light = found.distortion, found.vignetting
+def _line(profile: "LensfunProfile") -> str:
+    entry, light = profile.distortion, profile.vignetting
     evened = "" if light is None else f", light evened as at f/{light.aperture:g}"
-    return f"  {found.lens.name}, {entry.model} at {entry.focal_mm:g} mm{evened}"
+    return f"  {profile.lens.name}, {entry.model} at {entry.focal_mm:g} mm{evened}"

@@ -65,21 +65,21 @@ def lensfun_out(
         aperture=aperture,
         most_residual_px=most_residual_px,
     )
-    made = lensfun_entry(source, options)
-    texts = {out: made.to_xml()}
+    entry = lensfun_entry(source, options)
+    texts = {out: entry.to_xml()}
     if page is not None:
         from camkit.report.calibration.lensfun_page import entry_html
 
-        texts[page] = entry_html(made)
+        texts[page] = entry_html(entry)
     for path in texts:
         path.parent.mkdir(parents=True, exist_ok=True)
     with atomic_outputs(*texts) as parts:
         for part, text in zip(parts, texts.values(), strict=True):
             part.write_text(text, encoding="utf-8")
-    fit = made.fit
+    fit = entry.fit
     line = (
-        f"  {made.name.model}, {fit.distortion.model} at {fit.distortion.focal_mm:g} mm, misses by "
-        f"{fit.residual_px:.3f} px"
+        f"  {entry.name.model}, {fit.distortion.model} at {fit.distortion.focal_mm:g} mm, misses "
+        f"by {fit.residual_px:.3f} px"
     )
-    shown = {} if page is None else {"page": str(page)}
-    tell({**made.to_record(), "out": str(out), **shown}, [line], as_json=json_)
+    extra = {} if page is None else {"page": str(page)}
+    tell({**entry.to_record(), "out": str(out), **extra}, [line], as_json=json_)

@@ -39,25 +39,25 @@ def noise(
     _debug: Debug = False,
 ) -> None:
     """Measure gain, read noise and fixed patterns of a sensor from pairs of RAW frames."""
-    outputs = Outputs.asked(out, page, overwrite=overwrite, as_json=json_)
+    outputs = Outputs.checked(out, page, overwrite=overwrite, as_json=json_)
     if iso is not None and not 0 < iso < float("inf"):
         raise ContractError(f"--iso must be > 0; got {iso:g}")
     from camkit.calibration.noise.sensor_noise import measure_sensor
 
-    found = measure_sensor(dark, flat, mosaic_options(mosaic, black_level, white_level), iso)
+    sensor = measure_sensor(dark, flat, mosaic_options(mosaic, black_level, white_level), iso)
 
-    def shown() -> str:
+    def html() -> str:
         from camkit.report.calibration.noise_page import noise_html
 
-        return noise_html(found)
+        return noise_html(sensor)
 
-    outputs.write(found.to_record(), [_line(facts) for facts in found.isos], shown)
+    outputs.write(sensor.to_record(), [_line(facts) for facts in sensor.isos], html)
 
 
 def _line(facts: "IsoFacts") -> str:
-    below = "" if facts.read.resolved else "below "
+    bound = "" if facts.read.resolved else "below "
     return (
         f"  ISO {facts.iso:g}: {facts.gain_e_per_dn:.4g} e-/DN ({100 * facts.gain_error:.2g} %), "
-        f"read noise {below}{facts.read_noise_e:.3g} e-, PRNU {100 * facts.prnu:.2g} %, "
+        f"read noise {bound}{facts.read_noise_e:.3g} e-, PRNU {100 * facts.prnu:.2g} %, "
         f"{facts.pairs} levels"
     )

@@ -17,7 +17,7 @@ Page = Annotated[Path | None, typer.Option(help="Also write a self-contained pag
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outputs:
-    """The files of the results; made by `asked`, before any work.
+    """The files of the results; made by `checked`, before any work.
 
     Attributes:
         out: The TOML.
@@ -30,7 +30,7 @@ class Outputs:
     as_json: bool
 
     @classmethod
-    def asked(cls, out: Path, page: Path | None, *, overwrite: bool, as_json: bool) -> Self:
+    def checked(cls, out: Path, page: Path | None, *, overwrite: bool, as_json: bool) -> Self:
         """Check the outputs that a caller asks for.
 
         Raises:
@@ -74,7 +74,7 @@ class Outputs:
             return
         for note in record.get("notes", ()):
             say(f"note: {note}", err=True)
-        for line in (f"{named(self.out, self.page)}:", *lines):
+        for line in (f"{file_names(self.out, self.page)}:", *lines):
             say(line)
 
 
@@ -115,11 +115,11 @@ def tell(record: Mapping[str, Any], lines: Sequence[str], *, as_json: bool) -> N
         return
     for note in record.get("notes", ()):
         say(f"note: {note}", err=True)
-    for line in (f"{named(record['out'], record.get('page'))}:", *lines):
+    for line in (f"{file_names(record['out'], record.get('page'))}:", *lines):
         say(line)
 
 
-def named(out: Path | str, page: Path | str | None) -> str:
+def file_names(out: Path | str, page: Path | str | None) -> str:
     """Return the names of the written files."""
     return ", ".join(str(path) for path in (out, page) if path is not None)
 

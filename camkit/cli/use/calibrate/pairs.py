@@ -9,7 +9,7 @@ import typer
 from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.cli.say import say
 from camkit.cli.use.calibrate.folder import Folder
-from camkit.cli.use.calibrate.outputs import Page, check_page, named
+from camkit.cli.use.calibrate.outputs import Page, check_page, file_names
 from camkit.errors import ContractError
 
 if TYPE_CHECKING:
@@ -56,17 +56,17 @@ def pairs(
 ) -> None:
     """Align displayed pictures with their captures, as pairs for `camkit train --pairs`."""
     check_page(page, overwrite=overwrite)
-    within = (".", "capture", "reference")
-    folder = Folder.asked(out, (SETTINGS,), within, overwrite=overwrite)
-    shots, shown_in = _apart(captures, targets)
+    owned_parts = (".", "capture", "reference")
+    folder = Folder.checked(out, (SETTINGS,), owned_parts, overwrite=overwrite)
+    shots, shown_in = _split(captures, targets)
     from camkit.calibration.display.camera_file import Illumination, Lens, Tone
-    from camkit.calibration.display.pairs import Given, draw_pairs, find_pairs
+    from camkit.calibration.display.pairs import References, draw_pairs, find_pairs
     from camkit.calibration.display.targets import Targets
     from camkit.calibration.record import to_toml
     from camkit.runtime.output.pixels import png_bytes, tiff_bytes
 
     lens = Lens.read(geometry)
-    given = Given(
+    references = References(
         folder=shown_in,
         targets=Targets.read(shown_in),
         lens=lens,
@@ -74,22 +74,22 @@ def pairs(
         flat=Illumination.read(flat, lens.size),
         most_residual_px=most_residual_px,
     )
-    found = find_pairs(shots, given)
-    names = [pair.target.name for pair in found.pairs]
+    aligned = find_pairs(shots, references)
+    names = [pair.target.name for pair in aligned.pairs]
     files = [f"{kind}/{n}{end}" for n in names for kind, end in (("capture", ".tiff"), ("reference", ".png"))]  # noqa: E501 # fmt: skip
-    shown = [] if page is None else [str(page.absolute())]
-    with folder.writing([*files, *shown, REGISTRATION, SETTINGS]) as parts:
-        for n, (counts, codes) in enumerate(draw_pairs(found, given)):
+    pages = [] if page is None else [str(page.absolute())]
+    with folder.writing([*files, *pages, REGISTRATION, SETTINGS]) as parts:
+        for n, (counts, codes) in enumerate(draw_pairs(aligned, references)):
             parts[2 * n].write_bytes(tiff_bytes(counts))
             parts[2 * n + 1].write_bytes(png_bytes(codes))
-        if shown:
-            parts[-3].write_text(_html(found), encoding="utf-8")
-        parts[-2].write_text(to_toml(found.to_record()), encoding="utf-8")
-        parts[-1].write_text(to_toml(found.settings()), encoding="utf-8")
-    _tell(found, out, page, as_json=json_)
+        if pages:
+            parts[-3].write_text(_html(aligned), encoding="utf-8")
+        parts[-2].write_text(to_toml(aligned.to_record()), encoding="utf-8")
+        parts[-1].write_text(to_toml(aligned.settings()), encoding="utf-8")
+    _tell(aligned, out, page, as_json=json_)
 
 
-def _apart(named: list[Path], targets: Path | None) -> tuple[list[Path], Path]:
+def _split(files: list[Path], targets: Path | None) -> tuple[list[Path], Path]:
     """Return the captures, those of folders too, and the folder of the targets.
 
     Raises:
@@ -98,31 +98,31 @@ def _apart(named: list[Path], targets: Path | None) -> tuple[list[Path], Path]:
     from camkit.runtime.batch.sources import expand
 
     if targets is None:
-        *named, targets = named
+        *files, targets = files
         if not targets.is_dir():
             raise ContractError("add --targets DIR, or its folder after the files")
-    inside = [expand([path]) if path.is_dir() else [path] for path in named]
+    inside = [expand([path]) if path.is_dir() else [path] for path in files]
     shots = [path for paths in inside for path in paths]
     if not shots:
         raise ContractError(f"no capture is named beside {targets}")
     return shots, targets
 
 
-def _tell(found: "Pairs", out: Path, page: Path | None, *, as_json: bool) -> None:
+def _tell(result: "Pairs", out: Path, page: Path | None, *, as_json: bool) -> None:
     if as_json:
-        shown = {} if page is None else {"page": str(page)}
-        say(json.dumps({**found.to_record(), "out": str(out), **shown}, allow_nan=False))
+        extra = {} if page is None else {"page": str(page)}
+        say(json.dumps({**result.to_record(), "out": str(out), **extra}, allow_nan=False))
         return
-    for note in found.notes:
+    for note in result.notes:
         say(f"note: {note}", err=True)
-    say(f"{named(out, page)}: {len(found.pairs)} pairs at ISO {found.iso:g}")
-    worst = max(found.pairs, key=lambda pair: pair.residual_px)
+    say(f"{file_names(out, page)}: {len(result.pairs)} pairs at ISO {result.iso:g}")
+    worst = max(result.pairs, key=lambda pair: pair.residual_px)
     say(f"  at worst {worst.residual_px:.3f} px RMS, in {worst.path.name}")
-    if found.primaries is not None:
-        say(f"  colours of the display to {100 * found.primaries.residual:.2g} % of white")
+    if result.primaries is not None:
+        say(f"  colours of the display to {100 * result.primaries.residual:.2g} % of white")
 
 
-def _html(found: "Pairs") -> str:
+def _html(result: "Pairs") -> str:
     from camkit.report.calibration.pairs_page import pairs_html
 
-    return pairs_html(found)
+    return pairs_html(result)

@@ -89,23 +89,23 @@ def psf(
     options = PsfOptions(
         side_px=side_px, pixel_pitch_um=pixel_pitch_um, depth_m=depth_m, disc_px=disc_px
     )
-    said = mosaic_options(mosaic, black_level, white_level)
+    mosaic_facts = mosaic_options(mosaic, black_level, white_level)
     times_s, dark_times_s = _times(times, files, dark or [])
-    bracket = survey(files, times_s, mosaic=said, alike=edge)
-    darks = Darks.read(dark, dark_times_s, bracket, said) if dark else None
-    found = (measure_edge if edge else measure_psf)(bracket, options, darks)
-    made, seen = (found.psf, None) if designed is None else dots_psf(found, designed)
-    contents = {out: psf_to_bytes(made)}
+    bracket = survey(files, times_s, mosaic=mosaic_facts, alike=edge)
+    darks = Darks.read(dark, dark_times_s, bracket, mosaic_facts) if dark else None
+    measured = (measure_edge if edge else measure_psf)(bracket, options, darks)
+    frozen, seen_dots = (measured.psf, None) if designed is None else dots_psf(measured, designed)
+    contents = {out: psf_to_bytes(frozen)}
     if page is not None:
         from camkit.report.calibration.psf_page import psf_html
 
-        contents[page] = psf_html(found).encode()
+        contents[page] = psf_html(measured).encode()
     for path in contents:
         path.parent.mkdir(parents=True, exist_ok=True)
     with atomic_outputs(*contents) as parts:
         for part, content in zip(parts, contents.values(), strict=True):
             part.write_bytes(content)
-    _tell(contents, bracket, found, seen, as_json=json_)
+    _tell(contents, bracket, measured, seen_dots, as_json=json_)
 
 
 def _check_target(disc_px: float | None, dots: Path | None, *, edge: bool) -> None:
@@ -114,10 +114,10 @@ def _check_target(disc_px: float | None, dots: Path | None, *, edge: bool) -> No
     Raises:
         ContractError: If it is.
     """
-    named = {"--disc-px": disc_px is not None, "--edge": edge, "--dots": dots is not None}
-    said = [name for name, is_said in named.items() if is_said]
-    if len(said) > 1:
-        raise ContractError(f"the light is one thing; use one of {' and '.join(said)}")
+    kinds = {"--disc-px": disc_px is not None, "--edge": edge, "--dots": dots is not None}
+    used_kinds = [name for name, is_said in kinds.items() if is_said]
+    if len(used_kinds) > 1:
+        raise ContractError(f"the light is one thing; use one of {' and '.join(used_kinds)}")
 
 
 def _times(
@@ -141,46 +141,47 @@ def _times(
 def _tell(
     files: Iterable[Path],
     bracket: "Survey",
-    found: "MeasuredPsf",
-    seen: "SeenDots | None",
+    measured: "MeasuredPsf",
+    seen_dots: "SeenDots | None",
     *,
     as_json: bool,
 ) -> None:
-    (x, y), (out, *page) = found.centre_px, files
+    (x, y), (out, *page) = measured.centre_px, files
     if as_json:
         record: dict[str, Any] = {
             "frames": [frame.path.name for frame in bracket.frames],
             "times_s": [frame.time_s for frame in bracket.frames],
             "centre_px": [round(x, 4), round(y, 4)],
-            "side_px": found.side_px,
-            "pixel_pitch_um": found.psf.pixel_pitch_um,
-            "colours": [colour.to_json() for colour in found.colours],
-            "fields": [field.to_json() for field in found.fields],
-            "filled_samples": found.filled_samples,
-            "notes": [*bracket.notes, *found.notes],
+            "side_px": measured.side_px,
+            "pixel_pitch_um": measured.psf.pixel_pitch_um,
+            "colours": [colour.to_json() for colour in measured.colours],
+            "fields": [field.to_json() for field in measured.fields],
+            "filled_samples": measured.filled_samples,
+            "notes": [*bracket.notes, *measured.notes],
             "out": str(out),
         }
-        if seen is not None:
-            record["dots"] = seen.to_json()
+        if seen_dots is not None:
+            record["dots"] = seen_dots.to_json()
         if page:
             record["page"] = str(page[0])
         say(json.dumps(record))
         return
-    for note in (*bracket.notes, *found.notes):
+    for note in (*bracket.notes, *measured.notes):
         say(f"note: {note}", err=True)
-    say(f"{', '.join(map(str, (out, *page)))}: {found.side_px} px, the light at ({x:.2f}, {y:.2f})")
-    if seen is not None:
+    files_text = ", ".join(map(str, (out, *page)))
+    say(f"{files_text}: {measured.side_px} px, the light at ({x:.2f}, {y:.2f})")
+    if seen_dots is not None:
         say(
-            f"  dots: {seen.share:.1%} of the light in active areas, like the design by "
-            f"{seen.likeness:.4f}"
+            f"  dots: {seen_dots.share:.1%} of the light in active areas, like the design by "
+            f"{seen_dots.likeness:.4f}"
         )
         return
-    for field in found.fields:
+    for field in measured.fields:
         say(
             f"  {field.peak_share:.2%} +- {field.peak_share_error:.2%} within 10 px, "
             f"{field.height_mm:.2f} mm from the middle"
         )
-    for colour in found.colours:
+    for colour in measured.colours:
         noise = (
             "" if colour.noise_floor is None else f", noise {colour.noise_floor:.1e} of the peak"
         )

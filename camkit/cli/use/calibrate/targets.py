@@ -9,7 +9,7 @@ import typer
 from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.cli.say import say
 from camkit.cli.use.calibrate.folder import Folder
-from camkit.cli.use.calibrate.outputs import Page, check_page, named
+from camkit.cli.use.calibrate.outputs import Page, check_page, file_names
 
 LEVELS = "0,16,32,48,64,96,128,160,192,224,255"
 
@@ -45,27 +45,27 @@ def targets(
     from camkit.report.calibration.targets_page import shrunk, targets_html
     from camkit.runtime.output.pixels import png_bytes
 
-    given = pictures or []
-    asked = Screen.read(screen), Board.read(board), levels_of_steps(levels)
-    folder = Folder.asked(out, (LIST,), (".",), overwrite=overwrite)
-    planned = plan_targets(given, *asked)
+    paths = pictures or []
+    settings = Screen.read(screen), Board.read(board), levels_of_steps(levels)
+    folder = Folder.checked(out, (LIST,), (".",), overwrite=overwrite)
+    planned = plan_targets(paths, *settings)
     names = [*(target.file for target in planned.targets), LIST]
-    shown = [] if page is None else [str(page.absolute())]
-    with folder.writing([*shown, *names]) as parts:
+    pages = [] if page is None else [str(page.absolute())]
+    with folder.writing([*pages, *names]) as parts:
         small = []
-        for part, codes in zip(parts[len(shown) :], draw_targets(planned, given), strict=False):
+        for part, codes in zip(parts[len(pages) :], draw_targets(planned, paths), strict=False):
             part.write_bytes(png_bytes(codes))
-            if shown:
+            if pages:
                 small.append(shrunk(codes))
         parts[-1].write_text(to_toml(planned.to_record()), encoding="utf-8")
-        if shown:
+        if pages:
             parts[0].write_text(targets_html(planned, small), encoding="utf-8")
     if json_:
         files = {"out": str(out), **({} if page is None else {"page": str(page)})}
         say(json.dumps({**planned.to_record(), **files}))
         return
     kinds = [target.kind for target in planned.targets]
-    say(f"{named(out, page)}: {len(kinds)} targets of {planned.screen} px")
+    say(f"{file_names(out, page)}: {len(kinds)} targets of {planned.screen} px")
     say(
         f"  a board of {planned.board} corners, {kinds.count('grey')} grey steps, "
         f"{kinds.count('colour')} colours, {kinds.count('picture')} pictures"

@@ -28,19 +28,19 @@ def tone(
     _debug: Debug = False,
 ) -> None:
     """Measure the luminance of a display at each of its levels."""
-    outputs = Outputs.asked(out, page, overwrite=overwrite, as_json=json_)
+    outputs = Outputs.checked(out, page, overwrite=overwrite, as_json=json_)
     from camkit.calibration.tone import levels_of, measure_tone
 
-    said = mosaic_options(mosaic, black_level, white_level)
-    found = measure_tone(files, levels_of(levels, len(files)), said)
+    mosaic_facts = mosaic_options(mosaic, black_level, white_level)
+    facts = measure_tone(files, levels_of(levels, len(files)), mosaic_facts)
 
-    def shown() -> str:
+    def html() -> str:
         from camkit.report.calibration.tone_page import tone_html
 
-        return tone_html(found)
+        return tone_html(facts)
 
-    record = found.to_record()
-    line = f"  {len(files)} steps, black {found.luminance[0]:.3g} of the brightest"
+    record = facts.to_record()
+    line = f"  {len(files)} steps, black {facts.luminance[0]:.3g} of the brightest"
     if record["gamma"] is not None:
         line += f", gamma {record['gamma']:.3g} to {record['residual_percent']:.2g} %"
-    outputs.write(record, [line], shown)
+    outputs.write(record, [line], html)

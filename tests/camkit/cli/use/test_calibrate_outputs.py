@@ -15,7 +15,7 @@ RECORD: dict[str, Any] = {"rms_px": 0.25, "notes": ["small"]}
 
 def _asked(folder: Path, *, page: bool = True, as_json: bool = False, overwrite: bool = False) -> Outputs:  # noqa: E501 # fmt: skip
     named = folder / "page.html" if page else None
-    return Outputs.asked(folder / "found.toml", named, overwrite=overwrite, as_json=as_json)
+    return Outputs.checked(folder / "found.toml", named, overwrite=overwrite, as_json=as_json)
 
 
 def test_toml_page_and_lines_say_the_same(tmp_path: Path, capsys) -> None:
@@ -54,7 +54,7 @@ def test_what_exists_is_kept_unless_overwritten(tmp_path: Path, name: str) -> No
 def test_names_of_other_kinds_are_refused(tmp_path: Path, out: str, page: str | None) -> None:
     named = None if page is None else tmp_path / page
     with pytest.raises(ContractError, match="expected a name in"):
-        Outputs.asked(tmp_path / out, named, overwrite=False, as_json=False)
+        Outputs.checked(tmp_path / out, named, overwrite=False, as_json=False)
 
 
 def test_a_page_that_fails_leaves_no_file(tmp_path: Path) -> None:

@@ -120,7 +120,7 @@ def test_a_folder_of_other_things_is_left_alone(camkit_command, picture, tmp_pat
 
 def test_a_file_beside_the_folder_appears_with_it_or_not_at_all(tmp_path):
     beside = tmp_path / "pages" / "page.html"
-    folder = Folder.asked(tmp_path / "made", ("list",), (".",), overwrite=False)
+    folder = Folder.checked(tmp_path / "made", ("list",), (".",), overwrite=False)
     names = ["list", str(beside)]
 
     def fill(error: Exception | None) -> None:
