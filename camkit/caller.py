@@ -38,8 +38,8 @@ PARAMETERS: Final = {
 """Options that are fields of a parameter."""
 
 
-class _Nothing(Enum):
-    SAID = 0
+class _Missing(Enum):
+    VALUE = 0
 
 
 _task: ContextVar[Language | None] = ContextVar("camkit_language", default=None)
@@ -47,35 +47,35 @@ _task: ContextVar[Language | None] = ContextVar("camkit_language", default=None)
 
 def language() -> Language:
     """Return the language of the caller."""
-    spoken = _task.get() or os.environ.get(VARIABLE)
-    return cast("Language", spoken) if spoken in get_args(Language) else "python"
+    name = _task.get() or os.environ.get(VARIABLE)
+    return cast("Language", name) if name in get_args(Language) else "python"
 
 
 @contextmanager
-def speaking(chosen: Language) -> Iterator[None]:
+def speaking(name: Language) -> Iterator[None]:
     """Set the language of this process and of the children that it starts."""
-    before = os.environ.get(VARIABLE)
-    os.environ[VARIABLE] = chosen
+    previous = os.environ.get(VARIABLE)
+    os.environ[VARIABLE] = name
     try:
         yield
     finally:
-        if before is None:
+        if previous is None:
             del os.environ[VARIABLE]
         else:
-            os.environ[VARIABLE] = before
+            os.environ[VARIABLE] = previous
 
 
 @contextmanager
-def speaking_here(chosen: Language) -> Iterator[None]:
+def speaking_here(name: Language) -> Iterator[None]:
     """Set the language of this thread alone, whose process serves several callers."""
-    token = _task.set(chosen)
+    token = _task.set(name)
     try:
         yield
     finally:
         _task.reset(token)
 
 
-def option_text(name: str, value: object = _Nothing.SAID) -> str:
+def option_text(name: str, value: object = _Missing.VALUE) -> str:
     """Return an option as the caller writes it.
 
     Args:
@@ -85,7 +85,7 @@ def option_text(name: str, value: object = _Nothing.SAID) -> str:
     if language() == "command":
         return _flag(name, value)
     parameter = PARAMETERS.get(name, name)
-    if value is _Nothing.SAID:
+    if value is _Missing.VALUE:
         return parameter
     if isinstance(value, str):
         return f'{parameter}="{value}"'
@@ -106,7 +106,7 @@ def _flag(name: str, value: object) -> str:
     flag = FLAGS.get(name, "--" + name.replace("_", "-"))
     if value is False:
         return flag.replace("--", "--no-", 1)
-    if value is _Nothing.SAID or value is True:
+    if value is _Missing.VALUE or value is True:
         return flag
     if name == "max_mem_bytes" and isinstance(value, int):
         return f"{flag} {value // 10**6 + 1}M"

@@ -139,10 +139,10 @@ class OutputColours:
             light: Camera colours; those bright enough keep their bits.
             least: (3, n) or (n,) in colours of the output.
         """
-        seen = self.of(light)
-        short = (seen < least).any(axis=0)
+        output_light = self.of(light)
+        short = (output_light < least).any(axis=0)
         out = light.copy()
-        out[:, short] = _turned(np.maximum(seen, least)[:, short], self._back)
+        out[:, short] = _turned(np.maximum(output_light, least)[:, short], self._back)
         return out
 
 

@@ -58,7 +58,7 @@ def shifted_cfa(cfa: CfaPattern, origin_px: tuple[int, int]) -> CfaPattern:
     """
     x, y = origin_px
     letters = "".join(cfa[(y + dy) % 2 * 2 + (x + dx) % 2] for dy in (0, 1) for dx in (0, 1))
-    return next(known for known in CFA_PATTERNS if known == letters)
+    return next(pattern for pattern in CFA_PATTERNS if pattern == letters)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -274,8 +274,8 @@ class FrozenPsf:
         x_mm, y_mm = self.grid_x_mm, self.grid_y_mm
         fields = self.field_heights_mm.size
         if self.symmetry not in get_args(Symmetry):
-            known = ", ".join(get_args(Symmetry))
-            raise ContractError(f"symmetry must be one of {known}; got {self.symmetry!r}")
+            names = ", ".join(get_args(Symmetry))
+            raise ContractError(f"symmetry must be one of {names}; got {self.symmetry!r}")
         if self.symmetry != "grid":
             if x_mm is not None or y_mm is not None:
                 raise ContractError("only fields of a grid have positions of a grid")
@@ -297,10 +297,10 @@ class FrozenPsf:
             return
         if shifts_um is None or kernels is None:
             raise ContractError("kernels at other focus and their shifts come together")
-        wanted = (shifts_um.size, *self.kernels.shape)
-        if kernels.dtype != np.float32 or kernels.shape != wanted or shifts_um.ndim != 1:
+        shape = (shifts_um.size, *self.kernels.shape)
+        if kernels.dtype != np.float32 or kernels.shape != shape or shifts_um.ndim != 1:
             raise ContractError(
-                f"kernels at {shifts_um.size} shifts of focus must be float32 {wanted}; got "
+                f"kernels at {shifts_um.size} shifts of focus must be float32 {shape}; got "
                 f"{kernels.dtype} {kernels.shape}"
             )
         both = bool((shifts_um < 0).any() and (shifts_um > 0).any())
@@ -401,7 +401,7 @@ def focus_weights(shifts_um: NDArray[np.float64] | None, focus_um: float) -> NDA
             f"{focus_um:g} um: freeze it with a larger {option_text('focus_um')}, or focus the "
             "camera anew"
         )
-    below = int((shifts < 0).sum())
-    knots = np.insert(shifts, below, 0.0)
+    nominal = int((shifts < 0).sum())
+    knots = np.insert(shifts, nominal, 0.0)
     hats = np.array([np.interp(focus_um, knots, unit) for unit in np.eye(knots.size)])
-    return np.concatenate([hats[below : below + 1], np.delete(hats, below)])
+    return np.concatenate([hats[nominal : nominal + 1], np.delete(hats, nominal)])

@@ -26,19 +26,21 @@ class CamkitError(Exception):
 def one_line(text: str) -> str:
     """Return a text as one printable line of bounded length, whatever files put into it."""
     line = " ".join(text.split())
-    shown = "".join(letter if letter.isprintable() else "?" for letter in line)
-    if len(shown) <= _MOST_CHARACTERS:
-        return shown
+    printable = "".join(letter if letter.isprintable() else "?" for letter in line)
+    if len(printable) <= _MOST_CHARACTERS:
+        return printable
     # the reason stands behind a long name
-    return shown[: _MOST_CHARACTERS - _LAST_CHARACTERS - 3] + "..." + shown[-_LAST_CHARACTERS:]
+    return (
+        printable[: _MOST_CHARACTERS - _LAST_CHARACTERS - 3] + "..." + printable[-_LAST_CHARACTERS:]
+    )
 
 
 def unexpected(error: Exception) -> str:
     """Return one line about an error that nobody foresaw."""
-    told = one_line(str(error))
+    reason = one_line(str(error))
     return (
-        f"unexpected {type(error).__name__}{': ' if told else ''}{told}; please report it with the "
-        "file, --debug shows where"
+        f"unexpected {type(error).__name__}{': ' if reason else ''}{reason}; please report it with "
+        "the file, --debug shows where"
     )
 
 

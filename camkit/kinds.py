@@ -190,17 +190,17 @@ def find_kind(name: str) -> Kind:
     """
     if name in KINDS:
         return KINDS[name]
-    found = entry_points(GROUP)
-    if name not in found:
-        known = ", ".join(sorted({*KINDS, *found}))
+    installed = entry_points(GROUP)
+    if name not in installed:
+        names = ", ".join(sorted({*KINDS, *installed}))
         raise UnsupportedError(
-            f"there is no kind of camera {name!r} here; there are: {known}. The package that "
+            f"there is no kind of camera {name!r} here; there are: {names}. The package that "
             "brings it may not be installed"
         )
-    kind = load_entry_point(found[name], "kind of camera")
+    kind = load_entry_point(installed[name], "kind of camera")
     if not isinstance(kind, Kind) or kind.name != name or not kind.home:
         raise ContractError(
-            f"the entry point {found[name].value!r} must be a camkit Kind called {name!r} with a "
-            "home"
+            f"the entry point {installed[name].value!r} must be a camkit Kind called {name!r} with "
+            "a home"
         )
     return kind

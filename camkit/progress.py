@@ -64,11 +64,11 @@ class Task:
         """
         if not self.total or not self.is_even:
             return None
-        fresh, left = self.done - self.skipped, self.total - self.done
-        if fresh < LEAST_SHARE * self.total or left <= 0:
+        fresh, remaining = self.done - self.skipped, self.total - self.done
+        if fresh < LEAST_SHARE * self.total or remaining <= 0:
             return None
         spent_s = (time.monotonic() if now_s is None else now_s) - self.since_s
-        return spent_s * left / fresh
+        return spent_s * remaining / fresh
 
 
 @dataclass(slots=True, kw_only=True)
@@ -107,29 +107,29 @@ def working(
     writes_lines: bool = False,
 ) -> Iterator[Task]:
     """Yield a task for the work of this block; see `Task`."""
-    made = Task(what=what, total=total, unit=unit, is_even=is_even, writes_lines=writes_lines)
+    task = Task(what=what, total=total, unit=unit, is_even=is_even, writes_lines=writes_lines)
     board = _board.get()
     if board is None:
-        yield made
+        yield task
         return
-    board.tasks.append(made)
+    board.tasks.append(task)
     is_left = False
     try:
-        yield made
+        yield task
     except GeneratorExit:
         is_left = True  # a loop that ended early; tasks behind it may be of others by now
         raise
     finally:
-        if made in board.tasks:
-            at = board.tasks.index(made)
+        if task in board.tasks:
+            at = board.tasks.index(task)
             del board.tasks[at : at + 1 if is_left else None]
 
 
 def counted(items: Sequence[Item], what: str, unit: str | None = None) -> Iterator[Item]:
     """Yield items, each counted as a unit when the next one is asked for."""
-    with working(what, len(items), unit=unit) as made:
+    with working(what, len(items), unit=unit) as task:
         for number, item in enumerate(items):
-            made.count(number)
+            task.count(number)
             yield item
 
 

@@ -14,9 +14,9 @@ class Stopwatch:
     @classmethod
     def of_process(cls) -> Self:
         """Return one whose CPU time counts from the start of this process."""
-        made = cls()
-        made._cpu_s = 0.0
-        return made
+        watch = cls()
+        watch._cpu_s = 0.0
+        return watch
 
     def wall_s(self) -> float:
         """Return the wall time."""
@@ -31,5 +31,5 @@ class Stopwatch:
 
 
 def _cpu_s() -> float:
-    spent = os.times()
-    return time.process_time() + spent.children_user + spent.children_system
+    times = os.times()
+    return time.process_time() + times.children_user + times.children_system

@@ -97,7 +97,7 @@ class StreakOptics:
     def _check_shapes(self) -> None:
         lead = (self.depths_mm.size, self.wavelengths_um.size)
         arms, side, squares = self.angles_rad.size, self.core.shape[-1], self.haze.shape[-1]
-        wanted = {
+        shapes = {
             "core": (*lead, side, side),
             "bare_core": (*lead, side, side),
             "profiles": (*lead, arms, self.profiles.shape[-1]),
@@ -105,7 +105,7 @@ class StreakOptics:
             "haze": (*lead, squares, squares),
             "angles_rad": (arms,),
         }
-        for name, shape in wanted.items():
+        for name, shape in shapes.items():
             if getattr(self, name).shape != shape:
                 raise ContractError(
                     f"streaks: {name} must be {shape}; got {getattr(self, name).shape}"

@@ -23,6 +23,7 @@ LATER = TABLE["later"]
 VERBS = set(TABLE["docstrings"]["verbs"].split())
 HEADLESS = set(TABLE["docstrings"]["headless"].split())
 METHODS = set(TABLE["names"]["methods"].split())
+KEYS = {path: set(text.split()) for path, text in TABLE["names"]["keys"].items()}
 PAIRS = {word: set(text.split()) for word, text in TABLE["names"]["pairs"].items()}
 BANNED = {*TABLE["names"]["participles"].split(), *TABLE["names"]["prepositions"].split(), *PAIRS}
 FLOORS: dict[str, list[str]] = TABLE["floors"]
@@ -126,13 +127,14 @@ def name_faults(path: str, tree: ast.Module) -> Iterator[Fault]:
     """Counterparts of a pair are looked for in the function or class at the top of the module."""
     if Path(path).stem in BANNED:
         yield Fault(path, 1, "the name of the module does not say what it holds")
+    banned = BANNED - KEYS.get(path, set())
     for statement in tree.body:
         names = list(_names(statement))
         words = {name.word for name in names}
         for name in names:
             is_pair = not PAIRS.get(name.word, set()).isdisjoint(words)
             is_phrase = name.is_method and name.word in METHODS
-            if name.word in BANNED and not is_pair and not is_phrase:
+            if name.word in banned and not is_pair and not is_phrase:
                 yield Fault(path, name.line, f"{name.text!r} does not say what the value is")
 
 

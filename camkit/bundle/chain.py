@@ -38,32 +38,32 @@ def join_stages(stages: Sequence[Stage], parts: Parts) -> dict[str, Plane]:
     Raises:
         JoinError: If a stage cannot take what it is given; names both ends.
     """
-    known = {CAPTURE: capture_plane(parts.sensor)}
+    planes = {CAPTURE: capture_plane(parts.sensor)}
     made_by = {CAPTURE: f"the sensor ({parts.sensor.type})"}
     for number, stage in enumerate(stages, start=1):
         name = f"stage {number} ({stage.type})"
-        for taken in stage.takes:
-            if taken not in known:
-                have = ", ".join(f"{plane!r} of {made_by[plane]}" for plane in known)
+        for source in stage.takes:
+            if source not in planes:
+                have = ", ".join(f"{plane!r} of {made_by[plane]}" for plane in planes)
                 raise JoinError(
-                    f"{name} takes {taken!r}, which nothing before it gives; there are {have}"
+                    f"{name} takes {source!r}, which nothing before it gives; there are {have}"
                 )
         try:
-            given = stage.join([known[taken] for taken in stage.takes], parts)
+            outputs = stage.join([planes[source] for source in stage.takes], parts)
         except JoinError as error:
             ends = "; ".join(
-                f"{taken!r} of {made_by[taken]} is {known[taken].describe()}"
-                for taken in stage.takes
+                f"{source!r} of {made_by[source]} is {planes[source].describe()}"
+                for source in stage.takes
             )
             raise JoinError(f"{name} does not join: {error}. {ends}") from error
-        if len(given) != len(stage.gives):
-            raise JoinError(f"{name} makes {len(given)} plane(s), it names {len(stage.gives)}")
-        for plane_name, plane in zip(stage.gives, given, strict=True):
-            if plane_name in known:
+        if len(outputs) != len(stage.gives):
+            raise JoinError(f"{name} makes {len(outputs)} plane(s), it names {len(stage.gives)}")
+        for plane_name, plane in zip(stage.gives, outputs, strict=True):
+            if plane_name in planes:
                 raise JoinError(f"{name} gives {plane_name!r}, as does {made_by[plane_name]}")
-            known[plane_name] = plane
+            planes[plane_name] = plane
             made_by[plane_name] = name
-    return {name: plane for name, plane in known.items() if name != CAPTURE}
+    return {name: plane for name, plane in planes.items() if name != CAPTURE}
 
 
 def check_use(
@@ -79,9 +79,9 @@ def check_use(
     for product, plane in products.items():
         if plane not in planes:
             raise JoinError(f"the product {product!r} is the plane {plane!r}, which no stage gives")
-    used = {taken for stage in stages for taken in stage.takes} | set(products.values())
+    used_planes = {name for stage in stages for name in stage.takes} | set(products.values())
     for number, stage in enumerate(stages, start=1):
-        if not used & set(stage.gives):
+        if not used_planes & set(stage.gives):
             raise JoinError(
                 f"stage {number} ({stage.type}) gives {', '.join(stage.gives)}, which no stage "
                 "takes and no product names"
@@ -117,19 +117,19 @@ def rewired(stages: Sequence[Stage], usual: Sequence[Stage]) -> tuple[Stage, ...
     Returns:
         The same stages; what a missing one would have given is replaced by what stands in for it.
     """
-    kept = {(stage.type, getattr(stage, "role", None)) for stage in stages}
+    present = {(stage.type, getattr(stage, "role", None)) for stage in stages}
     stand_in: dict[str, str] = {}
     for stage in usual:
-        if (stage.type, getattr(stage, "role", None)) not in kept:
-            taken = stage.takes[stage.stands_in]
-            first = stand_in.get(taken, taken)
+        if (stage.type, getattr(stage, "role", None)) not in present:
+            source = stage.takes[stage.stands_in]
+            first = stand_in.get(source, source)
             stand_in |= dict.fromkeys(stage.gives[:1], first)
             # a mask that is not passed on is that which was taken, if one was
-            for mask, taken in zip(stage.gives[1:], stage.takes[1:], strict=False):
-                stand_in[mask] = stand_in.get(taken, taken)
-    given = {CAPTURE} | {name for stage in stages for name in stage.gives}
-    made = []
+            for mask, source in zip(stage.gives[1:], stage.takes[1:], strict=False):
+                stand_in[mask] = stand_in.get(source, source)
+    planes = {CAPTURE} | {name for stage in stages for name in stage.gives}
+    result = []
     for stage in stages:
         takes = dict.fromkeys(stand_in.get(name, name) for name in stage.takes)
-        made.append(stage.model_copy(update={"takes": tuple(n for n in takes if n in given)}))
-    return tuple(made)
+        result.append(stage.model_copy(update={"takes": tuple(n for n in takes if n in planes)}))
+    return tuple(result)

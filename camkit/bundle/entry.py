@@ -48,11 +48,11 @@ class Entry(BaseModel):
 
     def needs(self) -> list[Since]:
         """Return what of this part readers of older formats do not know."""
-        own = [] if self.since is None else [self.since]
+        entry_marks = [] if self.since is None else [self.since]
         fields = [
             mark
             for name, field in type(self).model_fields.items()
             for mark in field.metadata
             if isinstance(mark, Since) and getattr(self, name) != field.default
         ]
-        return own + fields
+        return entry_marks + fields

@@ -112,31 +112,31 @@ def golden_from_bytes(data: bytes) -> dict[str, GoldenArrays]:
     parts: dict[str, dict[str, Any]] = {}
     for name, array in tensors.items():
         case, *rest = name.split(".")
-        known = parts.setdefault(case, {"outputs": {}})
+        members = parts.setdefault(case, {"outputs": {}})
         match rest:
             case ["capture"]:
-                known["capture"] = array
+                members["capture"] = array
             case ["reference"]:
-                known["reference"] = _widened(array)
+                members["reference"] = _widened(array)
             case ["output", size]:
-                known["outputs"].setdefault(IMAGE, {})[size] = _widened(array)
+                members["outputs"].setdefault(IMAGE, {})[size] = _widened(array)
             case ["output", product, size]:
-                known["outputs"].setdefault(product, {})[size] = _widened(array)
+                members["outputs"].setdefault(product, {})[size] = _widened(array)
             case [old, *_] if old in _OF_1_0:
                 pass
             case _:
                 raise BundleError(f"golden.safetensors: tensor {name!r} is of no known kind")
-    return {name: _to_case(name, known) for name, known in sorted(parts.items())}
+    return {name: _to_case(name, members) for name, members in sorted(parts.items())}
 
 
 def _widened(picture: NDArray[Any]) -> NDArray[Any]:
     return picture.astype(np.float32) if picture.dtype == np.float16 else picture
 
 
-def _to_case(name: str, known: Mapping[str, Any]) -> GoldenArrays:
-    if missing := {"capture", "reference"} - known.keys():
+def _to_case(name: str, members: Mapping[str, Any]) -> GoldenArrays:
+    if missing := {"capture", "reference"} - members.keys():
         raise BundleError(f"golden case {name!r} lacks {' and '.join(sorted(missing))}")
     try:
-        return GoldenArrays(**known)
+        return GoldenArrays(**members)
     except ContractError as error:
         raise BundleError(f"golden case {name!r}: {error}") from error

@@ -45,15 +45,15 @@ def haze_from_bytes(data: bytes, *, what: str = "haze.safetensors") -> Haze:
             is none.
     """
     tensors = read_tensors(data, what=what)
-    wanted = _RANKS | dict.fromkeys(_NUMBERS, 1)
-    if tensors.keys() != wanted.keys():
-        missing = ", ".join(sorted(wanted.keys() - tensors.keys())) or "none"
-        extra = ", ".join(sorted(tensors.keys() - wanted.keys())) or "none"
+    ranks = _RANKS | dict.fromkeys(_NUMBERS, 1)
+    if tensors.keys() != ranks.keys():
+        missing = ", ".join(sorted(ranks.keys() - tensors.keys())) or "none"
+        extra = ", ".join(sorted(tensors.keys() - ranks.keys())) or "none"
         raise BundleError(
-            f"{what} must hold the {len(wanted)} tensors of a haze; missing: {missing}; unknown: "
+            f"{what} must hold the {len(ranks)} tensors of a haze; missing: {missing}; unknown: "
             f"{extra}. Freeze the optics again"
         )
-    for name, rank in wanted.items():
+    for name, rank in ranks.items():
         array, kind = tensors[name], np.float32 if name == KERNELS else np.float64
         if array.dtype != kind or array.ndim != rank or array.size == 0:
             raise BundleError(

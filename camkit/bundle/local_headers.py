@@ -23,7 +23,7 @@ _FACTS: Final = struct.Struct("<3L")
 _END: Final = struct.Struct("<4s4H2LH")
 _END_MAGIC: Final = b"PK\x05\x06"
 _SIZES_FOLLOW: Final = 0x8
-_AGAIN: Final = "pack the bundle again"
+_ADVICE: Final = "pack the bundle again"
 
 
 def check_local_headers(data: bytes, archive: zipfile.ZipFile) -> None:
@@ -41,7 +41,7 @@ def check_local_headers(data: bytes, archive: zipfile.ZipFile) -> None:
         if entry.header_offset != expected:
             raise BundleError(
                 f"member {entry.filename} begins at byte {entry.header_offset}, what lies before "
-                f"it ends at {expected}: members overlap, or bytes belong to none; {_AGAIN}"
+                f"it ends at {expected}: members overlap, or bytes belong to none; {_ADVICE}"
             )
         expected = _end_of(data, entry)
     _check_end(data, archive, expected)
@@ -51,22 +51,22 @@ def _end_of(data: bytes, entry: zipfile.ZipInfo) -> int:
     """Check the local header of a member; return the position behind its data."""
     at = entry.header_offset
     if len(data) < at + _LOCAL.size:
-        raise BundleError(f"member {entry.filename} has no local header; {_AGAIN}")
+        raise BundleError(f"member {entry.filename} has no local header; {_ADVICE}")
     magic, _, flags, method, _, _, crc, packed, size, name_bytes, extra_bytes = _LOCAL.unpack_from(
         data, at
     )
     begin = at + _LOCAL.size
     name = data[begin : begin + name_bytes]
-    stated = (entry.CRC, entry.compress_size, entry.file_size)
+    facts = (entry.CRC, entry.compress_size, entry.file_size)
     follow = bool(entry.flag_bits & _SIZES_FOLLOW)
     same = (magic, name, flags, method) == (
         *(_LOCAL_MAGIC, entry.orig_filename.encode("utf-8")),
         *(entry.flag_bits, entry.compress_type),
     )
-    if not same or not ((crc, packed, size) == stated or (follow and not (crc or packed or size))):
+    if not same or not ((crc, packed, size) == facts or (follow and not (crc or packed or size))):
         raise BundleError(
             f"the local header of member {entry.filename} contradicts the directory of the zip; "
-            f"{_AGAIN}"
+            f"{_ADVICE}"
         )
     end = begin + name_bytes + extra_bytes + entry.compress_size
     return _behind_descriptor(data, end, entry) if follow else end
@@ -79,7 +79,7 @@ def _behind_descriptor(data: bytes, end: int, entry: zipfile.ZipInfo) -> int:
     if facts != _FACTS.pack(entry.CRC, entry.compress_size, entry.file_size):
         raise BundleError(
             f"what follows the data of member {entry.filename} contradicts the directory of the "
-            f"zip; {_AGAIN}"
+            f"zip; {_ADVICE}"
         )
     return begin + _FACTS.size
 
@@ -88,7 +88,7 @@ def _check_end(data: bytes, archive: zipfile.ZipFile, members_end: int) -> None:
     """Refuse bytes between members, directory, end record and the end of the file."""
     at = len(data) - _END.size - len(archive.comment)
     if at < 0 or data[at : at + 4] != _END_MAGIC:
-        raise BundleError(f"bytes follow the end record of the zip; {_AGAIN}")
+        raise BundleError(f"bytes follow the end record of the zip; {_ADVICE}")
     _, disk, first_disk, here, count, size, offset, comment_bytes = _END.unpack_from(data, at)
     entries: Sequence[zipfile.ZipInfo] = archive.infolist()
     if (disk, first_disk, here, count) != (0, 0, len(entries), len(entries)) or (
@@ -96,5 +96,5 @@ def _check_end(data: bytes, archive: zipfile.ZipFile, members_end: int) -> None:
     ):
         raise BundleError(
             f"the end record of the zip contradicts its directory of {len(entries)} members; "
-            f"{_AGAIN}"
+            f"{_ADVICE}"
         )

@@ -168,16 +168,16 @@ class Manifest(Entry):
 
     @model_validator(mode="after")
     def _check(self) -> "Manifest":
-        found = join_stages(self.stages, self.parts)
-        for name in found.keys() | self.planes.keys():
-            if name not in found:
+        joined = join_stages(self.stages, self.parts)
+        for name in joined.keys() | self.planes.keys():
+            if name not in joined:
                 raise ValueError(f"no stage gives the plane {name!r}")
             if name not in self.planes:
                 raise ValueError(f"the plane {name!r} is not stated")
-            if found[name] != self.planes[name]:
+            if joined[name] != self.planes[name]:
                 raise ValueError(
                     f"the plane {name!r} is stated as {self.planes[name].describe()}; its stage "
-                    f"gives {found[name].describe()}"
+                    f"gives {joined[name].describe()}"
                 )
         check_use(self.stages, self.products, self.planes)
         check_haze(self.stages, self.optics)
@@ -285,7 +285,7 @@ def manifest_without_networks(
     Raises:
         BundleError: If the stages do not join.
     """
-    stated = {
+    entries = {
         "training_data": "none: no network",
         "format_version": format_of(None, (*stages, *([] if optics is None else [optics]))),
     } | facts
@@ -296,7 +296,7 @@ def manifest_without_networks(
         stages=stages,
         planes=planes_of(stages, parts),
         products={IMAGE: stages[-1].gives[0]},
-        **stated,
+        **entries,
     )
 
 
@@ -387,9 +387,9 @@ def _first(error: ValidationError) -> str:
     """Return the first complaint as one line: where, what."""
     details = error.errors(include_url=False, include_input=False)
     where = "".join(f"{part}." for part in details[0]["loc"]).removesuffix(".")
-    said = details[0]["msg"].removeprefix("Value error, ")
+    message = details[0]["msg"].removeprefix("Value error, ")
     more = f" (and {len(details) - 1} more)" if len(details) > 1 else ""
-    return f"{where}: {said}{more}" if where else f"{said}{more}"
+    return f"{where}: {message}{more}" if where else f"{message}{more}"
 
 
 def manifest_to_bytes(manifest: Manifest) -> bytes:

@@ -63,15 +63,15 @@ def read_tensors(data: bytes, *, what: str) -> dict[str, NDArray[Any]]:
 
 def _check_header(data: bytes, what: str) -> None:
     """Refuse a header that readers take differently; the library reports all else."""
-    stated = int.from_bytes(data[:_LENGTH_BYTES], "little")
+    length = int.from_bytes(data[:_LENGTH_BYTES], "little")
     if data[_LENGTH_BYTES : _LENGTH_BYTES + 1] != b"{":
         raise BundleError(f"{what} is no safetensors file; is it another kind of file?")
-    if stated > min(len(data) - _LENGTH_BYTES, _MAX_HEADER_BYTES):
+    if length > min(len(data) - _LENGTH_BYTES, _MAX_HEADER_BYTES):
         raise BundleError(
-            f"{what} is not a sound safetensors file (its header is said to have {stated} bytes); "
+            f"{what} is not a sound safetensors file (its header is said to have {length} bytes); "
             "export it again"
         )
-    read_json(data[_LENGTH_BYTES : _LENGTH_BYTES + stated], what=f"the header of {what}")
+    read_json(data[_LENGTH_BYTES : _LENGTH_BYTES + length], what=f"the header of {what}")
 
 
 def psf_to_bytes(psf: FrozenPsf) -> bytes:
@@ -145,13 +145,13 @@ def psf_from_bytes(data: bytes, *, what: str = "psf.safetensors") -> FrozenPsf:
 
 def _read_symmetry(tensors: Mapping[str, NDArray[Any]], what: str) -> Symmetry:
     """Return the symmetry that a file names; radial where it names none."""
-    stated = tensors.get(_SYMMETRY)
-    if stated is None:
+    tensor = tensors.get(_SYMMETRY)
+    if tensor is None:
         return "radial"
-    for known in get_args(Symmetry):
-        if stated.dtype == np.uint8 and stated.tobytes() == known.encode("ascii"):
-            found: Symmetry = known
-            return found
+    for name in get_args(Symmetry):
+        if tensor.dtype == np.uint8 and tensor.tobytes() == name.encode("ascii"):
+            symmetry: Symmetry = name
+            return symmetry
     raise BundleError(f"{what}: symmetry must be one of {', '.join(get_args(Symmetry))}")
 
 
@@ -183,10 +183,10 @@ def _check_tensors(tensors: Mapping[str, NDArray[Any]], symmetry: Symmetry, what
     )
     for name in sorted(wanted_names - {_SYMMETRY, *_KERNELS}):
         array = tensors[name]
-        wanted = shapes.get(name, (array.size,))
-        if array.dtype != np.float64 or array.shape != wanted:
+        shape = shapes.get(name, (array.size,))
+        if array.dtype != np.float64 or array.shape != shape:
             raise BundleError(
-                f"{what}: {name} must be float64 of shape {wanted}; got {array.dtype} {array.shape}"
+                f"{what}: {name} must be float64 of shape {shape}; got {array.dtype} {array.shape}"
             )
 
 

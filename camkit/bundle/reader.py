@@ -274,46 +274,46 @@ def _check_bundle(container: Container, path: Path) -> Bundle:
 
 def _optics_of(container: Container, manifest: Manifest) -> FrozenOptics | None:
     """Read the optics; those of a bundle without any are refused."""
-    stated = manifest.optics
-    own = {getattr(stated, "member", None), getattr(stated, "haze_member", None)}
-    if isinstance(stated, HazyPsfOptics):
-        own.add(STRESS_HAZE)
+    entry = manifest.optics
+    optics_members = {getattr(entry, "member", None), getattr(entry, "haze_member", None)}
+    if isinstance(entry, HazyPsfOptics):
+        optics_members.add(STRESS_HAZE)
     for name in (PSF, STREAKS, HAZE, STRESS_HAZE):
-        if name in manifest.members and name not in own:
-            such = "no" if stated is None else "no such"
+        if name in manifest.members and name not in optics_members:
+            such = "no" if entry is None else "no such"
             raise BundleError(f"the bundle holds {name}, and its manifest states {such} optics")
-    if stated is None:
+    if entry is None:
         return None
     channels = len(manifest.sensor.channels)
-    if isinstance(stated, LensProfile):
-        rows = 0 if stated.distortion is None else len(stated.distortion.coefficients)
+    if isinstance(entry, LensProfile):
+        rows = 0 if entry.distortion is None else len(entry.distortion.coefficients)
         if rows not in (0, channels):
             raise BundleError(
                 f"the lens profile has the distortion of {rows} channel(s), the sensor {channels}"
             )
         return None
-    data = container.read(stated.member)
-    optics = optics_from_bytes(data, what=stated.member, channels=channels)
-    if optics.member_name != stated.member:
-        raise BundleError(f"{stated.member} holds optics of another type than the manifest states")
-    _check_psf(optics.psf, stated, channels)
+    data = container.read(entry.member)
+    optics = optics_from_bytes(data, what=entry.member, channels=channels)
+    if optics.member_name != entry.member:
+        raise BundleError(f"{entry.member} holds optics of another type than the manifest states")
+    _check_psf(optics.psf, entry, channels)
     if optics.psf.focus_um is not None:
-        what = f"{stated.member} holds kernels of a moved sensor"
+        what = f"{entry.member} holds kernels of a moved sensor"
         _need_version(manifest, FOCUS_VERSION, what)
     if optics.psf.distortion.even_coefficients is not None:
-        what = f"{stated.member} holds even powers of distortion"
+        what = f"{entry.member} holds even powers of distortion"
         _need_version(manifest, PROFILE_VERSION, what)
-    return optics if not isinstance(stated, HazyPsfOptics) else _hazy(container, manifest, optics)
+    return optics if not isinstance(entry, HazyPsfOptics) else _hazy(container, manifest, optics)
 
 
 def _hazy(container: Container, manifest: Manifest, optics: FrozenOptics) -> FrozenOptics:
     """Add the haze to optics whose manifest states one."""
-    stated = manifest.optics
-    assert isinstance(stated, HazyPsfOptics)
+    entry = manifest.optics
+    assert isinstance(entry, HazyPsfOptics)
     haze = haze_from_bytes(container.read(HAZE), what=HAZE)
-    if haze.cell_px != stated.cell_px:
+    if haze.cell_px != entry.cell_px:
         raise BundleError(
-            f"{HAZE} has cells of {haze.cell_px} px, the manifest says {stated.cell_px}"
+            f"{HAZE} has cells of {haze.cell_px} px, the manifest says {entry.cell_px}"
         )
     try:
         return replace(optics, haze=haze)
@@ -321,11 +321,11 @@ def _hazy(container: Container, manifest: Manifest, optics: FrozenOptics) -> Fro
         raise BundleError(f"{HAZE} is refused: {error}") from error
 
 
-def _need_version(manifest: Manifest, needed: tuple[int, int], what: str) -> None:
+def _need_version(manifest: Manifest, version: tuple[int, int], what: str) -> None:
     """Refuse what the stated format did not know."""
-    if manifest.version_pair < needed:
+    if manifest.version_pair < version:
         raise BundleError(
-            f"{what}, which format {'.'.join(map(str, needed))} brought, and the manifest states "
+            f"{what}, which format {'.'.join(map(str, version))} brought, and the manifest states "
             f"{manifest.format_version}; export the bundle again"
         )
 
@@ -359,21 +359,21 @@ def _check_names(manifest: Manifest, sizes: Mapping[str, int]) -> None:
 
 
 def _check_references(manifest: Manifest) -> None:
-    needed, members = {}, manifest.members
+    users, members = {}, manifest.members
     for role, sizes in manifest.networks.items():
         for size, facts in sizes.items():
-            needed[facts.member] = f"network {size} ({role})"
+            users[facts.member] = f"network {size} ({role})"
             if facts.fp16_member is not None:
-                needed[facts.fp16_member] = f"network {size} ({role}) in fp16"
+                users[facts.fp16_member] = f"network {size} ({role}) in fp16"
     if manifest.optics is not None and not isinstance(manifest.optics, LensProfile):
-        needed[manifest.optics.member] = "the optics"
+        users[manifest.optics.member] = "the optics"
     if isinstance(manifest.optics, HazyPsfOptics):
-        needed[manifest.optics.haze_member] = "the haze of the optics"
+        users[manifest.optics.haze_member] = "the haze of the optics"
     if manifest.golden:
-        needed[GOLDEN] = "the golden cases"
-    beside = {PLATE_HEIGHTS: PLATE, STRESS_HAZE: STRESS_PSF}
-    needed |= {name: f"what {what} holds" for what, name in beside.items() if what in members}
-    for name, user in needed.items():
+        users[GOLDEN] = "the golden cases"
+    companions = {PLATE_HEIGHTS: PLATE, STRESS_HAZE: STRESS_PSF}
+    users |= {name: f"what {what} holds" for what, name in companions.items() if what in members}
+    for name, user in users.items():
         if name not in members:
             raise BundleError(f"{user} needs the member {name}, which the bundle does not have")
 
@@ -393,22 +393,22 @@ def _check_member(container: Container, name: str, size: int, sha256: str) -> No
 
 
 def _check_psf(
-    psf: FrozenPsf, stated: FrozenPsfOptics | HazyPsfOptics | StreakEntry, channels: int
+    psf: FrozenPsf, entry: FrozenPsfOptics | HazyPsfOptics | StreakEntry, channels: int
 ) -> None:
     """Check the PSF against the statements of the manifest."""
-    if abs(psf.pixel_pitch_um - stated.pixel_pitch_um) > _PITCH_RTOL * stated.pixel_pitch_um:
+    if abs(psf.pixel_pitch_um - entry.pixel_pitch_um) > _PITCH_RTOL * entry.pixel_pitch_um:
         raise BundleError(
-            f"{stated.member} is sampled at {psf.pixel_pitch_um} um, the manifest says "
-            f"{stated.pixel_pitch_um} um; freeze the PSF at the pitch of the sensor"
+            f"{entry.member} is sampled at {psf.pixel_pitch_um} um, the manifest says "
+            f"{entry.pixel_pitch_um} um; freeze the PSF at the pitch of the sensor"
         )
-    if psf.symmetry != stated.symmetry:
+    if psf.symmetry != entry.symmetry:
         raise BundleError(
-            f"{stated.member} is {psf.symmetry}, the manifest says {stated.symmetry}; export again"
+            f"{entry.member} is {psf.symmetry}, the manifest says {entry.symmetry}; export again"
         )
     rows = psf.distortion.coefficients.shape[0]
     if rows != channels:
         raise BundleError(
-            f"{stated.member} has the distortion of {rows} channel(s), the sensor {channels}"
+            f"{entry.member} has the distortion of {rows} channel(s), the sensor {channels}"
         )
 
 
@@ -420,8 +420,8 @@ def built_in_bundles() -> dict[str, Path]:
 
 def is_built_in(bundle: Bundle) -> bool:
     """Return whether a bundle lies where those that come with camkit do."""
-    known = built_in_bundles().get(bundle.path.stem)
-    return known is not None and bundle.path.resolve() == known.resolve()
+    path = built_in_bundles().get(bundle.path.stem)
+    return path is not None and bundle.path.resolve() == path.resolve()
 
 
 def find_bundle(name_or_path: str | Path) -> Path:
@@ -431,16 +431,16 @@ def find_bundle(name_or_path: str | Path) -> Path:
         BundleError: If there is neither; near names are suggested.
     """
     path, text = Path(name_or_path), str(name_or_path)
-    known = built_in_bundles()
-    if text in known:
-        return known[text]
+    bundles = built_in_bundles()
+    if text in bundles:
+        return bundles[text]
     if path.is_file():
         return path
     if path.suffix == SUFFIX or path.name != text:
         raise BundleError(f"there is no bundle file {text}")
-    near = difflib.get_close_matches(text, known, n=3)
-    hint = f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(known)}."
+    near = difflib.get_close_matches(text, bundles, n=3)
+    hint = f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(bundles)}."
     raise BundleError(
-        f"no built-in bundle is called {text!r}; {hint if known else 'there is none.'} "
+        f"no built-in bundle is called {text!r}; {hint if bundles else 'there is none.'} "
         "A bundle of your own is named by its path, FILE.camkit"
     )

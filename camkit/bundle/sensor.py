@@ -183,15 +183,15 @@ class LightSensor(PixelSensor):
         """
         if not (math.isfinite(iso) and iso > 0):
             raise ContractError(f"iso must be a number > 0; got {iso}")
-        known = np.log([entry.iso for entry in self.noise])
+        log_isos = np.log([entry.iso for entry in self.noise])
         gains = np.log([entry.gain_e_per_dn for entry in self.noise])
         reads = [entry.read_noise_e for entry in self.noise]
-        wanted = math.log(iso)
-        inside = min(max(wanted, known[0]), known[-1])
-        above = max(wanted - known[-1], 0.0)
-        gain = math.exp(float(np.interp(inside, known, gains)) - above)
+        log_iso = math.log(iso)
+        inside = min(max(log_iso, log_isos[0]), log_isos[-1])
+        excess = max(log_iso - log_isos[-1], 0.0)
+        gain = math.exp(float(np.interp(inside, log_isos, gains)) - excess)
         shot = 1 / (gain * (self.white_level - self.black_level))
-        return shot, (float(np.interp(inside, known, reads)) * shot) ** 2
+        return shot, (float(np.interp(inside, log_isos, reads)) * shot) ** 2
 
 
 def _check_matrix(matrix: tuple[Row, Row, Row]) -> None:

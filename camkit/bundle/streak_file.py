@@ -41,12 +41,12 @@ def streaks_from_bytes(data: bytes, *, what: str = "streaks.safetensors") -> Str
 
 def streaks_from_tensors(tensors: Mapping[str, NDArray[Any]], *, what: str) -> StreakOptics:
     """Check the tensors of streak optics; see `streaks_from_bytes`."""
-    wanted = {*LIGHT, *AXES, PITCH}
-    if tensors.keys() != wanted:
-        missing = ", ".join(sorted(wanted - tensors.keys())) or "none"
-        extra = ", ".join(sorted(tensors.keys() - wanted)) or "none"
+    names = {*LIGHT, *AXES, PITCH}
+    if tensors.keys() != names:
+        missing = ", ".join(sorted(names - tensors.keys())) or "none"
+        extra = ", ".join(sorted(tensors.keys() - names)) or "none"
         raise BundleError(
-            f"{what} must hold the {len(wanted)} tensors of streak optics; missing: {missing}; "
+            f"{what} must hold the {len(names)} tensors of streak optics; missing: {missing}; "
             f"unknown: {extra}. Freeze the plate again"
         )
     for name, array in tensors.items():

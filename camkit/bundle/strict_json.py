@@ -43,9 +43,9 @@ def read_json(data: bytes, *, what: str) -> Any:
 
 
 def _object(pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
-    made: dict[str, Any] = {}
+    table: dict[str, Any] = {}
     for key, value in pairs:
-        if key in made:
+        if key in table:
             raise _TwiceError(repr(key[:80]))
-        made[key] = value
-    return made
+        table[key] = value
+    return table

@@ -86,13 +86,13 @@ def upgrade(data: bytes) -> bytes:
         document: dict[str, Any] = json.loads(data)
     except ValueError as error:
         raise UpgradeError(f"it cannot be read: {error}") from error
-    kept = {name: document.pop(name) for name in list(document) if name not in _Old.model_fields}
+    rest = {name: document.pop(name) for name in list(document) if name not in _Old.model_fields}
     old = _Old.model_validate(document)
-    if newer := kept.keys() & _ADDED:
+    if newer := rest.keys() & _ADDED:
         raise UpgradeError(f"{', '.join(sorted(newer))}: extra inputs are not permitted")
     sensor = _sensor(old)
     stages = _stages(old, sensor)
-    members = kept.get("members", {})
+    members = rest.get("members", {})
     if not isinstance(members, dict):
         raise UpgradeError("members: it must be a table")
     optics = _optics(old, members, stages)
@@ -102,7 +102,7 @@ def upgrade(data: bytes) -> bytes:
         planes = join_stages(stages, Parts(sensor=sensor, optics=optics, networks=roles))
     except JoinError as error:
         raise UpgradeError(str(error)) from error
-    made = {
+    upgraded = {
         "format_version": "2.0",
         "kind": "bayer",
         "sensor": sensor.model_dump(mode="json"),
@@ -115,7 +115,7 @@ def upgrade(data: bytes) -> bytes:
             for role, sizes in roles.items()
         },
     }
-    return json.dumps(kept | made).encode()
+    return json.dumps(rest | upgraded).encode()
 
 
 def _sensor(old: _Old) -> BayerSensor | PlanesSensor:
@@ -165,15 +165,15 @@ def _stages(old: _Old, sensor: BayerSensor | PlanesSensor) -> tuple[Stage, ...]:
     usual: tuple[Stage, ...] = (Linearise(), Repair(), WhiteBalance(), Demosaic(method="fast"))
     usual = (*usual, bank, Network(), RaiseClipped(), Illumination(), Undistort(), Color())
     mosaic = isinstance(sensor, BayerSensor)
-    done = {"demosaic": mosaic, "raise_clipped": mosaic} | dict.fromkeys(_LISTED, False)
+    implied = {"demosaic": mosaic, "raise_clipped": mosaic} | dict.fromkeys(_LISTED, False)
     # a demosaic that linear RGB listed was checked and passed over
-    made = [
+    stages = [
         _validated("stages", type(stage), listed.get(stage.type, stage.model_dump()))
         for stage in usual
-        if stage.type in listed or done.get(stage.type, True)
+        if stage.type in listed or implied.get(stage.type, True)
     ]
-    made = [stage for stage in made if mosaic or stage.type != "demosaic"]
-    return rewired(made, usual)
+    stages = [stage for stage in stages if mosaic or stage.type != "demosaic"]
+    return rewired(stages, usual)
 
 
 def _optics(
@@ -195,15 +195,18 @@ def _facts(table: Mapping[str, Any]) -> NetworkFacts:
     if {"inputs", "outputs"} & table.keys():
         raise UpgradeError("networks: extra inputs are not permitted")
     rest = {k: v for k, v in table.items() if k not in {"input_channels", "output_channels"}}
-    taken, given = table.get("input_channels", 2 * _COLOURS), table.get("output_channels", _COLOURS)
-    if not (isinstance(taken, int) and isinstance(given, int)):
+    channels_in, channels_out = (
+        table.get("input_channels", 2 * _COLOURS),
+        table.get("output_channels", _COLOURS),
+    )
+    if not (isinstance(channels_in, int) and isinstance(channels_out, int)):
         raise UpgradeError("networks: channels must be whole numbers")
-    if taken != 2 * _COLOURS:
+    if channels_in != 2 * _COLOURS:
         raise UpgradeError(
-            f"a network of format 1.0 is given {2 * _COLOURS} planes; this one takes {taken}"
+            f"a network of format 1.0 is given {2 * _COLOURS} planes; this one takes {channels_in}"
         )
     ports = [{"name": "capture", "channels": _COLOURS}, {"name": "wiener", "channels": _COLOURS}]
-    outputs = [{"name": "clean", "channels": given}]
+    outputs = [{"name": "clean", "channels": channels_out}]
     return _validated("networks", NetworkFacts, {**rest, "inputs": ports, "outputs": outputs})
 
 

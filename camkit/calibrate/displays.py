@@ -7,7 +7,7 @@ from typing import Final
 from camkit.calibrate.result_files import check_result, check_results, paths_of, write_results
 from camkit.calibrate.result_folder import Folder
 from camkit.calibration.display.camera_file import Illumination, Lens, Tone
-from camkit.calibration.display.pairs import Given, Pairs, draw_pairs, find_pairs
+from camkit.calibration.display.pairs import Pairs, References, draw_pairs, find_pairs
 from camkit.calibration.display.screen import Screen
 from camkit.calibration.display.targets import (
     LIST,
@@ -146,7 +146,7 @@ def pairs(
     folder = Folder.checked(Path(out), (SETTINGS,), folders, overwrite=overwrite)
     shots, target_folder = _split(paths_of(captures), optional_path(targets))
     lens = Lens.read(Path(geometry))
-    settings = Given(
+    settings = References(
         folder=target_folder,
         targets=Targets.read(target_folder),
         lens=lens,

@@ -71,8 +71,8 @@ class Darks:
         for number, path in enumerate(files):
             capture = read_frame(path, mosaic)
             check_alike(bracket.like, bracket.frames[0].path, capture, path)
-            told = capture.metadata.exposure_time_s or capture.exposure_time_s
-            time_s = told if times_s is None else times_s[number]
+            stated_s = capture.metadata.exposure_time_s or capture.exposure_time_s
+            time_s = stated_s if times_s is None else times_s[number]
             if not bracket.is_timed:
                 time_s = bracket.frames[0].time_s
             why = "states no exposure time" if time_s is None else _why_not(times_s, bracket)
@@ -85,8 +85,8 @@ class Darks:
             light[clipped_rows(capture, 0, capture.height)] = np.nan
             light = light.reshape(capture.plane_shape)
             levels.setdefault(time_s, []).append(_level(light))
-            before, count = sums.get(time_s, (np.zeros_like(light), 0))
-            sums[time_s] = before + light, count + 1
+            total, count = sums.get(time_s, (np.zeros_like(light), 0))
+            sums[time_s] = total + light, count + 1
         like = bracket.like
         step = 1 / (like.white_level - float(like.black_level.max()))
         means = {time_s: total / np.float32(count) for time_s, (total, count) in sums.items()}
@@ -109,19 +109,19 @@ class Darks:
         shares = bracket.times_s / bracket.times_s[0]
         factors = dict.fromkeys(self._means, 0.0)
         for frame in bracket.frames:
-            time_s, factor = self._taken(frame)
+            time_s, factor = self._nearest(frame)
             factors[time_s] += factor
         of_darks = sum(total**2 / self._counts[time_s] for time_s, total in factors.items())
         return self._drift * float(np.sqrt(shares.size + of_darks) / shares.sum())
 
     def rows(self, frame: Frame, top: int, bottom: int) -> tuple[FloatArray, NDArray[np.bool_]]:
         """Return the dark light of rows of a frame, and where it leaves nothing to measure."""
-        time_s, factor = self._taken(frame)
+        time_s, factor = self._nearest(frame)
         dark = self._means[time_s][:, top:bottom] * np.float32(factor)
         broken = ~(dark <= BROKEN_LIGHT)
         return np.where(broken, np.float32(0), dark), broken
 
-    def _taken(self, frame: Frame) -> tuple[float, float]:
+    def _nearest(self, frame: Frame) -> tuple[float, float]:
         """Return the time of the darks that apply to a frame, and the factor for them."""
         nearest = min(self._means, key=lambda time_s: abs(np.log(time_s / frame.time_s)))
         is_same = abs(nearest / frame.time_s - 1) <= SAME_TIME
@@ -140,11 +140,11 @@ def _why_not(times_s: Sequence[float] | None, bracket: Survey) -> str:
 
 def _level(light: FloatArray) -> float:
     """Return the mean of a dark frame without its hot pixels."""
-    seen = light[np.isfinite(light)]
-    if not seen.size:
+    valid = light[np.isfinite(light)]
+    if not valid.size:
         return 0.0
-    low, high = np.quantile(seen, (0.01, 0.99))
-    return float(seen[(seen >= low) & (seen <= high)].mean(dtype=np.float64))
+    low, high = np.quantile(valid, (0.01, 0.99))
+    return float(valid[(valid >= low) & (valid <= high)].mean(dtype=np.float64))
 
 
 def _drift(levels: Sequence[Sequence[float]], least: float) -> float:

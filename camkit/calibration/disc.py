@@ -74,8 +74,8 @@ class DiscCore:
         places = np.arange(0.0, most + _RADIUS_STEP_PX, _RADIUS_STEP_PX)
         profile = blurred_disc(places, self.diameter_px, self.spread_px)
         inside = np.where(radius < most, radius, most)
-        found = interpolate.CubicSpline(places, profile)(inside)
-        return np.asarray(np.where(radius < most, self.level * found, 0.0))
+        height = interpolate.CubicSpline(places, profile)(inside)
+        return np.asarray(np.where(radius < most, self.level * height, 0.0))
 
 
 def blurred_disc(radius_px: FloatLine, diameter_px: float, spread_px: float) -> FloatLine:
@@ -124,8 +124,8 @@ def fit_disc(lattice: Lattice, y: float, x: float, diameter_px: float) -> DiscCo
     at_y, at_x = lattice.places()
     near = np.hypot(at_y - y, at_x - x) <= diameter_px / 2 + CORE_PX
     near &= np.isfinite(lattice.values)
-    seen = lattice.values[near]
-    top = float(seen.max(initial=0))
+    values = lattice.values[near]
+    top = float(values.max(initial=0))
     if top <= 0:
         raise DecodeError("the light is dark in one colour: take one that every colour sees")
     dy, dx = at_y[near] - y, at_x[near] - x
@@ -140,19 +140,19 @@ def fit_disc(lattice: Lattice, y: float, x: float, diameter_px: float) -> DiscCo
         )
 
     def misfit(p: FloatLine) -> FloatLine:
-        return np.asarray(disc(p).at(dy, dx) - seen / top)
+        return np.asarray(disc(p).at(dy, dx) - values / top)
 
     reach = CORE_PX + diameter_px / 2
     log_low, log_high = np.log(_SPREADS_PX)
     start = [0.0, 0.0, 1.0, np.log(_START_SPREAD_PX)]
     bounds = ([-reach, -reach, 0.0, log_low], [reach, reach, 100.0, log_high])
-    found = disc(optimize.least_squares(misfit, start, bounds=bounds).x)
+    fitted = disc(optimize.least_squares(misfit, start, bounds=bounds).x)
     return DiscCore(
-        y=y + found.y,
-        x=x + found.x,
-        level=found.level * top,
+        y=y + fitted.y,
+        x=x + fitted.x,
+        level=fitted.level * top,
         diameter_px=diameter_px,
-        spread_px=found.spread_px,
+        spread_px=fitted.spread_px,
     )
 
 
@@ -189,22 +189,22 @@ def without_disc(
     y, x = np.meshgrid(offset - offset_px[0], offset - offset_px[1], indexing="ij")
     radius, square = np.hypot(y, x), core.spread_px**2
     at_origin = replace(core, y=0.0, x=0.0)
-    left = image - at_origin.at(y, x)
-    rest = _wide(smooth_noise(left, noise), core.diameter_px)
+    residual = image - at_origin.at(y, x)
+    rest = _wide(smooth_noise(residual, noise), core.diameter_px)
     disc, frequency = _spectrum_of(rest.shape[0], core.diameter_px)
     window = _fade(radius, core.diameter_px / 2 + 2 * core.spread_px) / core.light
-    power = np.abs(fft.rfft2(_wide(left * window, core.diameter_px, dark=True))) ** 2
+    power = np.abs(fft.rfft2(_wide(residual * window, core.diameter_px, dark=True))) ** 2
     noise_power = pitch_px**2 * float(np.square(noise * window).sum())
     gain = _gain(disc, frequency, core, power, noise_power)
     spectrum = fft.rfft2(rest)
     inside = slice((rest.shape[0] - image.shape[0]) // 2, None)
-    close, far = (
+    close, distant = (
         fft.irfft2(spectrum * g, s=rest.shape)[inside, inside][: image.shape[0], : image.shape[1]]
         for g in (gain, disc / (disc**2 + FAR_REGULAR * (1 - disc) ** 2))
     )
     share = _fade(radius, CLOSE_SPREADS * core.spread_px)
     gauss = core.light / (2 * np.pi * square) * np.exp(-(radius**2) / (2 * square))
-    return np.asarray(gauss + share * close + (1 - share) * far)
+    return np.asarray(gauss + share * close + (1 - share) * distant)
 
 
 def _fade(radius: FloatGrid, start: float) -> FloatGrid:
@@ -212,7 +212,7 @@ def _fade(radius: FloatGrid, start: float) -> FloatGrid:
 
 
 def _gain(
-    disc: FloatGrid, frequency: FloatGrid, core: DiscCore, seen: FloatGrid, noise_power: float
+    disc: FloatGrid, frequency: FloatGrid, core: DiscCore, observed: FloatGrid, noise_power: float
 ) -> FloatGrid:
     """Return the factor on the spectrum of the remainder that makes the error least.
 
@@ -220,7 +220,7 @@ def _gain(
         disc: Spectrum of the disc.
         frequency: Of its samples, in cycles/pixel.
         core: The Gaussian; all light is that of it.
-        seen: Power of the rest near the core; the light as 1.
+        observed: Power of the rest near the core; the light as 1.
         noise_power: What of it is noise, at any frequency.
 
     Raises:
@@ -229,8 +229,8 @@ def _gain(
     ring = np.rint(frequency / RING_STEP).astype(np.intp)
     # the power of what the disc blurred, by least squares over rings as wide as some of its zeros
     fitted = [
-        np.convolve(np.bincount(ring.ravel(), of.ravel()), np.ones(RINGS), mode="same")
-        for of in ((seen - noise_power) * disc**2, disc**4)
+        np.convolve(np.bincount(ring.ravel(), power.ravel()), np.ones(RINGS), mode="same")
+        for power in ((observed - noise_power) * disc**2, disc**4)
     ]
     rest = np.maximum(fitted[0] / np.maximum(fitted[1], _LEAST_POWER), 0.0)[ring]
     gain = disc * rest / (disc**2 * rest + noise_power)
@@ -261,8 +261,8 @@ def _wide(image: FloatGrid, diameter_px: float, *, dark: bool = False) -> FloatG
     """Pad (side, side) so far that a disc does not wrap around, to a side with a fast FFT."""
     side = image.shape[0]
     wide = fft.next_fast_len(side + 2 * (int(np.ceil(diameter_px)) + _MARGIN_PX), real=True)
-    before = (wide - side) // 2
-    widths = (before, wide - side - before)
+    margin = (wide - side) // 2
+    widths = (margin, wide - side - margin)
     return np.pad(image, widths) if dark else np.pad(image, widths, mode="symmetric")
 
 

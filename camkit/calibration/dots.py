@@ -149,15 +149,15 @@ def dots_psf(
             f"dots are seen by the light of a point; leave {option_text('disc_px')} and "
             f"{option_text('edge')} out"
         )
-    seen = see_dots(
+    dots = see_dots(
         measured.red.light,
         measured.red.pitch_um,
         designed.kernels[0, 0, 0],
         spacing_um=designed.pixel_pitch_um,
         active_um=active_um,
     )
-    kernels = np.ascontiguousarray(seen.kernel[None, None, None], dtype=np.float32)
-    return replace(designed, kernels=kernels, depths_mm=measured.psf.depths_mm), seen
+    kernels = np.ascontiguousarray(dots.kernel[None, None, None], dtype=np.float32)
+    return replace(designed, kernels=kernels, depths_mm=measured.psf.depths_mm), dots
 
 
 def _line(
@@ -200,10 +200,10 @@ def _circle(image: FloatGrid, y: float, x: float, radius: float) -> float:
 
 def _most_like(circles: FloatGrid, designed: NDArray[np.floating]) -> tuple[tuple[int, int], float]:
     """Return the first (row, column) of the window most like a PSF, and the likeness."""
-    wanted = designed / np.sqrt(np.square(designed, dtype=np.float64).sum())
-    windows = np.lib.stride_tricks.sliding_window_view(circles, wanted.shape)
+    unit_psf = designed / np.sqrt(np.square(designed, dtype=np.float64).sum())
+    windows = np.lib.stride_tricks.sliding_window_view(circles, unit_psf.shape)
     sizes = np.sqrt((windows**2).sum((-2, -1)))
     # of windows with next to no light a few dots could look like anything
-    alike = (windows * wanted).sum((-2, -1)) / np.maximum(sizes, LEAST_LIGHT * sizes.max())
+    alike = (windows * unit_psf).sum((-2, -1)) / np.maximum(sizes, LEAST_LIGHT * sizes.max())
     row, column = np.unravel_index(int(alike.argmax()), alike.shape)
     return (int(row), int(column)), float(alike[row, column])

@@ -61,7 +61,7 @@ MOST_CLIPPED: Final = 0.01
 WIDE: Final = 0.2
 """Of the reach: a Gaussian wider than that rises so evenly that it could be background."""
 MOST_WIDE: Final = 0.01
-LOST: Final = 1e-3
+LOST_SHARE: Final = 1e-3
 """Of the light, that may lie beyond the kernels."""
 STRIPS: Final = 8
 LEAST_HALF_PX: Final = 7
@@ -96,11 +96,11 @@ class RoundPsf:
         kernel = np.einsum("n,ny,nx->yx", self.shares, lines, lines)
         return np.asarray(kernel / kernel.sum())
 
-    def half_of(self, lost: float) -> int:
+    def half_of(self, share: float) -> int:
         """Return the radius in pixels beyond which so large a share of the light lies, at most."""
         radii = np.arange(LEAST_HALF_PX, MOST_HALF_PX + 1)
         inside = np.array([self.share_within(float(radius)) for radius in radii])
-        return int(radii[min(int(np.searchsorted(inside, 1 - lost)), radii.size - 1)])
+        return int(radii[min(int(np.searchsorted(inside, 1 - share)), radii.size - 1)])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -133,13 +133,13 @@ class EdgeFit:
         psf: The PSF.
         moved_px: Of the edge, from where its profile has 0.
         step: From dark to bright.
-        told: (n,) the profile that it makes.
+        predicted: (n,) the profile that it makes.
     """
 
     psf: RoundPsf
     moved_px: float
     step: float
-    told: FloatLine
+    predicted: FloatLine
 
 
 def fit_edge(profile: EdgeProfile, dark: float | None) -> EdgeFit:
@@ -154,17 +154,17 @@ def fit_edge(profile: EdgeProfile, dark: float | None) -> EdgeFit:
     """
     count = int(np.log(profile.reach_px / LEAST_SPREAD_PX) / np.log(RATIO)) + 1
     spreads = LEAST_SPREAD_PX * RATIO ** np.arange(count, dtype=np.float64)
-    wanted = (profile.value - (dark or 0.0)) * profile.weight
+    target = (profile.value - (dark or 0.0)) * profile.weight
 
-    def solved(moved: float) -> tuple[FloatLine, float, FloatGrid]:
-        at = (profile.distance_px - moved)[:, None]
+    def solved(shift_px: float) -> tuple[FloatLine, float, FloatGrid]:
+        at = (profile.distance_px - shift_px)[:, None]
         table = special.ndtr(at / np.sqrt(spreads**2 + profile.width_px[:, None] ** 2 / 12))
         if dark is None:
             table = np.hstack([table, np.ones((at.size, 1)), -np.ones((at.size, 1))])
-        found, rest = optimize.nnls(table * profile.weight[:, None], wanted)
-        return found, float(rest), table
+        shares, rest = optimize.nnls(table * profile.weight[:, None], target)
+        return shares, float(rest), table
 
-    moved = float(
+    shift_px = float(
         optimize.minimize_scalar(
             lambda at: solved(float(at))[1],
             bounds=(-MOST_MOVE_PX, MOST_MOVE_PX),
@@ -172,12 +172,12 @@ def fit_edge(profile: EdgeProfile, dark: float | None) -> EdgeFit:
             options={"xatol": 1e-4},
         ).x
     )
-    found, _, table = solved(moved)
-    step = float(found[:count].sum())
+    shares, _, table = solved(shift_px)
+    step = float(shares[:count].sum())
     if step <= 0:
         raise DecodeError("an edge is dark in one colour: light it so that every colour sees it")
-    psf = RoundPsf(spreads_px=spreads, shares=found[:count] / step)
-    return EdgeFit(psf=psf, moved_px=moved, step=step, told=table @ found + (dark or 0.0))
+    psf = RoundPsf(spreads_px=spreads, shares=shares[:count] / step)
+    return EdgeFit(psf=psf, moved_px=shift_px, step=step, predicted=table @ shares + (dark or 0.0))
 
 
 @working("measuring the PSF of an edge")
@@ -201,33 +201,35 @@ def measure_edge(survey: Survey, options: PsfOptions, darks: Darks | None) -> Me
             f"{option_text('side_px')} of an edge is at most {most}; got {options.side_px}"
         )
     merged = merge(survey, None, None if darks is None else darks.rows)
-    light, precision = (_plain(of, survey) for of in (merged.light, merged.precision))
+    light, precision = (_plain(plane, survey) for plane in (merged.light, merged.precision))
     clipped = float((precision <= 0).mean())
     if clipped > MOST_CLIPPED:
         raise DecodeError(f"{clipped:.0%} of the edge's samples are clipped; expose less")
     samples = edge_samples(light, survey.like.cfa)
-    weights = [of for _, _, of in edge_samples(precision, survey.like.cfa)]
+    weights = [plane for _, _, plane in edge_samples(precision, survey.like.cfa)]
     line = _line(merged, survey, samples[1])
-    told = [
+    colours = [
         _Colour(line, samples[c], weights[c], None if darks is None else darks.level_error(survey))
         for c in CHANNELS
     ]
     half = (
-        max(one.fit.psf.half_of(LOST) for one in told)
+        max(one.fit.psf.half_of(LOST_SHARE) for one in colours)
         if options.side_px is None
         else options.side_px // 2
     )
-    kernels = np.stack([one.fit.psf.kernel(half) for one in told])
+    kernels = np.stack([one.fit.psf.kernel(half) for one in colours])
     centre_px = float(line.x), float(line.y)
     return MeasuredPsf(
         psf=frozen(kernels, pitch_um, options.depth_m),
         centre_px=centre_px,
-        colours=tuple(_facts(n, kernels[n], one, told[GREEN], line) for n, one in enumerate(told)),
+        colours=tuple(
+            _facts(n, kernels[n], one, colours[GREEN], line) for n, one in enumerate(colours)
+        ),
         fields=(
             Field(
                 height_mm=height_mm(survey.like, centre_px, pitch_um),
-                peak_share=told[GREEN].peak_share,
-                peak_share_error=told[GREEN].peak_share_error,
+                peak_share=colours[GREEN].peak_share,
+                peak_share_error=colours[GREEN].peak_share_error,
             ),
         ),
         notes=(),
@@ -241,12 +243,14 @@ class _Colour:
         self, line: Line, samples: Samples, precision: FloatLine, black_error: float | None
     ) -> None:
         y, x, values = samples
-        seen = precision > 0
-        distance, along = line.distances(y, x)[seen], line.along(y, x)[seen]
-        values, precision = values[seen], precision[seen]
+        valid = precision > 0
+        distance, position = line.distances(y, x)[valid], line.along(y, x)[valid]
+        values, precision = values[valid], precision[valid]
         dark = None if black_error is None else 0.0
-        length = float(np.ptp(along)) or 1.0
-        strip = np.minimum((along - along.min()) / length * STRIPS, STRIPS - 1).astype(np.intp)
+        length = float(np.ptp(position)) or 1.0
+        strip = np.minimum((position - position.min()) / length * STRIPS, STRIPS - 1).astype(
+            np.intp
+        )
         bins = Bins.of(distance, values, precision, strip)
         self.profile = bins.profile()
         self.fit = fit_edge(self.profile, dark)
@@ -258,14 +262,14 @@ class _Colour:
                 f"from the background; give frames without light by {option_text('dark')}"
             )
         self.peak_share = self.fit.psf.share_within(PEAK_PX)
-        without = [
-            fit_edge(bins.profile(without=n), dark).psf.share_within(PEAK_PX) for n in range(STRIPS)
+        shares = [
+            fit_edge(bins.profile(omitted=n), dark).psf.share_within(PEAK_PX) for n in range(STRIPS)
         ]
-        noise = np.sqrt((STRIPS - 1) * np.var(without))
+        noise = np.sqrt((STRIPS - 1) * np.var(shares))
         black = 0.0
         if black_error is not None:
-            moved = fit_edge(self.profile, black_error).psf.share_within(PEAK_PX)
-            black = abs(moved - self.peak_share)
+            share = fit_edge(self.profile, black_error).psf.share_within(PEAK_PX)
+            black = abs(share - self.peak_share)
         self.peak_share_error = float(np.hypot(noise, black))
 
 
@@ -306,19 +310,19 @@ class Bins:
         sums = [np.bincount(number, part, bins * STRIPS).reshape(STRIPS, bins) for part in parts]
         return cls(ends=ends, sums=np.stack(sums).astype(np.float64))
 
-    def profile(self, without: int | None = None) -> EdgeProfile:
+    def profile(self, omitted: int | None = None) -> EdgeProfile:
         """Return the profile, of all strips or without one.
 
         Raises:
             DecodeError: If a side of the edge is not seen.
         """
-        kept = np.arange(STRIPS) != (-1 if without is None else without)
-        sums = self.sums[:, kept].sum(axis=1)
-        seen = sums[0] > 0
-        count, distance, value, variance = sums[:, seen]
+        strips = np.arange(STRIPS) != (-1 if omitted is None else omitted)
+        sums = self.sums[:, strips].sum(axis=1)
+        filled = sums[0] > 0
+        count, distance, value, variance = sums[:, filled]
         profile = EdgeProfile(
             distance_px=distance / count,
-            width_px=np.diff(self.ends)[seen],
+            width_px=np.diff(self.ends)[filled],
             value=value / count,
             weight=count / np.sqrt(variance),
         )
@@ -347,29 +351,29 @@ def _line(merged: Merged, survey: Survey, green: Samples) -> Line:
         light = light[:height, :width].reshape(height // 2, 2, width // 2, 2).sum(axis=(1, 3))
     step = step_of(light)
     size = survey.like.height, survey.like.width
-    found = None
+    fit = None
     if step is not None:
-        found = fit_line(Line(y=step[0], x=step[1], angle=step[2]), green, size)
-    if found is None or found[2] < LEAST_EXPLAINED:
+        fit = fit_line(Line(y=step[0], x=step[1], angle=step[2]), green, size)
+    if fit is None or fit[2] < LEAST_EXPLAINED:
         raise DecodeError(
             "the frames show no straight edge, or a faint one: take one edge, from border to "
             "border of the picture, through its middle, well lit"
         )
-    return found[0]
+    return fit[0]
 
 
 def _facts(n: int, kernel: FloatGrid, one: _Colour, green: _Colour, line: Line) -> ColourFacts:
-    moved, step = one.fit.moved_px - green.fit.moved_px, one.fit.step
+    shift_px, step = one.fit.moved_px - green.fit.moved_px, one.fit.step
     return ColourFacts(
         colour=COLOURS[n],
         wavelength_um=WAVELENGTHS_UM[n],
         core_share=core_share(kernel),
         peak_share=one.peak_share,
         peak_share_error=one.peak_share_error,
-        offset_px=(float(moved * line.normal[1]), float(moved * line.normal[0])),
+        offset_px=(float(shift_px * line.normal[1]), float(shift_px * line.normal[0])),
         reblurred=Reblurred(
             distance_px=one.profile.distance_px - one.fit.moved_px,
             seen=one.profile.value / step,
-            told=one.fit.told / step,
+            told=one.fit.predicted / step,
         ),
     )

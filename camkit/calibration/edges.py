@@ -128,10 +128,10 @@ def find_edges(capture: Capture) -> FoundEdges:
         unusable = np.max(unusable, axis=0)
     linear[..., unusable] = 0.0
     unusable_cells: Sites = np.max(_as_cells(unusable), axis=0)
-    found: list[Edge] = []
+    edges: list[Edge] = []
     clipped = 0
     for y_px, x_px, angle in _steps(_searched_cells(linear, capture)):
-        if any(math.hypot(y_px - edge.y_px, x_px - edge.x_px) < STEP_PX for edge in found):
+        if any(math.hypot(y_px - edge.y_px, x_px - edge.x_px) < STEP_PX for edge in edges):
             continue
         top, left = (round(at - SQUARE_PX / 2) // _CELL_PX * _CELL_PX for at in (y_px, x_px))
         if unusable_cells[_square(top // _CELL_PX, left // _CELL_PX)].any():
@@ -143,8 +143,8 @@ def find_edges(capture: Capture) -> FoundEdges:
         line = Line(y=y_px - top, x=x_px - left, angle=angle)
         edge = _edge(square, capture, (top, left), line)
         if edge is not None:
-            found.append(edge)
-    return FoundEdges(edges=tuple(found), clipped=clipped)
+            edges.append(edge)
+    return FoundEdges(edges=tuple(edges), clipped=clipped)
 
 
 def _square(top: int, left: int) -> tuple[slice, slice]:
@@ -179,20 +179,20 @@ def _steps(cells: FloatGrid) -> Iterator[tuple[float, float, float]]:
             first = _step_in(cells, top, left)
             if first is None:
                 continue
-            moved = [round((at - 0.5) / _CELL_PX - (size - 1) / 2) for at in first[:2]]
-            if any(not 0 <= at <= n - size for at, n in zip(moved, cells.shape, strict=True)):
+            corner = [round((at - 0.5) / _CELL_PX - (size - 1) / 2) for at in first[:2]]
+            if any(not 0 <= at <= n - size for at, n in zip(corner, cells.shape, strict=True)):
                 continue
-            second = _step_in(cells, *moved)
+            second = _step_in(cells, *corner)
             if second is not None:
                 yield second
 
 
 def _step_in(cells: FloatGrid, top: int, left: int) -> tuple[float, float, float] | None:
     """Return (y, x) in pixels and the angle of the step of a square, None where there is none."""
-    found = step_of(cells[_square(top, left)])
-    if found is None:
+    step = step_of(cells[_square(top, left)])
+    if step is None:
         return None
-    return found[0] + top * _CELL_PX, found[1] + left * _CELL_PX, found[2]
+    return step[0] + top * _CELL_PX, step[1] + left * _CELL_PX, step[2]
 
 
 def step_of(cells: FloatGrid) -> tuple[float, float, float] | None:
@@ -215,9 +215,9 @@ def step_of(cells: FloatGrid) -> tuple[float, float, float] | None:
     length = float(np.hypot(*total))
     if length < (high - low) * min(cells.shape) / 4:
         return None
-    along = np.tensordot(total / length, gradient, axes=1)
-    y, x = np.mgrid[: along.shape[0], : along.shape[1]] + 0.5
-    middle = (float((along * at).sum() / along.sum()) for at in (y, x))
+    rise = np.tensordot(total / length, gradient, axes=1)
+    y, x = np.mgrid[: rise.shape[0], : rise.shape[1]] + 0.5
+    middle = (float((rise * at).sum() / rise.sum()) for at in (y, x))
     y_px, x_px = (at * _CELL_PX + 0.5 for at in middle)
     return y_px, x_px, float(np.arctan2(total[0], total[1]))
 
@@ -266,10 +266,10 @@ def edge_samples(
 
 def _fitted(line: Line, samples: Samples) -> Line | None:
     """Fit a line until its profile explains the samples best; None if it never does."""
-    found = fit_line(line, samples, (SQUARE_PX, SQUARE_PX))
-    if found is None or found[2] < LEAST_EXPLAINED or not _is_even(found[1]):
+    fit = fit_line(line, samples, (SQUARE_PX, SQUARE_PX))
+    if fit is None or fit[2] < LEAST_EXPLAINED or not _is_even(fit[1]):
         return None
-    return found[0]
+    return fit[0]
 
 
 def fit_line(
@@ -292,19 +292,19 @@ def fit_line(
     y, x, values = samples
     explained, profile = 0.0, None
     for _ in range(_ROUNDS):
-        distance, along = line.distances(y, x), line.along(y, x)
+        distance, position = line.distances(y, x), line.along(y, x)
         profile = _profile(distance, values)
         if profile is None:
             return None
         near = np.abs(distance) < REACH_PX
-        lost = not (0 <= line.y <= size[0] and 0 <= line.x <= size[1])
-        if lost or not values[near].var() > 0:
+        is_outside = not (0 <= line.y <= size[0] and 0 <= line.x <= size[1])
+        if is_outside or not values[near].var() > 0:
             return None
         slope = np.gradient(profile.value, profile.distance_px)
         rise = np.interp(distance, profile.distance_px, slope)[near]
         rest = values[near] - np.interp(distance, profile.distance_px, profile.value)[near]
         explained = 1 - float(rest.var() / values[near].var())
-        table = np.stack([rise, rise * along[near]], axis=1)
+        table = np.stack([rise, rise * position[near]], axis=1)
         (move, turn), *_ = np.linalg.lstsq(table, rest, rcond=None)
         down, right = line.normal
         line = Line(y=line.y - move * down, x=line.x - move * right, angle=line.angle + turn)
@@ -316,8 +316,8 @@ def _is_even(profile: Profile) -> bool:
     distance, value = profile.distance_px, profile.value
     ends = []
     for side in (-1, 1):
-        far = side * distance > _OUTER * REACH_PX
-        mean, slope = value[far].mean(), np.polyfit(distance[far], value[far], 1)[0]
+        outer = side * distance > _OUTER * REACH_PX
+        mean, slope = value[outer].mean(), np.polyfit(distance[outer], value[outer], 1)[0]
         ends.append((mean, slope * (1 - _OUTER) * REACH_PX))
     step = ends[1][0] - ends[0][0]
     return bool(step > 0 and max(abs(rise) for _, rise in ends) < MOST_UNEVEN * step)
@@ -330,9 +330,9 @@ def _profile(distance: FloatLine, values: FloatLine) -> Profile | None:
     near = (number >= 0) & (number < count)
     number = number[near]
     counts = np.bincount(number, minlength=count).astype(np.float64)
-    seen = counts >= _LEAST_SAMPLES
-    if seen.sum() < count / 4 or not (seen[: count // 4].any() and seen[-count // 4 :].any()):
+    filled = counts >= _LEAST_SAMPLES
+    if filled.sum() < count / 4 or not (filled[: count // 4].any() and filled[-count // 4 :].any()):
         return None
-    sums = (np.bincount(number, of[near], count)[seen] for of in (distance, values))
-    places, means = (total / counts[seen] for total in sums)
-    return Profile(distance_px=places, value=means, count=counts[seen])
+    sums = (np.bincount(number, values_of[near], count)[filled] for values_of in (distance, values))
+    places, means = (total / counts[filled] for total in sums)
+    return Profile(distance_px=places, value=means, count=counts[filled])

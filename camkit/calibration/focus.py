@@ -35,7 +35,7 @@ LEAST_ERRORS: Final = 2.0
 """Standard errors that a focus must differ from the nominal one."""
 LEAST_FALL: Final = 0.01
 """Of the mean square, by which it must explain the edges better."""
-TRIED: Final = 41
+SHIFTS: Final = 41
 FINE: Final = 16
 """Places per pixel at which the light across an edge is computed."""
 MOST_MOVE_PX: Final = 4.0
@@ -109,13 +109,17 @@ def measure_focus(captures: Sequence[tuple[str, Capture]], camera: EdgeCamera) -
         )
         for at_um in (0.0, *shifts_um)
     ]
-    tried_um = np.unique([*np.linspace(shifts_um[0], shifts_um[-1], TRIED), 0.0])
+    tried_um = np.unique([*np.linspace(shifts_um[0], shifts_um[-1], SHIFTS), 0.0])
     shares = np.stack([focus_weights(shifts_um, float(at_um)) for at_um in tried_um])
     squares: list[FloatLine] = []
-    seen = clipped = 0
+    captures_used = clipped = 0
     for name, capture in captures:
-        found, lost = _squares_of(name, capture, camera, kernels, shares)
-        squares, seen, clipped = squares + found, seen + bool(found), clipped + lost
+        fits, clipped_edges = _squares_of(name, capture, camera, kernels, shares)
+        squares, captures_used, clipped = (
+            squares + fits,
+            captures_used + bool(fits),
+            clipped + clipped_edges,
+        )
     if len(squares) < LEAST_EDGES:
         why = f"; {clipped} more are clipped: expose less" if clipped else ""
         raise ContractError(
@@ -123,7 +127,7 @@ def measure_focus(captures: Sequence[tuple[str, Capture]], camera: EdgeCamera) -
             "photograph dark squares on white, turned by some degrees, sharp to the eye and evenly "
             "lit"
         )
-    return _best(np.array(squares), tried_um, seen)
+    return _best(np.array(squares), tried_um, captures_used)
 
 
 def _known_shifts(psf: FrozenPsf) -> NDArray[np.float64]:
@@ -150,13 +154,13 @@ def _squares_of(
         window = place(capture, camera.sensor.extent, None).window
     except ContractError as error:
         raise ContractError(f"{name}: {error}") from error
-    found = find_edges(capture)
+    edges = find_edges(capture)
     squares = []
-    for edge in found.edges:
+    for edge in edges.edges:
         x_mm, y_mm = (float(at) for at in window.to_mm(edge.x_px, edge.y_px))
         rises = np.stack([edge_rises(k.at(x_mm, y_mm), edge.normal) for k in kernels])
         squares.append(_edge_squares(edge, np.tensordot(shares, rises, axes=1)))
-    return squares, found.clipped
+    return squares, edges.clipped
 
 
 def edge_rises(kernels: FloatArray, normal: tuple[float, float]) -> FloatGrid:
@@ -217,25 +221,25 @@ def _edge_squares(edge: Edge, rises: FloatGrid) -> FloatLine:
     """
     half = rises.shape[-1] // 2
     places = np.arange(-half, half + 1) / FINE
-    found = []
+    squares = []
     for of_focus in rises:
         middle = of_focus[of_focus.shape[0] // 2]
-        start = moved = -float(np.interp(0.5, middle, places))
+        start = shift = -float(np.interp(0.5, middle, places))
         square = 0.0
         for _ in range(_ROUNDS):
-            square, step_px = _fit_colours(edge, of_focus, places, moved)
-            moved = float(np.clip(moved + step_px, start - MOST_MOVE_PX, start + MOST_MOVE_PX))
-        found.append(square)
-    return np.array(found)
+            square, step_px = _fit_colours(edge, of_focus, places, shift)
+            shift = float(np.clip(shift + step_px, start - MOST_MOVE_PX, start + MOST_MOVE_PX))
+        squares.append(square)
+    return np.array(squares)
 
 
 def _fit_colours(
-    edge: Edge, rises: FloatGrid, places: FloatLine, moved: float
+    edge: Edge, rises: FloatGrid, places: FloatLine, shift: float
 ) -> tuple[float, float]:
     """Return the mean square, and how much farther the edge lies."""
     rest_by_move = move_by_move = total = weight = 0.0
     for profile, rise in zip(edge.profiles, rises, strict=True):
-        at = profile.distance_px - moved
+        at = profile.distance_px - shift
         light = np.interp(at, places, rise, left=0.0, right=1.0)
         slope = (np.interp(at + 0.5, places, rise) - np.interp(at - 0.5, places, rise)) * -1.0
         root = np.sqrt(profile.count)
@@ -258,8 +262,8 @@ def _best(squares: FloatGrid, tried_um: FloatLine, captures: int) -> MeasuredFoc
     Raises:
         ContractError: If that is no measurement.
     """
-    own = squares.min(axis=1)
-    squares = squares[own <= OUTLIER * np.median(own)]
+    least_squares = squares.min(axis=1)
+    squares = squares[least_squares <= OUTLIER * np.median(least_squares)]
     edges = len(squares)
     total = squares.mean(axis=0)
     focus_um, least = _minimum(tried_um, total)
@@ -275,10 +279,10 @@ def _best(squares: FloatGrid, tried_um: FloatLine, captures: int) -> MeasuredFoc
             f"the focus lies at or beyond {focus_um:g} um, where the kernels end: give a larger "
             f"{option_text('focus_um')}, or focus the camera anew"
         )
-    without = np.array(
+    jackknife = np.array(
         [_minimum(tried_um, (total * edges - one) / (edges - 1))[0] for one in squares]
     )
-    error_um = float(np.sqrt((edges - 1) / edges * np.square(without - without.mean()).sum()))
+    error_um = float(np.sqrt((edges - 1) / edges * np.square(jackknife - jackknife.mean()).sum()))
     if abs(focus_um) <= LEAST_ERRORS * error_um or least > (1 - LEAST_FALL) * nominal:
         raise ContractError(
             f"the focus is {focus_um:.1f} +- {error_um:.1f} um, which these captures do not tell "
@@ -300,5 +304,5 @@ def _minimum(at: FloatLine, values: FloatLine) -> tuple[float, float]:
     if i in (0, at.size - 1):
         return float(at[i]), float(values[i])
     curve = np.polyfit(at[i - 1 : i + 2] - at[i], values[i - 1 : i + 2], 2)
-    away = float(-curve[1] / (2 * curve[0])) if curve[0] > 0 else 0.0
-    return float(at[i]) + away, float(np.polyval(curve, away))
+    offset = float(-curve[1] / (2 * curve[0])) if curve[0] > 0 else 0.0
+    return float(at[i]) + offset, float(np.polyval(curve, offset))

@@ -54,7 +54,7 @@ class Lattice:
         matrix = np.array([[0.5, 0.5], [0.5, -0.5]])
         y, x = np.nonzero(np.indices(mosaic.shape).sum(axis=0) % 2 == odd)
         shift = np.array([-odd / 2, mosaic.shape[1] // 2 - odd / 2])
-        row, column = (np.rint(part).astype(int) for part in _placed(matrix, shift, y, x))
+        row, column = (np.rint(part).astype(int) for part in _lattice_places(matrix, shift, y, x))
         turned = np.full((row.max() + 1, column.max() + 1), np.nan)
         turned[row, column] = mosaic[y, x]
         return cls(values=turned, matrix=matrix, shift=shift)
@@ -77,11 +77,11 @@ class Lattice:
 
     def at(self, y: FloatGrid, x: FloatGrid, *, order: int = SPLINE_ORDER) -> FloatGrid:
         """Return values at any pixels; missing ones are taken from their neighbours."""
-        row, column = _placed(self.matrix, self.shift, y, x)
+        row, column = _lattice_places(self.matrix, self.shift, y, x)
         whole = filled(self.values)
         places = np.stack([row, column])
-        found = ndimage.map_coordinates(whole, places, order=order, mode="mirror")  # type: ignore[call-overload]
-        return np.asarray(found)
+        values = ndimage.map_coordinates(whole, places, order=order, mode="mirror")  # type: ignore[call-overload]
+        return np.asarray(values)
 
 
 def filled(values: FloatGrid) -> FloatGrid:
@@ -91,15 +91,15 @@ def filled(values: FloatGrid) -> FloatGrid:
         return values
     row, column = np.nonzero(missing)
     wide = np.pad(values, 1, constant_values=np.nan)
-    around = np.stack([wide[row + dy, column + dx] for dy in range(3) for dx in range(3)])
-    known = np.isfinite(around).any(axis=0)
-    found = values.copy()
-    found[row, column] = 0.0
-    found[row[known], column[known]] = np.nanmedian(around[:, known], axis=0)
-    return found
+    neighbours = np.stack([wide[row + dy, column + dx] for dy in range(3) for dx in range(3)])
+    has_any = np.isfinite(neighbours).any(axis=0)
+    result = values.copy()
+    result[row, column] = 0.0
+    result[row[has_any], column[has_any]] = np.nanmedian(neighbours[:, has_any], axis=0)
+    return result
 
 
-def _placed(
+def _lattice_places(
     matrix: FloatGrid, shift: FloatGrid, y: NDArray[np.generic], x: NDArray[np.generic]
 ) -> tuple[FloatGrid, FloatGrid]:
     row, column = (

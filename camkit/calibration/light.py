@@ -90,8 +90,8 @@ def find_light(cells: NDArray[np.floating]) -> tuple[int, int]:
     Raises:
         DecodeError: If nothing stands out of the noise.
     """
-    around = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], dtype=bool)
-    bound = LONE_FACTOR * np.maximum(ndimage.maximum_filter(cells, footprint=around), 0)
+    ring = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], dtype=bool)
+    bound = LONE_FACTOR * np.maximum(ndimage.maximum_filter(cells, footprint=ring), 0)
     smooth = ndimage.uniform_filter(np.minimum(cells, bound), 3)
     level, spread = background([smooth])
     if smooth.max() - level < LEAST_SNR * spread:
@@ -118,9 +118,9 @@ def background(planes: Sequence[NDArray[np.floating]]) -> tuple[float, float]:
 def border(plane: NDArray[np.floating]) -> NDArray[np.bool_]:
     """Return which samples of a (h, w) plane lie along its border."""
     sides = [max(_LEAST_BORDER_PX, round(BORDER_SHARE * n)) for n in plane.shape]
-    found = np.ones(plane.shape, dtype=bool)
-    found[sides[0] : -sides[0], sides[1] : -sides[1]] = False
-    return found
+    mask = np.ones(plane.shape, dtype=bool)
+    mask[sides[0] : -sides[0], sides[1] : -sides[1]] = False
+    return mask
 
 
 def level_of(values: NDArray[np.floating]) -> tuple[float, float]:
@@ -129,12 +129,12 @@ def level_of(values: NDArray[np.floating]) -> tuple[float, float]:
     Raises:
         DecodeError: If there is nothing but NaN.
     """
-    seen = values[np.isfinite(values)]
-    if not seen.size:
+    finite = values[np.isfinite(values)]
+    if not finite.size:
         raise DecodeError("every frame is clipped along its border: darken the room")
-    middle, high = np.quantile(seen, (0.5, _ONE_SIGMA))
+    middle, high = np.quantile(finite, (0.5, _ONE_SIGMA))
     spread = float(high - middle)
-    return float(seen[np.abs(seen - middle) <= _OUTLIER_SPREADS * spread].mean()), spread
+    return float(finite[np.abs(finite - middle) <= _OUTLIER_SPREADS * spread].mean()), spread
 
 
 def fit_core(lattice: Lattice, y: float, x: float) -> Core:
@@ -150,21 +150,21 @@ def fit_core(lattice: Lattice, y: float, x: float) -> Core:
     """
     at_y, at_x = lattice.places()
     near = (np.hypot(at_y - y, at_x - x) <= CORE_PX) & np.isfinite(lattice.values)
-    seen = lattice.values[near]
-    top = float(seen.max(initial=0))
+    values = lattice.values[near]
+    top = float(values.max(initial=0))
     if top <= 0:
         raise DecodeError("the light is dark in one colour: take one that every colour sees")
     dy, dx = at_y[near] - y, at_x[near] - x
 
     def misfit(p: FloatGrid) -> FloatGrid:
-        return _core(p, top).at(dy, dx) / top - seen / top
+        return _core(p, top).at(dy, dx) / top - values / top
 
     log_low, log_high = np.log(_SPREADS_PX)
     start = [0.0, 0.0, 1.0, np.log(_START_SPREAD_PX), np.log(_START_SPREAD_PX), 0.0]
     low = [-CORE_PX, -CORE_PX, 0.0, log_low, log_low, -np.pi]
     high = [CORE_PX, CORE_PX, 10.0, log_high, log_high, np.pi]
-    found = _core(optimize.least_squares(misfit, start, bounds=(low, high)).x, top)
-    return Core(y=y + found.y, x=x + found.x, height=found.height, form=found.form)
+    fitted = _core(optimize.least_squares(misfit, start, bounds=(low, high)).x, top)
+    return Core(y=y + fitted.y, x=x + fitted.x, height=fitted.height, form=fitted.form)
 
 
 def _core(p: FloatGrid, top: float) -> Core:

@@ -94,7 +94,7 @@ class ColourFacts:
 
     def to_json(self) -> dict[str, Any]:
         """Return plain JSON values."""
-        told: dict[str, Any] = {
+        record: dict[str, Any] = {
             "colour": self.colour,
             "wavelength_um": self.wavelength_um,
             "core_share": round(self.core_share, 5),
@@ -103,10 +103,10 @@ class ColourFacts:
             "offset_px": [round(part, 4) for part in self.offset_px],
         }
         if self.noise_floor is not None:
-            told["noise_floor"] = float(f"{self.noise_floor:.3g}")
+            record["noise_floor"] = float(f"{self.noise_floor:.3g}")
         if self.reblurred is not None:
-            told["residual"] = float(f"{self.reblurred.rest:.3g}")
-        return told
+            record["residual"] = float(f"{self.reblurred.rest:.3g}")
+        return record
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

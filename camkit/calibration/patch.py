@@ -146,31 +146,31 @@ def _refuse_haze(
     Raises:
         DecodeError: If so.
     """
-    within, total, ring = 0.0, 0.0, list[FloatArray]()
+    samples, total, ring = 0.0, 0.0, list[FloatArray]()
     for plane, pitch, first in planes:
         y, x = (
             pitch * np.arange(n) + start - at
             for n, start, at in zip(plane.shape, first, place, strict=True)
         )
-        far = np.hypot(y[:, None], x[None])
+        distance = np.hypot(y[:, None], x[None])
         reach = min(-y[0], y[-1], -x[0], x[-1])
-        seen = np.isfinite(plane)
-        ring.append(plane[seen & (far > RING[0] * reach) & (far < RING[1] * reach)])
-        total += float((plane[seen & (far < reach)].astype(np.float64) - level).sum())
-        within += np.pi * (reach / pitch) ** 2
+        finite = np.isfinite(plane)
+        ring.append(plane[finite & (distance > RING[0] * reach) & (distance < RING[1] * reach)])
+        total += float((plane[finite & (distance < reach)].astype(np.float64) - level).sum())
+        samples += np.pi * (reach / pitch) ** 2
     values = np.concatenate(ring)
     if values.size < BORDER_PX:
         return
     # streaks are bright and narrow, haze lifts the darker half too
     rise = _darker_half(values) - _darker_half(np.concatenate([p[border(p)] for p, _, _ in planes]))
-    if rise > HAZE_SPREADS * spread / np.sqrt(values.size) and rise * within > MOST_HAZE * total:
+    if rise > HAZE_SPREADS * spread / np.sqrt(values.size) and rise * samples > MOST_HAZE * total:
         raise DecodeError(
-            f"veiling glare fills the frame: {rise * within / max(total, 1e-300):.0%} of the light "
-            "or more cannot be told from the background; give frames without light by "
+            f"veiling glare fills the frame: {rise * samples / max(total, 1e-300):.0%} of the "
+            "light or more cannot be told from the background; give frames without light by "
             f"{option_text('dark')}"
         )
 
 
 def _darker_half(values: FloatArray) -> float:
-    seen = values[np.isfinite(values)]
-    return float(seen[seen <= np.median(seen)].mean(dtype=np.float64))
+    finite = values[np.isfinite(values)]
+    return float(finite[finite <= np.median(finite)].mean(dtype=np.float64))

@@ -95,20 +95,20 @@ def measure_psf(survey: Survey, options: PsfOptions, darks: Darks | None) -> Mea
     half = _most_half(survey, row, column, options.side_px)
     black_error = None if darks is None else darks.level_error(survey)
     patch = Patch(merged, survey, (row, column), half, black_error)
-    seen = _centred(patch, half, options.disc_px)
-    middle = seen.cores[GREEN]
-    notes = _doubts(patch, seen.cores)
-    light, noise = _as_point(seen, [lattice.pitch_px for lattice in patch.light]), seen.noise
+    centred = _centred(patch, half, options.disc_px)
+    middle = centred.cores[GREEN]
+    notes = _doubts(patch, centred.cores)
+    light, noise = _as_point(centred, [lattice.pitch_px for lattice in patch.light]), centred.noise
     if options.side_px is None:
-        found = reach_px(light, noise)
-        if found == half:
+        side_px = reach_px(light, noise)
+        if side_px == half:
             notes.append(f"light is still seen {half} px from the centre, where the crop ends")
-        half = found
+        half = side_px
         light, noise = cropped(light, half), cropped(noise, half)
     kernels = np.stack([smooth_noise(p, n) for p, n in zip(light, noise, strict=True)])
     kernels = np.maximum(kernels, 0)
     kernels /= kernels.sum((-2, -1), keepdims=True)
-    colours = _facts(kernels, light, noise, seen, patch)
+    colours = _facts(kernels, light, noise, centred, patch)
     centre_px = (patch.left + middle.x, patch.top + middle.y)
     red = RedSamples(light=patch.red(half, middle), pitch_um=pitch_um * patch.light[RED].pitch_px)
     return MeasuredPsf(
@@ -217,13 +217,13 @@ def _core(lattice: Lattice, place: tuple[int, int], disc_px: float | None) -> Li
     return fit_disc(lattice, *place, disc_px)
 
 
-def _as_point(seen: _Centred, pitches_px: Sequence[float]) -> FloatGrid:
+def _as_point(centred: _Centred, pitches_px: Sequence[float]) -> FloatGrid:
     """Return (colour, side, side) light as of a point: discs are removed."""
-    light, middle = seen.light.copy(), seen.cores[GREEN]
-    for n, (core, pitch_px) in enumerate(zip(seen.cores, pitches_px, strict=True)):
+    light, middle = centred.light.copy(), centred.cores[GREEN]
+    for n, (core, pitch_px) in enumerate(zip(centred.cores, pitches_px, strict=True)):
         if isinstance(core, DiscCore):
             offset = core.y - middle.y, core.x - middle.x
-            light[n] = without_disc(seen.light[n], seen.noise[n], core, offset, pitch_px)
+            light[n] = without_disc(centred.light[n], centred.noise[n], core, offset, pitch_px)
     return light
 
 
@@ -243,16 +243,16 @@ def _doubts(patch: Patch, cores: Sequence[LightCore]) -> list[str]:
 
 
 def _facts(
-    kernels: FloatGrid, light: FloatGrid, noise: FloatGrid, seen: _Centred, patch: Patch
+    kernels: FloatGrid, light: FloatGrid, noise: FloatGrid, centred: _Centred, patch: Patch
 ) -> tuple[ColourFacts, ...]:
-    middle, told = seen.cores[GREEN], []
+    middle, facts = centred.cores[GREEN], []
     for n, (colour, wavelength_um) in enumerate(zip(COLOURS, WAVELENGTHS_UM, strict=True)):
-        core, pitch_px = seen.cores[n], patch.light[n].pitch_px
+        core, pitch_px = centred.cores[n], patch.light[n].pitch_px
         # what darks add to the noise is seen where there is no light
         modelled = float(np.nanmedian(patch.variance[n].values))
         variance = noise[n] ** 2 + max(0.0, patch.floors[n] ** 2 - modelled)
         share, error = peak_share(light[n], variance, patch.level_errors[n], pitch_px)
-        told.append(
+        facts.append(
             ColourFacts(
                 colour=colour,
                 wavelength_um=wavelength_um,
@@ -261,13 +261,13 @@ def _facts(
                 peak_share_error=error,
                 offset_px=(core.x - middle.x, core.y - middle.y),
                 noise_floor=patch.floors[n] / core.height,
-                reblurred=_reblurred(kernels[n] * light[n].sum(), seen.light[n], core),
+                reblurred=_reblurred(kernels[n] * light[n].sum(), centred.light[n], core),
             )
         )
-    return tuple(told)
+    return tuple(facts)
 
 
-def _reblurred(kernel: FloatGrid, seen: FloatGrid, core: LightCore) -> Reblurred | None:
+def _reblurred(kernel: FloatGrid, image: FloatGrid, core: LightCore) -> Reblurred | None:
     """Return the means of rings of a disc, as captured and as a kernel predicts it."""
     if not isinstance(core, DiscCore):
         return None
@@ -277,13 +277,13 @@ def _reblurred(kernel: FloatGrid, seen: FloatGrid, core: LightCore) -> Reblurred
     most = min(int(core.diameter_px / 2) + SHOWN_PX, kernel.shape[-1] // 2)
     ring = np.rint(radius).astype(np.intp)
     # as much light as of a point, spread over a disc of its level
-    told = with_disc(kernel, core.diameter_px)
+    predicted = with_disc(kernel, core.diameter_px)
     counts = np.bincount(ring)[: most + 1]
 
-    def means(of: FloatGrid) -> FloatLine:
-        return np.asarray(np.bincount(ring, of.ravel())[: most + 1] / counts / level)
+    def means(values: FloatGrid) -> FloatLine:
+        return np.asarray(np.bincount(ring, values.ravel())[: most + 1] / counts / level)
 
     at = np.bincount(ring, radius)[: most + 1] / counts
     return Reblurred(
-        distance_px=at, seen=means(cropped(seen, kernel.shape[-1] // 2)), told=means(told)
+        distance_px=at, seen=means(cropped(image, kernel.shape[-1] // 2)), told=means(predicted)
     )

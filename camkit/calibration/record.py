@@ -95,9 +95,9 @@ def _list(values: Sequence[Any], name: str) -> str:
 def _text(text: str, name: str) -> str:
     if any("\ud800" <= letter <= "\udfff" for letter in text):
         raise ContractError(f"{name} of a record is no text that UTF-8 can hold; got {text!a}")
-    return '"' + "".join(_ESCAPES.get(letter, _shown(letter)) for letter in text) + '"'
+    return '"' + "".join(_ESCAPES.get(letter, _escaped(letter)) for letter in text) + '"'
 
 
-def _shown(letter: str) -> str:
+def _escaped(letter: str) -> str:
     control = letter < " " or letter == "\x7f"
     return f"\\u{ord(letter):04x}" if control else letter

@@ -80,7 +80,7 @@ class ToneFacts:
         levels: (step,) increasing.
         luminance: (step,) never decreasing, 1 at the brightest.
         curve: Fitted to them; None for fewer than `FITTED_STEPS` steps.
-        seen: (step,) whether its light stands out of the camera's black; the curve is fitted to
+        is_lit: (step,) whether its light stands out of the camera's black; the curve is fitted to
             those that do.
         notes: What the user should know.
     """
@@ -88,7 +88,7 @@ class ToneFacts:
     levels: FloatGrid
     luminance: FloatGrid
     curve: PowerCurve | None
-    seen: NDArray[np.bool_]
+    is_lit: NDArray[np.bool_]
     notes: tuple[str, ...]
 
     @property
@@ -96,16 +96,16 @@ class ToneFacts:
         """Return the deviations of fitted steps from the curve, as shares of it; NaN of others."""
         if self.curve is None:
             return None
-        return np.where(self.seen, self.luminance / self.curve.at(self.levels) - 1, np.nan)
+        return np.where(self.is_lit, self.luminance / self.curve.at(self.levels) - 1, np.nan)
 
     def to_record(self) -> dict[str, Any]:
         """Return plain values; None where no curve was fitted."""
         rest, curve = self.residuals, self.curve
-        left = None if rest is None else 100 * np.sqrt(np.mean(rest[self.seen] ** 2))
+        residual = None if rest is None else 100 * np.sqrt(np.mean(rest[self.is_lit] ** 2))
         return {
             "levels": [float(level) for level in self.levels],
             "luminance": [float(f"{light:.6g}") for light in self.luminance],
-            "residual_percent": None if left is None else float(f"{left:.3g}"),
+            "residual_percent": None if residual is None else float(f"{residual:.3g}"),
             "gamma": None if curve is None else round(curve.gamma, 4),
             "notes": list(self.notes),
         }
@@ -161,34 +161,34 @@ def measure_tone(
     if len({path.resolve() for path in files}) < len(files):
         raise ContractError("a picture is given twice; give one of each step")
     captures: list[Capture] = []
-    found = []
+    readings = []
     steps_seen = list(zip(files, levels, strict=True))
     for path, level in counted(steps_seen, "reading", "pictures"):
         capture = read_frame(path, mosaic)
         light, error = _middle(path, capture)
         captures.append(without_pixels(capture))
         check_one_camera(captures[0], files[0], capture, path)
-        found.append((path, level, light, error))
+        readings.append((path, level, light, error))
     exposures, notes = exposures_of(files, captures)
     steps = [
         Step(path=path, level=level, light=light / t, error=error / t)
-        for (path, level, light, error), t in zip(found, exposures, strict=True)
+        for (path, level, light, error), t in zip(readings, exposures, strict=True)
     ]
     steps.sort(key=lambda step: step.level)
     _check_rising(steps)
     rising = _monotone([max(step.light, 0.0) for step in steps])
     luminance, at = rising / rising[-1], np.array([step.level for step in steps])
-    seen = np.array([step.light > _SURE * step.error for step in steps]) & (luminance > 0)
+    is_lit = np.array([step.light > _SURE * step.error for step in steps]) & (luminance > 0)
     notes += [
         f"{step.path.name} (level {step.level:g}) does not stand out of the camera's black; expose "
         "it longer if the display is not black there"
-        for step, lit in zip(steps, seen, strict=True)
+        for step, lit in zip(steps, is_lit, strict=True)
         if not lit
     ]
     curve = None
-    if np.count_nonzero(seen) >= FITTED_STEPS:
-        curve = _fitted(at[seen], luminance[seen], float(at[-1]))
-    return ToneFacts(levels=at, luminance=luminance, curve=curve, seen=seen, notes=tuple(notes))
+    if np.count_nonzero(is_lit) >= FITTED_STEPS:
+        curve = _fitted(at[is_lit], luminance[is_lit], float(at[-1]))
+    return ToneFacts(levels=at, luminance=luminance, curve=curve, is_lit=is_lit, notes=tuple(notes))
 
 
 def _middle(path: Path, capture: Capture) -> tuple[float, float]:
@@ -209,10 +209,10 @@ def _middle(path: Path, capture: Capture) -> tuple[float, float]:
         raise DecodeError(f"{path.name} has {capture.width}x{capture.height} pixels: too few")
     if share > MOST_CLIPPED:
         raise DecodeError(f"{path.name}: {share:.1%} of green is clipped; expose less")
-    seen = green[inside]
+    middle = green[inside]
     # neighbours, since what is uneven is so in every picture
-    noise = float(np.diff(seen, axis=1).std()) / _OF_TWO if seen.shape[1] > 1 else 0.0
-    return float(seen.mean()), noise / float(np.sqrt(seen.size))
+    noise = float(np.diff(middle, axis=1).std()) / _OF_TWO if middle.shape[1] > 1 else 0.0
+    return float(middle.mean()), noise / float(np.sqrt(middle.size))
 
 
 def exposures_of(
@@ -223,7 +223,7 @@ def exposures_of(
     Raises:
         DecodeError: If some files state time and ISO and others do not.
     """
-    told: list[dict[str, float | None]] = [
+    settings: list[dict[str, float | None]] = [
         {
             "exposure time": c.metadata.exposure_time_s or c.exposure_time_s,
             "ISO": c.iso or c.metadata.iso,
@@ -234,24 +234,24 @@ def exposures_of(
     exposure = np.ones(len(files))
     differs = []
     for name, power in (("exposure time", 1), ("ISO", 1), ("f-number", -2)):
-        values = [one[name] for one in told]
-        known = [value for value in values if value is not None]
-        if not known:
+        values = [one[name] for one in settings]
+        stated_values = [value for value in values if value is not None]
+        if not stated_values:
             continue
-        if len(known) < len(values):
+        if len(stated_values) < len(values):
             path = files[values.index(None)]
             raise DecodeError(
                 f"{path.name} states no {name}, as others do; give pictures of one camera as it "
                 "wrote them"
             )
-        if max(known) > min(known) * (1 + _SAME):
+        if max(stated_values) > min(stated_values) * (1 + _SAME):
             differs.append(name)
-        exposure *= (np.array(known) / known[0]) ** power
+        exposure *= (np.array(stated_values) / stated_values[0]) ** power
     notes = []
     if differs:
         words = " and ".join(differs)
         notes.append(f"pictures differ in {words}; light is scaled by what the files state")
-    if all(one["exposure time"] is None for one in told):
+    if all(one["exposure time"] is None for one in settings):
         notes.append("no picture states its exposure time; all are taken as equal")
     return list(exposure), notes
 
@@ -262,13 +262,13 @@ def _check_rising(steps: Sequence[Step]) -> None:
     Raises:
         DecodeError: If there is one, or the last is no brighter than the first.
     """
-    for before, step in pairwise(steps):
-        chance = _SURE * float(np.hypot(before.error, step.error))
-        if step.light < before.light - chance:
+    for previous, step in pairwise(steps):
+        chance = _SURE * float(np.hypot(previous.error, step.error))
+        if step.light < previous.light - chance:
             raise DecodeError(
-                f"{step.path.name} (level {step.level:g}) is darker than {before.path.name} (level "
-                f"{before.level:g}), by {1 - step.light / before.light:.2%}; are levels and "
-                "pictures in one order, and exposures as stated?"
+                f"{step.path.name} (level {step.level:g}) is darker than {previous.path.name} "
+                f"(level {previous.level:g}), by {1 - step.light / previous.light:.2%}; are "
+                "levels and pictures in one order, and exposures as stated?"
             )
     chance = _SURE * float(np.hypot(steps[0].error, steps[-1].error))
     if steps[-1].light <= max(steps[0].light + chance, 0.0):
@@ -302,10 +302,10 @@ def _fitted(levels: FloatGrid, luminance: FloatGrid, top: float) -> PowerCurve:
         return np.asarray(curve(p).at(levels) / luminance - 1)
 
     start = np.array([np.log(max(float(luminance[0]), _LEAST)), 0.0, 0.0, 2.2])
-    found = optimize.least_squares(
+    fit = optimize.least_squares(
         misfit,
         start,
         bounds=([-40, -3, -0.2, 0.3], [1, 3, 0.5, 6.0]),
         x_scale=[1.0, 0.1, 0.01, 0.1],
     )
-    return curve(found.x)
+    return curve(fit.x)

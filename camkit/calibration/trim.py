@@ -42,8 +42,8 @@ def reach_px(light: FloatGrid, noise: FloatGrid) -> int:
         # it is taken where there is least light
         low, high = np.quantile(mean[rings >= OUTER_SHARE * half], _LOW_PAIR)
         scatter = float(high - low) / _LOW_PAIR_SPREADS
-        found = mean > SPREADS * max(scatter, 1 / BOX_PX)
-        lit |= np.bincount(rings[found], minlength=half + 1)[: half + 1] > 0
+        is_light = mean > SPREADS * max(scatter, 1 / BOX_PX)
+        lit |= np.bincount(rings[is_light], minlength=half + 1)[: half + 1] > 0
     last = 0
     for ring in np.flatnonzero(lit):
         if ring - last > GAP_PX:
@@ -62,8 +62,8 @@ def smooth_noise(light: FloatGrid, noise: FloatGrid) -> FloatGrid:
     mean = ndimage.uniform_filter(light, BOX_PX, mode="mirror")
     scatter = ndimage.uniform_filter((light - mean) ** 2, BOX_PX, mode="mirror")
     expected = ndimage.uniform_filter(noise**2, BOX_PX, mode="mirror")
-    kept = np.clip(1 - expected / np.maximum(scatter, 1e-300), 0, 1)
-    return np.asarray(mean + kept * (light - mean))
+    share = np.clip(1 - expected / np.maximum(scatter, 1e-300), 0, 1)
+    return np.asarray(mean + share * (light - mean))
 
 
 def cropped(light: FloatGrid, half: int) -> FloatGrid:

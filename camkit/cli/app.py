@@ -27,7 +27,7 @@ from camkit.cli.judge.bench import bench
 from camkit.cli.judge.check import check
 from camkit.cli.judge.doctor import doctor
 from camkit.cli.judge.stress import stress
-from camkit.cli.progress import shown
+from camkit.cli.progress import showing_progress
 from camkit.cli.say import plain, say
 from camkit.cli.use.calibrate.app import calibrate_app
 from camkit.cli.use.info import info
@@ -100,9 +100,9 @@ def run(arguments: Sequence[str], stopwatch: Stopwatch | None = None) -> int:
     try:
         with (
             speaking("command"),
-            _messages(shown=debug),
+            _messages(is_shown=debug),
             none_is_lost(),
-            shown(_command_name(arguments)),
+            showing_progress(_command_name(arguments)),
         ):
             app(list(arguments), prog_name="camkit", obj=stopwatch or Stopwatch())
     except SystemExit as end:
@@ -140,20 +140,20 @@ class _SayHandler(logging.Handler):
 
 
 @contextmanager
-def _messages(*, shown: bool) -> Iterator[None]:
+def _messages(*, is_shown: bool) -> Iterator[None]:
     """Show what camkit's modules log, for `--debug`."""
-    if not shown:
+    if not is_shown:
         yield
         return
     logger, handler = logging.getLogger("camkit"), _SayHandler()
     handler.setFormatter(_PlainFormatter())
-    before = logger.level
+    level = logger.level
     logger.addHandler(handler)
     logger.setLevel(logging.DEBUG)
     try:
         yield
     finally:
-        logger.setLevel(before)
+        logger.setLevel(level)
         logger.removeHandler(handler)
 
 

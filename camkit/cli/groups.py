@@ -31,13 +31,13 @@ def add_command(
     app.command(name, short_help=summary, rich_help_panel=group)(command)
 
 
-def add_application(app: typer.Typer, below: Any, group: str, summary: str) -> None:
+def add_application(app: typer.Typer, commands: Any, group: str, summary: str) -> None:
     """Add a command that has commands of its own to a group.
 
     Args:
         app: The application.
-        below: The application with those commands; the docstring of its callback is its help.
+        commands: The application with those commands; the docstring of its callback is its help.
         group: Title of its group in the help of `app`.
         summary: What it does, in about five words, for the list of commands.
     """
-    app.add_typer(below, short_help=summary, rich_help_panel=group)
+    app.add_typer(commands, short_help=summary, rich_help_panel=group)

@@ -22,24 +22,24 @@ AGAIN_S: Final = 0.02
 @contextmanager
 def none_is_lost() -> Iterator[None]:
     """Raise a lost interrupt in the main thread a moment later; never after the block."""
-    before, coming = sys.unraisablehook, list[threading.Timer]()
+    previous_hook, timers = sys.unraisablehook, list[threading.Timer]()
 
-    def tell(lost: "UnraisableHookArgs") -> None:
-        if not issubclass(lost.exc_type, KeyboardInterrupt):
-            before(lost)
+    def tell(unraisable: "UnraisableHookArgs") -> None:
+        if not issubclass(unraisable.exc_type, KeyboardInterrupt):
+            previous_hook(unraisable)
             return
-        again = threading.Timer(AGAIN_S, _interrupt)
-        again.daemon = True
-        coming.append(again)
-        again.start()
+        timer = threading.Timer(AGAIN_S, _interrupt)
+        timer.daemon = True
+        timers.append(timer)
+        timer.start()
 
     sys.unraisablehook = tell
     try:
         yield
     finally:
-        sys.unraisablehook = before
-        for again in coming:
-            again.cancel()
+        sys.unraisablehook = previous_hook
+        for timer in timers:
+            timer.cancel()
 
 
 def _interrupt() -> None:

@@ -38,7 +38,7 @@ class Display:
         self._last_s: float | None = None
         self._last_state: object = None
         self._has_begun = self._has_left = False
-        self._held: list[str] = []
+        self._kept_lines: list[str] = []
         self._lock = threading.RLock()
 
     def tick(self, now_s: float) -> None:
@@ -50,22 +50,22 @@ class Display:
             if spent_s < SILENT_S or not (self._has_begun or spent_s > LINE_S):
                 return
             self.flush()
-            left = time_left(tasks, now_s)
+            left_line = time_left(tasks, now_s)
             text = tasks_text(tasks) or ("working" if self._has_begun else "starting")
-            line = f"{self._name}: {text}; {duration(spent_s)} so far{left}"
+            line = f"{self._name}: {text}; {duration(spent_s)} so far{left_line}"
             if self._is_terminal:
                 say_over(line[: _columns() - 1])
-            elif self._is_time(tasks, now_s, is_first_left=bool(left) and not self._has_left):
+            elif self._is_time(tasks, now_s, is_first_left=bool(left_line) and not self._has_left):
                 self._last_s = now_s
-                self._has_left = bool(left)
+                self._has_left = bool(left_line)
                 say(line, err=True)
 
     def flush(self) -> None:
         """Print the lines that were kept back."""
         with self._lock:
-            for line in self._held:
+            for line in self._kept_lines:
                 say(line, err=True)
-            self._held.clear()
+            self._kept_lines.clear()
 
     def _is_time(self, tasks: Sequence[Task], now_s: float, *, is_first_left: bool) -> bool:
         """Return whether a plain line is due."""
@@ -86,7 +86,7 @@ class Display:
         with self._lock:
             now_s = time.monotonic()
             if self._last_s is None and now_s - self._start_s < SILENT_S:
-                self._held.append(line)
+                self._kept_lines.append(line)
                 return
             self._last_s = now_s
             say(line, err=True)
@@ -139,14 +139,14 @@ def _text(task: Task) -> str:
 
 
 @contextmanager
-def shown(name: str) -> Iterator[None]:
+def showing_progress(name: str) -> Iterator[None]:
     """Show the tasks of this block."""
-    display, over = Display(name), threading.Event()
+    display, is_over = Display(name), threading.Event()
 
     def run() -> None:
         wait_s = SILENT_S
         with suppress(OSError, ValueError):  # nobody reads stderr any more
-            while not over.wait(wait_s):
+            while not is_over.wait(wait_s):
                 display.tick(time.monotonic())
                 wait_s = REDRAW_S
 
@@ -159,6 +159,6 @@ def shown(name: str) -> Iterator[None]:
         display.flush()
         raise
     finally:
-        over.set()
+        is_over.set()
         clock.join()
         erase()

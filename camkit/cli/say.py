@@ -29,7 +29,7 @@ def is_terminal() -> bool:
 
 def plain(text: str) -> str:
     """Return a text with its control characters as visible escapes."""
-    return _STEERING.sub(lambda found: ascii(found[0])[1:-1], text)
+    return _STEERING.sub(lambda match: ascii(match[0])[1:-1], text)
 
 
 def say(text: str, *, err: bool = False) -> None:

@@ -6,12 +6,12 @@ lettering     lines of made-up glyphs
 procedural    `procedural:SEED`, a bit of everything
 clean         edges, stars and discs whose truth is known to the last pixel
 slanted_edge  a sharp edge, to measure an MTF on
-squares       `squares:SEED`, dark squares on white, to measure the focus of a unit on
+squares       `squares:SEED`, dark squares on white, to measure the focus of a camera body on
 saturation    the exposure at which a share of a scene saturates
-named         a scene by its name; those that a kind of camera brings too (`night:SEED`)
+scene_register  a scene by its name; those that a kind of camera brings too (`night:SEED`)
 """
 
-from camkit.scenes.named import is_scene_name, named_scene
 from camkit.scenes.procedural import procedural_scene
+from camkit.scenes.scene_register import is_scene_name, named_scene
 
 __all__ = ["is_scene_name", "named_scene", "procedural_scene"]

@@ -64,8 +64,8 @@ def edges(rng: Generator, side_px: int) -> FloatArray:
     dark = _log_uniform(rng, DARK)
     scene = np.ones((3, side_px, side_px)) * _colour(rng, dark)
     for _ in range(int(rng.integers(1, MOST_SHAPES + 1))):
-        turn, off = rng.uniform(0, 2 * np.pi), rng.uniform(-0.25, 0.25) * side_px
-        cover = np.clip(x * np.cos(turn) + y * np.sin(turn) - off + 0.5, 0, 1)
+        turn, offset = rng.uniform(0, 2 * np.pi), rng.uniform(-0.25, 0.25) * side_px
+        cover = np.clip(x * np.cos(turn) + y * np.sin(turn) - offset + 0.5, 0, 1)
         level = min(dark * _log_uniform(rng, RATIO), BRIGHTEST)
         scene += cover * (_colour(rng, level) - scene)
     return np.asarray(scene, np.float32)

@@ -37,9 +37,9 @@ def _glyph(rng: Generator, cell: int) -> FloatArray:
     x = np.arange(cell)[None, :]
     ink = np.zeros((cell, cell))
     for _ in range(int(rng.integers(2, 6))):
-        (ay, ax), (by, bx) = nodes[rng.choice(len(nodes), 2, replace=False)]
-        length2 = (by - ay) ** 2 + (bx - ax) ** 2
-        t = np.clip(((y - ay) * (by - ay) + (x - ax) * (bx - ax)) / length2, 0, 1)
-        gap = np.hypot(y - ay - t * (by - ay), x - ax - t * (bx - ax))
+        (y0, x0), (y1, x1) = nodes[rng.choice(len(nodes), 2, replace=False)]
+        length2 = (y1 - y0) ** 2 + (x1 - x0) ** 2
+        t = np.clip(((y - y0) * (y1 - y0) + (x - x0) * (x1 - x0)) / length2, 0, 1)
+        gap = np.hypot(y - y0 - t * (y1 - y0), x - x0 - t * (x1 - x0))
         np.maximum(ink, np.clip(thick - gap + 0.5, 0, 1), out=ink)
     return ink.astype(np.float32)

@@ -81,10 +81,10 @@ def _grating(rng: Generator, rows: int, columns: int) -> FloatArray:
     angle = rng.uniform(0, np.pi)
     y = np.arange(rows)[:, None]
     x = np.arange(columns)[None, :]
-    along = x * np.cos(angle) + y * np.sin(angle)
+    position = x * np.cos(angle) + y * np.sin(angle)
     first = rng.uniform(0.01, 0.1)
     sweep = rng.uniform(0, 0.25) / (rows + columns)
-    wave = np.sin(2 * np.pi * (first + 0.5 * sweep * np.abs(along)) * along)
+    wave = np.sin(2 * np.pi * (first + 0.5 * sweep * np.abs(position)) * position)
     if rng.random() < 0.5:
         wave = np.clip(3 * wave, -1, 1)
     return np.asarray(0.5 + 0.5 * wave, dtype=np.float32)

@@ -137,23 +137,23 @@ def _saturation(
 
 def _threshold(fill: FloatArray, share: float) -> float:
     """Return a value that a share of the values exceeds."""
-    wanted = round(share * fill.size)
-    if wanted < 1:
+    count = round(share * fill.size)
+    if count < 1:
         raise ContractError(
             f"{share:.3%} of a scene of {fill.size} pixels is less than one of them; "
             "give a larger scene or share"
         )
-    level = float(np.partition(fill, fill.size - wanted)[fill.size - wanted])
+    level = float(np.partition(fill, fill.size - count)[fill.size - count])
     above, alike = np.count_nonzero(fill > level), np.count_nonzero(fill == level)
     # values that are alike saturate together: all of them, or none
-    reached = above + alike if above + alike - wanted <= wanted - above else above
-    if level <= 0 or abs(reached - wanted) > max(TOLERANCE * wanted, 0.5):
+    saturated = above + alike if above + alike - count <= count - above else above
+    if level <= 0 or abs(saturated - count) > max(TOLERANCE * count, 0.5):
         raise ContractError(
             f"no exposure saturates {share:.3%} of this scene: {alike / fill.size:.3%} of its "
             f"pixels are alike and {above / fill.size:.3%} are brighter; "
             "it must have lights of different brightness"
         )
-    if reached == above:
+    if saturated == above:
         level = float(fill[fill > level].min())
     below = max(float(np.max(fill, where=fill < level, initial=0)), level * (1 - HEADROOM) ** 2)
     return float(np.sqrt(below * level))

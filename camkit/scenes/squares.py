@@ -51,8 +51,8 @@ def _rows(
     cosine, sine = math.cos(angle_rad), math.sin(angle_rad)
     y, x = rows[:, None] + offset[0], np.arange(width) + offset[1]
     inside = np.ones((rows.size, width))
-    for across in (x * cosine + y * sine, y * cosine - x * sine):
-        from_middle = np.abs(across % PITCH_PX - PITCH_PX / 2)
+    for position in (x * cosine + y * sine, y * cosine - x * sine):
+        from_middle = np.abs(position % PITCH_PX - PITCH_PX / 2)
         inside *= bright_share(SIDE_PX / 2 - from_middle, cosine, abs(sine))
     dark, bright = LEVELS
     return bright + (dark - bright) * inside

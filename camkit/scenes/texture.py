@@ -72,11 +72,11 @@ def sample_texture(
     Returns:
         (h, w) float32.
     """
-    tall = _along(texture, y, 0)
-    return _along(tall, x, 1)
+    tall = _sampled_axis(texture, y, 0)
+    return _sampled_axis(tall, x, 1)
 
 
-def _along(texture: FloatArray, at: NDArray[np.float64], axis: int) -> FloatArray:
+def _sampled_axis(texture: FloatArray, at: NDArray[np.float64], axis: int) -> FloatArray:
     first = np.floor(at).astype(np.intp)
     share = (at - first).astype(np.float32)
     share = share * share * (3 - 2 * share)

@@ -12,7 +12,7 @@ from camkit.errors import BundleError, ParityError
 from camkit.runtime.bank.cell_means import cell_count
 from camkit.runtime.bank.haze import CoarseBand, hazy_kernels, solve_coarse
 from camkit.runtime.geometry.sensor_window import SensorWindow
-from camkit.scenes.named import named_scene
+from camkit.scenes.scene_register import named_scene
 
 ALLOWED: Final = 2e-3
 """Of the largest value; half precision takes half of a thousandth."""

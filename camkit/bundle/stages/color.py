@@ -16,10 +16,10 @@ class Color(StageEntry):
     takes: tuple[Word, ...] = ("straight",)
     gives: tuple[Word, ...] = ("picture",)
 
-    def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
+    def join(self, planes: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Return three planes in the colour of the output."""
         del parts
-        plane = one_linear(taken)
+        plane = one_linear(planes)
         if plane.channels == MOSAIC:
             raise JoinError("a mosaic has no colour yet; it must be demosaicked")
         if len(plane.channels) not in (1, len(RGB)):

@@ -16,7 +16,7 @@ class Correct(StageEntry):
     takes: tuple[Word, ...] = ("capture",)
     gives: tuple[Word, ...] = ("photons",)
 
-    def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
+    def join(self, planes: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Return the photons, over the axes of the capture."""
         del parts
-        return (need_counts_of_pixels(taken).model_copy(update={"type": "float32"}),)
+        return (need_counts_of_pixels(planes).model_copy(update={"type": "float32"}),)

@@ -41,10 +41,10 @@ class Deglare(StageEntry):
             )
         return self
 
-    def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
+    def join(self, planes: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Return the plane as taken."""
         del parts
-        plane = one_linear(taken)
+        plane = one_linear(planes)
         need_rows(plane)
         if plane.channels != RGB:
             raise JoinError("it takes red, green and blue")

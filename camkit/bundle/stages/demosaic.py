@@ -17,10 +17,10 @@ class Demosaic(StageEntry):
     gives: tuple[Word, ...] = ("rgb",)
     method: Literal["fast", "quality"] = "quality"
 
-    def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
+    def join(self, planes: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Return the three planes."""
         del parts
-        plane = one_linear(taken)
+        plane = one_linear(planes)
         if plane.channels != MOSAIC:
             raise JoinError("it takes a mosaic")
         return (plane.model_copy(update={"channels": RGB}),)

@@ -62,7 +62,7 @@ class StageEntry(Entry):
     gives: tuple[Word, ...]
     type: Word
 
-    def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
+    def join(self, planes: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Return the planes that the stage makes of those it takes; one for each name in `gives`.
 
         Raises:
@@ -83,16 +83,16 @@ class PackageStage(StageEntry):
     package: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")]
 
 
-def need_count(taken: Sequence[Plane], least: int, most: int | None = None) -> None:
+def need_count(planes: Sequence[Plane], least: int, most: int | None = None) -> None:
     """Refuse a number of planes; `most` is `least` unless given.
 
     Raises:
         JoinError: If there are too few or too many.
     """
     most = least if most is None else most
-    if not least <= len(taken) <= most:
-        wanted = f"{least}" if least == most else f"{least} to {most}"
-        raise JoinError(f"it takes {wanted} plane(s), not {len(taken)}")
+    if not least <= len(planes) <= most:
+        expected = f"{least}" if least == most else f"{least} to {most}"
+        raise JoinError(f"it takes {expected} plane(s), not {len(planes)}")
 
 
 def need_domain(plane: Plane, domain: Domain) -> None:
@@ -115,28 +115,28 @@ def need_rows(plane: Plane) -> None:
         raise JoinError(f"it takes pictures (y x), not planes over {plane.axes}")
 
 
-def need_counts_of_pixels(taken: Sequence[Plane]) -> Plane:
+def need_counts_of_pixels(planes: Sequence[Plane]) -> Plane:
     """Return the one plane of photons that a stage takes, as the pixels of the array counted them.
 
     Raises:
         JoinError: If it is given none, several, one of another domain or a finer one.
     """
-    need_count(taken, 1)
-    need_domain(taken[0], "counts")
-    if taken[0].grid.pitch_ratio != 1:
+    need_count(planes, 1)
+    need_domain(planes[0], "counts")
+    if planes[0].grid.pitch_ratio != 1:
         raise JoinError("it takes what the pixels of the array counted, not a finer plane")
-    return taken[0]
+    return planes[0]
 
 
-def one_linear(taken: Sequence[Plane]) -> Plane:
+def one_linear(planes: Sequence[Plane]) -> Plane:
     """Return the one linear plane that a stage takes.
 
     Raises:
         JoinError: If it is given none, several or one of another domain.
     """
-    need_count(taken, 1)
-    need_domain(taken[0], "linear")
-    return taken[0]
+    need_count(planes, 1)
+    need_domain(planes[0], "linear")
+    return planes[0]
 
 
 def need_masks(masks: Sequence[Plane], plane: Plane, use: str) -> None:

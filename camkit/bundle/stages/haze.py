@@ -37,13 +37,13 @@ class Dehaze(StageEntry):
     terms: Annotated[int, Field(ge=1, le=128)] = 32
     rounds: Annotated[int, Field(ge=1, le=16)] = 3
 
-    def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
+    def join(self, planes: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Return the plane as taken, its light in the cores."""
-        need_count(taken, 1, 2)
-        plane = taken[0]
+        need_count(planes, 1, 2)
+        plane = planes[0]
         need_domain(plane, "linear")
         need_rows(plane)
-        need_masks(taken[1:], plane, "clears")
+        need_masks(planes[1:], plane, "clears")
         optics = parts.need_optics("it undoes the haze of optics")
         if optics.type != "hazy_psf":
             raise JoinError(f"it needs optics with a haze (hazy_psf), not {optics.type}")

@@ -43,13 +43,13 @@ class Highlights(StageEntry):
         """Return what of this stage readers of older formats do not know."""
         return super().needs() + ([_FROM_SAMPLES] if self.from_samples else [])
 
-    def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
+    def join(self, planes: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Return the plane as taken; its lights may lie far above white."""
-        need_count(taken, 1, 2)
-        plane = one_linear(taken[:1])
-        if len(taken) > 1:
-            need_domain(taken[1], "linear")
-            if taken[1].channels != MOSAIC or taken[1].grid != plane.grid:
+        need_count(planes, 1, 2)
+        plane = one_linear(planes[:1])
+        if len(planes) > 1:
+            need_domain(planes[1], "linear")
+            if planes[1].channels != MOSAIC or planes[1].grid != plane.grid:
                 raise JoinError("beside its colours it takes their mosaic")
         if plane.channels != RGB:
             raise JoinError("it takes red, green and blue")

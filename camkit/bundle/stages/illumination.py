@@ -15,9 +15,9 @@ class Illumination(StageEntry):
     takes: tuple[Word, ...] = ("neutral",)
     gives: tuple[Word, ...] = ("even",)
 
-    def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
+    def join(self, planes: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Return a plane of the kind taken."""
-        plane = one_linear(taken)
+        plane = one_linear(planes)
         need_rows(plane)
         optics = parts.need_optics("it divides by the illumination of optics")
         if optics.type == "lens_profile" and optics.illumination is None:

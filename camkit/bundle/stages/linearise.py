@@ -16,12 +16,12 @@ class Linearise(StageEntry):
     takes: tuple[Word, ...] = ("capture",)
     gives: tuple[Word, ...] = ("light", "clipped")
 
-    def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
+    def join(self, planes: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Return the linear plane and the mask."""
-        need_count(taken, 1)
-        need_domain(taken[0], "dn")
+        need_count(planes, 1)
+        need_domain(planes[0], "dn")
         if not isinstance(parts.sensor, ColorSensor):
             raise JoinError(f"a sensor of type {parts.sensor.type} has no black and white level")
-        light = taken[0].model_copy(update={"domain": "linear", "type": "float32"})
-        mask = taken[0].model_copy(update={"domain": "mask", "type": "bool"})
+        light = planes[0].model_copy(update={"domain": "linear", "type": "float32"})
+        mask = planes[0].model_copy(update={"domain": "mask", "type": "bool"})
         return (light, mask)[: len(self.gives)]

@@ -64,29 +64,29 @@ class Network(StageEntry):
         """Pixels that its stage looks beyond the reach of the network."""
         return 0 if self.light is None else BOUND_REACH_PX
 
-    def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
+    def join(self, planes: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Return the outputs of the network, on a finer grid where it says so."""
         sizes = parts.networks.get(self.role)
         if not sizes:
             raise JoinError(f"the bundle holds no network of the role {self.role!r}")
-        taken = self._without_masks(taken)
-        first = taken[0]
+        planes = self._without_masks(planes)
+        first = planes[0]
         need_rows(first)
-        for plane in taken:
+        for plane in planes:
             if plane.grid != first.grid or plane.axes != first.axes:
                 raise JoinError("its planes must lie on one grid")
             need_domain(plane, "linear" if self.transform == "stabilise" else first.domain)
             if self.transform == "stabilise":
                 _check_noise(len(plane.channels), parts)
         for size, facts in sizes.items():
-            _check_ports(size, facts.inputs, taken)
+            _check_ports(size, facts.inputs, planes)
         outputs = _outputs(sizes)
         if self.light is not None or self.keeps_white:
-            self._check_bound(taken[-1], outputs)
+            self._check_bound(planes[-1], outputs)
         if self.transform == "stabilise":
             for port in outputs:
                 _check_noise(port.channels, parts)
-        last = taken[-1]
+        last = planes[-1]
         _check_finest(last, outputs)
         if self.transform == "stabilise" and any(
             port.channels != len(last.channels) for port in outputs
@@ -99,7 +99,7 @@ class Network(StageEntry):
             last.model_copy(
                 update={
                     "type": "float32",
-                    "channels": _names(port, taken, parts),
+                    "channels": _names(port, planes, parts),
                     "grid": last.grid.finer(port.scale),
                 }
             )
@@ -127,12 +127,12 @@ class Network(StageEntry):
             raise JoinError("its light is bounded by its last plane, which its output must match")
 
 
-def _check_ports(size: str, ports: Sequence[Port], taken: Sequence[Plane]) -> None:
-    wanted = [port.channels for port in ports]
-    got = [len(plane.channels) for plane in taken]
-    if wanted != got:
+def _check_ports(size: str, ports: Sequence[Port], planes: Sequence[Plane]) -> None:
+    expected = [port.channels for port in ports]
+    got = [len(plane.channels) for plane in planes]
+    if expected != got:
         raise JoinError(
-            f"its network of size {size} has inputs of {_listed(wanted)} channels "
+            f"its network of size {size} has inputs of {_listed(expected)} channels "
             f"({', '.join(port.name for port in ports)}); its planes have {_listed(got)}"
         )
 
@@ -164,9 +164,9 @@ def _outputs(sizes: Mapping[str, NetworkFacts]) -> tuple[Port, ...]:
     return first
 
 
-def _names(port: Port, taken: Sequence[Plane], parts: Parts) -> tuple[str, ...]:
+def _names(port: Port, planes: Sequence[Plane], parts: Parts) -> tuple[str, ...]:
     """Return the channel names of an output: those of the last plane of that many, or numbers."""
-    for plane in reversed(taken):
+    for plane in reversed(planes):
         if len(plane.channels) == port.channels:
             return plane.channels
     if len(parts.sensor.channels) == port.channels:

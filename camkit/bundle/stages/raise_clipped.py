@@ -16,10 +16,10 @@ class RaiseClipped(StageEntry):
     takes: tuple[Word, ...] = ("clean",)
     gives: tuple[Word, ...] = ("neutral",)
 
-    def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
+    def join(self, planes: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Return a plane of the kind taken."""
         del parts
-        plane = one_linear(taken)
+        plane = one_linear(planes)
         if plane.channels != RGB:
             raise JoinError("it takes red, green and blue")
         return (plane,)

@@ -75,9 +75,9 @@ def find_stage(name: str) -> type[StageEntry]:
         return _BY_TYPE[name]
     installed = entry_points(GROUP)
     if name not in installed:
-        known = ", ".join(sorted({*_BY_TYPE, *installed}))
+        names = ", ".join(sorted({*_BY_TYPE, *installed}))
         raise UnsupportedError(
-            f"no installed package brings the stage {name!r}; there are: {known}"
+            f"no installed package brings the stage {name!r}; there are: {names}"
         )
     return _of_package(name)
 
@@ -115,14 +115,14 @@ def all_stages() -> list[type[StageEntry]]:
 
 def stages_of_packages() -> dict[str, str]:
     """Return the stages that packages bring by name: `READY`, or why they are refused."""
-    found = {}
+    states = {}
     for name in sorted(entry_points(GROUP)):
         try:
             _of_package(name)
-            found[name] = READY
+            states[name] = READY
         except ContractError as error:
-            found[name] = str(error)
-    return found
+            states[name] = str(error)
+    return states
 
 
 def _validated(value: Any, built_in: core_schema.ValidatorFunctionWrapHandler) -> StageEntry:
@@ -130,14 +130,14 @@ def _validated(value: Any, built_in: core_schema.ValidatorFunctionWrapHandler) -
     table = value if isinstance(value, Mapping) else {}
     name = table.get("type", getattr(value, "type", None))
     if not isinstance(name, str) or not _TYPE.fullmatch(name) or name in _BY_TYPE:
-        made: StageEntry = built_in(value)  # it refuses what is no name
-        return made
+        entry: StageEntry = built_in(value)  # it refuses what is no name
+        return entry
     try:
         return find_stage(name).model_validate(value)
     except UnsupportedError as error:
         package = str(table.get("package", ""))
-        said = f"; the bundle names the package {package!r}" if _PACKAGE.fullmatch(package) else ""
-        raise ValueError(f"{error}{said}") from error
+        hint = f"; the bundle names the package {package!r}" if _PACKAGE.fullmatch(package) else ""
+        raise ValueError(f"{error}{hint}") from error
     except CamkitError as error:
         raise ValueError(str(error)) from error
 

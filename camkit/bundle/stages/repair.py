@@ -19,15 +19,15 @@ class Repair(StageEntry):
     takes: tuple[Word, ...] = ("light", "clipped")
     gives: tuple[Word, ...] = ("sound", "unknown")
 
-    def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
+    def join(self, planes: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Return planes of the kind taken."""
         del parts
-        need_count(taken, 1, 2)
-        need_domain(taken[0], "linear")
-        for mask in taken[1:]:
+        need_count(planes, 1, 2)
+        need_domain(planes[0], "linear")
+        for mask in planes[1:]:
             need_domain(mask, "mask")
-            if mask.grid != taken[0].grid or mask.channels != taken[0].channels:
+            if mask.grid != planes[0].grid or mask.channels != planes[0].channels:
                 raise JoinError("its mask must lie on the samples that it repairs")
-        if len(self.gives) > len(taken):
+        if len(self.gives) > len(planes):
             raise JoinError("it gives a mask only where it takes one")
-        return tuple(taken[: len(self.gives)])
+        return tuple(planes[: len(self.gives)])

@@ -36,10 +36,10 @@ class Sharpen(StageEntry):
     laser_fwhm_ps: NonNegative = 0.0
     laser_wavelength_nm: Positive | None = None
 
-    def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
+    def join(self, planes: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Return the depth."""
-        need_count(taken, 1)
-        need_domain(taken[0], "counts")
-        if not isinstance(parts.sensor, SpadSensor) or taken[0].axes != "t y x":
+        need_count(planes, 1)
+        need_domain(planes[0], "counts")
+        if not isinstance(parts.sensor, SpadSensor) or planes[0].axes != "t y x":
             raise JoinError("it takes photons by time (t y x); the sensor states no time_bins")
-        return (taken[0].model_copy(update={"axes": "y x", "domain": "depth"}),)
+        return (planes[0].model_copy(update={"axes": "y x", "domain": "depth"}),)

@@ -60,9 +60,9 @@ class SuperResolve(StageEntry):
             raise ValueError("sigma belongs to the sampling gaussian, and to it alone")
         return self
 
-    def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
+    def join(self, planes: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Return the photons on the fine grid."""
-        plane = need_counts_of_pixels(taken)
+        plane = need_counts_of_pixels(planes)
         sensor, optics = parts.sensor, parts.need_optics("it undoes their blur")
         if not isinstance(sensor, SpadSensor) or sensor.sub_pixels < 2:
             raise JoinError("it takes an array that counts photons and states its sub_pixels")

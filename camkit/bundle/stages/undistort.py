@@ -36,9 +36,9 @@ class Undistort(StageEntry):
     interpolation: Interpolation = "lanczos"
     overshoot: Annotated[Overshoot, BOUNDED] = "kept"
 
-    def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
+    def join(self, planes: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Return the plane in ideal geometry."""
-        plane = one_linear(taken)
+        plane = one_linear(planes)
         need_rows(plane)
         optics = parts.need_optics("it undoes the distortion of optics")
         if optics.type == "lens_profile" and optics.distortion is None:

@@ -16,9 +16,9 @@ class WhiteBalance(StageEntry):
     takes: tuple[Word, ...] = ("sound",)
     gives: tuple[Word, ...] = ("balanced",)
 
-    def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
+    def join(self, planes: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Return a plane of the kind taken."""
-        plane = one_linear(taken)
+        plane = one_linear(planes)
         if parts.sensor.channels != RGB or plane.channels not in (MOSAIC, RGB):
             raise JoinError("it balances red, green and blue, which these planes are not")
         return (plane,)

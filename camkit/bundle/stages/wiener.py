@@ -69,13 +69,13 @@ class Wiener(StageEntry):
             )
         return self
 
-    def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
+    def join(self, planes: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Return the plane as taken: deconvolved."""
-        need_count(taken, 1, 2)
-        plane = taken[0]
+        need_count(planes, 1, 2)
+        plane = planes[0]
         need_domain(plane, "linear")
         need_rows(plane)
-        need_masks(taken[1:], plane, "deconvolves")
+        need_masks(planes[1:], plane, "deconvolves")
         optics = parts.need_optics("it deconvolves with the kernels of optics")
         if optics.type == "lens_profile":
             raise JoinError("it needs optics with kernels; a lens_profile has none")

@@ -1,7 +1,7 @@
-"""A display as the thing photographed: what it shows, and captures of that as pairs for training.
+"""A display as the photographed object: its targets, and captures of them as pairs for training.
 
 profile    the ICC profile in a picture file: sRGB, Adobe RGB, others by name
-shown      pictures as light, upright, whatever their profile
+displayed_picture  pictures as light, upright, whatever their profile
 marks      blocks in the corners of a screen that say which target it shows, drawn and found
 screen     where things lie on a screen: marks, picture, board
 targets    all that is shown, drawn, written, and read back

@@ -79,12 +79,12 @@ class Aligned:
     inside: NDArray[np.bool_]
 
 
-def align(patch: Patch, shown: FloatArray, start: FloatGrid) -> Aligned:
+def align(patch: Patch, picture: FloatArray, start: FloatGrid) -> Aligned:
     """Align a picture with a capture.
 
     Args:
         patch: The part of the capture.
-        shown: (3, h, w) light of the picture.
+        picture: (3, h, w) light of the picture.
         start: (3, 3) first homography, places without distortion -> px of the picture.
 
     Raises:
@@ -94,12 +94,12 @@ def align(patch: Patch, shown: FloatArray, start: FloatGrid) -> Aligned:
     for extra, every in ROUNDS:
         thin = patch.thinned(extra, every)
         if every != ROUNDS[1][1]:
-            blur = _blur_of(patch.thinned(0.0, ROUNDS[1][1]), shown, matrix, step)
-        soft = _softened(shown, float(np.hypot(blur, extra)) / step)
+            blur = _blur_of(patch.thinned(0.0, ROUNDS[1][1]), picture, matrix, step)
+        soft = _softened(picture, float(np.hypot(blur, extra)) / step)
         margin = 2.0 * float(np.hypot(blur, extra)) / step + 2
         matrix = _refined(thin, soft, matrix, margin)
     model, inside, correlation = _compared(patch, soft, matrix, margin)
-    if _moved(start, matrix, shown.shape) > MOST_MOVED:
+    if _movement(start, matrix, picture.shape) > MOST_MOVED:
         correlation = 0.0
     if not correlation >= LEAST_CORRELATION:
         raise DecodeError(
@@ -115,7 +115,7 @@ def map_places(matrix: FloatGrid, places: FloatGrid) -> FloatGrid:
     return np.asarray(mapped[..., :2] / mapped[..., 2:])
 
 
-def _moved(start: FloatGrid, end: FloatGrid, shape: tuple[int, ...]) -> float:
+def _movement(start: FloatGrid, end: FloatGrid, shape: tuple[int, ...]) -> float:
     """Return the movement of the corners of a picture, as a share of its diagonal."""
     height, width = shape[1:]
     corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]]) * (width, height)
@@ -132,15 +132,15 @@ def _samples_per_px(patch: Patch, start: FloatGrid) -> float:
     return float(1 / np.sqrt(max(abs(np.linalg.det(np.stack(sides))), 1e-12)))
 
 
-def _softened(shown: FloatArray, blur_px: float) -> FloatArray:
-    return np.stack([cv2.GaussianBlur(plane, (0, 0), max(blur_px, 0.1)) for plane in shown])
+def _softened(picture: FloatArray, blur_px: float) -> FloatArray:
+    return np.stack([cv2.GaussianBlur(plane, (0, 0), max(blur_px, 0.1)) for plane in picture])
 
 
-def _blur_of(patch: Patch, shown: FloatArray, matrix: FloatGrid, step: float) -> float:
+def _blur_of(patch: Patch, picture: FloatArray, matrix: FloatGrid, step: float) -> float:
     """Return the blur with which the picture resembles the capture most."""
     alike = []
     for blur in BLURS:
-        soft = _softened(shown, blur / step)
+        soft = _softened(picture, blur / step)
         alike.append(_compared(patch, soft, matrix, 2 * BLURS[-1] / step)[2])
     return BLURS[int(np.argmax(alike))]
 
@@ -162,11 +162,11 @@ def _alike(grey: FloatArray, model: FloatGrid, inside: NDArray[np.bool_]) -> flo
     """Return the correlation of what smooth light does not explain."""
     some = _some(inside)
     terms = _terms(grey.shape)[:, some]
-    seen, made = (
+    observed, predicted = (
         part[some] - _least(terms, part[some].astype(np.float64)) @ terms for part in (grey, model)
     )
-    sizes = np.sqrt((seen @ seen) * (made @ made))
-    return float(seen @ made / sizes) if sizes > 0 else 0.0
+    sizes = np.sqrt((observed @ observed) * (predicted @ predicted))
+    return float(observed @ predicted / sizes) if sizes > 0 else 0.0
 
 
 def _some(inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -203,21 +203,21 @@ def _mixture(
 ) -> tuple[FloatGrid, FloatGrid, FloatGrid]:
     """Fit grey = gain * (colours . planes) + offset; gain and offset are smooth surfaces."""
     terms, some = _terms(grey.shape), _some(inside)
-    seen, gain = grey[some].astype(np.float64), np.ones(np.count_nonzero(some))
+    values, gain = grey[some].astype(np.float64), np.ones(np.count_nonzero(some))
     here, surface = planes[:, some], terms[:, some]
     mixed, shapes = np.ones(3), np.zeros((2, len(terms)))
     for _ in range(3):
-        mixed = _least(np.vstack([here * gain, surface]), seen)[:3]
+        mixed = _least(np.vstack([here * gain, surface]), values)[:3]
         bright = mixed @ here
-        shapes = _least(np.vstack([surface * bright, surface]), seen).reshape(2, -1)
+        shapes = _least(np.vstack([surface * bright, surface]), values).reshape(2, -1)
         gain = shapes[0] @ surface
     gains, offsets = np.tensordot(shapes, terms, 1)
     return mixed, gains, offsets
 
 
-def _least(columns: FloatGrid, seen: FloatGrid) -> FloatGrid:
+def _least(columns: FloatGrid, values: FloatGrid) -> FloatGrid:
     """Solve for few numbers; a picture of one colour leaves some of them open."""
-    return np.asarray(np.linalg.lstsq(columns @ columns.T, columns @ seen, rcond=1e-12)[0])
+    return np.asarray(np.linalg.lstsq(columns @ columns.T, columns @ values, rcond=1e-12)[0])
 
 
 def _refined(patch: Patch, soft: FloatArray, start: FloatGrid, margin: float) -> FloatGrid:
@@ -243,7 +243,7 @@ def _refined(patch: Patch, soft: FloatArray, start: FloatGrid, margin: float) ->
 
 
 def _step(
-    seen: tuple[Patch, FloatArray, FloatGrid, NDArray[np.bool_]],
+    arrays: tuple[Patch, FloatArray, FloatGrid, NDArray[np.bool_]],
     matrix: FloatGrid,
     to_unit: FloatGrid,
     pull: float,
@@ -251,12 +251,12 @@ def _step(
     """Return the (8,) change of the homography between places in -1..1.
 
     Args:
-        seen: The patch, the soft picture, where samples lie in it, and which count.
+        arrays: The patch, the soft picture, where samples lie in it, and which count.
         matrix: (3, 3) so far, the last entry 1.
         to_unit: Places without distortion to -1..1.
         pull: Px of the picture in a unit.
     """
-    patch, soft, at, inside = seen
+    patch, soft, at, inside = arrays
     planes = np.stack([_sampled(plane, at) for plane in soft])
     mixed, gain, offset = _mixture(patch.grey, planes, inside)
     mix = np.tensordot(mixed, soft, 1).astype(np.float32)

@@ -52,24 +52,24 @@ class Lens:
         Raises:
             DecodeError: If it is not what `camkit calibrate geometry` writes, or no such lens.
         """
-        found = read_geometry(path)
-        model = next((m for m in MODELS if m.name == found.model), None)
-        if model is None or found.focal_px is None or found.coefficients is None:
+        file = read_geometry(path)
+        model = next((m for m in MODELS if m.name == file.model), None)
+        if model is None or file.focal_px is None or file.coefficients is None:
             raise DecodeError(f"{path} states no camera; write it with camkit calibrate geometry")
-        if len(found.coefficients) != model.coefficients:
+        if len(file.coefficients) != model.coefficients:
             raise DecodeError(
                 f"{path}: {model.name} has {model.coefficients} coefficients; got "
-                f"{len(found.coefficients)}"
+                f"{len(file.coefficients)}"
             )
-        if not 1 < found.focal_px < MOST_FOCAL_PX:
-            raise DecodeError(f"{path}: a focal length of {found.focal_px:g} px cannot be")
-        free = [found.coefficients[number] for number in model.free]
+        if not 1 < file.focal_px < MOST_FOCAL_PX:
+            raise DecodeError(f"{path}: a focal length of {file.focal_px:g} px cannot be")
+        free = [file.coefficients[number] for number in model.free]
         return cls(
             camera=Camera(
-                model=model, intrinsics=np.array([found.focal_px, *found.centre_px, *free])
+                model=model, intrinsics=np.array([file.focal_px, *file.centre_px, *free])
             ),
-            size=(found.width_px, found.height_px),
-            covered_px=found.covered_radius_px,
+            size=(file.width_px, file.height_px),
+            covered_px=file.covered_radius_px,
         )
 
     def without_distortion(self, seen_px: FloatGrid) -> FloatGrid:
@@ -81,13 +81,13 @@ class Lens:
         camera = self.camera
         centre, focal = np.array(camera.centre_px), camera.focal_px
         at = np.asarray(seen_px, dtype=np.float64)
-        off = np.zeros_like(at)
+        error = np.zeros_like(at)
         for _ in range(_ROUNDS):
-            off = self._distorted(at) - seen_px
-            at = at - off
-            if not np.isfinite(at).all() or np.abs(off).max(initial=0) < _DONE_PX:
+            error = self._distorted(at) - seen_px
+            at = at - error
+            if not np.isfinite(at).all() or np.abs(error).max(initial=0) < _DONE_PX:
                 break
-        if not np.abs(off).max(initial=0) < 1e-2:
+        if not np.abs(error).max(initial=0) < 1e-2:
             raise DecodeError(
                 f"the distortion cannot be undone {np.hypot(*(seen_px - centre).T).max():.0f} px "
                 f"from the optical centre (focal length {focal:.0f} px); it is known to "
@@ -103,10 +103,10 @@ class Lens:
             for line in (x_px, y_px)
         ]
         at = np.stack(np.meshgrid(*nodes), axis=-1)
-        moved = (self.without_distortion(at.reshape(-1, 2)) - at.reshape(-1, 2)).reshape(at.shape)
+        shift = (self.without_distortion(at.reshape(-1, 2)) - at.reshape(-1, 2)).reshape(at.shape)
         here = np.stack(np.meshgrid(x_px, y_px), axis=-1)
         for axis in (0, 1):
-            spline = RectBivariateSpline(nodes[1], nodes[0], moved[..., axis], kx=3, ky=3)
+            spline = RectBivariateSpline(nodes[1], nodes[0], shift[..., axis], kx=3, ky=3)
             here[..., axis] += spline(y_px, x_px)
         return here
 
@@ -115,11 +115,11 @@ class Lens:
         rays = (ideal_px - camera.centre_px) / camera.focal_px
         none, k = np.zeros(3), camera.coefficients
         if camera.model.fisheye:
-            seen = cv2.fisheye.distortPoints(rays[None], camera.matrix, k)
+            distorted = cv2.fisheye.distortPoints(rays[None], camera.matrix, k)
         else:
             points = np.column_stack([rays, np.ones(len(rays))])
-            seen, _ = cv2.projectPoints(points, none, none, camera.matrix, k)
-        return np.asarray(seen, dtype=np.float64).reshape(-1, 2)
+            distorted, _ = cv2.projectPoints(points, none, none, camera.matrix, k)
+        return np.asarray(distorted, dtype=np.float64).reshape(-1, 2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -147,11 +147,11 @@ class Tone:
         if path is None:
             light = decode_srgb((every / TOP_LEVEL).astype(np.float32)).astype(np.float64)
             return cls(light=light, measured=False)
-        found = read_tone(path)
-        light = np.array(found.luminance)
+        file = read_tone(path)
+        light = np.array(file.luminance)
         # a power of about 2.2 makes the curve nearly straight between steps
         share = (light - light[0]) / (light[-1] - light[0])
-        root = PchipInterpolator(np.array(found.levels), share ** (1 / _GAMMA))(every)
+        root = PchipInterpolator(np.array(file.levels), share ** (1 / _GAMMA))(every)
         return cls(light=np.asarray(root**_GAMMA / root[-1] ** _GAMMA), measured=True)
 
 
@@ -182,16 +182,16 @@ class Illumination:
         """
         if path is None:
             return cls()
-        found = read_flat(path)
-        if (found.width_px, found.height_px) not in (size, (None, None)):
+        file = read_flat(path)
+        if (file.width_px, file.height_px) not in (size, (None, None)):
             raise DecodeError(
-                f"{path} is of {found.width_px}x{found.height_px} px, the geometry of "
+                f"{path} is of {file.width_px}x{file.height_px} px, the geometry of "
                 f"{size[0]}x{size[1]}; give both of one camera"
             )
         return cls(
-            light=found.to_entry().to_illumination(),
-            pitch_mm=to_mm(found.pixel_pitch_um),
-            centre_px=found.centre_px,
+            light=file.to_entry().to_illumination(),
+            pitch_mm=to_mm(file.pixel_pitch_um),
+            centre_px=file.centre_px,
         )
 
     def at(self, places_px: FloatGrid) -> FloatGrid:

@@ -77,17 +77,17 @@ def find_marks(grey: FloatArray) -> SeenMarks | None:
         size = (round(grey.shape[1] * scale), round(grey.shape[0] * scale))
         way = cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC
         small = cv2.resize(grey, size, interpolation=way)
-        seen = _seen(to_codes(np.asarray(small, dtype=np.float32)))
-        if seen is not None and (best is None or len(seen.corners) > len(best.corners)):
+        marks = _detected(to_codes(np.asarray(small, dtype=np.float32)))
+        if marks is not None and (best is None or len(marks.corners) > len(best.corners)):
             factors = np.array(grey.shape[::-1]) / np.array(small.shape[::-1])
-            places = {n: (at + 0.5) * factors - 0.5 for n, at in seen.corners.items()}
-            best = SeenMarks(number=seen.number, corners=places)
+            places = {n: (at + 0.5) * factors - 0.5 for n, at in marks.corners.items()}
+            best = SeenMarks(number=marks.number, corners=places)
         if best is not None and len(best.corners) == 4:
             break
     return best
 
 
-def _seen(codes: NDArray[np.uint8]) -> SeenMarks | None:
+def _detected(codes: NDArray[np.uint8]) -> SeenMarks | None:
     settings = cv2.aruco.DetectorParameters()
     settings.adaptiveThreshWinSizeMin = 7
     settings.adaptiveThreshWinSizeMax = 7 + 3 * (max(codes.shape) // 40)
@@ -105,15 +105,15 @@ def _seen(codes: NDArray[np.uint8]) -> SeenMarks | None:
     if numbers is None:
         return None
     blocks = [np.asarray(one, dtype=np.float64).reshape(4, 2) for one in corners]
-    told = [int(n) for n in np.ravel(numbers)]
-    number, count = Counter(told).most_common(1)[0]
+    words = [int(n) for n in np.ravel(numbers)]
+    number, count = Counter(words).most_common(1)[0]
     if count < LEAST_BLOCKS:
         return None
-    placed = _placed([block for block, n in zip(blocks, told, strict=True) if n == number])
-    return None if placed is None else SeenMarks(number=number, corners=placed)
+    ordered = _by_corner([block for block, n in zip(blocks, words, strict=True) if n == number])
+    return None if ordered is None else SeenMarks(number=number, corners=ordered)
 
 
-def _placed(blocks: list[FloatGrid]) -> dict[int, FloatGrid] | None:
+def _by_corner(blocks: list[FloatGrid]) -> dict[int, FloatGrid] | None:
     """Return the blocks of one word by corner of the screen, in upright orientation."""
     if not LEAST_BLOCKS <= len(blocks) <= 4:
         return None
@@ -124,5 +124,5 @@ def _placed(blocks: list[FloatGrid]) -> dict[int, FloatGrid] | None:
     along = np.linalg.solve(np.stack([right, down], axis=1), middles.T).T
     halves = along > (along.min(axis=0) + along.max(axis=0)) / 2
     names = {(False, False): 0, (True, False): 1, (True, True): 2, (False, True): 3}
-    placed = {names[bool(x), bool(y)]: block for (x, y), block in zip(halves, blocks, strict=True)}
-    return placed if len(placed) == len(blocks) else None
+    ordered = {names[bool(x), bool(y)]: block for (x, y), block in zip(halves, blocks, strict=True)}
+    return ordered if len(ordered) == len(blocks) else None

@@ -46,7 +46,7 @@ _BAND_ROWS: Final = 256
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Given:
+class References:
     """The references of captures.
 
     Attributes:
@@ -71,7 +71,7 @@ class Given:
                 f"{option_text('most_residual_px')} must be > 0; got {self.most_residual_px:g}"
             )
 
-    def shown(self, target: Target) -> FloatArray:
+    def light_of(self, target: Target) -> FloatArray:
         """Return (3, h, w) light of what a picture's target shows, in its place.
 
         Raises:
@@ -164,7 +164,7 @@ class Pairs:
         }
 
 
-def find_pairs(files: Sequence[Path], given: Given) -> Pairs:
+def find_pairs(files: Sequence[Path], references: References) -> Pairs:
     """Sort captures and align every picture with its own.
 
     Raises:
@@ -176,22 +176,24 @@ def find_pairs(files: Sequence[Path], given: Given) -> Pairs:
         raise ContractError("a capture is given twice; give every capture once")
     if len(files) > MOST_CAPTURES:
         raise ContractError(f"expected at most {MOST_CAPTURES} captures; got {len(files)}")
-    found: list[Sorted] = []
+    captures: list[Sorted] = []
     for path in counted(files, "finding marks", "captures"):
-        view, _ = read_view(path, given.lens)
-        found.append(sort_view(view, given.lens, given.targets))
-    check_whole(found, given.targets)
-    order = {target.name: n for n, target in enumerate(given.targets.targets)}
-    found.sort(key=lambda one: order[one.target.name])
+        view, _ = read_view(path, references.lens)
+        captures.append(sort_view(view, references.lens, references.targets))
+    check_whole(captures, references.targets)
+    order = {target.name: n for n, target in enumerate(references.targets.targets)}
+    captures.sort(key=lambda one: order[one.target.name])
     pairs, likes = [], []
-    for one in found:
+    for one in captures:
         if one.target.kind == "picture":
-            pair, like = _pair(one, given)
+            pair, like = _pair(one, references)
             pairs.append(pair)
             likes.append(like)
     iso = _iso(pairs, likes)
-    primaries, notes = _primaries([one for one in found if one.target.kind == "colour"], given)
-    if not given.tone.measured:
+    primaries, notes = _primaries(
+        [one for one in captures if one.target.kind == "colour"], references
+    )
+    if not references.tone.measured:
         notes.append("no tone curve of the display: what it shows is taken as sRGB")
     gains = likes[0].white_balance
     if gains is None and likes[0].cfa is not None:
@@ -201,7 +203,7 @@ def find_pairs(files: Sequence[Path], given: Given) -> Pairs:
     return Pairs(
         pairs=tuple(pairs),
         primaries=primaries,
-        size=given.lens.size,
+        size=references.lens.size,
         iso=iso,
         white_balance=gains,
         notes=tuple(notes),
@@ -209,59 +211,59 @@ def find_pairs(files: Sequence[Path], given: Given) -> Pairs:
 
 
 def draw_pairs(
-    found: Pairs, given: Given
+    pairs: Pairs, references: References
 ) -> Iterator[tuple[NDArray[np.uint16], NDArray[np.uint8]]]:
     """Yield capture (h, w, 3) of 16 bits and reference (m, n, 3) of 8 bits, pair by pair."""
     from camkit.runtime.options import Options
     from camkit.runtime.pipeline import load
 
-    options = Options(color="camera", white_balance=found.white_balance)
+    options = Options(color="camera", white_balance=pairs.white_balance)
     pipeline = load(None, options=options)
-    for pair in found.pairs:
-        view, capture = read_view(pair.path, given.lens)
+    for pair in pairs.pairs:
+        view, capture = read_view(pair.path, references.lens)
         if view.like.cfa is None:
             light = capture.linear_rows(0, capture.height)
-            if found.white_balance is not None:
-                light *= np.array(found.white_balance, dtype=np.float32)[:, None, None]
+            if pairs.white_balance is not None:
+                light *= np.array(pairs.white_balance, dtype=np.float32)[:, None, None]
         else:
             light = pipeline.process(pair.path).image
         counts = np.rint(np.clip(light, 0, 1) * 65535).astype(np.uint16).transpose(1, 2, 0)
-        shown = given.shown(pair.target)
-        yield counts, reference_of(shown, pair.to_picture, pair.reference_px)
+        picture = references.light_of(pair.target)
+        yield counts, reference_of(picture, pair.to_picture, pair.reference_px)
 
 
-def _pair(one: Sorted, given: Given) -> tuple[Pair, Capture]:
+def _pair(one: Sorted, references: References) -> tuple[Pair, Capture]:
     """Align one picture with its capture.
 
     Raises:
         DecodeError: As `find_pairs`; names the capture.
     """
-    view, _ = read_view(one.path, given.lens)
-    target, shown = one.target, given.shown(one.target)
+    view, _ = read_view(one.path, references.lens)
+    target, picture = one.target, references.light_of(one.target)
     x, y, width, height = target.place_px or (0, 0, 0, 0)
     start = np.array([[1, 0, -x], [0, 1, -y], [0, 0, 1.0]]) @ one.to_screen
     try:
         box = _box(view, start, (width, height))
-        patch = _patch(view, box, given)
-        laid = align(patch, shown, start / start[2, 2])
-        at, shifts = tile_shifts(patch.grey, laid.model, laid.inside)
-        rectangle = filled_rectangle(laid.to_picture, (width, height), given.lens.size)
+        patch = _patch(view, box, references)
+        aligned = align(patch, picture, start / start[2, 2])
+        at, shifts = tile_shifts(patch.grey, aligned.model, aligned.inside)
+        rectangle = filled_rectangle(aligned.to_picture, (width, height), references.lens.size)
     except CamkitError as error:
         raise DecodeError(f"{one.path.name} ({target.file}): {error}") from error
     shifts_px = shifts * view.scale
     residual = float(np.sqrt(np.mean((shifts_px**2).sum(axis=1))))
-    if not residual <= given.most_residual_px:
+    if not residual <= references.most_residual_px:
         raise DecodeError(
             f"{one.path.name}: the picture of {target.file} lies on it to {residual:.2f} px RMS, "
-            f"{given.most_residual_px:g} is allowed ({option_text('most_residual_px')}): is the "
-            "geometry that of this camera, lens and focus, and the display flat?"
+            f"{references.most_residual_px:g} is allowed ({option_text('most_residual_px')}): is "
+            "the geometry that of this camera, lens and focus, and the display flat?"
         )
     pair = Pair(
         path=one.path,
         target=target,
-        to_picture=laid.to_picture,
+        to_picture=aligned.to_picture,
         residual_px=residual,
-        correlation=laid.correlation,
+        correlation=aligned.correlation,
         places_px=view.places(at + np.array(box[:2])),
         shifts_px=shifts_px,
         reference_px=rectangle,
@@ -272,25 +274,25 @@ def _pair(one: Sorted, given: Given) -> tuple[Pair, Capture]:
 def _box(view: View, to_picture: FloatGrid, size: tuple[int, int]) -> Place:
     """Return the window of the lattice that holds a picture; distortion bends it by a margin."""
     corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]]) * size
-    seen = map_places(np.asarray(np.linalg.inv(to_picture)), corners) / view.scale
+    places = map_places(np.asarray(np.linalg.inv(to_picture)), corners) / view.scale
     height, width = view.grey.shape
-    margin = _MARGIN + 0.05 * max(np.ptp(seen[:, 0]), np.ptp(seen[:, 1]))
-    left, top = np.clip(np.floor(seen.min(axis=0) - margin), 0, (width, height)).astype(int)
-    right, bottom = np.clip(np.ceil(seen.max(axis=0) + margin), 0, (width, height)).astype(int)
+    margin = _MARGIN + 0.05 * max(np.ptp(places[:, 0]), np.ptp(places[:, 1]))
+    left, top = np.clip(np.floor(places.min(axis=0) - margin), 0, (width, height)).astype(int)
+    right, bottom = np.clip(np.ceil(places.max(axis=0) + margin), 0, (width, height)).astype(int)
     if min(right - left, bottom - top) < _MARGIN:
         raise DecodeError("its picture lies outside the capture")
     return int(left), int(top), int(right - left), int(bottom - top)
 
 
-def _patch(view: View, box: Place, given: Given) -> Patch:
+def _patch(view: View, box: Place, references: References) -> Patch:
     x, y, width, height = box
     window = np.s_[y : y + height, x : x + width]
     here = np.stack(np.meshgrid(np.arange(x, x + width), np.arange(y, y + height)), axis=-1)
-    even = given.flat.at(view.places(here.astype(np.float64)))
+    even = references.flat.at(view.places(here.astype(np.float64)))
     return Patch(
         grey=np.asarray(view.grey[window] / even, dtype=np.float32),
         usable=~view.clipped[window],
-        ideal_px=view.window(given.lens, box),
+        ideal_px=view.window(references.lens, box),
     )
 
 
@@ -308,24 +310,26 @@ def _iso(pairs: Sequence[Pair], likes: Sequence[Capture]) -> float:
     return float(isos[0] or 0)
 
 
-def _primaries(colours: Sequence[Sorted], given: Given) -> tuple[Primaries | None, list[str]]:
+def _primaries(
+    colours: Sequence[Sorted], references: References
+) -> tuple[Primaries | None, list[str]]:
     if not colours:
         return None, ["no captures of the colours: the display's primaries are not known"]
-    seen, likes = [], []
+    lights, likes = [], []
     for one in colours:
-        view, capture = read_view(one.path, given.lens)
-        light, clipped = colours_of(capture, _middle(one, given.lens), given.flat)
+        view, capture = read_view(one.path, references.lens)
+        light, clipped = colours_of(capture, _middle(one, references.lens), references.flat)
         if clipped > MOST_CLIPPED:
             raise DecodeError(
                 f"{one.path.name} ({one.target.file}): {clipped:.1%} is clipped; expose less"
             )
-        seen.append(light)
+        lights.append(light)
         likes.append(view.like)
     exposures, notes = exposures_of([one.path for one in colours], likes)
-    shown = [given.tone.light[list(one.target.rgb or (0, 0, 0))] for one in colours]
-    light = np.array(seen) / np.array(exposures)[:, None]
+    display = [references.tone.light[list(one.target.rgb or (0, 0, 0))] for one in colours]
+    light = np.array(lights) / np.array(exposures)[:, None]
     names = [one.target.name for one in colours]
-    return fit_primaries(names, np.array(shown), light), notes
+    return fit_primaries(names, np.array(display), light), notes
 
 
 def _middle(one: Sorted, lens: Lens) -> NDArray[np.bool_]:

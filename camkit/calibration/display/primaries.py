@@ -50,27 +50,27 @@ class Primaries:
         }
 
 
-def fit_primaries(names: Sequence[str], shown: FloatGrid, seen: FloatGrid) -> Primaries:
+def fit_primaries(names: Sequence[str], display: FloatGrid, light: FloatGrid) -> Primaries:
     """Fit the matrix.
 
     Args:
         names: Of the colours.
-        shown: (colour, 3) light of the display.
-        seen: (colour, 3) light of the sensor's colours, of equal exposure.
+        display: (colour, 3) light of the display.
+        light: (colour, 3) light of the sensor's colours, of equal exposure.
 
     Raises:
         DecodeError: If the colours are too few or alike.
     """
-    columns = np.column_stack([shown, np.ones(len(shown))])
-    if len(shown) < columns.shape[1] or np.linalg.matrix_rank(columns) < columns.shape[1]:
-        raise DecodeError(f"{len(shown)} colours do not tell the primaries of a display")
-    found = np.linalg.lstsq(columns, seen, rcond=None)[0]
-    brightest = float(seen.max())
+    columns = np.column_stack([display, np.ones(len(display))])
+    if len(display) < columns.shape[1] or np.linalg.matrix_rank(columns) < columns.shape[1]:
+        raise DecodeError(f"{len(display)} colours do not tell the primaries of a display")
+    solution = np.linalg.lstsq(columns, light, rcond=None)[0]
+    brightest = float(light.max())
     if not brightest > 0:
         raise DecodeError("the captures of colours are black")
     return Primaries(
-        matrix=np.asarray(found[:3].T, dtype=np.float64),
-        offset=np.asarray(found[3], dtype=np.float64),
+        matrix=np.asarray(solution[:3].T, dtype=np.float64),
+        offset=np.asarray(solution[3], dtype=np.float64),
         names=tuple(names),
-        residuals=(seen - columns @ found) / brightest,
+        residuals=(light - columns @ solution) / brightest,
     )

@@ -40,8 +40,8 @@ def filled_rectangle(
     """
     width, height = picture
     corners = np.array([[0, 0], [width - 1, 0], [width - 1, height - 1], [0, height - 1.0]])
-    seen = map_places(np.asarray(np.linalg.inv(to_picture)), corners)
-    x, y = np.sort(seen[:, 0]), np.sort(seen[:, 1])
+    places = map_places(np.asarray(np.linalg.inv(to_picture)), corners)
+    x, y = np.sort(places[:, 0]), np.sort(places[:, 1])
     left, top = (max(0, int(np.ceil(n[1])) + INSET_PX) for n in (x, y))
     right, bottom = (
         min(side, int(np.floor(n[2])) + 1 - INSET_PX) for n, side in zip((x, y), size, strict=True)
@@ -54,11 +54,11 @@ def filled_rectangle(
     return left, top, right - left, bottom - top
 
 
-def reference_of(shown: FloatArray, to_picture: FloatGrid, place: Place) -> NDArray[np.uint8]:
+def reference_of(picture: FloatArray, to_picture: FloatGrid, place: Place) -> NDArray[np.uint8]:
     """Return the (h, w, 3) reference, 8-bit sRGB.
 
     Args:
-        shown: (3, h, w) light of the picture, 0..1.
+        picture: (3, h, w) light of the picture, 0..1.
         to_picture: (3, 3) places without distortion -> px of the picture.
         place: Of the reference among those places.
     """
@@ -78,7 +78,7 @@ def reference_of(shown: FloatArray, to_picture: FloatGrid, place: Place) -> NDAr
         last = min(height, first + band)
         rows = y[first * fine : last * fine]
         places = map_places(to_picture, np.stack(np.meshgrid(x, rows), axis=-1)).astype(np.float32)
-        for channel, plane in enumerate(shown):
+        for channel, plane in enumerate(picture):
             parts = cv2.remap(
                 plane,
                 places[..., 0].copy(),

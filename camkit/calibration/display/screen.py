@@ -50,10 +50,10 @@ class Screen:
         Raises:
             ContractError: If the text is anything else.
         """
-        found = _TEXT.fullmatch(text if isinstance(text, str) else "x".join(map(str, text)))
-        if found is None:
+        match = _TEXT.fullmatch(text if isinstance(text, str) else "x".join(map(str, text)))
+        if match is None:
             raise ContractError(f"a screen is WIDTHxHEIGHT in px, like 1920x1080; got {text!r}")
-        return cls(width_px=int(found[1]), height_px=int(found[2]))
+        return cls(width_px=int(match[1]), height_px=int(match[2]))
 
     def __str__(self) -> str:
         return f"{self.width_px}x{self.height_px}"
@@ -84,10 +84,10 @@ class Screen:
             aspect: Width over height.
         """
         gap = self.cell_px
-        beside = (BLOCK_CELLS + 1) * self.cell_px
+        margin = (BLOCK_CELLS + 1) * self.cell_px
         rooms = [
-            (self.width_px - 2 * beside, self.height_px - 2 * gap),
-            (self.width_px - 2 * gap, self.height_px - 2 * beside),
+            (self.width_px - 2 * margin, self.height_px - 2 * gap),
+            (self.width_px - 2 * gap, self.height_px - 2 * margin),
         ]
         sizes = [(min(w, h * aspect), min(h, w / aspect)) for w, h in rooms]
         width, height = (max(1, int(side)) for side in max(sizes, key=lambda size: size[0]))

@@ -39,51 +39,51 @@ def sort_view(view: View, lens: Lens, targets: Targets) -> Sorted:
     Raises:
         DecodeError: If it has no marks, or such that no target has.
     """
-    found = find_marks(np.sqrt(np.maximum(view.grey, 0)))
-    if found is None:
+    marks = find_marks(np.sqrt(np.maximum(view.grey, 0)))
+    if marks is None:
         raise DecodeError(
             f"{view.path.name} shows no marks; give captures of whole screens with marks, of "
             "colours and pictures alone"
         )
-    target = targets.by_code.get(found.number)
+    target = targets.by_code.get(marks.number)
     if target is None:
         raise DecodeError(
-            f"the marks of {view.path.name} say {found.number}, which none of the targets has; "
+            f"the marks of {view.path.name} say {marks.number}, which none of the targets has; "
             f"captures and {option_text('targets')} are of two sets"
         )
-    return Sorted(path=view.path, target=target, to_screen=_to_screen(found, view, lens, targets))
+    return Sorted(path=view.path, target=target, to_screen=_to_screen(marks, view, lens, targets))
 
 
-def _to_screen(found: SeenMarks, view: View, lens: Lens, targets: Targets) -> FloatGrid:
-    seen = np.concatenate(list(found.corners.values()))
-    wanted = np.concatenate([targets.screen.corners[number] for number in found.corners])
-    ideal = lens.without_distortion(view.places(seen))
-    matrix, _ = cv2.findHomography(ideal, wanted)
+def _to_screen(marks: SeenMarks, view: View, lens: Lens, targets: Targets) -> FloatGrid:
+    corners = np.concatenate(list(marks.corners.values()))
+    ideal_corners = np.concatenate([targets.screen.corners[number] for number in marks.corners])
+    ideal = lens.without_distortion(view.places(corners))
+    matrix, _ = cv2.findHomography(ideal, ideal_corners)
     if matrix is None:
         raise DecodeError(f"the marks of {view.path.name} lie on no plane")
     return np.asarray(matrix, dtype=np.float64)
 
 
-def check_whole(found: Sequence[Sorted], targets: Targets) -> None:
+def check_whole(captures: Sequence[Sorted], targets: Targets) -> None:
     """Refuse captures and targets that are not one to one.
 
     Raises:
         DecodeError: If two captures show one target, a picture has none, or some of the colours
             have and others not.
     """
-    seen: dict[str, Path] = {}
-    for one in found:
-        other = seen.get(one.target.name)
+    paths: dict[str, Path] = {}
+    for one in captures:
+        other = paths.get(one.target.name)
         if other is not None:
             raise DecodeError(
                 f"{other.name} and {one.path.name} both show {one.target.file}; give one of them"
             )
-        seen[one.target.name] = one.path
+        paths[one.target.name] = one.path
     pictures = [target for target in targets.targets if target.kind == "picture"]
     colours = [target for target in targets.targets if target.kind == "colour"]
-    some = any(target.name in seen for target in colours)
-    wanted = [*pictures, *(colours if some else [])]
-    missing = [target.file for target in wanted if target.name not in seen]
+    some = any(target.name in paths for target in colours)
+    expected = [*pictures, *(colours if some else [])]
+    missing = [target.file for target in expected if target.name not in paths]
     if missing:
         raise DecodeError(
             f"no capture shows {', '.join(missing)}; give one of every picture, and of all "

@@ -17,9 +17,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.calibration.display.displayed_picture import read_shown
 from camkit.calibration.display.marks import NUMBERS, draw_word
 from camkit.calibration.display.screen import Place, Screen
-from camkit.calibration.display.shown import read_shown
 from camkit.calibration.geometry.board import Board
 from camkit.caller import option_text
 from camkit.colorimetry import encode_srgb
@@ -146,7 +146,7 @@ class Targets:
             ) from error
         try:
             width, height = table["screen_px"]
-            found = cls(
+            result = cls(
                 screen=Screen(width_px=int(width), height_px=int(height)),
                 board=Board.read(table["board"]),
                 targets=tuple(_target(one) for one in table["targets"]),
@@ -156,11 +156,11 @@ class Targets:
                 f"{path} is no list of targets ({type(error).__name__}: {error}); write it with "
                 "camkit calibrate targets"
             ) from error
-        if not all(found.holds(target) for target in found.targets):
-            raise DecodeError(f"{path} places a target outside of its screen of {found.screen} px")
-        if len(found.by_code) != sum(target.code is not None for target in found.targets):
+        if not all(result.holds(target) for target in result.targets):
+            raise DecodeError(f"{path} places a target outside of its screen of {result.screen} px")
+        if len(result.by_code) != sum(target.code is not None for target in result.targets):
             raise DecodeError(f"{path} names a code twice")
-        return found
+        return result
 
 
 def plan_targets(
@@ -173,10 +173,10 @@ def plan_targets(
         DecodeError: If a picture cannot be read.
     """
     square, place = screen.squares(board)
-    found = [Target(file="", name="board", kind="board", place_px=place, square_px=square)]
-    found += [Target(file="", name=f"grey-{n}", kind="grey", rgb=(n, n, n)) for n in levels]
+    targets = [Target(file="", name="board", kind="board", place_px=place, square_px=square)]
+    targets += [Target(file="", name=f"grey-{n}", kind="grey", rgb=(n, n, n)) for n in levels]
     patch = screen.place(_PATCH_ASPECT)
-    found += [
+    targets += [
         Target(file="", name=name, kind="colour", rgb=rgb, code=code, place_px=patch)
         for code, (name, rgb) in enumerate(COLOURS.items())
     ]
@@ -185,11 +185,11 @@ def plan_targets(
             f"expected at most {NUMBERS - len(COLOURS)} pictures, as many as marks can number; got "
             f"{len(pictures)}: write several folders"
         )
-    names = _names(pictures, {target.name for target in found})
+    names = _names(pictures, {target.name for target in targets})
     for code, (path, name) in enumerate(zip(pictures, names, strict=True), start=len(COLOURS)):
         light, space = read_shown(path)
         at = screen.place(light.shape[2] / light.shape[1])
-        found.append(
+        targets.append(
             Target(
                 file="",
                 name=name,
@@ -199,10 +199,10 @@ def plan_targets(
                 source=(path.name, space),
             )
         )
-    digits = max(3, len(str(len(found))))
+    digits = max(3, len(str(len(targets))))
     numbered = (
         replace(target, file=f"{n:0{digits}d}-{target.name}.png")
-        for n, target in enumerate(found, start=1)
+        for n, target in enumerate(targets, start=1)
     )
     return Targets(screen=screen, board=board, targets=tuple(numbered))
 
@@ -280,12 +280,12 @@ def _squares(board: Board, side: int) -> Codes:
     return np.kron(squares, np.ones((side, side), dtype=np.uint8))
 
 
-def _names(pictures: Sequence[Path], taken: AbstractSet[str]) -> list[str]:
+def _names(pictures: Sequence[Path], reserved: AbstractSet[str]) -> list[str]:
     """Return a name for each that no other target has, of letters that any file system takes."""
     names: dict[str, Path] = {}
     for path in pictures:
         name = _UNSAFE.sub("_", path.stem) or "_"
-        if name in names or name in taken:
+        if name in names or name in reserved:
             other = names.get(name, "a target of its own")
             raise ContractError(
                 f"{path} and {other} would both be called {name}; give every picture once, under "

@@ -43,7 +43,7 @@ def tile_shifts(
     top, left = int(rows.min()), int(columns.min())
     bottom, right = int(rows.max()) + 1, int(columns.max()) + 1
     side = max(8, -(-max(bottom - top, right - left) // TILES))
-    seen, smooth = (
+    observed, smooth = (
         cv2.GaussianBlur(part.astype(np.float32), (0, 0), SMOOTH) for part in (grey, model)
     )
     slopes = [
@@ -56,7 +56,7 @@ def tile_shifts(
             here = inside[window]
             if np.count_nonzero(here) < max(_LEAST_SAMPLES, here.size // 2):
                 continue
-            parts = [part[window][here].astype(np.float64) for part in (seen, smooth, *slopes)]
+            parts = [part[window][here].astype(np.float64) for part in (observed, smooth, *slopes)]
             shift = _shift(parts)
             if shift is not None:
                 down, across = np.nonzero(here)
@@ -72,14 +72,14 @@ def tile_shifts(
 
 def _shift(parts: list[FloatGrid]) -> FloatGrid | None:
     """Return the shift x, y of a tile; None where it cannot be determined."""
-    seen, model, along, down = parts
+    observed, model, along, down = parts
     columns = np.column_stack([-along, -down, model, np.ones_like(model)])
     normal = columns.T @ columns
     if np.linalg.cond(normal) > 1e14:
         return None
-    found = np.linalg.solve(normal, columns.T @ (seen - model))
-    rest = seen - model - columns @ found
-    spread = np.linalg.inv(normal)[:2, :2] * (rest @ rest) / max(len(seen) - 4, 1)
+    solution = np.linalg.solve(normal, columns.T @ (observed - model))
+    rest = observed - model - columns @ solution
+    spread = np.linalg.inv(normal)[:2, :2] * (rest @ rest) / max(len(observed) - 4, 1)
     if not np.sqrt(max(np.trace(spread), 0.0)) < SURE_PX:
         return None
-    return np.asarray(found[:2])
+    return np.asarray(solution[:2])

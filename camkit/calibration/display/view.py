@@ -40,9 +40,9 @@ class View:
     clipped: NDArray[np.bool_]
     scale: FloatGrid
 
-    def places(self, seen: FloatGrid) -> FloatGrid:
+    def places(self, places: FloatGrid) -> FloatGrid:
         """Return px of the capture of (..., 2) places on the lattice."""
-        return np.asarray((seen + 0.5) * self.scale - 0.5)
+        return np.asarray((places + 0.5) * self.scale - 0.5)
 
     def window(self, lens: Lens, box: tuple[int, int, int, int]) -> FloatGrid:
         """Return (h, w, 2) places without distortion, px, of a window (x, y, width, height)."""
@@ -92,12 +92,12 @@ def read_view(path: Path, lens: Lens) -> tuple[View, Capture]:
 
 
 def colours_of(
-    capture: Capture, seen: NDArray[np.bool_], illumination: Illumination
+    capture: Capture, mask: NDArray[np.bool_], illumination: Illumination
 ) -> tuple[FloatGrid, float]:
     """Return the mean light (3,) of the sensor's colours where `seen`, and the clipped share."""
     light = capture.linear_rows(0, capture.height)
     clipped = clipped_rows(capture, 0, capture.height)
-    rows, columns = np.nonzero(seen)
+    rows, columns = np.nonzero(mask)
     even = illumination.at(np.stack([columns, rows], axis=-1).astype(np.float64))
     if capture.cfa is None:
         values = light[:, rows, columns] / even

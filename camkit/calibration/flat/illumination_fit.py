@@ -222,32 +222,32 @@ def _refuse_reversed(views: Views, parts: Parts) -> None:
     """
     if parts.rms < SURE_REST:
         return
-    tried = {}
+    reversals = {}
     for (shift, turn), what in _REVERSALS.items():
         poses = tuple(pose.reversed(shift=shift, turn=turn) for pose in views.poses)
-        tried[separate(replace(views, poses=poses)).rms] = what
-    least = min(tried)
+        reversals[separate(replace(views, poses=poses)).rms] = what
+    least = min(reversals)
     if least < MUCH_BETTER * parts.rms:
         raise ContractError(
-            f"the pictures fit with {tried[least]} reversed ({least:.2%} are left, {parts.rms:.2%} "
-            "as they are); check how what is photographed moved in the picture: right, down and "
-            "clockwise are positive"
+            f"the pictures fit with {reversals[least]} reversed ({least:.2%} are left, "
+            f"{parts.rms:.2%} as they are); check how the object moved in the picture: right, down "
+            "and clockwise are positive"
         )
 
 
 def _notes(parts: Parts, count: int) -> list[str]:
-    found = []
+    notes = []
     if not parts.separated:
         why = "one picture does not tell" if count == 1 else "these poses do not tell"
-        found.append(
+        notes.append(
             f"{why} the lens from what is photographed: what both explain counts as the lens's; "
             "shift the camera by a third of the picture, to the side and up, and turn it once"
         )
     elif not parts.centre_found:
-        found.append("the pictures do not determine the optical centre; the middle is used")
+        notes.append("the pictures do not determine the optical centre; the middle is used")
     if parts.rms > MOST_REST:
-        found.append(
+        notes.append(
             f"lens and display leave {parts.rms:.2%} of the light: a pose may be wrong, or there "
             "is an edge in a picture"
         )
-    return found
+    return notes

@@ -98,7 +98,7 @@ def green_of(capture: Capture) -> tuple[FloatGrid, NDArray[np.bool_], int]:
     return np.asarray(mean), np.logical_or.reduce([clipped[site] for site in sites]), 2
 
 
-def check_one_camera(one: Capture, named: Path, other: Capture, path: Path) -> None:
+def check_one_camera(one: Capture, one_path: Path, other: Capture, path: Path) -> None:
     """Refuse a picture that another camera took; exposure and levels may differ.
 
     Raises:
@@ -106,7 +106,7 @@ def check_one_camera(one: Capture, named: Path, other: Capture, path: Path) -> N
     """
     if (one.width, one.height, one.cfa) != (other.width, other.height, other.cfa):
         raise DecodeError(
-            f"pictures differ: {named.name} is {_kind(one)}, {path.name} {_kind(other)}; give "
+            f"pictures differ: {one_path.name} is {_kind(one)}, {path.name} {_kind(other)}; give "
             "pictures of one camera"
         )
 
@@ -121,5 +121,5 @@ def _block_means(plane: FloatGrid, side: int) -> FloatGrid:
     values = tiled.swapaxes(1, 2).reshape(rows, columns, side * side)
     middle = np.median(values, axis=-1, keepdims=True)
     spread = _MAD_TO_SIGMA * np.median(np.abs(values - middle), axis=-1, keepdims=True)
-    kept = np.abs(values - middle) <= np.maximum(_SPREADS * spread, 1e-12)
-    return np.asarray(np.where(kept, values, 0).sum(axis=-1) / kept.sum(axis=-1))
+    inliers = np.abs(values - middle) <= np.maximum(_SPREADS * spread, 1e-12)
+    return np.asarray(np.where(inliers, values, 0).sum(axis=-1) / inliers.sum(axis=-1))

@@ -59,28 +59,28 @@ def orientation_turn_deg(orientation: int) -> float:
 def poses_of(
     shifts: Sequence[str | tuple[float, float]] | None,
     turns: Sequence[float] | None,
-    told: Sequence[float],
+    exif_turns: Sequence[float],
 ) -> list[Pose]:
     """Return the poses that a person states.
 
     Args:
         shifts: (x, y) or "x,y" in pixels for each picture; None for no shifts.
-        turns: Degrees for each picture; None for what the pictures tell.
-        told: Turns in degrees that the pictures tell.
+        turns: Degrees for each picture; None for `exif_turns`.
+        exif_turns: Turns in degrees by the EXIF orientation of the pictures.
 
     Raises:
         ContractError: If there is not one for each picture, or one is no pair of numbers.
     """
-    count = len(told)
-    for option, said in (("shift_px", shifts), ("turn_deg", turns)):
-        if said and len(said) != count:
+    count = len(exif_turns)
+    for option, values in (("shift_px", shifts), ("turn_deg", turns)):
+        if values and len(values) != count:
             raise ContractError(
-                f"{option_text(option)} is given {len(said)} times for {count} pictures; give it "
+                f"{option_text(option)} is given {len(values)} times for {count} pictures; give it "
                 "once for each, in their order"
             )
     return [
         Pose(shift_px=_pair(shift), turn_rad=math.radians(turn))
-        for shift, turn in zip(shifts or ["0,0"] * count, turns or told, strict=True)
+        for shift, turn in zip(shifts or ["0,0"] * count, turns or exif_turns, strict=True)
     ]
 
 

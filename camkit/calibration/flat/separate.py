@@ -113,50 +113,54 @@ class _Surroundings:
         self.display_terms = display.shape[1]
         self._pictures = len(views.poses)
         power, mixtures = linalg.eigh(self.columns.T @ self.columns)
-        seen = power > _LEAST_SEEN * power[-1]
-        self._unit = self.columns @ (mixtures[:, seen] / np.sqrt(power[seen]))
+        strong = power > _LEAST_SEEN * power[-1]
+        self._unit = self.columns @ (mixtures[:, strong] / np.sqrt(power[strong]))
 
-    def left_of(self, wanted: FloatGrid) -> FloatGrid:
+    def left_of(self, columns: FloatGrid) -> FloatGrid:
         """Return columns without the part that display and exposures explain."""
-        return np.asarray(wanted - self._unit @ (self._unit.T @ wanted))
+        return np.asarray(columns - self._unit @ (self._unit.T @ columns))
 
-    def least_share(self, wanted: FloatGrid) -> float:
+    def least_share(self, columns: FloatGrid) -> float:
         """Return the least share of any mixture of columns that these cannot take over."""
-        by_picture = wanted.reshape(self._pictures, -1, wanted.shape[1])
-        alone = (by_picture - by_picture.mean(axis=1, keepdims=True)).reshape(wanted.shape)
+        by_picture = columns.reshape(self._pictures, -1, columns.shape[1])
+        alone = (by_picture - by_picture.mean(axis=1, keepdims=True)).reshape(columns.shape)
         power, mixtures = linalg.eigh(alone.T @ alone)
-        seen = power > _LEAST_POWER * power[-1]
-        unit = mixtures[:, seen] / np.sqrt(power[seen])
-        left = self.left_of(wanted) @ unit
-        return float(np.clip(linalg.eigvalsh(left.T @ left)[0], 0.0, 1.0))
+        strong = power > _LEAST_POWER * power[-1]
+        unit = mixtures[:, strong] / np.sqrt(power[strong])
+        residual = self.left_of(columns) @ unit
+        return float(np.clip(linalg.eigvalsh(residual.T @ residual)[0], 0.0, 1.0))
 
 
 def separate(views: Views) -> Parts:
     """Separate pictures into lens and display, with the optical centre where they show it."""
-    around = _Surroundings(views)
-    parts = middle = _fit(views, around, views.centre)
+    surroundings = _Surroundings(views)
+    parts = middle = _fit(views, surroundings, views.centre)
     if not parts.separated:
         return parts
     for _ in range(CENTRE_ROUNDS):
-        moved = _moved_centre(views, around, parts)
-        if moved is None:
+        centre = _moved_centre(views, surroundings, parts)
+        if centre is None:
             return middle
-        before, parts = parts.centre, _fit(views, around, moved, found=True)
-        if np.hypot(moved[0] - before[0], moved[1] - before[1]) < _SAME_CENTRE:
+        previous, parts = parts.centre, _fit(views, surroundings, centre, centre_found=True)
+        if np.hypot(centre[0] - previous[0], centre[1] - previous[1]) < _SAME_CENTRE:
             break
     return parts
 
 
 def _fit(
-    views: Views, around: _Surroundings, centre: tuple[float, float], *, found: bool = False
+    views: Views,
+    surroundings: _Surroundings,
+    centre: tuple[float, float],
+    *,
+    centre_found: bool = False,
 ) -> Parts:
     radial = Radial(views.reach, RADIAL_INTERVALS)
     lens = _repeated(radial.terms(np.hypot(views.x - centre[0], views.y - centre[1])), views)
-    share = around.least_share(lens)
+    share = surroundings.least_share(lens)
     light = views.log_light.ravel()
     light = light - light.mean()
-    count, last = lens.shape[1], lens.shape[1] + around.display_terms
-    columns = np.concatenate([lens, around.columns], axis=1)
+    count, last = lens.shape[1], lens.shape[1] + surroundings.display_terms
+    columns = np.concatenate([lens, surroundings.columns], axis=1)
     normal = columns.T @ columns
     power = np.diag(normal)
     ridge = np.zeros(len(normal))
@@ -170,30 +174,32 @@ def _fit(
         display=(columns[:, count:last] @ factors[count:last]).reshape(shape),
         rest=(light - columns @ factors).reshape(shape),
         centre=centre,
-        centre_found=found,
+        centre_found=centre_found,
         share=share,
     )
 
 
-def _moved_centre(views: Views, around: _Surroundings, parts: Parts) -> tuple[float, float] | None:
+def _moved_centre(
+    views: Views, surroundings: _Surroundings, parts: Parts
+) -> tuple[float, float] | None:
     """Return better centre by one step of Gauss and Newton; None where the pictures do not tell."""
     dx, dy = views.x - parts.centre[0], views.y - parts.centre[1]
     radius = np.hypot(dx, dy)
     slope = parts.radial.slopes(radius) @ parts.falling / np.maximum(radius, 1e-9)
     moves = _repeated(-np.stack([slope * dx, slope * dy], axis=1), views)
-    if not np.abs(moves).max() > 0 or around.least_share(moves) < LEAST_CENTRE_SHARE:
+    if not np.abs(moves).max() > 0 or surroundings.least_share(moves) < LEAST_CENTRE_SHARE:
         return None
-    lens = around.left_of(_repeated(parts.radial.terms(radius), views))
-    seen = around.left_of(moves)
-    seen = seen - lens @ linalg.lstsq(lens, seen)[0]
+    lens = surroundings.left_of(_repeated(parts.radial.terms(radius), views))
+    slopes = surroundings.left_of(moves)
+    slopes = slopes - lens @ linalg.lstsq(lens, slopes)[0]
     rest = parts.rest.ravel()
-    step = linalg.lstsq(seen, rest)[0]
-    variance = float(np.mean((rest - seen @ step) ** 2))
-    if variance > MOST_CENTRE_ERROR**2 * float(linalg.eigvalsh(seen.T @ seen)[0]):
+    step = linalg.lstsq(slopes, rest)[0]
+    variance = float(np.mean((rest - slopes @ step) ** 2))
+    if variance > MOST_CENTRE_ERROR**2 * float(linalg.eigvalsh(slopes.T @ slopes)[0]):
         return None
     x, y = parts.centre[0] + float(step[0]), parts.centre[1] + float(step[1])
-    far = np.hypot(x - views.centre[0], y - views.centre[1]) > MOST_OFFSET
-    return None if far else (x, y)
+    is_outside = np.hypot(x - views.centre[0], y - views.centre[1]) > MOST_OFFSET
+    return None if is_outside else (x, y)
 
 
 def _repeated(columns: FloatGrid, views: Views) -> FloatGrid:

@@ -69,16 +69,16 @@ def adjust(
     at = _Linear.at(camera, poses, corners, points)
     for _ in range(MOST_STEPS):
         step = at.step(damping, lens=lens)
-        tried = replace(camera, intrinsics=camera.intrinsics + step[0])
-        moved = poses + step[1]
-        found = _Linear.at(tried, moved, corners, points)
-        if not found.square < at.square:
+        next_camera = replace(camera, intrinsics=camera.intrinsics + step[0])
+        next_poses = poses + step[1]
+        next_at = _Linear.at(next_camera, next_poses, corners, points)
+        if not next_at.square < at.square:
             damping *= 10
             if damping > _MOST_DAMPING:
                 break
             continue
-        gain = 1 - found.square / at.square
-        camera, poses, at, damping = tried, moved, found, max(damping / 5, _TINY)
+        gain = 1 - next_at.square / at.square
+        camera, poses, at, damping = next_camera, next_poses, next_at, max(damping / 5, _TINY)
         if gain < LEAST_GAIN:
             break
     return Fit(camera=camera, poses=poses, residuals=at.rest, spread=at.spread())
@@ -91,7 +91,7 @@ class _Linear:
     Attributes:
         rest: (view, corner, 2) residuals.
         square: Their sum of squares; infinite where a corner lies nowhere.
-        own: (view, 6, 6) normal matrices of the poses.
+        pose_block: (view, 6, 6) normal matrices of the poses.
         mixed: (view, 6, intrinsics) of both.
         shared: (intrinsics, intrinsics) of the camera.
         own_side: (view, 6) right-hand sides.
@@ -100,7 +100,7 @@ class _Linear:
 
     rest: FloatGrid
     square: float
-    own: FloatGrid
+    pose_block: FloatGrid
     mixed: FloatGrid
     shared: FloatGrid
     own_side: FloatGrid
@@ -110,18 +110,18 @@ class _Linear:
     def at(
         cls, camera: Camera, poses: FloatGrid, corners: FloatGrid, points: FloatGrid
     ) -> "_Linear":
-        seen = [project(camera, pose, points) for pose in poses]
-        rest = corners - np.stack([at for at, _ in seen])
-        slopes = np.stack([slope.reshape(2 * len(points), -1) for _, slope in seen])
+        projections = [project(camera, pose, points) for pose in poses]
+        rest = corners - np.stack([at for at, _ in projections])
+        slopes = np.stack([slope.reshape(2 * len(points), -1) for _, slope in projections])
         flat = rest.reshape(len(poses), -1)
         square = float(np.square(flat).sum())
         usable = np.isfinite(square) and bool(np.isfinite(slopes).all())
         by_pose, by_lens = slopes[..., :POSE_NUMBERS], slopes[..., POSE_NUMBERS:]
-        by_lens[..., list(camera.held)] = 0
+        by_lens[..., list(camera.fixed)] = 0
         return cls(
             rest=rest,
             square=square if usable else np.inf,
-            own=np.einsum("vni,vnj->vij", by_pose, by_pose),
+            pose_block=np.einsum("vni,vnj->vij", by_pose, by_pose),
             mixed=np.einsum("vni,vnj->vij", by_pose, by_lens),
             shared=np.einsum("vni,vnj->ij", by_lens, by_lens),
             own_side=np.einsum("vni,vn->vi", by_pose, flat),
@@ -130,24 +130,24 @@ class _Linear:
 
     def step(self, damping: float, *, lens: bool) -> tuple[FloatGrid, FloatGrid]:
         """Return the steps of intrinsics and of poses."""
-        own = self.own + damping * _diagonals(self.own)
-        own_step = _solve(own, self.own_side[..., None])[..., 0]
+        poses_only = self.pose_block + damping * _diagonals(self.pose_block)
+        own_step = _solve(poses_only, self.own_side[..., None])[..., 0]
         if not lens:
             return np.zeros_like(self.shared_side), own_step
-        own_mixed = _solve(own, self.mixed)
+        own_mixed = _solve(poses_only, self.mixed)
         shared = self.shared + damping * _diagonals(self.shared)
-        left = shared - np.einsum("vki,vkj->ij", self.mixed, own_mixed)
-        right = self.shared_side - np.einsum("vki,vk->i", self.mixed, own_step)
-        lens_step = _solve(left, right[:, None])[:, 0]
+        reduced = shared - np.einsum("vki,vkj->ij", self.mixed, own_mixed)
+        reduced_side = self.shared_side - np.einsum("vki,vk->i", self.mixed, own_step)
+        lens_step = _solve(reduced, reduced_side[:, None])[:, 0]
         return lens_step, own_step - np.einsum("vki,i->vk", own_mixed, lens_step)
 
     def spread(self) -> FloatGrid:
         """Return the covariance of the intrinsics, poses being unknown too."""
         if not np.isfinite(self.square):
             return np.full_like(self.shared, np.inf)
-        own_mixed = _solve(self.own, self.mixed)
-        left = self.shared - np.einsum("vki,vkj->ij", self.mixed, own_mixed)
-        return _solve(left, np.eye(len(left)))
+        own_mixed = _solve(self.pose_block, self.mixed)
+        reduced = self.shared - np.einsum("vki,vkj->ij", self.mixed, own_mixed)
+        return _solve(reduced, np.eye(len(reduced)))
 
 
 def _diagonals(squares: FloatGrid) -> FloatGrid:

@@ -47,5 +47,5 @@ def blur_px(grey: FloatArray, corners: FloatGrid, board: Board) -> float:
 
 def _light(grey: FloatArray, places: FloatGrid) -> FloatGrid:
     x, y = (np.ascontiguousarray(places[:, i], dtype=np.float32) for i in (0, 1))
-    seen = cv2.remap(grey, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(seen, dtype=np.float64).ravel()
+    light = cv2.remap(grey, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(light, dtype=np.float64).ravel()

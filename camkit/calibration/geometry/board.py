@@ -45,12 +45,12 @@ class Board:
         Raises:
             ContractError: If the text is anything else.
         """
-        found = _TEXT.fullmatch(text if isinstance(text, str) else "x".join(map(str, text)))
-        if found is None:
+        match = _TEXT.fullmatch(text if isinstance(text, str) else "x".join(map(str, text)))
+        if match is None:
             raise ContractError(
                 f"a board is COLUMNSxROWS of its inner corners, like 9x6; got {text!r}"
             )
-        return cls(columns=int(found[1]), rows=int(found[2]), square_mm=square_mm)
+        return cls(columns=int(match[1]), rows=int(match[2]), square_mm=square_mm)
 
     def __str__(self) -> str:
         return f"{self.columns}x{self.rows}"

@@ -78,12 +78,12 @@ class Camera:
     Attributes:
         model: The form.
         intrinsics: Focal length, centre x, centre y, then the free coefficients; px.
-        held: Places in `intrinsics` of what is known and not fitted.
+        fixed: Places in `intrinsics` of what is known and not fitted.
     """
 
     model: Model
     intrinsics: FloatGrid
-    held: tuple[int, ...] = ()
+    fixed: tuple[int, ...] = ()
 
     @property
     def focal_px(self) -> float:
@@ -134,12 +134,12 @@ def project(camera: Camera, pose: FloatGrid, points: FloatGrid) -> tuple[FloatGr
     turn, shift = pose[:3], pose[3:]
     k, model = camera.coefficients, camera.model
     if model.fisheye:
-        placed, table = cv2.fisheye.projectPoints(points[None], turn, shift, camera.matrix, k)
+        places, table = cv2.fisheye.projectPoints(points[None], turn, shift, camera.matrix, k)
         poses, lens, others = table[:, 8:14], table[:, :4], table[:, 4:8]
     else:
-        placed, table = cv2.projectPoints(points, turn, shift, camera.matrix, k)
+        places, table = cv2.projectPoints(points, turn, shift, camera.matrix, k)
         poses, lens, others = table[:, :6], table[:, 6:10], table[:, 10:]
-    at = np.asarray(placed, dtype=np.float64).reshape(-1, 2)
+    at = np.asarray(places, dtype=np.float64).reshape(-1, 2)
     columns = [poses, lens[:, :1] + lens[:, 1:2], lens[:, 2:4], others[:, list(model.free)]]
     if (depths(pose, points) <= 0).any():
         at = np.full_like(at, np.nan)

@@ -77,8 +77,8 @@ class Judged:
     def formal(self) -> FloatGrid:
         """Return the standard errors (intrinsics,) by the covariance; inf where it is singular."""
         variances = np.diagonal(self.fit.spread) / 2
-        known = np.where(variances >= 0, variances, np.inf)
-        return np.asarray(np.sqrt(known) * max(self.fit.rms_px, LEAST_SCATTER_PX))
+        finite = np.where(variances >= 0, variances, np.inf)
+        return np.asarray(np.sqrt(finite) * max(self.fit.rms_px, LEAST_SCATTER_PX))
 
     @property
     def spread(self) -> FloatGrid:
@@ -92,8 +92,8 @@ class Judged:
         References: Tukey 1958; Efron and Stein 1981, "The jackknife estimate of variance".
         """
         count = len(self.others)
-        off = self.others - self.others.mean(axis=0)
-        jackknife = np.sqrt((count - 1) / count * np.square(off).sum(axis=0))
+        deviations = self.others - self.others.mean(axis=0)
+        jackknife = np.sqrt((count - 1) / count * np.square(deviations).sum(axis=0))
         return np.asarray(np.maximum(jackknife, self.formal))
 
     @property
@@ -117,10 +117,10 @@ def judge(fit: Fit, corners: FloatGrid, points: FloatGrid) -> Judged:
     """
     rests, others_px, cameras, leverage = [], [], [], []
     for view in range(len(corners)):
-        kept = np.arange(len(corners)) != view
-        others = adjust(fit.camera, fit.poses[kept], corners[kept], points)
+        is_other = np.arange(len(corners)) != view
+        others = adjust(fit.camera, fit.poses[is_other], corners[is_other], points)
         alone = adjust(
-            others.camera, fit.poses[view : view + 1], corners[~kept], points, lens=False
+            others.camera, fit.poses[view : view + 1], corners[~is_other], points, lens=False
         )
         rests.append(alone.residuals[0])
         others_px.append(others.rms_px)
@@ -184,26 +184,26 @@ def judge_all(
         The models from simple to rich, of all views; and the numbers of views that contradict the
         others with the errors of their corners, worst first.
     """
-    left, dropped = list(range(len(corners))), list[int]()
+    views, dropped = list(range(len(corners))), list[int]()
     first: list[Judged] | None = None
     while True:
         judged = [
-            judge(fit, corners[left], points) for fit in fit_models(corners[left], points, size)
+            judge(fit, corners[views], points) for fit in fit_models(corners[views], points, size)
         ]
         first = judged if first is None else first
         if not judged:
             return first, {}
         typical = _typical(judged)
         worst = _outlier(typical)
-        if worst is not None and len(left) > LEAST_VIEWS:
-            dropped.append(left.pop(worst))
+        if worst is not None and len(views) > LEAST_VIEWS:
+            dropped.append(views.pop(worst))
             continue
         model = typical.fit.camera.model
         poses = next(one.fit.poses for one in first if one.fit.camera.model is model)
-        found = _disagreeing(dropped, typical, poses, corners, points)
+        disagreeing = _disagreeing(dropped, typical, poses, corners, points)
         if worst is not None:
-            found[left[worst]] = float(typical.of_views_px[worst])
-        return first, found
+            disagreeing[views[worst]] = float(typical.of_views_px[worst])
+        return first, disagreeing
 
 
 def _outlier(judged: Judged) -> int | None:

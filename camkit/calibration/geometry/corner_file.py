@@ -83,11 +83,11 @@ def _corner_file(document: _Document) -> CornerFile:
     board = Board.read(document.board, document.square_mm)
     if document.unit != "px":
         raise DecodeError(f"corners are in px; got the unit {document.unit!r}")
-    wanted = board.columns * board.rows
+    expected = board.columns * board.rows
     for number, picture in enumerate(document.pictures, start=1):
-        if len(picture) != wanted:
+        if len(picture) != expected:
             raise DecodeError(
-                f"a board of {board} has {wanted} corners; picture {number} has {len(picture)}"
+                f"a board of {board} has {expected} corners; picture {number} has {len(picture)}"
             )
     corners = np.array(document.pictures, dtype=np.float64)
     size = document.width_px, document.height_px
@@ -117,7 +117,7 @@ def is_corner_file(files: Sequence[Path]) -> bool:
     Raises:
         ContractError: If it is one among other files.
     """
-    given = [path for path in files if path.suffix.lower() == SUFFIX]
-    if given and len(files) > 1:
-        raise ContractError(f"{given[0]} holds corners: give it alone, or photographs")
-    return bool(given)
+    corner_files = [path for path in files if path.suffix.lower() == SUFFIX]
+    if corner_files and len(files) > 1:
+        raise ContractError(f"{corner_files[0]} holds corners: give it alone, or photographs")
+    return bool(corner_files)

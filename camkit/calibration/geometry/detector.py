@@ -86,24 +86,24 @@ def _copies(codes: Codes) -> list[tuple[int, Codes]]:
     return copies
 
 
-def _by_sectors(small: Codes, wanted: tuple[int, int], flags: int = 0) -> Corners | None:
-    seen, corners = cv2.findChessboardCornersSB(small, wanted, flags=flags)
-    return corners if seen else None
+def _by_sectors(small: Codes, corner_counts: tuple[int, int], flags: int = 0) -> Corners | None:
+    is_board, corners = cv2.findChessboardCornersSB(small, corner_counts, flags=flags)
+    return corners if is_board else None
 
 
-def _by_sectors_evened(small: Codes, wanted: tuple[int, int]) -> Corners | None:
+def _by_sectors_evened(small: Codes, corner_counts: tuple[int, int]) -> Corners | None:
     """Find a board in a picture of even histogram, which helps in uneven light only."""
-    return _by_sectors(small, wanted, cv2.CALIB_CB_NORMALIZE_IMAGE)
+    return _by_sectors(small, corner_counts, cv2.CALIB_CB_NORMALIZE_IMAGE)
 
 
-def _by_sectors_thoroughly(small: Codes, wanted: tuple[int, int]) -> Corners | None:
-    return _by_sectors(small, wanted, cv2.CALIB_CB_EXHAUSTIVE)
+def _by_sectors_thoroughly(small: Codes, corner_counts: tuple[int, int]) -> Corners | None:
+    return _by_sectors(small, corner_counts, cv2.CALIB_CB_EXHAUSTIVE)
 
 
-def _by_squares(small: Codes, wanted: tuple[int, int]) -> Corners | None:
+def _by_squares(small: Codes, corner_counts: tuple[int, int]) -> Corners | None:
     flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_FAST_CHECK
-    seen, corners = cv2.findChessboardCorners(small, wanted, flags=flags)
-    return corners if seen else None
+    is_board, corners = cv2.findChessboardCorners(small, corner_counts, flags=flags)
+    return corners if is_board else None
 
 
 def _unfolded(corners: Corners, factor: int) -> FloatGrid:
@@ -135,9 +135,9 @@ def refine(grey: FloatArray, rough: FloatGrid, board: Board) -> FloatGrid | None
         smooth = _smoothed(grey, min(blur, np.sqrt(max((ROUNDED * way) ** 2 - blur**2, 0))))
         halves = np.maximum(LEAST_WINDOW_PX, np.rint(WINDOW * ways)).astype(int)
         refined = _by_gradients(smooth, _by_gradients(smooth, rough, halves), halves)
-    moved = np.linalg.norm(refined - rough, axis=1)
-    lost = not np.isfinite(refined).all() or bool((moved > MOST_MOVE * ways).any())
-    return None if lost else refined
+    moves = np.linalg.norm(refined - rough, axis=1)
+    is_lost = not np.isfinite(refined).all() or bool((moves > MOST_MOVE * ways).any())
+    return None if is_lost else refined
 
 
 def _smoothed(grey: FloatArray, sigma_px: float) -> FloatArray:

@@ -42,7 +42,7 @@ class Determined:
 
     Attributes:
         judged: All models with what is held.
-        chosen: The one taken.
+        best: The one taken.
         coverage: Where the board was seen.
         profile: Its distortion along a radius.
         undetermined: "centre_px" and "focal_px" where the views do not tell them.
@@ -50,7 +50,7 @@ class Determined:
     """
 
     judged: Sequence[Judged]
-    chosen: Judged
+    best: Judged
     coverage: Coverage
     profile: Profile
     undetermined: tuple[str, ...] = ()
@@ -59,7 +59,7 @@ class Determined:
     @property
     def focal_error(self) -> float:
         """Return the standard error of the focal length by views left out, of itself."""
-        return float(self.chosen.spread[FOCAL]) / self.chosen.fit.camera.focal_px
+        return float(self.best.spread[FOCAL]) / self.best.fit.camera.focal_px
 
 
 def determine(
@@ -82,43 +82,43 @@ def determine(
         DecodeError: If no model that a lens may have explains the corners, or the focal length is
             as good as unknown and no nominal one is given.
     """
-    best, held = simplest(judged), Nominal(centre=True)
+    best, nominal = simplest(judged), Nominal(centre=True)
     try:
-        found = _chosen(judged, corners, size)
+        result = _best(judged, corners, size)
     except DecodeError:
         # What folds or cancels itself may do so because nothing ties it down.
         if _is_loose(best, size):
             _check_nominal(best, size, focal_px)
-            held = replace(held, focal_px=focal_px)
+            nominal = replace(nominal, focal_px=focal_px)
         elif not _is_open(best, size):
             raise
-        found = None
-    if found is None or _is_open(found.chosen, size):
-        found = _held(held, corners, points, size)
-    if not _is_loose(found.chosen, size):
-        return found
+        result = None
+    if result is None or _is_open(result.best, size):
+        result = _with_nominal(nominal, corners, points, size)
+    if not _is_loose(result.best, size):
+        return result
     if focal_px is not None:
-        return _held(replace(found.nominal, focal_px=focal_px), corners, points, size)
-    _check_nominal(found.chosen, size, focal_px)
-    return replace(found, undetermined=(*found.undetermined, "focal_px"))
+        return _with_nominal(replace(result.nominal, focal_px=focal_px), corners, points, size)
+    _check_nominal(result.best, size, focal_px)
+    return replace(result, undetermined=(*result.undetermined, "focal_px"))
 
 
-def _chosen(judged: Sequence[Judged], corners: FloatGrid, size: tuple[int, int]) -> Determined:
-    chosen, coverage, profile = unfolded(judged, corners, size)
-    return Determined(judged=judged, chosen=chosen, coverage=coverage, profile=profile)
+def _best(judged: Sequence[Judged], corners: FloatGrid, size: tuple[int, int]) -> Determined:
+    best, coverage, profile = unfolded(judged, corners, size)
+    return Determined(judged=judged, best=best, coverage=coverage, profile=profile)
 
 
-def _held(
+def _with_nominal(
     nominal: Nominal, corners: FloatGrid, points: FloatGrid, size: tuple[int, int]
 ) -> Determined:
     """Fit and judge again with fixed numbers."""
     fits = fit_models(corners, points, size, nominal)
     if not fits:
         raise DecodeError("no camera explains the corners: the pictures are not of one flat board")
-    found = _chosen([judge(fit, corners, points) for fit in fits], corners, size)
+    result = _best([judge(fit, corners, points) for fit in fits], corners, size)
     centre = ("centre_px",) if nominal.centre else ()
     focal = ("focal_px",) if nominal.focal_px is not None else ()
-    return replace(found, undetermined=(*centre, *focal), nominal=nominal)
+    return replace(result, undetermined=(*centre, *focal), nominal=nominal)
 
 
 def _is_open(judged: Judged, size: tuple[int, int]) -> bool:
@@ -140,8 +140,8 @@ def _check_nominal(judged: Judged, size: tuple[int, int], focal_px: float | None
     error = float(judged.formal[FOCAL]) / camera.focal_px
     if focal_px is not None or (is_lens(camera, size) and error <= WORST_GUESS):
         return
-    known = is_lens(camera, size) and error < 1
+    doubt = f" ({error:.0%} uncertain)" if is_lens(camera, size) and error < 1 else ""
     raise DecodeError(
-        f"the pictures do not tell the focal length{f' ({error:.0%} uncertain)' if known else ''}: "
+        f"the pictures do not tell the focal length{doubt}: "
         f"tilt the board by 20 degrees or more, to every side, or give {option_text('focal_px')}"
     )

@@ -91,10 +91,10 @@ def _spread(camera: Camera, angles: FloatGrid) -> FloatGrid:
     k1, k2, _, _, k3, k4, k5, k6 = camera.coefficients
     r = np.tan(angles)
     u = r**2
-    below = 1 + u * (k4 + u * (k5 + u * k6))
+    divisor = 1 + u * (k4 + u * (k5 + u * k6))
     # beyond the first pole there is no profile
-    below = np.where(np.minimum.accumulate(below) > 0, below, np.nan)
-    return np.asarray(r * (1 + u * (k1 + u * (k2 + u * k3))) / below)
+    divisor = np.where(np.minimum.accumulate(divisor) > 0, divisor, np.nan)
+    return np.asarray(r * (1 + u * (k1 + u * (k2 + u * k3))) / divisor)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,12 +135,17 @@ def fit_radial(profile: Profile, radius_px: float, corner_px: float) -> RadialFi
 
     References: Sun 2021, eq. (6.10) and (6.11).
     """
-    placed = np.linspace(0, profile.covered_px, FITTED)
-    known = np.stack([profile.ideal_px(placed), placed], axis=1) / radius_px
-    beyond = [on / radius_px for on in _continued(profile, corner_px)]
-    tried = [(known[:0], 0.0), *((on, weight) for on in beyond for weight in HOLDS)]
+    radii_px = np.linspace(0, profile.covered_px, FITTED)
+    samples = np.stack([profile.ideal_px(radii_px), radii_px], axis=1) / radius_px
+    extensions = [extension / radius_px for extension in _continued(profile, corner_px)]
+    attempts = [
+        (samples[:0], 0.0),
+        *((extension, weight) for extension in extensions for weight in HOLDS),
+    ]
     for terms in range(_TERMS, 0, -1):
-        fits = [_fitted(known, on, weight, terms, radius_px) for on, weight in tried]
+        fits = [
+            _fitted(samples, extension, weight, terms, radius_px) for extension, weight in attempts
+        ]
         usable = [fit for fit in fits if _is_usable(fit, corner_px)]
         if usable:
             return min(usable, key=lambda fit: fit.residual_px)
@@ -149,29 +154,29 @@ def fit_radial(profile: Profile, radius_px: float, corner_px: float) -> RadialFi
 
 def _continued(profile: Profile, corner_px: float) -> list[FloatGrid]:
     """Return (sample, 2) ideal and placed radii beyond the known ones, extrapolated in two ways."""
-    placed = np.linspace(profile.covered_px, RANGE_MARGIN * corner_px, FITTED)[1:]
-    angles = np.interp(placed, profile.radii_px, profile.angles_rad)
-    guessed = np.stack(
-        [profile.focal_px * np.tan(np.minimum(angles, _GUESSED_RAD)), placed], axis=1
+    radii_px = np.linspace(profile.covered_px, RANGE_MARGIN * corner_px, FITTED)[1:]
+    angles = np.interp(radii_px, profile.radii_px, profile.angles_rad)
+    fisheye = np.stack(
+        [profile.focal_px * np.tan(np.minimum(angles, _GUESSED_RAD)), radii_px], axis=1
     )
     inner, outer = profile.ideal_px(profile.covered_px * np.array([0.99, 1.0]))
     slope = 0.01 * profile.covered_px / (outer - inner)
-    straight = np.stack([outer + (placed - profile.covered_px) / slope, placed], axis=1)
-    return [guessed[angles < _GUESSED_RAD], straight]
+    straight = np.stack([outer + (radii_px - profile.covered_px) / slope, radii_px], axis=1)
+    return [fisheye[angles < _GUESSED_RAD], straight]
 
 
 def _fitted(
-    known: FloatGrid, beyond: FloatGrid, weight: float, terms: int, radius_px: float
+    samples: FloatGrid, extension: FloatGrid, weight: float, terms: int, radius_px: float
 ) -> RadialFit:
     """Fit some terms to the known radii, and with a weight to the extrapolated ones."""
     powers = 2 * np.arange(terms) + 1
-    root = np.concatenate([np.ones(len(known)), np.full(len(beyond), np.sqrt(weight))])
-    every = np.concatenate([known, beyond])
-    found = np.linalg.lstsq(every[:, :1] ** powers * root[:, None], every[:, 1] * root, rcond=None)[
-        0
-    ]
-    missed = np.abs(known[:, :1] ** powers @ found - known[:, 1]).max()
-    one, two, three, four = np.pad(found, (0, _TERMS - terms)).tolist()
+    root = np.concatenate([np.ones(len(samples)), np.full(len(extension), np.sqrt(weight))])
+    every = np.concatenate([samples, extension])
+    solution = np.linalg.lstsq(
+        every[:, :1] ** powers * root[:, None], every[:, 1] * root, rcond=None
+    )[0]
+    missed = np.abs(samples[:, :1] ** powers @ solution - samples[:, 1]).max()
+    one, two, three, four = np.pad(solution, (0, _TERMS - terms)).tolist()
     return RadialFit(
         coefficients=(one, two, three, four),
         radius_px=radius_px,

@@ -118,7 +118,7 @@ class Geometry:
 
     def _pictures(self) -> list[dict[str, Any]]:
         records: list[dict[str, Any]] = []
-        fit, seen = self.chosen.fit, 0
+        fit, number = self.chosen.fit, 0
         for view in self.views:
             record: dict[str, Any] = {
                 "file": view.path.name,
@@ -126,11 +126,11 @@ class Geometry:
                 "rms_px": None,
             }
             if view.corners is not None:
-                record["rms_px"] = round(rms(fit.residuals[seen]), 5)
+                record["rms_px"] = round(rms(fit.residuals[number]), 5)
                 if self.board.square_mm is not None:
-                    squares = distance(fit.poses[seen], self.board.points.mean(axis=0))
+                    squares = distance(fit.poses[number], self.board.points.mean(axis=0))
                     record["distance_mm"] = round(squares * self.board.square_mm, 2)
-                seen += 1
+                number += 1
             records.append(record)
         return records
 
@@ -156,11 +156,11 @@ def calibrate_geometry(
     return _measured(look_for(files, board), board, focal_px)
 
 
-def calibrate_corners(given: CornerFile, focal_px: float | None = None) -> Geometry:
+def calibrate_corners(file: CornerFile, focal_px: float | None = None) -> Geometry:
     """Measure the geometry of a camera from known corners.
 
     Args:
-        given: The corners; see `corner_file.read_corners`.
+        file: The corners; see `corner_file.read_corners`.
         focal_px: Nominal focal length, which is held if the pictures do not determine it; None
             for that of the file, if it states one.
 
@@ -169,14 +169,14 @@ def calibrate_corners(given: CornerFile, focal_px: float | None = None) -> Geome
         DecodeError: If there are fewer than three pictures, they contradict each other, or what
             explains them folds or is none of a lens.
     """
-    focal_px = given.focal_px if focal_px is None else focal_px
+    focal_px = file.focal_px if focal_px is None else focal_px
     _check_nominal(focal_px)
     views = [
-        View(path=Path(f"picture {number}"), size=given.size, corners=corners)
-        for number, corners in enumerate(given.corners, start=1)
+        View(path=Path(f"picture {number}"), size=file.size, corners=corners)
+        for number, corners in enumerate(file.corners, start=1)
     ]
-    _check_enough(views, given.board)
-    return _measured(views, given.board, focal_px)
+    _check_enough(views, file.board)
+    return _measured(views, file.board, focal_px)
 
 
 def _check_nominal(focal_px: float | None) -> None:
@@ -186,24 +186,26 @@ def _check_nominal(focal_px: float | None) -> None:
 
 def _measured(views: Sequence[View], board: Board, focal_px: float | None) -> Geometry:
     """Return the geometry that views show."""
-    seen = [view for view in views if view.corners is not None]
-    corners = np.stack([view.corners for view in seen if view.corners is not None])
+    with_board = [view for view in views if view.corners is not None]
+    corners = np.stack([view.corners for view in with_board if view.corners is not None])
     size = views[0].size
     judged, outliers = judge_all(corners, board.points, size)
-    _check_agree(judged, outliers, seen, size)
-    found = determine(judged, corners, board.points, size, focal_px)
-    radial = fit_radial(found.profile, float(np.hypot(*size)) / 2, found.coverage.corner_px)
+    _check_agree(judged, outliers, with_board, size)
+    determined = determine(judged, corners, board.points, size, focal_px)
+    radial = fit_radial(
+        determined.profile, float(np.hypot(*size)) / 2, determined.coverage.corner_px
+    )
     return Geometry(
         board=board,
         views=tuple(views),
         size=size,
-        tried=tuple(found.judged),
-        chosen=found.chosen,
-        coverage=found.coverage,
-        profile=found.profile,
+        tried=tuple(determined.judged),
+        chosen=determined.best,
+        coverage=determined.coverage,
+        profile=determined.profile,
         radial=radial,
-        notes=_notes(views, size, found, radial),
-        undetermined=found.undetermined,
+        notes=_notes(views, size, determined, radial),
+        undetermined=determined.undetermined,
     )
 
 
@@ -234,17 +236,17 @@ def look_for(files: Sequence[Path], board: Board) -> list[View]:
 
 
 def _check_enough(views: Sequence[View], board: Board) -> None:
-    found = sum(view.corners is not None for view in views)
-    if found < LEAST_VIEWS:
+    count = sum(view.corners is not None for view in views)
+    if count < LEAST_VIEWS:
         what = f"a board of {board} inner corners"
-        told = f"{found} of {len(views)} pictures show {what}" if found else f"no picture shows {what}"  # noqa: E501 # fmt: skip
+        problem = f"{count} of {len(views)} pictures show {what}" if count else f"no picture shows {what}"  # noqa: E501 # fmt: skip
         cure = (
             "give more pictures"
             if len(views) < LEAST_VIEWS
             else f"check {option_text('board')} (inner corners, not squares), and show the whole "
             "board with white around it"
         )
-        raise DecodeError(f"{told}, {LEAST_VIEWS} are needed: {cure}")
+        raise DecodeError(f"{problem}, {LEAST_VIEWS} are needed: {cure}")
 
 
 def _check_sizes(views: Sequence[View]) -> None:
@@ -260,22 +262,24 @@ def _check_sizes(views: Sequence[View]) -> None:
 def _check_agree(
     judged: Sequence[Judged],
     outliers: Mapping[int, float],
-    seen: Sequence[View],
+    views: Sequence[View],
     size: tuple[int, int],
 ) -> None:
     """Refuse views that contradict each other."""
     if not judged:
         raise DecodeError("no camera explains the corners: the pictures are not of one flat board")
     if outliers:
-        told = ", ".join(f"{seen[n].path.name} ({off:.2f} px rms)" for n, off in outliers.items())
+        outlier_text = ", ".join(
+            f"{views[n].path.name} ({error_px:.2f} px rms)" for n, error_px in outliers.items()
+        )
         raise DecodeError(
-            f"the camera that the other pictures show does not fit {told}: check "
+            f"the camera that the other pictures show does not fit {outlier_text}: check "
             f"{option_text('board')}, leave it out, or photograph one flat board at one setting of "
             "lens and focus"
         )
     best = min(judged, key=lambda one: one.rms_px)
     if best.rms_px > MOST_ERROR * np.hypot(*size):
-        worst = seen[int(best.of_views_px.argmax())].path.name
+        worst = views[int(best.of_views_px.argmax())].path.name
         raise DecodeError(
             f"the pictures contradict each other: left out, corners are off by {best.rms_px:.2f} "
             f"px rms, most in {worst}; check {option_text('board')}, photograph one flat board at "
@@ -283,27 +287,27 @@ def _check_agree(
         )
 
 
-def _held_notes(found: Determined, size: tuple[int, int]) -> list[str]:
+def _nominal_notes(determined: Determined, size: tuple[int, int]) -> list[str]:
     """Return notes on numbers that the pictures do not determine, and their replacements."""
     notes = []
-    if "centre_px" in found.undetermined:
-        x, y = found.chosen.fit.camera.centre_px
+    if "centre_px" in determined.undetermined:
+        x, y = determined.best.fit.camera.centre_px
         notes.append(
             f"the pictures do not determine the optical centre: it is held at the middle of the "
             f"{size[0]}x{size[1]} px, ({x:g}, {y:g}); tilt the board to every side"
         )
-    if "focal_px" in found.undetermined:
-        notes.append(f"the pictures do not determine the focal length: {_focal_text(found)}")
+    if "focal_px" in determined.undetermined:
+        notes.append(f"the pictures do not determine the focal length: {_focal_text(determined)}")
     return notes
 
 
-def _focal_text(found: Determined) -> str:
-    focal_px = found.chosen.fit.camera.focal_px
-    if found.nominal.focal_px is not None:
+def _focal_text(determined: Determined) -> str:
+    focal_px = determined.best.fit.camera.focal_px
+    if determined.nominal.focal_px is not None:
         return f"it is held at its nominal {focal_px:g} px; tilt the board by 20 degrees or more"
     return (
-        f"{focal_px:.0f} px explains them best, with a standard error of {found.focal_error:.0%} "
-        "by leaving out one after the other; give the nominal one "
+        f"{focal_px:.0f} px explains them best, with a standard error of "
+        f"{determined.focal_error:.0%} by leaving out one after the other; give the nominal one "
         f"({option_text('focal_px')}), or tilt the board by 20 degrees or more"
     )
 
@@ -311,10 +315,10 @@ def _focal_text(found: Determined) -> str:
 def _notes(
     views: Sequence[View],
     size: tuple[int, int],
-    found: Determined,
+    determined: Determined,
     radial: RadialFit,
 ) -> tuple[str, ...]:
-    chosen, coverage = found.chosen, found.coverage
+    best, coverage = determined.best, determined.coverage
     notes = [f"{view.path.name}: no board found" for view in views if view.corners is None]
     if not coverage.is_whole:
         notes.append(
@@ -322,16 +326,16 @@ def _notes(
             f"picture reaches to {coverage.corner_px:.0f} px ({coverage.share:.0%} of it lay "
             "within a board); the distortion beyond is a guess: do not use it"
         )
-    notes += _held_notes(found, size)
-    error = float(chosen.formal[FOCAL]) / chosen.fit.camera.focal_px
-    if error > WEAK_FOCAL and not found.undetermined:
+    notes += _nominal_notes(determined, size)
+    error = float(best.formal[FOCAL]) / best.fit.camera.focal_px
+    if error > WEAK_FOCAL and not determined.undetermined:
         notes.append(f"the focal length is uncertain by {error:.1%}: tilt the board more")
     middle = ((size[0] - 1) / 2, (size[1] - 1) / 2)
-    off = float(np.hypot(*np.subtract(chosen.fit.camera.centre_px, middle)))
-    if off > _OFF_MIDDLE * np.hypot(*size):
+    offset_px = float(np.hypot(*np.subtract(best.fit.camera.centre_px, middle)))
+    if offset_px > _OFF_MIDDLE * np.hypot(*size):
         notes.append(
-            f"the optical centre lies {off:.1f} px off the middle of the picture, about which a "
-            "bundle undistorts unless it states `optical_centre_px`"
+            f"the optical centre lies {offset_px:.1f} px off the middle of the picture, about "
+            "which a bundle undistorts unless it states `optical_centre_px`"
         )
     if radial.residual_px > MISSED_PX:
         notes.append(

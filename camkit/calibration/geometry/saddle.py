@@ -47,8 +47,8 @@ def refine_saddles(grey: FloatArray, rough: FloatGrid, radius_px: float) -> Floa
             for i, part in enumerate((u, v))
         )
         light = cv2.remap(grey, x, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
-        moved = _stationary(np.asarray(light, dtype=np.float64) @ inverse.T)
-        corners = corners + radius_px * moved
+        step = _stationary(np.asarray(light, dtype=np.float64) @ inverse.T)
+        corners = corners + radius_px * step
     return corners
 
 

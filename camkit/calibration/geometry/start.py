@@ -32,7 +32,7 @@ FOCALS: Final = (0.2, 0.3, 0.45, 0.7, 1.0, 1.5, 2.2, 3.3, 5.0, 8.0)
 """Tried, of the longer side."""
 POSSIBLE_FOCALS: Final = (0.1, 20.0)
 """Least and most that a lens has, likewise."""
-TRIED: Final = 3
+BEST_STARTS: Final = 3
 WIDEST_RAD: Final = 1.45
 """Half angle beyond which a direction is no place on a plane."""
 _MIDDLE: Final = Model(name="middle", free=())
@@ -44,16 +44,16 @@ class Nominal:
     """The numbers that are not fitted, and the reasons.
 
     Attributes:
-        centre: Whether the optical centre is held at the middle of the picture; then nothing is
+        centre: Whether the optical centre is fixed at the middle of the picture; then nothing is
             fitted that moves it, tangential terms among them.
-        focal_px: Focal length that is held; None to fit it.
+        focal_px: Focal length that is fixed; None to fit it.
     """
 
     centre: bool = False
     focal_px: float | None = None
 
     @property
-    def held(self) -> tuple[int, ...]:
+    def fixed(self) -> tuple[int, ...]:
         """Return the indices of the fixed numbers in a vector of intrinsics."""
         return (() if self.focal_px is None else (FOCAL,)) + (CENTRE if self.centre else ())
 
@@ -87,13 +87,13 @@ def fit_models(
         kin = [fit for fit in fits if fit.camera.model.fisheye == model.fisheye]
         first = bent if model.fisheye else straight
         starts = [fit for fit in kin[-1:] if is_lens(fit.camera, size)] or first
-        tried = [
+        adjusted = [
             adjust(with_model(start.camera, model), start.poses, corners, points)
             for start in starts
         ]
-        tried = [fit for fit in tried if np.isfinite(fit.residuals).all()]
-        tried = [fit for fit in tried if is_lens(fit.camera, size)] or tried
-        fits += [min(tried, key=lambda fit: fit.rms_px)] if tried else []
+        adjusted = [fit for fit in adjusted if np.isfinite(fit.residuals).all()]
+        adjusted = [fit for fit in adjusted if is_lens(fit.camera, size)] or adjusted
+        fits += [min(adjusted, key=lambda fit: fit.rms_px)] if adjusted else []
     return fits
 
 
@@ -108,28 +108,28 @@ def _started(
 ) -> list[Fit]:
     """Return the few best starts of one kind, poses adjusted."""
     (width, height), (model, nominal) = size, kind
-    found: list[tuple[float, Fit]] = []
+    starts: list[tuple[float, Fit]] = []
     focals = [share * max(size) for share in FOCALS]
     for focal in focals if nominal.focal_px is None else [nominal.focal_px]:
         camera = Camera(
             model=model,
             intrinsics=np.array([focal, (width - 1) / 2, (height - 1) / 2]),
-            held=nominal.held,
+            fixed=nominal.fixed,
         )
-        poses = [_pose(camera, seen, points) for seen in corners]
-        known = [pose for pose in poses if pose is not None]
-        if len(known) < len(corners):
+        poses = [_pose(camera, corners_px, points) for corners_px in corners]
+        valid = [pose for pose in poses if pose is not None]
+        if len(valid) < len(corners):
             continue
-        fit = adjust(camera, np.stack(known), corners, points, lens=False)
+        fit = adjust(camera, np.stack(valid), corners, points, lens=False)
         if np.isfinite(fit.residuals).all():
-            found.append((fit.rms_px, fit))
-    found.sort(key=lambda one: one[0])
-    return [fit for _, fit in found[:TRIED]]
+            starts.append((fit.rms_px, fit))
+    starts.sort(key=lambda one: one[0])
+    return [fit for _, fit in starts[:BEST_STARTS]]
 
 
-def _pose(camera: Camera, seen: FloatGrid, points: FloatGrid) -> FloatGrid | None:
+def _pose(camera: Camera, corners_px: FloatGrid, points: FloatGrid) -> FloatGrid | None:
     """Return the pose (6,) of a board from the directions of its corners; None if it has none."""
-    flat = (seen - camera.centre_px) / camera.focal_px
+    flat = (corners_px - camera.centre_px) / camera.focal_px
     if camera.model.fisheye:
         angle = np.linalg.norm(flat, axis=1, keepdims=True)
         if angle.max() > WIDEST_RAD:
@@ -146,4 +146,4 @@ def _pose(camera: Camera, seen: FloatGrid, points: FloatGrid) -> FloatGrid | Non
     poses = [pose for pose in poses if (depths(pose, points) > 0).all()]
     if not poses:
         return None
-    return min(poses, key=lambda pose: rms(seen - project(camera, pose, points)[0]))
+    return min(poses, key=lambda pose: rms(corners_px - project(camera, pose, points)[0]))

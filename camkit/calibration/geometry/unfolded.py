@@ -39,19 +39,19 @@ def unfolded(
     Raises:
         DecodeError: If none of them is about as good as the best that folds.
     """
-    every = [(one, *_seen(one, corners, size)) for one in judged]
+    every = [(one, *_coverage_and_profile(one, corners, size)) for one in judged]
     usable = [
-        found
-        for found in every
-        if found[2].fold_px >= found[1].corner_px
-        and not _doubt(found[0].fit.camera, found[2], size)
+        candidate
+        for candidate in every
+        if candidate[2].fold_px >= candidate[1].corner_px
+        and not _doubt(candidate[0].fit.camera, candidate[2], size)
     ]
     best = simplest(judged)
     if usable:
-        chosen = simplest([one for one, _, _ in usable])
-        if chosen.rms_px <= FOLDED * best.rms_px:
-            return next(found for found in usable if found[0] is chosen)
-    _, coverage, profile = next(found for found in every if found[0] is best)
+        best_usable = simplest([one for one, _, _ in usable])
+        if best_usable.rms_px <= FOLDED * best.rms_px:
+            return next(candidate for candidate in usable if candidate[0] is best_usable)
+    _, coverage, profile = next(candidate for candidate in every if candidate[0] is best)
     if profile.fold_px >= coverage.corner_px:
         raise DecodeError(
             f"the distortion that explains the corners ({best.fit.camera.model.name}) has "
@@ -93,6 +93,8 @@ def _largest_term(camera: Camera, profile: Profile) -> float:
     return float(np.abs(camera.coefficients * powers).max(initial=0.0))
 
 
-def _seen(one: Judged, corners: FloatGrid, size: tuple[int, int]) -> tuple[Coverage, Profile]:
+def _coverage_and_profile(
+    one: Judged, corners: FloatGrid, size: tuple[int, int]
+) -> tuple[Coverage, Profile]:
     coverage = coverage_of(corners, one.fit.camera.centre_px, size)
     return coverage, profile_of(one.fit.camera, coverage.radius_px)

@@ -59,14 +59,19 @@ def stated_crop(path: Path) -> float | None:
     if not tags.directories:
         with path.open("rb") as file:
             tags = exif_of_picture(file.read(EXIF_WITHIN_BYTES))
-    told, own = (tags.numbers(tag) for tag in (FOCAL_LENGTH_35_MM, NUMBER_TAGS["focal_length_mm"]))
-    if not told or not own or not (told[0] > 0 and own[0] > 0):
+    equivalents, focals = (
+        tags.numbers(tag) for tag in (FOCAL_LENGTH_35_MM, NUMBER_TAGS["focal_length_mm"])
+    )
+    if not equivalents or not focals or not (equivalents[0] > 0 and focals[0] > 0):
         return None
-    return told[0] / own[0]
+    return equivalents[0] / focals[0]
 
 
 def frame_of(
-    capture: Capture, crop_factor: float | None, database: Database, stated: float | None = None
+    capture: Capture,
+    crop_factor: float | None,
+    database: Database,
+    stated_crop_factor: float | None = None,
 ) -> tuple[Frame, tuple[str, ...]]:
     """Return size and scale of the captures, and notes on values taken from elsewhere.
 
@@ -74,7 +79,7 @@ def frame_of(
         capture: One of them.
         crop_factor: What a person states; None for what file or database say.
         database: Knows cameras by name.
-        stated: What `stated_crop` says of its file.
+        stated_crop_factor: What `stated_crop` says of its file.
 
     Raises:
         DecodeError: If nothing tells how large the sensor is, or file and database contradict each
@@ -83,18 +88,21 @@ def frame_of(
     if capture.channels != COLOURS:
         raise DecodeError(f"expected a mosaic or three colours; got {capture.channels} channel(s)")
     size = (capture.width, capture.height)
-    known = capture.metadata
+    metadata = capture.metadata
     notes = []
     crop, pitch_um = crop_factor, capture.pixel_pitch_um
     if crop is None and pitch_um is not None:
         crop = FULL_FRAME_MM / (math.hypot(*size) * to_mm(pitch_um))
-    if crop is None and (crop := database.crop_factor(known.make, known.model)) is not None:
-        notes.append(f"the sensor's size is that of the {known.model} in the database")
-        if stated is not None and not crop / CROPS_AGREE < stated < crop * CROPS_AGREE:
+    if crop is None and (crop := database.crop_factor(metadata.make, metadata.model)) is not None:
+        notes.append(f"the sensor's size is that of the {metadata.model} in the database")
+        if (
+            stated_crop_factor is not None
+            and not crop / CROPS_AGREE < stated_crop_factor < crop * CROPS_AGREE
+        ):
             raise DecodeError(
-                f"the database has crop factor {crop:g} for the {known.model}, the capture states "
-                f"focal lengths of crop factor {stated:.2f}, as in a crop mode: add "
-                f"{option_text('crop_factor')}"
+                f"the database has crop factor {crop:g} for the {metadata.model}, the capture "
+                f"states focal lengths of crop factor {stated_crop_factor:.2f}, as in a crop mode: "
+                f"add {option_text('crop_factor')}"
             )
     if crop is None:
         raise DecodeError(
@@ -112,7 +120,7 @@ def manifest_of(
     """Return the manifest of a bundle for captures like one, and notes."""
     sensor, notes = _sensor(capture, frame)
     stages = _stages(profile, mosaic=capture.cfa is not None)
-    made = manifest_without_networks(
+    manifest = manifest_without_networks(
         stages,
         sensor,
         profile,
@@ -121,7 +129,7 @@ def manifest_of(
         licence=LICENCE,
         training_data="no network; distortion and vignetting of lensfun's database",
     )
-    return made, notes
+    return manifest, notes
 
 
 def slug(text: str) -> str:
@@ -153,14 +161,14 @@ def _sensor(capture: Capture, frame: Frame) -> tuple[BayerSensor | PlanesSensor,
             ),
         ),
     }
-    stated = capture.color_matrix
+    from_xyz = capture.color_matrix
     if capture.cfa is None:
-        matrix = None if stated is None else _rows(stated)
+        matrix = None if from_xyz is None else _rows(from_xyz)
         return PlanesSensor(**fields, color_matrix=matrix), tuple(notes)
-    if stated is None:
-        stated = np.asarray(np.linalg.inv(rgb_to_xyz(REC709_PRIMARIES, D65)), dtype=np.float64)
+    if from_xyz is None:
+        from_xyz = np.asarray(np.linalg.inv(rgb_to_xyz(REC709_PRIMARIES, D65)), dtype=np.float64)
         notes.append("the capture states no colour matrix: camera RGB is used as Rec.709")
-    return BayerSensor(**fields, cfa=capture.cfa, color_matrix=_rows(stated)), tuple(notes)
+    return BayerSensor(**fields, cfa=capture.cfa, color_matrix=_rows(from_xyz)), tuple(notes)
 
 
 def _rows(matrix: NDArray[np.float64]) -> tuple[Row, Row, Row]:

@@ -75,27 +75,31 @@ class Database:
         Raises:
             DecodeError: If there is none of that name (near ones are named), or it is malformed.
         """
-        wanted, found = _plain(name), []
-        known: dict[str, str] = {}
+        plain_name, lenses = _plain(name), []
+        names_by_plain: dict[str, str] = {}
         for file, element in self.lenses():
             names = _names(element)
-            if wanted in (_plain(one) for one in names):
-                found.append(lens_of(element, file))
-            known |= {_plain(one): one for one in names[:1]}
-        if not found:
-            near = _near(wanted, known)
-            hint = f"near: {'; '.join(known[one] for one in near)}" if near else "none is near"
+            if plain_name in (_plain(one) for one in names):
+                lenses.append(lens_of(element, file))
+            names_by_plain |= {_plain(one): one for one in names[:1]}
+        if not lenses:
+            near = _near(plain_name, names_by_plain)
+            hint = (
+                f"near: {'; '.join(names_by_plain[one] for one in near)}"
+                if near
+                else "none is near"
+            )
             raise DecodeError(f"{self._place} has no lens {name!r}; {hint}")
-        return found
+        return lenses
 
     def crop_factor(self, make: str, model: str) -> float | None:
         """Return the crop factor of a camera; None if it is not known."""
-        wanted = _plain(model)
+        plain_model = _plain(model)
         for root in self._files.values():
             for camera in root.iter("camera"):
                 models = {_plain(one.text or "") for one in camera.iter("model")}
                 makers = {_plain(one.text or "") for one in camera.iter("maker")}
-                if wanted and wanted in models and (not make or _plain(make) in makers):
+                if plain_model and plain_model in models and (not make or _plain(make) in makers):
                     return _number(camera.findtext("cropfactor"), f"crop factor of {model}")
         return None
 
@@ -113,11 +117,11 @@ def _files_of(place: Path) -> list[Path]:
     return files
 
 
-def _near(wanted: str, known: Iterable[str]) -> list[str]:
+def _near(name: str, candidates: Iterable[str]) -> list[str]:
     """Return similar names, those with all the words first."""
-    words, names = wanted.split(), list(known)
+    words, names = name.split(), list(candidates)
     with_all = [one for one in names if words and all(word in one for word in words)]
-    alike = difflib.get_close_matches(wanted, names, n=_NEAR, cutoff=0.5)
+    alike = difflib.get_close_matches(name, names, n=_NEAR, cutoff=0.5)
     return list(dict.fromkeys((*sorted(with_all, key=len), *alike)))[:_NEAR]
 
 
@@ -155,8 +159,8 @@ def lens_of(element: Element, file: str) -> Lens:
     )
 
 
-def _distortion(said: Mapping[str, str], where: str) -> Distortion:
-    model = said.get("model", "")
+def _distortion(attributes: Mapping[str, str], where: str) -> Distortion:
+    model = attributes.get("model", "")
     if model not in TERMS:
         raise DecodeError(
             f"{where}: the model {model!r} of distortion is not known; expected one of "
@@ -164,17 +168,21 @@ def _distortion(said: Mapping[str, str], where: str) -> Distortion:
         )
     return Distortion(
         model=model,
-        focal_mm=_positive(said.get("focal"), f"{where}: focal"),
-        terms=tuple(_number(said.get(term, "0"), f"{where}: {term}") for term in TERMS[model]),
+        focal_mm=_positive(attributes.get("focal"), f"{where}: focal"),
+        terms=tuple(
+            _number(attributes.get(term, "0"), f"{where}: {term}") for term in TERMS[model]
+        ),
     )
 
 
-def _vignetting(said: Mapping[str, str], where: str) -> Vignetting:
-    k1, k2, k3 = (_number(said.get(term, "0"), f"{where}: {term}") for term in ("k1", "k2", "k3"))
+def _vignetting(attributes: Mapping[str, str], where: str) -> Vignetting:
+    k1, k2, k3 = (
+        _number(attributes.get(term, "0"), f"{where}: {term}") for term in ("k1", "k2", "k3")
+    )
     return Vignetting(
-        focal_mm=_positive(said.get("focal"), f"{where}: focal"),
-        aperture=_positive(said.get("aperture"), f"{where}: aperture"),
-        distance_m=_positive(said.get("distance", "1000"), f"{where}: distance"),
+        focal_mm=_positive(attributes.get("focal"), f"{where}: focal"),
+        aperture=_positive(attributes.get("aperture"), f"{where}: aperture"),
+        distance_m=_positive(attributes.get("distance", "1000"), f"{where}: distance"),
         terms=(k1, k2, k3),
     )
 

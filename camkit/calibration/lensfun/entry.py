@@ -157,17 +157,17 @@ class Entry:
 
     def to_record(self) -> dict[str, Any]:
         """Return plain values."""
-        known = self.fit.distortion
+        distortion = self.fit.distortion
         light = None
         if self.vignetting is not None:
-            made, missed = self.vignetting
-            light = {"terms": list(made.terms), "residual": missed}
+            vignetting, missed = self.vignetting
+            light = {"terms": list(vignetting.terms), "residual": missed}
         return {
             "lens": self.name.model,
             "crop_factor": self.name.crop_factor,
-            "model": known.model,
-            "focal_mm": known.focal_mm,
-            "terms": dict(zip(TERMS[known.model], known.terms, strict=True)),
+            "model": distortion.model,
+            "focal_mm": distortion.focal_mm,
+            "terms": dict(zip(TERMS[distortion.model], distortion.terms, strict=True)),
             "residual_px": round(self.fit.residual_px, 6),
             "scale": self.fit.scale,
             "vignetting": light,
@@ -214,8 +214,8 @@ def lensfun_entry(path: Path, options: EntryOptions) -> Entry:
     elif source.light is not None:
         notes = (*notes, f"vignetting is left out: it needs {option_text('aperture')}")
     model = source.name if options.lens_name is None else options.lens_name
-    named = Name(maker=options.maker, model=model, mount=options.mount, crop_factor=crop)
-    return Entry(name=named, source=source, fit=fit, vignetting=light, notes=notes)
+    name = Name(maker=options.maker, model=model, mount=options.mount, crop_factor=crop)
+    return Entry(name=name, source=source, fit=fit, vignetting=light, notes=notes)
 
 
 def fit_distortion(source: Source, focal_mm: float) -> Fit:
@@ -231,30 +231,30 @@ def fit_distortion(source: Source, focal_mm: float) -> Fit:
     except ContractError as error:
         raise DecodeError(f"{source.name}: {error}") from error
     unit_px = min(source.size_px) / 2
-    placed = np.linspace(0, source.corner_px, SAMPLES)
-    ideal = _ideal_px(placed, source.distortion)
-    fits = [_fitted(model, ideal / unit_px, placed / unit_px, focal_mm) for model in POWERS]
-    found = [
+    placed_px = np.linspace(0, source.corner_px, SAMPLES)
+    ideal = _ideal_px(placed_px, source.distortion)
+    fits = [_fitted(model, ideal / unit_px, placed_px / unit_px, focal_mm) for model in POWERS]
+    usable = [
         Fit(distortion=one, scale=scale, residual_px=missed * unit_px)
         for one, scale, missed in (fit for fit in fits if fit is not None)
     ]
-    if not found:
+    if not usable:
         raise DecodeError(f"no model of lensfun's fits the distortion of {source.name}")
-    least = min(fit.residual_px for fit in found)
-    return next(fit for fit in found if fit.residual_px <= least + SAME_PX)
+    least = min(fit.residual_px for fit in usable)
+    return next(fit for fit in usable if fit.residual_px <= least + SAME_PX)
 
 
-def _ideal_px(placed: FloatGrid, distortion: RadialDistortion) -> FloatGrid:
-    points = np.stack([placed, np.zeros_like(placed)], axis=-1)
+def _ideal_px(placed_px: FloatGrid, distortion: RadialDistortion) -> FloatGrid:
+    points = np.stack([placed_px, np.zeros_like(placed_px)], axis=-1)
     return undistort_points(points, distortion, channel=0)[:, 0]
 
 
 def _fitted(
-    model: str, ideal: FloatGrid, placed: FloatGrid, focal_mm: float
+    model: str, ideal: FloatGrid, radii: FloatGrid, focal_mm: float
 ) -> tuple[Distortion, float, float] | None:
     """Fit one model; return it, its scale and its largest error. None where it has no form."""
     powers = np.array(POWERS[model])
-    p = np.linalg.lstsq(ideal[:, None] ** powers, placed, rcond=None)[0]
+    p = np.linalg.lstsq(ideal[:, None] ** powers, radii, rcond=None)[0]
     scale = float(p[0]) if model == "poly5" else _unit_scale(p, powers)
     if scale is None or not scale > 0:
         return None
@@ -263,8 +263,8 @@ def _fitted(
         terms: Sequence[float] = (q[4], q[3], q[2])
     else:
         terms = [q[power] for power in powers[1:].tolist()]
-    made = Distortion(model=model, focal_mm=focal_mm, terms=tuple(map(_rounded, terms)))
-    return made, scale, float(np.abs(made.placed(scale * ideal) - placed).max())
+    distortion = Distortion(model=model, focal_mm=focal_mm, terms=tuple(map(_rounded, terms)))
+    return distortion, scale, float(np.abs(distortion.placed(scale * ideal) - radii).max())
 
 
 def _unit_scale(p: FloatGrid, powers: NDArray[np.int64]) -> float | None:
@@ -289,11 +289,11 @@ def fit_vignetting(
         aperture: F-number.
     """
     u = np.linspace(0, 1, SAMPLES)
-    known = np.interp(u * corner_px**2, light.heights_mm**2, light.light)
-    k1, k2, k3 = np.linalg.lstsq(u[:, None] ** [1, 2, 3], known - 1, rcond=None)[0]
+    samples = np.interp(u * corner_px**2, light.heights_mm**2, light.light)
+    k1, k2, k3 = np.linalg.lstsq(u[:, None] ** [1, 2, 3], samples - 1, rcond=None)[0]
     terms = (_rounded(k1), _rounded(k2), _rounded(k3))
-    made = Vignetting(focal_mm=focal_mm, aperture=aperture, distance_m=FAR_M, terms=terms)
-    return made, float(np.abs(made.light(np.sqrt(u)) - known).max())
+    vignetting = Vignetting(focal_mm=focal_mm, aperture=aperture, distance_m=FAR_M, terms=terms)
+    return vignetting, float(np.abs(vignetting.light(np.sqrt(u)) - samples).max())
 
 
 def to_xml(
@@ -318,10 +318,10 @@ def to_xml(
     focal = _number(distortion.focal_mm)
     SubElement(calibration, "distortion", {"model": distortion.model, "focal": focal, **terms})
     if vignetting is not None:
-        said = {"focal": vignetting.focal_mm, "aperture": vignetting.aperture}
-        said |= {"distance": vignetting.distance_m}
-        said |= dict(zip(("k1", "k2", "k3"), vignetting.terms, strict=True))
-        numbers = {key: _number(value) for key, value in said.items()}
+        values = {"focal": vignetting.focal_mm, "aperture": vignetting.aperture}
+        values |= {"distance": vignetting.distance_m}
+        values |= dict(zip(("k1", "k2", "k3"), vignetting.terms, strict=True))
+        numbers = {key: _number(value) for key, value in values.items()}
         SubElement(calibration, "vignetting", {"model": "pa", **numbers})
     indent(root, "    ")
     return tostring(root, encoding="unicode") + "\n"

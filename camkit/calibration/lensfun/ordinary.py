@@ -8,7 +8,7 @@ from camkit.bundle.manifest import Manifest
 from camkit.calibration.lensfun.camera import frame_of, manifest_of, slug, stated_crop
 from camkit.calibration.lensfun.database import Database, check_positive
 from camkit.calibration.lensfun.models import TERMS
-from camkit.calibration.lensfun.profile import Found, profile_of
+from camkit.calibration.lensfun.profile import LensfunProfile, profile_of
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.raw import read_capture
 
@@ -57,21 +57,21 @@ class LensBundle:
     """
 
     manifest: Manifest
-    found: Found
+    found: LensfunProfile
     notes: tuple[str, ...]
 
     def to_record(self) -> dict[str, Any]:
         """Return its sources as JSON values."""
-        found, entry, light = self.found, self.found.distortion, self.found.vignetting
+        lens_profile, entry, light = self.found, self.found.distortion, self.found.vignetting
         return {
-            "lens": found.lens.name,
-            "file": found.lens.file,
-            "crop_factor": found.lens.crop_factor,
+            "lens": lens_profile.lens.name,
+            "file": lens_profile.lens.file,
+            "crop_factor": lens_profile.lens.crop_factor,
             "model": entry.model,
             "focal_mm": entry.focal_mm,
             "terms": dict(zip(TERMS[entry.model], entry.terms, strict=True)),
-            "scale": found.scale,
-            "residual_px": round(found.residual_px, 6),
+            "scale": lens_profile.scale,
+            "residual_px": round(lens_profile.residual_px, 6),
             "vignetting": light
             and {
                 "focal_mm": light.focal_mm,
@@ -99,11 +99,11 @@ def lensfun_bundle(
         DecodeError: If database or capture cannot be read, the lens is not known or was not
             measured for such captures, or nothing tells the sensor's size.
     """
-    known = Database(database)
-    lenses = known.find(lens)
+    files = Database(database)
+    lenses = files.find(lens)
     shot = read_capture(capture, mosaic=options.mosaic)
-    frame, taken = frame_of(shot, options.crop_factor, known, stated_crop(capture))
-    found = profile_of(
+    frame, frame_notes = frame_of(shot, options.crop_factor, files, stated_crop(capture))
+    lens_profile = profile_of(
         lenses,
         options.focal_mm,
         frame,
@@ -111,5 +111,7 @@ def lensfun_bundle(
         distance_m=options.distance_m,
         scale=options.scale,
     )
-    manifest, stood_in = manifest_of(slug(name or lens), shot, frame, found.profile)
-    return LensBundle(manifest=manifest, found=found, notes=(*taken, *found.notes, *stood_in))
+    manifest, stood_in = manifest_of(slug(name or lens), shot, frame, lens_profile.profile)
+    return LensBundle(
+        manifest=manifest, found=lens_profile, notes=(*frame_notes, *lens_profile.notes, *stood_in)
+    )

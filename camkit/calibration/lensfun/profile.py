@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.bundle.optics import IlluminationEntry, LensProfile, RadialEntry
-from camkit.calibration.lensfun.between import distortion_at, vignetting_at
 from camkit.calibration.lensfun.database import Lens
+from camkit.calibration.lensfun.interpolation import distortion_at, vignetting_at
 from camkit.calibration.lensfun.models import (
     FULL_FRAME_MM,
     Distortion,
@@ -72,7 +72,7 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Found:
+class LensfunProfile:
     """A profile, and its sources.
 
     Attributes:
@@ -102,7 +102,7 @@ def profile_of(
     aperture: float | None = None,
     distance_m: float | None = None,
     scale: float | None = None,
-) -> Found:
+) -> LensfunProfile:
     """Make a profile.
 
     Args:
@@ -123,8 +123,8 @@ def profile_of(
     as_measured = entry.to_radial(radius_mm, frame.channels)
     try:
         check_distortion(as_measured.to_distortion(), frame.corner_radius_mm)
-        chosen = filling_scale(as_measured, frame) if scale is None else scale
-        distortion = entry.to_radial(radius_mm, frame.channels, chosen)
+        ideal_scale = filling_scale(as_measured, frame) if scale is None else scale
+        distortion = entry.to_radial(radius_mm, frame.channels, ideal_scale)
         check_distortion(distortion.to_distortion(), frame.corner_radius_mm)
     except ContractError as error:
         raise DecodeError(
@@ -132,8 +132,8 @@ def profile_of(
             f"so it cannot be undone: {str(error).split(';')[0]}"
         ) from error
     notes = []
-    if scale is None and chosen < 1:
-        notes.append(f"the picture is enlarged by {1 / chosen:.4f}, so that nothing beyond the capture shows")  # noqa: E501 # fmt: skip
+    if scale is None and ideal_scale < 1:
+        notes.append(f"the picture is enlarged by {1 / ideal_scale:.4f}, so that nothing beyond the capture shows")  # noqa: E501 # fmt: skip
     if len({one.model for one in lens.distortion}) > 1:
         notes.append(f"entries of other models than {entry.model} are left out, as lensfun does")
     if lens.kind != RADIAL_KIND:
@@ -144,16 +144,16 @@ def profile_of(
         notes.append("the database has no vignetting of this lens; light is not evened")
     else:
         light = _illumination(nearest, lens, frame)
-        notes.append(_told(nearest, aperture, distance_m))
+        notes.append(_vignetting_note(nearest, aperture, distance_m))
         if light is None:
             notes.append("that vignetting leaves no light inside the picture; light is not evened")
-    return Found(
+    return LensfunProfile(
         profile=LensProfile(distortion=distortion, illumination=light),
         lens=lens,
         distortion=entry,
         vignetting=None if light is None else nearest,
-        scale=chosen,
-        residual_px=missed_px(entry, distortion, frame, chosen),
+        scale=ideal_scale,
+        residual_px=missed_px(entry, distortion, frame, ideal_scale),
         notes=tuple(notes),
     )
 
@@ -172,11 +172,11 @@ def filling_scale(distortion: RadialEntry, frame: Frame) -> float:
     scale = 1.0
     for channel in range(frame.channels):
         points = np.stack([radii_mm, np.zeros(radii_mm.size)], axis=-1)
-        placed = distort_points(points, rows, channel=channel)[:, 0]
-        beyond = points[placed > radii_mm + _SEEN_PX * to_mm(frame.pitch_um)]
-        if beyond.size:
-            ideal = undistort_points(beyond, rows, channel=channel)
-            scale = min(scale, float((ideal[:, 0] / beyond[:, 0]).min()))
+        placed_mm = distort_points(points, rows, channel=channel)[:, 0]
+        empty = points[placed_mm > radii_mm + _SEEN_PX * to_mm(frame.pitch_um)]
+        if empty.size:
+            ideal = undistort_points(empty, rows, channel=channel)
+            scale = min(scale, float((ideal[:, 0] / empty[:, 0]).min()))
     return scale
 
 
@@ -185,11 +185,11 @@ def missed_px(
 ) -> float:
     """Return the largest error of a profile against lensfun's formula, in pixels of the picture."""
     ideal_mm = np.linspace(0, frame.corner_radius_mm, CHECKED)
-    placed = entry.placed(scale * ideal_mm / distortion.radius_mm) * distortion.radius_mm
+    placed_mm = entry.placed(scale * ideal_mm / distortion.radius_mm) * distortion.radius_mm
     points = np.stack([ideal_mm, np.zeros(CHECKED)], axis=-1)
     rows = distortion.to_distortion()
     missed = [
-        np.abs(distort_points(points, rows, channel=channel)[:, 0] - placed).max()
+        np.abs(distort_points(points, rows, channel=channel)[:, 0] - placed_mm).max()
         for channel in range(frame.channels)
     ]
     return float(max(missed)) / to_mm(frame.pitch_um)
@@ -197,14 +197,14 @@ def missed_px(
 
 def _measured_on(lenses: Sequence[Lens], frame: Frame) -> Lens:
     """Choose the smallest sensor that holds that of the captures, as lensfun does."""
-    known = [lens for lens in lenses if lens.distortion]
-    if not known:
+    measured = [lens for lens in lenses if lens.distortion]
+    if not measured:
         raise DecodeError(f"{lenses[0].file} has no distortion of {lenses[0].name}")
-    large = [lens for lens in known if frame.crop_factor / lens.crop_factor >= SMALLER]
+    large = [lens for lens in measured if frame.crop_factor / lens.crop_factor >= SMALLER]
     if not large:
-        crops = ", ".join(f"{lens.crop_factor:g}" for lens in known)
+        crops = ", ".join(f"{lens.crop_factor:g}" for lens in measured)
         raise DecodeError(
-            f"{known[0].name} was measured with crop factor {crops}; the captures have "
+            f"{measured[0].name} was measured with crop factor {crops}; the captures have "
             f"{frame.crop_factor:.3g}, a larger sensor, whose corners were not "
             f"measured; add {option_text('crop_factor')} if they are a part of it"
         )
@@ -222,11 +222,11 @@ def _illumination(entry: Vignetting, lens: Lens, frame: Frame) -> IlluminationEn
     )
 
 
-def _told(entry: Vignetting, aperture: float | None, distance_m: float | None) -> str:
+def _vignetting_note(entry: Vignetting, aperture: float | None, distance_m: float | None) -> str:
     """Return notes on the vignetting that was used, and on the one asked for."""
-    wanted = "smallest aperture" if aperture is None else f"f/{aperture:g}"
+    aperture_text = "smallest aperture" if aperture is None else f"f/{aperture:g}"
     where = "far away" if distance_m is None else f"{distance_m:g} m"
     return (
         f"vignetting is that measured at {entry.focal_mm:g} mm, f/{entry.aperture:g}, "
-        f"{entry.distance_m:g} m, the nearest to {wanted}, {where}"
+        f"{entry.distance_m:g} m, the nearest to {aperture_text}, {where}"
     )

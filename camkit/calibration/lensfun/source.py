@@ -81,8 +81,12 @@ def _of_bundle(bundle: Bundle) -> Source:
             notes = (*notes, "lateral colour is left out: the entry is that of green")
     light = None
     if profile is None or profile.illumination is not None:
-        known = bundle.illumination
-        light = known.radial_illumination if isinstance(known, FrozenPsf) else known
+        illumination = bundle.illumination
+        light = (
+            illumination.radial_illumination
+            if isinstance(illumination, FrozenPsf)
+            else illumination
+        )
         if light is None:
             notes = (*notes, "illumination over a grid is left out: lensfun knows the radius alone")
     diagonal_mm = float(np.hypot(*size)) * pitch_mm
@@ -96,25 +100,25 @@ def _of_bundle(bundle: Bundle) -> Source:
     )
 
 
-def _of_geometry(found: GeometryFile, path: Path) -> Source:
-    size = (found.width_px, found.height_px)
-    made = Source(
+def _of_geometry(file: GeometryFile, path: Path) -> Source:
+    size = (file.width_px, file.height_px)
+    source = Source(
         name=path.stem,
         size_px=size,
         crop_factor=None,
         distortion=RadialDistortion(
-            coefficients=np.array([found.radial.coefficients], dtype=np.float64),
-            radius_mm=found.radial.radius_px,
+            coefficients=np.array([file.radial.coefficients], dtype=np.float64),
+            radius_mm=file.radial.radius_px,
         ),
         light=None,
-        focal_px=found.focal_px,
-        notes=_off_middle(found.centre_px, size),
+        focal_px=file.focal_px,
+        notes=_off_middle(file.centre_px, size),
     )
-    if found.covered_radius_px < made.corner_px:
-        known = f"{found.covered_radius_px:.0f} px of {made.corner_px:.0f}"
-        note = f"the geometry is known to {known} from the centre; the rest is its guess"
-        made = replace(made, notes=(*made.notes, note))
-    return made
+    if file.covered_radius_px < source.corner_px:
+        extent = f"{file.covered_radius_px:.0f} px of {source.corner_px:.0f}"
+        note = f"the geometry is known to {extent} from the centre; the rest is its guess"
+        source = replace(source, notes=(*source.notes, note))
+    return source
 
 
 def _one_row(whole: RadialDistortion, channel: int, radius_px: float) -> RadialDistortion:
@@ -129,7 +133,9 @@ def _one_row(whole: RadialDistortion, channel: int, radius_px: float) -> RadialD
 def _off_middle(centre: tuple[float, float] | None, size: tuple[int, int]) -> tuple[str, ...]:
     if centre is None:
         return ()
-    off = float(np.hypot(centre[0] - (size[0] - 1) / 2, centre[1] - (size[1] - 1) / 2))
-    if off < OFF_MIDDLE_PX:
+    offset_px = float(np.hypot(centre[0] - (size[0] - 1) / 2, centre[1] - (size[1] - 1) / 2))
+    if offset_px < OFF_MIDDLE_PX:
         return ()
-    return (f"the optical centre lies {off:.1f} px off the middle, about which lensfun corrects",)
+    return (
+        f"the optical centre lies {offset_px:.1f} px off the middle, about which lensfun corrects",
+    )

@@ -75,8 +75,8 @@ class _Limits:
     def leave(self) -> None:
         self._depth -= 1
 
-    def document_type(self, _name: str, _system: object, _public: object, own: bool) -> None:
-        if own:
+    def document_type(self, _name: str, _system: object, _public: object, is_own: bool) -> None:
+        if is_own:
             raise DecodeError(f"{self._what} declares a document type of its own; refused")
 
     def entity(self, *_: object) -> None:

@@ -84,11 +84,11 @@ def in_pairs(files: Sequence[Path], option: str) -> list[tuple[Path, Path]]:
             f"{option_text(option)} takes pairs, two frames of one light and setting; got "
             f"{len(files)} files"
         )
-    seen: set[Path] = set()
+    paths: set[Path] = set()
     for path in files:
-        if path.resolve() in seen:
+        if path.resolve() in paths:
             raise ContractError(f"{path} is given twice; a pair is two exposures")
-        seen.add(path.resolve())
+        paths.add(path.resolve())
     return list(zip(files[::2], files[1::2], strict=True))
 
 
@@ -135,9 +135,9 @@ class PairReader:
         check_alike(first.like, first.path, second.like, second.path)
         self._check_sensor(first)
         if darks and first.iso not in darks:
-            known = ", ".join(f"{iso:g}" for iso in sorted(darks))
+            isos = ", ".join(f"{iso:g}" for iso in sorted(darks))
             raise DecodeError(
-                f"{first.path.name} has ISO {first.iso:g}, the dark frames {known}; give a pair of "
+                f"{first.path.name} has ISO {first.iso:g}, the dark frames {isos}; give a pair of "
                 "darks of every ISO"
             )
         dark = darks.get(first.iso, {})
@@ -175,12 +175,12 @@ class PairReader:
         iso = capture.iso or capture.metadata.iso or self._iso
         if iso is None:
             raise DecodeError(f"{path.name} states no ISO; add {option_text('iso')}")
-        used = np.flatnonzero(np.bincount(_plane_of(capture).ravel()))
+        codes = np.flatnonzero(np.bincount(_plane_of(capture).ravel()))
         return Frame(
             path=path,
             like=without_pixels(capture),
             iso=float(iso),
-            step=int(np.gcd.reduce(np.diff(used))) if used.size > 1 else 0,
+            step=int(np.gcd.reduce(np.diff(codes))) if codes.size > 1 else 0,
         )
 
     def _check_sensor(self, frame: Frame) -> None:
@@ -252,10 +252,10 @@ def _check_dark(frame: Frame, capture: Capture, _dark: dict[str, float]) -> None
 def _check_flat(frame: Frame, capture: Capture, dark: dict[str, float]) -> None:
     """Refuse a frame that is clipped or black in a colour."""
     limit = capture.saturated_rows(0, capture.height)
-    seen = limit if capture.cfa is not None else limit[:1]
+    saturated = limit if capture.cfa is not None else limit[:1]
     for dy in (0, 1):
         for dx in (0, 1):
-            clipped = float(np.mean(seen[..., dy::2, dx::2]))
+            clipped = float(np.mean(saturated[..., dy::2, dx::2]))
             if clipped > MOST_CLIPPED:
                 raise DecodeError(
                     f"{frame.path.name}: {clipped:.1%} of a colour is clipped; expose less"
@@ -271,10 +271,13 @@ def _check_flat(frame: Frame, capture: Capture, dark: dict[str, float]) -> None:
 def _site(
     paths: tuple[Path, Path], planes: tuple[FloatGrid, FloatGrid], dark: float | None, step: float
 ) -> SitePair:
-    found = site_pair(*planes, dark, step)
-    if dark is not None and abs((found.second_mean - dark) / (found.mean - dark) - 1) > MOST_DRIFT:
+    statistics = site_pair(*planes, dark, step)
+    if (
+        dark is not None
+        and abs((statistics.second_mean - dark) / (statistics.mean - dark) - 1) > MOST_DRIFT
+    ):
         raise DecodeError(
             f"{paths[0].name} and {paths[1].name} differ by more than {MOST_DRIFT:.0%} in light: "
             "a pair is one light and one setting"
         )
-    return found
+    return statistics

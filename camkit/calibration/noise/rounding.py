@@ -48,13 +48,13 @@ def spread_of(variance: float, samples: int, step: float) -> Spread:
         samples: Behind it.
         step: Of the converter, in DN.
     """
-    seen = variance / step**2
-    least, most = _bounds(seen)
-    plain = float(np.sqrt(max(seen - OF_ROUNDING, 0)))
+    rounded = variance / step**2
+    least, most = _bounds(rounded)
+    plain = float(np.sqrt(max(rounded - OF_ROUNDING, 0)))
     if max(most - plain, plain - least) <= MOST_OPEN * plain:
         return Spread(value=plain * step, resolved=True)
-    chance = _TAIL * float(np.sqrt((seen + 2 * seen**2) / samples)) + _TAIL / samples
-    return Spread(value=max(_bounds(seen + chance)[1], LEAST_BOUND) * step, resolved=False)
+    chance = _TAIL * float(np.sqrt((rounded + 2 * rounded**2) / samples)) + _TAIL / samples
+    return Spread(value=max(_bounds(rounded + chance)[1], LEAST_BOUND) * step, resolved=False)
 
 
 def rounded_variance(sigma: float, place: float) -> float:
@@ -70,20 +70,20 @@ def rounded_variance(sigma: float, place: float) -> float:
     return float(share @ (codes - mean) ** 2)
 
 
-def _bounds(seen: float) -> tuple[float, float]:
+def _bounds(variance: float) -> tuple[float, float]:
     """Return least and most noise, in steps, that a variance in squared steps may stand for."""
-    sigma, on_step, between = _table()
-    if seen >= on_step[-1]:
-        plain = float(np.sqrt(seen - OF_ROUNDING))
+    sigma, on_step, half_step = _table()
+    if variance >= on_step[-1]:
+        plain = float(np.sqrt(variance - OF_ROUNDING))
         return plain, plain
-    least = 0.0 if seen < between[0] else float(np.interp(seen, between, sigma))
-    return least, float(np.interp(seen, on_step, sigma))
+    least = 0.0 if variance < half_step[0] else float(np.interp(variance, half_step, sigma))
+    return least, float(np.interp(variance, on_step, sigma))
 
 
 @cache
 def _table() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     sigma = np.linspace(0.02, _WIDEST, _SIGMAS)
-    on_step, between = (
+    on_step, half_step = (
         np.array([rounded_variance(float(s), place) for s in sigma]) for place in (0.0, 0.5)
     )
-    return sigma, on_step, between
+    return sigma, on_step, half_step

@@ -153,10 +153,10 @@ def measure_sensor(
 
 
 def _by_iso(pairs: Iterable[Pair]) -> dict[float, list[Pair]]:
-    found: dict[float, list[Pair]] = {}
+    by_iso: dict[float, list[Pair]] = {}
     for pair in pairs:
-        found.setdefault(pair.iso, []).append(pair)
-    return found
+        by_iso.setdefault(pair.iso, []).append(pair)
+    return by_iso
 
 
 def _means(darks: Sequence[Pair]) -> dict[str, float]:
@@ -181,7 +181,7 @@ def _iso_facts(darks: Sequence[Pair], flats: Sequence[Pair]) -> IsoFacts:
     gain, error = _one_gain(list(transfers.values()))
     dark_pattern = float(np.mean([site.pattern for site in every]))
     like = flats[0].first.like
-    seen = [*every, *(site for pair in flats for site in pair.sites.values())]
+    all_sites = [*every, *(site for pair in flats for site in pair.sites.values())]
     return IsoFacts(
         iso=flats[0].iso,
         transfers=transfers,
@@ -194,7 +194,7 @@ def _iso_facts(darks: Sequence[Pair], flats: Sequence[Pair]) -> IsoFacts:
         dsnu_dn=float(np.sqrt(max(dark_pattern, 0))),
         linearity=_linearity(flats, black),
         pairs=len(flats),
-        defects=sum(s.defects for s in seen) / sum(s.samples + s.defects for s in seen),
+        defects=sum(s.defects for s in all_sites) / sum(s.samples + s.defects for s in all_sites),
     )
 
 
@@ -258,9 +258,9 @@ def _prnu(flats: Sequence[SitePair], dark_pattern: float) -> float:
 
 def _linearity(flats: Sequence[Pair], black: dict[str, float]) -> float | None:
     """Return the deviation of means from exposure times a constant; None without times."""
-    told = [pair.first.time_s for pair in flats]
-    times = np.array([time for time in told if time is not None])
-    if len(times) < len(told) or np.unique(times).size < LEAST_TIMES:
+    stated_times = [pair.first.time_s for pair in flats]
+    times = np.array([time for time in stated_times if time is not None])
+    if len(times) < len(stated_times) or np.unique(times).size < LEAST_TIMES:
         return None
     means: NDArray[np.float64] = np.array(
         [
@@ -273,31 +273,31 @@ def _linearity(flats: Sequence[Pair], black: dict[str, float]) -> float | None:
 
 
 def _notes(facts: IsoFacts) -> list[str]:
-    at, found = f"ISO {facts.iso:g}", []
+    at, notes = f"ISO {facts.iso:g}", []
     if not facts.read.resolved:
-        found.append(
+        notes.append(
             f"{at}: the read noise is finer than the converter's step; it lies below "
             f"{facts.read_noise_e:.3g} e-"
         )
     if facts.pairs < FEW_FLATS:
-        found.append(f"{at}: only {facts.pairs} levels of light; give {FEW_FLATS} or more")
+        notes.append(f"{at}: only {facts.pairs} levels of light; give {FEW_FLATS} or more")
     if facts.prnu > MUCH_PATTERN:
-        found.append(
+        notes.append(
             f"{at}: the flats hold a pattern of {facts.prnu:.0%}: is there something sharp in them?"
         )
     slopes = np.array([line.dn_per_e for line in facts.transfers.values()])
     errors = np.array([line.error for line in facts.transfers.values()])
-    apart = np.abs(slopes * facts.gain_e_per_dn - 1)
-    if (apart > np.maximum(MUCH_APART, _SURE * errors * facts.gain_e_per_dn)).any():
+    deviations = np.abs(slopes * facts.gain_e_per_dn - 1)
+    if (deviations > np.maximum(MUCH_APART, _SURE * errors * facts.gain_e_per_dn)).any():
         listed = ", ".join(f"{n} {1 / t.dn_per_e:.3g}" for n, t in facts.transfers.items())
-        found.append(f"{at}: the colours differ in gain: {listed} e-/DN")
+        notes.append(f"{at}: the colours differ in gain: {listed} e-/DN")
     misfit = max(float(np.abs(line.misfits()).max()) for line in facts.transfers.values())
     if misfit > MUCH_OFF:
-        found.append(
+        notes.append(
             f"{at}: a level lies {misfit:.0%} off the line of photon transfer; the sensor is not "
             "linear there, or the light changed"
         )
-    return found
+    return notes
 
 
 def _short(value: float, digits: int = 5) -> float:

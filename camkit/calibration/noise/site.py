@@ -70,11 +70,11 @@ def site_pair(first: FloatGrid, second: FloatGrid, dark: float | None, step: flo
         ratio = lit / (second_mean - dark)
         signal = lit * (1 + ratio) / (1 + ratio**2)
     one, two = _blocks(first), _blocks(second) * ratio
-    difference, apart = _without_defects(one - two, step)
+    difference, defects = _without_defects(one - two, step)
     shared, broken = _without_defects((one + two) / 2, step)
-    left_out = apart | broken
-    kept = 1 - _PLANE_TERMS / one.shape[1]
-    count = kept * np.count_nonzero(~left_out)
+    left_out = defects | broken
+    freedom = 1 - _PLANE_TERMS / one.shape[1]
+    count = freedom * np.count_nonzero(~left_out)
     noise = float((difference[~left_out] ** 2).sum() / count)
     mixed = float((shared[~left_out] ** 2).sum() / count)
     return SitePair(
@@ -102,11 +102,11 @@ def _without_defects(blocks: FloatGrid, step: float) -> tuple[FloatGrid, NDArray
     """Return blocks without their planes, and where a sample is a lone defect."""
     rest = blocks - _planes(blocks)
     limit = MOST_SPREADS * max(_MAD_TO_SIGMA * float(np.median(np.abs(rest))), step / 2)
-    apart = np.abs(rest) > limit
-    if apart.any():
-        rest = blocks - _planes(np.where(apart, blocks - rest, blocks))
-        apart = np.abs(rest) > limit
-    return rest, apart
+    is_defect = np.abs(rest) > limit
+    if is_defect.any():
+        rest = blocks - _planes(np.where(is_defect, blocks - rest, blocks))
+        is_defect = np.abs(rest) > limit
+    return rest, is_defect
 
 
 def _planes(blocks: FloatGrid) -> FloatGrid:

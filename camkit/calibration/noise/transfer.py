@@ -70,9 +70,9 @@ def fit_transfer(points: Sequence[Point], dark: Point) -> Transfer:
     Raises:
         DecodeError: If the variance does not grow with the light.
     """
-    known = [dark, *points]
+    levels = [dark, *points]
     signal, variance, samples = (
-        np.array([getattr(p, name) for p in known], dtype=np.float64)
+        np.array([getattr(p, name) for p in levels], dtype=np.float64)
         for name in ("signal", "variance", "samples")
     )
     terms = np.stack([np.ones_like(signal), signal], axis=1)
@@ -88,7 +88,7 @@ def fit_transfer(points: Sequence[Point], dark: Point) -> Transfer:
                 "differ, straight from the sensor"
             )
         expected = np.maximum(begins + slope * signal, expected.min())
-    freedom = len(known) - _LEAST_LEVELS
+    freedom = len(levels) - _LEAST_LEVELS
     chi = float(((variance - expected) ** 2 * samples / (2 * expected**2)).sum())
     scatter = max(1.0, chi / freedom) if freedom > 0 else 1.0
     return Transfer(

@@ -72,7 +72,7 @@ def design(
 
     if resume and overwrite:
         raise ContractError("--resume continues, --overwrite starts again: use one of them")
-    chosen = with_choices(
+    plan = with_choices(
         read_design(recipe),
         steps=steps,
         lens_rate=lens_rate,
@@ -80,14 +80,14 @@ def design(
         seed=seed,
         search=search,
     )
-    searches = chosen.starts.count and chosen.schedule.lens_rate and not resume
+    searches = plan.starts.count and plan.schedule.lens_rate and not resume
     if searches:
-        say(f"trying {chosen.starts.count} starts", err=True)
+        say(f"trying {plan.starts.count} starts", err=True)
     with working("trying starts" if searches else "reading the lens"):
         run = DesignRun(
-            chosen,
+            plan,
             DesignOptions(
-                out_dir=out_dir or Path("runs") / chosen.name,
+                out_dir=out_dir or Path("runs") / plan.name,
                 recipe_folder=recipe.parent,
                 pictures=data,
                 threads=threads,
@@ -95,16 +95,16 @@ def design(
                 overwrite=overwrite,
             ),
         )
-    for variable, own in run.loop.parts.lens.problem.free.outside():
+    for variable, value in run.loop.parts.lens.problem.free.outside():
         say(
-            f"{variable.kind} of surface {variable.surface}: the given lens has {own:.6g}, outside "
-            f"its bounds {variable.low:g} .. {variable.high:g}: it begins at the bound",
+            f"{variable.kind} of surface {variable.surface}: the given lens has {value:.6g}, "
+            f"outside its bounds {variable.low:g} .. {variable.high:g}: it begins at the bound",
             err=True,
         )
     if run.searched_s:
         say(f"starts tried in {run.searched_s:.0f} s", err=True)
-    total = chosen.schedule.steps
-    with working(f"designing {chosen.name}", total, unit="steps", writes_lines=True) as task:
+    total = plan.schedule.steps
+    with working(f"designing {plan.name}", total, unit="steps", writes_lines=True) as task:
         task.begin(run.loop.step)
         for moment in run.go():
             task.count(moment.step)
@@ -117,11 +117,11 @@ def design(
 
 
 def _line(moment: "Progress") -> str:
-    lost = f", {moment.lost_light:.0%} of the light beyond kernel_px at the worst field"
+    lost_text = f", {moment.lost_light:.0%} of the light beyond kernel_px at the worst field"
     return (
         f"step {moment.step}: loss {moment.loss:.4f}, validation {moment.valid_db:.3f} dB "
         f"(best {moment.best_db:.3f}), {moment.seconds:.0f} s"
-        + (lost if moment.lost_light > MUCH_LOST else "")
+        + (lost_text if moment.lost_light > MUCH_LOST else "")
     )
 
 

@@ -56,9 +56,9 @@ def fit_bank(
         seed=seed,
     )
     with working(f"fitting the bank of {plan.name}"):
-        found = bank_fitting_kind(plan.kind).fit(plan, options, note)
+        fit = bank_fitting_kind(plan.kind).fit(plan, options, note)
     with atomic_output(output) as part:
-        part.write_text(with_bank(text, found.together), encoding="utf-8")
-    numbers = found.together.model_dump(mode="json", exclude={"spread"})
-    told = {"samples": found.samples, "steps": found.steps, "gain_db": round(found.gain_db, 3)}
-    print_report({"output": str(output), **told, **numbers}, json_)
+        part.write_text(with_bank(text, fit.together), encoding="utf-8")
+    numbers = fit.together.model_dump(mode="json", exclude={"spread"})
+    record = {"samples": fit.samples, "steps": fit.steps, "gain_db": round(fit.gain_db, 3)}
+    print_report({"output": str(output), **record, **numbers}, json_)

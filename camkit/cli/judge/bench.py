@@ -117,7 +117,7 @@ def bench(
     )
     from camkit.report.bench.trial import Axes
 
-    chosen = [*(bundles or ()), *(_cameras() if all_ else ())]
+    names = [*(bundles or ()), *(_cameras() if all_ else ())]
     axes = Axes(
         sizes=_words(sizes),
         methods=_words(methods),
@@ -130,7 +130,7 @@ def bench(
         vary=not quick,
     )
     settings = Settings(
-        bundles=tuple(dict.fromkeys(chosen)),
+        bundles=tuple(dict.fromkeys(names)),
         references=tuple(reference or ()),
         axes=axes,
         repeat=(2 if quick else DEFAULT_REPEAT) if repeat is None else repeat,
@@ -184,19 +184,19 @@ def _run(settings: "Settings", out_dir: Path, *, as_json: bool) -> None:
 
 
 def _lines(rows: "list[Row]") -> list[str]:
-    shown = [
+    columns = [
         *(("PSNR dB", "psnr_db", ".2f"), ("SSIM", "ssim", ".3f")),
         *(("HDR dB", "hdr_psnr_db", ".2f"), ("stops", "stops_rmse", ".2f")),
         *(("s", "seconds_median", ".2f"), ("p90", "seconds_p90", ".2f")),
         ("steady s", "steady_seconds_median", ".2f"),
     ]
     if not any("hdr_psnr_db" in row for row in rows):
-        del shown[2:4]
-    heads = ("bundle", "method", *(head for head, _, _ in shown), "peak MB", "noisy")
+        del columns[2:4]
+    heads = ("bundle", "method", *(head for head, _, _ in columns), "peak MB", "noisy")
     table: list[tuple[str, ...]] = [heads]
     for row in rows:
         numbers = [
-            "-" if row.get(key) is None else format(row[key], form) for _, key, form in shown
+            "-" if row.get(key) is None else format(row[key], form) for _, key, form in columns
         ]
         peak = "-" if row["peak_rss_mb"] is None else f"{row['peak_rss_mb']:.0f}"
         noisy = {True: "yes", False: "no", None: "-"}[row["noisy"]]

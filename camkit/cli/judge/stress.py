@@ -77,9 +77,9 @@ def stress(
         data_folder=data,
         out_dir=out_dir,
     )
-    before = None if compare is None else open_bundle(find_bundle(compare))
+    earlier = None if compare is None else open_bundle(find_bundle(compare))
     with working("sweeping", unit="points") as task:
-        result = run_stress(opened, options, before=before, progress=_teller(task))
+        result = run_stress(opened, options, before=earlier, progress=_teller(task))
     if write:
         write_envelope(opened, result.envelope)
     if json_:
@@ -89,8 +89,8 @@ def stress(
         say(_line(row))
     if result.page is not None:
         say(f"page: {result.page}")
-    for name, found in result.envelope.items():
-        say(f"{name}: {found.low:.4g} to {found.high:.4g}{' (stored)' if write else ''}")
+    for name, limits in result.envelope.items():
+        say(f"{name}: {limits.low:.4g} to {limits.high:.4g}{' (stored)' if write else ''}")
 
 
 def _line(row: dict[str, object]) -> str:

@@ -16,15 +16,15 @@ def decoding_ahead(command: Callable[..., None]) -> Callable[..., None]:
     """
 
     @wraps(command)
-    def ahead(**given: Any) -> None:
-        elsewhere = given["scheduler"] is not None or given["workers"] is not None
-        if elsewhere or given["dry_run"] or not _needs_decoder(given["files"]):
-            command(**given)
+    def ahead(**arguments: Any) -> None:
+        elsewhere = arguments["scheduler"] is not None or arguments["workers"] is not None
+        if elsewhere or arguments["dry_run"] or not _needs_decoder(arguments["files"]):
+            command(**arguments)
             return
         from camkit.runtime.files.decoder import decoder_ahead
 
         with decoder_ahead():
-            command(**given)
+            command(**arguments)
 
     return ahead
 
@@ -35,5 +35,5 @@ def _needs_decoder(files: Sequence[str]) -> bool:
 
     first = Path(files[0])
     suffix = first.suffix.lower()
-    others = {own for kind in all_kinds() for own in kind.file_types}
+    others = {file_type for kind in all_kinds() for file_type in kind.file_types}
     return bool(suffix) and suffix not in PICTURE_SUFFIXES | others and first.is_file()

@@ -91,8 +91,8 @@ def _laws_text(laws: dict[str, dict[str, Any]]) -> dict[str, dict[str, str]]:
         return f"{worst} (at most {limit}){'' if law.kept else ', BROKEN'}"
 
     return {
-        size: {name: line(StatedLaw.model_validate(law)) for name, law in stated.items()}
-        for size, stated in laws.items()
+        size: {name: line(StatedLaw.model_validate(law)) for name, law in by_name.items()}
+        for size, by_name in laws.items()
     }
 
 
@@ -103,13 +103,13 @@ def _describe_psf(bundle: "Bundle") -> dict[str, Any] | None:
     if PSF not in bundle.names:
         return None
     psf = bundle.psf
-    moved = {} if psf.focus_um is None else {"focus_um": psf.focus_um.tolist()}
+    focus = {} if psf.focus_um is None else {"focus_um": psf.focus_um.tolist()}
     return {
         "kernels": list(psf.kernels.shape),
         "field_heights_mm": [round(float(v), 3) for v in psf.field_heights_mm],
         "depths": [depth_name(v) for v in psf.depths_mm],
         "wavelengths_um": [round(float(v), 4) for v in psf.wavelengths_um],
-        **moved,
+        **focus,
     }
 
 

@@ -16,7 +16,7 @@ def with_kind_options(command: Callable[..., None]) -> Callable[..., None]:
         command: Its last parameter is **of_kind.
     """
     whole = inspect.signature(command)
-    own = [p for p in whole.parameters.values() if p.kind is not inspect.Parameter.VAR_KEYWORD]
+    plain = [p for p in whole.parameters.values() if p.kind is not inspect.Parameter.VAR_KEYWORD]
     added = {
         option.name: Annotated[
             str | None, typer.Option(f"--{option.name}", help=_help(kind, option))
@@ -28,19 +28,19 @@ def with_kind_options(command: Callable[..., None]) -> Callable[..., None]:
         for name, note in added.items()
     ]
     # typer reads a command's options from here
-    command.__signature__ = whole.replace(parameters=[*own, *keywords])  # type: ignore[attr-defined]
-    notes: dict[str, Any] = {p.name: p.annotation for p in own}
+    command.__signature__ = whole.replace(parameters=[*plain, *keywords])  # type: ignore[attr-defined]
+    notes: dict[str, Any] = {p.name: p.annotation for p in plain}
     command.__annotations__ = {**notes, **added, "return": None}
     return command
 
 
 def _options() -> list[tuple[str, KindOption]]:
     """Return (kind, option) for every option of a name, from the first kind that has it."""
-    found: dict[str, tuple[str, KindOption]] = {}
+    options: dict[str, tuple[str, KindOption]] = {}
     for kind in all_kinds():
         for option in kind.options:
-            found.setdefault(option.name, (kind.name, option))
-    return list(found.values())
+            options.setdefault(option.name, (kind.name, option))
+    return list(options.values())
 
 
 def _help(kind: str, option: KindOption) -> str:

@@ -71,8 +71,8 @@ def merge(
     from camkit.runtime.merging.survey import survey
     from camkit.runtime.output.preview_file import preview_path
 
-    chosen = _response(response)
-    said = mosaic_options(mosaic, black_level, white_level)
+    response_name = _response(response)
+    mosaic_facts = mosaic_options(mosaic, black_level, white_level)
     brackets = find_brackets(files)
     outs = merged_paths(brackets, out)
     previews = [preview_path(path) if preview else None for path in outs]
@@ -81,32 +81,34 @@ def merge(
             raise ContractError(f"{path} exists; add --overwrite or choose another name")
     failed = False
     jobs = list(zip(brackets, outs, previews, strict=True))
-    for bracket, path, shown in counted(jobs, "merging", "brackets"):
+    for bracket, path, preview_out in counted(jobs, "merging", "brackets"):
         try:
-            found = survey(bracket.files, bracket.times_s(times), mosaic=said)
+            frames = survey(bracket.files, bracket.times_s(times), mosaic=mosaic_facts)
             path.parent.mkdir(parents=True, exist_ok=True)
-            report = merge_to_exr(found, path, response=chosen, reference=reference, preview=shown)
+            report = merge_to_exr(
+                frames, path, response=response_name, reference=reference, preview=preview_out
+            )
         except (CamkitError, OSError) as error:
             if len(brackets) == 1:
                 raise
             say(f"camkit: {bracket.folder}: {error}", err=True)
             failed = True
             continue
-        _print(report, path, shown, json_=json_)
+        _print(report, path, preview_out, json_=json_)
     if failed:
         raise typer.Exit(ExitCode.INPUT_FAILED)
 
 
 def _print(report: "Report", out: Path, preview: Path | None, *, json_: bool) -> None:
     if json_:
-        shown = {} if preview is None else {"preview": str(preview)}
-        say(json.dumps({**report.to_json(), "out": str(out), **shown}))
+        extra = {} if preview is None else {"preview": str(preview)}
+        say(json.dumps({**report.to_json(), "out": str(out), **extra}))
         return
     for note in report.notes:
         say(f"note: {note}", err=True)
-    beside = "" if preview is None else f", {preview}"
+    preview_text = "" if preview is None else f", {preview}"
     say(
-        f"{out}{beside}: {len(report.frames)} frames, {report.times_s[-1]:g} to "
+        f"{out}{preview_text}: {len(report.frames)} frames, {report.times_s[-1]:g} to "
         f"{report.times_s[0]:g} s, response {report.response}, {report.range_stops:.1f} stops, "
         f"{report.clipped_fraction:.4%} clipped in all; 1.0 is the white of {report.reference}"
     )

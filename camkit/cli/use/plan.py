@@ -17,8 +17,8 @@ def plan(**choices: Any) -> None:
 def _as_process() -> inspect.Signature:
     """Return the signature of `process` without the options that do not change a plan."""
     whole = inspect.signature(process)
-    kept = [p for name, p in whole.parameters.items() if name not in NOT_PLANNED]
-    return whole.replace(parameters=kept)
+    parameters = [p for name, p in whole.parameters.items() if name not in NOT_PLANNED]
+    return whole.replace(parameters=parameters)
 
 
 # typer reads a command's options from here; so the two commands can never differ.

@@ -83,7 +83,7 @@ class BenchPart:
         isos: Sensitivities.
         rows: Row makers of its own; one called as a common maker stands in its place.
         metrics: Of its own, beside the common ones; the kind names those that count.
-        source: Of the register of scenes (`camkit.scenes.named`): its scenes are photographed
+        source: Of the register of scenes (`camkit.scenes`): its scenes are photographed
             where there is no folder of pictures; None takes the golden cases.
         measure: Measures a bundle in place of all that; None for photographs.
     """

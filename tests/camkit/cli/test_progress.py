@@ -12,7 +12,7 @@ import pytest
 
 from camkit.cli import progress as display_module
 from camkit.cli.app import run
-from camkit.cli.progress import Display, outer, shown, tasks_text, time_left
+from camkit.cli.progress import Display, outer, showing_progress, tasks_text, time_left
 from camkit.cli.say import say
 from camkit.progress import Task, counted, duration, listening, note, working
 from tests.capture_factory import write_tiny_captures
@@ -194,7 +194,7 @@ def test_times_are_said_as_people_say_them(seconds: float, text: str) -> None:
 
 def test_the_clock_of_a_command_stops_with_it(monkeypatch, capsys) -> None:
     monkeypatch.setattr(display_module, "SILENT_S", 0.01)
-    with shown("camkit try"), working("waiting"):
+    with showing_progress("camkit try"), working("waiting"):
         time.sleep(0.1)
     said = capsys.readouterr().err
     assert said.startswith("camkit try: waiting; 0 s so far\n")
@@ -209,7 +209,7 @@ def test_a_stderr_that_nobody_reads_stops_no_work(monkeypatch) -> None:
 
     monkeypatch.setattr(display_module, "SILENT_S", 0.01)
     monkeypatch.setattr(sys, "stderr", Gone())
-    with shown("camkit try"):
+    with showing_progress("camkit try"):
         assert list(counted(range(3), "counting")) == [0, 1, 2]
         time.sleep(0.1)
 

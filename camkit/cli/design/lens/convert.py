@@ -57,8 +57,8 @@ def convert(
     for note in notes:
         say(f"{source.name}: {note}", err=True)
     if json_:
-        found = {"lens": lens.name, "surfaces": len(lens.surfaces), "out": str(out)}
-        say(json.dumps({**found, "notes": list(notes)}))
+        record = {"lens": lens.name, "surfaces": len(lens.surfaces), "out": str(out)}
+        say(json.dumps({**record, "notes": list(notes)}))
     else:
         say(f"{out}: {lens.name}, {len(lens.surfaces)} surfaces")
 

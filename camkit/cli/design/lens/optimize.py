@@ -75,24 +75,24 @@ def optimize(
     begin = problem.free.scaled()
     problem = in_own_frame(problem, begin)
     with working(f"improving {lens.name}"):
-        found = improve(problem, begin, starts=starts, spread=spread, steps=steps, seed=seed)
-    better = problem.free.made(found.scaled)
+        result = improve(problem, begin, starts=starts, spread=spread, steps=steps, seed=seed)
+    better = problem.free.made(result.scaled)
     write_lens(better, out)
     notes = [
         *read_notes,
         *(
             f"surface {surface}: the beam needs {reach_mm:.3f} mm, the rim of {rim_mm:.3f} mm stays"
-            for surface, reach_mm, rim_mm in too_small_rims(problem, found.scaled)
+            for surface, reach_mm, rim_mm in too_small_rims(problem, result.scaled)
         ),
     ]
     report = {
         "lens": lens.name,
         "out": str(out),
         "merit": merit,
-        "merit_before": found.merit_before,
-        "merit_after": found.merit,
+        "merit_before": result.merit_before,
+        "merit_after": result.merit,
         "variables": len(problem.free.variables),
-        "evaluations": found.evaluations,
+        "evaluations": result.evaluations,
         "spot_rms_mm_before": _spots(lens),
         "spot_rms_mm_after": _spots(better),
         "notes": notes,
@@ -147,8 +147,8 @@ def _spots(lens: "Lens") -> list[float]:
     waves = torch.tensor(lens.wavelengths_um, dtype=torch.float64)
     with torch.no_grad():
         spots = trace_spots(lens, slopes, waves, hexapolar(RINGS), definition="paraxial")
-        found: list[float] = rms_radius(all_waves(spots))[:, 0].tolist()
-    return found
+        radii: list[float] = rms_radius(all_waves(spots))[:, 0].tolist()
+    return radii
 
 
 def _text(report: dict[str, Any]) -> str:

@@ -56,13 +56,13 @@ def peak(
     lens, notes = read_noted_lens(file, [read_agf(path) for path in glass or ()])
     if tool_radius_um is not None:
         lens = with_tool(lens, tool_radius_um)
-    told = measured(lens, lens.field_angles_rad, pitch_um, waves=waves)
+    record = measured(lens, lens.field_angles_rad, pitch_um, waves=waves)
     if json_:
-        say(json.dumps(told | {"notes": list(notes)}))
+        say(json.dumps(record | {"notes": list(notes)}))
         return
     for note in notes:
         say(f"{file.name}: {note}", err=True)
-    say(to_text(told))
+    say(to_text(record))
 
 
 def measured(
@@ -72,13 +72,13 @@ def measured(
     from camkit.models_def.optics.thin.report import between, report_peaks, to_json
 
     fields = between(field_angles_rad)
-    chosen = sorted({0, len(fields) // 2, len(fields) - 1}) if waves else []
+    wave_fields = sorted({0, len(fields) // 2, len(fields) - 1}) if waves else []
     with working("measuring peaks", unit="peaks", is_even=not waves) as task:
-        found = report_peaks(
+        peaks = report_peaks(
             lens,
             fields,
             pitch_um,
-            wave_fields_rad=[fields[i] for i in chosen],
+            wave_fields_rad=[fields[i] for i in wave_fields],
             progress=task.count,
         )
-    return to_json(found)
+    return to_json(peaks)

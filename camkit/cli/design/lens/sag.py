@@ -41,7 +41,7 @@ def sag(
 
     lens, notes = read_noted_lens(file, [read_agf(path) for path in glass or ()])
     if surface is None:
-        cut = (n for n, found in enumerate(lens.surfaces) if found.grooves is not None)
+        cut = (n for n, face in enumerate(lens.surfaces) if face.grooves is not None)
         surface = next(cut, 0)
     if surface >= len(lens.surfaces):
         raise ContractError(f"--surface must be 0..{len(lens.surfaces) - 1}; got {surface}")
@@ -53,9 +53,9 @@ def sag(
     low, high = float(table.height_um.min()), float(table.height_um.max())
     steepest_deg = math.degrees(math.atan(float(abs(table.slope).max())))
     if json_:
-        told = {"lens": lens.name, "surface": surface, "out": str(out)}
-        told |= {"rows": len(table.radius_mm), "walls": table.walls}
-        say(json.dumps(told | {"height_um": [low, high], "steepest_deg": steepest_deg}))
+        record = {"lens": lens.name, "surface": surface, "out": str(out)}
+        record |= {"rows": len(table.radius_mm), "walls": table.walls}
+        say(json.dumps(record | {"height_um": [low, high], "steepest_deg": steepest_deg}))
         return
     say(
         f"{out}: {len(table.radius_mm)} radii, {table.walls} walls, heights {low:.3f} to "

@@ -46,13 +46,13 @@ def show(
     from camkit.report.pages.lens.lens_page import write_lens_page
     from camkit.report.pages.page import page_path
 
-    chosen = Pupil(definition=pupil, sampling=sampling)  # type: ignore[arg-type]
+    rays = Pupil(definition=pupil, sampling=sampling)  # type: ignore[arg-type]
     folder = out_dir if out_dir is not None or json_ else Path()
     if folder is not None:
         refuse_existing([page_path(folder, file.stem)], overwrite=overwrite)
     lens, notes = read_noted_lens(file, [read_agf(path) for path in glass or ()])
     with working(f"measuring {lens.name}"):
-        facts = analyse(lens, chosen, notes)
+        facts = analyse(lens, rays, notes)
     with working("drawing the page"):
         written = [] if folder is None else write_lens_page(facts, folder, file.stem)
     if json_:

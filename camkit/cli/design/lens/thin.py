@@ -48,18 +48,18 @@ def thin(
         raise UnsupportedError(f"grooves need a lens file that ends in .toml; got {out.name}")
     refuse_existing([out], overwrite=overwrite)
     ready_for_lens(out)
-    wanted = find_thin_recipe(recipe)
+    plan = find_thin_recipe(recipe)
     began = time.process_time()
     with working("solving the plate"):
-        solved = solve_plate(wanted)
-        lens = plate_lens(wanted, solved)
+        solved = solve_plate(plan)
+        lens = plate_lens(plan, solved)
     if tool_radius_um is not None:
         lens = with_tool(lens, tool_radius_um)
     seconds = time.process_time() - began
     write_lens(lens, out)
-    told = measured(lens, lens.field_angles_rad, pitch_um, waves=waves)
+    record = measured(lens, lens.field_angles_rad, pitch_um, waves=waves)
     discs = solved.apertures
-    told |= {
+    record |= {
         "out": str(out),
         "cpu_seconds": round(seconds, 2),
         "virtual_aperture_radius_mm": discs.radius_mm,
@@ -80,7 +80,7 @@ def thin(
         ],
     }
     if json_:
-        say(json.dumps(told))
+        say(json.dumps(record))
         return
     say(f"{out}: {lens.name}, solved in {seconds:.1f} CPU-seconds")
-    say(to_text(told))
+    say(to_text(record))

@@ -85,9 +85,9 @@ def _tolerances(file: Path, errors: Path | None) -> "Tolerances":
     from camkit.models_def.optics.tolerance.errors import Tolerances
 
     if errors is not None:
-        found = read_tolerances(errors)
-        if found is None:
+        tolerances = read_tolerances(errors)
+        if tolerances is None:
             raise ContractError(f"{errors} has no [tolerance] table; see docs/tolerance.md")
-        return found
-    own = read_tolerances(file) if file.suffix.lower() == ".toml" else None
-    return own or Tolerances()
+        return tolerances
+    of_lens = read_tolerances(file) if file.suffix.lower() == ".toml" else None
+    return of_lens or Tolerances()

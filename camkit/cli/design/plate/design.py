@@ -77,7 +77,7 @@ def design(
 
 
 def _line(moment: "Moment") -> str:
-    core, streak, far = (
+    core, streak, outer = (
         "/".join(f"{100 * share:.1f}" for share in shares)
         for shares in (
             moment.reached.core_share,
@@ -85,11 +85,15 @@ def _line(moment: "Moment") -> str:
             moment.reached.far_share,
         )
     )
-    found = moment.picture
-    read = "" if found is None else f", read at {found.db:.2f} dB (capture {found.capture_db:.2f})"
+    picture = moment.picture
+    read = (
+        ""
+        if picture is None
+        else f", read at {picture.db:.2f} dB (capture {picture.capture_db:.2f})"
+    )
     return (
         f"step {moment.step}: loss {moment.loss:.5f} (best {moment.best_loss:.5f}), core {core} % "
-        f"of the bare lens's, written {streak} %, of it far out {far} %{read}, "
+        f"of the bare lens's, written {streak} %, of it far out {outer} %{read}, "
         f"{moment.seconds:.0f} s"
     )
 

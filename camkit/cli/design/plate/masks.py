@@ -35,13 +35,13 @@ def masks(
 
     if format_ not in ("png", "tiff"):
         raise ContractError(f"--format is png or tiff; got {format_!r}")
-    found = read_plate(plate)
-    paths = mask_paths(found, out_dir, plate.stem, format_)  # type: ignore[arg-type]
+    source = read_plate(plate)
+    paths = mask_paths(source, out_dir, plate.stem, format_)  # type: ignore[arg-type]
     refuse_existing(paths, overwrite=overwrite)
-    told = write_masks(found, out_dir, plate.stem, format_)  # type: ignore[arg-type]
+    record = write_masks(source, out_dir, plate.stem, format_)  # type: ignore[arg-type]
     if json_:
-        say(json.dumps(told))
+        say(json.dumps(record))
         return
-    for mask, path in zip(told["masks"], paths[:-1], strict=True):
+    for mask, path in zip(record["masks"], paths[:-1], strict=True):
         say(f"{path}: etch {mask['depth_um']:.4f} um, {mask['etched_share']:.1%} of the cells")
     say(str(paths[-1]))

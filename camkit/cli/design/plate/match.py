@@ -51,46 +51,49 @@ def match(
 
     check_levels(levels)
     camera = DotCamera(cells=cells)
-    given = read_target(psf)
-    target = to_target(given)
+    psf_values = read_target(psf)
+    target = to_target(psf_values)
     refuse_existing(older_files(out_dir), overwrite=overwrite)
     began = time.process_time()
     with working(f"matching {psf}"):
-        found = match_dots(target, camera, levels, np.random.default_rng(seed))
+        matched = match_dots(target, camera, levels, np.random.default_rng(seed))
     cpu_seconds = time.process_time() - began
-    told = write_dots(found, target, out_dir)
-    told |= {"cpu_seconds": round(cpu_seconds, 2), "notes": _notes(float(given.sum()), told)}
+    record = write_dots(matched, target, out_dir)
+    record |= {
+        "cpu_seconds": round(cpu_seconds, 2),
+        "notes": _notes(float(psf_values.sum()), record),
+    }
     if json_:
-        say(json.dumps(told))
+        say(json.dumps(record))
         return
-    for note in told["notes"]:
+    for note in record["notes"]:
         say(f"note: {note}", err=True)
-    _tell(told, out_dir)
+    _tell(record, out_dir)
 
 
-def _notes(total: float, told: dict[str, Any]) -> list[str]:
+def _notes(total: float, record: dict[str, Any]) -> list[str]:
     notes = []
     if abs(total - 1) > _SUM_TOLERANCE:
         notes.append(f"the PSF had a sum of {total:g}; it was divided by it")
-    if told["correlation"] < _POOR:
+    if record["correlation"] < _POOR:
         more = (
             "a plate of two levels is as bright on one side as on the other"
-            if told["levels"] == 2
+            if record["levels"] == 2
             else "give it more levels, or more cells"
         )
         notes.append(f"the plate is little like the PSF: {more}")
     return notes
 
 
-def _tell(told: dict[str, Any], folder: Path) -> None:
-    for mask in told["masks"]:
+def _tell(record: dict[str, Any], folder: Path) -> None:
+    for mask in record["masks"]:
         say(
             f"{folder / mask['file']}: etch {mask['depth_um']:.4f} um, "
             f"{mask['etched_share']:.1%} of the cells"
         )
-    for what, reached in (("dots", told), ("seen by the array", told["seen"])):
+    for what, likeness in (("dots", record), ("seen by the array", record["seen"])):
         say(
-            f"{what}: correlation {reached['correlation']:.5f}, RMSE {reached['rmse']:.4f} of the "
-            f"peak, {reached['efficiency']:.1%} of the light"
+            f"{what}: correlation {likeness['correlation']:.5f}, RMSE {likeness['rmse']:.4f} of "
+            f"the peak, {likeness['efficiency']:.1%} of the light"
         )
-    say(told["plate"])
+    say(record["plate"])

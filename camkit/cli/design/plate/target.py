@@ -57,8 +57,8 @@ def read_target(path: Path) -> NDArray[Any]:
 def _member(archive: zipfile.ZipFile, path: Path) -> NDArray[Any]:
     names = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
     if KEY not in names:
-        held = ", ".join(sorted(names)) or "nothing"
-        raise ContractError(f"{path} must have the key {KEY}, the 11x11 PSF; it holds {held}")
+        keys = ", ".join(sorted(names)) or "nothing"
+        raise ContractError(f"{path} must have the key {KEY}, the 11x11 PSF; it holds {keys}")
     if names[KEY].file_size > MOST_BYTES:
         raise ContractError(
             f"{KEY} of {path} unpacks to {names[KEY].file_size} bytes; an 11x11 PSF has less than "

@@ -81,17 +81,17 @@ def field(
         frame_px=frame_px,
     )
     with working("measuring", len(subjects), unit="lenses") as task:
-        found = []
+        measured = []
         for number, subject in enumerate(subjects):
             task.count(number)
-            found.append(measure_field(subject, options, task.tell))
+            measured.append(measure_field(subject, options, task.tell))
 
     def html() -> str:
         from camkit.report.analysis.field_page import field_html
 
-        return field_html(found, options)
+        return field_html(measured, options)
 
-    deliver(to_json(found, options), page, html, to_text, as_json=json_)
+    deliver(to_json(measured, options), page, html, to_text, as_json=json_)
 
 
 def _frame_px(text: str) -> tuple[int, int]:

@@ -9,7 +9,7 @@ from camkit.cli.say import say
 
 
 def deliver(
-    told: dict[str, Any],
+    record: dict[str, Any],
     page: Path | None,
     html: Callable[[], str],
     text: Callable[[dict[str, Any]], str],
@@ -19,7 +19,7 @@ def deliver(
     """Write the page and print the results.
 
     Args:
-        told: What was found, as plain JSON values.
+        record: What was found, as plain JSON values.
         page: Where the page goes; None for none.
         html: Gives it; called only where one is asked for.
         text: Gives what is said without --json.
@@ -31,5 +31,5 @@ def deliver(
         page.parent.mkdir(parents=True, exist_ok=True)
         with atomic_output(page) as part:
             part.write_text(html(), encoding="utf-8")
-        told = {**told, "page": str(page)}
-    say(json.dumps(told, allow_nan=False) if as_json else text(told))
+        record = {**record, "page": str(page)}
+    say(json.dumps(record, allow_nan=False) if as_json else text(record))

@@ -10,7 +10,7 @@ from camkit.cli.use.calibrate.outputs import Page, print_result, with_files
 from camkit.cli.use.mosaic import BlackLevel, MosaicCfa, WhiteLevel, mosaic_options
 
 if TYPE_CHECKING:
-    from camkit.calibration.lensfun.profile import Found
+    from camkit.calibration.lensfun.profile import LensfunProfile
 
 
 def lensfun_in(
@@ -72,7 +72,7 @@ def lensfun_in(
     print_result(record, [_line(bundle.found)], as_json=json_)
 
 
-def _line(profile: "Found") -> str:
+def _line(profile: "LensfunProfile") -> str:
     entry, light = profile.distortion, profile.vignetting
     evened = "" if light is None else f", light evened as at f/{light.aperture:g}"
     return f"  {profile.lens.name}, {entry.model} at {entry.focal_mm:g} mm{evened}"

@@ -18,7 +18,7 @@ from camkit.runtime.kinds.spad.finer.pictures import SURE, finer_frames
 from camkit.runtime.kinds.spad.twin.counting import Disturbances, count_frames
 from camkit.runtime.kinds.spad.twin.photon_twin import fitted, luminance, seen_by
 from camkit.runtime.proof.laws.law import SHARE, Law
-from camkit.scenes.named import named_scene
+from camkit.scenes.scene_register import named_scene
 
 PHOTONS: Final = (30.0, 300.0, 3000.0, 1e5)
 """Of white."""

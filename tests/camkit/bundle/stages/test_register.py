@@ -41,8 +41,8 @@ class Dim(PackageStage):
     gives: tuple[str, ...] = ("dimmed",)
     factor: Positive = 0.5
 
-    def join(self, taken, parts):
-        return tuple(taken)
+    def join(self, planes, parts):
+        return tuple(planes)
 
 
 class Homeless(Dim):

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from camkit.calibration.display.camera_file import Lens, Tone
-from camkit.calibration.display.pairs import Given, Pair, Pairs, draw_pairs
+from camkit.calibration.display.pairs import Pair, Pairs, References, draw_pairs
 from camkit.calibration.display.screen import Screen
 from camkit.calibration.display.targets import Target, Targets
 from camkit.calibration.geometry.board import Board
@@ -36,7 +36,7 @@ def _drawn(path, folder):
         board=Board(columns=9, rows=6),
         targets=(target,),
     )
-    given = Given(folder=folder, targets=shown, lens=lens, tone=Tone.read(None))
+    given = References(folder=folder, targets=shown, lens=lens, tone=Tone.read(None))
     pair = Pair(
         path=path,
         target=target,

@@ -96,7 +96,7 @@ def test_poor_views_give_a_camera_that_a_lens_may_have_and_say_what_is_held(name
     assert found.to_record()["undetermined"] == ["centre_px", "focal_px"]
     # no worse than what the true camera leaves by more than its uncertainty
     true = judge(fit_models(POOR[name], POINTS, SIZE)[1], POOR[name], POINTS)
-    assert found.chosen.rms_px < 1.3 * true.rms_px
+    assert found.best.rms_px < 1.3 * true.rms_px
 
 
 GOOD = {
@@ -135,7 +135,7 @@ def test_exactly_parallel_views_need_the_nominal_focal_length(scatter_px: float)
     found = _measured(corners, LENS.focal_px)
     assert "focal_px" in found.undetermined
     assert found.camera.focal_px == LENS.focal_px
-    assert found.chosen.rms_px < 1.2 * scatter_px + 0.05
+    assert found.best.rms_px < 1.2 * scatter_px + 0.05
 
 
 def test_views_of_one_tilt_do_not_run_away_to_no_focal_length() -> None:
@@ -182,17 +182,17 @@ def test_sixteen_flat_views_get_a_model_that_they_can_carry(flat: Geometry) -> N
     assert flat.camera.centre_px == (2999.5, 1999.5)
     assert np.abs(flat.camera.coefficients).max() < 2
     # OpenCV with k1 and k2: 3.1 px
-    assert flat.chosen.fit.rms_px < 3.2
-    assert flat.chosen.rms_px < 3.5
+    assert flat.best.fit.rms_px < 3.2
+    assert flat.best.rms_px < 3.5
     assert "do not determine the focal length" in " ".join(flat.notes)
     assert flat.profile.fold_px >= flat.coverage.corner_px
 
 
 def test_the_covariance_alone_would_believe_the_flat_views(flat: Geometry) -> None:
-    fit = flat.chosen.fit
+    fit = flat.best.fit
     formal = np.sqrt(fit.spread[0, 0]) * fit.rms_px / np.sqrt(2)
     assert formal < 0.015 * fit.camera.focal_px
-    assert flat.chosen.spread[0] > 5 * formal
+    assert flat.best.spread[0] > 5 * formal
 
 
 @pytest.mark.slow
@@ -201,8 +201,8 @@ def test_models_that_no_lens_has_are_not_taken_however_well_they_explain() -> No
     judged, _ = judge_all(corners, POINTS, SIZE)
     found = determine(judged, corners, POINTS, SIZE)
     best = min(judged, key=lambda one: one.fit.rms_px)
-    assert best.fit.rms_px < found.chosen.fit.rms_px
-    assert not found.chosen.fit.camera.model.is_tangential
+    assert best.fit.rms_px < found.best.fit.rms_px
+    assert not found.best.fit.camera.model.is_tangential
 
 
 def _document(**changes: object) -> dict[str, object]:

@@ -14,7 +14,7 @@ from camkit.runtime.geometry.turning import turn
 from camkit.runtime.raw import is_picture
 
 LEAST_SIDE_PX: Final = 16
-_KNOWN: Final = {"sRGB": SRGB, "Adobe RGB": ADOBE_RGB}
+_SPACES: Final = {"sRGB": SRGB, "Adobe RGB": ADOBE_RGB}
 
 
 def read_shown(path: Path) -> tuple[FloatArray, str]:
@@ -37,12 +37,14 @@ def read_shown(path: Path) -> tuple[FloatArray, str]:
     except OSError as error:
         raise DecodeError(f"cannot read {path}: {error.strerror or error}") from error
     except DecodeError as error:
-        named = path.name in str(error)
-        raise DecodeError(str(error) if named else f"{path.name}: {error}") from error
+        has_name = path.name in str(error)
+        raise DecodeError(str(error) if has_name else f"{path.name}: {error}") from error
     if min(light.shape[1:]) < LEAST_SIDE_PX:
         raise DecodeError(
             f"{path.name}: {light.shape[2]}x{light.shape[1]} px are too few to be shown; expected "
             f"{LEAST_SIDE_PX} or more on either side"
         )
-    name = next((name for name, known in _KNOWN.items() if space.means(known)), space.name)
+    name = next(
+        (name for name, known_space in _SPACES.items() if space.means(known_space)), space.name
+    )
     return np.ascontiguousarray(turn(light, orientation)), name

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageCms
 
-from camkit.calibration.display.shown import read_shown
+from camkit.calibration.display.displayed_picture import read_shown
 from camkit.colorimetry import D65, adapt_white, encode_srgb, rgb_to_xyz
 from camkit.errors import DecodeError
 from camkit.runtime.files.formats.color_space import ADOBE_RGB_GAMMA, ADOBE_RGB_PRIMARIES

@@ -30,21 +30,21 @@ def distortion_at(lens: Lens, focal_mm: float) -> Distortion:
         raise DecodeError(f"{lens.file} has no distortion of {lens.name}")
     model = lens.distortion[0].model
     # as lensfun does: models cannot be mixed, and the first entry of a focal length counts
-    known: dict[float, Distortion] = {}
+    by_focal: dict[float, Distortion] = {}
     for one in lens.distortion:
         if one.model == model:
-            known.setdefault(one.focal_mm, one)
-    line = [known[focal] for focal in sorted(known)]
+            by_focal.setdefault(one.focal_mm, one)
+    line = [by_focal[focal] for focal in sorted(by_focal)]
     low, high = line[0].focal_mm, line[-1].focal_mm
     if not low * (1 - SAME) <= focal_mm <= high * (1 + SAME):
         reach = f"{low:g} mm" if low == high else f"{low:g} to {high:g} mm"
         raise DecodeError(f"{lens.name} was measured at {reach}; got {focal_mm:g} mm")
     at = min(max(focal_mm, low), high)
-    if at in known:
-        return known[at]
-    after = next(index for index, one in enumerate(line) if one.focal_mm > at)
+    if at in by_focal:
+        return by_focal[at]
+    upper = next(index for index, one in enumerate(line) if one.focal_mm > at)
     terms = tuple(
-        _cubic([one.terms[n] * one.focal_mm for one in line], _places(line, at), after) / at
+        _cubic([one.terms[n] * one.focal_mm for one in line], _places(line, at), upper) / at
         for n in range(len(line[0].terms))
     )
     return Distortion(model=model, focal_mm=at, terms=terms)
@@ -52,19 +52,19 @@ def distortion_at(lens: Lens, focal_mm: float) -> Distortion:
 
 def _places(line: Sequence[Distortion], at: float) -> float:
     """Return the interpolation weights between the neighbours of a focal length."""
-    after = next(index for index, one in enumerate(line) if one.focal_mm > at)
-    low, high = line[after - 1].focal_mm, line[after].focal_mm
+    number = next(index for index, one in enumerate(line) if one.focal_mm > at)
+    low, high = line[number - 1].focal_mm, line[number].focal_mm
     return (at - low) / (high - low)
 
 
-def _cubic(values: Sequence[float], share: float, after: int) -> float:
-    low, high = values[after - 1], values[after]
+def _cubic(values: Sequence[float], share: float, number: int) -> float:
+    low, high = values[number - 1], values[number]
     chord = high - low
-    leaving = (high - values[after - 2]) / 2 if after >= 2 else chord
-    coming = (values[after + 1] - low) / 2 if after + 1 < len(values) else chord
+    start_slope = (high - values[number - 2]) / 2 if number >= 2 else chord
+    end_slope = (values[number + 1] - low) / 2 if number + 1 < len(values) else chord
     # the cubic with these values and slopes, as what it adds to the straight line
     rest = 1 - share
-    bend = (leaving - chord) * rest - (coming - chord) * share
+    bend = (start_slope - chord) * rest - (end_slope - chord) * share
     return low + share * chord + share * rest * bend
 
 
@@ -86,11 +86,11 @@ def vignetting_at(
     f_number = max(one.aperture for one in lens.vignetting) if aperture is None else aperture
     away_m = max(one.distance_m for one in lens.vignetting) if distance_m is None else distance_m
 
-    def off(one: Vignetting) -> float:
+    def squared_distance(one: Vignetting) -> float:
         return (
             ((one.focal_mm - focal_mm) / span) ** 2
             + (4 / one.aperture - 4 / f_number) ** 2
             + (0.1 / one.distance_m - 0.1 / away_m) ** 2
         )
 
-    return min(lens.vignetting, key=off)
+    return min(lens.vignetting, key=squared_distance)

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from camkit.calibration.lensfun.between import distortion_at, vignetting_at
 from camkit.calibration.lensfun.database import Database, Lens
+from camkit.calibration.lensfun.interpolation import distortion_at, vignetting_at
 from camkit.errors import DecodeError
 from tests.lensfun_factory import TERMS, ZOOM, write_database
 

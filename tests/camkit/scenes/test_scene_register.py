@@ -3,7 +3,7 @@ import pytest
 
 from camkit.errors import ContractError
 from camkit.scenes import is_scene_name, named_scene, procedural_scene
-from camkit.scenes.named import scene_sources
+from camkit.scenes.scene_register import scene_sources
 
 
 def test_a_name_gives_the_scene_of_its_source_and_seed():

@@ -19,15 +19,17 @@ MOST_DIGITS: Final = 18
 
 def scene_sources() -> dict[str, Draw | str]:
     """Return every source by its name; that of a kind as the name of its function."""
-    brought = {name: place for kind in all_kinds() for name, place in kind.scenes.items()}
-    return {**SOURCES, **{name: place for name, place in brought.items() if name not in SOURCES}}
+    of_kinds = {name: place for kind in all_kinds() for name, place in kind.scenes.items()}
+    return {**SOURCES, **{name: place for name, place in of_kinds.items() if name not in SOURCES}}
 
 
 def is_scene_name(text: str) -> bool:
     """Return whether a text names a scene, rightly or not, and not a file."""
     source, colon, seed = text.partition(":")
-    meant = len(source) > 1 and source.isalpha() and seed.isdigit() and not Path(text).exists()
-    return bool(colon) and (meant or source in scene_sources())
+    is_plausible = (
+        len(source) > 1 and source.isalpha() and seed.isdigit() and not Path(text).exists()
+    )
+    return bool(colon) and (is_plausible or source in scene_sources())
 
 
 def named_scene(name: str, height: int, width: int) -> FloatArray:
@@ -48,8 +50,8 @@ def named_scene(name: str, height: int, width: int) -> FloatArray:
     source, _, seed = name.partition(":")
     sources = scene_sources()
     if source not in sources:
-        known = ", ".join(f"{known}:SEED" for known in sources)
-        raise ContractError(f"there is no scene {name!r}; expected one of {known}")
+        names = ", ".join(f"{names}:SEED" for names in sources)
+        raise ContractError(f"there is no scene {name!r}; expected one of {names}")
     if not (seed.isascii() and seed.isdigit() and len(seed) <= MOST_DIGITS):
         raise ContractError(
             f"expected {source}:SEED with a whole number of at most {MOST_DIGITS} digits; "
