@@ -214,17 +214,12 @@ def _understood(file: CountsFile, settings: Settings, manifest: Manifest | None)
 
 
 def _check_finer(settings: Settings, manifest: Manifest | None) -> None:
-    """Refuse what means nothing where pictures become finer, or where they do not.
+    """Refuse what means nothing where pictures become finer, and sizes that are not held.
 
     Raises:
         ContractError: Names it.
     """
     stages = () if manifest is None else manifest.stages_of(SuperResolve)
-    if not stages and settings.finer is not None:
-        raise ContractError(
-            f"{option_text('method', settings.finer)} makes pictures finer behind the plate of a "
-            f"bundle; add {option_text('bundle')} too"
-        )
     if stages and settings.way.pool not in ("auto", "1"):
         raise ContractError(
             f"{option_text('pool')} puts pixels of an array together; with a bundle the estimate "
