@@ -17,10 +17,10 @@ class Lifetime(StageEntry):
     takes: tuple[Word, ...] = ("photons",)
     gives: tuple[Word, ...] = ("lifetime",)
 
-    def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
+    def join(self, planes: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Return the lifetimes."""
         del parts
-        plane = need_counts_of_pixels(taken)
+        plane = need_counts_of_pixels(planes)
         if plane.axes != "t y x":
             raise JoinError("it takes photons by time (t y x); the sensor states no time_bins")
         return (plane.model_copy(update={"axes": "y x", "domain": "lifetime"}),)
