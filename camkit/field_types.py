@@ -81,7 +81,7 @@ def check_value(name: str, value: object, hint: Any) -> None:
         ContractError: If the value is of another type.
     """
     if not _fits(value, hint):
-        raise ContractError(f"{option_text(name)} must be {_named(hint)}; got {value!r}")
+        raise ContractError(f"{option_text(name)} must be {_name_of(hint)}; got {value!r}")
 
 
 @cache
@@ -117,18 +117,18 @@ def _fits_tuple(value: object, parts: tuple[Any, ...]) -> bool:
     return len(value) == len(parts) and all(map(_fits, value, parts))
 
 
-def _named(hint: Any) -> str:
+def _name_of(hint: Any) -> str:
     """Return the name of a type for people."""
     origin, parts = get_origin(hint), get_args(hint)
     if origin in (Union, types.UnionType):
-        rest = [_named(part) for part in parts if part is not type(None)]
+        rest = [_name_of(part) for part in parts if part is not type(None)]
         return " or ".join(rest)
     if origin is Literal:
         return f"one of {', '.join(map(str, parts))}"
     if origin is tuple:
-        return f"({', '.join(_named(part) for part in parts)})"
+        return f"({', '.join(_name_of(part) for part in parts)})"
     if origin is Sequence:
-        return f"several of: {_named(*parts)}"
+        return f"several of: {_name_of(*parts)}"
     if origin is PathLike:
         return "a path"
     return _PLAIN[hint][1] if hint in _PLAIN else getattr(hint, "__name__", str(hint))

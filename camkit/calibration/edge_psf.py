@@ -373,7 +373,7 @@ def _facts(n: int, kernel: FloatGrid, one: _Colour, green: _Colour, line: Line) 
         offset_px=(float(shift_px * line.normal[1]), float(shift_px * line.normal[0])),
         reblurred=Reblurred(
             distance_px=one.profile.distance_px - one.fit.moved_px,
-            seen=one.profile.value / step,
-            told=one.fit.predicted / step,
+            captured=one.profile.value / step,
+            predicted=one.fit.predicted / step,
         ),
     )

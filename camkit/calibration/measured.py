@@ -53,18 +53,18 @@ class Reblurred:
 
     Attributes:
         distance_px: (n,) from the middle of a disc, or from an edge.
-        seen: (n,) means.
-        told: (n,) what the PSF says of them.
+        captured: (n,) means.
+        predicted: (n,) what the PSF says of them.
     """
 
     distance_px: FloatLine
-    seen: FloatLine
-    told: FloatLine
+    captured: FloatLine
+    predicted: FloatLine
 
     @property
     def rest(self) -> float:
         """Return the root mean square of what is left."""
-        return float(np.sqrt(np.square(self.seen - self.told).mean()))
+        return float(np.sqrt(np.square(self.captured - self.predicted).mean()))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

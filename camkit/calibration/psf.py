@@ -285,5 +285,7 @@ def _reblurred(kernel: FloatGrid, image: FloatGrid, core: LightCore) -> Reblurre
 
     at = np.bincount(ring, radius)[: most + 1] / counts
     return Reblurred(
-        distance_px=at, seen=means(cropped(image, kernel.shape[-1] // 2)), told=means(predicted)
+        distance_px=at,
+        captured=means(cropped(image, kernel.shape[-1] // 2)),
+        predicted=means(predicted),
     )

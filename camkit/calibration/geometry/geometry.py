@@ -66,8 +66,8 @@ class Geometry:
         board: What was photographed.
         views: All pictures, in the order given.
         size: Width and height, px.
-        tried: All models, from simple to rich.
-        chosen: The one taken.
+        candidates: All models, from simple to rich.
+        best: The one taken.
         coverage: Where the board was seen.
         profile: Distortion along a radius.
         radial: The same as the polynomial of `undistort`.
@@ -79,8 +79,8 @@ class Geometry:
     board: Board
     views: tuple[View, ...]
     size: tuple[int, int]
-    tried: tuple[Judged, ...]
-    chosen: Judged
+    candidates: tuple[Judged, ...]
+    best: Judged
     coverage: Coverage
     profile: Profile
     radial: RadialFit
@@ -90,11 +90,11 @@ class Geometry:
     @property
     def camera(self) -> Camera:
         """Return the camera."""
-        return self.chosen.fit.camera
+        return self.best.fit.camera
 
     @property
     def corners(self) -> FloatGrid:
-        """Return (view, corner, 2) of the views with a board, as `chosen` has them."""
+        """Return (view, corner, 2) of the views with a board, as `best` has them."""
         return np.stack([view.corners for view in self.views if view.corners is not None])
 
     def to_record(self) -> dict[str, Any]:
@@ -107,9 +107,9 @@ class Geometry:
             "focal_px": round(self.camera.focal_px, 4),
             "centre_px": [round(at, 4) for at in self.camera.centre_px],
             "coefficients": self.camera.coefficients.tolist(),
-            "rms_px": round(self.chosen.fit.rms_px, 5),
-            "held_out_rms_px": round(self.chosen.rms_px, 5),
-            "held_out_worst_px": round(self.chosen.worst_px, 5),
+            "rms_px": round(self.best.fit.rms_px, 5),
+            "held_out_rms_px": round(self.best.rms_px, 5),
+            "held_out_worst_px": round(self.best.worst_px, 5),
             "covered_radius_px": round(self.coverage.radius_px, 3),
             "notes": list(self.notes),
             "radial": self.radial.to_record(),
@@ -118,7 +118,7 @@ class Geometry:
 
     def _pictures(self) -> list[dict[str, Any]]:
         records: list[dict[str, Any]] = []
-        fit, number = self.chosen.fit, 0
+        fit, number = self.best.fit, 0
         for view in self.views:
             record: dict[str, Any] = {
                 "file": view.path.name,
@@ -199,8 +199,8 @@ def _measured(views: Sequence[View], board: Board, focal_px: float | None) -> Ge
         board=board,
         views=tuple(views),
         size=size,
-        tried=tuple(determined.judged),
-        chosen=determined.best,
+        candidates=tuple(determined.judged),
+        best=determined.best,
         coverage=determined.coverage,
         profile=determined.profile,
         radial=radial,

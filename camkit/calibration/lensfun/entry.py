@@ -148,7 +148,7 @@ class Entry:
         """Return by how much the entry puts light farther out than the source, at such radii."""
         unit_px = min(self.size_px) / 2
         ideal = self.fit.scale * self.straight_px(placed_px) / unit_px
-        return self.fit.distortion.placed(ideal) * unit_px - placed_px
+        return self.fit.distortion.captured_radius(ideal) * unit_px - placed_px
 
     def to_xml(self) -> str:
         """Return the file that lensfun reads."""
@@ -264,7 +264,7 @@ def _fitted(
     else:
         terms = [q[power] for power in powers[1:].tolist()]
     distortion = Distortion(model=model, focal_mm=focal_mm, terms=tuple(map(_rounded, terms)))
-    return distortion, scale, float(np.abs(distortion.placed(scale * ideal) - radii).max())
+    return distortion, scale, float(np.abs(distortion.captured_radius(scale * ideal) - radii).max())
 
 
 def _unit_scale(p: FloatGrid, powers: NDArray[np.int64]) -> float | None:

@@ -49,7 +49,7 @@ class Distortion:
     focal_mm: float
     terms: tuple[float, ...]
 
-    def placed(self, r: FloatGrid) -> FloatGrid:
+    def captured_radius(self, r: FloatGrid) -> FloatGrid:
         """Return the radius in the picture of ideal radii, by lensfun's own formula."""
         return _FORMULAS[self.model](r, *self.terms)
 

@@ -52,17 +52,17 @@ class LensBundle:
 
     Attributes:
         manifest: For `write_bundle(path, manifest, {})`.
-        found: What the database knows of the lens.
+        profile: What the database knows of the lens.
         notes: What had to be taken from elsewhere.
     """
 
     manifest: Manifest
-    found: LensfunProfile
+    profile: LensfunProfile
     notes: tuple[str, ...]
 
     def to_record(self) -> dict[str, Any]:
         """Return its sources as JSON values."""
-        lens_profile, entry, light = self.found, self.found.distortion, self.found.vignetting
+        lens_profile, entry, light = self.profile, self.profile.distortion, self.profile.vignetting
         return {
             "lens": lens_profile.lens.name,
             "file": lens_profile.lens.file,
@@ -113,5 +113,7 @@ def lensfun_bundle(
     )
     manifest, stood_in = manifest_of(slug(name or lens), shot, frame, lens_profile.profile)
     return LensBundle(
-        manifest=manifest, found=lens_profile, notes=(*frame_notes, *lens_profile.notes, *stood_in)
+        manifest=manifest,
+        profile=lens_profile,
+        notes=(*frame_notes, *lens_profile.notes, *stood_in),
     )

@@ -185,7 +185,9 @@ def missed_px(
 ) -> float:
     """Return the largest error of a profile against lensfun's formula, in pixels of the picture."""
     ideal_mm = np.linspace(0, frame.corner_radius_mm, CHECKED)
-    placed_mm = entry.placed(scale * ideal_mm / distortion.radius_mm) * distortion.radius_mm
+    placed_mm = (
+        entry.captured_radius(scale * ideal_mm / distortion.radius_mm) * distortion.radius_mm
+    )
     points = np.stack([ideal_mm, np.zeros(CHECKED)], axis=-1)
     rows = distortion.to_distortion()
     missed = [

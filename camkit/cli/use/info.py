@@ -120,8 +120,8 @@ def _describe_capture(path: Path, mosaic: Any) -> dict[str, Any]:
 
     kind = kind_of_file(path)
     facts = runtime_part((kind or BAYER).name).describe(path, mosaic)
-    head = {} if kind is None else {"kind": kind.name}
-    return {"capture": str(path), "sha256": file_sha256(path), **head, **facts}
+    kind_fact = {} if kind is None else {"kind": kind.name}
+    return {"capture": str(path), "sha256": file_sha256(path), **kind_fact, **facts}
 
 
 def _lines(value: Any, indent: str) -> list[str]:

@@ -57,7 +57,7 @@ def geometry(
 def _lines(facts: "Geometry") -> list[str]:
     x, y = facts.camera.centre_px
     seen_count = sum(view.corners is not None for view in facts.views)
-    fit = facts.chosen
+    fit = facts.best
     return [
         f"  {facts.camera.model.name}: focal length {facts.camera.focal_px:.2f} px, centre "
         f"({x:.2f}, {y:.2f}) of {facts.size[0]}x{facts.size[1]} px",

@@ -69,7 +69,7 @@ def lensfun_in(
         overwrite=overwrite,
     )
     record = with_files(bundle.to_record(), out, page)
-    print_result(record, [_line(bundle.found)], as_json=json_)
+    print_result(record, [_line(bundle.profile)], as_json=json_)
 
 
 def _line(profile: "LensfunProfile") -> str:

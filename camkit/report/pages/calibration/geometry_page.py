@@ -36,7 +36,7 @@ def geometry_html(found: Geometry) -> str:
     )
     arrows = (
         "Every picture left out once: the camera is that of the others, the pose its own. Arrows "
-        f"are {enlargement(found.chosen.held_out, found.size)} times enlarged; the circle marks "
+        f"are {enlargement(found.best.held_out, found.size)} times enlarged; the circle marks "
         "what was covered, the cross the optical centre."
     )
     missed = (
@@ -60,7 +60,7 @@ def geometry_html(found: Geometry) -> str:
 
 
 def _result(found: Geometry) -> Table:
-    camera, chosen, radial = found.camera, found.chosen, found.radial
+    camera, chosen, radial = found.camera, found.best, found.radial
     rows = [
         ("pictures with the board", f"{len(found.corners)} of {len(found.views)}"),
         ("board, inner corners", str(found.board)),
@@ -82,13 +82,13 @@ def _result(found: Geometry) -> Table:
 def _models(found: Geometry) -> Table:
     rows = [
         (
-            one.fit.camera.model.name + (" (taken)" if one is found.chosen else ""),
+            one.fit.camera.model.name + (" (taken)" if one is found.best else ""),
             str(len(one.fit.camera.model.free)),
             f"{one.fit.rms_px:.4f}",
             f"{one.rms_px:.4f}",
             f"{one.worst_px:.4f}",
         )
-        for one in found.tried
+        for one in found.candidates
     ]
     return Table(header=("model", "coefficients", "rms, px", "held out", "worst"), rows=rows)
 
@@ -100,7 +100,7 @@ def _pictures(found: Geometry) -> Table:
         if view.corners is None:
             rows.append((view.path.name, "no board", ""))
             continue
-        errors = (found.chosen.fit.residuals[seen], found.chosen.held_out[seen])
+        errors = (found.best.fit.residuals[seen], found.best.held_out[seen])
         rows.append((view.path.name, *(f"{rms(error):.4f}" for error in errors)))
         seen += 1
     return Table(header=("picture", "rms, px", "held out"), rows=rows)
@@ -117,7 +117,7 @@ def enlargement(residuals: FloatGrid, size: tuple[int, int]) -> int:
 def draw_residuals(found: Geometry) -> Figure:
     """Draw every corner's held-out residual as an arrow, enlarged."""
     figure, panel = _picture_panel(found)
-    rest = found.chosen.held_out
+    rest = found.best.held_out
     factor = enlargement(rest, found.size)
     at, arrow = found.corners.reshape(-1, 2), rest.reshape(-1, 2) * factor
     panel.quiver(*at.T, *arrow.T, angles="xy", scale_units="xy", scale=1, color=_SEEN, width=0.0018)
@@ -154,7 +154,7 @@ def draw_radii(found: Geometry) -> Figure:
     """Draw the held-out error of corners over their distance from the optical centre."""
     figure = new_figure(WIDTH_IN, 3.6)
     panel = figure.add_subplot()
-    rest = found.chosen.held_out.reshape(-1, 2)
+    rest = found.best.held_out.reshape(-1, 2)
     away = np.linalg.norm(found.corners.reshape(-1, 2) - found.camera.centre_px, axis=1)
     panel.plot(away, np.linalg.norm(rest, axis=1), ".", color=_SEEN, alpha=0.35)
     edges = np.linspace(0, away.max() * (1 + 1e-9), RINGS + 1)

@@ -47,7 +47,7 @@ def entry_html(made: Entry) -> str:
 
 def bundle_html(made: LensBundle) -> str:
     """Return the page of a bundle of a lens that lensfun knows."""
-    title = f"camkit calibrate lensfun-in: {made.found.lens.name}"
+    title = f"camkit calibrate lensfun-in: {made.profile.lens.name}"
     return _html(title, curves_of_bundle(made), made)
 
 
@@ -66,14 +66,14 @@ def curves_of_entry(made: Entry) -> Curves:
 
 def curves_of_bundle(made: LensBundle) -> Curves:
     """Return what a bundle does, and misses of lensfun's formula; green, else all colours."""
-    found, extent = made.found, made.manifest.sensor.known_extent
+    found, extent = made.profile, made.manifest.sensor.known_extent
     pitch_mm, ideal_mm = to_mm(extent.pixel_pitch_um), half_diagonal_mm(extent)
     profile = found.profile
     assert profile.distortion is not None  # lensfun-in makes none without
     rows = profile.distortion.to_distortion()
     placed = placed_along(ideal_mm, rows, 0)
     unit_mm = rows.radius_mm
-    formula = found.distortion.placed(found.scale * ideal_mm / unit_mm) * unit_mm
+    formula = found.distortion.captured_radius(found.scale * ideal_mm / unit_mm) * unit_mm
     light = None
     if profile.illumination is not None:
         known = profile.illumination.to_illumination()

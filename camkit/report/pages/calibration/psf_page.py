@@ -83,9 +83,11 @@ def draw_reblurred(found: MeasuredPsf) -> Figure:
         if target is None:
             continue
         color = _COLORS[colour.colour]
-        above.plot(target.distance_px, target.seen, ".", color=color)
-        above.plot(target.distance_px, target.told, color=color, linewidth=0.8, label=colour.colour)
-        rest = 100 * (target.seen - target.told)
+        above.plot(target.distance_px, target.captured, ".", color=color)
+        above.plot(
+            target.distance_px, target.predicted, color=color, linewidth=0.8, label=colour.colour
+        )
+        rest = 100 * (target.captured - target.predicted)
         below.plot(target.distance_px, rest, ".-", color=color, linewidth=0.5)
     above.set_ylabel("light")
     above.legend()

@@ -117,15 +117,15 @@ def test_checkerboards_are_calibrated() -> None:
     files = sorted(data_path("lens/checkerboard_left").glob("*.jpg"))
     found = calibrate_geometry(files, NINE_BY_SIX)
     assert all(view.corners is not None for view in found.views)
-    assert found.chosen.rms_px <= 0.25
-    assert found.chosen.worst_px <= 0.25
+    assert found.best.rms_px <= 0.25
+    assert found.best.worst_px <= 0.25
 
 
 def test_a_fisheye_is_calibrated() -> None:
     files = sorted(data_path("lens/fisheye_left").glob("*.jpg"))
     found = calibrate_geometry(files, NINE_BY_SIX)
-    assert found.chosen.rms_px <= 0.35
-    assert found.chosen.worst_px <= 0.35
+    assert found.best.rms_px <= 0.35
+    assert found.best.worst_px <= 0.35
 
 
 def _with(photographs: list[Path], extra: FloatGrid | np.ndarray, folder: Path) -> list[Path]:

@@ -68,7 +68,7 @@ def test_the_scale_of_the_ideal_picture_does_not_count(xi: float) -> None:
     fit = fit_distortion(_source((xi, k1 * xi**3, k2 * xi**5, 0.0)), 50.0)
     assert fit.residual_px < AGREES_PX
     ideal = np.linspace(0, 1.7, 100)
-    placed = fit.distortion.placed(fit.scale * ideal)
+    placed = fit.distortion.captured_radius(fit.scale * ideal)
     wanted = distort_points(
         np.stack([ideal, ideal * 0], -1),
         RadialDistortion(coefficients=np.array([[xi, k1 * xi**3, k2 * xi**5, 0.0]]), radius_mm=1.0),
@@ -85,7 +85,7 @@ def test_the_stated_residual_is_the_most_that_the_model_misses() -> None:
     points = np.stack([ideal, ideal * 0], -1) * 200
     wanted = distort_points(points, source.distortion, channel=0)[:, 0]
     seen = wanted <= source.corner_px
-    missed = np.abs(fit.distortion.placed(fit.scale * ideal) * 200 - wanted)[seen].max()
+    missed = np.abs(fit.distortion.captured_radius(fit.scale * ideal) * 200 - wanted)[seen].max()
     assert fit.residual_px > 0.01
     assert fit.residual_px == pytest.approx(missed, rel=0.02)
 

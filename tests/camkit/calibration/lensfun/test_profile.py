@@ -42,7 +42,7 @@ def test_each_model_becomes_the_same_polynomial(model: str, terms: tuple[float, 
     }[model](*terms)
     points = np.stack([r * 12.0, np.zeros(50)], axis=-1)
     np.testing.assert_allclose(distort_points(points, radial)[:, 0] / 12.0, d, atol=1e-12)
-    np.testing.assert_allclose(entry.placed(r), d, atol=1e-12)
+    np.testing.assert_allclose(entry.captured_radius(r), d, atol=1e-12)
 
 
 def test_the_unit_is_half_the_shorter_side_of_the_measured_picture(lens: Lens) -> None:

@@ -43,8 +43,8 @@ def _found(target: Reblurred | None) -> MeasuredPsf:
 
 TARGET = Reblurred(
     distance_px=np.array([-1.0, 0.0, 1.0]),
-    seen=np.array([0.0, 0.5, 1.0]),
-    told=np.array([0.01, 0.5, 0.98]),
+    captured=np.array([0.0, 0.5, 1.0]),
+    predicted=np.array([0.01, 0.5, 0.98]),
 )
 
 

@@ -17,7 +17,7 @@ def _facts(curve: PowerCurve | None) -> ToneFacts:
         levels=np.array([0.0, 80.0, 160.0, 255.0]),
         luminance=LIGHT,
         curve=curve,
-        seen=LIGHT > 0,
+        is_lit=LIGHT > 0,
         notes=("a note",),
     )
 
