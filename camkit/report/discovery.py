@@ -21,12 +21,12 @@ def discover(package: str, name: str, expected: type[_T]) -> tuple[_T, ...]:
     Raises:
         UnsupportedError: If a module defines none of that type.
     """
-    found = []
+    entries = []
     places = importlib.import_module(package).__path__
     for module in sorted(pkgutil.iter_modules(places), key=lambda m: m.name):
         full = f"{package}.{module.name}"
         entry = getattr(importlib.import_module(full), name, None)
         if not isinstance(entry, expected):
             raise UnsupportedError(f"{full} must define {name} as a {expected.__name__}")
-        found.append(entry)
-    return tuple(found)
+        entries.append(entry)
+    return tuple(entries)

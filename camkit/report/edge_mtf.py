@@ -215,20 +215,20 @@ def _fitted(values: FloatGrid, there: Sites, line: _Line) -> _Line:
         (y, (x[1:] + x[:-1]) / 2, np.diff(values[y, x])) for y, x in rows if x.size >= _LEAST_ROWS
     ]
     for _ in range(_ROUNDS):
-        found = []
+        moments = []
         for y, place, slope in slopes:
             at = line.place + line.slope * y
             if not half <= at <= values.shape[1] - 1 - half:
                 continue
             near = np.abs(place - at) < half
             weighted = slope[near] * np.cos(np.pi / 2 * (place[near] - at) / half) ** 2
-            found.append((y, weighted @ (place[near] - at), weighted.sum()))
-        if len(found) < _LEAST_ROWS:
+            moments.append((y, weighted @ (place[near] - at), weighted.sum()))
+        if len(moments) < _LEAST_ROWS:
             raise ContractError(
-                f"the edge crosses {len(found)} rows away from the border of the picture; "
+                f"the edge crosses {len(moments)} rows away from the border of the picture; "
                 f"{_LEAST_ROWS} are needed: put it into the middle"
             )
-        y, moment, step = np.array(found).T
+        y, moment, step = np.array(moments).T
         if step.mean() <= 0:
             raise ContractError("the picture shows no straight edge: it is not steep along a line")
         change = np.polynomial.polynomial.polyfit(y, moment / step.mean(), 1)
@@ -282,6 +282,6 @@ def _variance(values: FloatGrid, profile: FloatLine, bins: Bins) -> float:
     """Return the variance of the samples away from the edge, around the profile."""
     residual = values[bins.inside] - profile[bins.number]
     middle = (bins.counts.size - 1) / 2
-    away = np.abs(bins.number - middle) > bins.counts.size / 4
-    free = int(away.sum()) - bins.counts.size // 2
-    return float(np.square(residual[away]).sum()) / max(free, 1)
+    outer = np.abs(bins.number - middle) > bins.counts.size / 4
+    free = int(outer.sum()) - bins.counts.size // 2
+    return float(np.square(residual[outer]).sum()) / max(free, 1)

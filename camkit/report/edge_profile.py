@@ -115,8 +115,8 @@ def _to_middles(bins: Bins) -> FloatLine:
     count = bins.counts.size
     middles = (np.arange(count) - (count - 1) / 2) / bins.bins_per_px
     before, after = np.arange(count)[:-2], np.arange(count)[2:]
-    moved = (middles - bins.places)[1:-1] / (bins.places[after] - bins.places[before])
+    weights = (middles - bins.places)[1:-1] / (bins.places[after] - bins.places[before])
     matrix = np.eye(count)
-    matrix[before + 1, after] += moved
-    matrix[before + 1, before] -= moved
+    matrix[before + 1, after] += weights
+    matrix[before + 1, before] -= weights
     return matrix

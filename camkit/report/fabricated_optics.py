@@ -67,14 +67,16 @@ def fabricated_optics(
         content.append(repr(bundle.haze.cell_px))
     name = hashlib.sha256("\n".join(content).encode()).hexdigest()[:16]
     cached = cache_folder / f"psf-{seed}-{name}.safetensors"
-    beside = cached.with_stem(f"haze-{seed}-{name}") if bundle.manifest.has_haze else None
+    haze_path = cached.with_stem(f"haze-{seed}-{name}") if bundle.manifest.has_haze else None
     if not cached.exists():
         cache_folder.mkdir(parents=True, exist_ok=True)
-        made = _trace(bundle, text, seed, depth_mm)
-        if beside is not None and made.haze is not None:
-            write_haze(beside, made.haze)
-        write_psf(cached, made.psf)
-    return FrozenOptics(psf=read_psf(cached), haze=None if beside is None else read_haze(beside))
+        traced = _trace(bundle, text, seed, depth_mm)
+        if haze_path is not None and traced.haze is not None:
+            write_haze(haze_path, traced.haze)
+        write_psf(cached, traced.psf)
+    return FrozenOptics(
+        psf=read_psf(cached), haze=None if haze_path is None else read_haze(haze_path)
+    )
 
 
 def _max_side_px(psf: FrozenPsf) -> int:

@@ -74,7 +74,7 @@ def chart(draw: Callable[_P, Figure]) -> Callable[_P, Figure]:
     """Return a function that draws in the style of all charts; pictures within have no grid."""
 
     @wraps(draw)
-    def drawn(*args: _P.args, **kwargs: _P.kwargs) -> Figure:
+    def styled(*args: _P.args, **kwargs: _P.kwargs) -> Figure:
         from matplotlib import rc_context
 
         with rc_context(STYLE):
@@ -85,7 +85,7 @@ def chart(draw: Callable[_P, Figure]) -> Callable[_P, Figure]:
                     panel.grid(visible=False)
         return figure
 
-    return drawn
+    return styled
 
 
 def new_figure(width_in: float, height_in: float) -> Figure:
@@ -129,6 +129,6 @@ def levels_of(picture: NDArray[Any], enlarged: int = 1) -> NDArray[np.uint8]:
 
 def encode_png(levels: NDArray[np.uint8]) -> bytes:
     """Return the PNG of 8-bit levels (h, w, 3), blue first."""
-    done, data = cv2.imencode(".png", levels)
-    assert done  # an 8-bit picture of three channels always encodes
+    encoded, data = cv2.imencode(".png", levels)
+    assert encoded  # an 8-bit picture of three channels always encodes
     return data.tobytes()

@@ -67,7 +67,7 @@ class Reference:
                 f"white must have a luminance > 0 cd/m^2; got {self.nits_per_unit:g}"
             )
 
-    def within(self, inside: tuple[slice, ...]) -> "Reference":
+    def cropped(self, inside: tuple[slice, ...]) -> "Reference":
         """Return a part of it."""
         return Reference(
             truth=self.truth[inside],
@@ -92,9 +92,9 @@ def hdr_scores(result: FloatArray, reference: Reference) -> dict[str, float]:
         ContractError: If the result is not finite or of another shape.
     """
     check_picture("result", result, reference.truth.shape)
-    found = _scores(result, reference)
-    again = _scores(aligned(result, reference.truth), reference)
-    return found | {f"{name}{ALIGNED}": value for name, value in again.items()}
+    scores = _scores(result, reference)
+    aligned_scores = _scores(aligned(result, reference.truth), reference)
+    return scores | {f"{name}{ALIGNED}": value for name, value in aligned_scores.items()}
 
 
 def guess_scores(reference: Reference) -> dict[str, float]:
@@ -103,8 +103,8 @@ def guess_scores(reference: Reference) -> dict[str, float]:
         return {}
     truth = reference.truth
     guess = blob_guess(reference.bare, reference.clipped)
-    found = {"": stops_rmse(guess, truth), ALIGNED: stops_rmse(aligned(guess, truth), truth)}
-    return {f"stops_rmse_guess{end}": v for end, v in found.items() if v is not None}
+    errors = {"": stops_rmse(guess, truth), ALIGNED: stops_rmse(aligned(guess, truth), truth)}
+    return {f"stops_rmse_guess{end}": v for end, v in errors.items() if v is not None}
 
 
 def check_picture(name: str, picture: FloatArray, shape: tuple[int, ...]) -> None:
@@ -135,11 +135,11 @@ def stops_rmse(result: FloatArray, truth: FloatArray) -> float | None:
 
     What is darker than `DARKEST` counts as that.
     """
-    above = truth > 1
-    if not above.any():
+    bright = truth > 1
+    if not bright.any():
         return None
-    got = np.maximum(result[above].astype(np.float64), DARKEST)
-    return float(np.sqrt(np.mean(np.square(np.log2(got / truth[above])))))
+    got = np.maximum(result[bright].astype(np.float64), DARKEST)
+    return float(np.sqrt(np.mean(np.square(np.log2(got / truth[bright])))))
 
 
 def mu_law(linear: FloatArray) -> NDArray[np.float64]:
@@ -164,10 +164,10 @@ def aligned(result: FloatArray, truth: FloatArray) -> FloatArray:
     `ALIGN_FLOOR`: the scale is the median of truth / result; 1 where there are none. Least squares
     would let the few lights that are lost move the scale of all the rest.
     """
-    seen = (truth > ALIGN_FLOOR) & (result > ALIGN_FLOOR)
-    if not seen.any():
+    bright = (truth > ALIGN_FLOOR) & (result > ALIGN_FLOOR)
+    if not bright.any():
         return result
-    scale = np.median(truth[seen].astype(np.float64) / result[seen])
+    scale = np.median(truth[bright].astype(np.float64) / result[bright])
     return np.asarray(result * np.float32(scale), dtype=np.float32)
 
 
@@ -182,9 +182,9 @@ def blob_guess(bare: FloatArray, clipped: Mask) -> FloatArray:
         bare: (3, h, w) float32 linear, clipped at white.
         clipped: (3, h, w).
     """
-    around = ((1, 1), (1, 1))
+    border = ((1, 1), (1, 1))
     distance = np.stack(
-        [distance_transform_edt(np.pad(plane, around))[1:-1, 1:-1] for plane in clipped]
+        [distance_transform_edt(np.pad(plane, border))[1:-1, 1:-1] for plane in clipped]
     )
     lights = np.clip(GUESS_PER_PX2 * np.square(distance), 1, CEILING)
     return np.asarray(np.where(clipped, lights, bare), dtype=np.float32)
@@ -192,7 +192,7 @@ def blob_guess(bare: FloatArray, clipped: Mask) -> FloatArray:
 
 def _scores(result: FloatArray, reference: Reference) -> dict[str, float]:
     truth, nits = reference.truth, reference.nits_per_unit
-    found = {
+    scores = {
         "hdr_psnr_db": psnr_db(_mean_square(result, truth), CEILING),
         "stops_rmse": stops_rmse(result, truth),
         "mu_psnr_db": psnr_db(_mean_square(mu_law(result), mu_law(truth))),
@@ -201,11 +201,11 @@ def _scores(result: FloatArray, reference: Reference) -> dict[str, float]:
     }
     if reference.clipped is not None and not reference.clipped.any(axis=0).all():
         # colours of the output are mixed of those of the camera
-        kept = np.broadcast_to(~reference.clipped.any(axis=0), truth.shape)
-        found["unclipped_psnr_db"] = psnr_db(_mean_square(result[kept], truth[kept]))
+        unclipped = np.broadcast_to(~reference.clipped.any(axis=0), truth.shape)
+        scores["unclipped_psnr_db"] = psnr_db(_mean_square(result[unclipped], truth[unclipped]))
     for ev in EXPOSURES_EV:
-        found[f"ev{ev}_psnr_db"] = psnr_db(_mean_square(exposed(result, ev), exposed(truth, ev)))
-    return {name: value for name, value in found.items() if value is not None}
+        scores[f"ev{ev}_psnr_db"] = psnr_db(_mean_square(exposed(result, ev), exposed(truth, ev)))
+    return {name: value for name, value in scores.items() if value is not None}
 
 
 def _mean_square(one: FloatArray | NDArray[np.float64], other: object) -> float:

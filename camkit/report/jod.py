@@ -43,9 +43,9 @@ def jod(result: FloatArray, truth: FloatArray, nits_per_unit: float) -> float:
     import torch
 
     metric = _metric()
-    shown = [torch.from_numpy(np.ascontiguousarray(p * nits_per_unit)) for p in (result, truth)]
+    displayed = [torch.from_numpy(np.ascontiguousarray(p * nits_per_unit)) for p in (result, truth)]
     with torch.no_grad():
-        quality, _ = metric.predict(*(p.to(torch.float32) for p in shown), dim_order="CHW")
+        quality, _ = metric.predict(*(p.to(torch.float32) for p in displayed), dim_order="CHW")
     return float(quality)
 
 

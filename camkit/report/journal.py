@@ -24,17 +24,17 @@ def read_journal(path: Path, parse: Callable[[Mapping[str, Any]], Entry], what: 
     if not path.exists():
         return []
     lines = path.read_text(encoding="utf-8").splitlines()
-    found = []
+    entries = []
     for number, line in enumerate(lines, start=1):
         try:
-            found.append(parse(json.loads(line)))
+            entries.append(parse(json.loads(line)))
         except (json.JSONDecodeError, TypeError, KeyError) as error:
             if number == len(lines):
                 break
             raise ContractError(
                 f"{path} line {number} is no {what}; remove the file and start over"
             ) from error
-    return found
+    return entries
 
 
 def append_journal(path: Path, entries: Iterable[Mapping[str, Any]]) -> None:

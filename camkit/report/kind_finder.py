@@ -23,10 +23,10 @@ def find_part(kind: str, tool: str, expected: type[_T]) -> _T:
         UnsupportedError: If there is no such kind.
         ContractError: If its module defines no such part.
     """
-    known = find_kind(kind)
-    if not known.has_part("report"):
+    entry = find_kind(kind)
+    if not entry.has_part("report"):
         return expected()
-    module = known.part("report")
+    module = entry.part("report")
     part = getattr(getattr(module, "PART", None), tool, None)
     if not isinstance(part, expected):
         raise ContractError(
@@ -46,9 +46,9 @@ def check_photographs(manifest: Manifest, instead: str) -> None:
         ContractError: If it states no optics.
     """
     if not manifest.has_kernels:
-        stated = "no optics" if manifest.optics is None else "a lens profile without kernels"
+        optics = "no optics" if manifest.optics is None else "a lens profile without kernels"
         raise ContractError(
-            f"{manifest.name} states {stated}, so nothing can be photographed with it; {instead}"
+            f"{manifest.name} states {optics}, so nothing can be photographed with it; {instead}"
         )
 
 

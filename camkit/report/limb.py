@@ -66,14 +66,16 @@ def limb_errors(picture: FloatArray, truth: FloatArray) -> LimbErrors:
             `REACH_PX` and as far inside the picture, on a dark sky.
     """
     limb = find_limb(truth)
-    away = np.arange(-REACH_PX, REACH_PX + STEP_PX / 2, STEP_PX)
-    seen, true = (_profiles(p, limb, away) for p in (picture, truth))
+    radii_px = np.arange(-REACH_PX, REACH_PX + STEP_PX / 2, STEP_PX)
+    profiles, true = (_profiles(p, limb, radii_px) for p in (picture, truth))
     inside, outside = true[..., 0].mean(axis=1), true[..., -1].mean(axis=1)
     half = float(np.mean(inside + outside) / 2)
     grey = [scipy.ndimage.gaussian_filter(p.mean(axis=0), SAMPLED_PX) for p in (picture, truth)]
-    at, at_first = (crossings(_profiles(p[None], limb, away)[0], away, half) for p in grey)
-    sectors = seen.reshape(len(seen), SECTORS, -1, away.size).mean(axis=2)
-    rim, seam = (largest_rise(sectors[..., side]).mean(axis=1) for side in (away < 0, away > 0))
+    at, at_first = (crossings(_profiles(p[None], limb, radii_px)[0], radii_px, half) for p in grey)
+    sectors = profiles.reshape(len(profiles), SECTORS, -1, radii_px.size).mean(axis=2)
+    rim, seam = (
+        largest_rise(sectors[..., side]).mean(axis=1) for side in (radii_px < 0, radii_px > 0)
+    )
     return LimbErrors(
         wobble_px=wobble(at - at_first, float(limb.radius_px.mean())),
         seam=float(np.mean(seam / (inside - outside))),
@@ -93,44 +95,48 @@ def find_limb(truth: FloatArray) -> Limb:
     radius_px = float(np.sqrt(lit.sum() / np.pi))
     count = SECTORS * max(round(2 * np.pi * radius_px / SECTORS), 1)
     circle = Limb(center_px=(y, x), radius_px=np.full(count, radius_px))
-    away = np.arange(-REACH_PX, REACH_PX + STEP_PX / 2, STEP_PX)
-    profiles = _profiles(plane[None], circle, away)[0]
-    found = crossings(profiles, away, float(profiles[:, 0].mean() + profiles[:, -1].mean()) / 2)
+    radii_px = np.arange(-REACH_PX, REACH_PX + STEP_PX / 2, STEP_PX)
+    profiles = _profiles(plane[None], circle, radii_px)[0]
+    shifts_px = crossings(
+        profiles, radii_px, float(profiles[:, 0].mean() + profiles[:, -1].mean()) / 2
+    )
     room_px = min(y, x, plane.shape[0] - 1 - y, plane.shape[1] - 1 - x) - radius_px
-    if not np.isfinite(found).all() or min(radius_px, room_px - found.max()) < REACH_PX:
+    if not np.isfinite(shifts_px).all() or min(radius_px, room_px - shifts_px.max()) < REACH_PX:
         raise ContractError(
             f"expected a disc of more than {REACH_PX:g} px radius, as far inside a picture; got "
             f"one of {radius_px:.0f} px around y {y:.0f}, x {x:.0f} of {plane.shape[0]} x "
             f"{plane.shape[1]} px"
         )
-    return Limb(center_px=(y, x), radius_px=radius_px + found)
+    return Limb(center_px=(y, x), radius_px=radius_px + shifts_px)
 
 
-def crossings(profiles: Grid, away: Grid, half: float) -> Grid:
+def crossings(profiles: Grid, radii_px: Grid, half: float) -> Grid:
     """Return where profiles (n, r) fall through a level, nearest to 0; NaN where they do not."""
-    above = profiles >= half
-    falls = above[:, :-1] & ~above[:, 1:]
-    at = np.argmin(np.where(falls, np.abs(away[:-1]), np.inf), axis=1)
+    bright = profiles >= half
+    falls = bright[:, :-1] & ~bright[:, 1:]
+    at = np.argmin(np.where(falls, np.abs(radii_px[:-1]), np.inf), axis=1)
     row = np.arange(len(profiles))
     high, low = profiles[row, at], profiles[row, at + 1]
     share = (high - half) / np.where(high > low, high - low, 1)
-    return np.where(falls.any(axis=1), away[at] + share * (away[at + 1] - away[at]), np.nan)
+    return np.where(
+        falls.any(axis=1), radii_px[at] + share * (radii_px[at + 1] - radii_px[at]), np.nan
+    )
 
 
-def wobble(moved: Grid, radius_px: float) -> float:
+def wobble(shifts_px: Grid, radius_px: float) -> float:
     """Return the standard deviation of displacements in waves of at most `LONGEST_PX`.
 
     Args:
-        moved: (n,) at equal steps around a circle; where one is NaN, its neighbours count.
+        shifts_px: (n,) at equal steps around a circle; where one is NaN, its neighbours count.
         radius_px: Of the circle.
     """
-    known = np.flatnonzero(np.isfinite(moved))
-    if not known.size:
+    finite = np.flatnonzero(np.isfinite(shifts_px))
+    if not finite.size:
         return float("nan")
-    whole = np.interp(np.arange(moved.size), known, moved[known], period=moved.size)
+    whole = np.interp(np.arange(shifts_px.size), finite, shifts_px[finite], period=shifts_px.size)
     waves = np.fft.rfft(whole)
     waves[: int(np.ceil(2 * np.pi * radius_px / LONGEST_PX))] = 0
-    return float(np.fft.irfft(waves, moved.size).std())
+    return float(np.fft.irfft(waves, shifts_px.size).std())
 
 
 def largest_rise(profiles: Grid) -> Grid:
@@ -138,11 +144,11 @@ def largest_rise(profiles: Grid) -> Grid:
     return np.asarray((profiles - np.minimum.accumulate(profiles, axis=-1)).max(axis=-1))
 
 
-def _profiles(picture: FloatArray | Grid, limb: Limb, away: Grid) -> Grid:
+def _profiles(picture: FloatArray | Grid, limb: Limb, radii_px: Grid) -> Grid:
     """Return (colours, angles, radii) at distances from the limb, > 0 outside."""
     count = limb.radius_px.size
     angle = 2 * np.pi * np.arange(count)[:, None] / count
-    radius = limb.radius_px[:, None] + away
+    radius = limb.radius_px[:, None] + radii_px
     y = limb.center_px[0] + np.sin(angle) * radius
     x = limb.center_px[1] + np.cos(angle) * radius
     planes = [p.astype(np.float64) for p in picture]

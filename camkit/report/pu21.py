@@ -56,8 +56,8 @@ def pu21_mean_square(result: FloatArray, truth: FloatArray, nits_per_unit: float
         truth: Likewise.
         nits_per_unit: Luminance of white (1.0) in cd/m^2.
     """
-    got, wanted = (pu21(_luminance(_shown(p, nits_per_unit))) for p in (result, truth))
-    return float(np.mean(np.square((got - wanted) / _WHITE)))
+    got, reference = (pu21(_luminance(_luminous(p, nits_per_unit))) for p in (result, truth))
+    return float(np.mean(np.square((got - reference) / _WHITE)))
 
 
 def pu21_ssim(result: FloatArray, truth: FloatArray, nits_per_unit: float) -> float:
@@ -65,10 +65,12 @@ def pu21_ssim(result: FloatArray, truth: FloatArray, nits_per_unit: float) -> fl
 
     References: Wang et al. 2004 (SSIM with Gaussian weights of sigma 1.5).
     """
-    got, wanted = (_luminance(pu21(_shown(p, nits_per_unit)) / _WHITE) for p in (result, truth))
+    got, reference = (
+        _luminance(pu21(_luminous(p, nits_per_unit)) / _WHITE) for p in (result, truth)
+    )
     return float(
         structural_similarity(
-            wanted,
+            reference,
             got,
             data_range=1.0,
             gaussian_weights=True,
@@ -78,7 +80,7 @@ def pu21_ssim(result: FloatArray, truth: FloatArray, nits_per_unit: float) -> fl
     )
 
 
-def _shown(linear: FloatArray, nits_per_unit: float) -> FloatGrid:
+def _luminous(linear: FloatArray, nits_per_unit: float) -> FloatGrid:
     return np.clip(linear.astype(np.float64) * nits_per_unit, LEAST_NITS, MOST_NITS)
 
 

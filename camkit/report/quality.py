@@ -115,10 +115,10 @@ def list_set(folder: Path, count: int | None = None) -> tuple[Path, ...]:
     """
     if not folder.is_dir():
         raise ContractError(f"there is no folder {folder}; give the folder of the picture sets")
-    found = sorted(p for p in folder.iterdir() if p.suffix.lower() in PICTURE_SUFFIXES)
-    if not found:
+    paths = sorted(p for p in folder.iterdir() if p.suffix.lower() in PICTURE_SUFFIXES)
+    if not paths:
         raise ContractError(f"{folder} holds no pictures ({', '.join(PICTURE_SUFFIXES)})")
-    return tuple(found[:count])
+    return tuple(paths[:count])
 
 
 def crop_origin(

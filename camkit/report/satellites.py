@@ -57,15 +57,15 @@ def satellites(picture: FloatArray, truth: FloatArray) -> Satellites:
     noise = _noise(picture, stars)
     above, below, core = np.empty((3, len(stars)))
     for i, place in enumerate(stars):
-        window, away = _around(place)
-        annulus = (away > CORE_PX) & (away <= ANNULUS_PX)
-        ring = (away > ANNULUS_PX) & (away <= RING_PX)
-        seen, true = (_above_sky(p[window], ring) for p in (picture, truth))
-        light = true[:, away <= ANNULUS_PX].sum()
+        window, distance_px = _star_window(place)
+        annulus = (distance_px > CORE_PX) & (distance_px <= ANNULUS_PX)
+        ring = (distance_px > ANNULUS_PX) & (distance_px <= RING_PX)
+        light_map, true = (_above_sky(p[window], ring) for p in (picture, truth))
+        light = true[:, distance_px <= ANNULUS_PX].sum()
         expected = noise * np.count_nonzero(annulus)
-        above[i] = (np.maximum(seen[:, annulus], 0).sum() - expected) / light
-        below[i] = (np.maximum(-seen[:, annulus], 0).sum() - expected) / light
-        core[i] = seen[:, away <= CORE_PX].sum() / light
+        above[i] = (np.maximum(light_map[:, annulus], 0).sum() - expected) / light
+        below[i] = (np.maximum(-light_map[:, annulus], 0).sum() - expected) / light
+        core[i] = light_map[:, distance_px <= CORE_PX].sum() / light
     return Satellites(above=np.maximum(above, 0), below=np.maximum(below, 0), core=core)
 
 
@@ -86,7 +86,7 @@ def find_stars(truth: FloatArray) -> Grid:
     return np.array(middles).reshape(-1, 2)
 
 
-def _around(place: Grid) -> tuple[tuple[slice, ...], Grid]:
+def _star_window(place: Grid) -> tuple[tuple[slice, ...], Grid]:
     """Return the window of a star, and how far its pixels are from it."""
     reach = int(RING_PX) + 1
     top, left = (round(float(v)) - reach for v in place)
@@ -104,15 +104,15 @@ def _above_sky(window: FloatArray, ring: NDArray[np.bool_]) -> Grid:
 def _noise(picture: FloatArray, stars: Grid) -> float:
     """Return what noise alone adds above the sky in a pixel, all colours added up."""
     height, width = picture.shape[1:]
-    far = np.ones((height, width), dtype=bool)
+    sky_mask = np.ones((height, width), dtype=bool)
     edge = int(RING_PX)
-    far[:edge] = far[-edge:] = far[:, :edge] = far[:, -edge:] = False
+    sky_mask[:edge] = sky_mask[-edge:] = sky_mask[:, :edge] = sky_mask[:, -edge:] = False
     for place in stars:
-        window, away = _around(place)
-        far[window[1:]] &= away > RING_PX
-    if not far.any():
+        window, distance_px = _star_window(place)
+        sky_mask[window[1:]] &= distance_px > RING_PX
+    if not sky_mask.any():
         return 0.0
-    sky = picture[:, far].astype(np.float64)
+    sky = picture[:, sky_mask].astype(np.float64)
     middle = np.median(sky, axis=1, keepdims=True)
     sigma = np.median(np.abs(sky - middle), axis=1) / MEDIAN_OF_NORMAL
     return float(sigma.sum() / np.sqrt(2 * np.pi))

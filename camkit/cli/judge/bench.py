@@ -176,7 +176,7 @@ def _run(settings: "Settings", out_dir: Path, *, as_json: bool) -> None:
         say(json.dumps(result.report, allow_nan=False))
         return
     rows = result.report["rows"]
-    for line in own_lines(rows) if result.own else _lines(rows):
+    for line in own_lines(rows) if result.self_measured else _lines(rows):
         say(line)
     for skip in result.report["skipped"]:
         say(f"camkit: not measured: {skip['what']}: {skip['reason']}", err=True)

@@ -79,7 +79,7 @@ def stress(
     )
     earlier = None if compare is None else open_bundle(find_bundle(compare))
     with working("sweeping", unit="points") as task:
-        result = run_stress(opened, options, before=earlier, progress=_teller(task))
+        result = run_stress(opened, options, earlier_bundle=earlier, progress=_teller(task))
     if write:
         write_envelope(opened, result.envelope)
     if json_:

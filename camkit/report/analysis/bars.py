@@ -92,17 +92,17 @@ def see_bars(
     noise, step = noise_of(sensor, setting), _step(sensor, setting)
     signals = mean * np.array([1 + contrast, 1 - contrast])
     rng = np.random.default_rng(SEED)
-    seen = record(np.repeat(signals[:, None], PAIRS, axis=1), noise, sensor.full_well_e, rng)
-    bright, dark = np.rint(seen / step) * step
-    told = int((bright - dark > least_difference(mean, noise, step)).sum())
+    samples = record(np.repeat(signals[:, None], PAIRS, axis=1), noise, sensor.full_well_e, rng)
+    bright, dark = np.rint(samples / step) * step
+    hits = int((bright - dark > least_difference(mean, noise, step)).sum())
     total = bright + dark
     ratio = np.divide(bright - dark, total, out=np.zeros(PAIRS), where=total > 0)
     near = np.abs(ratio - NOMINAL) <= TOLERANCE * NOMINAL
     return Bars(
         width_px=width_px,
         contrast=contrast,
-        detection=told / PAIRS,
-        detection_ci=interval(told, PAIRS),
+        detection=hits / PAIRS,
+        detection_ci=interval(hits, PAIRS),
         cdp=float(near.mean()),
     )
 

@@ -132,13 +132,13 @@ def measure_field(
     Raises:
         ContractError: If no light arrives.
     """
-    told = tell or (lambda _: None)
-    told(f"{subject.name}: points")
+    report = tell or (lambda _: None)
+    report(f"{subject.name}: points")
     images = subject.images(band_of(subject.sensor, options.wavelength_um), options.fields)
     recovered: Recovered | None = None
     note: str | None = None
     if options.pictures:
-        told(f"{subject.name}: pictures")
+        report(f"{subject.name}: pictures")
         # a lens that no kernels hold is still measured
         try:
             recovered = _recover(subject, images, options, watch)
@@ -180,19 +180,19 @@ def _point(
 ) -> FieldPoint:
     wide = max(1, round(THESIS_WIDTHS * image.fwhm_px))
 
-    def seen(width_px: int) -> dict[Direction, Bars]:
+    def bars_of(width_px: int) -> dict[Direction, Bars]:
         return {d: see_bars(image, d, width_px, subject.sensor, options.iso) for d in DIRECTIONS}
 
     return FieldPoint(
         image=image,
         likeness=likeness(axis, image),
-        bars=seen(options.bars_px),
-        thesis=seen(wide),
+        bars=bars_of(options.bars_px),
+        thesis=bars_of(wide),
         psnr_db=psnr_db,
     )
 
 
-def to_json(found: Sequence[LensField], options: FieldOptions) -> dict[str, Any]:
+def to_json(fields: Sequence[LensField], options: FieldOptions) -> dict[str, Any]:
     """Return what was found as plain JSON values."""
     return {
         "iso": options.iso,
@@ -200,19 +200,19 @@ def to_json(found: Sequence[LensField], options: FieldOptions) -> dict[str, Any]
         "wavelength_um": options.wavelength_um,
         "cycles_per_px": list(CYCLES_PER_PX),
         "pictures": len(options.pictures),
-        "lenses": {lens.subject.name: _lens(lens) for lens in found},
+        "lenses": {lens.subject.name: _lens(lens) for lens in fields},
     }
 
 
-def _lens(found: LensField) -> dict[str, Any]:
-    recovered = found.recovered
+def _lens(field: LensField) -> dict[str, Any]:
+    recovered = field.recovered
     return {
-        "kind": found.subject.kind,
-        "pixel_pitch_um": found.subject.sensor.known_extent.pixel_pitch_um,
+        "kind": field.subject.kind,
+        "pixel_pitch_um": field.subject.sensor.known_extent.pixel_pitch_um,
         "method": None if recovered is None else recovered.method,
         "psnr_db": None if recovered is None else _psnr(recovered.overall),
-        "notes": [] if found.note is None else [found.note],
-        "fields": [_field(point) for point in found.points],
+        "notes": [] if field.note is None else [field.note],
+        "fields": [_field(point) for point in field.points],
     }
 
 
@@ -258,7 +258,7 @@ def _short(value: float) -> float:
     return round(float(value), 5)
 
 
-def to_text(told: dict[str, Any]) -> str:
+def to_text(report: dict[str, Any]) -> str:
     """Return what was found, as `to_json` has it, as a table for each lens."""
     head = (
         "mm",
@@ -274,7 +274,7 @@ def to_text(told: dict[str, Any]) -> str:
         "after",
     )
     lines = []
-    for name, lens in told["lenses"].items():
+    for name, lens in report["lenses"].items():
         method = "not photographed" if lens["method"] is None else f"restored by {lens['method']}"
         lines.append(f"{name} ({lens['kind']}, {method})")
         lines += [f"  note: {note}" for note in lens["notes"]]

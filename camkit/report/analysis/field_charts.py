@@ -16,47 +16,47 @@ _FREQUENCIES: Final = np.linspace(0.0, 0.5, 101)
 
 
 @chart
-def draw_light(found: Sequence[LensField]) -> Figure:
+def draw_light(lenses: Sequence[LensField]) -> Figure:
     """Draw the shares near the peak and within 900 px, and the width of the peak."""
     figure = new_figure(9.0, 3.0)
     near, far, width = figure.subplots(1, 3)
-    _lines(near, found, lambda p: p.image.near_share)
+    _lines(near, lenses, lambda p: p.image.near_share)
     near.set(yscale="log", ylim=(LEAST_SHARE, 1.3), ylabel="light within 10 px")
-    _lines(far, found, lambda p: p.image.far_share)
+    _lines(far, lenses, lambda p: p.image.far_share)
     far.set(ylim=(0, 1.05), ylabel="light within 900 px")
-    _lines(width, found, lambda p: p.image.fwhm_px)
+    _lines(width, lenses, lambda p: p.image.fwhm_px)
     width.set(yscale="log", ylabel="width of the peak, px")
     near.legend()
     return figure
 
 
 @chart
-def draw_detection(found: Sequence[LensField], bars_px: int) -> Figure:
+def draw_detection(lenses: Sequence[LensField], bars_px: int) -> Figure:
     """Draw contrast, detection and CDP of bars; the thesis's below."""
     figure = new_figure(9.0, 5.6)
     rows = figure.subplots(2, 3, sharex=True)
-    said = (f"bars of {bars_px} px", f"bars of {THESIS_WIDTHS} widths of the peak")
-    for row, (title, panels) in enumerate(zip(said, rows, strict=True)):
+    titles = (f"bars of {bars_px} px", f"bars of {THESIS_WIDTHS} widths of the peak")
+    for row, (title, panels) in enumerate(zip(titles, rows, strict=True)):
         contrast, detection, cdp = panels
-        _lines(contrast, found, _of_bars(row, "contrast"))
+        _lines(contrast, lenses, _of_bars(row, "contrast"))
         contrast.axhline(0, color="black", linewidth=0.6)
         contrast.set(ylabel="contrast", title=title)
-        _lines(detection, found, _of_bars(row, "detection"), interval=_interval(row))
+        _lines(detection, lenses, _of_bars(row, "detection"), interval=_interval(row))
         detection.axhline(0.95, color="black", linewidth=0.6, linestyle=":")
         detection.axhline(0.05, color="black", linewidth=0.6, linestyle=":")
         detection.set(ylim=(-0.03, 1.03), ylabel="told apart at 95 %")
-        _lines(cdp, found, _of_bars(row, "cdp"))
+        _lines(cdp, lenses, _of_bars(row, "cdp"))
         cdp.set(ylim=(-0.03, 1.03), ylabel="CDP, within half of nominal")
     rows[0][0].legend()
     return figure
 
 
 @chart
-def draw_mtf(found: Sequence[LensField]) -> Figure:
+def draw_mtf(lenses: Sequence[LensField]) -> Figure:
     """Draw the MTF on the axis, in the middle of the field and at its end; across dashed."""
     figure = new_figure(9.0, 3.0)
     for panel, share in zip(figure.subplots(1, 3, sharey=True), (0.0, 0.5, 1.0), strict=True):
-        for number, lens in enumerate(found):
+        for number, lens in enumerate(lenses):
             image = lens.points[round(share * (len(lens.points) - 1))].image
             color = field_color(number)
             for direction, style in zip(DIRECTIONS, ("-", "--"), strict=True):
@@ -71,11 +71,11 @@ def draw_mtf(found: Sequence[LensField]) -> Figure:
 
 
 @chart
-def draw_recovery(found: Sequence[LensField]) -> Figure:
+def draw_recovery(lenses: Sequence[LensField]) -> Figure:
     """Draw dB before (dashed) and after recovery, of lenses that were photographed with."""
     figure = new_figure(6.0, 3.4)
     panel = figure.subplots()
-    for number, lens in enumerate(found):
+    for number, lens in enumerate(lenses):
         if lens.recovered is None:
             continue
         color = field_color(number)
@@ -96,14 +96,14 @@ def draw_recovery(found: Sequence[LensField]) -> Figure:
 
 
 @chart
-def draw_peaks(found: Sequence[LensField]) -> Figure:
+def draw_peaks(lenses: Sequence[LensField]) -> Figure:
     """Draw the peaks of every lens over the field, square root of the light."""
-    columns = min(_MOST_PEAKS, max(len(lens.points) for lens in found))
-    figure = new_figure(1.5 * columns, 1.6 * len(found))
-    rows = figure.subplots(len(found), columns, squeeze=False)
-    for lens, panels in zip(found, rows, strict=True):
-        chosen = np.linspace(0, len(lens.points) - 1, columns).round().astype(int)
-        for panel, index in zip(panels, chosen, strict=True):
+    columns = min(_MOST_PEAKS, max(len(lens.points) for lens in lenses))
+    figure = new_figure(1.5 * columns, 1.6 * len(lenses))
+    rows = figure.subplots(len(lenses), columns, squeeze=False)
+    for lens, panels in zip(lenses, rows, strict=True):
+        indices = np.linspace(0, len(lens.points) - 1, columns).round().astype(int)
+        for panel, index in zip(panels, indices, strict=True):
             image = lens.points[index].image
             light = np.sqrt(np.maximum(image.patch, 0) / image.patch.max())
             reach = PATCH_PX
@@ -124,12 +124,12 @@ def _interval(row: int) -> Callable[[FieldPoint], tuple[float, float]]:
 
 def _lines(
     panel: Panel,
-    found: Sequence[LensField],
+    lenses: Sequence[LensField],
     value: Value,
     *,
     interval: Callable[[FieldPoint], tuple[float, float]] | None = None,
 ) -> None:
-    for number, lens in enumerate(found):
+    for number, lens in enumerate(lenses):
         color = field_color(number)
         at = [p.image.height_mm for p in lens.points]
         panel.plot(

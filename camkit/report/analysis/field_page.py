@@ -22,7 +22,7 @@ _HEADER: Final = (
 )
 
 
-def field_html(found: Sequence[LensField], options: FieldOptions) -> str:
+def field_html(lenses: Sequence[LensField], options: FieldOptions) -> str:
     """Return the page."""
     colour = (
         "the middle colour of each sensor"
@@ -32,8 +32,8 @@ def field_html(found: Sequence[LensField], options: FieldOptions) -> str:
     light = (
         f"In {colour}, all light that arrives is 1. The peak is the densest disc of 5 px; its "
         "width is that of a disc of the area above half its height.",
-        Picture("Light and width over the field.", to_png(draw_light(found))),
-        Picture("Peaks, 129 px wide; square root of the light.", to_png(draw_peaks(found))),
+        Picture("Light and width over the field.", to_png(draw_light(lenses))),
+        Picture("Peaks, 129 px wide; square root of the light.", to_png(draw_peaks(lenses))),
     )
     bars = (
         f"Bars of full contrast at ISO {options.iso:g}, white on the axis at "
@@ -42,18 +42,20 @@ def field_html(found: Sequence[LensField], options: FieldOptions) -> str:
         "differ in 19 of 20 pairs; 0.05 is chance. CDP is the share of pairs whose contrast "
         f"lies within half of the nominal one. Below: bars {THESIS_WIDTHS} widths of the peak "
         "wide. Of two directions the one with less contrast at the bars above is shown.",
-        Picture("Bars over the field.", to_png(draw_detection(found, options.bars_px))),
+        Picture("Bars over the field.", to_png(draw_detection(lenses, options.bars_px))),
     )
     detail = "Detail along the radius (line) and across it (dashed)."
     sections = [
         Section("Light of a point", light),
         Section("Bars", bars),
-        Section("MTF", (Picture(detail, to_png(draw_mtf(found))),)),
+        Section("MTF", (Picture(detail, to_png(draw_mtf(lenses))),)),
     ]
-    if any(lens.recovered is not None for lens in found):
-        drawn = Picture("Capture (dashed) and what was made of it.", to_png(draw_recovery(found)))
-        sections.append(Section("Recovery", (_photographed(options), drawn)))
-    sections += [_table(lens) for lens in found]
+    if any(lens.recovered is not None for lens in lenses):
+        recovery = Picture(
+            "Capture (dashed) and what was made of it.", to_png(draw_recovery(lenses))
+        )
+        sections.append(Section("Recovery", (_photographed(options), recovery)))
+    sections += [_table(lens) for lens in lenses]
     return to_html(Page(title="Over the field", sections=sections))
 
 

@@ -63,8 +63,8 @@ def frozen_images(
     images = []
     for height_mm in heights_mm:
         place = _place(float(height_mm), on_grid=psf.symmetry == "grid")
-        held = 1.0 if share is None else float(share(*place)[0])
-        peak = held * kernels.outward(*place)[0].astype(np.float64)
+        core_share = 1.0 if share is None else float(share(*place)[0])
+        peak = core_share * kernels.outward(*place)[0].astype(np.float64)
         cells = None if haze is None else haze(*place)[0].astype(np.float64)
         images.append(
             _image(
@@ -82,11 +82,11 @@ def frozen_images(
 def _check_wavelength(band: Band, known_um: Array) -> None:
     if band.wavelengths_um.size > 1:
         return
-    asked = float(band.wavelengths_um[0])
-    if not known_um.min() - LEAST_APART_UM <= asked <= known_um.max() + LEAST_APART_UM:
+    wavelength_um = float(band.wavelengths_um[0])
+    if not known_um.min() - LEAST_APART_UM <= wavelength_um <= known_um.max() + LEAST_APART_UM:
         raise ContractError(
             f"these optics are known from {known_um.min():g} to {known_um.max():g} um; nothing is "
-            f"known at {asked:g} um"
+            f"known at {wavelength_um:g} um"
         )
 
 
@@ -109,21 +109,21 @@ def _image(
     total = core.sum() + (0.0 if cells is None else cells.sum())
     core = core / total
     peak = find_peak(core)
-    off = peak.row - core.shape[0] // 2, peak.column - core.shape[1] // 2
+    shift_px = peak.row - core.shape[0] // 2, peak.column - core.shape[1] // 2
     down, across = (np.arange(side) for side in core.shape)
     distance = np.hypot(down[:, None] - peak.row, across - peak.column)
     near, far = (float(core[distance < radius].sum()) for radius in (NEAR_PX, FAR_PX))
     lines: dict[Direction, Array] = {
-        name: _centred(core.sum(axis=1 - along), off[along])
+        name: _centred(core.sum(axis=1 - along), shift_px[along])
         for along, name in enumerate(DIRECTIONS)
     }
     patch = peak.patch
     if cells is not None:
         cells = cells / total
-        near += within_cells(cells, cell_px, off, NEAR_PX)
-        far += within_cells(cells, cell_px, off, FAR_PX)
+        near += within_cells(cells, cell_px, shift_px, NEAR_PX)
+        far += within_cells(cells, cell_px, shift_px, FAR_PX)
         for along, name in enumerate(DIRECTIONS):
-            spread = _in_pixels(cells.sum(axis=1 - along), cell_px, off[along])
+            spread = _in_pixels(cells.sum(axis=1 - along), cell_px, shift_px[along])
             lines[name] = _sum(lines[name], spread)
         patch = patch + cells[cells.shape[0] // 2, cells.shape[1] // 2] / cell_px**2
     return PointImage(
@@ -148,7 +148,7 @@ def within_cells(cells: Array, cell_px: int, off_px: tuple[int, int], radius_px:
     """
     side = cells.shape[0]
     part = (np.arange(side * _PARTS) + 0.5) / _PARTS - side / 2
-    down, across = (part * cell_px - off for off in off_px)
+    down, across = (part * cell_px - shift_px for shift_px in off_px)
     inside = np.hypot(down[:, None], across) < radius_px
     shares = inside.reshape(side, _PARTS, side, _PARTS).mean(axis=(1, 3))
     return float((cells * shares).sum())
@@ -171,8 +171,8 @@ def _in_pixels(cells: Array, cell_px: int, off_px: int) -> Array:
 def _sum(one: Array, other: Array) -> Array:
     """Add two lines of odd lengths, middle upon middle."""
     short, long = sorted((one, other), key=lambda line: line.size)
-    beside = (long.size - short.size) // 2
-    return long + np.pad(short, beside)
+    margin = (long.size - short.size) // 2
+    return long + np.pad(short, margin)
 
 
 def sensor_heights_mm(sensor: ColorSensor, fields: int) -> Array:

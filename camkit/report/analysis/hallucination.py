@@ -101,14 +101,14 @@ class Method:
 
     def maps(self, measure: str) -> dict[str, Array]:
         """Return a measure of the patches of every picture, by row and column."""
-        found: dict[str, list[Patch]] = {}
+        by_scene: dict[str, list[Patch]] = {}
         for patch in self.patches:
-            found.setdefault(patch.scene, []).append(patch)
+            by_scene.setdefault(patch.scene, []).append(patch)
         return {
             scene: np.array([patch.values[measure] for patch in patches]).reshape(
                 -1, len({patch.place[1] for patch in patches})
             )
-            for scene, patches in found.items()
+            for scene, patches in by_scene.items()
         }
 
 
@@ -119,14 +119,14 @@ class Control:
     Attributes:
         method: Which.
         planted: How many patches.
-        found: How many of them have a larger excess than 99 of 100 patches of the method itself.
+        detected: How many of them have a larger excess than 99 of 100 patches of the method itself.
         first: How many of as many patches of the largest excess are among them.
         rise: Least `detail` of a planted patch less that of the same patch without.
     """
 
     method: str
     planted: int
-    found: int
+    detected: int
     first: int
     rise: float
 
@@ -211,33 +211,37 @@ def analyse(bundle: Bundle, scenes: Sequence[Scene], options: Options) -> Report
     methods = tuple(
         Method(
             name=name,
-            patches=tuple(held.patches),
-            worst=() if name == TRUTH else tuple(sorted(held.crops, key=_crop_rank)[:WORST]),
+            patches=tuple(entry.patches),
+            worst=() if name == TRUTH else tuple(sorted(entry.crops, key=_crop_rank)[:WORST]),
         )
-        for name, held in gathered.items()
+        for name, entry in gathered.items()
     )
     return Report(options=options, methods=methods, control=_judge(methods, primary, places))
 
 
-def _take(held: _Gathered, picture: FloatArray, view: _View, options: Options) -> None:
+def _take(gathered: _Gathered, picture: FloatArray, view: _View, options: Options) -> None:
     """Measure a picture and keep its worst patches."""
     shot, side = view.shot, options.side_px
-    left = unexplained(picture, shot, view.lens)
+    remainder = unexplained(picture, shot, view.lens)
     cell = np.ones((shot.scene.scale, shot.scene.scale))
-    excess = left.detail - view.filtered
+    excess = remainder.detail - view.filtered
     denied = {
         name: np.asarray(np.kron(plane, cell), np.float64)
-        for name, plane in (("chi2", left.chi2), ("detail", left.detail), ("excess", excess))
+        for name, plane in (
+            ("chi2", remainder.chi2),
+            ("detail", remainder.detail),
+            ("excess", excess),
+        )
     }
     patches = measure_patches(
         shot.scene.name, picture, view.truth, denied, side, options.perceptual
     )
-    held.patches += patches
+    gathered.patches += patches
     restored = encode_srgb(picture)
     for patch in sorted(patches, key=_rank)[:WORST]:
         y, x = patch.place
         cut = np.s_[:, y : y + side, x : x + side]
-        held.crops.append(
+        gathered.crops.append(
             Crop(
                 patch=patch,
                 truth=view.truth[cut].copy(),
@@ -253,10 +257,10 @@ def _restored(rig: Rig, shot: Shot) -> dict[str, FloatArray]:
     Raises:
         ContractError: If one gives none.
     """
-    made = rig.restore(shot)
-    for name, reason in made.faults.items():
+    restoration = rig.restore(shot)
+    for name, reason in restoration.faults.items():
         raise ContractError(f"{shot.scene.name}: {name} gives no picture: {reason}")
-    return dict(made.pictures)
+    return dict(restoration.pictures)
 
 
 def _rank(patch: Patch) -> tuple[float, float]:
@@ -273,18 +277,18 @@ def _crop_rank(crop: Crop) -> tuple[float, float]:
 def _judge(
     methods: Sequence[Method], primary: str, places: set[tuple[str, tuple[int, int]]]
 ) -> Control:
-    named = {method.name: method for method in methods}
-    plain, planted = named[primary], named[primary + PLANTED]
-    known = plain.values("excess")
-    known = known[np.isfinite(known)]
-    limit = float(np.percentile(known, 99)) if known.size else np.inf
+    by_name = {method.name: method for method in methods}
+    plain, planted = by_name[primary], by_name[primary + PLANTED]
+    excesses = plain.values("excess")
+    excesses = excesses[np.isfinite(excesses)]
+    limit = float(np.percentile(excesses, 99)) if excesses.size else np.inf
     before, after = ({(p.scene, p.place): p.values for p in m.patches} for m in (plain, planted))
     ranked = [(p.scene, p.place) for p in sorted(planted.patches, key=_rank)]
     rises = [after[key]["detail"] - before[key]["detail"] for key in places]
     return Control(
         method=primary,
         planted=len(places),
-        found=sum(after[key]["excess"] > limit for key in places),
+        detected=sum(after[key]["excess"] > limit for key in places),
         first=len(places & set(ranked[: len(places)])),
         rise=float(np.nanmin(rises)) if np.isfinite(rises).any() else 0.0,
     )
@@ -307,7 +311,7 @@ def to_json(report: Report, crops: Sequence[str] = ()) -> dict[str, Any]:
         "control": {
             "method": control.method,
             "planted": control.planted,
-            "found": control.found,
+            "found": control.detected,
             "first": control.first,
             "least_rise": round(control.rise, 4),
         },
@@ -315,41 +319,41 @@ def to_json(report: Report, crops: Sequence[str] = ()) -> dict[str, Any]:
 
 
 def _method(method: Method, report: Report, crops: Sequence[str]) -> dict[str, Any]:
-    told: dict[str, Any] = {name: summary(method.values(name)) for name in MEASURES}
+    columns: dict[str, Any] = {name: summary(method.values(name)) for name in MEASURES}
     for measure in ("chi2", "detail"):
-        told[measure] |= {
+        columns[measure] |= {
             "map": {
-                scene: [[_known(v) for v in row] for row in values]
+                scene: [[_rounded(v) for v in row] for row in values]
                 for scene, values in method.maps(measure).items()
             }
         }
-    named = crops if method.name == report.control.method else ()
-    told["worst"] = [
+    names = crops if method.name == report.control.method else ()
+    columns["worst"] = [
         {
             "picture": crop.patch.scene,
             "x_px": crop.patch.place[1],
             "y_px": crop.patch.place[0],
-            **{name: _known(crop.patch.values[name]) for name in MEASURES},
-            "crop": named[number] if number < len(named) else None,
+            **{name: _rounded(crop.patch.values[name]) for name in MEASURES},
+            "crop": names[number] if number < len(names) else None,
         }
         for number, crop in enumerate(method.worst)
     ]
-    return told
+    return columns
 
 
-def _known(value: float) -> float | None:
+def _rounded(value: float) -> float | None:
     return round(float(value), 6) if np.isfinite(value) else None
 
 
-def to_text(told: dict[str, Any]) -> str:
+def to_text(report: dict[str, Any]) -> str:
     """Return what was found, as `to_json` has it, as a table."""
-    lines = [f"{told['patches']} patches of {told['patch_px']} px, ISO {told['iso']:g}"]
-    lines.append(f"perceptual: {told['perceptual']}")
+    lines = [f"{report['patches']} patches of {report['patch_px']} px, ISO {report['iso']:g}"]
+    lines.append(f"perceptual: {report['perceptual']}")
     lines.append(f"  {'':16}" + "".join(f"{name + ' median, p99':>24}" for name in MEASURES))
-    for name, method in told["methods"].items():
+    for name, method in report["methods"].items():
         cells = [_pair(method[measure]) for measure in MEASURES]
         lines.append(f"  {name:16}" + "".join(f"{cell:>24}" for cell in cells))
-    control = told["control"]
+    control = report["control"]
     lines.append(
         f"control: {control['found']} of {control['planted']} patches with planted detail found in "
         f"{control['method']}, {control['first']} of them first; detail rose by "
@@ -358,7 +362,7 @@ def to_text(told: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _pair(found: dict[str, Any]) -> str:
-    if found["median"] is None:
+def _pair(figures: dict[str, Any]) -> str:
+    if figures["median"] is None:
         return "-"
-    return f"{found['median']:.4g}, {found['p99']:.4g}"
+    return f"{figures['median']:.4g}, {figures['p99']:.4g}"

@@ -35,7 +35,7 @@ _GAP_PX: Final = 4
 def hallucination_html(report: Report) -> str:
     """Return the page."""
     control = report.control
-    shown = [m for m in report.methods if m.name not in {TRUTH, INPUT}]
+    methods = [m for m in report.methods if m.name not in {TRUTH, INPUT}]
     primary = report.method(control.method)
     planted = report.method(control.method + PLANTED)
     patches = (
@@ -46,15 +46,15 @@ def hallucination_html(report: Report) -> str:
         f"{LEVEL_PX} px; excess: detail less that of the filter alone; above 0 the capture "
         "denies what a method added.",
         _table(report),
-        Picture("Patches by measure.", to_png(draw_histograms(shown))),
+        Picture("Patches by measure.", to_png(draw_histograms(methods))),
     )
-    below = f"detail of patches: {control.method}, below with what was planted."
-    found = (
+    caption = f"detail of patches: {control.method}, below with what was planted."
+    detection = (
         f"Bars planted into {control.planted} patches of {control.method}: "
-        f"{control.found} have a larger excess than 99 of 100 patches without, {control.first} "
+        f"{control.detected} have a larger excess than 99 of 100 patches without, {control.first} "
         f"of the {control.planted} largest are theirs. detail rose by {control.rise:.2f} at "
         "least.",
-        Picture(below, to_png(draw_maps(primary, planted))),
+        Picture(caption, to_png(draw_maps(primary, planted))),
     )
     each, order = (
         "By excess. Each: truth, capture, restored.",
@@ -64,10 +64,10 @@ def hallucination_html(report: Report) -> str:
         Section(
             f"The worst patches of {method.name}", (each, Picture(order, crops_png(method.worst)))
         )
-        for method in shown
+        for method in methods
         if method.worst
     ]
-    sections = [Section("Patches", patches), Section("Control", found), *worst]
+    sections = [Section("Patches", patches), Section("Control", detection), *worst]
     return to_html(Page(title="What the capture does not hold", sections=sections))
 
 
@@ -113,9 +113,9 @@ def draw_maps(plain: Method, planted: Method) -> Figure:
     names = list(maps[0])[:_MOST_MAPS]
     figure = new_figure(1.9 * len(names) + 0.6, 3.6)
     panels = figure.subplots(2, len(names), squeeze=False)
-    for row, found in zip(panels, maps, strict=True):
+    for row, by_scene in zip(panels, maps, strict=True):
         for panel, name in zip(row, names, strict=True):
-            light = np.log10(np.maximum(found[name], 1e-2))
+            light = np.log10(np.maximum(by_scene[name], 1e-2))
             image = panel.imshow(light, cmap="magma", vmin=-0.3, vmax=1.5)
             panel.set_title(name[:24], fontsize=6)
             hide_ticks(panel)
@@ -155,7 +155,7 @@ def _table(report: Report) -> Table:
     for method in report.methods:
         cells = [method.name]
         for name in MEASURES:
-            found = summary(method.values(name))
-            cells += ["-" if found[k] is None else f"{found[k]:.4g}" for k in ("median", "p99")]
+            figures = summary(method.values(name))
+            cells += ["-" if figures[k] is None else f"{figures[k]:.4g}" for k in ("median", "p99")]
         rows.append(tuple(cells))
     return Table(header=header, rows=rows)

@@ -62,22 +62,22 @@ def measure_patches(
         perceptual: Gives (h, w) of two pictures of sRGB values.
     """
     got = encode_srgb(picture)
-    apart = np.abs(got - truth).astype(np.float64)
+    difference = np.abs(got - truth).astype(np.float64)
     maps = {
-        "l1": apart.mean(axis=0),
-        "l2": np.square(apart).mean(axis=0),
+        "l1": difference.mean(axis=0),
+        "l2": np.square(difference).mean(axis=0),
         "perceptual": perceptual(got, truth),
         **denied,
     }
-    over = overshoot_of(got, truth)
-    found = []
+    overshoot = overshoot_of(got, truth)
+    patches = []
     for y, x in corners_of(truth.shape[1], truth.shape[2], side_px):
         cut = np.s_[y : y + side_px, x : x + side_px]
         values = {name: _mean(plane[cut]) for name, plane in maps.items()}
         values["l2"] = float(np.sqrt(values["l2"]))
-        values["overshoot"] = float(over[cut].max())
-        found.append(Patch(scene=scene, place=(y, x), values=values))
-    return found
+        values["overshoot"] = float(overshoot[cut].max())
+        patches.append(Patch(scene=scene, place=(y, x), values=values))
+    return patches
 
 
 def overshoot_of(picture: FloatArray, truth: FloatArray) -> Array:
@@ -90,17 +90,17 @@ def overshoot_of(picture: FloatArray, truth: FloatArray) -> Array:
 
 def summary(values: Array) -> dict[str, float | None]:
     """Return median, 95th and 99th percentile and maximum of what is known."""
-    known = values[np.isfinite(values)]
-    if known.size == 0:
+    finite = values[np.isfinite(values)]
+    if finite.size == 0:
         return dict.fromkeys(("median", "p95", "p99", "max"))
-    told = [*np.percentile(known, (50, 95, 99)), known.max()]
+    figures = [*np.percentile(finite, (50, 95, 99)), finite.max()]
     return {
         name: round(float(v), 6)
-        for name, v in zip(("median", "p95", "p99", "max"), told, strict=True)
+        for name, v in zip(("median", "p95", "p99", "max"), figures, strict=True)
     }
 
 
 def _mean(part: Array) -> float:
-    known = part[np.isfinite(part)]
+    finite = part[np.isfinite(part)]
     # a patch most of which is clipped says nothing
-    return float(known.mean()) if known.size * 2 >= part.size else float("nan")
+    return float(finite.mean()) if finite.size * 2 >= part.size else float("nan")

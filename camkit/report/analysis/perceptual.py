@@ -33,8 +33,8 @@ def looks_different(first: FloatArray, second: FloatArray) -> Array:
     for scale in range(SCALES):
         size = max(width >> scale, 3), max(height >> scale, 3)
         a, b = (_gradient(cv2.resize(p, size, interpolation=cv2.INTER_AREA)) for p in (one, other))
-        apart = 1 - (2 * a * b + CONSTANT) / (a * a + b * b + CONSTANT)
-        total += cv2.resize(apart, (width, height), interpolation=cv2.INTER_LINEAR)
+        difference = 1 - (2 * a * b + CONSTANT) / (a * a + b * b + CONSTANT)
+        total += cv2.resize(difference, (width, height), interpolation=cv2.INTER_LINEAR)
     return total / SCALES
 
 
@@ -56,9 +56,9 @@ def vgg_measure(weights: Path) -> Measure:
                 network(torch.from_numpy(np.ascontiguousarray(p, np.float32))[None])[0].numpy()
                 for p in (first, second)
             )
-        apart = np.square(one - other).mean(axis=0).astype(np.float64)
+        difference = np.square(one - other).mean(axis=0).astype(np.float64)
         size = first.shape[2], first.shape[1]
-        return np.asarray(cv2.resize(apart, size, interpolation=cv2.INTER_LINEAR))
+        return np.asarray(cv2.resize(difference, size, interpolation=cv2.INTER_LINEAR))
 
     return measure
 

@@ -62,6 +62,6 @@ def write_camera(path: Path, name: str, optics: FrozenOptics, sensor: ColorSenso
         Undistort(),
         Color(),
     )
-    kept = [stage for stage in usual if stage is not dehaze or optics.haze is not None]
+    stages = [stage for stage in usual if stage is not dehaze or optics.haze is not None]
     farthest_mm = float(optics.psf.depths_mm[-1])
-    return write_physics(path, rewired(kept, usual), sensor, optics, farthest_mm, name=name)
+    return write_physics(path, rewired(stages, usual), sensor, optics, farthest_mm, name=name)

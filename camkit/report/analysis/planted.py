@@ -48,15 +48,15 @@ def plant(
     """
     rng = np.random.default_rng(seed)
     count = min(COUNT, len(corners))
-    chosen = sorted(rng.choice(len(corners), count, replace=False).tolist())
-    made = picture.copy()
+    indices = sorted(rng.choice(len(corners), count, replace=False).tolist())
+    planted = picture.copy()
     fade = np.hanning(side_px)
     waves = np.sin(2 * np.pi * np.arange(side_px) / period_px)
     bars = (np.outer(fade, fade) * waves).astype(np.float32)
-    for index in chosen:
+    for index in indices:
         y, x = corners[index]
-        part = made[:, y : y + side_px, x : x + side_px]
+        part = planted[:, y : y + side_px, x : x + side_px]
         level = max(float(part.mean()), LEAST_LEVEL)
         part += np.float32(strength * level) * bars
-    np.maximum(made, 0, out=made)
-    return Planted(picture=made, places=tuple(corners[index] for index in chosen))
+    np.maximum(planted, 0, out=planted)
+    return Planted(picture=planted, places=tuple(corners[index] for index in indices))

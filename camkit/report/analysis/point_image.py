@@ -59,8 +59,10 @@ def band_of(sensor: ColorSensor, wavelength_um: float | None = None) -> Band:
         return Band(wavelengths_um=np.array([wavelength_um]), weights=np.ones(1))
     response_um, response = sensor.response_arrays()
     row = response[len(sensor.channels) // 2]
-    seen = response_um[row > LEAST_RESPONSE * row.max()]
-    waves_um = np.linspace(seen[0], seen[-1], WAVELENGTHS if seen.size > 1 else 1)
+    sensitive_um = response_um[row > LEAST_RESPONSE * row.max()]
+    waves_um = np.linspace(
+        sensitive_um[0], sensitive_um[-1], WAVELENGTHS if sensitive_um.size > 1 else 1
+    )
     weights = np.interp(waves_um, response_um, row)
     return Band(wavelengths_um=waves_um, weights=np.asarray(weights / weights.sum()))
 
@@ -112,9 +114,9 @@ class PointImage:
         linear between them.
         """
         fine = _finer(self.patch)
-        above, _ = scipy.ndimage.label(fine >= fine.max() / 2)
-        here = above[np.unravel_index(int(fine.argmax()), fine.shape)]
-        return float(2 * np.sqrt((above == here).sum() / np.pi) / _FINER)
+        regions, _ = scipy.ndimage.label(fine >= fine.max() / 2)
+        here = regions[np.unravel_index(int(fine.argmax()), fine.shape)]
+        return float(2 * np.sqrt((regions == here).sum() / np.pi) / _FINER)
 
     def mtf(self, direction: Direction, cycles_per_px: Array) -> Array:
         """Return the modulation transfer at spatial frequencies, that of the pixel included.
@@ -156,9 +158,9 @@ def find_peak(light: Array) -> Peak:
     if min(light.shape) <= 1:
         row, column = (side // 2 for side in light.shape)
     else:
-        held = scipy.signal.fftconvolve(light, disc(PEAK_PX), mode="same")
-        held[held < held.max() * (1 - 1e-9)] = 0
-        row, column = (round(float(v.mean())) for v in np.nonzero(held))
+        disc_light = scipy.signal.fftconvolve(light, disc(PEAK_PX), mode="same")
+        disc_light[disc_light < disc_light.max() * (1 - 1e-9)] = 0
+        row, column = (round(float(v.mean())) for v in np.nonzero(disc_light))
     padded = np.pad(light, PATCH_PX)
     cut = padded[row : row + 2 * PATCH_PX + 1, column : column + 2 * PATCH_PX + 1]
     return Peak(row=row, column=column, patch=cut.copy())

@@ -75,8 +75,8 @@ def recover(
     """
     manifest = bundle.manifest
     scale, sensor = picture_scale(manifest), light_sensor(manifest)
-    rig = Rig(bundle, usual_sizes(manifest), chosen={"max_mem_bytes": MOST_BYTES})
-    methods = _chosen(rig)
+    rig = Rig(bundle, usual_sizes(manifest), option_fields={"max_mem_bytes": MOST_BYTES})
+    methods = _compared_methods(rig)
     extent = sensor.known_extent
     width, height = frame_px or (extent.width_px, extent.height_px)
     width, height = min(width, extent.width_px), min(height, extent.height_px)
@@ -90,34 +90,34 @@ def recover(
             depth_mm=bundle.reference_depth_mm,
             distort=False,
         )
-        made = photograph(filled(picture, scale * width, scale * height), bundle, options)
-        truth = encode_srgb(true_picture(made.clean, sensor))
+        simulation = photograph(filled(picture, scale * width, scale * height), bundle, options)
+        truth = encode_srgb(true_picture(simulation.clean, sensor))
         if watch is not None:
             watch(TRUTH, truth)
-        zone = zones_of(made.window, scale, heights_mm)
+        zone = zones_of(simulation.window, scale, heights_mm)
         inside = np.s_[
             BORDER_PX : truth.shape[1] - BORDER_PX, BORDER_PX : truth.shape[2] - BORDER_PX
         ]
         near = zone[inside].ravel()
         count += np.bincount(near, minlength=heights_mm.size)
         for row, method in enumerate(methods):
-            seen = encode_srgb(restored(method.pipeline, made))
+            estimate = encode_srgb(restored(method.pipeline, simulation))
             if watch is not None:
-                watch(method.name, seen)
-            seen -= truth
-            error = np.square(seen, out=seen).mean(axis=0)[inside].ravel()
+                watch(method.name, estimate)
+            estimate -= truth
+            error = np.square(estimate, out=estimate).mean(axis=0)[inside].ravel()
             square[row] += np.bincount(near, error, minlength=heights_mm.size)
     whole = square.sum(axis=1) / count.sum()
     with np.errstate(invalid="ignore", divide="ignore"):
         means = square / count
-    found = [
+    zones = [
         None if count[i] == 0 else _three([_decibels(v) for v in means[:, i]])
         for i in range(heights_mm.size)
     ]
     last = methods[-1]
     return Recovered(
         method=last.name if last.networks else FILTER,
-        zones=tuple(found),
+        zones=tuple(zones),
         overall=_three([_decibels(v) for v in whole]),
     )
 
@@ -138,27 +138,27 @@ def zones_of(window: SensorWindow, scale: int, heights_mm: Array) -> NDArray[np.
     y, x = (np.arange(scale * side, dtype=np.float64) for side in (height, width))
     x_mm, y_mm = fine.to_mm(x[None], y[:, None])
     rising = np.flatnonzero(np.diff(heights_mm, prepend=-1.0) > 0)
-    kept = heights_mm[rising]
-    edges = (kept[1:] + kept[:-1]) / 2
+    distinct_mm = heights_mm[rising]
+    edges = (distinct_mm[1:] + distinct_mm[:-1]) / 2
     return rising[np.searchsorted(edges, np.hypot(x_mm, y_mm))]
 
 
-def _chosen(rig: Rig) -> Sequence[Method]:
+def _compared_methods(rig: Rig) -> Sequence[Method]:
     """Return the capture, the last method without networks, and the network where there is one."""
     simple = [method for method in rig.methods if not method.networks]
     capture = next(method for method in simple if method.name == INPUT)
-    named = {method.name: method for method in rig.networks}
-    network = named.get(rig.primary)
+    by_name = {method.name: method for method in rig.networks}
+    network = by_name.get(rig.primary)
     return (capture, simple[-1]) if network is None else (capture, simple[-1], network)
 
 
-def restored(pipeline: Pipeline, made: Simulation) -> FloatArray:
+def restored(pipeline: Pipeline, simulation: Simulation) -> FloatArray:
     """Return what a pipeline makes of a simulated capture, (3, h, w) linear Rec.709."""
     capture = pipeline.capture_of(
-        made.samples,
-        iso=made.iso,
-        white_balance=made.white_balance,  # type: ignore[arg-type]
-        origin_px=tuple(int(v) for v in made.window.origin_px),  # type: ignore[arg-type]
+        simulation.samples,
+        iso=simulation.iso,
+        white_balance=simulation.white_balance,  # type: ignore[arg-type]
+        origin_px=tuple(int(v) for v in simulation.window.origin_px),  # type: ignore[arg-type]
     )
     return pipeline.start(capture).fill()
 

@@ -43,7 +43,7 @@ USUAL_SENSOR: Final = "duet"
 LENS: Final = "lens:"
 LENS_SUFFIXES: Final = (".toml", ".zmx")
 PSF_SUFFIX: Final = ".safetensors"
-BESIDE: Final = re.compile(r"(?<=\.safetensors)\+", re.IGNORECASE)
+HAZE_JOINT: Final = re.compile(r"(?<=\.safetensors)\+", re.IGNORECASE)
 """Between the two files of optics with a haze; a + elsewhere belongs to a name."""
 PINHOLE: Final = re.compile(r"pinhole-(?P<diameter>[0-9.]+)(?:@(?P<distance>[0-9.]+))?")
 PINHOLE_MM: Final = 43.0
@@ -124,7 +124,7 @@ def _of_bundle(name: str) -> Subject:
 
 
 def _of_files(name: str, sensor: ColorSensor) -> Subject:
-    psf, *haze = BESIDE.split(name)
+    psf, *haze = HAZE_JOINT.split(name)
     if len(haze) > 1:
         raise ContractError(f"frozen optics are PSF.safetensors[+HAZE.safetensors]; got {name}")
     read = read_optics_file(Path(psf), channels=len(sensor.channels))
@@ -161,20 +161,22 @@ def _of_lens(name: str, sensor: ColorSensor) -> Subject:
     from camkit.models_def.optics.lens_file.lens_file import built_in_lenses, read_lens
     from camkit.report.analysis.traced_image import traced_images
 
-    asked = name.removeprefix(LENS)
-    if asked not in built_in_lenses() and Path(asked).suffix.lower() not in LENS_SUFFIXES:
+    lens_name = name.removeprefix(LENS)
+    if lens_name not in built_in_lenses() and Path(lens_name).suffix.lower() not in LENS_SUFFIXES:
         raise ContractError(
             f"nothing is called {name!r}: give a bundle ({', '.join(built_in_bundles())} or a "
             f"file), a lens ({', '.join(built_in_lenses())} or a file), frozen optics "
             "(PSF.safetensors+HAZE.safetensors) or pinhole-0.8"
         )
-    lens = read_lens(Path(asked))
+    lens = read_lens(Path(lens_name))
 
     def camera(folder: Path) -> Bundle:
         from camkit.report.analysis.frozen_lens import freeze_lens
 
         frozen = freeze_lens(lens, sensor)
-        return write_camera(folder / "lens.camkit", _manifest_name(asked), frozen, _mosaic(sensor))
+        return write_camera(
+            folder / "lens.camkit", _manifest_name(lens_name), frozen, _mosaic(sensor)
+        )
 
     return Subject(
         name=name,
@@ -185,24 +187,24 @@ def _of_lens(name: str, sensor: ColorSensor) -> Subject:
     )
 
 
-def _of_hole(name: str, said: re.Match[str], sensor: ColorSensor) -> Subject:
+def _of_hole(name: str, match: re.Match[str], sensor: ColorSensor) -> Subject:
     from camkit.models_def.optics.diffraction.pinhole import Pinhole
     from camkit.report.analysis.frozen_lens import freeze_hole
 
     try:
-        diameter_mm = float(said["diameter"])
-        distance_mm = PINHOLE_MM if said["distance"] is None else float(said["distance"])
+        diameter_mm = float(match["diameter"])
+        distance_mm = PINHOLE_MM if match["distance"] is None else float(match["distance"])
     except ValueError:
         raise ContractError(
             f"a pinhole is pinhole-DIAMETER or pinhole-DIAMETER@DISTANCE in mm; got {name}"
         ) from None
     hole = Pinhole(diameter_mm=diameter_mm, distance_mm=distance_mm)
-    made: list[FrozenOptics] = []
+    cache: list[FrozenOptics] = []
 
     def optics() -> FrozenOptics:
-        if not made:
-            made.append(freeze_hole(hole, sensor))
-        return made[0]
+        if not cache:
+            cache.append(freeze_hole(hole, sensor))
+        return cache[0]
 
     def images(band: Band, fields: int) -> list[PointImage]:
         return frozen_images(

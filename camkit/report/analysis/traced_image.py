@@ -58,13 +58,13 @@ def traced_images(
     """
     pitch_um = sensor.known_extent.pixel_pitch_um
     angles = np.linspace(0.0, last_angle_rad(lens, sensor), fields)
-    landed = [land_band(lens, float(angle), band, pitch_um, rays) for angle in angles]
-    heights = np.array([peak_height_px(light) for light in landed])
+    lights = [land_band(lens, float(angle), band, pitch_um, rays) for angle in angles]
+    heights = np.array([peak_height_px(light) for light in lights])
     heights[0] = 0.0
     lit = _illumination(lens, heights, pitch_um)
     return [
         image_of(light, float(height), float(angle), to_mm(pitch_um), float(even))
-        for light, height, angle, even in zip(landed, heights, angles, lit, strict=True)
+        for light, height, angle, even in zip(lights, heights, angles, lit, strict=True)
     ]
 
 
@@ -82,15 +82,15 @@ def land_band(lens: Lens, angle_rad: float, band: Band, pitch_um: float, rays: i
     """Trace a field in a colour."""
     waves_um, weights = band.wavelengths_um, band.weights
     parts = [land_light(lens, angle_rad, float(wave), pitch_um, rays) for wave in waves_um]
-    lost: dict[str, float] = {}
+    lost_shares: dict[str, float] = {}
     for part, weight in zip(parts, weights, strict=True):
         for fate, share in part.lost.items():
-            lost[fate] = lost.get(fate, 0.0) + float(weight) * share
+            lost_shares[fate] = lost_shares.get(fate, 0.0) + float(weight) * share
     return LandedLight(
         x_px=np.concatenate([part.x_px for part in parts]),
         y_px=np.concatenate([part.y_px for part in parts]),
         share=np.concatenate([w * p.share for p, w in zip(parts, weights, strict=True)]),
-        lost=lost,
+        lost=lost_shares,
     )
 
 
@@ -101,12 +101,12 @@ def image_of(
     total = float(light.share.sum())
     x, y, share = light.x_px, light.y_px - height_px, light.share / total
     columns, rows = np.rint(x), np.rint(y)
-    across = _line(np.concatenate([columns, -columns]), np.concatenate([share, share]) / 2)
+    tangential = _line(np.concatenate([columns, -columns]), np.concatenate([share, share]) / 2)
     return PointImage(
         height_mm=height_px * pitch_mm,
         field_angle_rad=angle_rad,
         patch=_patch(rows, columns, share),
-        lines={"radial": _line(rows, share), "tangential": across},
+        lines={"radial": _line(rows, share), "tangential": tangential},
         near_share=within(light, height_px, NEAR_PX) / total,
         far_share=within(light, height_px, FAR_PX) / total,
         lost_share=max(1 - total, 0.0),
@@ -116,16 +116,16 @@ def image_of(
 
 def _line(place: Array, share: Array) -> Array:
     reach = int(np.abs(place).max())
-    made = np.bincount((place + reach).astype(np.intp), share, minlength=2 * reach + 1)
-    return np.asarray(made, np.float64)
+    counts = np.bincount((place + reach).astype(np.intp), share, minlength=2 * reach + 1)
+    return np.asarray(counts, np.float64)
 
 
 def _patch(rows: Array, columns: Array, share: Array) -> Array:
     side = 2 * PATCH_PX + 1
     inside = (np.abs(rows) <= PATCH_PX) & (np.abs(columns) <= PATCH_PX)
     place = ((rows + PATCH_PX) * side + columns + PATCH_PX)[inside].astype(np.intp)
-    made = np.bincount(place, share[inside], minlength=side * side).reshape(side, side)
-    patch = np.asarray((made + made[:, ::-1]) / 2, np.float64)
+    counts = np.bincount(place, share[inside], minlength=side * side).reshape(side, side)
+    patch = np.asarray((counts + counts[:, ::-1]) / 2, np.float64)
     # where rays lie thinly their chance is no peak: every place is the mean of so many
     near = int((np.hypot(rows, columns) < MIDDLE_PX).sum()) / (np.pi * MIDDLE_PX**2)
     sigma_px = np.sqrt(SMOOTH_RAYS / (8 * np.pi * max(near, 1e-3)))
@@ -141,11 +141,11 @@ def _illumination(lens: Lens, heights_px: Array, pitch_um: float) -> Array:
     """
     # where peaks jump, a height that lies further in than one before it is known by its neighbours
     rising = np.flatnonzero(np.diff(np.maximum.accumulate(heights_px), prepend=-1.0) > 0)
-    known = heights_px[rising]
+    rising_px = heights_px[rising]
     try:
-        lit = flat_light(lens, known, pitch_um, rays=SEARCH_RAYS)
+        lit = flat_light(lens, rising_px, pitch_um, rays=SEARCH_RAYS)
     except ContractError:
-        at_mm = torch.from_numpy(known * to_mm(pitch_um))
+        at_mm = torch.from_numpy(rising_px * to_mm(pitch_um))
         lit = relative_illumination_at(lens, at_mm).numpy()
         lit = lit / lit[0]
-    return np.interp(heights_px, known, lit)
+    return np.interp(heights_px, rising_px, lit)

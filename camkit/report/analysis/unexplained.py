@@ -50,12 +50,12 @@ def unexplained(picture: FloatArray, shot: Shot, lens: Lens) -> Unexplained:
         lens: What the light went through.
     """
     capture = shot.capture
-    seen = np.nan_to_num(np.maximum(picture, 0), nan=0.0, posinf=0.0).astype(np.float32)
+    light_map = np.nan_to_num(np.maximum(picture, 0), nan=0.0, posinf=0.0).astype(np.float32)
     options = LightOptions(exposure=shot.exposure, scale=shot.scene.scale, distort=False)
-    light = light_of(seen, shot.sensor, lens, shot.light.window, options)
+    light = light_of(light_map, shot.sensor, lens, shot.light.window, options)
     predicted = signal_of(light, shot.sensor).astype(np.float64)
     captured = capture.linear_rows(0, capture.height).astype(np.float64)
-    left, variance = captured - predicted, variance_of(predicted, shot.noise, shot.step)
+    residual, variance = captured - predicted, variance_of(predicted, shot.noise, shot.step)
     unknown = near(capture.saturated_rows(0, capture.height), CLIPPED_REACH_PX)
 
     def squared(rest: Array) -> Array:
@@ -64,17 +64,17 @@ def unexplained(picture: FloatArray, shot: Shot, lens: Lens) -> Unexplained:
         # planes are as many samples of a pixel
         return np.asarray(chi2 if chi2.ndim == 2 else chi2.mean(axis=0))
 
-    return Unexplained(chi2=squared(left), detail=squared(_detail(left)))
+    return Unexplained(chi2=squared(residual), detail=squared(_detail(residual)))
 
 
-def _detail(left: Array) -> Array:
+def _detail(residual: Array) -> Array:
     """Subtract the level from a mosaic (h, w), each place of its pattern alone, or from planes."""
-    found = left.copy()
-    if left.ndim == 2:
-        parts = [found[y::2, x::2] for y in (0, 1) for x in (0, 1)]
+    detail = residual.copy()
+    if residual.ndim == 2:
+        parts = [detail[y::2, x::2] for y in (0, 1) for x in (0, 1)]
         side = LEVEL_PX // 2
     else:
-        parts, side = list(found), LEVEL_PX
+        parts, side = list(detail), LEVEL_PX
     for part in parts:
         np.subtract(part, cv2.blur(np.ascontiguousarray(part), (side, side)), out=part)
-    return found
+    return detail

@@ -21,7 +21,7 @@ from camkit.runtime.plan.decision import DEVELOP
 Key = tuple[object, ...]
 INPUT: Key = ("input",)
 """Key of the capture that was only developed."""
-BROUGHT: Key = ("brought",)
+SUPPLIED: Key = ("brought",)
 """Key of the picture that a capture brings as its input, such as that of an ordinary lens."""
 BROUGHT_NAME: Final = "input"
 """Its name among the extras of a capture."""
@@ -29,7 +29,7 @@ OnResult = Callable[[Key, KnownCapture, FloatArray], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Taken:
+class CaptureScores:
     """One capture by one method.
 
     Attributes:
@@ -53,13 +53,13 @@ class Scores:
 
     Attributes:
         by_picture: Picture -> column -> values, one per capture.
-        taken: The same capture by capture, with what distinguishes them.
+        captures: The same capture by capture, with what distinguishes them.
         psf: Lenses of the captures.
         error: Why there is none.
     """
 
     by_picture: dict[str, dict[str, list[float]]] = field(default_factory=dict)
-    taken: list[Taken] = field(default_factory=list)
+    captures: list[CaptureScores] = field(default_factory=list)
     psf: set[str] = field(default_factory=set)
     error: str | None = None
 
@@ -74,43 +74,43 @@ class Restorers:
     def __init__(self, bundle: Bundle, threads: int) -> None:
         self._bundle = bundle
         self._threads = threads
-        self._made: dict[tuple[Key, bool], Pipeline] = {}
+        self._pipelines: dict[tuple[Key, bool], Pipeline] = {}
 
     def restore(
-        self, trial: Trial | None, known: KnownCapture, products: Iterable[str] = (IMAGE,)
+        self, trial: Trial | None, known_capture: KnownCapture, products: Iterable[str] = (IMAGE,)
     ) -> dict[str, FloatArray]:
         """Return products (c, h, w) in the geometry of the truth; pictures in linear Rec.709.
 
         Args:
             trial: The method; None, or one without a bundle, restores nothing.
-            known: The capture.
+            known_capture: The capture.
             products: Those wanted.
 
         Raises:
             CamkitError: If the method cannot do it.
         """
-        place = INPUT if trial is None else score_key(trial), known.undistort
-        if place not in self._made:
-            self._made[place] = self._make(trial, undistort=known.undistort)
-        pipeline = self._made[place]
+        place = INPUT if trial is None else score_key(trial), known_capture.undistort
+        if place not in self._pipelines:
+            self._pipelines[place] = self._make(trial, undistort=known_capture.undistort)
+        pipeline = self._pipelines[place]
         capture = pipeline.capture_of(
-            known.capture,
-            iso=known.iso,
-            white_balance=known.white_balance,
-            origin_px=known.origin_px,
+            known_capture.capture,
+            iso=known_capture.iso,
+            white_balance=known_capture.white_balance,
+            origin_px=known_capture.origin_px,
         )
         work = pipeline.start(capture)
         return {product: work.fill(product=product) for product in products}
 
     def _make(self, trial: Trial | None, *, undistort: bool) -> Pipeline:
-        chosen: dict[str, Any] = {"method": DEVELOP}
+        options: dict[str, Any] = {"method": DEVELOP}
         bundle = self._bundle
         if trial is not None and score_key(trial) != INPUT:
             assert trial.path is not None
             bundle = open_bundle(trial.path)
-            chosen = trial.options() | {"tile_px": None}
+            options = trial.options() | {"tile_px": None}
         geometry = {} if undistort else in_sensor_geometry(bundle.manifest)
-        return Pipeline(bundle, Options(**chosen | geometry | {"threads": self._threads}))
+        return Pipeline(bundle, Options(**options | geometry | {"threads": self._threads}))
 
 
 def score_key(trial: Trial) -> Key:
@@ -137,56 +137,58 @@ def measure_accuracy(
         constants: What metrics may take that is the same for all captures.
 
     Returns:
-        Scores by `score_key`; under `BROUGHT` those of what captures bring as their input.
+        Scores by `score_key`; under `SUPPLIED` those of what captures bring as their input.
     """
     methods: dict[Key, Trial | None] = {INPUT: None}
     methods |= {score_key(t): t for t in trials if score_key(t) != INPUT}
-    found = {key: Scores() for key in methods}
+    scores = {key: Scores() for key in methods}
     products = dict.fromkeys(metric.product for metric in metrics)
-    for known in captures:
-        beside = {**(constants or {}), **known.extras}
-        if BROUGHT_NAME in beside:
-            brought = {IMAGE: beside[BROUGHT_NAME]}
-            _add(found.setdefault(BROUGHT, Scores()), known, brought, metrics, beside)
+    for known_capture in captures:
+        extras = {**(constants or {}), **known_capture.extras}
+        if BROUGHT_NAME in extras:
+            supplied = {IMAGE: extras[BROUGHT_NAME]}
+            _add(scores.setdefault(SUPPLIED, Scores()), known_capture, supplied, metrics, extras)
         for key, trial in methods.items():
-            if found[key].error is not None:
+            if scores[key].error is not None:
                 continue
             try:
-                restored = restorers.restore(trial, known, products)
-                _add(found[key], known, restored, metrics, beside)
+                restored = restorers.restore(trial, known_capture, products)
+                _add(scores[key], known_capture, restored, metrics, extras)
             except CamkitError as error:
-                found[key] = Scores(error=str(error))
+                scores[key] = Scores(error=str(error))
                 continue
             if on_result is not None and IMAGE in restored:
-                on_result(key, known, restored[IMAGE])
-    return found
+                on_result(key, known_capture, restored[IMAGE])
+    return scores
 
 
 def _add(
     scores: Scores,
-    known: KnownCapture,
+    known_capture: KnownCapture,
     restored: Mapping[str, FloatArray],
     metrics: Sequence[Metric],
-    beside: Mapping[str, Any],
+    extras: Mapping[str, Any],
 ) -> None:
-    scores.psf.add(known.psf)
-    values = scores.by_picture.setdefault(known.picture, {})
+    scores.psf.add(known_capture.psf)
+    values = scores.by_picture.setdefault(known_capture.picture, {})
     of_capture: dict[str, float] = {}
     for metric in metrics:
-        there = metric.product in known.truths and metric.product in restored
-        if not there or not all(name in beside for name in metric.needs):
+        there = metric.product in known_capture.truths and metric.product in restored
+        if not there or not all(name in extras for name in metric.needs):
             continue
-        named = {n: beside[n] for n in (*metric.needs, *metric.takes) if n in beside}
-        found = metric.measure(restored[metric.product], known.truths[metric.product], **named)
-        of_capture |= found
-        for name, value in found.items():
+        arguments = {n: extras[n] for n in (*metric.needs, *metric.takes) if n in extras}
+        by_column = metric.measure(
+            restored[metric.product], known_capture.truths[metric.product], **arguments
+        )
+        of_capture |= by_column
+        for name, value in by_column.items():
             values.setdefault(name, []).append(value)
-    scores.taken.append(
-        Taken(
-            picture=known.picture,
-            iso=known.iso,
-            field_share=known.field_share,
-            field_mm=known.field_mm,
+    scores.captures.append(
+        CaptureScores(
+            picture=known_capture.picture,
+            iso=known_capture.iso,
+            field_share=known_capture.field_share,
+            field_mm=known_capture.field_mm,
             values=of_capture,
         )
     )
@@ -194,9 +196,9 @@ def _add(
 
 def mean_and_spread(values: Iterable[float]) -> tuple[float | None, float | None]:
     """Return mean and standard deviation (n - 1); None for what the count does not allow."""
-    known = list(values)
-    mean = statistics.fmean(known) if known else None
-    return mean, statistics.stdev(known) if len(known) > 1 else None
+    sample = list(values)
+    mean = statistics.fmean(sample) if sample else None
+    return mean, statistics.stdev(sample) if len(sample) > 1 else None
 
 
 def mean_gain(scores: Scores, other: Scores, column: str) -> float | None:

@@ -13,8 +13,8 @@ from typing import Final
 from camkit.bundle.facts import NetworkFacts
 from camkit.report.bench.part import RowMaker
 from camkit.report.bench.trial import (
+    AXIS_VALUES,
     BASE_SIZE,
-    KNOWN,
     Axes,
     Entrant,
     Ground,
@@ -29,7 +29,7 @@ from camkit.runtime.plan.decision import DEVELOP, Work
 from camkit.runtime.plan.ways import offered_methods, planned
 from camkit.runtime.stage_finder import all_methods, stage_module
 
-Made = tuple[list[Trial], list[Skip]]
+TrialsAndSkips = tuple[list[Trial], list[Skip]]
 DNG: Final = ".dng"
 PHYSICS: Final = "physics"
 """`camkit process --method physics`: a solve without the network behind it."""
@@ -39,29 +39,29 @@ WHOLE_SHARE: Final = 0.7
 """Of the free memory that one window over the whole picture may take."""
 
 
-def _without_networks(entrant: Entrant, axes: Axes, ground: Ground) -> Made:
+def _without_networks(entrant: Entrant, axes: Axes, ground: Ground) -> TrialsAndSkips:
     """Return every method once, on the first number of threads asked for."""
     if entrant.is_reference:
         return [], []
     stages = entrant.bundle.manifest.stages
-    offered = [
+    methods = [
         method
-        for method in _offered(entrant)
+        for method in _methods_of(entrant)
         if method not in (DEVELOP, PHYSICS) and not planned(stages, Work(method=method)).networks
     ]
-    wanted = [method for method in offered if axes.methods is None or method in axes.methods]
-    lacking = [m for m in axes.methods or () if m in CLASSICAL.methods and m not in offered]
+    requested = [method for method in methods if axes.methods is None or method in axes.methods]
+    lacking = [m for m in axes.methods or () if m in CLASSICAL.methods and m not in methods]
     return (
-        [plain_trial(entrant, axes, ground, CLASSICAL.name, method) for method in wanted],
+        [plain_trial(entrant, axes, ground, CLASSICAL.name, method) for method in requested],
         [Skip(f"{entrant.label} {method}", NO_STAGE) for method in lacking],
     )
 
 
-def _physics(entrant: Entrant, axes: Axes, ground: Ground) -> Made:
+def _physics(entrant: Entrant, axes: Axes, ground: Ground) -> TrialsAndSkips:
     return _one_method(entrant, axes, ground, PHYSICS, NO_STAGE)
 
 
-def _develop(entrant: Entrant, axes: Axes, ground: Ground) -> Made:
+def _develop(entrant: Entrant, axes: Axes, ground: Ground) -> TrialsAndSkips:
     """Return one trial; captures that are DNG need no bundle to be developed."""
     if not entrant.is_reference and DNG in part_of(entrant.bundle.manifest).suffixes:
         return [replace(plain_trial(entrant, axes, ground, DEVELOP, DEVELOP), path=None)], []
@@ -69,32 +69,36 @@ def _develop(entrant: Entrant, axes: Axes, ground: Ground) -> Made:
     return _one_method(entrant, axes, ground, DEVELOP, reason)
 
 
-def _one_method(entrant: Entrant, axes: Axes, ground: Ground, method: str, lacking: str) -> Made:
+def _one_method(
+    entrant: Entrant, axes: Axes, ground: Ground, method: str, lacking: str
+) -> TrialsAndSkips:
     """Return the trial of a method, or why there is none where it was asked for."""
     if entrant.is_reference:
         return [], []
-    if method not in _offered(entrant):
-        asked = axes.methods is not None
-        return [], [Skip(f"{entrant.label} {method}", lacking)] if asked else []
+    if method not in _methods_of(entrant):
+        is_requested = axes.methods is not None
+        return [], [Skip(f"{entrant.label} {method}", lacking)] if is_requested else []
     return [plain_trial(entrant, axes, ground, method, method)], []
 
 
-def _offered(entrant: Entrant) -> tuple[str, ...]:
+def _methods_of(entrant: Entrant) -> tuple[str, ...]:
     manifest = entrant.bundle.manifest
     return offered_methods(manifest.stages, manifest.all_planes)
 
 
-def _networks(entrant: Entrant, axes: Axes, ground: Ground) -> Made:
+def _networks(entrant: Entrant, axes: Axes, ground: Ground) -> TrialsAndSkips:
     """Return all trials of a bundle; a reference gets its sizes in their base trial only."""
-    held = list(entrant.bundle.manifest.sizes)
-    sizes = [size for size in axes.sizes or held if size in held]
+    bundle_sizes = list(entrant.bundle.manifest.sizes)
+    sizes = [size for size in axes.sizes or bundle_sizes if size in bundle_sizes]
     skips = [
-        Skip(f"{entrant.label} {size}", f"the bundle holds {', '.join(held) or 'no network'}")
+        Skip(
+            f"{entrant.label} {size}", f"the bundle holds {', '.join(bundle_sizes) or 'no network'}"
+        )
         for size in axes.sizes or ()
-        if size not in held and not entrant.is_reference
+        if size not in bundle_sizes and not entrant.is_reference
     ]
     if entrant.is_reference:
-        sizes, axes = held, Axes(vary=False)
+        sizes, axes = bundle_sizes, Axes(vary=False)
     base_size = BASE_SIZE if BASE_SIZE in sizes else (*sizes, "")[0]
     trials = []
     for size in sizes:
@@ -114,7 +118,7 @@ def _trials_of(
     half = ("fp16",) if _has_fp16(_facts(entrant, size)) else ()
     one = (1,) if ground.threads > 1 else ()
     varied = [
-        Vary("mode", axes.modes or KNOWN["modes"], axes.modes is not None),
+        Vary("mode", axes.modes or AXIS_VALUES["modes"], axes.modes is not None),
         Vary("dtype", axes.dtypes or ("fp32", *half), axes.dtypes is not None),
         Vary("provider", axes.providers or ground.providers, axes.providers is not None),
         Vary("threads", axes.threads or (ground.threads, *one), axes.threads is not None),

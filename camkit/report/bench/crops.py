@@ -50,33 +50,33 @@ class CropCollector:
         self.patches: list[Patch] = []
         self._keys = {INPUT, *keys}
         self._every = every
-        self._seen = -1
-        self._known: KnownCapture | None = None
+        self._number = -1
+        self._capture: KnownCapture | None = None
         self._place: tuple[slice, slice] | None = None
         self._gain = np.float32(1)
 
-    def take(self, key: Key, known: KnownCapture, restored: FloatArray) -> None:
+    def take(self, key: Key, known_capture: KnownCapture, restored: FloatArray) -> None:
         """Keep the patch of a result; the first result of a capture begins a patch."""
-        if known is not self._known:
-            self._known = known
-            self._seen += 1
-            wanted = self._seen % self._every == 0 and len(self.patches) < MOST_CAPTURES
-            self._place = busiest_place(known.truths[IMAGE]) if wanted else None
+        if known_capture is not self._capture:
+            self._capture = known_capture
+            self._number += 1
+            is_sampled = self._number % self._every == 0 and len(self.patches) < MOST_CAPTURES
+            self._place = busiest_place(known_capture.truths[IMAGE]) if is_sampled else None
             if self._place is not None:
-                self._begin(known, known.truths[IMAGE][:, *self._place])
+                self._begin(known_capture, known_capture.truths[IMAGE][:, *self._place])
         if self._place is None or key not in self._keys:
             return
         linear = np.ascontiguousarray(restored[:, *self._place])
-        error = encode_srgb(linear) - known.truths[IMAGE][:, *self._place]
+        error = encode_srgb(linear) - known_capture.truths[IMAGE][:, *self._place]
         mean_square = float(np.mean(np.square(error), dtype=np.float64))
         self.patches[-1].pictures[key] = encode_png(levels_of(encode_srgb(linear * self._gain)))
         self.patches[-1].psnr_db[key] = -10 * float(np.log10(max(mean_square, 1e-12)))
 
-    def _begin(self, known: KnownCapture, sharp: FloatArray) -> None:
+    def _begin(self, known_capture: KnownCapture, sharp: FloatArray) -> None:
         linear = decode_srgb(np.ascontiguousarray(sharp))
         self._gain = display_gain(linear)
-        shown = f", shown {self._gain:.0f} times brighter" if self._gain > 1 else ""
-        patch = Patch(caption=known.caption + shown)
+        note = f", shown {self._gain:.0f} times brighter" if self._gain > 1 else ""
+        patch = Patch(caption=known_capture.caption + note)
         patch.pictures[SHARP] = encode_png(levels_of(encode_srgb(linear * self._gain)))
         self.patches.append(patch)
 

@@ -35,7 +35,7 @@ CYCLES_PER_PX: Final = (0.25, 0.5)
 COLUMNS: Final = ("mtf_025", "mtf_050")
 CAPTURE: Final = "capture_"
 SCENE: Final = "scene_"
-_OF: Final = ("", CAPTURE, SCENE)
+PREFIXES: Final = ("", CAPTURE, SCENE)
 LEVELS: Final = (0.2, 0.8)
 """4 : 1, as ISO 12233 has it; as bright as leaves room for overshoot."""
 SIDE_PX: Final = 256
@@ -61,8 +61,12 @@ class Edges:
 
     def columns(self, key: Key) -> dict[str, float | None]:
         """Return all columns of a row; None for what was not measured."""
-        known = {**self.shared, **self.by_method.get(key, {})}
-        return {f"{of}{name}": known.get(f"{of}{name}") for of in _OF for name in COLUMNS}
+        values = {**self.shared, **self.by_method.get(key, {})}
+        return {
+            f"{prefix}{name}": values.get(f"{prefix}{name}")
+            for prefix in PREFIXES
+            for name in COLUMNS
+        }
 
 
 def measure_edges(bundle: Bundle, trials: Iterable[Trial], restorers: Restorers) -> Edges:
@@ -78,31 +82,31 @@ def measure_edges(bundle: Bundle, trials: Iterable[Trial], restorers: Restorers)
         return Edges()
     try:
         scale = picture_scale(manifest)
-        scene = _drawn(manifest, scale)
-        known = _photographed(bundle, scene)
-        shared = _named(SCENE, scene[1], 1)
+        scene = _draw_edge(manifest, scale)
+        known_capture = _photographed(bundle, scene)
+        shared = _edge_columns(SCENE, scene[1], 1)
     except CamkitError as error:
         return Edges(skips=(Skip(f"MTF of {manifest.name}", str(error)),))
     skips = []
     try:
-        shared |= _of_capture(known, manifest, scale)
+        shared |= _of_capture(known_capture, manifest, scale)
     except CamkitError as error:
         skips.append(Skip(f"MTF of the capture of {manifest.name}", str(error)))
-    found: dict[Key, dict[str, float]] = {}
+    by_method: dict[Key, dict[str, float]] = {}
     for trial in trials:
         key = score_key(trial)
-        if key in found:
+        if key in by_method:
             continue
-        found[key] = {}
+        by_method[key] = {}
         try:
-            picture = restorers.restore(trial, known)[IMAGE]
-            found[key] = _named("", picture[len(picture) // 2], 1)
+            picture = restorers.restore(trial, known_capture)[IMAGE]
+            by_method[key] = _edge_columns("", picture[len(picture) // 2], 1)
         except CamkitError as error:
             skips.append(Skip(f"MTF of {trial.bundle} {trial.label}", str(error)))
-    return Edges(shared=shared, by_method=found, skips=tuple(skips))
+    return Edges(shared=shared, by_method=by_method, skips=tuple(skips))
 
 
-def _drawn(manifest: Manifest, scale: int) -> NDArray[np.float32]:
+def _draw_edge(manifest: Manifest, scale: int) -> NDArray[np.float32]:
     """Return the edge; it runs along the longer side, where it shows more."""
     extent = manifest.sensor.extent
     most = (SIDE_PX, SIDE_PX) if extent is None else (extent.height_px, extent.width_px)
@@ -123,20 +127,20 @@ def _photographed(bundle: Bundle, scene: NDArray[np.float32]) -> KnownCapture:
     return known_capture(shot, part.photograph(shot, scene, bundle, bundle.frozen_optics))
 
 
-def _of_capture(known: KnownCapture, manifest: Manifest, scale: int) -> dict[str, float]:
+def _of_capture(known_capture: KnownCapture, manifest: Manifest, scale: int) -> dict[str, float]:
     """Measure the samples themselves: the green ones of a mosaic, the middle one of planes."""
-    samples = np.asarray(known.capture, np.float64)
+    samples = np.asarray(known_capture.capture, np.float64)
     plane = samples if samples.ndim == 2 else samples[len(samples) // 2]
     cfa = getattr(manifest.sensor, "cfa", None)
     sites = None
     if cfa is not None:
         y, x = np.mgrid[: plane.shape[0], : plane.shape[1]]
         sites = np.array(cfa_channels(cfa))[y % 2, x % 2] == 1
-    return _named(CAPTURE, plane, scale, sites)
+    return _edge_columns(CAPTURE, plane, scale, sites)
 
 
-def _named(
-    of: str, plane: NDArray[Any], scale: int, sites: NDArray[np.bool_] | None = None
+def _edge_columns(
+    prefix: str, plane: NDArray[Any], scale: int, sites: NDArray[np.bool_] | None = None
 ) -> dict[str, float]:
     """Measure a plane whose pixels are `scale` of the picture's wide."""
     cut = min(CUT_PX // scale, min(plane.shape) // 8) // 2 * 2
@@ -148,4 +152,4 @@ def _named(
         bins_per_px=BINS_PER_PX * min(scale, 2),
         reach_px=REACH_PX // scale,
     ).mtf
-    return {f"{of}{name}": float(value) for name, value in zip(COLUMNS, mtf, strict=True)}
+    return {f"{prefix}{name}": float(value) for name, value in zip(COLUMNS, mtf, strict=True)}

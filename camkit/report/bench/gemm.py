@@ -34,12 +34,12 @@ def gemm_peak_gmac_per_s(threads: int, seconds: float = 1.0) -> float:
     """
     environment = {**child_environment(), **dict.fromkeys(_THREAD_NAMES, str(threads))}
     command = [sys.executable, "-P", "-m", "camkit.report.bench.gemm", str(seconds)]
-    done = subprocess.run(
+    process = subprocess.run(
         command, env=environment, capture_output=True, text=True, timeout=TIMEOUT_S, check=False
     )
-    if done.returncode:
-        raise UnsupportedError(f"the matrix product could not be measured: {done.stderr[-300:]}")
-    return float(done.stdout)
+    if process.returncode:
+        raise UnsupportedError(f"the matrix product could not be measured: {process.stderr[-300:]}")
+    return float(process.stdout)
 
 
 def best_product(side: int, seconds: float) -> float:
@@ -50,9 +50,10 @@ def best_product(side: int, seconds: float) -> float:
     left, right = (rng.random((side, side), dtype=np.float32) for _ in range(2))
     out = np.empty_like(left)
     best, began = np.inf, time.perf_counter()
-    spent = time.process_time()
+    cpu_start_s = time.process_time()
     while not np.isfinite(best) or (
-        time.process_time() - spent < seconds and time.perf_counter() - began < MOST_WAIT * seconds
+        time.process_time() - cpu_start_s < seconds
+        and time.perf_counter() - began < MOST_WAIT * seconds
     ):
         start = time.perf_counter()
         np.matmul(left, right, out=out)

@@ -163,8 +163,8 @@ def picture_captures(
     Raises:
         ContractError: If the folder holds no pictures, or one is too small, or as `bench_scene`.
     """
-    shown = ((path, bench_scene(path, bundle, saturate)) for path in list_set(folder, count))
-    return _photographed(bundle, folder.name, shown, cache_folder)
+    scenes = ((path, bench_scene(path, bundle, saturate)) for path in list_set(folder, count))
+    return _photographed(bundle, folder.name, scenes, cache_folder)
 
 
 def scene_captures(
@@ -173,12 +173,12 @@ def scene_captures(
     """Photograph the first scenes of the source that the kind of a camera names, likewise."""
     source = find_part(bundle.manifest.kind, "bench", BenchPart).source
     names = [f"{source}:{seed}" for seed in range(count or SCENES)]
-    shown = ((Path(name), drawn_scene(name, bundle, saturate)) for name in names)
-    return _photographed(bundle, str(source), shown, cache_folder)
+    scenes = ((Path(name), drawn_scene(name, bundle, saturate)) for name in names)
+    return _photographed(bundle, str(source), scenes, cache_folder)
 
 
 def _photographed(
-    bundle: Bundle, set_name: str, shown: Iterable[tuple[Path, FloatArray]], cache_folder: Path
+    bundle: Bundle, set_name: str, scenes: Iterable[tuple[Path, FloatArray]], cache_folder: Path
 ) -> Iterator[KnownCapture]:
     """Photograph named scenes at every place and sensitivity of a kind of camera."""
     psf = psf_source(bundle)
@@ -188,7 +188,7 @@ def _photographed(
     def lens(seed: int) -> FrozenOptics:
         return fabricated_optics(bundle, seed, cache_folder=cache_folder)
 
-    for number, (path, scene) in enumerate(shown):
+    for number, (path, scene) in enumerate(scenes):
         if min(scene.shape[1:]) < LEAST_PX:
             raise ContractError(
                 f"{path} has {scene.shape[2]}x{scene.shape[1]} pixels; a picture to measure on "
@@ -204,8 +204,8 @@ def _photographed(
                     iso=iso,
                     psf=psf,
                 )
-                taken = lens(shot.fabrication_seed) if psf == "fresh" else bundle.frozen_optics
-                yield known_capture(shot, part.photograph(shot, scene, bundle, taken))
+                optics = lens(shot.fabrication_seed) if psf == "fresh" else bundle.frozen_optics
+                yield known_capture(shot, part.photograph(shot, scene, bundle, optics))
 
 
 def bench_scene(path: Path, bundle: Bundle, saturate: float | None = None) -> FloatArray:

@@ -16,9 +16,9 @@ from camkit.runtime.plan.ways import offered_methods
 
 def makers_of(manifest: Manifest) -> tuple[RowMaker, ...]:
     """Return the row makers of a camera, by name; one of its kind goes before a common one."""
-    own = find_part(manifest.kind, "bench", BenchPart).rows
-    known = {maker.name: maker for maker in (*COMMON, *own)}
-    return tuple(known[name] for name in sorted(known))
+    kind_rows = find_part(manifest.kind, "bench", BenchPart).rows
+    by_name = {maker.name: maker for maker in (*COMMON, *kind_rows)}
+    return tuple(by_name[name] for name in sorted(by_name))
 
 
 def metrics_of(manifest: Manifest) -> tuple[Metric, ...]:
@@ -27,15 +27,15 @@ def metrics_of(manifest: Manifest) -> tuple[Metric, ...]:
     Raises:
         UnsupportedError: If it names one that is not there.
     """
-    own = find_part(manifest.kind, "bench", BenchPart).metrics
-    known = {metric.name: metric for metric in (*registered_metrics(), *own)}
-    named = find_kind(manifest.kind).metrics
-    if absent := [name for name in named if name not in known]:
+    kind_metrics = find_part(manifest.kind, "bench", BenchPart).metrics
+    by_name = {metric.name: metric for metric in (*registered_metrics(), *kind_metrics)}
+    names = find_kind(manifest.kind).metrics
+    if absent := [name for name in names if name not in by_name]:
         raise UnsupportedError(
             f"cameras of the kind {manifest.kind!r} are judged by {', '.join(absent)}; reports "
-            f"know {', '.join(known)}"
+            f"know {', '.join(by_name)}"
         )
-    return tuple(known[name] for name in named if known[name].product in manifest.products)
+    return tuple(by_name[name] for name in names if by_name[name].product in manifest.products)
 
 
 def make_trials(
@@ -47,18 +47,20 @@ def make_trials(
         ContractError: If a method has no maker.
     """
     makers = {entrant.label: makers_of(entrant.bundle.manifest) for entrant in entrants}
-    known = dict.fromkeys(method for own in makers.values() for m in own for method in m.methods)
-    if unknown := [m for m in axes.methods or () if m not in known]:
-        raise ContractError(f"methods are {', '.join(known)}; got {', '.join(unknown)}")
+    methods = dict.fromkeys(
+        method for rows in makers.values() for m in rows for method in m.methods
+    )
+    if unknown := [m for m in axes.methods or () if m not in methods]:
+        raise ContractError(f"methods are {', '.join(methods)}; got {', '.join(unknown)}")
     trials: list[Trial] = []
     skips: list[Skip] = []
     for entrant in entrants:
-        own = _axes_of(entrant, axes)
+        entrant_axes = _axes_of(entrant, axes)
         for maker in makers[entrant.label]:
-            if own.methods is None or set(own.methods) & set(maker.methods):
-                made, left = maker.trials(entrant, own, ground)
-                trials += made
-                skips += left
+            if entrant_axes.methods is None or set(entrant_axes.methods) & set(maker.methods):
+                new_trials, new_skips = maker.trials(entrant, entrant_axes, ground)
+                trials += new_trials
+                skips += new_skips
     return trials, skips
 
 
@@ -67,5 +69,5 @@ def _axes_of(entrant: Entrant, axes: Axes) -> Axes:
     if axes.methods is not None or axes.best is None:
         return axes
     manifest = entrant.bundle.manifest
-    offered = offered_methods(manifest.stages, manifest.all_planes)
-    return replace(axes, methods=offered[: axes.best])
+    methods = offered_methods(manifest.stages, manifest.all_planes)
+    return replace(axes, methods=methods[: axes.best])

@@ -29,16 +29,16 @@ def write_bench(result: Result, folder: Path) -> list[Path]:
     text = json.dumps(result.report, indent=1, allow_nan=False)
     paths["json"].write_text(text + "\n", encoding="utf-8")
     write_csv(paths["csv"], result.report["rows"])
-    shown: dict[str, bytes] = {}
-    if not result.own:
+    contents: dict[str, bytes] = {}
+    if not result.self_measured:
         figure = draw_chart(result.report)
         svg = None if figure is None else to_svg(figure)
         if figure is not None and svg is not None:
-            shown = {"svg": svg.encode(), "png": to_png(figure)}
-        shown["html"] = to_html(bench_page(result, svg)).encode()
+            contents = {"svg": svg.encode(), "png": to_png(figure)}
+        contents["html"] = to_html(bench_page(result, svg)).encode()
     for suffix in ("svg", "png", "html"):
-        if suffix in shown:
-            paths[suffix].write_bytes(shown[suffix])
+        if suffix in contents:
+            paths[suffix].write_bytes(contents[suffix])
         else:
             paths.pop(suffix).unlink(missing_ok=True)
     return list(paths.values())

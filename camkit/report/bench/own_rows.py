@@ -41,10 +41,10 @@ def measures_of(bundles: Sequence[Bundle]) -> tuple[Measure, ...]:
     Raises:
         ContractError: If some photograph and others measure themselves.
     """
-    found = {b.path: find_part(b.manifest.kind, "bench", BenchPart).measure for b in bundles}
-    measures = tuple(measure for measure in found.values() if measure is not None)
-    if measures and len(measures) < len(found):
-        names = [b.manifest.name for b in bundles if found[b.path] is not None]
+    by_path = {b.path: find_part(b.manifest.kind, "bench", BenchPart).measure for b in bundles}
+    measures = tuple(measure for measure in by_path.values() if measure is not None)
+    if measures and len(measures) < len(by_path):
+        names = [b.manifest.name for b in bundles if by_path[b.path] is not None]
         raise ContractError(
             f"{', '.join(names)} takes no photographs and measures itself: bench it in a call of "
             "its own"
@@ -75,7 +75,7 @@ def measure_own(
             f"{names} takes no photographs, so {', '.join(unknown)} does not apply to it; it knows "
             f"{OPTIONS}"
         )
-    asked = OwnSettings(
+    own_settings = OwnSettings(
         data=settings.data,
         images=settings.images,
         sizes=settings.axes.sizes,
@@ -86,19 +86,19 @@ def measure_own(
     skipped: list[dict[str, str]] = []
     tuning: list[dict[str, Any]] = []
     for bundle, measure in zip(bundles, measures, strict=True):
-        found, name = measure(bundle, asked, tell), bundle.manifest.name
-        for other in (bundle, *found.beside):
+        own_rows, name = measure(bundle, own_settings, tell), bundle.manifest.name
+        for other in (bundle, *own_rows.other_bundles):
             tuning += whole_tuning(name, other)
-        rows += [{"bundle": name, **row} for row in found.rows]
-        skipped += [skip._asdict() for skip in found.skips]
+        rows += [{"bundle": name, **row} for row in own_rows.rows]
+        skipped += [skip._asdict() for skip in own_rows.skips]
     return {
         "machine": describe_machine(),
         "settings": {
-            "data": None if asked.data is None else asked.data.name,
-            "images": asked.images,
-            "sizes": asked.sizes,
-            "quick": asked.quick,
-            "repeat": asked.repeat,
+            "data": None if own_settings.data is None else own_settings.data.name,
+            "images": own_settings.images,
+            "sizes": own_settings.sizes,
+            "quick": own_settings.quick,
+            "repeat": own_settings.repeat,
         },
         "bundles": {bundle.manifest.name: bundle.sha256 for bundle in bundles},
         "tuning": tuning,
@@ -109,10 +109,10 @@ def measure_own(
 
 def _foreign(settings: Settings) -> list[str]:
     """Return the options that were given and mean nothing here."""
-    given = ["--reference"] if settings.references else []
-    given += [name for name, at in FOREIGN_AXES.items() if getattr(settings.axes, at) is not None]
-    given += [name for name, at in FOREIGN.items() if getattr(settings, at) is not None]
-    return given + [f"--{name.replace('_', '-')}" for name in settings.constants]
+    options = ["--reference"] if settings.references else []
+    options += [name for name, at in FOREIGN_AXES.items() if getattr(settings.axes, at) is not None]
+    options += [name for name, at in FOREIGN.items() if getattr(settings, at) is not None]
+    return options + [f"--{name.replace('_', '-')}" for name in settings.constants]
 
 
 def own_lines(rows: Iterable[OwnRow]) -> list[str]:
@@ -128,9 +128,9 @@ def own_lines(rows: Iterable[OwnRow]) -> list[str]:
 
 def _table(rows: list[OwnRow]) -> list[str]:
     keys = dict.fromkeys(key for row in rows for key in row if key != SORT)
-    shown = [key for key in keys if any(row.get(key) is not None for row in rows)]
-    cells = [shown, *([_cell(row.get(key)) for key in shown] for row in rows)]
-    widths = [max(len(line[i]) for line in cells) for i in range(len(shown))]
+    columns = [key for key in keys if any(row.get(key) is not None for row in rows)]
+    cells = [columns, *([_cell(row.get(key)) for key in columns] for row in rows)]
+    widths = [max(len(line[i]) for line in cells) for i in range(len(columns))]
     return [
         "  ".join(w.ljust(n) for w, n in zip(line, widths, strict=True)).rstrip() for line in cells
     ]

@@ -62,12 +62,12 @@ class OwnRows:
     Attributes:
         rows: Plain JSON values, each row with the columns of its sort.
         skips: What was asked for, or is usual, and could not be measured.
-        beside: Other bundles whose networks took part.
+        other_bundles: Other bundles whose networks took part.
     """
 
     rows: Sequence[Mapping[str, Any]]
     skips: Sequence[Skip] = ()
-    beside: Sequence[Bundle] = ()
+    other_bundles: Sequence[Bundle] = ()
 
 
 Measure = Callable[[Bundle, OwnSettings, Tell], OwnRows]

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from camkit.report.bench.accuracy import (
-    BROUGHT,
     INPUT,
+    SUPPLIED,
     Key,
     Scores,
     mean_and_spread,
@@ -90,7 +90,7 @@ def make_row(trial: Trial, runs: Sequence[Run], facts: Facts) -> Row:
 
 
 def _seconds(runs: Sequence[Run], facts: Facts, megapixels: float) -> Row:
-    fresh = _known(run.seconds for run in runs)
+    fresh = _numbers(run.seconds for run in runs)
     spread = spread_of(fresh)
     steady = spread_of([s for run in runs for s in run.steady_s])
     load = _median(run.load_of_others for run in runs)
@@ -98,7 +98,7 @@ def _seconds(runs: Sequence[Run], facts: Facts, megapixels: float) -> Row:
     return {
         "n": len(fresh),
         **_spread_columns("seconds", spread),
-        "seconds_ratio": paired_ratio(fresh, _known(run.seconds for run in facts.base)),
+        "seconds_ratio": paired_ratio(fresh, _numbers(run.seconds for run in facts.base)),
         "ratio_to": facts.base_label,
         "cpu_seconds_median": _median(run.cpu_s for run in runs),
         "steady_n": 0 if steady is None else steady.n,
@@ -127,8 +127,8 @@ def _network_share(trial: Trial, runs: Sequence[Run], facts: Facts) -> Row:
     stages = _stage_medians(runs).items()
     seconds = sum(s for stage, s in stages if stage.split()[0] == NETWORK)
     share = None
-    known = facts.mac_per_px is not None and facts.gemm_gmac_per_s is not None
-    if known and seconds and trial.provider == "cpu":
+    is_computable = facts.mac_per_px is not None and facts.gemm_gmac_per_s is not None
+    if is_computable and seconds and trial.provider == "cpu":
         width, height = facts.size_px
         assert facts.mac_per_px is not None
         assert facts.gemm_gmac_per_s is not None
@@ -140,7 +140,7 @@ def _network_share(trial: Trial, runs: Sequence[Run], facts: Facts) -> Row:
 
 def _accuracy(trial: Trial, facts: Facts) -> Row:
     scores = facts.scores.get(score_key(trial))
-    of_input = facts.scores.get(BROUGHT, facts.scores.get(INPUT))
+    of_input = facts.scores.get(SUPPLIED, facts.scores.get(INPUT))
     of_base = facts.scores.get(facts.base_key)
     lenses = set() if scores is None else scores.psf
     row: Row = {
@@ -173,14 +173,14 @@ def _each_picture(metrics: Sequence[Metric], scores: Scores | None, of_input: Sc
     columns = [column for m in metrics if m.each_picture for column in m.columns]
     if not columns:
         return {}
-    found: dict[str, Row] = {} if scores is None else {name: {} for name in scores.by_picture}
+    by_picture: dict[str, Row] = {} if scores is None else {name: {} for name in scores.by_picture}
     for column in columns:
-        wanted = ((column.name, scores), (column.of_input, of_input))
-        for name, source in wanted:
+        sources = ((column.name, scores), (column.of_input, of_input))
+        for name, source in sources:
             if name is not None and source is not None:
                 for picture, value in source.picture_means(column.name).items():
-                    found.setdefault(picture, {})[name] = value
-    return {"pictures": found}
+                    by_picture.setdefault(picture, {})[name] = value
+    return {"pictures": by_picture}
 
 
 def _gain(
@@ -198,14 +198,14 @@ def _means(scores: Scores | None, column: str) -> tuple[float | None, float | No
 
 def _stage_medians(runs: Sequence[Run]) -> dict[str, float]:
     names = dict.fromkeys(name for run in runs for name in run.stages)
-    found = {name: _median(run.stages.get(name) for run in runs) for name in names}
-    return {name: value for name, value in found.items() if value is not None}
+    medians = {name: _median(run.stages.get(name) for run in runs) for name in names}
+    return {name: value for name, value in medians.items() if value is not None}
 
 
-def _known(values: Any) -> list[float]:
+def _numbers(values: Any) -> list[float]:
     return [value for value in values if value is not None]
 
 
 def _median(values: Any) -> float | None:
-    known = _known(values)
-    return quantile(known, 0.5) if known else None
+    numbers = _numbers(values)
+    return quantile(numbers, 0.5) if numbers else None

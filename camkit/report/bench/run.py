@@ -59,13 +59,13 @@ class Result:
 
     Attributes:
         report: Plain JSON values: machine, settings, cameras, rows, skipped.
-        own: Whether its kinds measured themselves, so that rows have columns of their own.
+        self_measured: Whether its kinds measured themselves; then rows have their own columns.
         patches: Camera -> the same patches of every method, by `Trial.accuracy_key`.
         names: `Trial.accuracy_key` -> label.
     """
 
     report: dict[str, Any]
-    own: bool = False
+    self_measured: bool = False
     patches: dict[str, list[Patch]] = field(default_factory=dict)
     names: dict[Key, str] = field(default_factory=dict)
 
@@ -85,7 +85,7 @@ def run_bench(settings: Settings, tell: Tell = lambda _text: None) -> Result:
     entrants = open_entrants(settings.bundles, settings.references)
     opened = [entrant.bundle for entrant in entrants]
     if measures := measures_of(opened):
-        return Result(report=measure_own(settings, opened, measures, tell), own=True)
+        return Result(report=measure_own(settings, opened, measures, tell), self_measured=True)
     folder = settings.folder()
     cameras = [entrant for entrant in entrants if not entrant.is_reference]
     _check(settings, [entrant.bundle for entrant in cameras])
@@ -110,14 +110,14 @@ def run_bench(settings: Settings, tell: Tell = lambda _text: None) -> Result:
     random = {label for label, bundle in bundles.items() if not bundle.manifest.is_trained}
     idle = [trial for trial in trials if trial.bundle in random and trial.size is not None]
     skips += [Skip(what=f"accuracy of {t.camera} {t.label}", reason=NOT_TRAINED) for t in idle]
-    shown = [trial for trial in trials if trial not in idle]
-    judged = {camera.label: _judge(camera, shown, settings, folder, tell) for camera in cameras}
+    scored = [trial for trial in trials if trial not in idle]
+    judged = {camera.label: _judge(camera, scored, settings, folder, tell) for camera in cameras}
     skips += [
-        Skip(what=f"accuracy of {label}", reason=found.error)
-        for label, found in judged.items()
-        if found.error is not None
+        Skip(what=f"accuracy of {label}", reason=judgement.error)
+        for label, judgement in judged.items()
+        if judgement.error is not None
     ]
-    skips += [skip for found in judged.values() for skip in found.edges.skips]
+    skips += [skip for judgement in judged.values() for skip in judgement.edges.skips]
 
     rows = [
         make_row(trial, runs[trial], _facts(trial, trials, shots, judged, runs, peaks, bundles))
@@ -143,7 +143,7 @@ def run_bench(settings: Settings, tell: Tell = lambda _text: None) -> Result:
     }
     return Result(
         report=report,
-        patches={label: found.patches for label, found in judged.items()},
+        patches={label: judgement.patches for label, judgement in judged.items()},
         names={trial.accuracy_key: trial.label for trial in reversed(trials)},
     )
 
@@ -161,8 +161,8 @@ def _nothing(entrants: Sequence[Entrant], skips: Sequence[Skip]) -> str:
 
 def _check(settings: Settings, bundles: Sequence[Bundle]) -> None:
     """Refuse settings and pictures that do not fit the cameras, before anything is timed."""
-    known = {name for b in bundles for m in metrics_of(b.manifest) for name in m.takes}
-    if unknown := [name for name in settings.constants if name not in known]:
+    constants = {name for b in bundles for m in metrics_of(b.manifest) for name in m.takes}
+    if unknown := [name for name in settings.constants if name not in constants]:
         raise ContractError(
             f"none of these cameras is judged by a metric that takes {', '.join(unknown)}"
         )
@@ -190,29 +190,29 @@ def open_entrants(bundles: Sequence[str], references: Sequence[str]) -> list[Ent
         BundleError: If one is refused.
         ContractError: If a reference is of no camera, or two have one label.
     """
-    own = [open_bundle(find_bundle(name)) for name in bundles]
-    found = [Entrant(label=b.manifest.name, bundle=b, camera=b.manifest.name) for b in own]
+    opened = [open_bundle(find_bundle(name)) for name in bundles]
+    entrants = [Entrant(label=b.manifest.name, bundle=b, camera=b.manifest.name) for b in opened]
     for name in references:
         bundle = open_bundle(find_bundle(name))
         camera = camera_of(bundle.manifest)
-        host = next((b for b in own if camera_of(b.manifest) == camera), None)
+        host = next((b for b in opened if camera_of(b.manifest) == camera), None)
         if host is None:
             raise ContractError(
                 f"{bundle.path.name} is the camera of none of the bundles; a reference must be of "
                 "the same camera as one of them"
             )
-        found.append(Entrant(label=bundle.path.stem, bundle=bundle, camera=host.manifest.name))
-    labels = [entrant.label for entrant in found]
+        entrants.append(Entrant(label=bundle.path.stem, bundle=bundle, camera=host.manifest.name))
+    labels = [entrant.label for entrant in entrants]
     if len(set(labels)) != len(labels):
         raise ContractError(f"two bundles have one name ({', '.join(labels)}); rename a file")
-    return found
+    return entrants
 
 
 def _timed_shot(bundle: Bundle, settings: Settings, folder: Path) -> _TimedShot:
-    manifest, given, photo = bundle.manifest, settings.capture, settings.photo
-    if given is not None:
-        capture = part_of(manifest).read(given, None, manifest, Options())
-        return _TimedShot(given, (capture.width, capture.height), given.name)
+    manifest, file, photo = bundle.manifest, settings.capture, settings.photo
+    if file is not None:
+        capture = part_of(manifest).read(file, None, manifest, Options())
+        return _TimedShot(file, (capture.width, capture.height), file.name)
     width, height = settings.width_px, settings.height_px
     if settings.small:
         extent = manifest.sensor.extent
@@ -269,23 +269,28 @@ def _judge(
 ) -> _Judged:
     """Measure the accuracy of all methods of one camera; without it the seconds still stand."""
     bundle, label = camera.bundle, camera.label
-    own = [trial for trial in trials if trial.camera == label]
+    camera_trials = [trial for trial in trials if trial.camera == label]
     metrics = metrics_of(bundle.manifest)
     captures, count, text = _known_captures(bundle, settings, folder)
-    plain = [trial.accuracy_key for trial in own if not trial.is_variant]
+    plain = [trial.accuracy_key for trial in camera_trials if not trial.is_variant]
     collector = CropCollector(plain, every=max(1, count // MOST_CAPTURES))
 
-    def told(found: Iterable[KnownCapture]) -> Iterable[KnownCapture]:
+    def with_progress(queue: Iterable[KnownCapture]) -> Iterable[KnownCapture]:
         with working("judging", count, unit="captures") as task:
-            for number, known in enumerate(found):
+            for number, known_capture in enumerate(queue):
                 task.count(number)
-                tell(f"{label}: judging {known.caption}")
-                yield known
+                tell(f"{label}: judging {known_capture.caption}")
+                yield known_capture
 
     restorers = Restorers(bundle, available_threads(None))
     try:
         scores = measure_accuracy(
-            own, told(captures), restorers, metrics, collector.take, settings.constants
+            camera_trials,
+            with_progress(captures),
+            restorers,
+            metrics,
+            collector.take,
+            settings.constants,
         )
     except CamkitError as error:
         text = f"not measured: {error}"
@@ -296,7 +301,7 @@ def _judge(
         patches=collector.patches,
         metrics=metrics,
         text=text,
-        edges=measure_edges(bundle, own, restorers),
+        edges=measure_edges(bundle, camera_trials, restorers),
     )
 
 
@@ -305,14 +310,14 @@ def _known_captures(
 ) -> tuple[Iterable[KnownCapture], int, str]:
     """Return the captures to judge on, how many there are, and what they are."""
     part = find_part(bundle.manifest.kind, "bench", BenchPart)
-    asked, psf = settings.images, folder / "psf"
+    count, psf = settings.images, folder / "psf"
     if settings.data is not None:
-        pictures = len(list_set(settings.data, asked))
-        captures = picture_captures(bundle, settings.data, asked, psf, settings.saturate)
+        pictures = len(list_set(settings.data, count))
+        captures = picture_captures(bundle, settings.data, count, psf, settings.saturate)
         what = f"{pictures} pictures of {settings.data.name}"
     elif part.source is not None:
-        pictures = asked or SCENES
-        captures = scene_captures(bundle, asked, psf, settings.saturate)
+        pictures = count or SCENES
+        captures = scene_captures(bundle, count, psf, settings.saturate)
         what = f"scenes {part.source}:0 to {part.source}:{pictures - 1}"
     else:
         golden = golden_captures(bundle)
@@ -336,15 +341,15 @@ def _facts(
     bundles: dict[str, Bundle],
 ) -> Facts:
     """Return what the row of `trial` is made of, besides its own runs."""
-    base, found = _base_of(trial, trials), judged[trial.camera]
+    base, judgement = _base_of(trial, trials), judged[trial.camera]
     manifest = bundles[trial.bundle].manifest
     return Facts(
         size_px=shots[trial.camera].size_px,
         mac_per_px=None if trial.size is None else manifest.mac_per_pixel(trial.size),
         gemm_gmac_per_s=peaks[trial.threads],
-        scores=found.scores,
-        metrics=found.metrics,
-        edges=found.edges,
+        scores=judgement.scores,
+        metrics=judgement.metrics,
+        edges=judgement.edges,
         base=runs[base],
         base_label=base.label,
         base_key=score_key(base),
@@ -353,5 +358,7 @@ def _facts(
 
 def _base_of(trial: Trial, trials: Sequence[Trial]) -> Trial:
     """Return the trial that the others of its camera are compared with: size M, or the first."""
-    own = [other for other in trials if other.camera == trial.camera]
-    return next((o for o in own if o.size == BASE_SIZE and o.bundle == o.camera), own[0])
+    camera_trials = [other for other in trials if other.camera == trial.camera]
+    return next(
+        (o for o in camera_trials if o.size == BASE_SIZE and o.bundle == o.camera), camera_trials[0]
+    )

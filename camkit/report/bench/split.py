@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 from statistics import fmean
 from typing import Any
 
-from camkit.report.bench.accuracy import Scores, Taken
+from camkit.report.bench.accuracy import CaptureScores, Scores
 from camkit.report.bench.metric import Metric
 
 Cell = dict[str, Any]
@@ -38,20 +38,20 @@ def _cells(
     metrics: Sequence[Metric],
     shared: tuple[str, ...],
 ) -> list[Cell]:
-    def group(taken: Taken) -> tuple[float | None, ...]:
-        return tuple(getattr(taken, name) for name in shared)
+    def group(scored: CaptureScores) -> tuple[float | None, ...]:
+        return tuple(getattr(scored, name) for name in shared)
 
-    own = _grouped(() if scores is None else scores.taken, group)
-    inputs = _grouped(() if of_input is None else of_input.taken, group)
+    groups = _grouped(() if scores is None else scores.captures, group)
+    inputs = _grouped(() if of_input is None else of_input.captures, group)
     cells = []
-    for key in sorted(own, key=lambda values: [(v is None, v or 0) for v in values]):
-        taken = own[key]
+    for key in sorted(groups, key=lambda values: [(v is None, v or 0) for v in values]):
+        captures = groups[key]
         cell: Cell = dict(zip(shared, key, strict=True))
         if "field_share" in shared:
-            cell["field_mm"] = _mean(t.field_mm for t in taken)
-        cell |= {"captures": len(taken), "images": len({t.picture for t in taken})}
+            cell["field_mm"] = _mean(t.field_mm for t in captures)
+        cell |= {"captures": len(captures), "images": len({t.picture for t in captures})}
         for column in (c for m in metrics for c in m.columns if c.spread is not None):
-            cell[column.name] = picture_mean(taken, column.name)
+            cell[column.name] = picture_mean(captures, column.name)
             if column.of_input is not None:
                 cell[column.of_input] = picture_mean(inputs.get(key, ()), column.name)
         cells.append(cell)
@@ -59,23 +59,23 @@ def _cells(
 
 
 def _grouped(
-    taken: Iterable[Taken], group: Callable[[Taken], tuple[float | None, ...]]
-) -> dict[tuple[float | None, ...], list[Taken]]:
-    found: dict[tuple[float | None, ...], list[Taken]] = {}
-    for one in taken:
-        found.setdefault(group(one), []).append(one)
-    return found
+    captures: Iterable[CaptureScores], group: Callable[[CaptureScores], tuple[float | None, ...]]
+) -> dict[tuple[float | None, ...], list[CaptureScores]]:
+    groups: dict[tuple[float | None, ...], list[CaptureScores]] = {}
+    for one in captures:
+        groups.setdefault(group(one), []).append(one)
+    return groups
 
 
-def picture_mean(taken: Iterable[Taken], column: str) -> float | None:
+def picture_mean(captures: Iterable[CaptureScores], column: str) -> float | None:
     """Return the mean over pictures of the means over their captures; None without any."""
     by_picture: dict[str, list[float]] = {}
-    for one in taken:
+    for one in captures:
         if column in one.values:
             by_picture.setdefault(one.picture, []).append(one.values[column])
     return _mean(fmean(values) for values in by_picture.values())
 
 
 def _mean(values: Iterable[float | None]) -> float | None:
-    known = [value for value in values if value is not None]
-    return fmean(known) if known else None
+    numbers = [value for value in values if value is not None]
+    return fmean(numbers) if numbers else None

@@ -70,17 +70,17 @@ class Trial:
 
     def _particulars(self) -> list[str]:
         words = [v for v in (self.mode, self.dtype, self.provider) if v not in _PLAIN]
-        found = [word for word in words if word is not None]
-        found += [f"{name} {value}" for name, value in self.extra]
+        particulars = [word for word in words if word is not None]
+        particulars += [f"{name} {value}" for name, value in self.extra]
         if self.tile_px is not None:
-            found.append(f"tile {self.tile_px}")
+            particulars.append(f"tile {self.tile_px}")
         if self.threads != self.base_threads:
-            found.append(f"{self.threads} thread{'s' * (self.threads != 1)}")
-        return found
+            particulars.append(f"{self.threads} thread{'s' * (self.threads != 1)}")
+        return particulars
 
     def options(self) -> dict[str, Any]:
         """Return what differs from the default `Options`, as plain JSON values."""
-        chosen: dict[str, Any] = {
+        options: dict[str, Any] = {
             "method": None if self.path is None else self.method,
             "size": self.size,
             "mode": self.mode,
@@ -90,7 +90,7 @@ class Trial:
             "max_mem_bytes": self.max_mem_bytes,
             "threads": self.threads,
         }
-        return {k: v for k, v in chosen.items() if v is not None} | dict(self.extra)
+        return {k: v for k, v in options.items() if v is not None} | dict(self.extra)
 
 
 _PLAIN: Final = (None, "exact", "fp32", "cpu")
@@ -128,10 +128,10 @@ class Axes:
     def __post_init__(self) -> None:
         for name in ("modes", "dtypes", "providers"):
             values = getattr(self, name)
-            known = KNOWN[name]
-            if values is not None and (unknown := [v for v in values if v not in known]):
+            allowed = AXIS_VALUES[name]
+            if values is not None and (unknown := [v for v in values if v not in allowed]):
                 raise ContractError(
-                    f"{name} are {', '.join(known)}; got {', '.join(map(str, unknown))}"
+                    f"{name} are {', '.join(allowed)}; got {', '.join(map(str, unknown))}"
                 )
         for name in ("threads", "tiles_px"):
             values = getattr(self, name)
@@ -139,7 +139,7 @@ class Axes:
                 raise ContractError(f"{name} must be >= 1; got {values}")
 
 
-KNOWN: Final[dict[str, tuple[str, ...]]] = {
+AXIS_VALUES: Final[dict[str, tuple[str, ...]]] = {
     "modes": ("exact", "fast", "whole"),
     "dtypes": ("fp32", "fp16"),
     "providers": ("cpu", "cuda", "tensorrt", "openvino"),
@@ -211,7 +211,7 @@ class Vary(NamedTuple):
 
     field: str
     values: tuple[Any, ...]
-    asked: bool
+    is_requested: bool
 
 
 def spread_out(base: Trial, axes: Sequence[Vary], *, vary: bool) -> Iterator[Trial]:
@@ -223,10 +223,10 @@ def spread_out(base: Trial, axes: Sequence[Vary], *, vary: bool) -> Iterator[Tri
         vary: Whether axes that were not asked for are varied.
     """
     first = {axis.field: axis.values[0] for axis in axes}
-    asked = [axis for axis in axes if axis.asked]
-    for values in product(*(axis.values for axis in asked)):
-        chosen = first | dict(zip((axis.field for axis in asked), values, strict=True))
-        yield replace(base, **chosen)
+    requested = [axis for axis in axes if axis.is_requested]
+    for values in product(*(axis.values for axis in requested)):
+        fields = first | dict(zip((axis.field for axis in requested), values, strict=True))
+        yield replace(base, **fields)
     for axis in axes:
-        for value in axis.values[1:] if vary and not axis.asked else ():
+        for value in axis.values[1:] if vary and not axis.is_requested else ():
             yield replace(base, **(first | {axis.field: value}))

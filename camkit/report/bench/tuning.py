@@ -20,12 +20,12 @@ def tuning_table(trials: Iterable[Trial], bundles: Mapping[str, Bundle]) -> list
         Plain JSON values: camera, bundle, method, size; and as `Tuning` has them values, source,
         captures, follows.
     """
-    found: dict[tuple[str, str, str, str | None], Tuning] = {}
+    tunings: dict[tuple[str, str, str, str | None], Tuning] = {}
     for trial in trials:
         key = (trial.camera, trial.bundle, trial.method, trial.size)
-        if key not in found:
-            found[key] = tuning_of(trial, bundles[trial.bundle])
-    return [_told(key, tuning) for key, tuning in found.items()]
+        if key not in tunings:
+            tunings[key] = tuning_of(trial, bundles[trial.bundle])
+    return [_tuning_row(key, tuning) for key, tuning in tunings.items()]
 
 
 def whole_tuning(camera: str, bundle: Bundle) -> list[dict[str, Any]]:
@@ -36,19 +36,20 @@ def whole_tuning(camera: str, bundle: Bundle) -> list[dict[str, Any]]:
         bundle: One whose kind measures itself.
     """
     name, manifest = bundle.manifest.name, bundle.manifest
-    found = [
-        _told((camera, name, "net", size), _of_network(size, bundle)) for size in manifest.sizes
+    rows = [
+        _tuning_row((camera, name, "net", size), _of_network(size, bundle))
+        for size in manifest.sizes
     ]
     for stage in manifest.stages:
         if values := stated_numbers(stage):
             role = getattr(stage, "role", None)
             source = f"stage {stage.type} of the bundle" + ("" if role is None else f", {role}")
             tuning = Tuning(values=values, source=source)
-            found.append(_told((camera, name, stage.type, None), tuning))
-    return found
+            rows.append(_tuning_row((camera, name, stage.type, None), tuning))
+    return rows
 
 
-def _told(key: tuple[str, str, str, str | None], tuning: Tuning) -> dict[str, Any]:
+def _tuning_row(key: tuple[str, str, str, str | None], tuning: Tuning) -> dict[str, Any]:
     return {
         **dict(zip(("camera", "bundle", "method", "size"), key, strict=True)),
         "values": dict(tuning.values),
@@ -69,8 +70,8 @@ def tuning_of(trial: Trial, bundle: Bundle) -> Tuning:
         return Tuning(source="nothing is tuned: no bank, no network", captures="none")
     if trial.size is not None:
         return _of_network(trial.size, bundle)
-    known = stage_tuning(bundle.manifest.stages, trial.method)
-    return known or Tuning(source="no stage of the bundle says so")
+    tuning = stage_tuning(bundle.manifest.stages, trial.method)
+    return tuning or Tuning(source="no stage of the bundle says so")
 
 
 def _of_network(size: str, bundle: Bundle) -> Tuning:

@@ -87,9 +87,9 @@ def find_break(margins: Margins, method: str, side: Side) -> Break:
     """Find the break point on one side, with its confidence."""
     scenes = margins.faults.shape[1]
     rng = np.random.default_rng(BOOTSTRAP_SEED)
-    drawn = rng.multinomial(scenes, np.full(scenes, 1 / scenes), size=RESAMPLES)
+    draws = rng.multinomial(scenes, np.full(scenes, 1 / scenes), size=RESAMPLES)
     points, rules = _breaks(margins, side, np.ones((1, scenes)))
-    resampled, _ = _breaks(margins, side, drawn.astype(np.float64))
+    resampled, _ = _breaks(margins, side, draws.astype(np.float64))
     low, high = np.quantile(resampled, CONFIDENCE, method="inverted_cdf")
     point = _finite(float(points[0]))
     return Break(
@@ -105,13 +105,13 @@ def sound_values(margins: Margins) -> NDArray[np.bool_]:
     """Return for each value whether the method is sound there and on the way from the nominal."""
     means = _means(margins, np.ones((1, margins.faults.shape[1])))
     sound = np.asarray(np.min(list(means.values()), axis=0)[:, 0] >= 0)
-    kept = np.zeros(sound.shape, dtype=bool)
+    connected = np.zeros(sound.shape, dtype=bool)
     for way in (range(margins.nominal, sound.size), range(margins.nominal, -1, -1)):
         for i in way:
             if not sound[i]:
                 break
-            kept[i] = True
-    return kept
+            connected[i] = True
+    return connected
 
 
 def _finite(value: float) -> float | None:
@@ -127,9 +127,9 @@ def _means(margins: Margins, weights: Grid) -> dict[str, Grid]:
     """
     means = {}
     for rule, gain in margins.gains.items():
-        known = np.isfinite(gain)
-        count = known @ weights.T
-        total = np.where(known, gain, 0) @ weights.T
+        finite = np.isfinite(gain)
+        count = finite @ weights.T
+        total = np.where(finite, gain, 0) @ weights.T
         means[rule] = np.where(count > 0, total / np.maximum(count, 1), np.inf)
     means["fault"] = np.where(margins.faults @ weights.T > 0, -np.inf, np.inf)
     return means
@@ -143,14 +143,14 @@ def _breaks(margins: Margins, side: Side, weights: Grid) -> tuple[Grid, list[str
     way = np.arange(nominal, count) if side == "up" else np.arange(nominal, -1, -1)
     broken: NDArray[np.bool_] = (stacked.min(axis=0) < 0)[way]
     first = broken.argmax(axis=0)
-    here, before = way[first], way[np.maximum(first - 1, 0)]
+    here, previous = way[first], way[np.maximum(first - 1, 0)]
     draws = np.arange(weights.shape[0])
-    shares = _crossings(stacked[:, before, draws], stacked[:, here, draws])
+    shares = _crossings(stacked[:, previous, draws], stacked[:, here, draws])
     rule = np.where(first > 0, shares.argmin(axis=0), stacked[:, here, draws].argmin(axis=0))
     share = np.where(first > 0, shares.min(axis=0), 1.0)
-    points = _between(margins, margins.values[before], margins.values[here], share)
-    beyond = np.inf if side == "up" else -np.inf
-    return np.where(broken.any(axis=0), points, beyond), [rules[r] for r in rule]
+    points = _interpolate(margins, margins.values[previous], margins.values[here], share)
+    no_break = np.inf if side == "up" else -np.inf
+    return np.where(broken.any(axis=0), points, no_break), [rules[r] for r in rule]
 
 
 def _crossings(sound: Grid, broken: Grid) -> Grid:
@@ -164,7 +164,7 @@ def _crossings(sound: Grid, broken: Grid) -> Grid:
     return np.where(broken < 0, share, np.inf)
 
 
-def _between(margins: Margins, sound: Grid, broken: Grid, share: Grid) -> Grid:
+def _interpolate(margins: Margins, sound: Grid, broken: Grid, share: Grid) -> Grid:
     if not margins.ordered:
         return broken
     linear = sound + (broken - sound) * share

@@ -107,17 +107,17 @@ def _blur(planes: FloatArray, shot: Shot, lens: Lens, part: tuple[slice, slice])
     margin, (rows, columns) = lens.margin_px, part
     pad = ((0, 0), (margin, margin), (margin, margin))
     extended = np.pad(np.maximum(planes, 0), pad, mode="symmetric")
-    around = (slice(s.start, s.stop + 2 * margin) for s in part)
+    widened = (slice(s.start, s.stop + 2 * margin) for s in part)
     x, y = shot.light.window.origin_px
     window = replace(
         shot.light.window,
         size_px=(columns.stop - columns.start, rows.stop - rows.start),
         origin_px=(x + columns.start, y + rows.start),
     )
-    seen = extended[:, *around]
+    crop = extended[:, *widened]
     if lens.haze is None:
-        return scatter(seen, lens.kernels_at, window, margin_px=margin, step_px=BLUR_STEP_PX)
-    core, ones = scatter_light(seen, lit_core(lens), window, margin_px=margin, step_px=BLUR_STEP_PX)
+        return scatter(crop, lens.kernels_at, window, margin_px=margin, step_px=BLUR_STEP_PX)
+    core, ones = scatter_light(crop, lit_core(lens), window, margin_px=margin, step_px=BLUR_STEP_PX)
     # haze comes from all of the picture, and from farther than the core's margin
     wide_px = margin_px(lens.haze, margin)
     pad = ((0, 0), (wide_px, wide_px), (wide_px, wide_px))
@@ -163,9 +163,9 @@ class Scale:
     model_error: float = 0.0
     unit: float = 1.0
 
-    def chi2(self, found: Residual) -> float:
+    def chi2(self, residuals: Residual) -> float:
         """Return chi^2 per sample, 1 (or less) on the nominal capture."""
-        return found.chi2(self.model_error) / self.unit
+        return residuals.chi2(self.model_error) / self.unit
 
 
 def calibrate(nominal: Residual) -> Scale:

@@ -22,7 +22,7 @@ class Curve:
         psnr_db: Method -> (n, scenes), NaN where unknown.
         chi2: Method -> (n, scenes), NaN where unknown.
         extra: Name -> method -> (n, scenes).
-        seen: Quantity of the runtime -> (n, scenes).
+        quantities: Quantity of the runtime -> (n, scenes).
         outcomes: (value index, scene index) -> method -> outcome.
         rivals: Methods that the others must not fall behind.
     """
@@ -33,7 +33,7 @@ class Curve:
     psnr_db: Mapping[str, Grid]
     chi2: Mapping[str, Grid]
     extra: Mapping[str, Mapping[str, Grid]]
-    seen: Mapping[str, Grid]
+    quantities: Mapping[str, Grid]
     outcomes: Mapping[tuple[int, int], Mapping[str, Outcome]]
     rivals: tuple[str, ...] = ()
 
@@ -71,15 +71,17 @@ def curve_of(scenario: Scenario, points: Iterable[Point], rivals: tuple[str, ...
     values = tuple(sorted({p.value for p in mine}))
     scenes = tuple(dict.fromkeys(p.scene for p in mine))
     outcomes = {(values.index(p.value), scenes.index(p.scene)): p.verdict.outcomes for p in mine}
-    methods = tuple(dict.fromkeys(m for found in outcomes.values() for m in found))
+    methods = tuple(dict.fromkeys(m for by_method in outcomes.values() for m in by_method))
     shape = (len(values), len(scenes))
     extras = dict.fromkeys(n for o in outcomes.values() for m in o.values() for n in m.extra)
-    seen = {(values.index(p.value), scenes.index(p.scene)): p.verdict.seen for p in mine}
-    quantities = dict.fromkeys(name for found in seen.values() for name in found)
+    by_point = {(values.index(p.value), scenes.index(p.scene)): p.verdict.seen for p in mine}
+    quantities = dict.fromkeys(name for numbers in by_point.values() for name in numbers)
 
     def grid(method: str, name: str) -> Grid:
         cells = {
-            at: getattr(found[method], name) for at, found in outcomes.items() if method in found
+            at: getattr(by_method[method], name)
+            for at, by_method in outcomes.items()
+            if method in by_method
         }
         return _fill(shape, cells)
 
@@ -94,7 +96,9 @@ def curve_of(scenario: Scenario, points: Iterable[Point], rivals: tuple[str, ...
         psnr_db={m: grid(m, "psnr_db") for m in methods},
         chi2={m: grid(m, "chi2") for m in methods},
         extra={name: {m: extra_grid(m, name) for m in methods} for name in extras},
-        seen={q: _fill(shape, {at: s.get(q) for at, s in seen.items()}) for q in quantities},
+        quantities={
+            q: _fill(shape, {at: s.get(q) for at, s in by_point.items()}) for q in quantities
+        },
         outcomes=outcomes,
         rivals=rivals,
     )
@@ -111,14 +115,14 @@ def margins(curve: Curve, method: str) -> Margins:
     """Return how far a method is from breaking."""
     rivals: Sequence[str] = curve.rivals if curve.scenario.rival else ()
     faults = np.zeros((len(curve.values), len(curve.scenes)), dtype=bool)
-    for at, found in curve.outcomes.items():
-        faults[at] = method in found and found[method].fault is not None
-    known = {m: grid for m, grid in curve.psnr_db.items() if m == method or m in rivals}
+    for at, by_method in curve.outcomes.items():
+        faults[at] = method in by_method and by_method[method].fault is not None
+    grids = {m: grid for m, grid in curve.psnr_db.items() if m == method or m in rivals}
     return Margins(
         values=np.array(curve.values),
         nominal=curve.nominal,
         gains=margins_of(
-            known, curve.chi2[method], method=method, rivals=[r for r in rivals if r in known]
+            grids, curve.chi2[method], method=method, rivals=[r for r in rivals if r in grids]
         ),
         faults=faults,
         log=curve.scenario.log,
@@ -128,23 +132,23 @@ def margins(curve: Curve, method: str) -> Margins:
 
 def breaks_of(curve: Curve) -> tuple[Break, ...]:
     """Find the break points of every judged method, on every side of the nominal that was swept."""
-    found = []
+    breaks = []
     for method in curve.judged:
         margin = margins(curve, method)
         if curve.nominal > 0:
-            found.append(find_break(margin, method, "down"))
+            breaks.append(find_break(margin, method, "down"))
         if curve.nominal < len(curve.values) - 1:
-            found.append(find_break(margin, method, "up"))
-    return tuple(found)
+            breaks.append(find_break(margin, method, "up"))
+    return tuple(breaks)
 
 
 def nearest_break(curve: Curve, breaks: Sequence[Break], method: str) -> Break | None:
     """Return break of a method that is the fewest steps from the nominal value; None if none."""
     values, nominal = np.array(curve.values), curve.nominal
 
-    def steps(found: Break) -> float:
-        assert found.point is not None
-        return abs(float(np.interp(found.point, values, np.arange(values.size))) - nominal)
+    def steps(candidate: Break) -> float:
+        assert candidate.point is not None
+        return abs(float(np.interp(candidate.point, values, np.arange(values.size))) - nominal)
 
     mine = [b for b in breaks if b.method == method and b.point is not None]
     return min(mine, key=steps) if mine else None

@@ -64,9 +64,9 @@ def planckian(kelvin: float) -> tuple[float, float]:
 
     References: Kang et al. 2002, J. Korean Phys. Soc. 41, 865, eq. (5), (6): cubic splines.
     """
-    across, up = WARM if kelvin <= SPLIT_K else COLD
-    x = float(np.polyval(across, 1e3 / kelvin))
-    return x, float(np.polyval(up, x))
+    x_terms, y_terms = WARM if kelvin <= SPLIT_K else COLD
+    x = float(np.polyval(x_terms, 1e3 / kelvin))
+    return x, float(np.polyval(y_terms, x))
 
 
 def tint(kelvin: float) -> NDArray[np.float64]:

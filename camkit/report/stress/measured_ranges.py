@@ -26,7 +26,7 @@ OPEN_HIGH: Final = 1e9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Seen:
+class SoundRange:
     """Values of one quantity in one scenario.
 
     Attributes:
@@ -54,16 +54,16 @@ def measured_ranges(curves: Iterable[Curve], method: str) -> dict[str, Range]:
         range in which the method helps, and every capture would be outside. So is all of a camera
         that offers nothing simpler: no help was shown where there was nothing to beat.
     """
-    found: dict[str, list[tuple[str, Seen]]] = {}
+    by_quantity: dict[str, list[tuple[str, SoundRange]]] = {}
     for curve in curves:
         if method not in curve.methods or not curve.rivals:
             continue
         for quantity, end in curve.scenario.bounds.items():
-            seen = _seen(curve, quantity, method)
-            if seen is not None:
-                found.setdefault(quantity, []).append((end, seen))
+            sound_range = _sound_range(curve, quantity, method)
+            if sound_range is not None:
+                by_quantity.setdefault(quantity, []).append((end, sound_range))
     ranges = {}
-    for quantity, entries in found.items():
+    for quantity, entries in by_quantity.items():
         lows = [s for end, s in entries if end in ("low", "both")]
         highs = [s for end, s in entries if end in ("high", "both")]
         low, high = _low(lows), _high(highs)
@@ -72,20 +72,20 @@ def measured_ranges(curves: Iterable[Curve], method: str) -> dict[str, Range]:
     return ranges
 
 
-def _seen(curve: Curve, quantity: str, method: str) -> Seen | None:
+def _sound_range(curve: Curve, quantity: str, method: str) -> SoundRange | None:
     """Return what a curve says of a quantity; None without a sound value."""
-    if quantity not in curve.seen:
+    if quantity not in curve.quantities:
         return None
-    grid = curve.seen[quantity]
+    grid = curve.quantities[quantity]
     sound, broken = _helps(curve, method)
-    known = np.isfinite(grid)
-    if not (sound[:, None] & known).any():
+    finite = np.isfinite(grid)
+    if not (sound[:, None] & finite).any():
         return None
-    inside = grid[sound][known[sound]]
+    inside = grid[sound][finite[sound]]
     low, high = float(inside.min()), float(inside.max())
-    outside = [float(grid[i][known[i]].mean()) for i in np.flatnonzero(broken) if known[i].any()]
-    middle = float(grid[curve.nominal][known[curve.nominal]].mean())
-    return Seen(
+    outside = [float(grid[i][finite[i]].mean()) for i in np.flatnonzero(broken) if finite[i].any()]
+    middle = float(grid[curve.nominal][finite[curve.nominal]].mean())
+    return SoundRange(
         low=low,
         high=high,
         low_broken=any(value < middle for value in outside),
@@ -101,22 +101,22 @@ def _helps(curve: Curve, method: str) -> tuple[NDArray[np.bool_], NDArray[np.boo
     margin = margins(curve, method)
     gains = {rule: gain for rule, gain in margin.gains.items() if rule != CHI2}
     sound = sound_values(replace(margin, gains=gains))
-    known = np.isfinite(curve.psnr_db[method]).any(axis=1)
+    compared = np.isfinite(curve.psnr_db[method]).any(axis=1)
     faulty = margin.faults.any(axis=1)
-    return sound & known, ~sound & (known | faulty)
+    return sound & compared, ~sound & (compared | faulty)
 
 
-def _low(entries: Sequence[Seen]) -> float:
+def _low(entries: Sequence[SoundRange]) -> float:
     """Join the lower ends: where one broke, the highest of those; else the least tested."""
-    broken = [seen.low for seen in entries if seen.low_broken]
+    broken = [entry.low for entry in entries if entry.low_broken]
     if broken:
         return max(broken)
-    return min((seen.low for seen in entries), default=OPEN_LOW)
+    return min((entry.low for entry in entries), default=OPEN_LOW)
 
 
-def _high(entries: Sequence[Seen]) -> float:
+def _high(entries: Sequence[SoundRange]) -> float:
     """Join the upper ends: where one broke, the least of those; else the largest tested."""
-    broken = [seen.high for seen in entries if seen.high_broken]
+    broken = [entry.high for entry in entries if entry.high_broken]
     if broken:
         return min(broken)
-    return max((seen.high for seen in entries), default=OPEN_HIGH)
+    return max((entry.high for entry in entries), default=OPEN_HIGH)

@@ -26,8 +26,8 @@ def scenario_json(
     first = nearest_break(curve, breaks, primary)
     faults = [
         {"value": curve.values[i], "scene": curve.scenes[j], "method": m, "fault": o.fault}
-        for (i, j), found in sorted(curve.outcomes.items())
-        for m, o in found.items()
+        for (i, j), by_method in sorted(curve.outcomes.items())
+        for m, o in by_method.items()
         if o.fault is not None
     ]
     return _head(scenario, bundle, primary) | {
@@ -40,7 +40,7 @@ def scenario_json(
         "break_point": None if first is None else _round(first.point),
         "ci": None if first is None else [_round(end) for end in first.ci],
         "break_reason": None if first is None else first.reason,
-        "breaks": [_break_json(found) for found in breaks],
+        "breaks": [_break_json(one) for one in breaks],
         "faults": faults,
         "skipped": None,
     }
@@ -77,13 +77,13 @@ def _head(scenario: Scenario, bundle: Bundle, primary: str) -> dict[str, Any]:
     }
 
 
-def _break_json(found: Break) -> dict[str, Any]:
+def _break_json(break_point: Break) -> dict[str, Any]:
     return {
-        "method": found.method,
-        "side": found.side,
-        "break_point": _round(found.point),
-        "ci": [_round(end) for end in found.ci],
-        "reason": found.reason or None,
+        "method": break_point.method,
+        "side": break_point.side,
+        "break_point": _round(break_point.point),
+        "ci": [_round(end) for end in break_point.ci],
+        "reason": break_point.reason or None,
     }
 
 
@@ -93,8 +93,8 @@ def _means(grids: Mapping[str, Grid]) -> dict[str, list[float | None]]:
 
 
 def _mean(row: Grid) -> float | None:
-    known = row[np.isfinite(row)]
-    return round(float(known.mean()), 4) if known.size else None
+    finite = row[np.isfinite(row)]
+    return round(float(finite.mean()), 4) if finite.size else None
 
 
 def _round(value: float | None) -> float | None:

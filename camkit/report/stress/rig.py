@@ -45,7 +45,7 @@ from camkit.runtime.twin.light import (
 from camkit.runtime.twin.truth import light_sensor
 
 INPUT: Final = "input"
-BEFORE: Final = "before"
+EARLIER_MARK: Final = "before"
 """Marks the networks of the bundle that is compared with: "M before"."""
 KEPT_KERNELS: Final = 256
 """Of a haze: those of the places around one scene, a few 100 MB at most."""
@@ -98,7 +98,7 @@ class Rig:
         lens: Through which captures are taken: the bundle's, at its reference depth.
         assumed_lens: What restorations go by: the kernels of the bank. Another one only where
             the bundle knows several depths.
-        methods: From doing nothing to the networks, those of `before` last.
+        methods: From doing nothing to the networks, those of `earlier_bundle` last.
         rivals: Names of the methods that the others must not fall behind.
     """
 
@@ -107,16 +107,16 @@ class Rig:
         bundle: Bundle,
         sizes: Sequence[str],
         *,
-        before: Bundle | None = None,
-        chosen: Mapping[str, Any] | None = None,
+        earlier_bundle: Bundle | None = None,
+        option_fields: Mapping[str, Any] | None = None,
     ) -> None:
         """Make the methods ready.
 
         Args:
             bundle: What is tested.
             sizes: Of its networks.
-            before: Another bundle of the same camera, whose networks stand beside.
-            chosen: Further fields of `Options`, for all methods.
+            earlier_bundle: Another bundle of the same camera, whose networks stand beside.
+            option_fields: Further fields of `Options`, for all methods.
 
         Raises:
             ContractError: If the bundle states no optics, or lacks a size.
@@ -127,20 +127,20 @@ class Rig:
             "this judges cameras by their optics (`camkit bench --capture FILE` measures others)",
         )
         self.bundle = bundle
-        self.before = before
+        self.earlier_bundle = earlier_bundle
         self.sensor = light_sensor(bundle.manifest)
         self._sizes = tuple(sizes)
-        self._chosen = dict(chosen or {})
-        networks = _networks(bundle, sizes, "", self._chosen)
-        if before is not None:
-            have = [size for size in sizes if size in before.manifest.sizes]
-            networks += _networks(before, have, f" {BEFORE}", self._chosen)
-        simple = _simple(bundle, self._chosen)
+        self._option_fields = dict(option_fields or {})
+        networks = _networks(bundle, sizes, "", self._option_fields)
+        if earlier_bundle is not None:
+            have = [size for size in sizes if size in earlier_bundle.manifest.sizes]
+            networks += _networks(earlier_bundle, have, f" {EARLIER_MARK}", self._option_fields)
+        simple = _simple(bundle, self._option_fields)
         self.methods = (*simple, *networks)
         judged = networks or simple[1:]
         self.rivals = tuple(m.name for m in self.methods if m not in judged)
         self.lens = self.lens_at(bundle.reference_depth_mm)
-        depth_mm = Options(**self._chosen).depth_mm
+        depth_mm = Options(**self._option_fields).depth_mm
         share = bundle.haze.core_share if bundle.manifest.has_haze else None
         response = self.sensor.response_arrays()
         kernels = color_kernels(bundle.psf, *response, depth_mm=depth_mm, share=share)
@@ -150,12 +150,14 @@ class Rig:
         self._others: dict[tuple[tuple[str, Any], ...], Rig] = {}
         self._last: tuple[Capture, Restored] | None = None
 
-    def choosing(self, **chosen: Any) -> "Rig":
+    def choosing(self, **fields: Any) -> "Rig":
         """Return a rig like this one whose methods have further options; it is kept."""
-        key = tuple(sorted(chosen.items()))
+        key = tuple(sorted(fields.items()))
         if key not in self._others:
-            options = self._chosen | chosen
-            self._others[key] = Rig(self.bundle, self._sizes, before=self.before, chosen=options)
+            options = self._option_fields | fields
+            self._others[key] = Rig(
+                self.bundle, self._sizes, earlier_bundle=self.earlier_bundle, option_fields=options
+            )
         return self._others[key]
 
     @property
@@ -185,17 +187,17 @@ class Rig:
         if lens.haze is None:
             return lens
         # what every method made of a capture is spread by the same kernels
-        known = lru_cache(maxsize=KEPT_KERNELS)(lens.haze.haze_at)
-        return replace(lens, haze=replace(lens.haze, haze_at=known))
+        haze_kernels = lru_cache(maxsize=KEPT_KERNELS)(lens.haze.haze_at)
+        return replace(lens, haze=replace(lens.haze, haze_at=haze_kernels))
 
     def light(self, scene: Scene, lens: Lens | None = None) -> Light:
         """Project a scene on the sensor; that through the nominal lens is kept by its name."""
         if lens is None and scene.name in self._lights:
             return self._lights[scene.name]
-        made = self.light_amid(scene, scene.linear, lens)
+        light = self.light_amid(scene, scene.linear, lens)
         if lens is None:
-            self._lights[scene.name] = made
-        return made
+            self._lights[scene.name] = light
+        return light
 
     def light_in_place(self, scene: Scene) -> Light:
         """Project a scene on the sensor through the nominal lens, as if it distorted nothing.
@@ -206,22 +208,28 @@ class Rig:
         return self.light_amid(scene, scene.linear, distort=False)
 
     def light_amid(
-        self, scene: Scene, around: FloatArray, lens: Lens | None = None, *, distort: bool = True
+        self,
+        scene: Scene,
+        surroundings: FloatArray,
+        lens: Lens | None = None,
+        *,
+        distort: bool = True,
     ) -> Light:
         """Project a scene on the sensor with what surrounds it.
 
         Args:
             scene: What is in the picture.
-            around: (3, h', w') linear Rec.709: the scene, or it with as much on every side of it.
+            surroundings: (3, h', w') linear Rec.709: the scene, or it with as much on every side
+                of it.
             lens: None for the nominal one.
             distort: Whether the lens distorts.
         """
         extent, scale = self.sensor.known_extent, scene.scale
-        ring_px = (around.shape[1] - scene.linear.shape[1]) // (2 * scale)
+        ring_px = (surroundings.shape[1] - scene.linear.shape[1]) // (2 * scale)
         origin = scene.origin_px((extent.width_px, extent.height_px))
-        window = scene_window(around, self.sensor, origin, scale=scale, surround_px=ring_px)
+        window = scene_window(surroundings, self.sensor, origin, scale=scale, surround_px=ring_px)
         options = LightOptions(scale=scale, surround_px=ring_px, distort=distort)
-        return light_of(around, self.sensor, lens or self.lens, window, options)
+        return light_of(surroundings, self.sensor, lens or self.lens, window, options)
 
     def shoot(self, scene: Scene, lens: Lens | None = None, setting: Setting | None = None) -> Shot:
         """Record a scene through a lens (None: the nominal one) with a setting of the camera."""
@@ -229,24 +237,28 @@ class Rig:
 
     def record(self, scene: Scene, light: Light, setting: Setting | None = None) -> Shot:
         """Record light; the same scene has the same noise seed in every scenario."""
-        chosen = replace(setting or Setting(), seed=NOISE_SEED + scene.number)
-        samples = expose(light, self.sensor, chosen)
+        seeded_setting = replace(setting or Setting(), seed=NOISE_SEED + scene.number)
+        samples = expose(light, self.sensor, seeded_setting)
         x, y = (int(v) for v in light.window.origin_px)
         balance = stated_balance(light.gains)
-        made = self._from_array(
-            samples, self.bundle.manifest, iso=chosen.iso, white_balance=balance, origin_px=(x, y)
+        raw_capture = self._from_array(
+            samples,
+            self.bundle.manifest,
+            iso=seeded_setting.iso,
+            white_balance=balance,
+            origin_px=(x, y),
         )
-        black, white = levels_of(self.sensor, chosen)
+        black, white = levels_of(self.sensor, seeded_setting)
         capture = replace(
-            made, black_level=np.full_like(made.black_level, black), white_level=white
+            raw_capture, black_level=np.full_like(raw_capture.black_level, black), white_level=white
         )
         return Shot(
             scene=scene,
             capture=capture,
             light=light,
             sensor=self.sensor,
-            exposure=chosen.exposure,
-            noise=noise_of(self.sensor, chosen),
+            exposure=seeded_setting.exposure,
+            noise=noise_of(self.sensor, seeded_setting),
         )
 
     def restore(self, shot: Shot) -> Restored:
@@ -267,24 +279,24 @@ class Rig:
                 shared[source] = self._shared(method.bundle, capture)
             try:
                 work = method.pipeline.start(capture, known_planes=shared[source])
-                kept = None if method.plane is None else work.keep(method.plane).rows()
+                rows = None if method.plane is None else work.keep(method.plane).rows()
                 pictures[method.name] = work.fill()
-                if kept is not None:
-                    planes[method.name] = kept.read(0, kept.shape[1])
+                if rows is not None:
+                    planes[method.name] = rows.read(0, rows.shape[1])
             except ContractError as error:
                 faults[method.name] = str(error)
         return Restored(planes=planes, pictures=pictures, faults=faults)
 
     def _shared(self, bundle: Bundle, capture: Capture) -> dict[str, Stream]:
         """Return the planes that the first network takes, which are the same for all sizes."""
-        known: dict[str, Stream] = {}
+        planes: dict[str, Stream] = {}
         first = bundle.manifest.stage(Network)
         method = next((m for m in self.networks if m.bundle is bundle), None)
         if first is None or method is None:
-            return known
+            return planes
         for plane in first.takes:
-            known[plane] = method.pipeline.start(capture, known_planes=known).keep(plane)
-        return known
+            planes[plane] = method.pipeline.start(capture, known_planes=planes).keep(plane)
+        return planes
 
 
 def usual_sizes(manifest: Manifest) -> tuple[str, ...]:
@@ -296,36 +308,38 @@ def restored_plane(manifest: Manifest) -> str | None:
     """Return the plane that holds the light when all that restores is done; None if none does."""
     last = next((s for s in manifest.stages[::-1] if module_of(s).METHODS), None)
     names = list(manifest.planes)[::-1] if last is None else last.gives
-    known = manifest.planes
-    return next((n for n in names if known[n].domain == "linear" and known[n].grid.warped), None)
+    planes = manifest.planes
+    return next((n for n in names if planes[n].domain == "linear" and planes[n].grid.warped), None)
 
 
 def _networks(
-    bundle: Bundle, sizes: Sequence[str], mark: str, chosen: Mapping[str, Any]
+    bundle: Bundle, sizes: Sequence[str], mark: str, option_fields: Mapping[str, Any]
 ) -> tuple[Method, ...]:
-    return tuple(_method(bundle, f"{size}{mark}", {"size": size, **chosen}) for size in sizes)
-
-
-def _simple(bundle: Bundle, chosen: Mapping[str, Any]) -> tuple[Method, ...]:
-    """Return the methods without networks that the bundle offers: nothing, and what comes first."""
-    manifest = bundle.manifest
-    offered = offered_methods(manifest.stages, manifest.all_planes)
-    usual = [methods[0] for s in manifest.stages if (methods := module_of(s).METHODS)]
-    found = [DEVELOP, *(m for m in usual if not planned(manifest.stages, Work(method=m)).networks)]
     return tuple(
-        _method(bundle, INPUT if name == DEVELOP else name, {"method": name, **chosen})
-        for name in found
-        if name in offered
+        _method(bundle, f"{size}{mark}", {"size": size, **option_fields}) for size in sizes
     )
 
 
-def _method(bundle: Bundle, name: str, chosen: Mapping[str, Any]) -> Method:
-    options = Options(threads=1, **in_sensor_geometry(bundle.manifest), **chosen)
+def _simple(bundle: Bundle, option_fields: Mapping[str, Any]) -> tuple[Method, ...]:
+    """Return the methods without networks that the bundle offers: nothing, and what comes first."""
+    manifest = bundle.manifest
+    available = offered_methods(manifest.stages, manifest.all_planes)
+    usual = [methods[0] for s in manifest.stages if (methods := module_of(s).METHODS)]
+    names = [DEVELOP, *(m for m in usual if not planned(manifest.stages, Work(method=m)).networks)]
+    return tuple(
+        _method(bundle, INPUT if name == DEVELOP else name, {"method": name, **option_fields})
+        for name in names
+        if name in available
+    )
+
+
+def _method(bundle: Bundle, name: str, option_fields: Mapping[str, Any]) -> Method:
+    options = Options(threads=1, **in_sensor_geometry(bundle.manifest), **option_fields)
     return Method(
         name=name,
         pipeline=Pipeline(bundle, options),
         plane=restored_plane(bundle.manifest),
-        networks="size" in chosen,
+        networks="size" in option_fields,
     )
 
 

@@ -92,7 +92,7 @@ def run_stress(
     bundle: Bundle,
     options: StressOptions,
     *,
-    before: Bundle | None = None,
+    earlier_bundle: Bundle | None = None,
     progress: Progress | None = None,
 ) -> StressResult:
     """Sweep a bundle.
@@ -100,29 +100,29 @@ def run_stress(
     Args:
         bundle: What is tested.
         options: Settings of a run.
-        before: Another bundle of the same camera, whose networks are shown beside.
+        earlier_bundle: Another bundle of the same camera, whose networks are shown beside.
         progress: Called with (scenario, points done, points in all).
 
     Raises:
         ContractError: If sizes, scenes or bundles do not fit.
         BundleError: If the camera cannot be photographed with.
     """
-    _check_same_camera(bundle, before)
+    _check_same_camera(bundle, earlier_bundle)
     reasons = {s.name: s.applies(bundle) for s in options.scenarios}
-    taken = tuple(s.for_bundle(bundle) for s in options.scenarios if reasons[s.name] is None)
+    scenarios = tuple(s.for_bundle(bundle) for s in options.scenarios if reasons[s.name] is None)
     count = options.scenes or (QUICK_SCENES if options.quick else DEFAULT_SCENES)
     part = find_part(bundle.manifest.kind, "stress", StressPart)
-    judge = part.examiner(bundle, options.sizes or bundle.manifest.sizes, before)
+    judge = part.examiner(bundle, options.sizes or bundle.manifest.sizes, earlier_bundle)
     primary = judge.primary
     scenes = part.scenes(bundle, count, options.data_folder)
-    sweep = Sweep(scenarios=taken, scenes=scenes, quick=options.quick)
+    sweep = Sweep(scenarios=scenarios, scenes=scenes, quick=options.quick)
     points, total = [], len(sweep.tasks())
     for point in run_sweep(sweep, judge, _journal(options, judge)):
         points.append(point)
         if progress is not None:
             progress(point.scenario, len(points), total)
     curves = tuple(
-        curve_of(scenario, points, scenario.rivals or judge.rivals) for scenario in taken
+        curve_of(scenario, points, scenario.rivals or judge.rivals) for scenario in scenarios
     )
     breaks = {c.scenario.name: breaks_of(c) for c in curves}
     rows = [scenario_json(c, breaks[c.scenario.name], bundle, primary) for c in curves]
@@ -153,17 +153,19 @@ def write_envelope(bundle: Bundle, envelope: Mapping[str, Range]) -> Bundle:
     """
     if not envelope:
         raise ContractError("no range was measured, so there is nothing to write; see the report")
-    kept = bundle.manifest.envelope or {}
-    manifest = bundle.manifest.model_copy(update={"envelope": {**kept, **envelope}})
+    stored = bundle.manifest.envelope or {}
+    manifest = bundle.manifest.model_copy(update={"envelope": {**stored, **envelope}})
     members = {name: bundle.member(name) for name in bundle.names}
     return write_bundle(bundle.path, manifest, members)
 
 
-def _check_same_camera(bundle: Bundle, before: Bundle | None) -> None:
-    if before is not None and camera_of(before.manifest) != camera_of(bundle.manifest):
+def _check_same_camera(bundle: Bundle, earlier_bundle: Bundle | None) -> None:
+    if earlier_bundle is not None and camera_of(earlier_bundle.manifest) != camera_of(
+        bundle.manifest
+    ):
         raise ContractError(
-            f"bundles {before.path} and {bundle.path} are not of one camera; compare networks on "
-            "one camera only"
+            f"bundles {earlier_bundle.path} and {bundle.path} are not of one camera; compare "
+            "networks on one camera only"
         )
 
 

@@ -134,7 +134,7 @@ class Scenario:
         assert self.shoot is not None
         return judge.score(self.shoot(judge, scene, value))
 
-    def chosen(self, *, quick: bool) -> tuple[float, ...]:
+    def swept_values(self, *, quick: bool) -> tuple[float, ...]:
         """Return the values to sweep."""
         return tuple(v for v in self.values if v in self.quick) if quick else self.values
 
@@ -174,24 +174,24 @@ def all_scenarios() -> tuple[Scenario, ...]:
     return tuple(one for table in discover(SCENARIOS, "SCENARIOS", tuple) for one in table)
 
 
-def choose(names: str | None, own: tuple[Scenario, ...] = ()) -> tuple[Scenario, ...]:
+def choose(names: str | None, kind_scenarios: tuple[Scenario, ...] = ()) -> tuple[Scenario, ...]:
     """Return the scenarios that a comma-separated list names; all without one.
 
     Args:
         names: The list.
-        own: Scenarios of a kind of camera, beside those that serve every camera.
+        kind_scenarios: Scenarios of a kind of camera, beside those that serve every camera.
 
     Raises:
         ContractError: If one is unknown.
     """
-    known = {scenario.name: scenario for scenario in (*all_scenarios(), *own)}
+    by_name = {scenario.name: scenario for scenario in (*all_scenarios(), *kind_scenarios)}
     if names is None:
-        return tuple(known.values())
-    wanted = [name.strip() for name in names.split(",") if name.strip()]
-    unknown = [name for name in wanted if name not in known]
-    if unknown or not wanted:
+        return tuple(by_name.values())
+    requested = [name.strip() for name in names.split(",") if name.strip()]
+    unknown = [name for name in requested if name not in by_name]
+    if unknown or not requested:
         raise ContractError(
             f"unknown scenario(s) {', '.join(unknown) or 'none given'}; there are: "
-            f"{', '.join(known)}"
+            f"{', '.join(by_name)}"
         )
-    return tuple(known[name] for name in wanted)
+    return tuple(by_name[name] for name in requested)

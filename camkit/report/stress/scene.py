@@ -99,15 +99,15 @@ def _from_folder(
     folder: Path, count: int, size_px: tuple[int, int], scale: int
 ) -> tuple[Scene, ...]:
     width, height = size_px
-    found: list[Scene] = []
+    scenes: list[Scene] = []
     for path in list_set(folder):
         linear = read_picture(path, max(size_px))[:, :height, :width]
         if linear.shape[1:] == (height, width):
             scaled = np.ascontiguousarray(linear * np.float32(WHITE))
-            found.append(Scene(name=path.name, number=len(found), linear=scaled, scale=scale))
-        if len(found) == count:
-            return tuple(found)
+            scenes.append(Scene(name=path.name, number=len(scenes), linear=scaled, scale=scale))
+        if len(scenes) == count:
+            return tuple(scenes)
     raise ContractError(
-        f"{folder} holds {len(found)} picture(s) of at least {width}x{height} px, {count} are "
+        f"{folder} holds {len(scenes)} picture(s) of at least {width}x{height} px, {count} are "
         "needed; add pictures or ask for fewer"
     )

@@ -70,8 +70,8 @@ class Judge:
     @property
     def identity(self) -> tuple[object, ...]:
         """Return bundles and methods."""
-        before = self.rig.before
-        return self.rig.bundle.sha256, before and before.sha256, self.methods
+        earlier_bundle = self.rig.earlier_bundle
+        return self.rig.bundle.sha256, earlier_bundle and earlier_bundle.sha256, self.methods
 
     def pictures(self, shot: Shot) -> dict[str, FloatArray]:
         """Return the truth and what every method made of a capture as sRGB values."""
@@ -117,8 +117,8 @@ class Judge:
         compare, restored = Comparison(shot), self.rig.restore(shot)
         outcomes = self.judge(shot, restored, with_chi2=False)
         for method, picture in restored.pictures.items():
-            found = numbers(compare.level(picture), compare.truth)
-            outcomes[method] = replace(outcomes[method], extra=found)
+            extra = numbers(compare.level(picture), compare.truth)
+            outcomes[method] = replace(outcomes[method], extra=extra)
         return Verdict(outcomes=outcomes, seen=see(self.rig, shot))
 
     def scale(self, method: str, scene: Scene) -> Scale:
@@ -133,19 +133,19 @@ class Judge:
     def _chi2(self, method: str, restored: Restored, shot: Shot) -> float | None:
         if method not in restored.planes:
             return None
-        found = residual(restored.planes[method], shot, self.rig.assumed_lens)
-        return None if found is None else self.scale(method, shot.scene).chi2(found)
+        residuals = residual(restored.planes[method], shot, self.rig.assumed_lens)
+        return None if residuals is None else self.scale(method, shot.scene).chi2(residuals)
 
 
-def judge_of(bundle: Bundle, sizes: tuple[str, ...], before: Bundle | None) -> Judge:
+def judge_of(bundle: Bundle, sizes: tuple[str, ...], earlier_bundle: Bundle | None) -> Judge:
     """Return the judge of a camera that photographs.
 
     Args:
         bundle: What is tested.
         sizes: Of its networks.
-        before: Another bundle of the same camera, whose networks stand beside.
+        earlier_bundle: Another bundle of the same camera, whose networks stand beside.
     """
-    return Judge(Rig(bundle, sizes, before=before))
+    return Judge(Rig(bundle, sizes, earlier_bundle=earlier_bundle))
 
 
 def see(rig: Rig, shot: Shot) -> dict[str, float]:

@@ -11,7 +11,7 @@ from camkit.report.figure import Figure, Panel, chart, new_figure
 from camkit.report.stress.break_point import Break, Grid
 from camkit.report.stress.consistency import LIMIT
 from camkit.report.stress.curve import Curve
-from camkit.report.stress.rig import BEFORE
+from camkit.report.stress.rig import EARLIER_MARK
 
 ROW_IN: Final = 1.7
 LABEL_LETTERS: Final = 18
@@ -37,10 +37,10 @@ def draw_curve(curve: Curve, breaks: Sequence[Break]) -> Figure:
         for method, grid in grids.items():
             _line(axis, curve, method, (grid, common))
         axis.set_ylabel(textwrap.fill(label, LABEL_LETTERS))
-        for found in breaks:
-            if found.point is not None and BEFORE not in found.method:
-                place = _position(curve, found.point)
-                axis.axvline(place, color=_colour(curve, found.method), lw=1, ls=":")
+        for break_point in breaks:
+            if break_point.point is not None and EARLIER_MARK not in break_point.method:
+                place = _position(curve, break_point.point)
+                axis.axvline(place, color=_colour(curve, break_point.method), lw=1, ls=":")
     if len(rows) > 1 and rows[1][0] is curve.chi2:
         axes[1].axhline(LIMIT, color="#b00020", lw=0.8)
         axes[1].set_yscale("log")
@@ -52,24 +52,24 @@ def draw_curve(curve: Curve, breaks: Sequence[Break]) -> Figure:
 
 def _common(grids: Sequence[Grid]) -> Grid:
     """Return how far each scene lies from the others in the mean over the methods."""
-    known = np.stack([np.where(np.isfinite(grid), grid, np.nan) for grid in grids])
+    finite = np.stack([np.where(np.isfinite(grid), grid, np.nan) for grid in grids])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # nothing is known: stays NaN
-        scenes = np.nanmean(known, axis=0)
+        scenes = np.nanmean(finite, axis=0)
         return np.asarray(np.nan_to_num(scenes - np.nanmean(scenes, axis=1, keepdims=True)))
 
 
-def _line(axis: Panel, curve: Curve, method: str, found: tuple[Grid, Grid]) -> None:
-    grid, common = found
-    known = np.isfinite(grid).any(axis=1)
-    if not known.any():
+def _line(axis: Panel, curve: Curve, method: str, grids: tuple[Grid, Grid]) -> None:
+    grid, common = grids
+    finite = np.isfinite(grid).any(axis=1)
+    if not finite.any():
         return
-    x = np.arange(len(curve.values))[known]
-    rows = [row[np.isfinite(row)] for row in grid[known]]
+    x = np.arange(len(curve.values))[finite]
+    rows = [row[np.isfinite(row)] for row in grid[finite]]
     mean = np.array([row.mean() for row in rows])
-    apart = [row[np.isfinite(row)] for row in (grid - common)[known]]
-    error = np.array([row.std() / np.sqrt(row.size) for row in apart])
-    dashed = BEFORE in method
+    deviations = [row[np.isfinite(row)] for row in (grid - common)[finite]]
+    error = np.array([row.std() / np.sqrt(row.size) for row in deviations])
+    dashed = EARLIER_MARK in method
     colour = _colour(curve, method)
     axis.plot(x, mean, "o--" if dashed else "o-", ms=3, lw=1.4, color=colour, label=method)
     axis.fill_between(x, mean - error, mean + error, color=colour, alpha=0.12, lw=0)
@@ -77,7 +77,7 @@ def _line(axis: Panel, curve: Curve, method: str, found: tuple[Grid, Grid]) -> N
 
 def _colour(curve: Curve, method: str) -> str:
     """Return the colour of a method."""
-    namesake = method.removesuffix(f" {BEFORE}")
+    namesake = method.removesuffix(f" {EARLIER_MARK}")
     for names, colours in ((curve.rivals, RIVAL_COLOURS), (curve.judged, JUDGED_COLOURS)):
         if namesake in names:
             return colours[names.index(namesake) % len(colours)]

@@ -103,17 +103,17 @@ def _summary(swept: Sequence[Swept]) -> Table:
     return Table(header=("scenario", "method", "breaks"), rows=rows)
 
 
-def describe_break(curve: Curve, found: Break) -> str:
+def describe_break(curve: Curve, break_point: Break) -> str:
     """Describe where a method breaks on one side."""
-    side = "below" if found.side == "down" else "above"
-    if found.point is None:
-        return f"sound to {curve.label(curve.values[0 if found.side == 'down' else -1])}"
-    reason = REASONS.get(found.reason, found.reason)
+    side = "below" if break_point.side == "down" else "above"
+    if break_point.point is None:
+        return f"sound to {curve.label(curve.values[0 if break_point.side == 'down' else -1])}"
+    reason = REASONS.get(break_point.reason, break_point.reason)
     if curve.scenario.labels:
-        return f"at {curve.label(found.point)} ({reason})"
+        return f"at {curve.label(break_point.point)} ({reason})"
     unit = f" {curve.scenario.unit}".rstrip()
-    low, high = ("∞" if end is None else f"{end:.3g}" for end in found.ci)
-    return f"{side} {found.point:.3g}{unit} [{low} to {high}] ({reason})"
+    low, high = ("∞" if end is None else f"{end:.3g}" for end in break_point.ci)
+    return f"{side} {break_point.point:.3g}{unit} [{low} to {high}] ({reason})"
 
 
 def _ranges(envelope: Mapping[str, Range]) -> Section:
@@ -177,12 +177,12 @@ def worst_place(curve: Curve, method: str) -> tuple[int, int] | None:
         return None
     plain = [curve.psnr_db[m] for m in curve.rivals if m in curve.psnr_db and m != method]
     grid = curve.psnr_db[method] - (np.fmax.reduce(plain) if plain else 0.0)
-    known = np.isfinite(grid)
-    if not known.any():
+    finite = np.isfinite(grid)
+    if not finite.any():
         return None
-    broken = np.flatnonzero(~sound_values(margins(curve, method)) & known.any(axis=1))
+    broken = np.flatnonzero(~sound_values(margins(curve, method)) & finite.any(axis=1))
     if broken.size:
         row = int(min(broken, key=lambda i: abs(i - curve.nominal)))
     else:
-        row = int(np.unravel_index(np.argmin(np.where(known, grid, np.inf)), grid.shape)[0])
-    return row, int(np.argmin(np.where(known[row], grid[row], np.inf)))
+        row = int(np.unravel_index(np.argmin(np.where(finite, grid, np.inf)), grid.shape)[0])
+    return row, int(np.argmin(np.where(finite[row], grid[row], np.inf)))

@@ -57,7 +57,7 @@ class Sweep:
             (scenario, value, scene)
             for scenario in self.scenarios
             for scene in self.scenes
-            for value in scenario.chosen(quick=self.quick)
+            for value in scenario.swept_values(quick=self.quick)
         ]
 
 
@@ -72,10 +72,10 @@ def run_sweep(sweep: Sweep, judge: Examiner, journal: Path | None) -> Iterator[P
     Raises:
         ContractError: If the journal is damaged.
     """
-    done = {} if journal is None else {p.key: p for p in read_points(journal)}
+    finished = {} if journal is None else {p.key: p for p in read_points(journal)}
     for scenario, value, scene in sweep.tasks():
         key = (scenario.name, value, scene.name)
-        point = done.get(key)
+        point = finished.get(key)
         if point is None:
             verdict = scenario.take(judge, scene, value)
             point = Point(scenario=key[0], value=value, scene=key[2], verdict=verdict)

@@ -18,7 +18,7 @@ from camkit.runtime.twin.haze_spread import HazeLens
 from camkit.runtime.twin.light import Lens
 
 
-def through(change: Callable[[Lens, float], Lens]) -> Shoot:
+def through_lens(change: Callable[[Lens, float], Lens]) -> Shoot:
     """Return what photographs through a changed lens; at 0 through the nominal one."""
 
     def shoot(judge: Judge, scene: Scene, value: float) -> Shot:
@@ -35,7 +35,7 @@ def through_haze(change: Callable[[HazeLens, float], HazeLens]) -> Shoot:
         assert lens.haze is not None  # such scenarios are meant for no other bundle
         return replace(lens, haze=change(lens.haze, percent / 100))
 
-    return through(changed)
+    return through_lens(changed)
 
 
 def showing(show: Callable[[Scene, float], Scene], **judged: Any) -> Shoot:
@@ -47,8 +47,8 @@ def showing(show: Callable[[Scene, float], Scene], **judged: Any) -> Shoot:
     """
 
     def shoot(judge: Judge, scene: Scene, value: float) -> Shot:
-        rig, shown = judge.rig, show(scene, value)
-        light = rig.light(shown, None if shown is scene else rig.lens)
+        rig, shown_scene = judge.rig, show(scene, value)
+        light = rig.light(shown_scene, None if shown_scene is scene else rig.lens)
         return replace(rig.record(scene, light), **judged)
 
     return shoot

@@ -58,18 +58,18 @@ def measure(
     """
     inside = np.s_[:, BORDER_PX:-BORDER_PX, BORDER_PX:-BORDER_PX]
     reference = Reference(truth=linear, clipped=clipped, bare=input, nits_per_unit=nits_per_unit)
-    inner = reference.within(inside)
-    found = hdr_scores(result[inside], inner) | guess_scores(inner)
-    found |= _jods(result[inside], inner)
-    return found | {"nits_per_unit": nits_per_unit}
+    inner = reference.cropped(inside)
+    scores = hdr_scores(result[inside], inner) | guess_scores(inner)
+    scores |= _jods(result[inside], inner)
+    return scores | {"nits_per_unit": nits_per_unit}
 
 
 def _jods(result: FloatArray, reference: Reference) -> dict[str, float]:
     if obstacle() is not None:
         return {}
     truth, nits = reference.truth, reference.nits_per_unit
-    shown = {"jod": result, f"jod{ALIGNED}": aligned(result, truth)}
-    return {name: jod(picture, truth, nits) for name, picture in shown.items()}
+    pictures = {"jod": result, f"jod{ALIGNED}": aligned(result, truth)}
+    return {name: jod(picture, truth, nits) for name, picture in pictures.items()}
 
 
 def _notes() -> Mapping[str, str]:

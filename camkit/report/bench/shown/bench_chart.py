@@ -32,7 +32,7 @@ def draw_chart(report: dict[str, Any]) -> Figure | None:
         report: See `camkit.report.bench.run`.
     """
     cameras = [label for label in report["cameras"] if plottable(report["rows"], label)]
-    return _drawn(report, cameras) if cameras and has_matplotlib() else None
+    return _draw_figure(report, cameras) if cameras and has_matplotlib() else None
 
 
 def has_matplotlib() -> bool:
@@ -41,18 +41,18 @@ def has_matplotlib() -> bool:
 
 
 @chart
-def _drawn(report: dict[str, Any], cameras: list[str]) -> Figure:
+def _draw_figure(report: dict[str, Any], cameras: list[str]) -> Figure:
     rows = [row for camera in cameras for row in plottable(report["rows"], camera)]
-    looks, shown = looks_of(cameras, rows), shown_rows(rows)
-    isos = field_isos(shown)
+    looks, panel_rows = looks_of(cameras, rows), shown_rows(rows)
+    isos = field_isos(panel_rows)
     ratios = [FRONT_IN, FIELD_IN] if isos else [FRONT_IN]
     figure = new_figure(WIDTH_IN, sum(ratios))
     grid = figure.add_gridspec(len(ratios), max(len(isos), 1), height_ratios=ratios)
     panel = figure.add_subplot(grid[0, :])
     draw_front_panel(panel, report, rows, looks)
-    _draw_field(figure, [grid[1, column] for column in range(len(isos))], shown, isos, looks)
+    _draw_field(figure, [grid[1, column] for column in range(len(isos))], panel_rows, isos, looks)
     what = (ALL_METHODS if len(cameras) == 1 else BEST_TWO) if isos else ""
-    draw_legend(figure, rows, looks, below=what)
+    draw_legend(figure, rows, looks, lower_text=what)
     # where labels go depends on the layout, and they must not move it again
     figure.canvas.draw()
     figure.set_layout_engine("none")
@@ -117,12 +117,15 @@ def shown_rows(rows: Sequence[Row]) -> list[Row]:
     cameras = dict.fromkeys(row["camera"] for row in plain)
     if len(cameras) == 1:
         return plain
-    found: list[Row] = []
+    best_rows: list[Row] = []
     for camera in cameras:
-        own = [row for row in plain if row["camera"] == camera and row["bundle"] == camera]
-        for group in ([r for r in own if r["size"]], [r for r in own if not r["size"]]):
-            found += sorted(group, key=lambda row: -float(row["psnr_db"]))[:1]
-    return found
+        camera_rows = [row for row in plain if row["camera"] == camera and row["bundle"] == camera]
+        for group in (
+            [r for r in camera_rows if r["size"]],
+            [r for r in camera_rows if not r["size"]],
+        ):
+            best_rows += sorted(group, key=lambda row: -float(row["psnr_db"]))[:1]
+    return best_rows
 
 
 def draw_field_panel(panel: Panel, rows: Sequence[Row], iso: float, looks: Looks) -> None:
@@ -134,12 +137,12 @@ def draw_field_panel(panel: Panel, rows: Sequence[Row], iso: float, looks: Looks
         iso: Sensitivity.
         looks: Of their cameras and methods.
     """
-    done: set[str] = set()
+    cameras: set[str] = set()
     for row in rows:
         cells = _grid(row).get(iso, [])
         color = looks.color(row)
-        if cells and row["camera"] not in done:
-            done.add(row["camera"])
+        if cells and row["camera"] not in cameras:
+            cameras.add(row["camera"])
             _draw_line(panel, cells, "input_psnr_db", color=color, linestyle="--", alpha=0.7)
         _draw_line(panel, cells, "psnr_db", color=color, marker=looks.marker(row), markersize=5)
     panel.set_title(f"ISO {iso:g}", loc="left")
@@ -147,5 +150,5 @@ def draw_field_panel(panel: Panel, rows: Sequence[Row], iso: float, looks: Looks
 
 
 def _draw_line(panel: Panel, cells: Sequence[Cell], key: str, **look: Any) -> None:
-    known = [cell for cell in cells if cell.get(key) is not None]
-    panel.plot([c["field_mm"] for c in known], [c[key] for c in known], linewidth=1.2, **look)
+    points = [cell for cell in cells if cell.get(key) is not None]
+    panel.plot([c["field_mm"] for c in points], [c[key] for c in points], linewidth=1.2, **look)

@@ -13,7 +13,7 @@ from camkit.report.bench.timed.timing import LEAST_N_OF_P99, NOISY_LOAD, NOISY_S
 from camkit.report.pages.page import Cell, Page, Part, Picture, Section, Table, Words
 
 
-class Shown(NamedTuple):
+class TableColumn(NamedTuple):
     """A column of the table: head, key of the row, format of a number, what it means."""
 
     head: str
@@ -23,35 +23,39 @@ class Shown(NamedTuple):
 
 
 COLUMNS: Final = (
-    Shown("method", "label", "", "a size of network, or the name of a method"),
-    Shown("PSNR dB", "psnr_db", ".2f", "mean over pictures, on sRGB values"),
-    Shown("SSIM", "ssim", ".3f", "mean over pictures, on sRGB values"),
-    Shown("MTF 0.25", "mtf_025", ".2f", "of an edge on the axis, at 0.25 cycles per pixel"),
-    Shown("MTF 0.5", "mtf_050", ".2f", "likewise at 0.5, the finest that pixels can show"),
-    Shown(
+    TableColumn("method", "label", "", "a size of network, or the name of a method"),
+    TableColumn("PSNR dB", "psnr_db", ".2f", "mean over pictures, on sRGB values"),
+    TableColumn("SSIM", "ssim", ".3f", "mean over pictures, on sRGB values"),
+    TableColumn("MTF 0.25", "mtf_025", ".2f", "of an edge on the axis, at 0.25 cycles per pixel"),
+    TableColumn("MTF 0.5", "mtf_050", ".2f", "likewise at 0.5, the finest that pixels can show"),
+    TableColumn(
         "over base dB", "over_base_psnr_db", "+.2f", "mean over pictures of the gain over size M"
     ),
-    Shown("+-", "over_base_se_psnr_db", ".2f", "standard error of that gain over pictures"),
-    Shown("s", "seconds_median", ".2f", "median, file to EXR in a fresh process"),
-    Shown("p90 s", "seconds_p90", ".2f", "0.9 quantile, interpolated where processes are few"),
-    Shown("min s", "seconds_min", ".2f", "the fastest process"),
-    Shown("n", "n", "d", "processes measured"),
-    Shown("ratio", "seconds_ratio", ".2f", "seconds over those of size M, by rounds"),
-    Shown("steady s", "steady_seconds_median", ".2f", "the next file in the same process"),
-    Shown("CPU s", "cpu_seconds_median", ".2f", "processor time of the first file, all threads"),
-    Shown("MP/s", "mp_per_s", ".2f", "megapixels per second, from the median"),
-    Shown("s per 24 MP", "s_per_24mp", ".1f", "the median scaled to 24 megapixels"),
-    Shown("peak MB", "peak_rss_mb", ".0f", "memory of the process and its children"),
-    Shown("MAC/px", "mac_per_px", ".0f", "multiply-adds of the network per pixel"),
-    Shown("of GEMM", "share_of_gemm_peak", ".0%", "network speed over the matrix product's"),
-    Shown("threads", "threads", "d", "threads in all"),
-    Shown("noisy", "noisy", "", "the seconds are not to be trusted to a few per cent"),
+    TableColumn("+-", "over_base_se_psnr_db", ".2f", "standard error of that gain over pictures"),
+    TableColumn("s", "seconds_median", ".2f", "median, file to EXR in a fresh process"),
+    TableColumn(
+        "p90 s", "seconds_p90", ".2f", "0.9 quantile, interpolated where processes are few"
+    ),
+    TableColumn("min s", "seconds_min", ".2f", "the fastest process"),
+    TableColumn("n", "n", "d", "processes measured"),
+    TableColumn("ratio", "seconds_ratio", ".2f", "seconds over those of size M, by rounds"),
+    TableColumn("steady s", "steady_seconds_median", ".2f", "the next file in the same process"),
+    TableColumn(
+        "CPU s", "cpu_seconds_median", ".2f", "processor time of the first file, all threads"
+    ),
+    TableColumn("MP/s", "mp_per_s", ".2f", "megapixels per second, from the median"),
+    TableColumn("s per 24 MP", "s_per_24mp", ".1f", "the median scaled to 24 megapixels"),
+    TableColumn("peak MB", "peak_rss_mb", ".0f", "memory of the process and its children"),
+    TableColumn("MAC/px", "mac_per_px", ".0f", "multiply-adds of the network per pixel"),
+    TableColumn("of GEMM", "share_of_gemm_peak", ".0%", "network speed over the matrix product's"),
+    TableColumn("threads", "threads", "d", "threads in all"),
+    TableColumn("noisy", "noisy", "", "the seconds are not to be trusted to a few per cent"),
 )
 
 HDR_COLUMNS: Final = (
-    Shown("HDR dB", "hdr_psnr_db", ".2f", "mean over pictures, linear, with its peak at 2^8"),
-    Shown("stops", "stops_rmse", ".2f", "RMS of log2 above white, mean over pictures"),
-    Shown("unclipped dB", "unclipped_psnr_db", ".2f", "where the capture is not clipped"),
+    TableColumn("HDR dB", "hdr_psnr_db", ".2f", "mean over pictures, linear, with its peak at 2^8"),
+    TableColumn("stops", "stops_rmse", ".2f", "RMS of log2 above white, mean over pictures"),
+    TableColumn("unclipped dB", "unclipped_psnr_db", ".2f", "where the capture is not clipped"),
 )
 """Where a camera is judged by high dynamic range."""
 
@@ -94,7 +98,7 @@ def bench_page(result: Result, chart_svg: str | None) -> Page:
         chart_svg: The chart; None if there is none.
     """
     report = result.report
-    drawn = Words(NO_CHART, "small") if chart_svg is None else Picture("", chart_svg)
+    chart = Words(NO_CHART, "small") if chart_svg is None else Picture("", chart_svg)
     sections = []
     for camera in report["cameras"]:
         sections += [_rows(report, camera), split_section(report, camera)]
@@ -103,7 +107,7 @@ def bench_page(result: Result, chart_svg: str | None) -> Page:
     sections += [_machine(report), _reading()]
     return Page(
         title=f"camkit bench: {', '.join(report['cameras'])}",
-        lead=[*(summary(report, camera) for camera in report["cameras"]), drawn],
+        lead=[*(summary(report, camera) for camera in report["cameras"]), chart],
         sections=[section for section in sections if section is not None],
     )
 
@@ -113,22 +117,26 @@ def summary(report: dict[str, Any], camera: str) -> str:
     rows = [row for row in report["rows"] if row["camera"] == camera]
     facts = report["cameras"][camera]
     scored = [row for row in rows if row.get("psnr_db") is not None and row["kind"] != "develop"]
-    own = [row for row in scored if row["bundle"] == camera]
+    bundle_rows = [row for row in scored if row["bundle"] == camera]
     text = (
         f"Captures of {facts['width']} x {facts['height']} px ({facts['capture']}); accuracy on "
         f"{facts['accuracy']}. Bundle {facts['bundle_sha256'][:12]}."
     )
-    if not own:
+    if not bundle_rows:
         return text
-    best = max(own, key=lambda row: row["psnr_db"])
+    best = max(bundle_rows, key=lambda row: row["psnr_db"])
     text += f" Best of {camera}: {_in_words(best)}"
     if best["input_psnr_db"] is not None:
         text += f", {best['psnr_db'] - best['input_psnr_db']:+.2f} dB over the input"
-    near = [r for r in own if _psnr(r) > _psnr(best) - TIE_DB and r["seconds_median"] is not None]
+    near = [
+        r
+        for r in bundle_rows
+        if _psnr(r) > _psnr(best) - TIE_DB and r["seconds_median"] is not None
+    ]
     fastest = min(near, key=lambda row: float(row["seconds_median"]), default=best)
     if fastest is not best:
         text += f". The fastest within {TIE_DB:g} dB of it: {_in_words(fastest)}"
-    classical = [row for row in own if row["kind"] == "classical" and row is not best]
+    classical = [row for row in bundle_rows if row["kind"] == "classical" and row is not best]
     if classical:
         text += f". Best classical method: {_in_words(max(classical, key=_psnr))}"
     return text + "."
@@ -163,7 +171,7 @@ def _rows(report: dict[str, Any], camera: str) -> Section:
     return Section(f"{camera}: every row", (words, table, *failed))
 
 
-def _cell(row: Row, column: Shown) -> str | Cell:
+def _cell(row: Row, column: TableColumn) -> str | Cell:
     value = row.get(column.key)
     if value is None:
         return "-"
@@ -217,11 +225,11 @@ def _heads(rows: Iterable[Row], name: str, head: Callable[[Group], str]) -> list
 
 
 def _accuracy(group: Group | None) -> str | Cell:
-    shown = [] if group is None else [(group.get(key), form) for key, form in MEASURES]
-    known = [(value, form) for value, form in shown if value is not None][:2]
-    if not known:
+    pairs = [] if group is None else [(group.get(key), form) for key, form in MEASURES]
+    measures = [(value, form) for value, form in pairs if value is not None][:2]
+    if not measures:
         return "-"
-    return Cell(text=" / ".join(format(v, form) for v, form in known), value=known[0][0])
+    return Cell(text=" / ".join(format(v, form) for v, form in measures), value=measures[0][0])
 
 
 def tuning_section(tuning: Iterable[Mapping[str, Any]]) -> Section | None:

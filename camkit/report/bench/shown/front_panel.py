@@ -13,7 +13,9 @@ if TYPE_CHECKING:
     from matplotlib.transforms import Bbox
 
 FRONT_ALPHA: Final = 0.35
-APART: Final = "not judged on the same pictures: compare methods of one camera, not cameras"
+NOT_COMPARABLE: Final = (
+    "not judged on the same pictures: compare methods of one camera, not cameras"
+)
 FEW_TICKS_FROM: Final = 20.0
 """Ratio of the ends of the time axis from which on fewer ticks are told."""
 
@@ -53,11 +55,11 @@ def draw_front_panel(panel: Panel, report: dict[str, Any], rows: list[Row], look
     seconds = [seconds_per_mp(row) for row in (*rows, *alone)]
     panel.set(xscale="log", xlim=(min(seconds) / 1.5, max(seconds) * 1.8))
     for camera, color in looks.colors.items():
-        own = [row for row in rows if row["camera"] == camera]
-        level = input_level(own)
+        camera_rows = [row for row in rows if row["camera"] == camera]
+        level = input_level(camera_rows)
         if level is not None:
             panel.axhline(level, color=color, linestyle="--", linewidth=1, alpha=0.7)
-        _draw_front(panel, own, color)
+        _draw_front(panel, camera_rows, color)
     for row in rows:
         _draw_point(panel, row, looks)
     for row in alone:
@@ -89,7 +91,7 @@ def title(report: dict[str, Any], rows: Sequence[Row]) -> str:
     else:
         lines = [f"{camera}: {text}" for camera, text in texts.items()]
     if len({report["cameras"][camera]["accuracy"] for camera in cameras}) > 1:
-        lines.append(APART)
+        lines.append(NOT_COMPARABLE)
     noisy = sum(bool(row["noisy"]) for row in rows)
     if noisy:
         lines.append(f"{noisy} of {len(rows)} times are noisy")
@@ -171,11 +173,11 @@ def _tidy_axis(panel: Panel) -> None:
 
 def label_front_panel(panel: Panel, rows: Sequence[Row], looks: Looks) -> None:
     """Write beside every marker what it is, and at every input line whose it is."""
-    taken = [box for row in rows for box in _drawn_boxes(panel, row)]
+    obstacles = [box for row in rows for box in _drawn_boxes(panel, row)]
     inputs = _input_labels(panel, rows, looks)
-    taken += [_line_box(panel, label.point[1]) for label in inputs]
+    obstacles += [_line_box(panel, label.point[1]) for label in inputs]
     ordered = sorted(rows, key=lambda r: (r["variant"], seconds_per_mp(r)))
-    place_labels(panel, [*inputs, *map(_label(looks), ordered)], taken)
+    place_labels(panel, [*inputs, *map(_label(looks), ordered)], obstacles)
 
 
 def _label(looks: Looks) -> Any:
@@ -195,12 +197,12 @@ def _label(looks: Looks) -> Any:
 
 
 def _input_labels(panel: Panel, rows: Sequence[Row], looks: Looks) -> list[Label]:
-    found = []
+    labels = []
     for camera, color in looks.colors.items():
         level = input_level([row for row in rows if row["camera"] == camera])
         if level is not None:
             name = "input" if len(looks.colors) == 1 else f"{camera} input"
-            found.append(
+            labels.append(
                 Label(
                     text=f"{name} {level:.2f} dB",
                     point=(panel.get_xlim()[1], level),
@@ -209,7 +211,7 @@ def _input_labels(panel: Panel, rows: Sequence[Row], looks: Looks) -> list[Label
                     size_pt=7.5,
                 )
             )
-    return found
+    return labels
 
 
 def _line_box(panel: Panel, level: float) -> "Bbox":

@@ -19,8 +19,8 @@ class Place(NamedTuple):
 
     x_pt: float
     y_pt: float
-    across: str
-    up: str
+    x_align: str
+    y_align: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,20 +48,20 @@ class Label:
 
 def places_around(reach_pt: float) -> list[Place]:
     """Return places around a marker, the best ones first."""
-    found: list[Place] = []
+    places: list[Place] = []
     for gap in (NEAR_PT, 11.0, FAR_PT, 35.0, 53.0, 75.0, 100.0):
-        far = reach_pt + gap
-        found += [
-            Place(0.7 * far, 0.7 * far, "left", "bottom"),
-            Place(far, 0, "left", "center"),
-            Place(0.7 * far, -0.7 * far, "left", "top"),
-            Place(0, far, "center", "bottom"),
-            Place(0, -far, "center", "top"),
-            Place(-0.7 * far, 0.7 * far, "right", "bottom"),
-            Place(-far, 0, "right", "center"),
-            Place(-0.7 * far, -0.7 * far, "right", "top"),
+        offset_pt = reach_pt + gap
+        places += [
+            Place(0.7 * offset_pt, 0.7 * offset_pt, "left", "bottom"),
+            Place(offset_pt, 0, "left", "center"),
+            Place(0.7 * offset_pt, -0.7 * offset_pt, "left", "top"),
+            Place(0, offset_pt, "center", "bottom"),
+            Place(0, -offset_pt, "center", "top"),
+            Place(-0.7 * offset_pt, 0.7 * offset_pt, "right", "bottom"),
+            Place(-offset_pt, 0, "right", "center"),
+            Place(-0.7 * offset_pt, -0.7 * offset_pt, "right", "top"),
         ]
-    return found
+    return places
 
 
 def places_along(step_pt: float = 45.0, count: int = 8) -> list[Place]:
@@ -70,22 +70,22 @@ def places_along(step_pt: float = 45.0, count: int = 8) -> list[Place]:
     return [p for x in ends for p in (Place(x, 2, "right", "bottom"), Place(x, -2, "right", "top"))]
 
 
-def place_labels(panel: Panel, labels: Sequence[Label], taken: "list[Bbox]") -> None:
+def place_labels(panel: Panel, labels: Sequence[Label], obstacles: "list[Bbox]") -> None:
     """Draw labels, each where it shares least with what is taken and with the ones before it.
 
     Args:
         panel: With its final limits and layout.
         labels: In the order in which they choose.
-        taken: Boxes on the canvas that nothing should cover; the labels' own are added.
+        obstacles: Boxes on the canvas that nothing should cover; the labels' own are added.
     """
     for label in labels:
         size_px = _text_size_px(panel, label)
         x, y = panel.transData.transform(label.point)
         boxes = [_box_at((x, y), p, size_px, panel.figure.dpi) for p in label.places]
-        costs = [_overlap(box, taken, panel.bbox) for box in boxes]
+        costs = [_overlap(box, obstacles, panel.bbox) for box in boxes]
         best = costs.index(min(costs))
         _draw(panel, label, label.places[best])
-        taken.append(boxes[best])
+        obstacles.append(boxes[best])
 
 
 def _text_size_px(panel: Panel, label: Label) -> tuple[float, float]:
@@ -111,8 +111,8 @@ def _draw(panel: Panel, label: Label, place: Place) -> None:
         label.point,
         xytext=place[:2],
         textcoords="offset points",
-        ha=place.across,
-        va=place.up,
+        ha=place.x_align,
+        va=place.y_align,
         fontsize=label.size_pt,
         fontweight=_weight(label),
         color=label.color,
@@ -134,15 +134,15 @@ def _box_at(
     from matplotlib.transforms import Bbox
 
     shares = {"left": 0.0, "bottom": 0.0, "center": 0.5, "right": 1.0, "top": 1.0}
-    left = point_px[0] + place.x_pt * dpi / 72 - shares[place.across] * size_px[0]
-    low = point_px[1] + place.y_pt * dpi / 72 - shares[place.up] * size_px[1]
-    return Bbox.from_extents(left, low, left + size_px[0], low + size_px[1])
+    x_px = point_px[0] + place.x_pt * dpi / 72 - shares[place.x_align] * size_px[0]
+    y_px = point_px[1] + place.y_pt * dpi / 72 - shares[place.y_align] * size_px[1]
+    return Bbox.from_extents(x_px, y_px, x_px + size_px[0], y_px + size_px[1])
 
 
-def _overlap(box: "Bbox", taken: Sequence["Bbox"], inside: "Bbox") -> float:
+def _overlap(box: "Bbox", obstacles: Sequence["Bbox"], inside: "Bbox") -> float:
     """Return the area that a box shares with others, and that lies outside the panel."""
-    own = float(box.width * box.height)
-    return own - _shared(box, inside) + sum(_shared(box, other) for other in taken)
+    area = float(box.width * box.height)
+    return area - _shared(box, inside) + sum(_shared(box, other) for other in obstacles)
 
 
 def _shared(one: "Bbox", other: "Bbox") -> float:

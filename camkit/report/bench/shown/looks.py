@@ -72,11 +72,11 @@ class Looks:
 def looks_of(cameras: Sequence[str], rows: Iterable[Row]) -> Looks:
     """Return every camera a colour and every method a marker; where they run out, they repeat."""
     names = dict.fromkeys(method_name(row) for row in rows)
-    known = [name for name in MARKERS if name in names]
+    common = [name for name in MARKERS if name in names]
     others = [name for name in names if name not in MARKERS]
     return Looks(
         colors={c: CAMERA_COLORS[n % len(CAMERA_COLORS)] for n, c in enumerate(cameras)},
-        markers={name: MARKERS[name] for name in known}
+        markers={name: MARKERS[name] for name in common}
         | {name: SPARE_MARKERS[n % len(SPARE_MARKERS)] for n, name in enumerate(others)},
     )
 
@@ -102,14 +102,14 @@ def seconds_per_mp(row: Row, key: str = "seconds_median") -> float:
     return float(1e6 * row[key] / (row["width"] * row["height"]))
 
 
-def draw_legend(figure: Figure, rows: Sequence[Row], looks: Looks, *, below: str) -> None:
+def draw_legend(figure: Figure, rows: Sequence[Row], looks: Looks, *, lower_text: str) -> None:
     """Draw it to the right of all panels.
 
     Args:
         figure: With a layout that keeps room for it.
         rows: Those that are drawn.
         looks: Of their cameras and methods.
-        below: What the lower panels show; empty where there are none.
+        lower_text: What the lower panels show; empty where there are none.
     """
     entries = [_text(CAMERA), *(_line(color, name) for name, color in looks.colors.items())]
     entries.append(_text(METHOD))
@@ -121,8 +121,8 @@ def draw_legend(figure: Figure, rows: Sequence[Row], looks: Looks, *, below: str
     if any(row.get("gain_se_psnr_db") for row in rows):
         entries.append(_line(GREY, "+-1 standard error\nof the gain", width=1, marker="_"))
     entries.append(_dot("#bbbbbb", "o", "1 GB peak memory", size_pt2=AREA_PER_GB))
-    if below:
-        entries += [_text(LOWER), _text(below)]
+    if lower_text:
+        entries += [_text(LOWER), _text(lower_text)]
     legend = figure.legend(handles=entries, loc="outside right upper", labelspacing=0.55)
     for text in legend.get_texts():
         if text.get_text() in {CAMERA, METHOD, LINES, LOWER}:

@@ -64,9 +64,9 @@ def timed_capture(
     if optics is not None and optics.type == "hazy_psf":
         lens = f"{lens} {manifest.members[optics.haze_member].sha256}"
     depth_mm = None if optics is None else bundle.reference_depth_mm
-    shown = hashlib.sha256(photo.read_bytes()).hexdigest() if photo else SCENE_TEXT
+    scene_key = hashlib.sha256(photo.read_bytes()).hexdigest() if photo else SCENE_TEXT
     camera = (manifest.kind, manifest.sensor.model_dump_json(), lens, depth_mm)
-    parts = (*camera, width, height, shown, _VERSION)
+    parts = (*camera, width, height, scene_key, _VERSION)
     key = hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
     path = folder / f"{bundle.manifest.name}-{width}x{height}-{key}{part.suffixes[0]}"
     if not path.is_file():

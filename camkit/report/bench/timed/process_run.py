@@ -90,7 +90,7 @@ def run_job(job: Job) -> Run:
     """Run a job in a fresh process, which is ended with all its children if we are interrupted."""
     command = [sys.executable, "-P", "-m", "camkit.report.bench.timed.worker", job.to_json()]
     with tempfile.TemporaryFile() as complaints:
-        before, began = _busy_s(), time.perf_counter()
+        busy_start_s, began = _busy_s(), time.perf_counter()
         with subprocess.Popen(
             command,
             stdin=subprocess.DEVNULL,
@@ -102,7 +102,7 @@ def run_job(job: Job) -> Run:
             timer = threading.Timer(TIMEOUT_S, _end, (child,))
             timer.start()
             try:
-                run = _follow(child, began, before)
+                run = _follow(child, began, busy_start_s)
             finally:
                 expired = not timer.is_alive()
                 timer.cancel()
@@ -133,7 +133,7 @@ def _follow(child: subprocess.Popen[bytes], began: float, busy_before: float | N
     failed = next((r["error"] for r in records if r["status"] != "ok"), None)
     if failed is not None or not records or child.wait():
         return Run(error=failed or SILENT)
-    own = records[0]["peak_rss_mb"]
+    worker_peak_mb = records[0]["peak_rss_mb"]
     cpu = [record["cpu_s"] for record in records]
     return Run(
         seconds=arrivals[0] - began,
@@ -141,7 +141,7 @@ def _follow(child: subprocess.Popen[bytes], began: float, busy_before: float | N
         stages=records[0]["seconds"],
         steady_s=_steps(arrivals),
         steady_cpu_s=_steps(cpu),
-        peak_rss_mb=max(own, watch.peak_mb) or None,
+        peak_rss_mb=max(worker_peak_mb, watch.peak_mb) or None,
         load_of_others=load,
     )
 
@@ -162,8 +162,8 @@ def child_environment() -> dict[str, str]:
     environment = dict(os.environ)
     root = str(Path(camkit.__file__).resolve().parents[1])
     if not root.endswith(("site-packages", "dist-packages")):
-        known = environment.get("PYTHONPATH")
-        environment["PYTHONPATH"] = os.pathsep.join([*([known] if known else []), root])
+        paths = environment.get("PYTHONPATH")
+        environment["PYTHONPATH"] = os.pathsep.join([*([paths] if paths else []), root])
     return environment
 
 

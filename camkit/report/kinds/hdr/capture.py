@@ -44,8 +44,8 @@ def photograph(shot: Shot, scene: FloatArray, bundle: Bundle, lens: FrozenOptics
         bare lens as it is developed; `clipped`, what clipped in either of the two captures.
     """
     ended = np.minimum(scene, np.float32(CEILING))
-    without = FrozenOptics(psf=bare_psf(bundle))
-    coded, bare = (expose(shot, ended, bundle, optics) for optics in (lens, without))
+    bare_optics = FrozenOptics(psf=bare_psf(bundle))
+    coded, bare = (expose(shot, ended, bundle, optics) for optics in (lens, bare_optics))
     pipeline = developer(bundle, available_threads(None))
     captures = [capture_of(pipeline, exposed.simulation) for exposed in (coded, bare)]
     extras = {

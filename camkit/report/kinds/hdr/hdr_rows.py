@@ -60,7 +60,7 @@ def _set_to(setting: Callable[[float], Setting]) -> Shoot:
     return shoot
 
 
-def _behind(change: Callable[[StreakOptics, float], StreakOptics]) -> Shoot:
+def _through_streaks(change: Callable[[StreakOptics, float], StreakOptics]) -> Shoot:
     """Return what photographs the lights of a scene behind changed streaks; at 0 as they are."""
 
     def shoot(judge: HdrJudge, scene: Scene, value: float) -> HdrShot:
@@ -83,26 +83,26 @@ def _one_lamp(judge: HdrJudge, scene: Scene, value: float) -> HdrShot:
 def _surrounded(scene: Scene, lit: FloatArray, lamps: int) -> FloatArray:
     """Return a scene and what lies around it: its mirror image, and lamps."""
     ring, scale = RING_PX * scene.scale, scene.scale
-    around = np.pad(lit, ((0, 0), (ring, ring), (ring, ring)), mode="symmetric")
+    canvas = np.pad(lit, ((0, 0), (ring, ring), (ring, ring)), mode="symmetric")
     height, width = lit.shape[1:]
     rng = np.random.default_rng(7_300 + scene.number)
     for _ in range(lamps):
-        away = scale * rng.uniform(NEAREST_PX, FARTHEST_PX)
-        along = rng.uniform(0.1, 0.9)
+        distance_px = scale * rng.uniform(NEAREST_PX, FARTHEST_PX)
+        share = rng.uniform(0.1, 0.9)
         sides = (
-            (-away, along * width),
-            (height + away, along * width),
-            (along * height, -away),
-            (along * height, width + away),
+            (-distance_px, share * width),
+            (height + distance_px, share * width),
+            (share * height, -distance_px),
+            (share * height, width + distance_px),
         )
         y, x = sides[int(rng.integers(4))]
-        around = with_lamp(around, (y + ring, x + ring), scale * OUTSIDE_PX, POWER)
-    return around
+        canvas = with_lamp(canvas, (y + ring, x + ring), scale * OUTSIDE_PX, POWER)
+    return canvas
 
 
 def _lamps_outside(judge: HdrJudge, scene: Scene, value: float) -> HdrShot:
     lit = judge.lit(scene)
-    return judge.shoot(lit, around=_surrounded(scene, lit.linear, round(value)))
+    return judge.shoot(lit, surroundings=_surrounded(scene, lit.linear, round(value)))
 
 
 def _peak(judge: HdrJudge, scene: Scene, value: float) -> HdrShot:
@@ -123,9 +123,9 @@ def _panelled(dark: FloatArray, share: float, to_px: float, scale: int) -> Float
     height, width = dark.shape[1:]
     middle = (height - 1) / 2, (width - 1) / 2
     y, x = np.ogrid[:height, :width]
-    far = np.hypot(y - middle[0], x - middle[1])
+    radius_px = np.hypot(y - middle[0], x - middle[1])
     turn = np.arctan2(y - middle[0], x - middle[1]) / (2 * np.pi) % 1
-    panel = (far > PANEL_FROM_PX * scale) & (far <= to_px) & (turn < share)
+    panel = (radius_px > PANEL_FROM_PX * scale) & (radius_px <= to_px) & (turn < share)
     return with_lamp(np.where(panel, np.float32(PANEL), dark), middle, LAMP_PX * scale, POWER)
 
 
@@ -195,7 +195,7 @@ SCENARIOS: Final = (
     _hdr_row(
         *("plate_rotation", "Rotation of the plate", "rotation_deg", "deg"),
         "[0] 0.25 0.5 (1) 1.5 2",
-        shoot=_behind(lambda streaks, deg: turned(streaks, math.radians(deg))),
+        shoot=_through_streaks(lambda streaks, deg: turned(streaks, math.radians(deg))),
         note="The methods have the arms as the bundle states them.",
     ),
     _hdr_row(
@@ -230,7 +230,7 @@ SCENARIOS: Final = (
     _hdr_row(
         *("wrong_depth", "Focus at another distance", "length_percent", "%"),
         "-10 (-5) -2 [0] 2 (5) 10",
-        shoot=_behind(lambda streaks, percent: stretched(streaks, 1 + percent / 100)),
+        shoot=_through_streaks(lambda streaks, percent: stretched(streaks, 1 + percent / 100)),
         note="By so much the arms are longer than the bundle says. A 50 mm lens refocused from 5 "
         "m to 1 m makes them 4.2 % longer, one refocused to infinity 1 % shorter.",
     ),

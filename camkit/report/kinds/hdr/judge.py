@@ -113,7 +113,7 @@ class HdrJudge:
         *,
         lens: Lens | None = None,
         setting: Setting | None = None,
-        around: FloatArray | None = None,
+        surroundings: FloatArray | None = None,
     ) -> HdrShot:
         """Photograph a scene with and without the plate.
 
@@ -121,16 +121,16 @@ class HdrJudge:
             scene: What is in the picture.
             lens: With its plate, as it really is; None for the one that the bundle knows.
             setting: Of the camera.
-            around: (3, h', w') linear Rec.709: the scene with as much on every side of it; None
-                where it goes on as its mirror image.
+            surroundings: (3, h', w') linear Rec.709: the scene with as much on every side of it;
+                None where it goes on as its mirror image.
         """
-        is_nominal = lens is None and around is None
+        is_nominal = lens is None and surroundings is None
         if is_nominal and self._last is not None and self._last[0] is scene:
             coded, bare = self._last[1]
         else:
-            seen = scene.linear if around is None else around
+            light_map = scene.linear if surroundings is None else surroundings
             lenses = (lens, self._bare_lens)
-            coded, bare = (self.rig.light_amid(scene, seen, each) for each in lenses)
+            coded, bare = (self.rig.light_amid(scene, light_map, each) for each in lenses)
             self._last = (scene, (coded, bare)) if is_nominal else self._last
         return HdrShot(
             coded=self.rig.record(scene, coded, setting),
@@ -175,35 +175,39 @@ class HdrJudge:
     def _outcomes(self, shot: HdrShot) -> dict[str, Outcome]:
         pictures, faults = self._restored(shot)
         compare = _Comparison(shot)
-        given = compare.outcome(pictures[INPUT])
+        input_outcome = compare.outcome(pictures[INPUT])
         outcomes = {name: Outcome(psnr_db=None, fault=fault) for name, fault in faults.items()}
         for name, picture in pictures.items():
             least = compare.errors(pictures[INPUT]) if name != INPUT else 0.0
-            found = compare.outcome(picture, least)
-            fault = found.fault if name == INPUT else found.fault or shortfall(found, given)
-            outcomes[name] = replace(found, fault=fault)
+            outcome = compare.outcome(picture, least)
+            fault = (
+                outcome.fault
+                if name == INPUT
+                else outcome.fault or shortfall(outcome, input_outcome)
+            )
+            outcomes[name] = replace(outcome, fault=fault)
         return {name: outcomes[name] for name in self.methods if name in outcomes}
 
 
-def shortfall(found: Outcome, given: Outcome) -> str | None:
+def shortfall(outcome: Outcome, input_outcome: Outcome) -> str | None:
     """Return how far a result lies below the input, where that is a fault; else None."""
-    if found.psnr_db is None or given.psnr_db is None:
+    if outcome.psnr_db is None or input_outcome.psnr_db is None:
         return None
-    lost_db = given.psnr_db - found.psnr_db
-    if lost_db <= TIE_DB or found.psnr_db >= GOOD_DB:
+    lost_db = input_outcome.psnr_db - outcome.psnr_db
+    if lost_db <= TIE_DB or outcome.psnr_db >= GOOD_DB:
         return None
-    return f"{lost_db:.1f} dB below the input, at {found.psnr_db:.1f} dB"
+    return f"{lost_db:.1f} dB below the input, at {outcome.psnr_db:.1f} dB"
 
 
-def hdr_judge_of(bundle: Bundle, sizes: tuple[str, ...], before: Bundle | None) -> HdrJudge:
+def hdr_judge_of(bundle: Bundle, sizes: tuple[str, ...], earlier_bundle: Bundle | None) -> HdrJudge:
     """Return the judge of a snapshot HDR camera.
 
     Args:
         bundle: What is tested.
         sizes: Of its networks.
-        before: Another bundle of the same camera, whose networks stand beside.
+        earlier_bundle: Another bundle of the same camera, whose networks stand beside.
     """
-    return HdrJudge(Rig(bundle, sizes, before=before))
+    return HdrJudge(Rig(bundle, sizes, earlier_bundle=earlier_bundle))
 
 
 class _Comparison:
@@ -231,10 +235,10 @@ class _Comparison:
             return Outcome(psnr_db=None, fault="NaN or inf in the picture")
         got, truth = picture[self._inside], self._truth[self._inside]
         squared = np.square(got.astype(np.float64) - truth)
-        kept = ~self._clipped[self._inside[1:]]
+        unclipped = ~self._clipped[self._inside[1:]]
         extra = {}
-        if kept.any():
-            extra["unclipped_psnr_db"] = psnr_db(float(squared[:, kept].mean()))
+        if unclipped.any():
+            extra["unclipped_psnr_db"] = psnr_db(float(squared[:, unclipped].mean()))
         stops = stops_rmse(got, truth)
         return Outcome(
             psnr_db=psnr_db(float(squared.mean()), CEILING),

@@ -64,9 +64,11 @@ def with_lamp(
         power: In times white, in its middle.
     """
     y, x = np.ogrid[: linear.shape[1], : linear.shape[2]]
-    far = np.hypot(y - centre_px[0], x - centre_px[1]).astype(np.float32)
-    cover = np.clip(np.float32(radius_px + 0.5) - far, 0, 1)
-    light = np.float32(power) * (1 - np.float32(_LIMB) * np.minimum(far / radius_px, 1) ** 2)
+    distance_px = np.hypot(y - centre_px[0], x - centre_px[1]).astype(np.float32)
+    cover = np.clip(np.float32(radius_px + 0.5) - distance_px, 0, 1)
+    light = np.float32(power) * (
+        1 - np.float32(_LIMB) * np.minimum(distance_px / radius_px, 1) ** 2
+    )
     return np.asarray(linear + cover * (light - linear), np.float32)
 
 

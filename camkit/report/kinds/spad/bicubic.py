@@ -34,9 +34,9 @@ def _finer(lines: NDArray[np.float64], grid: Grid) -> NDArray[np.float64]:
     """Make an array finer along its first axis."""
     scale, count = grid.scale, len(lines)
     wide = np.pad(lines, ((REACH, REACH), (0, 0)), mode="edge")
-    beside = (np.arange(scale) - grid.phase) / scale
-    weights = cubic(beside[:, None] - np.arange(-REACH, REACH + 1))
-    found = np.zeros((count, scale, lines.shape[1]))
+    offsets = (np.arange(scale) - grid.phase) / scale
+    weights = cubic(offsets[:, None] - np.arange(-REACH, REACH + 1))
+    samples = np.zeros((count, scale, lines.shape[1]))
     for number, column in enumerate(weights.T):
-        found += column[:, None] * wide[number : number + count, None]
-    return found.reshape(count * scale, -1)
+        samples += column[:, None] * wide[number : number + count, None]
+    return samples.reshape(count * scale, -1)

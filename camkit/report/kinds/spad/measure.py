@@ -47,37 +47,39 @@ def measure(bundle: Bundle, settings: OwnSettings, tell: Tell) -> OwnRows:
     ways = ways_of(bundle, sizes, baselines.cameras)
     levels = QUICK_LEVELS if settings.quick else LEVELS
 
-    def told(text: str) -> None:
+    def report(text: str) -> None:
         tell(f"{name}: {text}")
 
-    rows = list(picture_rows(pictures, ways, camera.grid, levels, told))
+    rows = list(picture_rows(pictures, ways, camera.grid, levels, report))
     if camera.sensor.time_bins:
-        rows += timing_rows(settings.repeat, told, quick=settings.quick)
+        rows += timing_rows(settings.repeat, report, quick=settings.quick)
     else:
         skips.append(Skip(what="times of flight", reason="the array has no time bins"))
-    for found in seconds_rows(bundle, sizes, settings.repeat, told):
-        if isinstance(found, Skip):
-            skips.append(found)
+    for row in seconds_rows(bundle, sizes, settings.repeat, report):
+        if isinstance(row, Skip):
+            skips.append(row)
         else:
-            rows.append(found)
-    beside = {id(other.bundle): other.bundle for other in baselines.cameras.values()}
-    return OwnRows(rows=rows, skips=skips, beside=tuple(beside.values()))
+            rows.append(row)
+    other_bundles = {id(other.bundle): other.bundle for other in baselines.cameras.values()}
+    return OwnRows(rows=rows, skips=skips, other_bundles=tuple(other_bundles.values()))
 
 
-def _sizes(camera: FineCamera, asked: Sequence[str] | None) -> tuple[tuple[str, ...], list[Skip]]:
+def _sizes(
+    camera: FineCamera, requested: Sequence[str] | None
+) -> tuple[tuple[str, ...], list[Skip]]:
     """Return the sizes to measure, and those that are not there.
 
     Raises:
         ContractError: If none of those asked for is there.
     """
-    held, name = tuple(camera.sizes), camera.bundle.manifest.name
-    wanted = held if asked is None else tuple(asked)
-    have = ", ".join(held) or "none"
-    found = tuple(size for size in held if size in wanted)
-    if asked is not None and not found:
-        raise ContractError(f"bundle {name} holds size(s) {have}; got {', '.join(asked)}")
-    missing = [size for size in wanted if size not in held]
-    return found, [Skip(what=f"{name} {m}", reason=f"the bundle holds {have}") for m in missing]
+    bundle_sizes, name = tuple(camera.sizes), camera.bundle.manifest.name
+    candidates = bundle_sizes if requested is None else tuple(requested)
+    have = ", ".join(bundle_sizes) or "none"
+    sizes = tuple(size for size in bundle_sizes if size in candidates)
+    if requested is not None and not sizes:
+        raise ContractError(f"bundle {name} holds size(s) {have}; got {', '.join(requested)}")
+    missing = [size for size in candidates if size not in bundle_sizes]
+    return sizes, [Skip(what=f"{name} {m}", reason=f"the bundle holds {have}") for m in missing]
 
 
 def _baselines(camera: FineCamera, *, quick: bool) -> Baselines:

@@ -87,10 +87,10 @@ def _rows(
     scores: list[list[tuple[float, float]]] = [[] for _ in way.methods]
     for number, picture in enumerate(pictures):
         counted = count_picture(picture, way, grid, photons, (SEED, number))
-        for method, own in zip(way.methods, scores, strict=True):
-            own.append(_compare(counted, method, picture))
-    for method, own in zip(way.methods, scores, strict=True):
-        found_db, alike = zip(*own, strict=True)
+        for method, method_scores in zip(way.methods, scores, strict=True):
+            method_scores.append(_compare(counted, method, picture))
+    for method, method_scores in zip(way.methods, scores, strict=True):
+        found_db, alike = zip(*method_scores, strict=True)
         yield {
             "sort": "picture",
             "method": method.name,
@@ -100,12 +100,12 @@ def _rows(
             "light": way.light,
             "sigma": None if way.sigma is None else round(way.sigma, 4),
             "psnr_db": round(statistics.fmean(found_db), 4),
-            "psnr_std_db": round(statistics.stdev(found_db), 4) if len(own) > 1 else None,
+            "psnr_std_db": round(statistics.stdev(found_db), 4) if len(method_scores) > 1 else None,
             "ssim": round(statistics.fmean(alike), 5),
-            "images": len(own),
+            "images": len(method_scores),
         }
 
 
 def _compare(counted: Counted, method: Method, picture: FloatArray) -> tuple[float, float]:
-    found = np.clip(method.restore(counted.planes, counted.photons), 0, 1)
-    return psnr_db(found, picture), ssim(found, picture)
+    restored = np.clip(method.restore(counted.planes, counted.photons), 0, 1)
+    return psnr_db(restored, picture), ssim(restored, picture)

@@ -37,8 +37,8 @@ def read_pictures(folder: Path, count: int | None, scale: int) -> tuple[FloatArr
         ContractError: If there is none.
         DecodeError: If one is damaged; names it.
     """
-    found = (coded_luminance(read_picture(path)) for path in list_set(folder, count))
-    return tuple(whole_pixels(picture, scale) for picture in found)
+    lights = (coded_luminance(read_picture(path)) for path in list_set(folder, count))
+    return tuple(whole_pixels(picture, scale) for picture in lights)
 
 
 def drawn_pictures(camera: FineCamera, count: int | None) -> tuple[FloatArray, ...]:

@@ -15,18 +15,18 @@ SIGMA_PX: Final = 1.5
 SIDE_PX: Final = 11
 
 
-def psnr_db(found: FloatArray, truth: FloatArray) -> float:
+def psnr_db(picture: FloatArray, truth: FloatArray) -> float:
     """Return the PSNR in dB, at most `MOST_DB`."""
-    error = float(np.mean((found.astype(np.float64) - truth) ** 2))
+    error = float(np.mean((picture.astype(np.float64) - truth) ** 2))
     return min(float(-10 * np.log10(max(error, 1e-30))), MOST_DB)
 
 
-def ssim(found: FloatArray, truth: FloatArray) -> float:
+def ssim(picture: FloatArray, truth: FloatArray) -> float:
     """Return the mean SSIM of pictures (h, w), windows that reach over the border left out."""
     return float(
         structural_similarity(
             truth.astype(np.float64),
-            found.astype(np.float64),
+            picture.astype(np.float64),
             data_range=1.0,
             gaussian_weights=True,
             sigma=SIGMA_PX,

@@ -42,7 +42,7 @@ PHOTONS: Final = 1000.0
 FRAMES: Final = 20
 """Frames whose seconds are taken together: one alone is too short to be told."""
 SEED: Final = 50
-CHOSEN: Final = "default"
+DEFAULT_METHOD: Final = "default"
 """Method of a process that is not told any."""
 
 Do = Callable[[], object]
@@ -120,13 +120,13 @@ def _work(camera: FineCamera, captures: Timed, size: str | None) -> Iterator[tup
 def _median_cpu_s(do: Do, times: int, repeat: int) -> float:
     """Return the processor time of doing something once, when all is warm."""
     do()
-    found = []
+    seconds = []
     for _ in range(repeat):
         began = time.process_time()
         for _ in range(times):
             do()
-        found.append((time.process_time() - began) / times)
-    return statistics.median(found)
+        seconds.append((time.process_time() - began) / times)
+    return statistics.median(seconds)
 
 
 def _process_row(
@@ -135,8 +135,8 @@ def _process_row(
     with tempfile.TemporaryDirectory(prefix="camkit-bench-") as name:
         folder = Path(name)
         cube = folder / "cube.npz"
-        stated = times_of_bundle(camera.bundle.manifest)
-        write_recorded(cube, Recorded(name="histogram", values=histogram, attributes=stated))
+        times = times_of_bundle(camera.bundle.manifest)
+        write_recorded(cube, Recorded(name="histogram", values=histogram, attributes=times))
         job = Job(
             files=(cube,),
             bundle=str(camera.bundle.path.resolve()),
@@ -149,7 +149,7 @@ def _process_row(
         return Skip(what="seconds of a process", reason=failed)
     return _row(
         "depth_cube",
-        CHOSEN,
+        DEFAULT_METHOD,
         None,
         cpu_seconds=statistics.median(run.cpu_s or 0.0 for run in runs),
         seconds=round(statistics.median(run.seconds or 0.0 for run in runs), 4),

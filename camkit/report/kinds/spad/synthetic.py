@@ -41,18 +41,18 @@ def draw(
     times_ps: NDArray[np.float64], light: Light, rng: np.random.Generator, *, empty: bool = False
 ) -> FloatArray:
     """Draw Poisson counts (p, bins) of pixels at times of flight; `empty` has background alone."""
-    found = np.empty((len(times_ps), AXIS.bins), np.float32)
+    counts = np.empty((len(times_ps), AXIS.bins), np.float32)
     for start in range(0, len(times_ps), BLOCK):
         times = times_ps[start : start + BLOCK]
         every = np.broadcast_to(np.arange(AXIS.bins), (len(times), AXIS.bins))
         signal = 0.0 if empty else light.photons * AXIS.shares(PULSE, times, every)
-        found[start : start + BLOCK] = rng.poisson(signal + light.background, every.shape)
-    return found
+        counts[start : start + BLOCK] = rng.poisson(signal + light.background, every.shape)
+    return counts
 
 
 def bound_ps(times_ps: NDArray[np.float64], light: Light) -> NDArray[np.float64]:
     """Return the Cramer-Rao bound of every time, amplitude and background unknown as well."""
     bank: Bank = make_bank(AXIS, PULSE)
     of_template = information(bank, max(light.background / light.photons, DARKEST))
-    found = np.interp(times_ps, bank.mu_ps, of_template)
-    return np.asarray(1 / np.sqrt(light.photons * found))
+    fisher_information = np.interp(times_ps, bank.mu_ps, of_template)
+    return np.asarray(1 / np.sqrt(light.photons * fisher_information))

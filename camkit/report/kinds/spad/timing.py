@@ -30,7 +30,7 @@ FITTED: Final = 300
 SPAN_PS: Final = (400.0, 2100.0)
 METHODS: Final = ("log", "lsq", "argmax", "curve_fit")
 
-Found = tuple[NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.bool_]]
+Estimates = tuple[NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.bool_]]
 """Times, their sigmas, and whether they are believed."""
 
 
@@ -56,26 +56,26 @@ def measure(light: Light, pixels: int, turns: int) -> list[dict[str, Any]]:
     times = rng.uniform(*SPAN_PS, pixels)
     counts, empty = draw(times, light, rng), draw(times, light, rng, empty=True)
     bounds = bound_ps(times, light)
-    methods: dict[str, Callable[[FloatArray], Found]] = {
+    methods: dict[str, Callable[[FloatArray], Estimates]] = {
         "log": _by_camkit("log"),
         "lsq": _by_camkit("lsq"),
         "argmax": _by_argmax,
     }
     seconds: dict[str, list[float]] = {name: [] for name in METHODS}
-    found: dict[str, Found] = {}
+    estimates: dict[str, Estimates] = {}
     for _ in range(turns):
         for name, fit in methods.items():
             began = time.process_time()
-            found[name] = fit(counts)
+            estimates[name] = fit(counts)
             seconds[name].append(time.process_time() - began)
     some = slice(0, min(FITTED, pixels))
     began = time.process_time()
-    found["curve_fit"] = _by_curve_fit(counts[some])
+    estimates["curve_fit"] = _by_curve_fit(counts[some])
     seconds["curve_fit"].append((time.process_time() - began) * pixels / (some.stop))
     rows = []
     for name in METHODS:
         part = some if name == "curve_fit" else slice(None)
-        row = _judged(found[name], times[part], bounds[part])
+        row = _judged(estimates[name], times[part], bounds[part])
         is_judged = name in {"log", "lsq"} and light.background > 0
         alarms = float(methods[name](empty)[2].mean()) if is_judged else None
         rows.append(
@@ -102,20 +102,20 @@ def false_alarms(background: float, pixels: int) -> dict[str, Any]:
         cube = rng.poisson(background, (*SHAPE, AXIS.bins)).astype(np.float32)
         for pool, sharpener in ways.items():
             rates[pool].append(float(sharpener.strip(cube).valid.mean()))
-    told = {f"pool_{pool}": round(float(np.mean(found)), 6) for pool, found in rates.items()}
-    return {"background": background, **told}
+    columns = {f"pool_{pool}": round(float(np.mean(shares)), 6) for pool, shares in rates.items()}
+    return {"background": background, **columns}
 
 
-def _by_camkit(method: str) -> Callable[[FloatArray], Found]:
-    def fit(counts: FloatArray) -> Found:
+def _by_camkit(method: str) -> Callable[[FloatArray], Estimates]:
+    def fit(counts: FloatArray) -> Estimates:
         sharpener = Sharpener(AXIS, PULSE, Way(method=method, pool="1"))  # type: ignore[arg-type]
-        found = sharpener.strip(counts.reshape(-1, min(SHAPE[1], len(counts)), AXIS.bins))
-        return found.time_of_flight_ps.ravel(), found.sigma_ps.ravel(), found.valid.ravel()
+        depth = sharpener.strip(counts.reshape(-1, min(SHAPE[1], len(counts)), AXIS.bins))
+        return depth.time_of_flight_ps.ravel(), depth.sigma_ps.ravel(), depth.valid.ravel()
 
     return fit
 
 
-def _by_argmax(counts: FloatArray) -> Found:
+def _by_argmax(counts: FloatArray) -> Estimates:
     brightest = AXIS.centres_ps[counts.argmax(axis=1)]
     # where the pulse is brightest, relative to its time of flight
     u = np.arange(PULSE.start_ps, PULSE.end_ps)
@@ -123,7 +123,7 @@ def _by_argmax(counts: FloatArray) -> Found:
     return times, None, np.ones(len(counts), bool)
 
 
-def _by_curve_fit(counts: FloatArray) -> Found:
+def _by_curve_fit(counts: FloatArray) -> Estimates:
     start = _by_argmax(counts)[0]
     times, good = start.copy(), np.zeros(len(counts), bool)
     every = np.arange(AXIS.bins)[None]
@@ -144,18 +144,18 @@ def _by_curve_fit(counts: FloatArray) -> Found:
 
 
 def _judged(
-    found: Found, times: NDArray[np.float64], bounds: NDArray[np.float64]
+    estimates: Estimates, times: NDArray[np.float64], bounds: NDArray[np.float64]
 ) -> dict[str, Any]:
-    fitted, sigmas, valid = found
+    fitted, sigmas, valid = estimates
     errors = fitted - times
-    kept = valid & (np.abs(errors) < PULSE.width_ps)
-    if not kept.any():
+    accepted = valid & (np.abs(errors) < PULSE.width_ps)
+    if not accepted.any():
         return {"rmse_over_crb": None, "sigma_68": None, "accepted": 0.0, "lost": None}
-    ratio = np.sqrt(np.mean((errors[kept] / bounds[kept]) ** 2))
-    share = None if sigmas is None else np.quantile(np.abs(errors / sigmas)[kept], 0.6827)
+    ratio = np.sqrt(np.mean((errors[accepted] / bounds[accepted]) ** 2))
+    share = None if sigmas is None else np.quantile(np.abs(errors / sigmas)[accepted], 0.6827)
     return {
         "rmse_over_crb": round(float(ratio), 4),
         "sigma_68": None if share is None else round(float(share), 4),
         "accepted": round(float(valid.mean()), 4),
-        "lost": round(float((valid & ~kept).sum() / max(valid.sum(), 1)), 5),
+        "lost": round(float((valid & ~accepted).sum() / max(valid.sum(), 1)), 5),
     }

@@ -13,7 +13,7 @@ _MOST_PICTURES: Final = 8
 
 def flat_html(facts: FlatFacts) -> str:
     """Return the page."""
-    told = "Lens and display were told apart." if facts.separated else "NOT told apart:"
+    separation = "Lens and display were told apart." if facts.separated else "NOT told apart:"
     profile = [
         (f"{height:.3f}", f"{light:.4f}")
         for height, light in zip(facts.heights_mm, facts.relative_illumination, strict=True)
@@ -27,15 +27,15 @@ def flat_html(facts: FlatFacts) -> str:
         f"{facts.rest:.3%} (RMS). Optical centre ({facts.centre_px[0]:.1f}, "
         f"{facts.centre_px[1]:.1f}) px, {'found' if facts.centre_found else 'taken'}."
     )
-    over = "Over the distance from the optical centre."
+    caption = "Over the distance from the optical centre."
     maps = (
         "Above: what is photographed, as each picture sees it, 1 at its brightest. Below: what "
         "lens and display leave."
     )
     light = (
-        sentences(told, *facts.notes),
+        sentences(separation, *facts.notes),
         Table(header=("height, mm", "relative illumination"), rows=profile),
-        Picture(over, to_png(draw_profile(facts))),
+        Picture(caption, to_png(draw_profile(facts))),
     )
     pictures = (
         numbers,
@@ -64,19 +64,19 @@ def draw_profile(facts: FlatFacts) -> Figure:
 @chart
 def draw_maps(facts: FlatFacts) -> Figure:
     """Draw display and residual of up to eight pictures."""
-    shown = min(len(facts.files), _MOST_PICTURES)
-    figure = new_figure(max(3.6, 1.9 * shown + 0.8), 3.4)
-    panels = figure.subplots(2, shown, squeeze=False)
-    rest = 100 * facts.rest_maps[:shown]
+    count = min(len(facts.files), _MOST_PICTURES)
+    figure = new_figure(max(3.6, 1.9 * count + 0.8), 3.4)
+    panels = figure.subplots(2, count, squeeze=False)
+    rest = 100 * facts.rest_maps[:count]
     most = max(float(np.quantile(np.abs(rest), 0.995)), 0.01)
-    low = float(facts.display_maps[:shown].min())
-    for number in range(shown):
-        display, left = panels[:, number]
+    low = float(facts.display_maps[:count].min())
+    for number in range(count):
+        display, residual = panels[:, number]
         above = display.imshow(facts.display_maps[number], cmap="viridis", vmin=low, vmax=1)
-        below = left.imshow(rest[number], cmap="RdBu_r", vmin=-most, vmax=most)
+        below = residual.imshow(rest[number], cmap="RdBu_r", vmin=-most, vmax=most)
         display.set_title(facts.files[number][:20])
         hide_ticks(display)
-        hide_ticks(left)
+        hide_ticks(residual)
     for image, row, label in ((above, 0, "display"), (below, 1, "left, %")):
         figure.colorbar(image, ax=panels[row, :].tolist(), fraction=0.05, label=label)
     return figure

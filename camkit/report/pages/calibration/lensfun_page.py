@@ -40,48 +40,48 @@ class Curves:
     light: FloatGrid | None
 
 
-def entry_html(made: Entry) -> str:
+def entry_html(entry: Entry) -> str:
     """Return the page of an entry for lensfun."""
-    return _html(f"camkit calibrate lensfun-out: {made.name.model}", curves_of_entry(made), made)
+    return _html(f"camkit calibrate lensfun-out: {entry.name.model}", curves_of_entry(entry), entry)
 
 
-def bundle_html(made: LensBundle) -> str:
+def bundle_html(bundle: LensBundle) -> str:
     """Return the page of a bundle of a lens that lensfun knows."""
-    title = f"camkit calibrate lensfun-in: {made.profile.lens.name}"
-    return _html(title, curves_of_bundle(made), made)
+    title = f"camkit calibrate lensfun-in: {bundle.profile.lens.name}"
+    return _html(title, curves_of_bundle(bundle), bundle)
 
 
-def curves_of_entry(made: Entry) -> Curves:
+def curves_of_entry(entry: Entry) -> Curves:
     """Return what an entry says and what it misses of its source."""
-    placed = np.linspace(0, made.source.corner_px, POINTS)
-    straight = made.straight_px(placed)
-    half_px = float(np.hypot(*made.size_px)) / 2
+    distorted_px = np.linspace(0, entry.source.corner_px, POINTS)
+    straight = entry.straight_px(distorted_px)
+    half_px = float(np.hypot(*entry.size_px)) / 2
     return Curves(
         radius_px=straight,
-        moved_px=placed - straight,
-        missed_px=made.missed_px(placed),
-        light=made.vignetting and made.vignetting[0].light(placed / half_px),
+        moved_px=distorted_px - straight,
+        missed_px=entry.missed_px(distorted_px),
+        light=entry.vignetting and entry.vignetting[0].light(distorted_px / half_px),
     )
 
 
-def curves_of_bundle(made: LensBundle) -> Curves:
+def curves_of_bundle(bundle: LensBundle) -> Curves:
     """Return what a bundle does, and misses of lensfun's formula; green, else all colours."""
-    found, extent = made.profile, made.manifest.sensor.known_extent
+    match, extent = bundle.profile, bundle.manifest.sensor.known_extent
     pitch_mm, ideal_mm = to_mm(extent.pixel_pitch_um), half_diagonal_mm(extent)
-    profile = found.profile
+    profile = match.profile
     assert profile.distortion is not None  # lensfun-in makes none without
     rows = profile.distortion.to_distortion()
-    placed = placed_along(ideal_mm, rows, 0)
+    distorted_mm = placed_along(ideal_mm, rows, 0)
     unit_mm = rows.radius_mm
-    formula = found.distortion.captured_radius(found.scale * ideal_mm / unit_mm) * unit_mm
+    formula = match.distortion.captured_radius(match.scale * ideal_mm / unit_mm) * unit_mm
     light = None
     if profile.illumination is not None:
-        known = profile.illumination.to_illumination()
-        light = np.interp(placed**2, known.heights_mm**2, known.light)
+        radial = profile.illumination.to_illumination()
+        light = np.interp(distorted_mm**2, radial.heights_mm**2, radial.light)
     return Curves(
         radius_px=ideal_mm / pitch_mm,
-        moved_px=(placed - ideal_mm) / pitch_mm,
-        missed_px=(placed - formula) / pitch_mm,
+        moved_px=(distorted_mm - ideal_mm) / pitch_mm,
+        missed_px=(distorted_mm - formula) / pitch_mm,
         light=light,
     )
 
@@ -98,21 +98,21 @@ def placed_along(ideal_mm: FloatGrid, rows: RadialDistortion, channel: int) -> F
     return distort_points(points, rows, channel=channel)[:, 0]
 
 
-def _html(title: str, curves: Curves, made: Entry | LensBundle) -> str:
-    record = made.to_record()
+def _html(title: str, curves: Curves, product: Entry | LensBundle) -> str:
+    record = product.to_record()
     notes = sentences(*record.pop("notes"))
-    table = Table(rows=[(name, _told(value)) for name, value in record.items()])
+    table = Table(rows=[(name, _text(value)) for name, value in record.items()])
     lens = Section("Lens", (notes, table, Picture(_CAPTION, to_png(draw(curves)))))
     return to_html(Page(title=title, sections=[lens]))
 
 
-def _told(value: Any) -> str:
+def _text(value: Any) -> str:
     if value is None:
         return "-"
     if isinstance(value, dict):
-        return ", ".join(f"{name} {_told(part)}" for name, part in value.items())
+        return ", ".join(f"{name} {_text(part)}" for name, part in value.items())
     if isinstance(value, list):
-        return " ".join(map(_told, value))
+        return " ".join(map(_text, value))
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
@@ -120,11 +120,11 @@ def _told(value: Any) -> str:
 def draw(curves: Curves) -> Figure:
     """Draw shift, what is missed of it, and light, over the radius."""
     figure = new_figure(7.0, 6.0)
-    drawn = [(curves.moved_px, "moved, px"), (curves.missed_px, "missed, px")]
+    series = [(curves.moved_px, "moved, px"), (curves.missed_px, "missed, px")]
     if curves.light is not None:
-        drawn.append((curves.light, "relative illumination"))
-    for number, (values, label) in enumerate(drawn, start=1):
-        panel = figure.add_subplot(len(drawn), 1, number)
+        series.append((curves.light, "relative illumination"))
+    for number, (values, label) in enumerate(series, start=1):
+        panel = figure.add_subplot(len(series), 1, number)
         panel.plot(curves.radius_px, values, color=BLUE)
         panel.set_ylabel(label)
     panel.set_xlabel("radius in the straight picture, px")

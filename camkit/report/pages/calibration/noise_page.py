@@ -77,12 +77,12 @@ def _level(panel: Panel, variance: float, *, resolved: bool) -> None:
 
 def _row(facts: IsoFacts) -> tuple[str, ...]:
     record = facts.to_record()
-    below = "" if facts.read.resolved else "below "
+    prefix = "" if facts.read.resolved else "below "
     return (
         f"{facts.iso:g}",
         f"{facts.gain_e_per_dn:.5g}",
         f"{100 * facts.gain_error:.2g}",
-        f"{below}{facts.read_noise_e:.3g}",
+        f"{prefix}{facts.read_noise_e:.3g}",
         f"{record['full_well_e']:.5g}",
         f"{facts.black_level:.2f}",
         f"{facts.white_level:g}",

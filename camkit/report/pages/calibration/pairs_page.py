@@ -20,7 +20,7 @@ _OF_COLOURS: Final = (
 )
 
 
-def pairs_html(found: Pairs) -> str:
+def pairs_html(pairs: Pairs) -> str:
     """Return the page."""
     rows = [
         (
@@ -30,35 +30,35 @@ def pairs_html(found: Pairs) -> str:
             f"{pair.correlation:.4f}",
             "x".join(str(side) for side in pair.reference_px[2:]),
         )
-        for pair in found.pairs
+        for pair in pairs.pairs
     ]
-    longest = max(float(np.linalg.norm(pair.shifts_px, axis=1).max()) for pair in found.pairs)
+    longest = max(float(np.linalg.norm(pair.shifts_px, axis=1).max()) for pair in pairs.pairs)
     caption = (
         "What is left between captures and pictures, tile by tile, over the capture; the longest "
         f"arrow is {longest:.3f} px."
     )
     table = Table(header=_HEADER, rows=rows)
-    parts = (sentences(*found.notes), table, Picture(caption, to_png(draw_shifts(found))))
+    parts = (sentences(*pairs.notes), table, Picture(caption, to_png(draw_shifts(pairs))))
     sections = [Section("Pairs", parts)]
-    if found.primaries is not None:
-        sections.append(_colours(found.primaries))
+    if pairs.primaries is not None:
+        sections.append(_colours(pairs.primaries))
     return to_html(Page(title="Pairs of shown pictures and captures", sections=sections))
 
 
 @chart
-def draw_shifts(found: Pairs) -> Figure:
+def draw_shifts(pairs: Pairs) -> Figure:
     """Draw what is left of every pair as arrows, enlarged."""
-    figure = new_figure(7.0, 7.0 * found.size[1] / found.size[0] + 0.4)
+    figure = new_figure(7.0, 7.0 * pairs.size[1] / pairs.size[0] + 0.4)
     panel = figure.add_subplot()
-    at = np.concatenate([pair.places_px for pair in found.pairs])
-    shifts = np.concatenate([pair.shifts_px for pair in found.pairs])
+    at = np.concatenate([pair.places_px for pair in pairs.pairs])
+    shifts = np.concatenate([pair.shifts_px for pair in pairs.pairs])
     every = 1 + len(at) // MOST_ARROWS
-    factor = LONGEST * found.size[0] / max(float(np.linalg.norm(shifts, axis=1).max()), 1e-9)
+    factor = LONGEST * pairs.size[0] / max(float(np.linalg.norm(shifts, axis=1).max()), 1e-9)
     arrows: Any = {"angles": "xy", "scale_units": "xy", "scale": 1, "color": BLUE, "width": 0.002}
     panel.quiver(*at[::every].T, *(factor * shifts[::every]).T, **arrows)
     panel.set(
-        xlim=(0, found.size[0]),
-        ylim=(found.size[1], 0),
+        xlim=(0, pairs.size[0]),
+        ylim=(pairs.size[1], 0),
         aspect="equal",
         title=f"{factor:.0f} times enlarged",
     )

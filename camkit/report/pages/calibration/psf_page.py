@@ -23,36 +23,38 @@ _REBLURRED: Final = (
 )
 
 
-def psf_html(found: MeasuredPsf) -> str:
+def psf_html(measurement: MeasuredPsf) -> str:
     """Return the page."""
-    (field,) = found.fields
-    told = (
-        f"The light lies at ({found.centre_px[0]:.2f}, {found.centre_px[1]:.2f}) px, "
+    (field,) = measurement.fields
+    summary = (
+        f"The light lies at ({measurement.centre_px[0]:.2f}, {measurement.centre_px[1]:.2f}) px, "
         f"{field.height_mm:.3f} mm from the middle of the sensor. Of its green light "
         f"{field.peak_share:.4f} +- {field.peak_share_error:.4f} lie within {PEAK_PX:g} px of the "
         "peak."
     )
     light = (
-        sentences(told, *found.notes),
-        Table(header=_HEADER, rows=[_row(colour) for colour in found.colours]),
-        Picture(_KERNELS, to_png(draw_kernels(found))),
-        Picture("Share of the light within a radius.", to_png(draw_shares(found))),
+        sentences(summary, *measurement.notes),
+        Table(header=_HEADER, rows=[_row(colour) for colour in measurement.colours]),
+        Picture(_KERNELS, to_png(draw_kernels(measurement))),
+        Picture("Share of the light within a radius.", to_png(draw_shares(measurement))),
     )
     sections = [Section("Light", light)]
-    if any(colour.reblurred for colour in found.colours):
-        picture = Picture(_REBLURRED, to_png(draw_reblurred(found)))
+    if any(colour.reblurred for colour in measurement.colours):
+        picture = Picture(_REBLURRED, to_png(draw_reblurred(measurement)))
         sections.append(Section("The target, blurred anew", (picture,)))
     return to_html(Page(title="A point spread function", sections=sections))
 
 
 @chart
-def draw_kernels(found: MeasuredPsf) -> Figure:
+def draw_kernels(measurement: MeasuredPsf) -> Figure:
     """Draw the kernels on a logarithmic scale."""
     figure = new_figure(8.0, 3.0)
-    panels = figure.subplots(1, len(found.colours))
-    half = found.side_px // 2
+    panels = figure.subplots(1, len(measurement.colours))
+    half = measurement.side_px // 2
     look = {"cmap": "magma", "vmin": -_DECADES, "vmax": 0, "extent": (-half, half, half, -half)}
-    for panel, colour, kernel in zip(panels, found.colours, found.psf.kernels[0, 0], strict=True):
+    for panel, colour, kernel in zip(
+        panels, measurement.colours, measurement.psf.kernels[0, 0], strict=True
+    ):
         image = panel.imshow(np.log10(np.maximum(kernel / kernel.max(), 10.0**-_DECADES)), **look)
         panel.set(title=colour.colour, xlabel="px")
     figure.colorbar(image, ax=list(panels), fraction=0.02)
@@ -60,11 +62,11 @@ def draw_kernels(found: MeasuredPsf) -> Figure:
 
 
 @chart
-def draw_shares(found: MeasuredPsf) -> Figure:
+def draw_shares(measurement: MeasuredPsf) -> Figure:
     """Draw how much light lies within a radius."""
     figure = new_figure(6.0, 3.2)
     panel = figure.subplots()
-    for colour, kernel in zip(found.colours, found.psf.kernels[0, 0], strict=True):
+    for colour, kernel in zip(measurement.colours, measurement.psf.kernels[0, 0], strict=True):
         inside, name = light_within(kernel), colour.colour
         panel.semilogx(np.arange(inside.size) + 0.5, inside, color=_COLORS[name], label=name)
     panel.axvline(PEAK_PX, color="black", linewidth=0.6, linestyle=":")
@@ -74,11 +76,11 @@ def draw_shares(found: MeasuredPsf) -> Figure:
 
 
 @chart
-def draw_reblurred(found: MeasuredPsf) -> Figure:
+def draw_reblurred(measurement: MeasuredPsf) -> Figure:
     """Draw disc or edge as seen and as blurred by the PSF, and the residual."""
     figure = new_figure(7.0, 5.0)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
-    for colour in found.colours:
+    for colour in measurement.colours:
         target = colour.reblurred
         if target is None:
             continue

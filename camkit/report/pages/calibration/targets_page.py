@@ -40,7 +40,7 @@ def targets_html(planned: Targets, small: Sequence[Codes]) -> str:
         small: Every target, by `shrunk`.
     """
     screen = planned.screen
-    told = (
+    instruction = (
         f"Show every PNG on the whole screen, one to one: {screen.width_px} x {screen.height_px} "
         "px. Boards from 3 places at least; grey steps, colours and pictures from one, at one "
         "setting of the camera, the room dark."
@@ -59,7 +59,7 @@ def targets_html(planned: Targets, small: Sequence[Codes]) -> str:
     uses = Table(header=("kind", "for"), rows=_USES)
     order = Table(header=("file", "what", "number of its marks"), rows=rows)
     sections = [
-        Section("What to photograph", (told, uses)),
+        Section("What to photograph", (instruction, uses)),
         Section("In this order", (order, *pictures)),
     ]
     return to_html(Page(title="What is shown to the camera", sections=sections))

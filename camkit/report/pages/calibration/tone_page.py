@@ -20,8 +20,8 @@ def tone_html(facts: ToneFacts) -> str:
     if rest is None:
         rest = np.full(facts.levels.size, np.nan)
     rows = [
-        (f"{level:g}", f"{light:.6g}", "-" if np.isnan(off) else f"{100 * off:+.2f}")
-        for level, light, off in zip(facts.levels, facts.luminance, rest, strict=True)
+        (f"{level:g}", f"{light:.6g}", "-" if np.isnan(deviation) else f"{100 * deviation:+.2f}")
+        for level, light, deviation in zip(facts.levels, facts.luminance, rest, strict=True)
     ]
     parts = (
         sentences(*facts.notes),
@@ -37,7 +37,7 @@ def draw_tone(facts: ToneFacts) -> Figure:
     figure = new_figure(8.0, 5.0)
     grid = figure.add_gridspec(2, 2, height_ratios=(2, 1))
     even, decades = (figure.add_subplot(grid[0, column]) for column in (0, 1))
-    below = figure.add_subplot(grid[1, :])
+    lower = figure.add_subplot(grid[1, :])
     for panel in (even, decades):
         panel.plot(facts.levels, facts.luminance, "o", color=BLUE)
         if facts.curve is not None:
@@ -48,8 +48,8 @@ def draw_tone(facts: ToneFacts) -> Figure:
     even.set_ylabel("relative luminance")
     rest = facts.residuals
     if rest is not None:
-        below.vlines(facts.levels, 0, 100 * rest, color=BLUE)
-        below.plot(facts.levels, 100 * rest, "o", color=BLUE)
-        below.axhline(0, color="black", linewidth=0.6)
-    below.set(xlabel="level", ylabel="off the curve, %")
+        lower.vlines(facts.levels, 0, 100 * rest, color=BLUE)
+        lower.plot(facts.levels, 100 * rest, "o", color=BLUE)
+        lower.axhline(0, color="black", linewidth=0.6)
+    lower.set(xlabel="level", ylabel="off the curve, %")
     return figure

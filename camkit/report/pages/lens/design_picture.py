@@ -24,19 +24,19 @@ def draw_design(view: DesignView, path: Path) -> None:
         path: The picture.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(to_png(_drawn(view)))
+    path.write_bytes(to_png(_draw_view(view)))
 
 
 @chart
-def _drawn(view: DesignView) -> Figure:
+def _draw_view(view: DesignView) -> Figure:
     rows = len(view.patches[0])
     figure = new_figure(10, 3.2 + 1.6 + 1.9 * len(_TITLES))
     grid = figure.add_gridspec(2 + len(_TITLES), 1, height_ratios=[3.2, 1.6, *[1.9] * len(_TITLES)])
     draw_layout_on(figure.add_subplot(grid[0]), analyse(view.lens, Pupil()))
     fields = view.kernels.shape[1]
-    chosen = sorted({round(i * (fields - 1) / (_PSFS - 1)) for i in range(_PSFS)})
-    cells = grid[1].subgridspec(1, len(chosen))
-    for column, number in enumerate(chosen):
+    fields_shown = sorted({round(i * (fields - 1) / (_PSFS - 1)) for i in range(_PSFS)})
+    cells = grid[1].subgridspec(1, len(fields_shown))
+    for column, number in enumerate(fields_shown):
         panel = figure.add_subplot(cells[column])
         _show(panel, view.kernels[0, number] ** 0.5, scale=True)
         panel.set_title(f"PSF, field {number + 1} of {fields}")

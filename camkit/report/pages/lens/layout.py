@@ -68,21 +68,21 @@ def _vertices(lens: Lens) -> list[float]:
 def _ray_paths(facts: LensFacts, field: int) -> tuple[Tensor, Tensor]:
     """Return z and y (point, ray) of a fan; NaN from where a ray is lost."""
     lens = facts.lens
-    across = torch.linspace(-1, 1, RAYS_PER_FIELD, dtype=torch.float64)
-    fan = PupilSamples(x=torch.zeros_like(across), y=across)
+    pupil_y = torch.linspace(-1, 1, RAYS_PER_FIELD, dtype=torch.float64)
+    fan = PupilSamples(x=torch.zeros_like(pupil_y), y=pupil_y)
     wave = torch.tensor([lens.reference_wavelength_um], dtype=torch.float64)
     slopes = facts.slopes[field : field + 1]
     beams = launch_beams(lens, slopes, wave, fan, facts.pupil.definition)
-    seen: list[Rays] = []
-    landed = trace(beams.tensors, beams.rays, seen=seen)
+    history: list[Rays] = []
+    last_rays = trace(beams.tensors, beams.rays, seen=history)
     z, y = [], []
     vertices = _vertices(lens)
-    for rays, place in zip([*seen, landed], vertices, strict=True):
+    for rays, place in zip([*history, last_rays], vertices, strict=True):
         z.append(torch.where(rays.valid, rays.z + place, math.nan)[0, 0])
         y.append(torch.where(rays.valid, rays.y, math.nan)[0, 0])
-    before = -_LEAD * (vertices[-1] - vertices[0])
+    lead = -_LEAD * (vertices[-1] - vertices[0])
     lean = (beams.rays.m / beams.rays.n)[0, 0]
-    start = torch.full_like(z[0], min(before, float(torch.nan_to_num(z[0]).min()) + before))
+    start = torch.full_like(z[0], min(lead, float(torch.nan_to_num(z[0]).min()) + lead))
     z.insert(0, start)
     y.insert(0, beams.rays.y[0, 0] + start * lean)
     return torch.stack(z), torch.stack(y)
@@ -138,5 +138,5 @@ def _draw_stop(panel: Panel, facts: LensFacts, heights: list[float], vertices: l
     place = vertices[number] + float(z[-1])
     for sign in (-1, 1):
         panel.plot([place] * 2, [sign * edge, sign * outer], color="black", linewidth=2.5, zorder=5)
-    below: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "va": "top"}
-    panel.annotate("stop", (place, -outer), (0, -3), fontsize=8, **below)
+    style: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "va": "top"}
+    panel.annotate("stop", (place, -outer), (0, -3), fontsize=8, **style)

@@ -117,13 +117,13 @@ def _draw_spot(panel: Panel, facts: LensFacts, field: int, reach_um: float) -> N
 @chart
 def draw_mtf(facts: LensFacts) -> Figure:
     """Draw contrast, by waves or by rays times the diffraction limit, as the lens needs."""
-    cycles, regime, found, limit = trace_mtf(facts)
+    cycles, regime, mtf, limit = trace_mtf(facts)
     figure = new_figure(9.5, 3.9)
     panel = figure.add_subplot()
     for i in facts.drawn_fields():
         color, label = field_color(i), f"{to_degrees(facts.lens.field_angles_rad[i]):.4g}°"
-        panel.plot(cycles, found.tangential[i], color=color, label=f"{label} tangential")
-        panel.plot(cycles, found.sagittal[i], "--", color=color, label=f"{label} sagittal")
+        panel.plot(cycles, mtf.tangential[i], color=color, label=f"{label} tangential")
+        panel.plot(cycles, mtf.sagittal[i], "--", color=color, label=f"{label} sagittal")
     first, last = limit.tangential[0], limit.tangential[-1]
     panel.plot(cycles, first, color="black", linewidth=1.4, label="limit, first field")
     if len(facts.lens.field_angles_rad) > 1:
@@ -233,11 +233,11 @@ def draw_colour(facts: LensFacts) -> Figure:
     cross = longitudinal_mm(lens, zone, waves)
     slopes = torch.tan(torch.linspace(0, max(lens.field_angles_rad), _POINTS, dtype=torch.float64))
     degrees = torch.rad2deg(torch.atan(slopes))
-    beside = lateral_colour_mm(lens, slopes, waves, facts.pupil.definition) * UM_PER_MM
+    lateral_um = lateral_colour_mm(lens, slopes, waves, facts.pupil.definition) * UM_PER_MM
     for j, wave in enumerate(lens.wavelengths_um):
         color, label = wave_color(wave), f"{wave:.4g} µm"
         left.plot(cross[j], zone, color=color, label=label)
-        right.plot(degrees, beside[:, j], color=color, label=label)
+        right.plot(degrees, lateral_um[:, j], color=color, label=label)
     left.axvline(0, color="black", linewidth=0.8)
     left.set(
         title="axial rays cross the axis at, mm from the sensor",

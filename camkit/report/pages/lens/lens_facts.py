@@ -33,7 +33,7 @@ from camkit.models_def.optics.spot import Spots
 from camkit.models_def.optics.trace import Fate, count_fates
 from camkit.units import to_degrees
 
-Found = TypeVar("Found")
+Fact = TypeVar("Fact")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,7 +157,7 @@ def analyse(lens: Lens, pupil: Pupil, notes_of_file: Sequence[str] = ()) -> Lens
     )
 
 
-def _try(what: str, compute: Callable[[], Found], otherwise: Found, notes: list[str]) -> Found:
+def _try(what: str, compute: Callable[[], Fact], otherwise: Fact, notes: list[str]) -> Fact:
     """Compute something, or say why not: a page is made for every lens."""
     try:
         return compute()
@@ -168,26 +168,28 @@ def _try(what: str, compute: Callable[[], Found], otherwise: Found, notes: list[
 
 def _warnings(lens: Lens, spots: Spots) -> list[str]:
     """Return which glasses cannot be and which fields lose rays."""
-    found = [
+    warnings = [
         f"surface {i}: {surface.glass} is {surface.thickness_mm:g} mm thick, which cannot be made"
         for i, surface in enumerate(lens.surfaces)
         if surface.glass != "air" and surface.thickness_mm <= 0
     ]
     for i, angle_rad in enumerate(lens.field_angles_rad):
         name = f"field {to_degrees(angle_rad):.4g} degrees"
-        lost = [
+        losses = [
             f"{count} {fate.name.lower().replace('_', ' ')}"
             for fate, count in count_fates(spots.fate[i]).items()
             if fate is not Fate.VALID and count
         ]
         total = spots.fate[i].numel()
         if not bool((spots.weight[i] > 0).any()):
-            found.append(f"{name}: no ray reaches the sensor ({', '.join(lost)}); nothing is drawn")
-        elif lost:
-            found.append(f"{name}: of {total} rays {', '.join(lost)}")
+            warnings.append(
+                f"{name}: no ray reaches the sensor ({', '.join(losses)}); nothing is drawn"
+            )
+        elif losses:
+            warnings.append(f"{name}: of {total} rays {', '.join(losses)}")
         if not bool(torch.isfinite(spots.chief_y_mm[i])):
-            found.append(f"{name}: the chief ray does not reach the sensor")
-    return found
+            warnings.append(f"{name}: the chief ray does not reach the sensor")
+    return warnings
 
 
 def _sampling_note(pupil: Pupil, convergence: Convergence) -> list[str]:
@@ -195,8 +197,8 @@ def _sampling_note(pupil: Pupil, convergence: Convergence) -> list[str]:
     if pupil.sampling not in convergence.samplings:
         return []
     mine = convergence.rms_mm[convergence.samplings.index(pupil.sampling)]
-    off = torch.nan_to_num(mine / convergence.rms_mm[-1] - 1, posinf=0.0)
-    worst = float(off[off.abs().argmax()])
+    deviation = torch.nan_to_num(mine / convergence.rms_mm[-1] - 1, posinf=0.0)
+    worst = float(deviation[deviation.abs().argmax()])
     if abs(worst) < 0.02:
         return []
     return [
@@ -208,7 +210,7 @@ def _sampling_note(pupil: Pupil, convergence: Convergence) -> list[str]:
 def to_json(facts: LensFacts) -> dict[str, Any]:
     """Return the object that `camkit lens show --json` prints; None where there is no number."""
     data, sums = facts.paraxial, facts.seidel
-    found = {
+    report = {
         "name": facts.lens.name,
         "efl_mm": data.efl_mm,
         "bfl_mm": data.bfl_mm,
@@ -237,7 +239,7 @@ def to_json(facts: LensFacts) -> dict[str, Any]:
         "convergence": _convergence(facts),
         "notes": list(facts.notes),
     }
-    finite: dict[str, Any] = _finite(found)
+    finite: dict[str, Any] = _finite(report)
     return finite
 
 
@@ -261,10 +263,12 @@ def _field(facts: LensFacts, i: int, j: int) -> dict[str, Any]:
 
 
 def _convergence(facts: LensFacts) -> list[dict[str, Any]]:
-    found = facts.convergence
+    convergence = facts.convergence
     return [
         {"pupil_sampling": name, "rays": rays, "spot_rms_mm": rms}
-        for name, rays, rms in zip(found.samplings, found.rays, found.rms_mm.tolist(), strict=True)
+        for name, rays, rms in zip(
+            convergence.samplings, convergence.rays, convergence.rms_mm.tolist(), strict=True
+        )
     ]
 
 

@@ -84,21 +84,21 @@ def lens_page(facts: LensFacts, pictures: Mapping[str, str]) -> Page:
         pictures: Name -> SVG text.
     """
     lens = facts.lens
-    shown = {name: Picture(_CAPTIONS[name], svg) for name, svg in pictures.items()}
+    charts = {name: Picture(_CAPTIONS[name], svg) for name, svg in pictures.items()}
     lead: list[Part] = [Words(lens.note, "small")] if lens.note else []
     lead += [_pupil_words(facts), *(Words(note, "note") for note in facts.notes)]
-    spots = (shown.get("spots"), _fields(facts), Words(_BY_SAMPLING, "small"), _convergence(facts))
+    spots = (charts.get("spots"), _fields(facts), Words(_BY_SAMPLING, "small"), _convergence(facts))
     sections = [
-        Section("Layout", (shown.get("layout"),)),
+        Section("Layout", (charts.get("layout"),)),
         Section("First order", (_first_order(facts),)),
         Section("Prescription", (_prescription(facts), _grooves(facts))),
         Section("Spot diagrams", (*spots, f"PSF: {facts.model.reason}.")),
-        Section("MTF", (shown.get("mtf"),)),
-        Section("Field curvature, distortion, relative illumination", (shown.get("field"),)),
-        Section("Longitudinal aberration and colour", (shown.get("colour"),)),
+        Section("MTF", (charts.get("mtf"),)),
+        Section("Field curvature, distortion, relative illumination", (charts.get("field"),)),
+        Section("Longitudinal aberration and colour", (charts.get("colour"),)),
     ]
     if facts.seidel is not None:
-        sums = (shown.get("seidel"), *_seidel(facts.seidel))
+        sums = (charts.get("seidel"), *_seidel(facts.seidel))
         sections.append(Section("Third-order sums by surface", sums))
     return Page(title=lens.name, lead=lead, sections=sections)
 
@@ -169,7 +169,7 @@ def _fields(facts: LensFacts) -> Table:
     rows = []
     for i, angle_rad in enumerate(facts.lens.field_angles_rad):
         for j, wave in enumerate(facts.lens.wavelengths_um):
-            lost = {name: n for name, n in facts.fates(i, j).items() if n and name != "valid"}
+            losses = {name: n for name, n in facts.fates(i, j).items() if n and name != "valid"}
             spots = (facts.rms_mm, facts.rms_chief_mm, facts.max_mm)
             rows.append(
                 (
@@ -180,18 +180,20 @@ def _fields(facts: LensFacts) -> Table:
                     _number(float(facts.wavefront_um[i, j]) / wave, 4),
                     _number(100 * float(facts.distortion[i, j]), 4),
                     _number(float(facts.illumination[i, j]), 4),
-                    ", ".join(f"{n} {name.replace('_', ' ')}" for name, n in lost.items()) or "0",
+                    ", ".join(f"{n} {name.replace('_', ' ')}" for name, n in losses.items()) or "0",
                 )
             )
     return Table(header=_FIELDS, rows=rows)
 
 
 def _convergence(facts: LensFacts) -> Table:
-    found = facts.convergence
+    convergence = facts.convergence
     angles = [f"{to_degrees(a):.4g}°" for a in facts.lens.field_angles_rad]
     rows = [
         (name, str(rays), *(_number(v * UM_PER_MM, 5) for v in rms))
-        for name, rays, rms in zip(found.samplings, found.rays, found.rms_mm.tolist(), strict=True)
+        for name, rays, rms in zip(
+            convergence.samplings, convergence.rays, convergence.rms_mm.tolist(), strict=True
+        )
     ]
     return Table(header=("sampling", "rays", *angles), rows=rows)
 

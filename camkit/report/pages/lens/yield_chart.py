@@ -73,8 +73,10 @@ def _draw_classes(panel: Panel, result: ToleranceResult) -> None:
     ]
     mean = [float(c.loss_db.mean()) for c in classes]
     panel.barh(names, mean, color=field_color(0))
-    for place, found in enumerate(classes):
-        panel.plot(found.loss_db, [place] * len(found.loss_db), ".", color=field_color(2))
+    for place, sensitivity in enumerate(classes):
+        panel.plot(
+            sensitivity.loss_db, [place] * len(sensitivity.loss_db), ".", color=field_color(2)
+        )
     panel.axvline(0, color="black", linewidth=0.8)
     panel.set_title("each class alone at its limit: loss, dB")
     panel.grid(visible=False)
@@ -125,16 +127,16 @@ def to_json(result: ToleranceResult) -> dict[str, Any]:
             }
             for c in result.classes
         ],
-        "worst_offenders": [_offender(found) for found in result.offenders[:_WORST]],
+        "worst_offenders": [_offender(offender) for offender in result.offenders[:_WORST]],
     }
 
 
 def _field(result: ToleranceResult, number: int) -> dict[str, Any]:
     share, azimuth_deg = result.fields[number]
-    far = np.tan(max(result.lens.field_angles_rad, default=0.0))
+    edge_slope = np.tan(max(result.lens.field_angles_rad, default=0.0))
     psnr, spot = result.copies.psnr_db[:, number], result.copies.spot_rms_mm[:, number]
     return {
-        "field_angle_deg": round(to_degrees(float(np.arctan(share * far))), 9),
+        "field_angle_deg": round(to_degrees(float(np.arctan(share * edge_slope))), 9),
         "azimuth_deg": azimuth_deg,
         "nominal_psnr_db": float(result.nominal.psnr_db[0, number]),
         "psnr_db": {f"p{p}": float(np.percentile(psnr, p)) for p in PERCENTS},
@@ -143,13 +145,13 @@ def _field(result: ToleranceResult, number: int) -> dict[str, Any]:
     }
 
 
-def _offender(found: Offender) -> dict[str, Any]:
-    single = found.single
+def _offender(offender: Offender) -> dict[str, Any]:
+    single = offender.single
     return {
         "class": single.error_class,
         "part": single.part,
         "error": in_file_units(single.error_class, single.value),
-        "spot_growth_mm": found.spot_growth_mm,
+        "spot_growth_mm": offender.spot_growth_mm,
     }
 
 
@@ -180,8 +182,8 @@ def to_text(result: ToleranceResult) -> str:
     ]
     if result.offenders:
         lines += ["", f"{'worst single errors':<19} {'part':>4} {'error':>10} {'RMS spot um':>12}"]
-    for found in result.offenders[:_WORST]:
-        single, growth = found.single, found.spot_growth_mm * UM_PER_MM
+    for offender in result.offenders[:_WORST]:
+        single, growth = offender.single, offender.spot_growth_mm * UM_PER_MM
         part = "-" if single.part is None else str(single.part)
         error = in_file_units(single.error_class, single.value)
         lines.append(f"{single.error_class:<19} {part:>4} {error:>10} {growth:+12.3f}")

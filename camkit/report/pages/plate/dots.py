@@ -31,13 +31,13 @@ def older_files(folder: Path) -> list[Path]:
     return sorted(p for p in folder.iterdir() if p.name == PLATE or _MASK.fullmatch(p.name))
 
 
-def write_dots(found: Match, target: FloatGrid, folder: Path) -> dict[str, Any]:
+def write_dots(match: Match, target: FloatGrid, folder: Path) -> dict[str, Any]:
     """Write plate.npz and mask_1.png, mask_2.png, ...; all of them or none.
 
     Masks of an earlier plate of more levels are removed: etched through, they would spoil this one.
 
     Args:
-        found: The plate.
+        match: The plate.
         target: (11, 11), what it was made for.
         folder: Made if it is not there.
 
@@ -45,36 +45,36 @@ def write_dots(found: Match, target: FloatGrid, folder: Path) -> dict[str, Any]:
         What there is to tell: goals reached, step, cells, masks, and the same of the PSF that the
         array sees.
     """
-    plate = found.plate
+    plate = match.plate
     *masks, heights = dot_paths(folder, plate.levels)
-    seen = effective_psf(plate.height_um, plate.camera)
+    array_psf = effective_psf(plate.height_um, plate.camera)
     files = {
         **{path: mask_image(layer, "png") for path, layer in zip(masks, plate.masks, strict=True)},
-        heights: _npz(plate, seen),
+        heights: _npz(plate, array_psf),
     }
     write_together(files)
     for path in older_files(folder):
         if path not in files:
             path.unlink()
     return {
-        **found.reached.to_json(),
+        **match.reached.to_json(),
         "levels": plate.levels,
         "cell_um": plate.camera.cell_um,
         "step_um": plate.etching.step_um,
         "unit_mm": plate.camera.unit_mm,
         "tiles": plate.camera.tiles,
         "index": round(plate.camera.index, 6),
-        "seen": likeness(seen, target).to_json(),
-        "gerchberg_saxton": found.gerchberg_saxton.to_json(),
-        "refined": found.refined.to_json(),
-        "rounded": found.rounded.to_json(),
+        "seen": likeness(array_psf, target).to_json(),
+        "gerchberg_saxton": match.gerchberg_saxton.to_json(),
+        "refined": match.refined.to_json(),
+        "rounded": match.rounded.to_json(),
         "polarity": POLARITY,
         "masks": mask_facts(masks, plate.masks, plate.etching.step_um),
         "plate": str(heights),
     }
 
 
-def _npz(plate: DotPlate, seen: FloatGrid) -> bytes:
+def _npz(plate: DotPlate, array_psf: FloatGrid) -> bytes:
     """Return the archive: one unit, and the PSFs of dots and of the array, of unit sum."""
     light = plate.light
     data = io.BytesIO()
@@ -88,6 +88,6 @@ def _npz(plate: DotPlate, seen: FloatGrid) -> bytes:
         unit_mm=np.float64(plate.camera.unit_mm),
         wavelength_um=np.float64(plate.camera.wavelength_um),
         dots=light / light.sum(),
-        psf=(seen / seen.sum()).astype(np.float32),
+        psf=(array_psf / array_psf.sum()).astype(np.float32),
     )
     return data.getvalue()

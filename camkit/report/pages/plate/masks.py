@@ -63,7 +63,7 @@ def write_masks(plate: Plate, folder: Path, name: str, kind: MaskFormat) -> dict
     etching = etching_of(plate)
     *paths, told_path = mask_paths(plate, folder, name, kind)
     layers = mask_layers(etching.level(plate.height_um), etching.levels).numpy()
-    told: dict[str, Any] = {
+    report: dict[str, Any] = {
         "name": plate.name,
         "glass": plate.glass,
         "cells": plate.height_um.shape[0],
@@ -76,8 +76,8 @@ def write_masks(plate: Plate, folder: Path, name: str, kind: MaskFormat) -> dict
         "masks": mask_facts(paths, layers, etching.step_um),
     }
     images = {path: mask_image(layer, kind) for path, layer in zip(paths, layers, strict=True)}
-    write_together({**images, told_path: (json.dumps(told, indent=2) + "\n").encode()})
-    return told
+    write_together({**images, told_path: (json.dumps(report, indent=2) + "\n").encode()})
+    return report
 
 
 def mask_facts(

@@ -14,10 +14,10 @@ from camkit.units import UM_PER_MM
 DECADES: Final = (-7.0, -2.0)
 """Of light per pixel over all light; the middle is brighter than the scale."""
 _LEAST_PX: Final = 40
-_BEYOND: Final = 1.35
+_MARGIN: Final = 1.35
 _MOST_STREAKS: Final = 4
 _FLOOR: Final = 1e-7
-_SHOWN: Final = 600
+_MOST_SAMPLES: Final = 600
 """Cells along a side of the whole relief; every so many are drawn."""
 _MIDDLE: Final = 120
 
@@ -32,7 +32,7 @@ def draw_psf(facts: PlateFacts) -> Figure:
     edge = reach + 0.5
     for row, psf, name in zip(axes, (facts.psf, facts.bare), ("plate", "bare lens"), strict=True):
         for panel, one, channel in zip(row, psf, facts.channels, strict=True):
-            shown = panel.imshow(
+            picture = panel.imshow(
                 log_light(one, reach).numpy(),
                 cmap="magma",
                 vmin=DECADES[0],
@@ -44,7 +44,7 @@ def draw_psf(facts: PlateFacts) -> Figure:
     figure.supylabel("pixels, down")
     figure.supxlabel("pixels, right")
     what = "log10 of the share of the light in a pixel"
-    figure.colorbar(shown, ax=axes, shrink=0.7, label=what)
+    figure.colorbar(picture, ax=axes, shrink=0.7, label=what)
     return figure
 
 
@@ -52,7 +52,7 @@ def shown_reach_px(facts: PlateFacts) -> int:
     """Return how far from the middle is drawn: somewhat beyond the longest streak."""
     half = facts.psf.shape[-1] // 2
     longest = max((streak.reach_px for streak in facts.streaks), default=0.0)
-    return min(half, max(_LEAST_PX, round(_BEYOND * longest)))
+    return min(half, max(_LEAST_PX, round(_MARGIN * longest)))
 
 
 def log_light(psf: Tensor, reach_px: int) -> Tensor:
@@ -68,28 +68,28 @@ def draw_cuts(facts: PlateFacts) -> Figure:
     streaks = facts.streaks[:_MOST_STREAKS]
     angles = sorted(streak.angle_deg for streak in streaks) or [0.0]
     figure = new_figure(3.3 * (len(angles) + 1), 3.3)
-    *cuts, beyond = figure.subplots(1, len(angles) + 1, squeeze=False)[0]
+    *cuts, outer = figure.subplots(1, len(angles) + 1, squeeze=False)[0]
     reach = shown_reach_px(facts)
     for number, channel in enumerate(facts.channels):
         color = channel_color(channel, number)
         for psf, style, name in ((facts.psf, "-", channel), (facts.bare, ":", f"{channel}, bare")):
             for panel, angle in zip(cuts, angles, strict=True):
-                light = along(psf[number], angle)[: reach + 1].clamp_min(_FLOOR)
+                light = light_along(psf[number], angle)[: reach + 1].clamp_min(_FLOOR)
                 panel.semilogy(light.numpy(), style, color=color)
             light = farther(psf[number]).clamp_min(_FLOOR)
-            beyond.semilogy(light.numpy(), style, color=color, label=name)
+            outer.semilogy(light.numpy(), style, color=color, label=name)
     for panel, angle in zip(cuts, angles, strict=True):
         panel.set(title=f"along the line at {angle:.1f}°", ylim=(_FLOOR, 1))
     cuts[0].set_ylabel("share of the light a pixel of length")
-    beyond.axvline(CORE_PX, color="black", linewidth=0.6)
-    beyond.set(title="light farther out", ylim=(1e-4, 1))
-    beyond.legend()
-    for panel in (*cuts, beyond):
+    outer.axvline(CORE_PX, color="black", linewidth=0.6)
+    outer.set(title="light farther out", ylim=(1e-4, 1))
+    outer.legend()
+    for panel in (*cuts, outer):
         panel.set_xlabel("pixels from the middle")
     return figure
 
 
-def along(psf: Tensor, angle_deg: float) -> Tensor:
+def light_along(psf: Tensor, angle_deg: float) -> Tensor:
     """Return the light (distance,) of both arms of a line, within HALF_WIDTH_PX of it.
 
     Pixels are looked at four by four times, so that a slanted line is as smooth as an upright one.
@@ -106,10 +106,10 @@ def along(psf: Tensor, angle_deg: float) -> Tensor:
     x = math.cos(angle) * t[:, None] - math.sin(angle) * s[None, :]
     y = math.sin(angle) * t[:, None] + math.cos(angle) * s[None, :]
     at = torch.stack([x, y], dim=-1)[None] / (half + 0.5)
-    seen = torch.nn.functional.grid_sample(
+    samples = torch.nn.functional.grid_sample(
         psf.double()[None, None], at, mode="bilinear", align_corners=False
     )
-    both = seen[0, 0].sum(1).reshape(2 * half + 1, fine).sum(1) / fine**2
+    both = samples[0, 0].sum(1).reshape(2 * half + 1, fine).sum(1) / fine**2
     arms = both[half:] + both[: half + 1].flip(0)
     return torch.cat([both[half : half + 1], arms[1:]])
 
@@ -130,7 +130,7 @@ def draw_heights(facts: PlateFacts) -> Figure:
     cells, cell_mm = height_um.shape[0], facts.plate.cell_um / UM_PER_MM
     figure = new_figure(11.5, 3.6)
     whole, middle, counts = figure.subplots(1, 3)
-    step, width = max(1, cells // _SHOWN), min(_MIDDLE, cells)
+    step, width = max(1, cells // _MOST_SAMPLES), min(_MIDDLE, cells)
     inner = slice((cells - width) // 2, (cells - width) // 2 + width)
     low, high = float(height_um.min()), float(height_um.max())
     for panel, part, count in (
@@ -139,10 +139,10 @@ def draw_heights(facts: PlateFacts) -> Figure:
     ):
         half_mm = count * cell_mm / 2
         extent = (-half_mm, half_mm, half_mm, -half_mm)
-        shown = panel.imshow(part, "viridis", vmin=low, vmax=high, extent=extent)
+        picture = panel.imshow(part, "viridis", vmin=low, vmax=high, extent=extent)
     whole.set_title("whole, mm" + (f" (one cell of {step})" if step > 1 else ""))
     middle.set_title(f"the middle {width} cells, mm")
-    figure.colorbar(shown, ax=[whole, middle], shrink=0.8, label="height, µm")
+    figure.colorbar(picture, ax=[whole, middle], shrink=0.8, label="height, µm")
     counts.hist(height_um.ravel(), bins=64, color=BLUE)
     counts.set_title("cells by height, µm")
     return figure

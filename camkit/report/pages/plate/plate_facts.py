@@ -25,7 +25,7 @@ from camkit.units import MM_PER_M
 
 WAVELENGTHS: Final = 13
 """Of which the colours are made."""
-HELD: Final = 0.995
+WINDOW_SHARE: Final = 0.995
 """Of the light of every colour, by the side that is told."""
 
 
@@ -112,7 +112,7 @@ def analyse(plate: Plate, look: Look) -> PlateFacts:
         of_bare=tuple(shares(one, mask) for one, mask in zip(bare, masks, strict=True)),
         strehl=ratios[0],
         bare_strehl=ratios[1],
-        psf_side_px=side_for(psf, HELD),
+        psf_side_px=side_for(psf, WINDOW_SHARE),
     )
 
 
@@ -135,11 +135,11 @@ def to_json(facts: PlateFacts) -> dict[str, Any]:
     }
 
 
-def _shares(channels: tuple[str, ...], found: tuple[Shares, ...]) -> dict[str, dict[str, float]]:
+def _shares(channels: tuple[str, ...], shares: tuple[Shares, ...]) -> dict[str, dict[str, float]]:
     return {
         f"{part}_share": {
             channel: round(getattr(one, part), 5)
-            for channel, one in zip(channels, found, strict=True)
+            for channel, one in zip(channels, shares, strict=True)
         }
         for part in ("core", "streak", "haze")
     }

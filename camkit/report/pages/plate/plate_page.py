@@ -10,7 +10,7 @@ from camkit.models_def.optics.diffraction.plate_optics import REFERENCE_UM
 from camkit.models_def.optics.diffraction.shares import CORE_PX, HALF_WIDTH_PX
 from camkit.report.pages.page import Page, Part, Picture, Section, Table, Words, write_page
 from camkit.report.pages.plate.plate_charts import draw_cuts, draw_heights, draw_psf
-from camkit.report.pages.plate.plate_facts import HELD, PlateFacts
+from camkit.report.pages.plate.plate_facts import WINDOW_SHARE, PlateFacts
 from camkit.units import MM_PER_M
 
 _CHARTS: Final = {"psf": draw_psf, "cuts": draw_cuts, "heights": draw_heights}
@@ -50,14 +50,14 @@ def plate_page(facts: PlateFacts, pictures: Mapping[str, str]) -> Page:
         pictures: Name -> SVG text.
     """
     plate = facts.plate
-    shown = {name: Picture(_CAPTIONS[name], svg) for name, svg in pictures.items()}
-    light = (_shares(facts), _held(facts), Words(_MEANING, "small"))
+    charts = {name: Picture(_CAPTIONS[name], svg) for name, svg in pictures.items()}
+    light = (_shares(facts), _window_words(facts), Words(_MEANING, "small"))
     sections = [
         Section("Where the light goes", light),
-        Section("Point spread function", (shown.get("psf"),)),
-        Section("Along the streaks", (shown.get("cuts"),)),
+        Section("Point spread function", (charts.get("psf"),)),
+        Section("Along the streaks", (charts.get("cuts"),)),
         Section("Streaks", _streaks(facts)),
-        Section("Relief", (shown.get("heights"),)),
+        Section("Relief", (charts.get("heights"),)),
         Section("Plate and bench", (_bench(facts),)),
     ]
     lead = (Words(plate.note, "small"),) if plate.note else ()
@@ -71,21 +71,21 @@ def _shares(facts: PlateFacts) -> Table:
     ):
         parts = ("core", "streak", "haze")
         shares = [getattr(one, part) for part in parts for one in (with_plate, bare)]
-        moved = with_plate.streak - bare.streak * with_plate.core / bare.core
-        rows.append((channel, *(f"{100 * share:.2f}" for share in (*shares, moved))))
+        streak_gain = with_plate.streak - bare.streak * with_plate.core / bare.core
+        rows.append((channel, *(f"{100 * share:.2f}" for share in (*shares, streak_gain))))
     return Table(header=_SHARES, rows=rows)
 
 
-def _held(facts: PlateFacts) -> str:
-    held = (
-        f"{facts.psf_side_px} px hold {100 * HELD:g} % of the light of every colour."
+def _window_words(facts: PlateFacts) -> str:
+    statement = (
+        f"{facts.psf_side_px} px hold {100 * WINDOW_SHARE:g} % of the light of every colour."
         if facts.psf_side_px < facts.psf.shape[-1]
-        else f"The window of {facts.psf_side_px} px holds less than {100 * HELD:g} % of the light "
-        "of a colour."
+        else f"The window of {facts.psf_side_px} px holds less than {100 * WINDOW_SHARE:g} % of "
+        "the light of a colour."
     )
     return (
         f"Strehl ratio at {REFERENCE_UM:g} µm: {facts.strehl:.3f}; of the bare lens "
-        f"{facts.bare_strehl:.3f}. {held}"
+        f"{facts.bare_strehl:.3f}. {statement}"
     )
 
 

@@ -47,13 +47,13 @@ def largest_activation(method: Method, capture: Capture) -> float:
     """
     bundle, size = method.bundle, method.pipeline.size
     assert size is not None
-    work, found = method.pipeline.start(capture), 0.0
+    work, peak = method.pipeline.start(capture), 0.0
     for role in bundle.manifest.networks:
         stride_px = bundle.network_facts(role, size).stride_px
         window = _whole_cells(work.network_input(role), stride_px)
         largest = node_activations(bundle.network_bytes(role, size), [window[None]])
-        found = max(found, *largest.values())
-    return found
+        peak = max(peak, *largest.values())
+    return peak
 
 
 def _whole_cells(planes: FloatArray, stride_px: int) -> FloatArray:

@@ -22,7 +22,7 @@ from camkit.report.stress.scenario import (
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge, see
 from camkit.report.stress.shot import Shot
-from camkit.report.stress.taking import through, through_haze
+from camkit.report.stress.taking import through_haze, through_lens
 from camkit.report.stress.verdict import Verdict
 from camkit.runtime.job.choices import known_options
 from camkit.runtime.twin.haze_spread import HazeLens
@@ -59,8 +59,10 @@ def _inverse_per_m(psf: FrozenPsf) -> NDArray[np.float64]:
 
 
 def _off_focus_per_m(bundle: Bundle, psf: FrozenPsf) -> NDArray[np.float64]:
-    off: NDArray[np.float64] = np.abs(_inverse_per_m(psf) - MM_PER_M / bundle.reference_depth_mm)
-    return off
+    defocus: NDArray[np.float64] = np.abs(
+        _inverse_per_m(psf) - MM_PER_M / bundle.reference_depth_mm
+    )
+    return defocus
 
 
 def distances_of(scenario: Scenario, bundle: Bundle) -> Scenario:
@@ -83,8 +85,8 @@ def _at_known_field(scene: Scene, bundle: Bundle) -> tuple[Scene, float]:
     assert psf is not None
     free_px = np.hypot(sensor.width_px - scene.size_px[0], sensor.height_px - scene.size_px[1])
     reach_mm = max(to_mm(sensor.pixel_pitch_um) * float(free_px) / 2, 1e-9)
-    within = psf.field_heights_mm[psf.field_heights_mm <= reach_mm]
-    height_mm = float(within[scene.number % within.size])
+    heights_mm = psf.field_heights_mm[psf.field_heights_mm <= reach_mm]
+    height_mm = float(heights_mm[scene.number % heights_mm.size])
     return replace(scene, share=height_mm / reach_mm), height_mm
 
 
@@ -106,8 +108,8 @@ def _lens_at(bundle: Bundle, inverse_m: float, height_mm: float) -> Lens:
 
 def _off_focus(judge: Judge, scene: Scene, value: float) -> Shot:
     rig = judge.rig
-    placed, height_mm = _at_known_field(scene, rig.bundle)
-    return rig.shoot(placed, _lens_at(rig.bundle, value, height_mm))
+    scene_at_field, height_mm = _at_known_field(scene, rig.bundle)
+    return rig.shoot(scene_at_field, _lens_at(rig.bundle, value, height_mm))
 
 
 def _has_depths(bundle: Bundle) -> str | None:
@@ -146,22 +148,22 @@ def _told_depth(judge: Judge, scene: Scene, value: float) -> Verdict:
     return Verdict(outcomes=judge.judge(shot, restored, with_chi2=False), seen=see(rig, shot))
 
 
-def with_split(haze: HazeLens, moved: float) -> HazeLens:
+def with_split(haze: HazeLens, moved_share: float) -> HazeLens:
     """Return a haze that holds a share of the light of the core kernels as well; the sum stays.
 
     Args:
         haze: What lies beside the kernels.
-        moved: Share of the core's light; below 0 the core has it from the haze, as far as that
-            holds so much. A place without haze has no shape to lay light in, and gets none.
+        moved_share: Share of the core's light; below 0 the core has it from the haze, as far as
+            that holds so much. A place without haze has no shape to lay light in, and gets none.
     """
 
     def share_at(x_mm: float, y_mm: float) -> FloatArray:
-        return haze.share_at(x_mm, y_mm) * np.float32(1 - moved)
+        return haze.share_at(x_mm, y_mm) * np.float32(1 - moved_share)
 
     def haze_at(x_mm: float, y_mm: float) -> FloatArray:
         kernels = haze.haze_at(x_mm, y_mm)
         light = kernels.sum(axis=(1, 2))
-        gained = moved * haze.share_at(x_mm, y_mm)
+        gained = moved_share * haze.share_at(x_mm, y_mm)
         factor = np.maximum(1 + gained / np.where(light > 0, light, 1), 0)
         return np.asarray(kernels * factor[:, None, None], dtype=np.float32)
 
@@ -242,8 +244,8 @@ def other_lens(lens: Lens, share: float) -> Lens:
     def kernels_at(x_mm: float, y_mm: float) -> FloatArray:
         height_mm = float(np.hypot(x_mm, y_mm))
         other_mm = max(corner_mm - height_mm, 0.0)
-        away = (x_mm / height_mm, y_mm / height_mm) if height_mm else (0.0, 1.0)
-        other = lens.kernels_at(-away[0] * other_mm, -away[1] * other_mm)
+        direction = (x_mm / height_mm, y_mm / height_mm) if height_mm else (0.0, 1.0)
+        other = lens.kernels_at(-direction[0] * other_mm, -direction[1] * other_mm)
         return np.asarray((1 - share) * lens.kernels_at(x_mm, y_mm) + share * other, np.float32)
 
     return Lens(psf=lens.psf, kernels_at=kernels_at, margin_px=lens.margin_px, haze=lens.haze)
@@ -264,7 +266,7 @@ SCENARIOS: Final = (
     row(
         *("decentre", "Decentred lens", "decentre_mm", "mm"),
         "[0] 0.1 0.25 0.5 (1) 2 4",
-        shoot=through(lambda lens, mm: with_axis_moved(lens, 0.6 * mm, 0.8 * mm)),
+        shoot=through_lens(lambda lens, mm: with_axis_moved(lens, 0.6 * mm, 0.8 * mm)),
         applies=varies_over_field,
         note="The PSFs move, distortion and illumination stay.",
     ),
@@ -290,7 +292,7 @@ SCENARIOS: Final = (
     row(
         *("haze", "Light lost to haze", "haze_percent", "%"),
         "[0] 1 3 6 (10) 20 40",
-        shoot=through(
+        shoot=through_lens(
             lambda lens, percent: with_kernels(lens, lambda k: add_haze(k, percent / 100))
         ),
         note="The haze is a Gaussian of 15 px: dust, a finger print, an aged coating.",
@@ -325,19 +327,19 @@ SCENARIOS: Final = (
     row(
         *("psf_rotation", "Rotation of the PSF", "rotation_deg", "deg"),
         "[0] 1 2 5 (10) 20 45",
-        shoot=through(lambda lens, deg: with_transformed(lens, 1.0, float(np.deg2rad(deg)))),
+        shoot=through_lens(lambda lens, deg: with_transformed(lens, 1.0, float(np.deg2rad(deg)))),
     ),
     row(
         *("psf_scale", "Size of the PSF", "psf_scale_percent", "%"),
         "-20 -10 (-5) -2 [0] 2 (5) 10 20",
-        shoot=through(lambda lens, percent: with_transformed(lens, 1 + percent / 100, 0.0)),
+        shoot=through_lens(lambda lens, percent: with_transformed(lens, 1 + percent / 100, 0.0)),
         fit=reaching_far,
         note="The lens's kernels against the bundle's, its haze too where it has one.",
     ),
     row(
         *("wrong_bundle", "Wrong bundle", "other_percent", "%"),
         "[0] 10 25 50 75 (100)",
-        shoot=through(lambda lens, percent: other_lens(lens, percent / 100)),
+        shoot=through_lens(lambda lens, percent: other_lens(lens, percent / 100)),
         applies=varies_over_field,
         note="The other lens does in the middle what this one does in the corner, turned by 180 "
         "degrees; below 100 % light goes both ways.",

@@ -38,11 +38,11 @@ def moonlit(scene: Scene, light: float) -> Scene:
 
 def limb_numbers(picture: FloatArray, truth: FloatArray) -> dict[str, float]:
     """Return what is wrong with a limb as a report has it."""
-    found = limb_errors(picture, truth)
+    errors = limb_errors(picture, truth)
     return {
-        "wobble_px": found.wobble_px,
-        "seam_percent": 100 * found.seam,
-        "rim_percent": 100 * found.rim,
+        "wobble_px": errors.wobble_px,
+        "seam_percent": 100 * errors.seam,
+        "rim_percent": 100 * errors.rim,
     }
 
 
@@ -61,13 +61,13 @@ def starry(scene: Scene, light: float) -> Scene:
 
 def star_numbers(picture: FloatArray, truth: FloatArray) -> dict[str, float]:
     """Return the satellites of a scene as a report has them."""
-    found = satellites(picture, truth)
+    spots = satellites(picture, truth)
     satellite_light = {
         f"satellites_{part}_{rank}_percent": 100 * float(np.quantile(shares, share))
-        for part, shares in (("above", found.above), ("below", found.below))
+        for part, shares in (("above", spots.above), ("below", spots.below))
         for rank, share in (("median", 0.5), ("p90", 0.9))
     }
-    return satellite_light | {"core_median_percent": 100 * float(np.median(found.core))}
+    return satellite_light | {"core_median_percent": 100 * float(np.median(spots.core))}
 
 
 SCENARIOS: Final = (

@@ -22,8 +22,8 @@ def _stated_black(judge: Judge, scene: Scene, value: float) -> Shot:
     """Change the black level that is stated: warm electronics, another setting."""
     shot = judge.rig.shoot(scene)
     black, white = shot.capture.black_level, shot.capture.white_level
-    stated = black + np.float32(value / 100) * (np.float32(white) - black)
-    return replace(shot, capture=replace(shot.capture, black_level=stated.astype(np.float32)))
+    shifted = black + np.float32(value / 100) * (np.float32(white) - black)
+    return replace(shot, capture=replace(shot.capture, black_level=shifted.astype(np.float32)))
 
 
 def with_discs(scene: Scene, radius_px: float, count: int) -> Scene:

@@ -26,8 +26,8 @@ def sunlit(scene: Scene, ratio: float) -> FloatArray:
     height, width = scene.linear.shape[1:]
     angle = np.pi * (scene.number % 8 + 0.5) / 4
     y, x = np.mgrid[:height, :width].astype(np.float32)
-    away = np.cos(angle) * (x - (width - 1) / 2) + np.sin(angle) * (y - (height - 1) / 2)
-    sun = np.clip(away + 0.5, 0, 1)
+    distance_px = np.cos(angle) * (x - (width - 1) / 2) + np.sin(angle) * (y - (height - 1) / 2)
+    sun = np.clip(distance_px + 0.5, 0, 1)
     return np.asarray(scene.linear * (1 + (ratio - 1) * sun), dtype=np.float32)
 
 
@@ -62,10 +62,10 @@ def surrounded(scene: Scene, reach_px: int, factor: float) -> FloatArray:
         factor: On their light.
     """
     ring = scene.scale * reach_px
-    around = np.pad(scene.linear, ((0, 0), (ring, ring), (ring, ring)), mode="reflect")
-    around *= np.float32(factor)
-    around[:, ring:-ring, ring:-ring] = scene.linear
-    return around
+    canvas = np.pad(scene.linear, ((0, 0), (ring, ring), (ring, ring)), mode="reflect")
+    canvas *= np.float32(factor)
+    canvas[:, ring:-ring, ring:-ring] = scene.linear
+    return canvas
 
 
 def _amid(judge: Judge, scene: Scene, value: float) -> Shot:

@@ -87,7 +87,7 @@ def test_what_was_planted_is_found(by_filter: Report) -> None:
     control = by_filter.control
     assert control.method == "wiener"
     assert control.planted == 8
-    assert control.found == control.planted
+    assert control.detected == control.planted
     assert control.first == control.planted
     assert control.rise > 1
     # the worst patches of the control are those, the worst first
@@ -105,7 +105,7 @@ def test_a_network_that_nobody_trained_is_denied_where_nothing_was_planted(repor
     assert report.control.method == "M"
     assert np.nanmedian(report.method("M").values("excess")) > 10
     assert np.nanmedian(report.method(TRUTH).values("excess")) < 0
-    assert report.control.found < report.control.planted
+    assert report.control.detected < report.control.planted
 
 
 def test_detail_too_weak_for_its_noise_is_not_found() -> None:

@@ -17,8 +17,8 @@ from camkit.colorimetry import decode_srgb
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.report.bench.accuracy import (
-    BROUGHT,
     INPUT,
+    SUPPLIED,
     Restorers,
     Scores,
     mean_and_spread,
@@ -92,10 +92,10 @@ def test_scores_are_those_of_the_protocol(bundle: Bundle, pictures: Path, tmp_pa
         score = judge(restored, taken.sharp)
         assert found["psnr_db"][3] == pytest.approx(score.psnr_db, abs=1e-3)
         assert found["ssim"][3] == pytest.approx(score.ssim, abs=1e-4)
-        fourth = scores[key].taken[3]
+        fourth = scores[key].captures[3]
         assert (fourth.iso, fourth.field_share) == (1600.0, 0.25)
         assert fourth.values["psnr_db"] == found["psnr_db"][3]
-        away_mm = [t.field_mm for t in scores[key].taken]
+        away_mm = [t.field_mm for t in scores[key].captures]
         assert away_mm == sorted(away_mm)
         assert away_mm[0] < 0.01 < away_mm[-1]
     assert scores[INPUT].psf == {"bundle"}
@@ -139,7 +139,7 @@ def test_a_metric_gets_what_the_capture_brings_and_the_settings_say(
     scores = measure_accuracy(
         [], [plain, known], Restorers(bundle, threads=1), (wanting,), constants={"nits": 3.0}
     )
-    assert scores[BROUGHT].by_picture == {"a.png": {"level": [0.25], "nits": [3.0]}}
+    assert scores[SUPPLIED].by_picture == {"a.png": {"level": [0.25], "nits": [3.0]}}
     (level,) = scores[INPUT].by_picture["a.png"]["level"]  # of one capture: the other lacks a need
     assert level != 0.25
 

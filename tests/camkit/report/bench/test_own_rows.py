@@ -56,7 +56,7 @@ def test_a_kind_that_measures_itself_gives_machine_settings_and_rows(
     )
     result = run_bench(asked, told.append)
     report = result.report
-    assert result.own
+    assert result.self_measured
     assert told == ["measuring"]
     assert kind.asked == [
         ("tiny", OwnSettings(data=tmp_path, images=3, sizes=("S",), quick=True, repeat=2))

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from camkit.report.bench.accuracy import BROUGHT, INPUT, Scores
+from camkit.report.bench.accuracy import INPUT, SUPPLIED, Scores
 from camkit.report.bench.metric import Column, Metric
 from camkit.report.bench.output import flatten
 from camkit.report.bench.row import make_row
@@ -80,7 +80,7 @@ def test_trials_carry_no_paths_into_rows() -> None:
 
 
 def test_the_input_is_what_captures_bring_if_they_bring_it() -> None:
-    scores = make_facts().scores | {BROUGHT: make_scores({"a": 24.0, "b": 27.0})}
+    scores = make_facts().scores | {SUPPLIED: make_scores({"a": 24.0, "b": 27.0})}
     row = make_row(make_trial(), [make_run(1.0)], make_facts(scores=scores))
     assert (row["psnr_db"], row["input_psnr_db"]) == (27, 25.5)
     assert row["gain_se_psnr_db"] == pytest.approx(0.5)  # gains of 1 and 2

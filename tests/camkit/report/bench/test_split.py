@@ -2,13 +2,13 @@
 
 import pytest
 
-from camkit.report.bench.accuracy import Scores, Taken
+from camkit.report.bench.accuracy import CaptureScores, Scores
 from camkit.report.bench.metrics.picture import METRIC
 from camkit.report.bench.split import picture_mean, split_columns
 
 
-def make_taken(picture: str, iso: float, share: float | None, psnr_db: float) -> Taken:
-    return Taken(
+def make_taken(picture: str, iso: float, share: float | None, psnr_db: float) -> CaptureScores:
+    return CaptureScores(
         picture=picture,
         iso=iso,
         field_share=share,
@@ -25,7 +25,7 @@ def test_every_iso_and_place_has_the_mean_of_its_own_captures() -> None:
         for share in (1.0, 0.0)
     ]
     inputs = [make_taken(t.picture, t.iso, t.field_share, 15.0) for t in own]
-    found = split_columns(Scores(taken=own), Scores(taken=inputs), (METRIC,))
+    found = split_columns(Scores(captures=own), Scores(captures=inputs), (METRIC,))
     assert [(c["iso"], c["psnr_db"]) for c in found["by_iso"]] == [(100.0, 29.0), (1600.0, 19.0)]
     assert [(c["field_share"], c["field_mm"], c["psnr_db"]) for c in found["by_field"]] == [
         (0.0, 0.0, 26.0),
@@ -55,7 +55,7 @@ def test_without_scores_there_is_no_cell_and_unknown_places_are_null() -> None:
         "by_field": [],
         "by_iso_and_field": [],
     }
-    (cell,) = split_columns(Scores(taken=[make_taken("a", 100.0, None, 20.0)]), None, (METRIC,))[
+    (cell,) = split_columns(Scores(captures=[make_taken("a", 100.0, None, 20.0)]), None, (METRIC,))[
         "by_field"
     ]
     assert (cell["field_share"], cell["field_mm"]) == (None, None)

@@ -47,9 +47,9 @@ def test_threads_and_tiles_do_not_decide_accuracy_and_the_rest_does() -> None:
 
 def test_axes_asked_for_are_multiplied_and_others_varied_one_at_a_time() -> None:
     axes = [
-        Vary("mode", ("exact", "fast"), asked=True),
-        Vary("threads", (2, 1), asked=True),
-        Vary("dtype", ("fp32", "fp16"), asked=False),
+        Vary("mode", ("exact", "fast"), is_requested=True),
+        Vary("threads", (2, 1), is_requested=True),
+        Vary("dtype", ("fp32", "fp16"), is_requested=False),
     ]
     labels = [trial.label for trial in spread_out(make_trial(), axes, vary=True)]
     assert labels == ["M", "M 1 thread", "M fast", "M fast 1 thread", "M fp16"]

@@ -131,7 +131,7 @@ def test_a_size_that_the_bundle_lacks_is_refused(bundle: Bundle) -> None:
 def test_networks_of_another_bundle_restore_by_their_own_pipeline(
     bundle: Bundle, scene: Scene
 ) -> None:
-    rig = Rig(bundle, ("M",), before=replace(bundle))
+    rig = Rig(bundle, ("M",), earlier_bundle=replace(bundle))
     assert [m.name for m in rig.methods] == [INPUT, "wiener", "M", "M before"]
     pictures = rig.restore(rig.shoot(scene)).pictures
     np.testing.assert_array_equal(pictures["M"], pictures["M before"])

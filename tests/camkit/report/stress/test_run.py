@@ -79,12 +79,12 @@ def test_a_journal_that_was_cut_off_is_read_up_to_there(folder: Path) -> None:
 def test_networks_of_another_bundle_are_shown_beside(folder: Path) -> None:
     bundle = open_bundle(folder / "wide.camkit")
     options = StressOptions(scenarios=choose("fp16_range,bit_depth"), scenes=1, quick=True)
-    row = run_stress(bundle, options, before=bundle).rows[1]
+    row = run_stress(bundle, options, earlier_bundle=bundle).rows[1]
     assert row["psnr_db"]["M"] == row["psnr_db"]["M before"]
     other = bundle.manifest.sensor.model_copy(update={"full_well_e": 1.0})
     stranger = replace(bundle, manifest=bundle.manifest.model_copy(update={"sensor": other}))
     with pytest.raises(ContractError, match="one camera"):
-        run_stress(bundle, options, before=stranger)
+        run_stress(bundle, options, earlier_bundle=stranger)
 
 
 @pytest.mark.parametrize("extra", [("--quick",), ("--data", ".")])

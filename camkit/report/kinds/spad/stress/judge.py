@@ -24,7 +24,7 @@ from camkit.report.kinds.spad.stress.shot import (
 from camkit.report.kinds.spad.stress.studio import Studio
 from camkit.report.kinds.spad.stress.way import BARE, BARE_NET, BICUBIC, LINEAR, Ways
 from camkit.report.kinds.spad.ways import read_baselines
-from camkit.report.stress.rig import BEFORE
+from camkit.report.stress.rig import EARLIER_MARK
 from camkit.report.stress.verdict import Outcome, Verdict
 from camkit.runtime.kinds.spad.finer.camera import DEFAULT_SIZE, FineCamera
 
@@ -42,9 +42,9 @@ class SpadJudge:
         ways: Work on them.
     """
 
-    def __init__(self, studio: Studio, ways: Ways, before: Bundle | None = None) -> None:
+    def __init__(self, studio: Studio, ways: Ways, earlier_bundle: Bundle | None = None) -> None:
         self.studio, self.ways = studio, ways
-        self._before = before
+        self._earlier_bundle = earlier_bundle
         self._undisturbed: dict[str, Mapping[str, float]] = {}
 
     @property
@@ -60,15 +60,15 @@ class SpadJudge:
     @property
     def primary(self) -> str:
         """Name M, or the largest network there is, or the linear estimate."""
-        own = [name for name in self.ways.networks if BEFORE not in name]
-        return DEFAULT_SIZE if DEFAULT_SIZE in own else (own or [LINEAR])[-1]
+        networks = [name for name in self.ways.networks if EARLIER_MARK not in name]
+        return DEFAULT_SIZE if DEFAULT_SIZE in networks else (networks or [LINEAR])[-1]
 
     @property
     def identity(self) -> tuple[object, ...]:
         """Return bundles and ways."""
         plain = None if self.ways.plain is None else self.ways.plain.bundle
-        beside = [b.sha256 for b in (self._before, plain) if b is not None]
-        return ("spad", VERSION, self.ways.camera.bundle.sha256, beside, self.methods)
+        others = [b.sha256 for b in (self._earlier_bundle, plain) if b is not None]
+        return ("spad", VERSION, self.ways.camera.bundle.sha256, others, self.methods)
 
     def shoot(
         self, scene: SpadScene, setting: PictureSetting, *, with_chi2: bool = False
@@ -90,14 +90,14 @@ class SpadJudge:
     def pictures(self, shot: PictureShot | DepthShot) -> dict[str, FloatArray]:
         """Return the truth and what every way made, grey; depth is brighter the later it is."""
         if isinstance(shot, PictureShot):
-            shown = {"sharp": shot.truth, **self.ways.pictures(shot)}
+            pictures = {"sharp": shot.truth, **self.ways.pictures(shot)}
         else:
-            found = self.ways.depths(shot)
+            depths = self.ways.depths(shot)
             edges = shot.axis.edges_ps
             truth = (shot.times_ps[0] - edges[0]) / (edges[-1] - edges[0])
-            shown = {"sharp": np.asarray(truth, np.float32)}
-            shown |= {name: depth_errors(s, shot).shown for name, s in found.items()}
-        return {name: np.repeat(picture[None], 3, axis=0) for name, picture in shown.items()}
+            pictures = {"sharp": np.asarray(truth, np.float32)}
+            pictures |= {name: depth_errors(s, shot).preview for name, s in depths.items()}
+        return {name: np.repeat(picture[None], 3, axis=0) for name, picture in pictures.items()}
 
     def undisturbed(self, scene: SpadScene) -> Mapping[str, float]:
         """Return way -> mean squared error on the undisturbed capture of a scene."""
@@ -108,8 +108,8 @@ class SpadJudge:
         return self._undisturbed[scene.name]
 
     def _pictures(self, shot: PictureShot) -> dict[str, Outcome]:
-        made = self.ways.pictures(shot)
-        errors = {name: picture_errors(picture, shot.truth) for name, picture in made.items()}
+        pictures = self.ways.pictures(shot)
+        errors = {name: picture_errors(picture, shot.truth) for name, picture in pictures.items()}
         least = np.minimum.reduce([errors[name] for name in self.rivals])
         nominal = shot.undisturbed or {}
         return {
@@ -118,21 +118,23 @@ class SpadJudge:
         }
 
     def _depths(self, shot: DepthShot) -> dict[str, Outcome]:
-        found = self.ways.depths(shot)
-        plain = np.abs(depth_errors(found[BICUBIC], shot).first_ps)
+        depths = self.ways.depths(shot)
+        plain = np.abs(depth_errors(depths[BICUBIC], shot).first_ps)
         return {
             name: depth_outcome(s, shot, 0.0 if name == BICUBIC else plain)
-            for name, s in found.items()
+            for name, s in depths.items()
         }
 
 
-def spad_judge_of(bundle: Bundle, sizes: tuple[str, ...], before: Bundle | None) -> SpadJudge:
+def spad_judge_of(
+    bundle: Bundle, sizes: tuple[str, ...], earlier_bundle: Bundle | None
+) -> SpadJudge:
     """Return the examiner of a bundle.
 
     Args:
         bundle: What is tested.
         sizes: Of its networks.
-        before: Another bundle of the same camera, whose networks stand beside.
+        earlier_bundle: Another bundle of the same camera, whose networks stand beside.
 
     Raises:
         BundleError: If it makes no picture of photons finer.
@@ -140,9 +142,9 @@ def spad_judge_of(bundle: Bundle, sizes: tuple[str, ...], before: Bundle | None)
     """
     camera = FineCamera.of(bundle)
     networks = {size: (camera, camera.size(size)) for size in sizes}
-    if before is not None:
-        other = FineCamera.of(before)
-        networks |= {f"{s} {BEFORE}": (other, s) for s in sizes if s in other.sizes}
+    if earlier_bundle is not None:
+        other = FineCamera.of(earlier_bundle)
+        networks |= {f"{s} {EARLIER_MARK}": (other, s) for s in sizes if s in other.sizes}
     plain = read_baselines(camera).cameras.get(PLAIN)
     ways = Ways(camera=camera, networks=networks, plain=plain)
-    return SpadJudge(Studio(camera=camera), ways, before)
+    return SpadJudge(Studio(camera=camera), ways, earlier_bundle)

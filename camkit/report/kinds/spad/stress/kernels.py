@@ -38,9 +38,9 @@ def turned(kernel: FloatArray, angle_rad: float) -> FloatArray:
     return _shared(np.stack([c * y + s * x, c * x - s * y]), kernel)
 
 
-def moved(kernel: FloatArray, by: float) -> FloatArray:
+def shift_kernel(kernel: FloatArray, shift: float) -> FloatArray:
     """Move a kernel (n, n) along both axes; it may become larger."""
-    return _shared(_places(kernel) + by, kernel)
+    return _shared(_places(kernel) + shift, kernel)
 
 
 def blurred(kernel: FloatArray, diameter: float) -> FloatArray:
@@ -70,10 +70,10 @@ def order_shares(levels: int, depth_error: float) -> Floats:
     if levels < 2:
         raise ContractError(f"a plate has at least 2 levels; got {levels}")
     a = 1 + depth_error - np.arange(levels)
-    below = levels * np.sin(np.pi * a / levels)
-    whole = np.abs(below) < TINY
-    found = np.square(np.sin(np.pi * a) / np.where(whole, 1.0, below))
-    return np.asarray(np.where(whole, 1.0, found))
+    denominator = levels * np.sin(np.pi * a / levels)
+    whole = np.abs(denominator) < TINY
+    shares = np.square(np.sin(np.pi * a) / np.where(whole, 1.0, denominator))
+    return np.asarray(np.where(whole, 1.0, shares))
 
 
 def etched(kernel: FloatArray, levels: int, depth_error: float) -> FloatArray:
@@ -116,11 +116,11 @@ def _shared(places: Floats, light: NDArray[np.floating]) -> FloatArray:
     """Place light at places (2, ...) on the grid of sub-pixels."""
     y, x = np.round(places.reshape(2, -1), 9)
     top, left = np.floor(y).astype(int), np.floor(x).astype(int)
-    between = bool((y != top).any() or (x != left).any())
+    is_fractional = bool((y != top).any() or (x != left).any())
     half = math.ceil(max(float(np.abs(y).max()), float(np.abs(x).max())))
-    found = np.zeros((2 * half + 5, 2 * half + 5))
+    grid = np.zeros((2 * half + 5, 2 * half + 5))
     for dy, dx in itertools.product(range(1 - REACH, REACH + 1), repeat=2):
         share = cubic(y - top - dy) * cubic(x - left - dx)
-        np.add.at(found, (top + dy + half + 2, left + dx + half + 2), share * light.ravel())
-    edge = 1 if between else 2
-    return np.asarray(found[edge:-edge, edge:-edge], np.float32)
+        np.add.at(grid, (top + dy + half + 2, left + dx + half + 2), share * light.ravel())
+    edge = 1 if is_fractional else 2
+    return np.asarray(grid[edge:-edge, edge:-edge], np.float32)

@@ -52,7 +52,7 @@ def spad_scenes(bundle: Bundle, count: int, folder: Path | None = None) -> tuple
     height = camera.scale * camera.sensor.height_px
     width = camera.scale * camera.sensor.width_px
     if folder is None:
-        named = [
+        named_pictures = [
             (f"procedural:{SCENE_SEED + i}", procedural_scene(SCENE_SEED + i, height, width))
             for i in range(count)
         ]
@@ -63,8 +63,8 @@ def spad_scenes(bundle: Bundle, count: int, folder: Path | None = None) -> tuple
                 f"{folder} holds {len(files)} picture(s), {count} are needed; add pictures or "
                 "lower --scenes"
             )
-        named = [(file.name, read_picture(file)) for file in files]
+        named_pictures = [(file.name, read_picture(file)) for file in files]
     return tuple(
         SpadScene(name=name, number=i, light=np.clip(fitted(coded_luminance(rgb), camera), 0, 1))
-        for i, (name, rgb) in enumerate(named)
+        for i, (name, rgb) in enumerate(named_pictures)
     )

@@ -71,54 +71,54 @@ class DepthErrors:
 
     Attributes:
         first_ps: (m h, m w) of the nearer surface.
-        shown: (m h, m w) 0..1, for people to look at.
+        preview: (m h, m w) 0..1, for people to look at.
     """
 
     first_ps: NDArray[np.float64]
-    shown: FloatArray
+    preview: FloatArray
 
 
-def depth_errors(found: Sharpened, shot: DepthShot) -> DepthErrors:
+def depth_errors(depth: Sharpened, shot: DepthShot) -> DepthErrors:
     """Compare times with the truth."""
     edges = shot.axis.edges_ps
-    share = (found.time_of_flight_ps[0] - edges[0]) / (edges[-1] - edges[0])
+    share = (depth.time_of_flight_ps[0] - edges[0]) / (edges[-1] - edges[0])
     return DepthErrors(
-        first_ps=found.time_of_flight_ps[0] - shot.times_ps[0],
-        shown=np.asarray(np.clip(share, 0, 1), np.float32),
+        first_ps=depth.time_of_flight_ps[0] - shot.times_ps[0],
+        preview=np.asarray(np.clip(share, 0, 1), np.float32),
     )
 
 
-def depth_outcome(found: Sharpened, shot: DepthShot, least: NDArray[np.float64] | float) -> Outcome:
+def depth_outcome(depth: Sharpened, shot: DepthShot, least: NDArray[np.float64] | float) -> Outcome:
     """Judge depth; `least` are the errors of simpler ways, in ps."""
-    errors, judged = depth_errors(found, shot), shot.judged
-    away = np.asarray(np.abs(errors.first_ps))
-    if not np.isfinite(away[judged]).all():
+    errors, judged = depth_errors(depth, shot), shot.judged
+    errors_ps = np.asarray(np.abs(errors.first_ps))
+    if not np.isfinite(errors_ps[judged]).all():
         return Outcome(psnr_db=None, fault="NaN or inf in the times")
-    valid = found.valid[0] & judged
+    valid = depth.valid[0] & judged
     span_ps = float(shot.axis.edges_ps[-1] - shot.axis.edges_ps[0])
-    mean_ps = float(away[judged].mean())
+    mean_ps = float(errors_ps[judged].mean())
     share = float(valid.sum() / judged.sum())
-    wrong = float((away[valid] > shot.pulse.height_ps).mean()) if valid.any() else 0.0
+    wrong = float((errors_ps[valid] > shot.pulse.height_ps).mean()) if valid.any() else 0.0
     outcome = Outcome(
         psnr_db=_decibels(span_ps, mean_ps),
-        chi2=_spread(away, found.sigma_ps[0], valid),
+        chi2=_spread(errors_ps, depth.sigma_ps[0], valid),
         fault=_fault(share, wrong),
-        patch_px=worst_patch(np.where(judged, away - least, 0)),
+        patch_px=worst_patch(np.where(judged, errors_ps - least, 0)),
         extra={
             "mean_error_mm": mean_ps * MM_PER_PS,
             "bias_mm": float(np.median(errors.first_ps[judged])) * MM_PER_PS,
-            "far_share": float((away[judged] * MM_PER_PS > FAR_MM).mean()),
+            "far_share": float((errors_ps[judged] * MM_PER_PS > FAR_MM).mean()),
             "valid_share": share,
         },
     )
-    return outcome if len(shot.times_ps) == 1 else _with_second(outcome, found, shot)
+    return outcome if len(shot.times_ps) == 1 else _with_second(outcome, depth, shot)
 
 
-def _with_second(outcome: Outcome, found: Sharpened, shot: DepthShot) -> Outcome:
+def _with_second(outcome: Outcome, depth: Sharpened, shot: DepthShot) -> Outcome:
     reach_ps = min(NEAR_PS, float(np.ptp(shot.times_ps, axis=0).max()) / 2)
-    near = np.abs(found.time_of_flight_ps - shot.times_ps) < reach_ps
-    told: NDArray[np.bool_] = np.all(near & found.valid, axis=0)
-    both = float(told[shot.judged].mean())
+    near = np.abs(depth.time_of_flight_ps - shot.times_ps) < reach_ps
+    both_valid: NDArray[np.bool_] = np.all(near & depth.valid, axis=0)
+    both = float(both_valid[shot.judged].mean())
     few = f"both surfaces within {reach_ps:.3g} ps in {both:.0%} of the sub-pixels"
     fault = few if both < LEAST_BOTH else None
     return replace(outcome, chi2=None, fault=fault, extra={**outcome.extra, "both_share": both})

@@ -39,7 +39,7 @@ class PictureSetting:
         hot: (h, w) pixels that count far more; None for none.
         hot_counts: What they count without light.
         hot_known: Whether they are painted over.
-        told: What networks are told of white, over what the capture shows.
+        white_factor: What networks are told of white, over what the capture shows.
     """
 
     kernel: FloatArray | None = None
@@ -52,7 +52,7 @@ class PictureSetting:
     hot: NDArray[np.bool_] | None = None
     hot_counts: float = 0.0
     hot_known: bool = True
-    told: float = 1.0
+    white_factor: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -67,7 +67,7 @@ class PictureShot:
         dark: (h, w) counts that are taken off either.
         hot: (h, w) pixels that are painted over in either.
         photons: Of white, without and with the plate.
-        told: See `PictureSetting`.
+        white_factor: See `PictureSetting`.
         undisturbed: Way -> mean squared error on the undisturbed capture; None for no chi^2.
     """
 
@@ -78,7 +78,7 @@ class PictureShot:
     dark: NDArray[np.float64]
     hot: NDArray[np.bool_]
     photons: tuple[float, float]
-    told: float = 1.0
+    white_factor: float = 1.0
     undisturbed: Mapping[str, float] | None = None
 
 
@@ -91,7 +91,7 @@ class DepthSetting:
         sbr: Signal over background of all bins.
         axis: As it is; None for that of the bundle.
         pulse: As it is; None for that of the bundle.
-        believed: Axis and pulse that the fit believes; None for those that are.
+        assumed: Axis and pulse that the fit believes; None for those that are.
         behind_ps: How far a second surface lies behind the first, in the middle of the picture.
         chance: Of a photon in the brightest bin and cycle, corrected for; 0 for no pile-up.
         hot: (h, w) pixels that count far more, which nobody states; None for none.
@@ -102,7 +102,7 @@ class DepthSetting:
     sbr: float = DEPTH_SBR
     axis: TimeAxis | None = None
     pulse: Pulse | None = None
-    believed: tuple[TimeAxis, Pulse] | None = None
+    assumed: tuple[TimeAxis, Pulse] | None = None
     behind_ps: float = 0.0
     chance: float = 0.0
     hot: NDArray[np.bool_] | None = None

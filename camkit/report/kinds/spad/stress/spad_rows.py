@@ -15,7 +15,7 @@ from camkit.calibration.dots import ACTIVE_UM
 from camkit.contracts import FloatArray
 from camkit.errors import UnsupportedError
 from camkit.report.kinds.spad.stress.judge import SpadJudge
-from camkit.report.kinds.spad.stress.kernels import blurred, etched, moved, opened, turned
+from camkit.report.kinds.spad.stress.kernels import blurred, etched, opened, shift_kernel, turned
 from camkit.report.kinds.spad.stress.scene import SpadScene
 from camkit.report.kinds.spad.stress.score import OF_DEPTH, OF_PICTURES
 from camkit.report.kinds.spad.stress.shot import (
@@ -66,7 +66,7 @@ def _counting(
     return shoot
 
 
-def _behind(
+def _through_kernel(
     change: Callable[[FloatArray, FineCamera, float], FloatArray], *, bare_too: bool = False
 ) -> Shoot:
     """Return what counts a picture behind a changed kernel, without the plate as well if asked."""
@@ -151,28 +151,26 @@ def _shifted_plate(_judge: SpadJudge, _scene: SpadScene, value: float) -> Pictur
     return PictureSetting(plate_light=(1 - abs(value) / APERTURE_MM) ** 2)
 
 
-def gate_like(stated: Pulse, *, width: float = 1.0, rc: float = 1.0) -> Pulse:
+def gate_like(gate: Pulse, *, width: float = 1.0, rc: float = 1.0) -> Pulse:
     """Return a gate whose width and time constant are other ones, by factors.
 
     Raises:
         UnsupportedError: If it is no gate.
     """
-    if not isinstance(stated, GatedPulse):
+    if not isinstance(gate, GatedPulse):
         raise UnsupportedError("the bundle states no gate, so none can be another")
-    return replace(stated, width_ps=width * stated.width_ps, rc_ps=rc * stated.rc_ps)
+    return replace(gate, width_ps=width * gate.width_ps, rc_ps=rc * gate.rc_ps)
 
 
-def _through_gate(
-    axis: TimeAxis, stated: Pulse, *, width: float = 1, rc: float = 1
-) -> DepthSetting:
+def _through_gate(axis: TimeAxis, pulse: Pulse, *, width: float = 1, rc: float = 1) -> DepthSetting:
     """Photograph through another gate; the fit believes what the bundle states."""
-    return DepthSetting(pulse=gate_like(stated, width=width, rc=rc), believed=(axis, stated))
+    return DepthSetting(pulse=gate_like(pulse, width=width, rc=rc), assumed=(axis, pulse))
 
 
 def _turned_round(axis: TimeAxis, pulse: Pulse, value: float) -> DepthSetting:
     """Read a gate scan as a histogram, or the other way round: the pulse runs the other way."""
     other = replace(axis, orientation="histogram" if axis.orientation == "gate" else "gate")
-    return DepthSetting(believed=(axis if value == 0 else other, pulse))
+    return DepthSetting(assumed=(axis if value == 0 else other, pulse))
 
 
 _light_row = partial(row, applies=makes_finer)
@@ -234,7 +232,9 @@ LIGHT: Final = (
         *("wrong_photons", "Wrong level of photons", "told over true photons", ""),
         "(0.1) 0.2 0.5 0.8 [1] 1.25 2 5 (10)",
         shoot=_counting(
-            lambda _judge, _scene, told: PictureSetting(photons=FEW_PHOTONS, told=told)
+            lambda _judge, _scene, white_factor: PictureSetting(
+                photons=FEW_PHOTONS, white_factor=white_factor
+            )
         ),
         log=True,
         rivals=("bare", "bare net", "bicubic", "linear"),
@@ -253,21 +253,23 @@ PLATE: Final = (
     _light_row(
         *("defocus", "Defocus", "defocus_mm", "mm"),
         "[0] 0.05 0.1 (0.2) 0.3 0.4 0.6 0.8 (1)",
-        shoot=_behind(_defocused, bare_too=True),
+        shoot=_through_kernel(_defocused, bare_too=True),
         note="A round stop of 14 mm before 50 mm; the array without a plate is as far out of "
         f"focus. {OF_PICTURES}",
     ),
     _light_row(
         *("etch_depth", "Depth of etching", "depth_error_percent", "%"),
         "[0] 2 5 8 (10) 12 15 20 (30)",
-        shoot=_behind(lambda kernel, _camera, percent: etched(kernel, LEVELS, percent / 100)),
+        shoot=_through_kernel(
+            lambda kernel, _camera, percent: etched(kernel, LEVELS, percent / 100)
+        ),
         note="All depths of a plate of 8 levels are off by one factor; too flat is alike. "
         f"{OF_PICTURES}",
     ),
     _light_row(
         *("plate_rotation", "Rotation of the plate", "rotation_deg", "deg"),
         "[0] 1 2 3 (4) 5 6 8 (10)",
-        shoot=_behind(lambda kernel, _camera, deg: turned(kernel, math.radians(deg))),
+        shoot=_through_kernel(lambda kernel, _camera, deg: turned(kernel, math.radians(deg))),
         note=OF_PICTURES,
     ),
     _light_row(
@@ -281,7 +283,9 @@ PLATE: Final = (
     _light_row(
         *("sample_phase", "Phase of the sample", "shift", "sub-pixels"),
         "-2 (-1) -0.5 -0.25 -0.1 [0] 0.1 0.25 (0.5) 1",
-        shoot=_behind(lambda kernel, _camera, shift: moved(kernel, -shift), bare_too=True),
+        shoot=_through_kernel(
+            lambda kernel, _camera, shift: shift_kernel(kernel, -shift), bare_too=True
+        ),
         note="Along both axes; -2, -1 and 1 are the phases 0, 1 and 3 where the bundle says 2. The "
         f"picture lies as far beside its place, which alone is most of the error. {OF_PICTURES}",
     ),
@@ -356,7 +360,7 @@ TIMES: Final = (
         *("two_returns", "Depth: two surfaces", "apart_ps", "ps"),
         "25 (50) 75 100 150 (200) 400 600 [900]",
         shoot=_scanning(
-            lambda _axis, _pulse, apart: DepthSetting(photons=TWO_PHOTONS, behind_ps=apart)
+            lambda _axis, _pulse, gap_ps: DepthSetting(photons=TWO_PHOTONS, behind_ps=gap_ps)
         ),
         note="4000 signal photons of a pixel on average, over both surfaces. The nearer surface "
         "is judged; a way is broken where it finds both, within 100 ps and half of what they lie "

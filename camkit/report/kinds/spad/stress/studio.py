@@ -35,7 +35,7 @@ from camkit.runtime.kinds.spad.twin.scene import light_of_depth
 
 DARKEST: Final = 0.2
 """Albedo of black: what sends nothing back has no depth."""
-NEARER: Final = 0.6
+NEAR_SHARE: Final = 0.6
 """Times of flight of a scene with a second surface, over those without: both must be seen."""
 PANE: Final = 0.25
 """Of the picture's sides left free around the part with a second surface."""
@@ -60,35 +60,35 @@ class Studio:
     def picture(self, scene: SpadScene, setting: PictureSetting) -> PictureShot:
         """Count a picture, with the plate and without."""
         light = scene.light[None]
-        own = self.camera.kernel if setting.kernel is None else setting.kernel
+        plate_kernel = self.camera.kernel if setting.kernel is None else setting.kernel
         bare = setting.bare_kernel
         if bare is None:
-            bare = point_kernel(own.shape[0])
-        shown, nothing = setting.photons, np.zeros(self.shape)
+            bare = point_kernel(plate_kernel.shape[0])
+        white_photons, nothing = setting.photons, np.zeros(self.shape)
         background = 0.0
         if np.isfinite(setting.sbr):
-            background = shown * float(scene.light.mean(dtype=np.float64)) / setting.sbr
+            background = white_photons * float(scene.light.mean(dtype=np.float64)) / setting.sbr
         dark = nothing if setting.dark is None else setting.dark
         hot = np.zeros(self.shape, bool) if setting.hot is None else setting.hot
         added = Disturbances(hot=hot, hot_counts=setting.hot_counts)
 
         def counted(kernel: FloatArray, photons: float) -> FloatArray:
             # what lies between sub-pixels is interpolated, which may end a hair below 0
-            seen = np.maximum(see_through(light, kernel, self.camera.grid), 0).astype(np.float64)
-            mean = seen * photons + background + dark
+            pixels = np.maximum(see_through(light, kernel, self.camera.grid), 0).astype(np.float64)
+            mean = pixels * photons + background + dark
             return np.asarray(count_frames(mean, added, _chance(scene))[0], np.float32)
 
-        through = shown * setting.plate_light
-        known = dark if setting.dark_known else nothing
+        plate_photons = white_photons * setting.plate_light
+        stated_dark = dark if setting.dark_known else nothing
         return PictureShot(
             scene=scene.name,
             truth=scene.light,
-            counts=counted(own, through),
-            bare=counted(bare, shown),
-            dark=known + background,
+            counts=counted(plate_kernel, plate_photons),
+            bare=counted(bare, white_photons),
+            dark=stated_dark + background,
             hot=hot & setting.hot_known,
-            photons=(shown, through),
-            told=setting.told,
+            photons=(white_photons, plate_photons),
+            white_factor=setting.white_factor,
         )
 
     def times(self) -> tuple[TimeAxis, Pulse]:
@@ -97,14 +97,14 @@ class Studio:
 
     def depth(self, scene: SpadScene, setting: DepthSetting) -> DepthShot:
         """Count surfaces by time."""
-        own = self.times()
-        axis, pulse = setting.axis or own[0], setting.pulse or own[1]
+        defaults = self.times()
+        axis, pulse = setting.axis or defaults[0], setting.pulse or defaults[1]
         first = stage_set(self.camera, scene.number) * 2 / LIGHT_M_PER_PS
         times, judged = first[None], np.ones(first.shape, bool)
         if setting.behind_ps:
             judged = pane(first.shape)
-            times = np.stack([NEARER * first, NEARER * first + setting.behind_ps])
-        mean = scaled_to(self._seen(scene, times, judged, axis, pulse), setting.photons)
+            times = np.stack([NEAR_SHARE * first, NEAR_SHARE * first + setting.behind_ps])
+        mean = scaled_to(self._binned_light(scene, times, judged, axis, pulse), setting.photons)
         mean += setting.photons / setting.sbr / axis.bins
         cycles = 0
         if setting.chance:
@@ -117,7 +117,7 @@ class Studio:
             undone = without_pile_up(flat, cycles, axis.orientation)
             flat, blind = undone.counts, undone.blind.reshape(self.shape)
             scattering = cycles if undone.worst.max() >= LITTLE_LOST else 0
-        believed = setting.believed or (axis, pulse)
+        assumed = setting.assumed or (axis, pulse)
         return DepthShot(
             scene=scene.name,
             times_ps=times,
@@ -125,11 +125,11 @@ class Studio:
             counts=np.ascontiguousarray(flat.reshape(*self.shape, axis.bins)),
             blind=blind,
             cycles=scattering,
-            axis=believed[0],
-            pulse=believed[1],
+            axis=assumed[0],
+            pulse=assumed[1],
         )
 
-    def _seen(
+    def _binned_light(
         self,
         scene: SpadScene,
         times_ps: NDArray[np.float64],
@@ -138,8 +138,8 @@ class Studio:
         pulse: Pulse,
     ) -> FloatArray:
         """Return the light of every bin and pixel; the last of its kind is kept."""
-        behind = float(times_ps[-1, 0, 0] - times_ps[0, 0, 0])
-        key = scene.name, axis.orientation, axis.edges_ps.tobytes(), pulse, behind
+        gap_ps = float(times_ps[-1, 0, 0] - times_ps[0, 0, 0])
+        key = scene.name, axis.orientation, axis.edges_ps.tobytes(), pulse, gap_ps
         if key not in self._lit:
             albedo = DARKEST + (1 - DARKEST) * scene.light
             layers = [
@@ -156,10 +156,10 @@ class Studio:
 
 def pane(shape: tuple[int, int]) -> NDArray[np.bool_]:
     """Return the middle of a picture (h, w), where a second surface is seen."""
-    found = np.zeros(shape, bool)
+    mask = np.zeros(shape, bool)
     top, left = (round(PANE * side) for side in shape)
-    found[top : shape[0] - top, left : shape[1] - left] = True
-    return found
+    mask[top : shape[0] - top, left : shape[1] - left] = True
+    return mask
 
 
 def _chance(scene: SpadScene) -> np.random.Generator:

@@ -46,36 +46,38 @@ class Ways:
 
     def pictures(self, shot: PictureShot) -> dict[str, FloatArray]:
         """Return way -> (m h, m w), white = 1."""
-        grid, (bare, through) = self.camera.grid, shot.photons
+        grid, (bare, plate_photons) = self.camera.grid, shot.photons
         frame = self._sound(shot.counts, shot)
-        white = white_of(frame) * shot.told
+        white = white_of(frame) * shot.white_factor
         plain = self._sound(shot.bare, shot)
-        found = {BARE: self._bare(plain) / bare}
+        pictures = {BARE: self._bare(plain) / bare}
         if self.plain is not None:
             size = self.plain.size(None)
-            found[BARE_NET] = finer_frames(self.plain, plain[None], shot.dark, size)[0] / bare
-        found[BICUBIC] = bicubic(frame, grid) / through
-        found[LINEAR] = finer_frames(self.camera, frame[None], shot.dark, None)[0] / through
+            pictures[BARE_NET] = finer_frames(self.plain, plain[None], shot.dark, size)[0] / bare
+        pictures[BICUBIC] = bicubic(frame, grid) / plate_photons
+        pictures[LINEAR] = (
+            finer_frames(self.camera, frame[None], shot.dark, None)[0] / plate_photons
+        )
         for name, (camera, size) in self.networks.items():
-            made = finer_frames(camera, frame[None], shot.dark, size, white=white)
-            found[name] = made[0] / through
-        return {name: np.asarray(picture, np.float32) for name, picture in found.items()}
+            frames = finer_frames(camera, frame[None], shot.dark, size, white=white)
+            pictures[name] = frames[0] / plate_photons
+        return {name: np.asarray(picture, np.float32) for name, picture in pictures.items()}
 
     def depths(self, shot: DepthShot) -> dict[str, Sharpened]:
         """Return way -> what it found of every sub-pixel."""
         way = Way(returns=len(shot.times_ps))
         nothing, no_dark = np.zeros_like(shot.blind), np.zeros(shot.blind.shape)
         coarse = Sharpener(shot.axis, shot.pulse, way)
-        grown = _growth(coarse, shot)
+        growth = _growth(coarse, shot)
 
         def finer(camera: FineCamera, size: str | None) -> Sharpened:
             fine = FineSharpener(camera, shot.axis, shot.pulse, way, size=size, always=True)
-            cube = fine.cube(shot.counts, no_dark, hot=nothing, blind=shot.blind, growth=grown)
+            cube = fine.cube(shot.counts, no_dark, hot=nothing, blind=shot.blind, growth=growth)
             return cube.sharpened
 
-        alone = coarse.strip(shot.counts, blind=shot.blind, growth=grown)
-        found = {BICUBIC: self._upsampled(alone), LINEAR: finer(self.camera, None)}
-        return found | {name: finer(*network) for name, network in self.networks.items()}
+        alone = coarse.strip(shot.counts, blind=shot.blind, growth=growth)
+        depths = {BICUBIC: self._upsampled(alone), LINEAR: finer(self.camera, None)}
+        return depths | {name: finer(*network) for name, network in self.networks.items()}
 
     def _sound(self, counts: FloatArray, shot: PictureShot) -> FloatArray:
         frame = np.asarray(counts - shot.dark, np.float32)
@@ -87,15 +89,15 @@ class Ways:
         estimate = self.camera.linear(photons, point_kernel(side))
         return np.asarray(np.maximum(estimate(frame[None])[0], 0), np.float32)
 
-    def _upsampled(self, found: Sharpened) -> Sharpened:
+    def _upsampled(self, depth: Sharpened) -> Sharpened:
         scale = self.camera.scale
-        layers = np.asarray(found.time_of_flight_ps, np.float32)
+        layers = np.asarray(depth.time_of_flight_ps, np.float32)
         times = np.stack([bicubic(layer, self.camera.grid) for layer in layers])
         return replace(
-            found,
+            depth,
             time_of_flight_ps=times.astype(np.float64),
-            sigma_ps=found.sigma_ps.repeat(scale, axis=1).repeat(scale, axis=2),
-            valid=found.valid.repeat(scale, axis=1).repeat(scale, axis=2),
+            sigma_ps=depth.sigma_ps.repeat(scale, axis=1).repeat(scale, axis=2),
+            valid=depth.valid.repeat(scale, axis=1).repeat(scale, axis=2),
         )
 
 

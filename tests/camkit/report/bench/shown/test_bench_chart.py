@@ -15,7 +15,7 @@ from camkit.report.bench.shown.bench_chart import (
 )
 from camkit.report.bench.shown.bench_page import split_section, tuning_section
 from camkit.report.bench.shown.front_panel import (
-    APART,
+    NOT_COMPARABLE,
     draw_front_panel,
     label_front_panel,
     title,
@@ -145,12 +145,12 @@ def test_captures_that_were_not_swept_over_the_field_have_no_panel(report: dict[
 
 def test_a_title_says_once_what_all_cameras_share(report: dict[str, Any]) -> None:
     assert title(report, report["rows"]).startswith("3 pictures; ")
-    assert APART not in title(report, report["rows"])
+    assert NOT_COMPARABLE not in title(report, report["rows"])
     report["cameras"]["trio"]["accuracy"] = "8 scenes"
     lines = title(report, report["rows"])
     assert "duet: 3 pictures; " in lines
     assert "trio: 8 scenes; " in lines
-    assert lines.endswith(APART)
+    assert lines.endswith(NOT_COMPARABLE)
 
 
 def test_a_table_shows_every_plain_method_by_iso_and_place(report: dict[str, Any]) -> None:

@@ -113,8 +113,8 @@ def test_what_lies_around_a_scene_throws_its_light_into_both_captures(
 ) -> None:
     dark = scene.showing(np.full_like(scene.linear, 0.05), "dark")
     around = np.pad(dark.linear, ((0, 0), (32, 32), (32, 32)), mode="edge")
-    plain = judge.shoot(dark, around=around)
-    lit = judge.shoot(dark, around=with_lamp(around, (16.0, 160.0), 4.0, 256.0))
+    plain = judge.shoot(dark, surroundings=around)
+    lit = judge.shoot(dark, surroundings=with_lamp(around, (16.0, 160.0), 4.0, 256.0))
     np.testing.assert_array_equal(lit.truth, plain.truth)
     coded, bare = (
         now.samples.astype(float) - before.samples

@@ -15,9 +15,9 @@ from camkit.report.pages.calibration.bundle_page import (
     Curve,
     bundle_html,
     draw,
-    held,
+    encircled_light,
     light,
-    moved,
+    outward_shift,
 )
 from tests.bundle_factory import write_tiny_bundle
 from tests.camkit.cli.use.test_calibrate_bundle import (
@@ -44,7 +44,7 @@ def two_bundles(tmp_path_factory: pytest.TempPathFactory) -> tuple[Bundle, Bundl
 
 def test_colours_of_the_sensor_are_drawn_in_theirs() -> None:
     at = np.arange(3.0)
-    curve = Curve(radius=at, before=at, now=at)
+    curve = Curve(radius=at, original=at, now=at)
     above, _ = draw([curve] * 3, "across", "up", ("R", "G", "B")).axes
     drawn = [line.get_color() for line in above.lines]
     assert drawn == [color for color in CHANNEL_COLORS.values() for _ in range(2)]
@@ -52,17 +52,17 @@ def test_colours_of_the_sensor_are_drawn_in_theirs() -> None:
 
 def test_curves_are_those_of_both_bundles(two: tuple[Bundle, Bundle]) -> None:
     before, made = two
-    curve = moved(before, made)
+    curve = outward_shift(before, made)
     r = curve.radius / 57.7
     np.testing.assert_allclose(curve.now, -57.7 * 0.02 * r**3, atol=1e-6)
-    assert np.abs(curve.now - curve.before).max() > 0.1
+    assert np.abs(curve.now - curve.original).max() > 0.1
     curve = light(before, made)
     assert curve.now[0] == pytest.approx(1)
     assert curve.now[-1] == pytest.approx(0.7)
     known = before.psf
-    assert curve.before[-1] == pytest.approx(known.relative_illumination[-1])
+    assert curve.original[-1] == pytest.approx(known.relative_illumination[-1])
     drawn = draw([curve], "across", "up").axes
-    np.testing.assert_allclose(drawn[1].get_lines()[0].get_ydata(), curve.now - curve.before)
+    np.testing.assert_allclose(drawn[1].get_lines()[0].get_ydata(), curve.now - curve.original)
 
 
 def test_every_part_has_a_section(two: tuple[Bundle, Bundle]) -> None:
@@ -88,10 +88,10 @@ def test_every_part_has_a_section(two: tuple[Bundle, Bundle]) -> None:
 def test_kernels_hold_all_light_within_their_corner(tmp_path: Path) -> None:
     before = open_bundle(write_tiny_bundle(tmp_path))
     made, _ = remeasured(before, Measured(psf=measured_point()), tmp_path / "mine.camkit")
-    for shares in (*held(before), *held(made)):
+    for shares in (*encircled_light(before), *encircled_light(made)):
         assert shares[-1] == pytest.approx(1, abs=1e-5)
         assert (np.diff(shares) >= 0).all()
-    red, green, blue = (shares[0] for shares in held(made))
+    red, green, blue = (shares[0] for shares in encircled_light(made))
     assert red < green < blue  # the shorter the wavelength, the narrower that kernel
     empty = {"networks": [], "golden": [], "left_out": [], "notes": []}
     page = bundle_html(before, made, {**empty, "measured": {"psf": "p.safetensors"}})
@@ -106,5 +106,5 @@ def test_a_profile_without_distortion_moves_and_darkens_nothing(tmp_path: Path) 
     plain = write_bundle(
         tmp_path / "plain.camkit", profile_manifest(optics=optics, stages=stages), {}
     )
-    np.testing.assert_array_equal(light(plain, plain).before, 1)
-    np.testing.assert_array_equal(moved(plain, plain).now, 0)
+    np.testing.assert_array_equal(light(plain, plain).original, 1)
+    np.testing.assert_array_equal(outward_shift(plain, plain).now, 0)

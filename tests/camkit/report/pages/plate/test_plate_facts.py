@@ -11,7 +11,7 @@ from camkit.models_def.optics.diffraction.geometry import Bench
 from camkit.models_def.optics.diffraction.patterns import FlatPattern, StarPattern
 from camkit.models_def.optics.diffraction.plate import Plate, pattern_plate
 from camkit.report.pages.page import to_html
-from camkit.report.pages.plate.plate_charts import along, farther
+from camkit.report.pages.plate.plate_charts import farther, light_along
 from camkit.report.pages.plate.plate_facts import Look, PlateFacts, analyse, to_json
 from camkit.report.pages.plate.plate_page import plate_page, write_plate_page
 from tests.two_colours import red_and_blue_sensor
@@ -88,7 +88,7 @@ def test_a_slanted_line_is_cut_as_smoothly_as_an_upright_one() -> None:
         angle = math.radians(angle_deg)
         across = -math.sin(angle) * place[None] + math.cos(angle) * place[:, None]
         line = torch.exp(-(across**2) / 2)
-        light = along(line, angle_deg)
+        light = light_along(line, angle_deg)
         assert torch.allclose(light[2:45], light[10].expand(43), rtol=0.1)
         # both arms, across a line of this width
         assert float(light[10]) == pytest.approx(2 * math.sqrt(2 * math.pi), rel=0.05)

@@ -10,9 +10,9 @@ from camkit.errors import ContractError
 from camkit.report.kinds.spad.stress.kernels import (
     blurred,
     etched,
-    moved,
     opened,
     order_shares,
+    shift_kernel,
     turned,
 )
 from tests.spad_bundle import leaning_kernel
@@ -38,7 +38,7 @@ def _moments(kernel: FloatArray) -> tuple[float, np.ndarray, np.ndarray]:
     "same",
     [
         lambda k: turned(k, 0.0),
-        lambda k: moved(k, 0.0),
+        lambda k: shift_kernel(k, 0.0),
         lambda k: blurred(k, 0.0),
         lambda k: etched(k, 8, 0.0),
         lambda k: opened(k, 0.0),
@@ -53,7 +53,7 @@ def test_the_nominal_value_gives_the_designed_kernel(same: object, kernel: Float
     "other",
     [
         lambda k: turned(k, math.radians(7)),
-        lambda k: moved(k, 0.3),
+        lambda k: shift_kernel(k, 0.3),
         lambda k: blurred(k, 2.5),
         lambda k: etched(k, 8, 0.2),
         lambda k: opened(k, 0.03),
@@ -79,7 +79,7 @@ def test_a_turn_keeps_the_middle_at_its_distance(kernel: FloatArray) -> None:
 
 def test_a_shift_moves_the_middle_and_keeps_the_width(kernel: FloatArray) -> None:
     _, middle, width = _moments(kernel)
-    _, found, as_wide = _moments(moved(kernel, 0.4))
+    _, found, as_wide = _moments(shift_kernel(kernel, 0.4))
     np.testing.assert_allclose(found, middle + 0.4, atol=1e-5)
     np.testing.assert_allclose(as_wide, width, atol=1e-4)
 
