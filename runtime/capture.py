@@ -7,13 +7,11 @@ when a stage asks for them.
 import math
 from dataclasses import dataclass, field
 from numbers import Real
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.bundle.plane import Plane
-from camkit.bundle.sensor import MOSAIC, RGB
 from camkit.caller import option_text
 from camkit.contracts import CFA_PATTERNS, CfaPattern, FloatArray, InputContract, NoiseModel
 from camkit.errors import ContractError
@@ -22,6 +20,9 @@ from camkit.picture_window import PictureWindow
 from camkit.runtime.machine.memory import mapping_of
 from camkit.runtime.metadata import Metadata
 from camkit.runtime.rows import Rows, RowSource
+
+if TYPE_CHECKING:
+    from camkit.bundle.plane import Plane
 
 SATURATION_SHARE: Final = 0.99
 """A sample at this share of the white level is taken as clipped.
@@ -206,13 +207,17 @@ class Capture:
         """Return (channel, h, w) of the samples; a mosaic is one channel."""
         return 1 if self.cfa is not None else self.channels, self.height, self.width
 
-    def plane(self, sensor_plane: Plane | None) -> Plane:
+    def plane(self, sensor_plane: "Plane | None") -> "Plane":
         """Return what the samples are.
 
         Args:
             sensor_plane: The plane of a bundle's sensor; planes that come in place of a mosaic have
                 their own channels.
         """
+        # the process of the decoder, which is started for every file, needs no manifest
+        from camkit.bundle.plane import Plane
+        from camkit.bundle.sensor import MOSAIC, RGB
+
         channels = MOSAIC if self.cfa is not None else RGB
         if sensor_plane is None:
             return Plane(type="uint16", channels=channels, domain="dn")
@@ -224,7 +229,7 @@ class Capture:
         """Return the samples as the file holds them."""
         return _Samples(self)
 
-    def gives(self, _plane: Plane) -> bool:
+    def gives(self, _plane: "Plane") -> bool:
         """Return whether a plane can be a product of this capture: any can."""
         return True
 

@@ -156,7 +156,7 @@ def test_the_command_freezes_a_plate(optics: PlateOptics, tmp_path: Path) -> Non
     assert 0.9 < told["energy_kept"] < 1
     assert read_psf(out).symmetry == "uniform"
     again = CliRunner().invoke(app, arguments)
-    assert "--overwrite" in str(again.exception)
+    assert "psf.safetensors exists; add" in str(again.exception)
     missing = [*arguments[:3], str(tmp_path / "x.safetensors"), "--energy", "0.9999"]
     short = CliRunner().invoke(app, [*missing, "--max-side-px", "31"])
     assert "wanted 0.9999" in str(short.exception)
