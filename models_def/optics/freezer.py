@@ -56,9 +56,9 @@ class FreezeRequest:
 
     def __post_init__(self) -> None:
         names = ("depths_mm", "limit_db", "energy", "max_side_px", "focus_um")
-        chosen = [option_text(name) for name in names if getattr(self, name)]
-        if self.haze and chosen:
-            raise ContractError(f"{option_text('haze')} conflicts with {', '.join(chosen)}")
+        options = [option_text(name) for name in names if getattr(self, name)]
+        if self.haze and options:
+            raise ContractError(f"{option_text('haze')} conflicts with {', '.join(options)}")
 
     def grid(self, base: FreezeGrid) -> FreezeGrid:
         """Return a grid with what is asked for."""

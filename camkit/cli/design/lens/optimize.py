@@ -76,7 +76,7 @@ def optimize(
     problem = in_own_frame(problem, begin)
     with working(f"improving {lens.name}"):
         found = improve(problem, begin, starts=starts, spread=spread, steps=steps, seed=seed)
-    better = problem.free.made(found.scaled)
+    better = problem.free.lens_at(found.scaled)
     write_lens(better, out)
     notes = [
         *read_notes,
