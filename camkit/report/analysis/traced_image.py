@@ -84,7 +84,7 @@ def land_band(lens: Lens, angle_rad: float, band: Band, pitch_um: float, rays: i
     parts = [land_light(lens, angle_rad, float(wave), pitch_um, rays) for wave in waves_um]
     lost: dict[str, float] = {}
     for part, weight in zip(parts, weights, strict=True):
-        for fate, share in part.lost.items():
+        for fate, share in part.losses.items():
             lost[fate] = lost.get(fate, 0.0) + float(weight) * share
     return LandedLight(
         x_px=np.concatenate([part.x_px for part in parts]),

@@ -286,7 +286,7 @@ def _split(
     haze = np.zeros((MOST_CELLS, MOST_CELLS))
     # the mean over points of a cell: a triangle two cells wide
     left, top = np.floor(x / cell_px), np.floor(y / cell_px)
-    for right, across in ((0, 1 - (x / cell_px - left)), (1, x / cell_px - left)):
+    for right, column_share in ((0, 1 - (x / cell_px - left)), (1, x / cell_px - left)):
         for row_step, row_share in ((0, 1 - (y / cell_px - top)), (1, y / cell_px - top)):
             haze += _cell_light(
                 left + right, top + row_step, far * column_share * row_share, MOST_CELLS
