@@ -97,7 +97,7 @@ class LensModule(DesignLens):
         kernels, penalty = [], torch.zeros((), dtype=scaled.dtype)
         for distance_mm in problem.depths_mm:
             traced = trace_batch(problem, scaled, distance_mm)
-            kernels.append(splat_batch(traced.landed, self.pixels)[0])
+            kernels.append(splat_batch(traced.landings, self.pixels)[0])
             if distance_mm == problem.limited_mm:
                 penalty = limits_of(problem, traced, distance_mm).square().sum()
         return torch.stack(kernels), penalty
@@ -111,11 +111,11 @@ class LensModule(DesignLens):
             return made_with(tensors, copy, reference=reference, object_distance_mm=focused_mm)
 
         traced = (trace_batch(problem, scaled, mm, change) for mm in problem.depths_mm)
-        return torch.stack([splat_batch(found.landed, self.pixels)[0] for found in traced])
+        return torch.stack([splat_batch(found.landings, self.pixels)[0] for found in traced])
 
     def lens(self) -> Lens:
         """Return the present lens as a prescription."""
-        return self.problem.free.made(self.scaled().detach())
+        return self.problem.free.lens_at(self.scaled().detach())
 
 
 def fitting_window_px(problem: Problem, scaled: Tensor, pixels: Pixels) -> int:
@@ -135,7 +135,7 @@ def fitting_window_px(problem: Problem, scaled: Tensor, pixels: Pixels) -> int:
     with torch.no_grad():
         kernels = torch.stack(
             [
-                splat_batch(trace_batch(problem, scaled[None], depth_mm).landed, wide)[0]
+                splat_batch(trace_batch(problem, scaled[None], depth_mm).landings, wide)[0]
                 for depth_mm in problem.depths_mm
             ]
         )

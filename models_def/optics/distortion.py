@@ -75,9 +75,11 @@ def check_distortion(lens: Lens, psf: FrozenPsf, path: Path) -> None:
         ContractError: Naming the file.
     """
     frozen = psf.distortion
-    own = trace_distortion(lens, frozen.radius_mm, channels=len(frozen.coefficients))
-    along = np.stack([np.linspace(0.0, frozen.radius_mm, 33), np.zeros(33)], axis=1)
-    off_mm = np.abs(distort_points(along, own) - distort_points(along, frozen)).max()
+    lens_distortion = trace_distortion(lens, frozen.radius_mm, channels=len(frozen.coefficients))
+    points_mm = np.stack([np.linspace(0.0, frozen.radius_mm, 33), np.zeros(33)], axis=1)
+    off_mm = np.abs(
+        distort_points(points_mm, lens_distortion) - distort_points(points_mm, frozen)
+    ).max()
     refuse_other_lens(lens, path, float(off_mm * UM_PER_MM / psf.pixel_pitch_um), SAME_LENS_PX)
 
 

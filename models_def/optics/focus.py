@@ -57,21 +57,21 @@ def focus_shift_mm(
         raise ContractError(f"the merit must be one of {', '.join(FOCUS_MERITS)}; got {merit}")
     if merit == "paraxial":
         return paraxial_image(lens).distance_mm - lens.surfaces[-1].thickness_mm
-    chosen = half_disc(_RAYS) if samples is None else samples
+    pupil = half_disc(_RAYS) if samples is None else samples
     slopes = torch.tan(torch.tensor(lens.field_angles_rad, dtype=torch.float64))
     waves = torch.tensor(lens.wavelengths_um, dtype=torch.float64)
     with torch.no_grad():
         tensors = surface_tensors(lens, waves[:, None])
         slope = slopes[:, None, None].expand(-1, len(waves), 1)
-        rays, weight = pupil_rays(lens, tensors, chosen, slope, definition=definition)
+        rays, weight = pupil_rays(lens, tensors, pupil, slope, definition=definition)
         rays = replace(rays, path_mm=launch_path_mm(rays, lens.object_distance_mm))
-        landed = trace(tensors, rays, path=True)
-        weight = torch.where(landed.valid, weight, 0.0)
+        landings = trace(tensors, rays, path=True)
+        weight = torch.where(landings.valid, weight, 0.0)
         weight = weight * _weights(field_weights, len(slopes), "field")[:, None, None]
         weight = weight * _weights(wavelength_weights, len(waves), "wavelength")[:, None]
         if not bool(weight.sum() > 0):
             raise ContractError(f"no ray of {lens.name} reaches the sensor; it cannot be focused")
-        return _spot_shift(landed, weight) if merit == "spot" else _wave_shift(landed, weight)
+        return _spot_shift(landings, weight) if merit == "spot" else _wave_shift(landings, weight)
 
 
 def with_focus(lens: Lens, merit: FocusMerit) -> Lens:
@@ -92,15 +92,15 @@ def launch_path_mm(rays: Rays, object_distance_mm: float) -> Tensor:
     return (rays.z + object_distance_mm) / rays.n
 
 
-def _weights(given: Sequence[float] | None, count: int, what: str) -> Tensor:
-    if given is None:
+def _weights(weights: Sequence[float] | None, count: int, what: str) -> Tensor:
+    if weights is None:
         return torch.ones(count, dtype=torch.float64)
-    if len(given) != count or not all(w >= 0 for w in given):
-        raise ContractError(f"expected {count} {what} weights >= 0; got {list(given)}")
-    return torch.tensor(given, dtype=torch.float64)
+    if len(weights) != count or not all(w >= 0 for w in weights):
+        raise ContractError(f"expected {count} {what} weights >= 0; got {list(weights)}")
+    return torch.tensor(weights, dtype=torch.float64)
 
 
-def _spot_shift(landed: Rays, weight: Tensor) -> float:
+def _spot_shift(landings: Rays, weight: Tensor) -> float:
     """Minimise sum w |p - mean p + s (t - mean t)|^2, p the landing points, t their slopes.
 
     The pupil's half x < 0 mirrors the other, so means of x are 0 in it: x needs no mean.
@@ -110,28 +110,28 @@ def _spot_shift(landed: Rays, weight: Tensor) -> float:
     def centred(value: Tensor) -> Tensor:
         return value - (weight * value).sum((1, 2), keepdim=True) / total
 
-    ty = centred(landed.m / landed.n)
-    tx, y = landed.l / landed.n, centred(landed.y)
-    both = (weight * (landed.x * tx + y * ty)).sum()
+    ty = centred(landings.m / landings.n)
+    tx, y = landings.l / landings.n, centred(landings.y)
+    both = (weight * (landings.x * tx + y * ty)).sum()
     return float(-both / (weight * (tx**2 + ty**2)).sum())
 
 
-def _wave_shift(landed: Rays, weight: Tensor) -> float:
+def _wave_shift(landings: Rays, weight: Tensor) -> float:
     """Minimise sum w (W + s dW/ds + tilt)^2 with the piston of each beam removed.
 
     W is the path to the foot of the perpendicular from the reference point of the field, exact to
     second order in the distance by which a ray misses it.
     """
-    path = landed.path_mm
+    path = landings.path_mm
     if path is None:
         raise ContractError("rays must carry their optical path; trace them with path=True")
     share = weight / weight.sum((1, 2), keepdim=True).clamp_min(1e-300)
-    middle = (share * landed.y).sum((1, 2), keepdim=True)
-    lean = (share * landed.m / landed.n).sum((1, 2), keepdim=True)
-    waves = path - landed.x * landed.l - (landed.y - middle) * landed.m
-    by_shift = lean * landed.m + landed.n
+    middle = (share * landings.y).sum((1, 2), keepdim=True)
+    lean = (share * landings.m / landings.n).sum((1, 2), keepdim=True)
+    waves = path - landings.x * landings.l - (landings.y - middle) * landings.m
+    by_shift = lean * landings.m + landings.n
     fields = weight.shape[0]
-    tilts = [landed.m * (torch.arange(fields)[:, None, None] == i) for i in range(fields)]
+    tilts = [landings.m * (torch.arange(fields)[:, None, None] == i) for i in range(fields)]
     beam = weight.sum(2, keepdim=True).clamp_min(1e-300)
     root = torch.sqrt(weight)
 
@@ -139,5 +139,5 @@ def _wave_shift(landed: Rays, weight: Tensor) -> float:
         return (root * (value - (weight * value).sum(2, keepdim=True) / beam)).flatten()
 
     table = torch.stack([column(by_shift), *map(column, tilts)], dim=1)
-    found = torch.linalg.lstsq(table, -column(waves)[:, None]).solution
-    return float(found[0, 0])
+    solution = torch.linalg.lstsq(table, -column(waves)[:, None]).solution
+    return float(solution[0, 0])

@@ -140,16 +140,16 @@ def choose_depths(psf: FrozenPsf, bench: Bench, *, limit_db: float) -> tuple[flo
         limit_db: Mean loss allowed, both of interpolated kernels and of the mean kernel.
     """
     count = len(bench.depths_mm)
-    kept = sorted({0, count - 1})
-    while len(kept) < count:
-        thin = replace(psf, kernels=psf.kernels[:, kept], depths_mm=psf.depths_mm[kept])
+    indices = sorted({0, count - 1})
+    while len(indices) < count:
+        thin = replace(psf, kernels=psf.kernels[:, indices], depths_mm=psf.depths_mm[indices])
         losses = frozen_loss(thin, bench), mean_kernel_loss(thin, psf, bench)
         worst = max(losses, key=lambda loss: loss.mean_db)
         if worst.mean_db <= limit_db:
             break
-        left = (i for i in range(count) if i not in kept)
-        kept = sorted([*kept, max(left, key=worst.by_depth_db.__getitem__)])
-    return tuple(bench.depths_mm[i] for i in kept)
+        others = (i for i in range(count) if i not in indices)
+        indices = sorted([*indices, max(others, key=worst.by_depth_db.__getitem__)])
+    return tuple(bench.depths_mm[i] for i in indices)
 
 
 def between_mm(depths_mm: tuple[float, ...]) -> tuple[float, ...]:
@@ -172,14 +172,14 @@ def choose_blocks(psf: FrozenPsf, bench: Bench, *, tell: Tell = _silent) -> tupl
         for block_px, overlap_px in sorted(grids, key=lambda b: ((b[0] / (b[0] - b[1])) ** 2, b))
     ]
     probes = make_probes(psf, bench, cheapest_first)
-    tried: list[tuple[Wiener, Loss]] = []
+    trials: list[tuple[Wiener, Loss]] = []
     for settings in cheapest_first:
         loss = block_loss(psf, bench, settings, probes)
         grid = f"blocks of {settings.block_px} px, overlap {settings.overlap_px}"
         tell(f"{grid}: {loss.mean_db:.3f} dB")
-        tried.append((settings, loss))
-    allowed_db = min(loss.mean_db for _, loss in tried) + BLOCK_TOLERANCE_DB
-    return next(pair for pair in tried if pair[1].mean_db <= allowed_db)
+        trials.append((settings, loss))
+    allowed_db = min(loss.mean_db for _, loss in trials) + BLOCK_TOLERANCE_DB
+    return next(pair for pair in trials if pair[1].mean_db <= allowed_db)
 
 
 def freeze_samples(
@@ -216,23 +216,23 @@ def freeze_samples(
     Raises:
         ContractError: If the optics are wrong or no grid keeps the loss.
     """
-    chosen = settings or Wiener(prior_scale=PRIOR_SCALE, prior_exponent=PRIOR_EXPONENT)
+    filter_settings = settings or Wiener(prior_scale=PRIOR_SCALE, prior_exponent=PRIOR_EXPONENT)
     # losses of samples by the same filter for every camera, each colour alone
-    alone = chosen.model_copy(update={"together": None})
-    wanted = grid or FreezeGrid()
+    alone = filter_settings.model_copy(update={"together": None})
+    freeze_grid = grid or FreezeGrid()
     tell(f"tracing {optics.name} and its copies")
-    bench = make_bench(optics, sensor, alone, grid=wanted)
+    bench = make_bench(optics, sensor, alone, grid=freeze_grid)
     frozen, loss = choose_grid(optics, sensor, bench, limit_db=limit_db, grid=grid, tell=tell)
-    own = replace(bench, settings=chosen)
-    blocks, blocked = choose_blocks(frozen.psf, own, tell=tell)
+    own_bench = replace(bench, settings=filter_settings)
+    blocks, blocked = choose_blocks(frozen.psf, own_bench, tell=tell)
     psf, focus_kept = frozen.psf, 0.0
     if focus_um and isinstance(optics, LensOptics):
         tell(f"tracing {optics.name} with its sensor moved by {focus_um:g} um to both sides")
         psf, focus_kept = with_focus(psf, (-focus_um, focus_um), optics.refocused, sensor)
-    between = between_mm(tuple(frozen.psf.depths_mm.tolist()))
+    middles_mm = between_mm(tuple(frozen.psf.depths_mm.tolist()))
     between_db = None
-    if between:
-        there = make_bench(optics, sensor, alone, grid=replace(wanted, depths_mm=between))
+    if middles_mm:
+        there = make_bench(optics, sensor, alone, grid=replace(freeze_grid, depths_mm=middles_mm))
         between_db = frozen_loss(frozen.psf, there).mean_db
     facts = _facts(frozen, loss, limit_db) | {
         "block_px": blocks.block_px,

@@ -20,8 +20,8 @@ from camkit.models_def.optics.freeze import LOSS_LIMIT_DB, Facts, Tell, freeze_s
 from camkit.models_def.optics.frozen import FreezeGrid, freeze_stress
 from camkit.models_def.optics.lens_optics import LensOptics
 from camkit.models_def.optics.optics import Optics
+from camkit.models_def.optics.thin.distances import freeze_distances
 from camkit.models_def.optics.thin.freezing import freeze_hazy
-from camkit.models_def.optics.thin.nearer import freeze_distances
 from camkit.progress import note, working
 
 
@@ -56,9 +56,9 @@ class FreezeRequest:
 
     def __post_init__(self) -> None:
         names = ("depths_mm", "limit_db", "energy", "max_side_px", "focus_um")
-        chosen = [option_text(name) for name in names if getattr(self, name)]
-        if self.haze and chosen:
-            raise ContractError(f"{option_text('haze')} conflicts with {', '.join(chosen)}")
+        options = [option_text(name) for name in names if getattr(self, name)]
+        if self.haze and options:
+            raise ContractError(f"{option_text('haze')} conflicts with {', '.join(options)}")
 
     def grid(self, base: FreezeGrid) -> FreezeGrid:
         """Return a grid with what is asked for."""

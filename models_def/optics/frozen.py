@@ -107,9 +107,9 @@ def freeze(optics: Optics, sensor: ColorSensor, grid: FreezeGrid | None = None) 
     Raises:
         ContractError: If the largest side does not hold the wanted light.
     """
-    chosen = grid or FreezeGrid()
-    layout = optics.layout(corner_height_mm(sensor), chosen.fields)
-    return freeze_at(optics, sensor, chosen, layout)
+    freeze_grid = grid or FreezeGrid()
+    layout = optics.layout(corner_height_mm(sensor), freeze_grid.fields)
+    return freeze_at(optics, sensor, freeze_grid, layout)
 
 
 def freeze_at(optics: Optics, sensor: ColorSensor, grid: FreezeGrid, fields: FieldLayout) -> Frozen:
@@ -128,7 +128,7 @@ def freeze_at(optics: Optics, sensor: ColorSensor, grid: FreezeGrid, fields: Fie
         for depth_mm in depths_mm
     ]
     weights = torch.from_numpy(wavelength_weights(fine_um, response_um, response))
-    side_px, kept = _smallest_side(traced, weights, grid)
+    side_px, energy = _smallest_side(traced, weights, grid)
     averaged = [_average(t, bands, side_px) for t in traced]
     if optics.wavelengths_um is None:
         share = torch.from_numpy(wavelength_weights(waves_um, response_um, response))
@@ -148,7 +148,7 @@ def freeze_at(optics: Optics, sensor: ColorSensor, grid: FreezeGrid, fields: Fie
         grid_x_mm=fields.grid_x_mm,
         grid_y_mm=fields.grid_y_mm,
     )
-    return Frozen(psf=psf, energy_kept=kept)
+    return Frozen(psf=psf, energy_kept=energy)
 
 
 def with_focus(
@@ -179,13 +179,13 @@ def with_focus(
         least_energy=0.0,
     )
     fields = radial_layout(psf.field_heights_mm.copy())
-    moved = [freeze_at(refocused(shift_um), sensor, grid, fields) for shift_um in shifts_um]
+    shifted = [freeze_at(refocused(shift_um), sensor, grid, fields) for shift_um in shifts_um]
     added = replace(
         psf,
         focus_um=np.array(shifts_um, dtype=np.float64),
-        focus_kernels=np.stack([one.psf.kernels for one in moved]),
+        focus_kernels=np.stack([one.psf.kernels for one in shifted]),
     )
-    return added, min(one.energy_kept for one in moved)
+    return added, min(one.energy_kept for one in shifted)
 
 
 def _wavelengths(
@@ -227,11 +227,11 @@ def stress_depths_mm(depths_mm: tuple[float, ...]) -> tuple[float, ...]:
         Increasing, up to infinity where the offsets reach it.
     """
     near, far = MM_PER_M / depths_mm[0], MM_PER_M / depths_mm[-1]
-    found = {MM_PER_M / (near + offset) for offset in STRESS_OFFSETS_PER_M}
-    found |= {
+    distances_mm = {MM_PER_M / (near + offset) for offset in STRESS_OFFSETS_PER_M}
+    distances_mm |= {
         MM_PER_M / (far - offset) if far > offset else math.inf for offset in STRESS_OFFSETS_PER_M
     }
-    return tuple(sorted({*found, *depths_mm}))
+    return tuple(sorted({*distances_mm, *depths_mm}))
 
 
 @working("freezing kernels off the design point")
@@ -271,15 +271,15 @@ def _smallest_side(traced: list[TracedPsf], weights: Tensor, grid: FreezeGrid) -
     """Return smallest odd side that holds the wanted light of every colour, and what it holds."""
     full = torch.stack([t.kernels * t.energy_kept[..., None, None] for t in traced])
     colours = torch.einsum("cw,dfwij->dfcij", weights, full)
-    kept = 0.0
+    energy = 0.0
     for side_px in range(grid.least_side_px, grid.max_side_px + 1, 2):
-        kept = float(_centre(colours, side_px).sum((-2, -1)).min())
-        if kept >= grid.energy:
-            return side_px, kept
-    if grid.least_energy is not None and kept >= grid.least_energy:
-        return grid.max_side_px, kept
+        energy = float(_centre(colours, side_px).sum((-2, -1)).min())
+        if energy >= grid.energy:
+            return side_px, energy
+    if grid.least_energy is not None and energy >= grid.least_energy:
+        return grid.max_side_px, energy
     raise ContractError(
-        f"kernels of {grid.max_side_px} px hold {kept:.4f} of the light, wanted {grid.energy}; "
+        f"kernels of {grid.max_side_px} px hold {energy:.4f} of the light, wanted {grid.energy}; "
         f"raise {option_text('max_side_px')}, lower the energy, or use a better lens"
     )
 
@@ -301,13 +301,13 @@ def _match_colours(kernels: Tensor, colours: Tensor, share: Tensor) -> Tensor:
         share: (c, wavelength), what the lookup will weight them with.
     """
     total = share.sum(0)
-    used = (total > 1e-6)[:, None, None]
+    sensitive = (total > 1e-6)[:, None, None]
     scale = torch.where(total > 1e-6, total, 1.0)[:, None, None]
     for _ in range(_MATCH_STEPS):
-        seen = torch.einsum("cs,fsij->fcij", share, kernels)
-        ratio = torch.where(seen > 1e-15, colours / seen.clamp_min(1e-15), 1.0)
+        mixture = torch.einsum("cs,fsij->fcij", share, kernels)
+        ratio = torch.where(mixture > 1e-15, colours / mixture.clamp_min(1e-15), 1.0)
         factor = torch.einsum("cs,fcij->fsij", share, ratio) / scale
-        kernels = kernels * torch.where(used, factor, 1.0)
+        kernels = kernels * torch.where(sensitive, factor, 1.0)
         kernels = kernels / kernels.sum((-2, -1), keepdim=True)
     return kernels
 

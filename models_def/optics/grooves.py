@@ -99,10 +99,10 @@ def wall_radii_mm(profile: Profile, grooves: Grooves) -> Tensor:
         raise ContractError(
             f"a groove is narrower than {_STEP_MM * UM_PER_MM:.0f} um; make groove_depth_um larger"
         )
-    low, high, before = radius[change], radius[change + 1], number[change]
+    low, high, inner_number = radius[change], radius[change + 1], number[change]
     for _ in range(_BISECTIONS):
         middle = (low + high) / 2
-        same = ring(middle) == before
+        same = ring(middle) == inner_number
         low, high = torch.where(same, middle, low), torch.where(same, high, middle)
     return (low + high) / 2
 

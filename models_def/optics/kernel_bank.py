@@ -54,8 +54,8 @@ def gaussian_response(
 ) -> ChannelResponse:
     """Return Gaussian colour channels on a wavelength grid: camkit's own model camera."""
     sigma = fwhm_um / GAUSS_FWHM
-    away = wavelengths_um[None] - np.array(centres_um)[:, None]
-    response = np.exp(-0.5 * (away / sigma) ** 2)
+    offset_um = wavelengths_um[None] - np.array(centres_um)[:, None]
+    response = np.exp(-0.5 * (offset_um / sigma) ** 2)
     return ChannelResponse(
         wavelengths_um=wavelengths_um,
         response=response / response.sum(1, keepdims=True),
@@ -122,6 +122,6 @@ def colour_kernels(
         )
         # light that fell outside counts: a wavelength weighs what it puts into the window
         share = torch.from_numpy(response.response)[None] * traced.energy_kept[:, None]
-        kept = share.sum(-1)
-        kernels = torch.einsum("fcw,fwij->fcij", share / kept[..., None], traced.kernels)
-    return kernels.to(torch.float32).numpy(), float(kept.min())
+        energy = share.sum(-1)
+        kernels = torch.einsum("fcw,fwij->fcij", share / energy[..., None], traced.kernels)
+    return kernels.to(torch.float32).numpy(), float(energy.min())

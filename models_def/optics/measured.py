@@ -94,7 +94,7 @@ class MeasuredOptics:
         at_depth = np.einsum("d,fdlhw->flhw", shares, psf.kernels.astype(np.float64))
         units = np.eye(psf.wavelengths_um.size)
         hats = np.stack([np.interp(wavelengths_um, psf.wavelengths_um, unit) for unit in units])
-        known = FieldKernels(
+        field_kernels = FieldKernels(
             kernels=np.einsum("ln,flhw->fnhw", hats, at_depth).astype(np.float32),
             field_heights_mm=psf.field_heights_mm,
             symmetry=psf.symmetry,
@@ -102,12 +102,14 @@ class MeasuredOptics:
             grid_y_mm=psf.grid_y_mm,
         )
         places = zip(fields.x_mm.tolist(), fields.y_mm.tolist(), strict=True)
-        blended = np.stack([known.at(x_mm, y_mm) for x_mm, y_mm in places]).astype(np.float64)
-        found = resampled(torch.from_numpy(blended), psf.pixel_pitch_um / pitch_um)
-        inside = _window(found, side_px)
-        kept = inside.sum((-2, -1)) / found.sum((-2, -1))
+        blended = np.stack([field_kernels.at(x_mm, y_mm) for x_mm, y_mm in places]).astype(
+            np.float64
+        )
+        wide_kernels = resampled(torch.from_numpy(blended), psf.pixel_pitch_um / pitch_um)
+        inside = _window(wide_kernels, side_px)
+        energy = inside.sum((-2, -1)) / wide_kernels.sum((-2, -1))
         return TracedPsf(
-            kernels=inside / inside.sum((-2, -1), keepdim=True).clamp_min(1e-30), energy_kept=kept
+            kernels=inside / inside.sum((-2, -1), keepdim=True).clamp_min(1e-30), energy_kept=energy
         )
 
     def distortion(self, radius_mm: float, channels: int) -> RadialDistortion:
@@ -212,12 +214,12 @@ def resampled(kernels: Tensor, ratio: float) -> Tensor:
 
 
 def _shares(side: int, ratio: float) -> Tensor:
-    """Return (made, side): the share of each sample that falls into each one made."""
+    """Return (target, source): the share of each sample that falls into each one made."""
     half = int(np.ceil(side * ratio / 2 - 0.5))
-    made = torch.arange(-half, half + 1, dtype=torch.float64)[:, None]
-    given = (torch.arange(side, dtype=torch.float64)[None] - side // 2) * ratio
-    low = torch.maximum(made - 0.5, given - ratio / 2)
-    high = torch.minimum(made + 0.5, given + ratio / 2)
+    target_px = torch.arange(-half, half + 1, dtype=torch.float64)[:, None]
+    source_px = (torch.arange(side, dtype=torch.float64)[None] - side // 2) * ratio
+    low = torch.maximum(target_px - 0.5, source_px - ratio / 2)
+    high = torch.minimum(target_px + 0.5, source_px + ratio / 2)
     return (high - low).clamp(min=0) / ratio
 
 

@@ -209,8 +209,8 @@ class FabricationErrors:
 def with_focus_shift(lens: Lens, shift_mm: float) -> Lens:
     """Return the lens with its sensor moved away from it by `shift_mm`."""
     last = lens.surfaces[-1]
-    moved = replace(last, thickness_mm=last.thickness_mm + shift_mm)
-    return replace(lens, surfaces=(*lens.surfaces[:-1], moved))
+    back_surface = replace(last, thickness_mm=last.thickness_mm + shift_mm)
+    return replace(lens, surfaces=(*lens.surfaces[:-1], back_surface))
 
 
 def perturb(lens: Lens, errors: FabricationErrors, rng: np.random.Generator) -> Lens:
@@ -266,12 +266,12 @@ def parse_prescription(
 ) -> Lens:
     """Read a lens from TOML text; see `read_prescription`."""
     table = section("the lens", _LensTable, parse_toml(text.encode(), "the prescription"))
-    given = {kind: getattr(table, kind) for kind in APERTURE_KINDS}
-    kinds = [kind for kind, value in given.items() if value is not None]
+    apertures = {kind: getattr(table, kind) for kind in APERTURE_KINDS}
+    kinds = [kind for kind, value in apertures.items() if value is not None]
     if len(kinds) != 1:
         raise ContractError(f"give exactly one of {', '.join(APERTURE_KINDS)}; got {kinds}")
-    stated = ("object_distance_mm", "wavelengths_um", "reference_wavelength_um")
-    optional = {name: getattr(table, name) for name in stated}
+    names = ("object_distance_mm", "wavelengths_um", "reference_wavelength_um")
+    optional = {name: getattr(table, name) for name in names}
     if table.field_angles_deg is not None:
         optional["field_angles_rad"] = tuple(map(to_radians, table.field_angles_deg))
     glasses = (*_own_catalogues(table, folder), *catalogues)
@@ -284,17 +284,17 @@ def parse_prescription(
         ),
         stop=table.stop,
         aperture_kind=kinds[0],
-        aperture_value=given[kinds[0]],
+        aperture_value=apertures[kinds[0]],
         **{name: value for name, value in optional.items() if value is not None},
     )
 
 
 def _own_catalogues(table: _LensTable, folder: Path | None) -> list[GlassCatalogue]:
     """Return the glasses that a prescription brings along: its own tables, then its .agf files."""
-    own = GlassCatalogue(name=table.name, glasses=tuple(map(parse_glass_table, table.glass)))
+    tables = GlassCatalogue(name=table.name, glasses=tuple(map(parse_glass_table, table.glass)))
     if table.glass_catalogues and folder is None:
         raise ContractError("glass_catalogues are relative to a file; this prescription is none")
-    return [own, *(read_agf((folder or Path()) / name) for name in table.glass_catalogues)]
+    return [tables, *(read_agf((folder or Path()) / name) for name in table.glass_catalogues)]
 
 
 def write_prescription(lens: Lens, path: Path) -> None:
@@ -393,7 +393,7 @@ def _parse_surface(
         raise ContractError(f"{where}: radius_mm must not be 0 (a plane is inf)")
     try:
         glass = find_glass(table.glass, catalogues)
-        made = Surface(
+        surface = Surface(
             curvature_per_mm=1 / table.radius_mm,
             thickness_mm=table.thickness_mm,
             glass=glass.name,
@@ -403,7 +403,7 @@ def _parse_surface(
             even_asphere=table.even_asphere,
             vary=cast("tuple[Vary, ...]", table.vary),
         )
-        return replace(made, grooves=_parse_grooves(table))
+        return replace(surface, grooves=_parse_grooves(table))
     except (ContractError, UnsupportedError) as error:
         raise type(error)(f"{where}: {error}") from error
 

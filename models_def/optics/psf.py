@@ -57,8 +57,8 @@ def splat(spots: Spots, size_px: int, pitch_um: float) -> TracedPsf:
     inside = kernels.sum((-2, -1))
     if bool((inside <= 0).any()):
         raise ContractError("no light reaches a kernel; check stop, semi-diameters and focus")
-    kept = inside / (2 * spots.weight.sum(-1))
-    return TracedPsf(kernels=kernels / inside[..., None, None], energy_kept=kept)
+    energy = inside / (2 * spots.weight.sum(-1))
+    return TracedPsf(kernels=kernels / inside[..., None, None], energy_kept=energy)
 
 
 def spread_tents(row: Tensor, column: Tensor, weight: Tensor, size_px: int) -> Tensor:
@@ -82,8 +82,10 @@ def _tent(
 ) -> tuple[Tensor, Tensor]:
     """Return flat places and weights of one of the four pixels around each ray."""
     top, left = torch.floor(row.detach()), torch.floor(column.detach())
-    below, beside = row - top, column - left
-    weight = (below if offset[0] else 1 - below) * (beside if offset[1] else 1 - beside)
+    row_share, column_share = row - top, column - left
+    weight = (row_share if offset[0] else 1 - row_share) * (
+        column_share if offset[1] else 1 - column_share
+    )
     y, x = top + offset[0], left + offset[1]
     inside = (y >= 0) & (y < size_px) & (x >= 0) & (x < size_px)
     place = torch.where(inside, y * size_px + x, 0.0).to(torch.int64)
@@ -144,6 +146,6 @@ def energy_diameter(spots: Spots, share: float = 0.95) -> Tensor:
     # the mirrored half puts the centroid on x = 0
     radius = torch.hypot(x, y - (weight * y).sum(-1, keepdim=True))
     radius, order = radius.sort(-1)
-    reached = weight.gather(-1, order).cumsum(-1)
-    first = (reached >= share).to(torch.int8).argmax(-1, keepdim=True)
+    energy = weight.gather(-1, order).cumsum(-1)
+    first = (energy >= share).to(torch.int8).argmax(-1, keepdim=True)
     return 2 * radius.gather(-1, first)[:, 0]

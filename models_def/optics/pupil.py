@@ -173,7 +173,7 @@ def aim(
 
 def newton_aim(
     at_stop: Callable[[Tensor, Tensor], Rays],
-    wanted: tuple[Tensor, Tensor],
+    target: tuple[Tensor, Tensor],
     begin: tuple[Tensor, Tensor],
     *,
     steps: int = AIM_STEPS,
@@ -183,13 +183,13 @@ def newton_aim(
 
     Args:
         at_stop: Takes launch points x and y in mm to the rays on the stop, rims open.
-        wanted: x and y in mm on the stop; broadcast with `begin`.
+        target: x and y in mm on the stop; broadcast with `begin`.
         begin: Launch points to begin from.
         steps: The last one only judges.
         fresh: So many first steps measure the slopes, at three traces each; the others keep them.
     """
     x, y = begin
-    step, found = _DIFFERENCE_MM, torch.zeros_like(x, dtype=torch.bool)
+    step, converged = _DIFFERENCE_MM, torch.zeros_like(x, dtype=torch.bool)
     determinant = torch.ones_like(x)
     for number in range(steps):
         here = at_stop(x, y)
@@ -201,12 +201,12 @@ def newton_aim(
         product = xx * yy - xy * yx
         good = alive & (torch.abs(product) > 1e-9)
         determinant = torch.where(good, product, 1.0)
-        ex, ey = wanted[0] - here.x, wanted[1] - here.y
-        found = good & (ex**2 + ey**2 < AIM_TOLERANCE_MM**2)
+        ex, ey = target[0] - here.x, target[1] - here.y
+        converged = good & (ex**2 + ey**2 < AIM_TOLERANCE_MM**2)
         # a dead probe ray steps back to the axis, from where it may try again
         x = torch.where(good, x + (yy * ex - xy * ey) / determinant, 0.5 * x)
         y = torch.where(good, y + (xx * ey - yx * ex) / determinant, 0.5 * y)
-    return Aim(x=x, y=y, weight=torch.where(found, 1 / torch.abs(determinant), 0.0))
+    return Aim(x=x, y=y, weight=torch.where(converged, 1 / torch.abs(determinant), 0.0))
 
 
 def real_stop_radius_mm(lens: Lens) -> float:
@@ -300,8 +300,8 @@ def pupil_rays(
 
 def marked(rays: Rays, weight: Tensor) -> Rays:
     """Return launched rays; those without weight, which could not be aimed, as missed."""
-    lost = torch.where(weight > 0, int(Fate.VALID), int(Fate.MISSED)).to(torch.int8)
-    return replace(rays, fate=lost)
+    fate = torch.where(weight > 0, int(Fate.VALID), int(Fate.MISSED)).to(torch.int8)
+    return replace(rays, fate=fate)
 
 
 def _aim_at(

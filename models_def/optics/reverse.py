@@ -78,5 +78,5 @@ def trace_to_scene(
     beyond_mm = 0.0 if math.isinf(object_distance_mm) else object_distance_mm
     last = torch.full_like(lens.thickness_mm[-1:], beyond_mm)
     lens = replace(lens, thickness_mm=torch.cat([lens.thickness_mm[:-1], last]))
-    away = replace(rays, z=rays.z - tensors.thickness_mm[-1])
-    return trace(lens, away, path=path, compiled=compiled)
+    shifted = replace(rays, z=rays.z - tensors.thickness_mm[-1])
+    return trace(lens, shifted, path=path, compiled=compiled)

@@ -253,8 +253,8 @@ def make_probes(psf: FrozenPsf, bench: Bench, grids: Sequence[Wiener]) -> tuple[
             probe = Probe(
                 noisy=noisy, sharp=sharp, at_mm=at_mm, shot=shot, read_variance=read, error=0.0
             )
-            known = kernels[i : i + 1], at_mm
-            error = _block_error(probe, known, np.zeros(2), REFERENCE_PX, bench.settings)
+            middle = kernels[i : i + 1], at_mm
+            error = _block_error(probe, middle, np.zeros(2), REFERENCE_PX, bench.settings)
             probes.append(replace(probe, error=error))
     return tuple(probes)
 
@@ -291,7 +291,7 @@ def block_loss(
 
 def _block_error(
     probe: Probe,
-    known: tuple[Tensor, FloatGrid],
+    middle: tuple[Tensor, FloatGrid],
     offset_px: FloatGrid,
     block_px: int,
     settings: Wiener,
@@ -300,12 +300,12 @@ def _block_error(
 
     Args:
         probe: With its scene.
-        known: Kernel (1, c, kh, kw) and place of the block's middle.
+        middle: Kernel (1, c, kh, kw) and place of the block's middle.
         offset_px: (x, y) of the probe from the block's middle.
         block_px: Side of the block.
         settings: Of the filter.
     """
-    kernel, at_mm = known
+    kernel, at_mm = middle
     side = probe.noisy.shape[-1]
     left, top = (round((side - block_px) / 2 - float(offset)) for offset in offset_px)
     restored = wiener_restore(
@@ -323,8 +323,8 @@ def _block_error(
 
 def _reach_px(grid: Wiener) -> int:
     """Return the side of a scene that holds all blocks of a grid that see its middle."""
-    off = max(OFFSETS) * (grid.block_px - grid.overlap_px)
-    return 2 * int(np.ceil((grid.block_px + off) / 2)) + 2
+    offset_px = max(OFFSETS) * (grid.block_px - grid.overlap_px)
+    return 2 * int(np.ceil((grid.block_px + offset_px) / 2)) + 2
 
 
 def _middle(planes: Tensor, size_px: int) -> Tensor:

@@ -29,16 +29,18 @@ def scale_lens(lens: Lens, factor: float) -> Lens:
 def _scaled(surface: Surface, factor: float) -> Surface:
     # a_j multiplies r^(2 j) and gives mm
     terms = enumerate(surface.even_asphere, start=1)
-    own = surface.grooves
+    grooves = surface.grooves
     return replace(
         surface,
         curvature_per_mm=surface.curvature_per_mm / factor,
         thickness_mm=surface.thickness_mm * factor,
         semi_diameter_mm=surface.semi_diameter_mm * factor,
         grooves=None
-        if own is None
+        if grooves is None
         else replace(
-            own, depth_um=own.depth_um * factor, tool_radius_um=own.tool_radius_um * factor
+            grooves,
+            depth_um=grooves.depth_um * factor,
+            tool_radius_um=grooves.tool_radius_um * factor,
         ),
         even_asphere=tuple(a * factor ** (1 - 2 * j) for j, a in terms),
     )

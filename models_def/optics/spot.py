@@ -56,11 +56,11 @@ def chief_heights(lens: Lens, slopes: Tensor, wavelength_um: float | None = None
     wave = lens.reference_wavelength_um if wavelength_um is None else wavelength_um
     tensors = without_walls(surface_tensors(lens, torch.tensor(wave, dtype=torch.float64)))
     rays, _ = pupil_rays(lens, tensors, pupil_centre(), slopes[:, None])
-    landed = trace(tensors, rays)
-    if not bool(landed.valid.all()):
-        lost = slopes[~landed.valid[:, 0]].tolist()
-        raise ContractError(f"the chief ray is lost at field slopes {lost}; use smaller fields")
-    return landed.y[:, 0]
+    landings = trace(tensors, rays)
+    if not bool(landings.valid.all()):
+        failed = slopes[~landings.valid[:, 0]].tolist()
+        raise ContractError(f"the chief ray is lost at field slopes {failed}; use smaller fields")
+    return landings.y[:, 0]
 
 
 def slopes_for_heights(lens: Lens, heights_mm: Tensor) -> Tensor:
@@ -105,13 +105,13 @@ def trace_spots(
     tensors = surface_tensors(lens, wavelengths_um[:, None])
     slope = slopes[:, None, None].expand(-1, len(wavelengths_um), 1)
     rays, weight = pupil_rays(lens, tensors, samples, slope, definition=definition)
-    landed = trace(tensors, rays)
+    landings = trace(tensors, rays)
     return Spots(
-        x_mm=landed.x,
-        y_mm=landed.y,
-        weight=torch.where(landed.valid, weight, 0.0),
+        x_mm=landings.x,
+        y_mm=landings.y,
+        weight=torch.where(landings.valid, weight, 0.0),
         chief_y_mm=chief_heights(lens, slopes),
-        fate=landed.fate,
+        fate=landings.fate,
     )
 
 

@@ -130,13 +130,13 @@ def surface_tensors(lens: Lens, wavelengths_um: Tensor) -> SurfaceTensors:
 
 
 def _groove(surface: Surface) -> Groove | None:
-    own = surface.grooves
-    if own is None:
+    grooves = surface.grooves
+    if grooves is None:
         return None
     return Groove(
-        depth_mm=to_mm(own.depth_um),
-        walls=own.walls,
-        tool_radius_mm=to_mm(own.tool_radius_um),
+        depth_mm=to_mm(grooves.depth_um),
+        walls=grooves.walls,
+        tool_radius_mm=to_mm(grooves.tool_radius_um),
         solid_after=surface.glass != AIR.name,
     )
 
@@ -181,10 +181,10 @@ def trace(
     Returns:
         Rays on the plane that lies the last thickness after the last surface (z = 0 there).
     """
-    chosen = surfaces if surfaces is not None else range(len(tensors.aspheric))
-    if not chosen:
+    order = surfaces if surfaces is not None else range(len(tensors.aspheric))
+    if not order:
         return rays
-    result = _trace(tensors, rays, chosen, seen=seen, path=path, compiled=compiled)
+    result = _trace(tensors, rays, order, seen=seen, path=path, compiled=compiled)
     return replace(result, z=torch.zeros_like(result.z))
 
 
@@ -225,9 +225,9 @@ def _trace(
     engine = compiled_engine() if compiled and seen is None else Eager()
     result = trace_tensors(settings, engine, lens, state, rays.fate, with_seen=seen is not None)
     if seen is not None:
-        states = zip(result.kept.seen, result.kept.fates, strict=True)
-        seen += [Rays(**on._asdict(), fate=fate) for on, fate in states]
+        states = zip(result.record.states, result.record.fates, strict=True)
+        seen += [Rays(**surface_state._asdict(), fate=fate) for surface_state, fate in states]
     length = result.path
     if length is not None and rays.path_mm is not None:
         length = length + rays.path_mm
-    return Rays(**result.end._asdict(), fate=result.kept.fate, path_mm=length)
+    return Rays(**result.end._asdict(), fate=result.record.fate, path_mm=length)

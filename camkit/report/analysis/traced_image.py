@@ -20,7 +20,7 @@ from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.thin.freezing import flat_light
 from camkit.models_def.optics.thin.middle import corner_angle_rad
-from camkit.models_def.optics.thin.peak import LandedLight, land_light, peak_height_px, within
+from camkit.models_def.optics.thin.peak import LandedLight, land_light, peak_height_px, share_within
 from camkit.report.analysis.point_image import (
     FAR_PX,
     NEAR_PX,
@@ -84,13 +84,13 @@ def land_band(lens: Lens, angle_rad: float, band: Band, pitch_um: float, rays: i
     parts = [land_light(lens, angle_rad, float(wave), pitch_um, rays) for wave in waves_um]
     lost_shares: dict[str, float] = {}
     for part, weight in zip(parts, weights, strict=True):
-        for fate, share in part.lost.items():
+        for fate, share in part.losses.items():
             lost_shares[fate] = lost_shares.get(fate, 0.0) + float(weight) * share
     return LandedLight(
         x_px=np.concatenate([part.x_px for part in parts]),
         y_px=np.concatenate([part.y_px for part in parts]),
         share=np.concatenate([w * p.share for p, w in zip(parts, weights, strict=True)]),
-        lost=lost_shares,
+        losses=lost_shares,
     )
 
 
@@ -107,8 +107,8 @@ def image_of(
         field_angle_rad=angle_rad,
         patch=_patch(rows, columns, share),
         lines={"radial": _line(rows, share), "tangential": tangential},
-        near_share=within(light, height_px, NEAR_PX) / total,
-        far_share=within(light, height_px, FAR_PX) / total,
+        near_share=share_within(light, height_px, NEAR_PX) / total,
+        far_share=share_within(light, height_px, FAR_PX) / total,
         lost_share=max(1 - total, 0.0),
         illumination=illumination,
     )

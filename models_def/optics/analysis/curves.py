@@ -56,10 +56,10 @@ def field_curvature(
         x=torch.cat([zero, step, zero, zero]), y=torch.cat([zero, zero, step, -step])
     )
     beams = launch_near_chief(lens, slopes, wavelengths_um, samples, definition)
-    landed = trace(beams.tensors, beams.rays)
-    alive = landed.valid.all(-1)
-    x, y = landed.x, landed.y
-    lean_x, lean_y = landed.l / landed.n, landed.m / landed.n
+    landings = trace(beams.tensors, beams.rays)
+    alive = landings.valid.all(-1)
+    x, y = landings.x, landings.y
+    lean_x, lean_y = landings.l / landings.n, landings.m / landings.n
     tangential = -(y[..., 2] - y[..., 3]) / (lean_y[..., 2] - lean_y[..., 3])
     sagittal = -(x[..., 1] - x[..., 0]) / (lean_x[..., 1] - lean_x[..., 0])
     return FieldCurvature(
@@ -78,9 +78,9 @@ def distortion(
     """
     heights = chief_landings(lens, slopes, wavelengths_um, definition)
     ideal = ideal_heights(lens, slopes)[:, None]
-    away = torch.abs(slopes[:, None]) > 0
-    share = heights / torch.where(away, ideal, 1.0) - 1
-    return torch.where(away | ~torch.isfinite(heights), share, 0.0)
+    off_axis = torch.abs(slopes[:, None]) > 0
+    share = heights / torch.where(off_axis, ideal, 1.0) - 1
+    return torch.where(off_axis | ~torch.isfinite(heights), share, 0.0)
 
 
 def lateral_colour_mm(
@@ -103,8 +103,8 @@ def _paraxial_foci(lens: Lens, wavelengths_um: Tensor) -> Tensor:
     axis = torch.zeros(1, dtype=torch.float64)
     if math.isinf(lens.object_distance_mm):
         return focal_lengths(analysis_tensors(lens, wavelengths_um))[1]
-    found = field_curvature(lens, axis, wavelengths_um, "paraxial")
-    return found.sagittal_mm[0] + lens.surfaces[-1].thickness_mm
+    foci = field_curvature(lens, axis, wavelengths_um, "paraxial")
+    return foci.sagittal_mm[0] + lens.surfaces[-1].thickness_mm
 
 
 def longitudinal_mm(lens: Lens, pupil: Tensor, wavelengths_um: Tensor) -> Tensor:
@@ -118,8 +118,8 @@ def longitudinal_mm(lens: Lens, pupil: Tensor, wavelengths_um: Tensor) -> Tensor
     axis = torch.zeros(1, dtype=torch.float64)
     samples = PupilSamples(x=torch.zeros_like(pupil), y=pupil)
     beams = launch_beams(lens, axis, wavelengths_um, samples, "paraxial")
-    landed = trace(beams.tensors, beams.rays)
-    return torch.where(landed.valid, _crossing(landed), math.nan)[0]
+    landings = trace(beams.tensors, beams.rays)
+    return torch.where(landings.valid, _crossing(landings), math.nan)[0]
 
 
 def _crossing(rays: Rays) -> Tensor:

@@ -71,19 +71,21 @@ def paraxial_rays(lens: Lens, slope: float, wavelength_um: float | None = None) 
         )
     wave = lens.reference_wavelength_um if wavelength_um is None else wavelength_um
     tensors = surface_tensors(lens, torch.tensor(wave, dtype=torch.float64))
-    far = math.isinf(lens.object_distance_mm)
-    way = 1.0 if far else lens.object_distance_mm + data.entrance_pupil_mm
-    scale = 1.0 if far else lens.object_distance_mm / way
+    distant = math.isinf(lens.object_distance_mm)
+    way = 1.0 if distant else lens.object_distance_mm + data.entrance_pupil_mm
+    scale = 1.0 if distant else lens.object_distance_mm / way
     height = data.entrance_pupil_diameter_mm / 2 * scale
     lean = slope * scale
     return ParaxialRays(
         tensors=tensors,
-        marginal=_through(tensors, height, 0.0 if far else height / lens.object_distance_mm),
-        chief=_through(tensors, -data.entrance_pupil_mm * lean, lean),
+        marginal=_paraxial_ray(
+            tensors, height, 0.0 if distant else height / lens.object_distance_mm
+        ),
+        chief=_paraxial_ray(tensors, -data.entrance_pupil_mm * lean, lean),
     )
 
 
-def _through(tensors: SurfaceTensors, height_mm: float, slope: float) -> ParaxialRay:
+def _paraxial_ray(tensors: SurfaceTensors, height_mm: float, slope: float) -> ParaxialRay:
     y = torch.tensor(height_mm, dtype=torch.float64)
     u = torch.tensor(slope, dtype=torch.float64)
     heights, slopes = [y], [u]

@@ -74,10 +74,10 @@ def sensor_light(
         wavelengths_um: (wavelength,).
         rays: In half the stop, which the other half mirrors.
     """
-    known = torch.isfinite(heights_mm)
-    place = torch.where(known, heights_mm, 0.0)[..., None]
+    finite = torch.isfinite(heights_mm)
+    place = torch.where(finite, heights_mm, 0.0)[..., None]
     tensors = analysis_tensors(lens, wavelengths_um[:, None])
-    back, behind = reverse(with_open_apertures(tensors)), len(tensors.aspheric) - 1 - lens.stop
+    back, count = reverse(with_open_apertures(tensors)), len(tensors.aspheric) - 1 - lens.stop
     radius_mm, samples = real_stop_radius_mm(lens), half_disc(rays)
     x, y = radius_mm * samples.x, radius_mm * samples.y
     # where the object lies does not matter to the labels
@@ -87,7 +87,7 @@ def sensor_light(
     def at_stop(label_x: Tensor, label_y: Tensor) -> Rays:
         rays = rays_from(labels, 0 * place, place, label_x * to_label, label_y * to_label)
         rays = replace(rays, z=rays.z - tensors.thickness_mm[-1])
-        return refract(back, trace(back, rays, surfaces=range(behind)), behind)
+        return refract(back, trace(back, rays, surfaces=range(count)), count)
 
     with torch.no_grad():
         aimed = newton_aim(at_stop, (x, y), (x + 0 * place, y + 0 * place))
@@ -95,4 +95,4 @@ def sensor_light(
         end = trace_to_scene(tensors, start, lens.object_distance_mm)
         share = (light_of(start, end) * aimed.weight).mean(-1)
         light = labels.area * (radius_mm * to_label) ** 2 * share
-    return torch.where(known, light, torch.nan)
+    return torch.where(finite, light, torch.nan)

@@ -112,8 +112,8 @@ def chief_landings(
 ) -> Tensor:
     """Return the heights (field, wavelength) in mm of chief rays on the sensor; NaN if lost."""
     beams = launch_near_chief(lens, slopes, wavelengths_um, pupil_centre(), definition)
-    landed = trace(beams.tensors, beams.rays)
-    return torch.where(landed.valid, landed.y, math.nan)[..., 0]
+    landings = trace(beams.tensors, beams.rays)
+    return torch.where(landings.valid, landings.y, math.nan)[..., 0]
 
 
 def spot_diagram(lens: Lens, slopes: Tensor, wavelengths_um: Tensor, pupil: Pupil) -> Spots:
@@ -125,14 +125,14 @@ def spot_diagram(lens: Lens, slopes: Tensor, wavelengths_um: Tensor, pupil: Pupi
         ContractError: If the stop has no real radius (definition `stop`).
     """
     beams = launch_beams(lens, slopes, wavelengths_um, pupil.samples, pupil.definition)
-    landed = trace(beams.tensors, beams.rays)
+    landings = trace(beams.tensors, beams.rays)
     reference = torch.tensor([lens.reference_wavelength_um], dtype=torch.float64)
     return Spots(
-        x_mm=landed.x,
-        y_mm=landed.y,
-        weight=torch.where(landed.valid, sample_weights(pupil.samples), 0.0),
+        x_mm=landings.x,
+        y_mm=landings.y,
+        weight=torch.where(landings.valid, sample_weights(pupil.samples), 0.0),
         chief_y_mm=chief_landings(lens, slopes, reference, pupil.definition)[:, 0],
-        fate=landed.fate,
+        fate=landings.fate,
     )
 
 

@@ -108,8 +108,8 @@ def wave_kernels(wavefront: Wavefront, size_px: int, pitch_um: float, oversample
     light = irradiance_per_mm2(wavefront, place_mm, place_mm)
     tent = _tent_weights(place_px, size_px, oversample) * pitch_um / UM_PER_MM
     kernels = tent @ light @ tent.T
-    kept = kernels.sum((-2, -1))
-    return TracedPsf(kernels=kernels / kept[..., None, None], energy_kept=kept)
+    energy = kernels.sum((-2, -1))
+    return TracedPsf(kernels=kernels / energy[..., None, None], energy_kept=energy)
 
 
 def _tent_weights(place_px: Tensor, size_px: int, oversample: int) -> Tensor:
@@ -119,11 +119,11 @@ def _tent_weights(place_px: Tensor, size_px: int, oversample: int) -> Tensor:
     the kinks of the tent, which lie between points.
     """
     pixel = torch.arange(size_px, dtype=torch.float64) - (size_px - 1) / 2
-    away = torch.abs(place_px - pixel[:, None])
+    distance_px = torch.abs(place_px - pixel[:, None])
     half = 0.5 / oversample
-    top, foot = (torch.abs(away - place) < 1.5 * half for place in (0.0, 1.0))
+    top, foot = (torch.abs(distance_px - place) < 1.5 * half for place in (0.0, 1.0))
     kinks = (2 * top.to(torch.float64) - foot.to(torch.float64)) / (48 * oversample**2)
-    return (1 - away).clamp_min(0.0) / oversample + kinks
+    return (1 - distance_px).clamp_min(0.0) / oversample + kinks
 
 
 def trace_wave_psf(

@@ -71,10 +71,10 @@ def path_lengths(
         The rays on the sensor, and their paths (n times length) since they left the object's
         wave through the first vertex.
     """
-    landed = trace(tensors, rays, path=True)
-    if landed.path_mm is None:
+    landings = trace(tensors, rays, path=True)
+    if landings.path_mm is None:
         raise ContractError("the tracer gave no optical path")
-    return landed, tensors.index[0] * _path_before(rays, slope, distance_mm) + landed.path_mm
+    return landings, tensors.index[0] * _path_before(rays, slope, distance_mm) + landings.path_mm
 
 
 def _path_before(rays: Rays, slope: Tensor, distance_mm: float) -> Tensor:
@@ -109,17 +109,17 @@ def trace_wavefront(
     centre = chief_landings(lens, slopes, reference, definition)[:, 0]
     beams = launch_beams(lens, slopes, wavelengths_um, samples, definition)
     here = _at_sphere(lens, beams, slopes, centre)
-    right, above = (
-        _at_sphere(lens, replace(beams, rays=_moved(lens, beams, slopes, *step)), slopes, centre)
+    right, upper = (
+        _at_sphere(lens, replace(beams, rays=_shifted(lens, beams, slopes, *step)), slopes, centre)
         for step in ((_DIFFERENCE_MM, 0.0), (0.0, _DIFFERENCE_MM))
     )
-    spread = (right.l - here.l) * (above.m - here.m) - (right.m - here.m) * (above.l - here.l)
+    spread = (right.l - here.l) * (upper.m - here.m) - (right.m - here.m) * (upper.l - here.l)
     middle = _chief_path(lens, slopes, wavelengths_um, centre, definition)
     opd = (middle - here.path) * UM_PER_MM
     # without a chief ray there is nothing to measure from
     alive = here.valid & torch.isfinite(opd)
     flux = torch.where(alive, beams.area_mm2, 0.0)
-    close = alive & right.valid & above.valid
+    close = alive & right.valid & upper.valid
     density = torch.where(close, torch.abs(spread), 0.0) / _DIFFERENCE_MM**2
     return Wavefront(
         l=torch.where(alive, here.l, 0.0),
@@ -144,36 +144,38 @@ class _AtSphere:
 
 def _at_sphere(lens: Lens, beams: Beams, slopes: Tensor, centre_mm: Tensor) -> _AtSphere:
     """Trace beams and carry them from the sensor back to the reference sphere."""
-    landed, path = path_lengths(
+    landings, path = path_lengths(
         beams.tensors, beams.rays, slopes[:, None, None], lens.object_distance_mm
     )
-    x, y = landed.x, landed.y - centre_mm[:, None, None]
-    ahead, square = x * landed.l + y * landed.m, x**2 + y**2
-    away = lens.surfaces[-1].thickness_mm - paraxial_data(lens).exit_pupil_mm
-    if not math.isfinite(away):
+    x, y = landings.x, landings.y - centre_mm[:, None, None]
+    ahead, square = x * landings.l + y * landings.m, x**2 + y**2
+    radius_mm = lens.surfaces[-1].thickness_mm - paraxial_data(lens).exit_pupil_mm
+    if not math.isfinite(radius_mm):
         # the pupil is at infinity: directions are those of the rays
-        beyond, towards = ahead, (landed.l, landed.m)
+        excess, direction = ahead, (landings.l, landings.m)
     else:
-        radius = math.copysign(1.0, away) * torch.sqrt(away**2 + centre_mm**2)[:, None, None]
+        radius = (
+            math.copysign(1.0, radius_mm) * torch.sqrt(radius_mm**2 + centre_mm**2)[:, None, None]
+        )
         bend = torch.sqrt((radius**2 + ahead**2 - square).clamp_min(1e-12))
-        root = math.copysign(1.0, away) * bend
+        root = math.copysign(1.0, radius_mm) * bend
         # the way back to the sphere, less its radius, without the loss of a difference
-        beyond = ahead + (ahead**2 - square) / (root + radius)
-        way = radius + beyond
-        towards = ((way * landed.l - x) / radius, (way * landed.m - y) / radius)
+        excess = ahead + (ahead**2 - square) / (root + radius)
+        way = radius + excess
+        direction = ((way * landings.l - x) / radius, (way * landings.m - y) / radius)
     return _AtSphere(
-        l=towards[0],
-        m=towards[1],
-        path=path - beams.tensors.index[-1] * beyond,
+        l=direction[0],
+        m=direction[1],
+        path=path - beams.tensors.index[-1] * excess,
         miss_mm=torch.sqrt(square.detach()),
-        valid=landed.valid,
+        valid=landings.valid,
     )
 
 
-def _moved(lens: Lens, beams: Beams, slopes: Tensor, dx: float, dy: float) -> Rays:
+def _shifted(lens: Lens, beams: Beams, slopes: Tensor, dx: float, dy: float) -> Rays:
     rays = beams.rays
-    moved = launch(rays.x + dx, rays.y + dy, slopes[:, None, None], lens.object_distance_mm)
-    return replace(moved, fate=rays.fate)
+    shifted = launch(rays.x + dx, rays.y + dy, slopes[:, None, None], lens.object_distance_mm)
+    return replace(shifted, fate=rays.fate)
 
 
 def _chief_path(

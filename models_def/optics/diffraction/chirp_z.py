@@ -32,11 +32,11 @@ def zoom_fourier(field: Tensor, step: float, count: int) -> Tensor:
     """
     if not field.is_complex() or count < 1:
         raise ContractError(f"a complex field and a count > 0 are needed; got {field.dtype}")
-    given = field.shape[-1]
-    length = next_fast_len(given + count - 1)
-    lag = torch.arange(1 - given, count, dtype=torch.float64) + (given - count) / 2
-    kernel = torch.fft.fft(_wrapped(_chirp(lag, -step, field), given, length))
-    inner = field * _chirp(_centred(given), step, field)
+    samples = field.shape[-1]
+    length = next_fast_len(samples + count - 1)
+    lag = torch.arange(1 - samples, count, dtype=torch.float64) + (samples - count) / 2
+    kernel = torch.fft.fft(_wrapped(_chirp(lag, -step, field), samples, length))
+    inner = field * _chirp(_centred(samples), step, field)
     mixed: Tensor = torch.fft.ifft(torch.fft.fft(inner, length) * kernel)[..., :count]
     return mixed * _chirp(_centred(count), step, field)
 
@@ -57,9 +57,9 @@ def _chirp(place: Tensor, step: float, like: Tensor) -> Tensor:
     return torch.polar(torch.ones_like(cycles), -2 * math.pi * cycles).to(like.dtype)
 
 
-def _wrapped(lags: Tensor, given: int, length: int) -> Tensor:
-    """Return lags 1 - given .. count - 1 on a circle: negative ones at its end."""
+def _wrapped(lags: Tensor, samples: int, length: int) -> Tensor:
+    """Return lags 1 - samples .. count - 1 on a circle: negative ones at its end."""
     circle = torch.zeros(length, dtype=lags.dtype)
-    circle[: lags.numel() - given + 1] = lags[given - 1 :]
-    circle[length - given + 1 :] = lags[: given - 1]
+    circle[: lags.numel() - samples + 1] = lags[samples - 1 :]
+    circle[length - samples + 1 :] = lags[: samples - 1]
     return circle

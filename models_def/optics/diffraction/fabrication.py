@@ -79,8 +79,8 @@ class Etching:
             raise ContractError(f"{self.masks} masks want {self.masks} errors; got {len(errors)}")
         bits = mask_layers(self.level(height_um.detach()), self.levels).to(height_um.dtype)
         depths = [self.step_um * 2**k * (1 + error) for k, error in enumerate(errors)]
-        made = torch.einsum("k,khw->hw", torch.tensor(depths, dtype=height_um.dtype), bits)
-        return height_um + (made - height_um).detach()
+        relief = torch.einsum("k,khw->hw", torch.tensor(depths, dtype=height_um.dtype), bits)
+        return height_um + (relief - height_um).detach()
 
 
 def mask_layers(level: Tensor, levels: int) -> Tensor:

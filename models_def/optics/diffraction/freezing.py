@@ -58,11 +58,11 @@ def freeze_plate(
             keeps it in its place.
     """
     try:
-        found = _freeze_streaks(optics, sensor, grid, tell)
+        frozen = _freeze_streaks(optics, sensor, grid, tell)
     except NoStreaksError as error:
         tell(f"{error}; frozen as kernels")
-        found = None
-    return found or _freeze_kernels(optics, sensor, grid, tell)
+        frozen = None
+    return frozen or _freeze_kernels(optics, sensor, grid, tell)
 
 
 def _freeze_streaks(
@@ -79,20 +79,20 @@ def _freeze_streaks(
         side_px=grid.max_side_px,
     )
     light = streaks.dense()
-    misplaced, kept = compared(optics, sensor, light, streaks.wavelengths_um, streaks.depths_mm)
+    misplaced, energy = compared(optics, sensor, light, streaks.wavelengths_um, streaks.depths_mm)
     tell(f"{len(streaks.angles_rad)} arms: {misplaced:.4f} of the light of a colour is misplaced")
     if misplaced > STREAKS_LIMIT:
         tell(f"more than {STREAKS_LIMIT}: frozen as kernels")
         return None
     least = grid.energy if grid.least_energy is None else grid.least_energy
-    if kept < least:
+    if energy < least:
         raise ContractError(
-            f"core, arms and haze hold {kept:.4f} of the light, wanted {least}; raise "
+            f"core, arms and haze hold {energy:.4f} of the light, wanted {least}; raise "
             f"{option_text('max_side_px')} or lower the energy"
         )
     psf = psf_of_streaks(streaks, len(sensor.channels))
-    found = FrozenOptics(psf=psf, streaks=streaks)
-    return found, _facts(optics, found, kept, misplaced)
+    frozen = FrozenOptics(psf=psf, streaks=streaks)
+    return frozen, _facts(optics, frozen, energy, misplaced)
 
 
 def _freeze_kernels(
@@ -111,19 +111,19 @@ def _freeze_kernels(
             f"{count} wavelengths misplace {misplaced:.4f} of the light of a colour, more than "
             f"{MISPLACED_LIMIT}; freeze for a sensor with smoother responses"
         )
-    found = FrozenOptics(psf=psf)
-    return found, _facts(optics, found, frozen.energy_kept, misplaced)
+    frozen_optics = FrozenOptics(psf=psf)
+    return frozen_optics, _facts(optics, frozen_optics, frozen.energy_kept, misplaced)
 
 
-def _facts(optics: PlateOptics, found: FrozenOptics, kept: float, misplaced: float) -> Facts:
-    psf = found.psf
+def _facts(optics: PlateOptics, frozen: FrozenOptics, energy: float, misplaced: float) -> Facts:
+    psf = frozen.psf
     facts: Facts = {
         "plate": optics.name,
-        "form": "kernels" if found.streaks is None else "streaks",
+        "form": "kernels" if frozen.streaks is None else "streaks",
         "fields": 1,
         "wavelengths": psf.wavelengths_um.size,
         "side_px": psf.kernels.shape[-1],
-        "energy_kept": kept,
+        "energy_kept": energy,
         "misplaced": misplaced,
         "depths_mm": depths_text(psf),
     }
@@ -166,8 +166,10 @@ def compared(
         )
         light = traced.kernels[0] * traced.energy_kept[0, :, None, None]
         true = torch.einsum("cw,wyx->cyx", many, light)
-        found = torch.einsum("cw,wyx->cyx", few, torch.from_numpy(frozen.astype(np.float64)))
-        sums = found.sum((-2, -1), keepdim=True)
-        apart = (found / sums - true / true.sum((-2, -1), keepdim=True)).abs().sum((-2, -1))
-        worst, least = max(worst, float(apart.max()) / 2), min(least, float(sums.min()))
+        color_psf = torch.einsum("cw,wyx->cyx", few, torch.from_numpy(frozen.astype(np.float64)))
+        sums = color_psf.sum((-2, -1), keepdim=True)
+        difference = (
+            (color_psf / sums - true / true.sum((-2, -1), keepdim=True)).abs().sum((-2, -1))
+        )
+        worst, least = max(worst, float(difference.max()) / 2), min(least, float(sums.min()))
     return worst, least

@@ -56,12 +56,12 @@ class Streaks:
 
         All gratings take light from the core alike: 1 - share = J0(a)^(2 lines).
         """
-        left = (1 - self.share) ** (1 / (2 * len(self.angles_rad)))
+        bare_share = (1 - self.share) ** (1 / (2 * len(self.angles_rad)))
         low, high = 0.0, 2.4
         for _ in range(60):
             middle = (low + high) / 2
             value = float(torch.special.bessel_j0(torch.tensor(middle, dtype=torch.float64)))
-            low, high = (middle, high) if value > left else (low, middle)
+            low, high = (middle, high) if value > bare_share else (low, middle)
         return low
 
 
@@ -107,9 +107,9 @@ def _profiles(streaks: Streaks, bench: Bench, samples: int) -> Tensor:
     """Return a chirp (line, sample) over the diagonal for every line."""
     diagonal_mm = bench.diameter_mm * math.sqrt(2)
     place_mm = torch.linspace(-0.5, 0.5, samples, dtype=torch.float64) * diagonal_mm
-    made = [chirp_along(streaks, bench, angle, place_mm) for angle in streaks.angles_rad]
+    chirps = [chirp_along(streaks, bench, angle, place_mm) for angle in streaks.angles_rad]
     most_um = streaks.phase_rad * streaks.wavelength_um / (2 * math.pi * (streaks.index - 1))
-    return most_um * torch.stack(made)
+    return most_um * torch.stack(chirps)
 
 
 def _chord(place: Tensor, angle_rad: float, bench: Bench) -> Tensor:

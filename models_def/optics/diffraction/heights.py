@@ -104,8 +104,8 @@ class GratingMap(nn.Module):
         place = (torch.arange(self.cells, dtype=torch.float64) + 0.5) / self.cells - 0.5
         total = torch.zeros(self.cells, self.cells, dtype=self.profiles_um.dtype)
         for angle, profile in zip(self.angles_rad, self.profiles_um, strict=True):
-            along = math.cos(angle) * place[None, :] + math.sin(angle) * place[:, None]
-            at = ((along / math.sqrt(2) + 0.5) * (samples - 1)).clamp(0, samples - 1)
+            projection = math.cos(angle) * place[None, :] + math.sin(angle) * place[:, None]
+            at = ((projection / math.sqrt(2) + 0.5) * (samples - 1)).clamp(0, samples - 1)
             low = at.floor().clamp(max=samples - 2)
             share = (at - low).to(profile.dtype)
             index = low.long()
@@ -173,7 +173,7 @@ def zernike_basis(cells: int, terms: int) -> Tensor:
     place = (torch.arange(cells, dtype=torch.float64) + 0.5) / cells * 2 - 1
     radius = (place[:, None] ** 2 + place[None, :] ** 2).sqrt()
     angle = torch.atan2(place[:, None].expand(cells, cells), place[None, :].expand(cells, cells))
-    found = []
+    modes = []
     for term in range(1, terms + 1):
         n, m = noll_order(term)
         radial = torch.zeros_like(radius)
@@ -188,5 +188,5 @@ def zernike_basis(cells: int, terms: int) -> Tensor:
             radial += weight * radius ** (n - 2 * k)
         turn = torch.cos(m * angle) if m >= 0 else torch.sin(-m * angle)
         scale = math.sqrt(n + 1) * (math.sqrt(2) if m else 1)
-        found.append(torch.where(radius <= 1, scale * radial * turn, torch.zeros_like(radius)))
-    return torch.stack(found)
+        modes.append(torch.where(radius <= 1, scale * radial * turn, torch.zeros_like(radius)))
+    return torch.stack(modes)

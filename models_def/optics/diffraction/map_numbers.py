@@ -38,16 +38,16 @@ _KINDS: Final[dict[frozenset[str], type[HeightMap]]] = {
 _AXES: Final = {HEIGHTS: 2, "v": 2, "q": 2, "profiles_um": 2}
 
 
-def numbers_of(made: HeightMap) -> dict[str, Tensor]:
+def numbers_of(height_map: HeightMap) -> dict[str, Tensor]:
     """Return the numbers of a map, float32."""
-    found = {name: value.detach().float() for name, value in made.named_parameters()}
-    if isinstance(made, FullMap):
-        return found
-    if isinstance(made, RankMap):
-        found["most_um"] = torch.tensor([made.most_um])
-    if isinstance(made, GratingMap):
-        found["angles_rad"] = torch.tensor(made.angles_rad)
-    return found | {"cells": torch.tensor([made.cells])}
+    numbers = {name: value.detach().float() for name, value in height_map.named_parameters()}
+    if isinstance(height_map, FullMap):
+        return numbers
+    if isinstance(height_map, RankMap):
+        numbers["most_um"] = torch.tensor([height_map.most_um])
+    if isinstance(height_map, GratingMap):
+        numbers["angles_rad"] = torch.tensor(height_map.angles_rad)
+    return numbers | {"cells": torch.tensor([height_map.cells])}
 
 
 def map_of(numbers: Mapping[str, Tensor]) -> HeightMap:
@@ -81,13 +81,13 @@ def map_of(numbers: Mapping[str, Tensor]) -> HeightMap:
 def _check(name: str, value: Tensor) -> None:
     """Refuse numbers of a wrong shape or type, and those that are none."""
     axes = _AXES.get(name, 1)
-    wanted = torch.int64 if name == "cells" else None
-    right = value.dtype == wanted if wanted else value.is_floating_point()
+    dtype = torch.int64 if name == "cells" else None
+    right = value.dtype == dtype if dtype else value.is_floating_point()
     single = name in {"cells", "most_um"}
     if value.ndim != axes or not right or value.numel() == 0 or (single and value.numel() != 1):
         raise ContractError(
             f"{name} must be {'one' if single else f'{axes}-dimensional'} and of type "
-            f"{'int64' if wanted else 'float'}; got {tuple(value.shape)} {value.dtype}"
+            f"{'int64' if dtype else 'float'}; got {tuple(value.shape)} {value.dtype}"
         )
     if not bool(torch.isfinite(value).all()):
         raise ContractError(f"{name}: a height is not a finite number")
@@ -100,8 +100,8 @@ def _rank_map(numbers: Mapping[str, Tensor], cells: int) -> RankMap:
             f"v and q must be (cells, rank) for {cells} cells; got {tuple(v.shape)} and "
             f"{tuple(q.shape)}"
         )
-    made = RankMap(cells, rank=v.shape[1], most_um=float(numbers["most_um"]))
+    height_map = RankMap(cells, rank=v.shape[1], most_um=float(numbers["most_um"]))
     with torch.no_grad():
-        made.v.copy_(v)
-        made.q.copy_(q)
-    return made
+        height_map.v.copy_(v)
+        height_map.q.copy_(q)
+    return height_map

@@ -67,8 +67,8 @@ class StarPattern:
 
     def height_um(self, bench: Bench, index_at: IndexAt, cells: int) -> Tensor:
         """Return the heights."""
-        made: Tensor = self.grating_map(bench, index_at, cells)()
-        return made.detach().float()
+        heights: Tensor = self.grating_map(bench, index_at, cells)()
+        return heights.detach().float()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,20 +106,20 @@ class CrossPattern:
         )
         grating_um = streaks.phase_rad * self.wavelength_um / (2 * math.pi * (index - 1))
         depth = grating_um / (self.most_um * _SIGMOID_1 * (1 - _SIGMOID_1))
-        made = RankMap(cells, rank=1, most_um=self.most_um, offset=1.0, start=0.0)
+        height_map = RankMap(cells, rank=1, most_um=self.most_um, offset=1.0, start=0.0)
         fine = 8
         places = (torch.arange(cells * fine, dtype=torch.float64) + 0.5) / (cells * fine) - 0.5
         chirp = chirp_along(streaks, bench, 0.0, places * bench.diameter_mm)
         column = (1 + depth * chirp.reshape(cells, fine).mean(1)).float()[:, None]
         with torch.no_grad():
-            made.v.copy_(column)
-            made.q.copy_(column)
-        return made
+            height_map.v.copy_(column)
+            height_map.q.copy_(column)
+        return height_map
 
     def height_um(self, bench: Bench, index_at: IndexAt, cells: int) -> Tensor:
         """Return the heights."""
-        made: Tensor = self.rank_map(bench, index_at, cells)()
-        return made.detach()
+        heights: Tensor = self.rank_map(bench, index_at, cells)()
+        return heights.detach()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -100,18 +100,18 @@ class Pinhole:
         Raises:
             ContractError: If the light is too wide for the grid of the wave.
         """
-        found = [
+        frames = [
             [
                 self._light(float(height), float(wave), depth_mm, side_px, to_mm(pitch_um))
                 for wave in wavelengths_um
             ]
             for height in fields.y_mm
         ]
-        light = np.array(found)
-        kept = light.sum(axis=(-2, -1))
+        light = np.array(frames)
+        energy = light.sum(axis=(-2, -1))
         return TracedPsf(
-            kernels=torch.from_numpy(light / kept[..., None, None]),
-            energy_kept=torch.from_numpy(np.minimum(kept, 1.0)),
+            kernels=torch.from_numpy(light / energy[..., None, None]),
+            energy_kept=torch.from_numpy(np.minimum(energy, 1.0)),
         )
 
     def distortion(self, radius_mm: float, channels: int) -> RadialDistortion:
@@ -154,11 +154,11 @@ class Pinhole:
         field = np.abs(scipy.fft.ifft2(spectrum)) ** 2
         # a pixel sees the mean over its area, the chief ray in the middle of one
         pixel = np.sinc(np.fft.fftfreq(size) * finer)
-        seen = scipy.fft.ifft2(scipy.fft.fft2(field) * pixel[:, None] * pixel).real
-        seen = np.fft.fftshift(seen)[::finer, ::finer] * finer**2
-        middle, reach = seen.shape[0] // 2, side_px // 2
+        light = scipy.fft.ifft2(scipy.fft.fft2(field) * pixel[:, None] * pixel).real
+        light = np.fft.fftshift(light)[::finer, ::finer] * finer**2
+        middle, reach = light.shape[0] // 2, side_px // 2
         cut = slice(middle - reach, middle + reach + 1)
-        return np.asarray(np.maximum(seen[cut, cut], 0) / (np.abs(wave) ** 2).sum(), np.float64)
+        return np.asarray(np.maximum(light[cut, cut], 0) / (np.abs(wave) ** 2).sum(), np.float64)
 
     def _side(self, wanted_mm: float, finest_mm: float, step_mm: float) -> int:
         """Return the side of a grid on which the waves do not wrap into the kernel."""

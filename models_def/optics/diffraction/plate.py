@@ -156,10 +156,10 @@ def pattern_plate(
     """
     if not 1 < cells <= MAX_CELLS:
         raise ContractError(f"a plate has 2 to {MAX_CELLS} cells along a side; got {cells}")
-    found = find_glass(glass)
+    medium = find_glass(glass)
 
     def index_at(wavelength_um: float) -> float:
-        return float(refractive_index(found, torch.tensor([wavelength_um], dtype=torch.float64)))
+        return float(refractive_index(medium, torch.tensor([wavelength_um], dtype=torch.float64)))
 
     return Plate(
         name=name,
@@ -216,20 +216,20 @@ def read_plate(path: Path) -> Plate:
             f"no plate {path}: name a file, or one of {', '.join(built_in_plates())}"
         )
 
-    def beside(name: str) -> bytes:
+    def heights_of(name: str) -> bytes:
         if Path(name).name != name:
             raise ContractError(f"plate {path}: heights lie beside it, not at {name!r}")
         return read_side_bytes(path.with_name(name), "the heights")
 
-    return to_plate(read_side_toml(path, "plate"), beside, what=str(path))
+    return to_plate(read_side_toml(path, "plate"), heights_of, what=str(path))
 
 
 def _bundled(path: Path) -> Plate:
     bundle = open_bundle(path)
     if PLATE not in bundle.names:
         raise ContractError(f"{path} holds no {PLATE}; name a plate, or a bundle with one")
-    own = (PLATE, PLATE_HEIGHTS)
-    members = {name: bundle.member(name) for name in bundle.names if name in own}
+    names = (PLATE, PLATE_HEIGHTS)
+    members = {name: bundle.member(name) for name in bundle.names if name in names}
     return plate_of_members(members, str(path))
 
 
@@ -361,7 +361,7 @@ def plate_to_bytes(plate: Plate, heights: str) -> tuple[bytes, bytes | None]:
     if plate.etching is not None:
         lines += ["", "[etching]", *_entries(plate.etching)]
     if plate.pattern is not None:
-        kind = next(k for k, made in PATTERNS.items() if isinstance(plate.pattern, made))
+        kind = next(k for k, pattern in PATTERNS.items() if isinstance(plate.pattern, pattern))
         lines += ["", "[pattern]", key_line("kind", kind), *_entries(plate.pattern)]
     text = ("\n".join(lines) + "\n").encode()
     if plate.pattern is not None:

@@ -130,8 +130,8 @@ class PlateOptics:
         grid = PixelGrid(side_px=side_px, pitch_um=pitch_um)
         waves = tuple(float(wave) for wave in wavelengths_um)
         light = _stack(self.plate, grid, depth_mm, waves, bare=False).to(torch.float64)[None]
-        kept = light.sum((-2, -1))
-        return TracedPsf(kernels=light / kept[..., None, None], energy_kept=kept)
+        energy = light.sum((-2, -1))
+        return TracedPsf(kernels=light / energy[..., None, None], energy_kept=energy)
 
     def distortion(self, radius_mm: float, channels: int) -> RadialDistortion:
         """Return none: the stop lies in the lens, which is thin."""

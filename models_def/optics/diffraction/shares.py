@@ -67,22 +67,22 @@ def find_streaks(psf: Tensor, bare: Tensor) -> tuple[Streak, ...]:
     distance = _distance(added)
     centre = added.shape[0] // 2
     usable = (distance > 2 * CORE_PX) & (distance <= centre)
-    left = torch.where(usable, added, torch.zeros_like(added))
+    rest = torch.where(usable, added, torch.zeros_like(added))
     angles = torch.arange(0, 180, _STEP_DEG, dtype=torch.float64).tolist()
     bands = [_near_line(added.shape[0], angle) for angle in angles]
-    found: list[Streak] = []
+    streaks: list[Streak] = []
     brightest = 0.0
     for _ in range(_MOST):
-        light = torch.stack([left[band].sum() for band in bands])
-        above = light - light.median()
-        brightest = max(brightest, float(above.max()))
-        if float(above.max()) <= max(_LEAST * brightest, _FAINTEST):
+        light = torch.stack([rest[band].sum() for band in bands])
+        excess = light - light.median()
+        brightest = max(brightest, float(excess.max()))
+        if float(excess.max()) <= max(_LEAST * brightest, _FAINTEST):
             break
-        angle = _refined(left, angles[int(light.argmax())])
-        found.append(Streak(angle_deg=angle, reach_px=_reach(added, angle)))
+        angle = _refined(rest, angles[int(light.argmax())])
+        streaks.append(Streak(angle_deg=angle, reach_px=_reach(added, angle)))
         # beside it a line still meets its inner part
-        left = torch.where(_near_line(added.shape[0], angle, 3.0), torch.zeros_like(left), left)
-    return tuple(found)
+        rest = torch.where(_near_line(added.shape[0], angle, 3.0), torch.zeros_like(rest), rest)
+    return tuple(streaks)
 
 
 def with_reach(streaks: tuple[Streak, ...], psf: Tensor, bare: Tensor) -> tuple[Streak, ...]:
@@ -99,11 +99,11 @@ def side_for(psf: Tensor, share: float) -> int:
         share: Of the light of the aperture.
     """
     side = psf.shape[-1]
-    for wanted in range(1, side, 2):
-        cut = (side - wanted) // 2
-        inner = psf[..., cut : cut + wanted, cut : cut + wanted]
+    for side_px in range(1, side, 2):
+        cut = (side - side_px) // 2
+        inner = psf[..., cut : cut + side_px, cut : cut + side_px]
         if float(inner.sum((-2, -1)).min()) >= share:
-            return wanted
+            return side_px
     return side
 
 
@@ -138,8 +138,8 @@ def _distance(psf: Tensor) -> Tensor:
 def _near_line(side: int, angle_deg: float, widths: float = 1.0) -> Tensor:
     place = torch.arange(side, dtype=torch.float64) - side // 2
     angle = math.radians(angle_deg)
-    across = -math.sin(angle) * place[None, :] + math.cos(angle) * place[:, None]
-    return across.abs() <= widths * HALF_WIDTH_PX
+    distance_px = -math.sin(angle) * place[None, :] + math.cos(angle) * place[:, None]
+    return distance_px.abs() <= widths * HALF_WIDTH_PX
 
 
 def _refined(added: Tensor, angle_deg: float) -> float:
@@ -173,5 +173,5 @@ def _reach(added: Tensor, angle_deg: float) -> float:
     ]
     start = int(2 * CORE_PX) + _SMOOTH_PX
     bright = float(smooth[start:].clamp_min(0).pow(2).sum() / smooth[start:].clamp_min(1e-30).sum())
-    above = (smooth > _END * bright).nonzero().flatten()
-    return float(above.max()) if above.numel() else 0.0
+    bright_px = (smooth > _END * bright).nonzero().flatten()
+    return float(bright_px.max()) if bright_px.numel() else 0.0

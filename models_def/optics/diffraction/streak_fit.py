@@ -30,7 +30,7 @@ from camkit.streaks import (
 SECTION_PX: Final = 6.0
 """Half of the width in which an arm's light is told from haze."""
 _ROUNDS: Final = 4
-_REACHED: Final = 0.995
+_REACH_SHARE: Final = 0.995
 """Of an arm's light; beyond, it is haze."""
 _TAIL_PX: Final = 4
 _ENDED: Final = 0.5
@@ -89,10 +89,10 @@ def fit_streaks(
 
 def _arm_angles(kernel: NDArray[np.float32], bare: NDArray[np.float32]) -> list[float]:
     """Return the directions of both arms of every streak."""
-    found = find_streaks(torch.from_numpy(kernel), torch.from_numpy(bare))
-    if not found:
+    streaks = find_streaks(torch.from_numpy(kernel), torch.from_numpy(bare))
+    if not streaks:
         raise NoStreaksError("no streaks were found in the kernels: they are not streak optics")
-    lines = sorted(math.radians(streak.angle_deg) for streak in found)
+    lines = sorted(math.radians(streak.angle_deg) for streak in streaks)
     return [line + turn for turn in (0.0, math.pi) for line in lines]
 
 
@@ -113,13 +113,15 @@ def _fit(
         haze = _haze(kernel - arms, usable)
         taps = haze_taps(kernel.shape[0], haze.shape[0]).astype(np.float64)
         added = kernel - taps @ haze @ taps.T
-        found = [
+        arm_fits = [
             _separated(added[here], along[here], across[here], kernel.shape[0])
             for (along, across), here in zip(axes, alone, strict=True)
         ]
-        arms = np.sum([arm_light(*f, *axis) for f, axis in zip(found, axes, strict=True)], axis=0)
+        arms = np.sum(
+            [arm_light(*f, *axis) for f, axis in zip(arm_fits, axes, strict=True)], axis=0
+        )
         usable = outside  # with the arms taken away, squares under them are known too
-    profiles, sections = zip(*found, strict=True)
+    profiles, sections = zip(*arm_fits, strict=True)
     return np.array(profiles), np.array(sections), haze
 
 
@@ -133,17 +135,17 @@ def _haze(kernel: FloatGrid, usable: NDArray[np.bool_]) -> FloatGrid:
     total = np.bincount(flat, kernel[usable], squares**2)
     count = np.bincount(flat, minlength=squares**2)
     haze = (total / np.maximum(count, 1)).reshape(squares, squares)
-    known = (count > 0).reshape(squares, squares)
+    filled_cells = (count > 0).reshape(squares, squares)
     middle = np.arange(squares) - squares // 2
     ring = np.rint(np.hypot(middle[:, None], middle[None, :])).astype(int)
-    means = np.bincount(ring[known], haze[known], ring.max() + 1)
-    counts = np.bincount(ring[known], minlength=ring.max() + 1)
+    means = np.bincount(ring[filled_cells], haze[filled_cells], ring.max() + 1)
+    counts = np.bincount(ring[filled_cells], minlength=ring.max() + 1)
     filled = np.interp(
         np.arange(ring.max() + 1),
         np.flatnonzero(counts),
         (means / np.maximum(counts, 1))[counts > 0],
     )
-    return np.maximum(np.where(known, haze, filled[ring]), 0)
+    return np.maximum(np.where(filled_cells, haze, filled[ring]), 0)
 
 
 def _separated(
@@ -176,25 +178,25 @@ def _line(light: FloatGrid, place: FloatGrid, weight: FloatGrid, count: int) -> 
     """Return the line, linear between integers, whose values times weights are nearest to light."""
     low = np.clip(np.floor(place).astype(int), 0, count - 2)
     share = np.clip(place - low, 0, 1)
-    diagonal, beside, wanted = np.zeros(count), np.zeros(count - 1), np.zeros(count)
+    diagonal, off_diagonal, right_side = np.zeros(count), np.zeros(count - 1), np.zeros(count)
     for part, index in (((1 - share) * weight, low), (share * weight, low + 1)):
         diagonal += np.bincount(index, part**2, count)
-        wanted += np.bincount(index, part * light, count)
-    beside += np.bincount(low, (1 - share) * share * weight**2, count - 1)
+        right_side += np.bincount(index, part * light, count)
+    off_diagonal += np.bincount(low, (1 - share) * share * weight**2, count - 1)
     # what no light tells is drawn to its neighbours
     soft = 1e-3 * diagonal.max() + _TINY
     matrix = np.zeros((3, count))
     matrix[1] = diagonal + 2 * soft
-    matrix[0, 1:] = matrix[2, :-1] = beside - soft
+    matrix[0, 1:] = matrix[2, :-1] = off_diagonal - soft
     matrix[1, 0] -= soft
     matrix[1, -1] -= soft
-    return np.maximum(solve_banded((1, 1), matrix, wanted), 0)
+    return np.maximum(solve_banded((1, 1), matrix, right_side), 0)
 
 
 def _reach(profiles: FloatGrid, half: int) -> int:
     """Return the distance within which nearly all light of the longest arms lies."""
-    beyond = profiles[..., half + 1 :]
-    if (beyond[..., -_TAIL_PX:].mean(axis=-1) > _ENDED * beyond.mean(axis=-1)).any():
+    tails = profiles[..., half + 1 :]
+    if (tails[..., -_TAIL_PX:].mean(axis=-1) > _ENDED * tails.mean(axis=-1)).any():
         raise NoStreaksError("the arms do not end within the kernels: compute a wider window")
-    share = np.cumsum(beyond, axis=-1) / np.maximum(beyond.sum(axis=-1, keepdims=True), _TINY)
-    return half + 1 + int((share < _REACHED).sum(axis=-1).max())
+    share = np.cumsum(tails, axis=-1) / np.maximum(tails.sum(axis=-1, keepdims=True), _TINY)
+    return half + 1 + int((share < _REACH_SHARE).sum(axis=-1).max())

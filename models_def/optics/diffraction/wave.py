@@ -111,12 +111,12 @@ def plate_psf(
     step_mm = grid.pitch_um / UM_PER_MM / samples
     step = cell_mm * step_mm / (wave_mm * bench.distance_mm)
     fine = grid.side_px * samples
-    found = zoom_fourier_2d(field, step, fine).abs() ** 2
+    psf = zoom_fourier_2d(field, step, fine).abs() ** 2
     # a cell is a square, not a point: its own diffraction lies over that of the grid of cells
-    own = torch.sinc((torch.arange(fine, dtype=torch.float64) - (fine - 1) / 2) * step)
-    own = (own**2).to(found.dtype)
-    found = found * own[:, None] * own[None, :] * (step**2 / (light**2).sum())
-    return found.reshape(grid.side_px, samples, grid.side_px, samples).sum((1, 3))
+    cell_factor = torch.sinc((torch.arange(fine, dtype=torch.float64) - (fine - 1) / 2) * step)
+    cell_factor = (cell_factor**2).to(psf.dtype)
+    psf = psf * cell_factor[:, None] * cell_factor[None, :] * (step**2 / (light**2).sum())
+    return psf.reshape(grid.side_px, samples, grid.side_px, samples).sum((1, 3))
 
 
 def strehl(

@@ -33,7 +33,7 @@ def best_beginning(height_um: FloatGrid, camera: DotCamera, target: FloatGrid) -
     steps = np.unique(np.arange(PLACES) * camera.cells // PLACES).tolist()
 
     def error(begin: tuple[int, int]) -> float:
-        made = effective_psf(np.roll(height_um, begin, (0, 1)), camera, view)
-        return likeness(made, target).rmse
+        light = effective_psf(np.roll(height_um, begin, (0, 1)), camera, view)
+        return likeness(light, target).rmse
 
     return min(((down, right) for down in steps for right in steps), key=error)

@@ -25,8 +25,10 @@ def best_bottom(plate: DotPlate, target: FloatGrid) -> DotPlate:
         target: (11, 11), the PSF that is wanted.
     """
     turned = [
-        DotPlate(camera=plate.camera, level=(plate.level + up) % plate.levels, levels=plate.levels)
-        for up in range(plate.levels)
+        DotPlate(
+            camera=plate.camera, level=(plate.level + rise) % plate.levels, levels=plate.levels
+        )
+        for rise in range(plate.levels)
     ]
     return min(turned, key=lambda one: _error(one, target))
 

@@ -46,9 +46,9 @@ def effective_psf(
     tiles = camera.tiles if view.tiles is None else view.tiles
     samples = max(SAMPLES, 2 * tiles + 1)
     reach = abs(math.cos(view.turn_rad)) + abs(math.sin(view.turn_rad))
-    across = 2 * math.ceil((side * reach) / 2) + 1
+    count = 2 * math.ceil((side * reach) / 2) + 1
     pitch_um = camera.spacing_um / samples
-    grid = PixelGrid(side_px=across * samples, pitch_um=pitch_um, samples=1)
+    grid = PixelGrid(side_px=count * samples, pitch_um=pitch_um, samples=1)
     light = dot_picture(height_um, camera, grid, view)
     return seen_by_circles(light, pitch_um, camera, side, view.turn_rad)
 
@@ -68,7 +68,7 @@ def seen_by_circles(
     place_um = (np.arange(light.shape[0]) - light.shape[0] // 2) * pitch_um
     steps_um = (np.arange(side) - side // 2) * camera.spacing_um
     cos, sin = math.cos(turn_rad), math.sin(turn_rad)
-    found = np.zeros((side, side))
+    light_sums = np.zeros((side, side))
     for row, y_um in enumerate(steps_um):
         for column, x_um in enumerate(steps_um):
             down_um, right_um = cos * y_um - sin * x_um, cos * x_um + sin * y_um
@@ -76,8 +76,8 @@ def seen_by_circles(
             away_um = np.hypot(place_um[rows, None] - down_um, place_um[None, columns] - right_um)
             # pixels at the rim count by how far they lie inside
             inside = np.clip((camera.active_um / 2 - away_um) / pitch_um + 0.5, 0, 1)
-            found[row, column] = (light[rows, columns] * inside).sum()
-    return found
+            light_sums[row, column] = (light[rows, columns] * inside).sum()
+    return light_sums
 
 
 def _near(place_um: FloatGrid, at_um: float, width_um: float) -> slice:

@@ -29,13 +29,13 @@ def gerchberg_saxton(
         of the cells is divided out on the way back, which the thesis's point-like cells lack.
     """
     matrix = order_matrix(cells, target.shape[0])
-    own = np.abs(matrix[:, 0]) * cells
-    wanted = np.sqrt(target)
-    back = (matrix / own[:, None] ** 2).conj().T
-    dots = np.asarray(wanted * np.exp(2j * np.pi * rng.random(target.shape)))
+    norm = np.abs(matrix[:, 0]) * cells
+    amplitude = np.sqrt(target)
+    back = (matrix / norm[:, None] ** 2).conj().T
+    dots = np.asarray(amplitude * np.exp(2j * np.pi * rng.random(target.shape)))
     for _ in range(rounds):
         field = _unit(back @ dots @ back.T)
-        dots = wanted * _unit(orders_of(field, matrix))
+        dots = amplitude * _unit(orders_of(field, matrix))
     return np.angle(field)
 
 

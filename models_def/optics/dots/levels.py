@@ -45,16 +45,16 @@ def descend(
     """
     fields = level_field(levels)
     matrix = order_matrix(level.shape[0], merit.target.shape[0])
-    found = level.copy()
+    refined = level.copy()
     for _ in range(sweeps):
         # anew, so that roundings of many updates do not add up
-        dots = orders_of(fields[found], matrix)
-        if _sweep(found, dots, fields, matrix, merit, rng) < STILL * level.size:
+        dots = orders_of(fields[refined], matrix)
+        if _sweep(refined, dots, fields, matrix, merit, rng) < STILL * level.size:
             break
-    return found
+    return refined
 
 
-def moved(
+def shifted_orders(
     dots: ComplexGrid, cell: tuple[int, int], change: NDArray[np.complex128], matrix: ComplexGrid
 ) -> ComplexGrid:
     """Return the amplitudes (..., n, n) of dots after the field of one cell changed.
@@ -82,10 +82,12 @@ def _sweep(
     best, count = float(merit.of(intensity(dots))), 0
     for place in rng.permutation(level.size):
         row, column = divmod(int(place), level.shape[1])
-        tried = moved(dots, (row, column), fields - fields[level[row, column]], matrix)
-        merits = merit.of(intensity(tried))
-        chosen = int(merits.argmin())
-        if merits[chosen] < best - _LEAST:
-            level[row, column], dots, best = chosen, tried[chosen], float(merits[chosen])
+        candidates = shifted_orders(
+            dots, (row, column), fields - fields[level[row, column]], matrix
+        )
+        merits = merit.of(intensity(candidates))
+        choice = int(merits.argmin())
+        if merits[choice] < best - _LEAST:
+            level[row, column], dots, best = choice, candidates[choice], float(merits[choice])
             count += 1
     return count

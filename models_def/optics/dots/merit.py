@@ -32,16 +32,16 @@ class Merit:
 
     def of(self, light: FloatGrid) -> NDArray[np.float64]:
         """Return the merit (...) of light (..., n, n), shares of all light."""
-        held = light.sum((-2, -1))
-        apart = light / np.maximum(held, _TINY)[..., None, None] - self.target
-        return np.asarray(1 - held + self._price * (apart**2).sum((-2, -1)))
+        total = light.sum((-2, -1))
+        difference = light / np.maximum(total, _TINY)[..., None, None] - self.target
+        return np.asarray(1 - total + self._price * (difference**2).sum((-2, -1)))
 
     def slope(self, light: FloatGrid) -> FloatGrid:
         """Return the slope (n, n) of the merit by light (n, n)."""
-        held = max(float(light.sum()), _TINY)
-        share = light / held
-        apart = share - self.target
-        return np.asarray(2 * self._price * (apart - (apart * share).sum()) / held - 1)
+        total = max(float(light.sum()), _TINY)
+        share = light / total
+        difference = share - self.target
+        return np.asarray(2 * self._price * (difference - (difference * share).sum()) / total - 1)
 
     @property
     def _price(self) -> float:

@@ -37,11 +37,11 @@ def refine(phase: FloatGrid, merit: Merit, steps: int = STEPS) -> tuple[FloatGri
         pulled = matrix.T @ (merit.slope(light) * dots.conj()) @ matrix
         return float(merit.of(light)), np.asarray(-2 * (field * pulled).imag).ravel()
 
-    found = minimize(
+    optimum = minimize(
         judged,
         phase.ravel(),
         jac=True,
         method="L-BFGS-B",
         options={"maxiter": steps, "maxcor": _MEMORY},
     )
-    return np.asarray(found.x).reshape(cells, cells), float(found.fun)
+    return np.asarray(optimum.x).reshape(cells, cells), float(optimum.fun)

@@ -28,17 +28,17 @@ def to_target(values: NDArray[Any]) -> FloatGrid:
             f"a PSF for a plate must be {ORDERS}x{ORDERS} real numbers; got {values.dtype} "
             f"{values.shape}"
         )
-    found = values.astype(np.float64)
-    if not np.isfinite(found).all():
+    target = values.astype(np.float64)
+    if not np.isfinite(target).all():
         raise ContractError("a PSF must be finite; it holds NaN or infinite values")
-    if found.min() < 0:
-        raise ContractError(f"a PSF must be >= 0, as light is; its least value is {found.min():g}")
+    if target.min() < 0:
+        raise ContractError(f"a PSF must be >= 0, as light is; its least value is {target.min():g}")
     # by its peak first: the sum of finite values may not be finite
-    peak = float(found.max())
+    peak = float(target.max())
     if peak == 0:
         raise ContractError("a PSF needs light; it is 0 everywhere")
-    found /= peak
-    return np.asarray(found / found.sum())
+    target /= peak
+    return np.asarray(target / target.sum())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,17 +74,17 @@ def likeness(light: FloatGrid, target: FloatGrid) -> Likeness:
     References: Sun 2021, figure 4.4. The correlation of an even light is not defined; it counts
         as 1 where both are even, else as 0.
     """
-    spread, wanted = light - light.mean(), target - target.mean()
-    scale = float(np.sqrt((spread**2).sum() * (wanted**2).sum()))
+    spread, target_spread = light - light.mean(), target - target.mean()
+    scale = float(np.sqrt((spread**2).sum() * (target_spread**2).sum()))
     even = 1e-12 * float(light.max() * target.max())
     correlation = (
-        float((spread * wanted).sum()) / scale
+        float((spread * target_spread).sum()) / scale
         if scale > even
         else float(np.ptp(light) <= 1e-9 * light.max() and np.ptp(target) <= 1e-9 * target.max())
     )
-    apart = light / light.max() - target / target.max()
+    difference = light / light.max() - target / target.max()
     return Likeness(
         correlation=correlation,
-        rmse=float(np.sqrt((apart**2).mean())),
+        rmse=float(np.sqrt((difference**2).mean())),
         efficiency=float(light.sum()),
     )

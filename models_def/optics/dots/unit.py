@@ -68,8 +68,8 @@ class DotPlate:
         Raises:
             ContractError: If there is not one error a mask.
         """
-        made = self.etching.etched(torch.from_numpy(self.height_um), depth_errors)
-        return np.asarray(made.numpy())
+        relief = self.etching.etched(torch.from_numpy(self.height_um), depth_errors)
+        return np.asarray(relief.numpy())
 
 
 def phase_light(phase: FloatGrid) -> FloatGrid:

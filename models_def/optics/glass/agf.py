@@ -111,10 +111,10 @@ def _start(words: list[str], number: int) -> _Draft:
         raise DecodeError(
             f"line {number}: dispersion formula must be 1..{max(_FORMULAS)}; got {words[2]}"
         )
-    stated = [_number(word, number) for word in words[4:6]]
+    printed = [_number(word, number) for word in words[4:6]]
     # 1.0 and 0.0 stand for unknown
-    index_d = stated[0] if stated and stated[0] > 1 else None
-    abbe_number = stated[1] if index_d and len(stated) > 1 and stated[1] else None
+    index_d = printed[0] if printed and printed[0] > 1 else None
+    abbe_number = printed[1] if index_d and len(printed) > 1 and printed[1] else None
     return _Draft(number, words[1], int(formula), index_d, abbe_number)
 
 

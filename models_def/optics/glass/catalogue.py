@@ -50,8 +50,8 @@ class GlassCatalogue:
     def with_trade_name(self, trade_name: str) -> tuple[Glass, ...]:
         """Return the glasses of this trade name: at most one but in the literature."""
         if not self.literature:
-            found = self.get(f"{trade_name}-{self.name}")
-            return (found,) if found else ()
+            glass = self.get(f"{trade_name}-{self.name}")
+            return (glass,) if glass else ()
         return tuple(g for g in self.glasses if trade_name_of(g) == trade_name)
 
 
@@ -113,9 +113,9 @@ def find_glass(name: str, catalogues: Sequence[GlassCatalogue] = ()) -> Glass:
     if name == AIR.name:
         return AIR
     for catalogue in (*catalogues, *builtin_catalogues()):
-        found = catalogue.get(name)
-        if found is not None:
-            return found
+        match = catalogue.get(name)
+        if match is not None:
+            return match
     model = parse_model_name(name)
     if model is not None:
         return model
@@ -139,12 +139,12 @@ def own_glass(glass: Glass, catalogues: Iterable[GlassCatalogue]) -> Glass | Non
 
 
 def _near_names(name: str, catalogues: Sequence[GlassCatalogue]) -> list[str]:
-    wanted = name.casefold()
+    folded_name = name.casefold()
 
     def likeness(glass: Glass) -> float:
         trade_name = trade_name_of(glass).casefold()
-        match = difflib.SequenceMatcher(None, trade_name, wanted)
-        return max(match.ratio(), 0.99 * (glass.name.casefold() == wanted))
+        match = difflib.SequenceMatcher(None, trade_name, folded_name)
+        return max(match.ratio(), 0.99 * (glass.name.casefold() == folded_name))
 
     ranked = sorted(_all(catalogues), key=likeness, reverse=True)
     return [glass.name for glass in ranked[:_NEAR]]

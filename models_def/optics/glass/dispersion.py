@@ -124,8 +124,8 @@ def _herzberger(coefficients: _Coefficients, wavelengths_um: Tensor) -> Tensor:
 
 def _buchdahl(coefficients: _Coefficients, wavelengths_um: Tensor) -> Tensor:
     base, first, second, base_um = coefficients
-    away = wavelengths_um - base_um
-    chromatic = away / (1 + _BUCHDAHL_PER_UM * away)
+    offset_um = wavelengths_um - base_um
+    chromatic = offset_um / (1 + _BUCHDAHL_PER_UM * offset_um)
     return base + first * chromatic + second * chromatic**2
 
 

@@ -27,16 +27,16 @@ def parse_glass_table(table: Mapping[str, Any]) -> Glass:
         ContractError: If a key is unknown, missing or of a wrong type.
     """
     where = f"glass {table.get('name')!r}" if isinstance(table, Mapping) else "[[glass]]"
-    known = section(where, _GlassTable, table)
-    if len(known.range_um) != 2:
-        raise ContractError(f"{where}: range_um must be [low, high]; got {known.range_um}")
-    low, high = known.range_um
+    entries = section(where, _GlassTable, table)
+    if len(entries.range_um) != 2:
+        raise ContractError(f"{where}: range_um must be [low, high]; got {entries.range_um}")
+    low, high = entries.range_um
     return Glass(
-        name=known.name,
-        formula=known.formula,
-        coefficients=known.coefficients,
+        name=entries.name,
+        formula=entries.formula,
+        coefficients=entries.coefficients,
         range_um=(low, high),
-        source=known.source,
+        source=entries.source,
     )
 
 

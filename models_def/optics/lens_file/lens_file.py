@@ -42,8 +42,8 @@ def read_noted_lens(
     path = _built_in(path)
     if _suffix(path) == ".toml":
         return read_prescription(path, catalogues), ()
-    found = read_zmx(path, catalogues)
-    return found.lens, found.notes
+    prescription = read_zmx(path, catalogues)
+    return prescription.lens, prescription.notes
 
 
 def ready_for_lens(path: Path) -> None:
@@ -83,14 +83,14 @@ def find_lens(name: str, folder: Path | None = None) -> Lens:
         return read_lens(PRESCRIPTIONS / f"{name}.toml")
     path = (folder or Path()) / name
     if not path.is_file():
-        known = ", ".join(built_in_lenses())
-        raise ContractError(f"no lens {name!r}: give a path (.toml or .zmx), or one of {known}")
+        names = ", ".join(built_in_lenses())
+        raise ContractError(f"no lens {name!r}: give a path (.toml or .zmx), or one of {names}")
     return read_lens(path)
 
 
 def _built_in(path: Path) -> Path:
-    named = not path.is_file() and str(path) in built_in_lenses()
-    return PRESCRIPTIONS / f"{path}.toml" if named else path
+    is_name = not path.is_file() and str(path) in built_in_lenses()
+    return PRESCRIPTIONS / f"{path}.toml" if is_name else path
 
 
 def _suffix(path: Path) -> str:

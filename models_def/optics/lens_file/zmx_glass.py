@@ -43,21 +43,21 @@ class GlassOrder:
     """The order in which the catalogues of a .zmx file are searched for glasses.
 
     Attributes:
-        own: The user's catalogues; asked first.
+        user_catalogues: The user's catalogues; asked first.
         listed: Those of camkit that the GCAT line names, in its order; the first that has a name
             decides. A name that none of them has must stand in exactly one of the others.
     """
 
-    own: tuple[GlassCatalogue, ...] = ()
+    user_catalogues: tuple[GlassCatalogue, ...] = ()
     listed: tuple[GlassCatalogue, ...] = ()
 
 
-def glass_order(names: Sequence[str], own: Sequence[GlassCatalogue]) -> GlassOrder:
+def glass_order(names: Sequence[str], user_catalogues: Sequence[GlassCatalogue]) -> GlassOrder:
     """Return the order for a GCAT line; catalogues that camkit does not have are passed over."""
-    known = [c for c in builtin_catalogues() if not c.literature]
-    wanted = [_ALIASES.get(name.casefold(), name.casefold()) for name in names]
-    listed = (c for name in wanted for c in known if gcat_name(c) == name.upper())
-    return GlassOrder(own=tuple(own), listed=tuple(dict.fromkeys(listed)))
+    catalogues = [c for c in builtin_catalogues() if not c.literature]
+    catalogue_names = [_ALIASES.get(name.casefold(), name.casefold()) for name in names]
+    listed = (c for name in catalogue_names for c in catalogues if gcat_name(c) == name.upper())
+    return GlassOrder(user_catalogues=tuple(user_catalogues), listed=tuple(dict.fromkeys(listed)))
 
 
 def gcat_name(catalogue: GlassCatalogue) -> str:
@@ -72,10 +72,10 @@ def find_zmx_glass(name: str, order: GlassOrder) -> Glass:
     Raises:
         ContractError: If no catalogue has it, or several do that GCAT does not name.
     """
-    for catalogue in (*order.own, *order.listed):
-        found = _in_capitals(catalogue, name)
-        if found is not None:
-            return found
+    for catalogue in (*order.user_catalogues, *order.listed):
+        match = _in_capitals(catalogue, name)
+        if match is not None:
+            return match
     rest = [c for c in builtin_catalogues() if not c.literature and c not in order.listed]
     several = [glass for c in rest if (glass := _in_capitals(c, name))]
     if len(several) == 1:
@@ -94,11 +94,11 @@ def find_zmx_glass(name: str, order: GlassOrder) -> Glass:
 
 
 def _in_capitals(catalogue: GlassCatalogue, name: str) -> Glass | None:
-    found = catalogue.with_trade_name(name)
-    if found:
-        return found[0]
-    wanted = f"{name}-{catalogue.name}".upper()
-    several = [glass for glass in catalogue.glasses if glass.name.upper() == wanted]
+    glasses = catalogue.with_trade_name(name)
+    if glasses:
+        return glasses[0]
+    full_name = f"{name}-{catalogue.name}".upper()
+    several = [glass for glass in catalogue.glasses if glass.name.upper() == full_name]
     return several[0] if len(several) == 1 else None
 
 
@@ -107,12 +107,12 @@ def read_model_glass(numbers: Sequence[float], comment: str, order: GlassOrder) 
     model = model_glass(*numbers)
     if comment.startswith(COMMENT):
         try:
-            glass = find_glass(comment.removeprefix(COMMENT), order.own)
+            glass = find_glass(comment.removeprefix(COMMENT), order.user_catalogues)
         except ContractError:
             return model
         # someone may have changed the numbers in another program: then they hold
         pairs = zip(index_and_abbe(glass), numbers, strict=False)
-        if all(math.isclose(own, written, rel_tol=_SAME) for own, written in pairs):
+        if all(math.isclose(nominal, written, rel_tol=_SAME) for nominal, written in pairs):
             return glass
     return model
 
@@ -127,13 +127,13 @@ def index_and_abbe(glass: Glass) -> tuple[float, float]:
     return float(refractive_index(glass, line)), number if number != float("inf") else 0.0
 
 
-def glass_words(glass: Glass, order: GlassOrder, *, own: bool) -> tuple[str, str]:
+def glass_words(glass: Glass, order: GlassOrder, *, is_user_glass: bool) -> tuple[str, str]:
     """Return the text of a GLAS line and the comment that goes with it.
 
     Args:
         glass: Not air.
         order: Of the catalogues that the GCAT line of the file will name.
-        own: It comes from a user's catalogue, which a reader must be given too.
+        is_user_glass: It comes from a user's catalogue, which a reader must be given too.
     """
     if glass.name.startswith(MODEL_PREFIX):
         words = [*glass.name.removeprefix(MODEL_PREFIX).split(","), "0.0"][:3]
@@ -141,8 +141,8 @@ def glass_words(glass: Glass, order: GlassOrder, *, own: bool) -> tuple[str, str
     index_d, number = index_and_abbe(glass)
     numbers = f"{index_d!r} {number!r} 0 0 0 0 0 0"
     trade_name = trade_name_of(glass)
-    if (own and " " not in trade_name) or _reads_back(trade_name, glass, order):
-        return f"{trade_name if own else trade_name.upper()} 0 0 {numbers}", ""
+    if (is_user_glass and " " not in trade_name) or _reads_back(trade_name, glass, order):
+        return f"{trade_name if is_user_glass else trade_name.upper()} 0 0 {numbers}", ""
     if index_d:
         return f"{MODEL_NAME} 1 0 {numbers}", f"{COMMENT}{glass.name}"
     return f"{glass.name} 0 0 {numbers}", ""

@@ -143,19 +143,19 @@ def _check_image(records: ZmxRecords) -> None:
 
 
 def _stop(records: ZmxRecords) -> int:
-    found = [i for i, block in enumerate(records.surfaces) if "STOP" in block]
-    if len(found) != 1 or not 1 <= found[0] < len(records.surfaces) - 1:
-        raise DecodeError(f"one surface of the lens must hold STOP; got {found or 'none'}")
-    return found[0] - 1
+    stops = [i for i, block in enumerate(records.surfaces) if "STOP" in block]
+    if len(stops) != 1 or not 1 <= stops[0] < len(records.surfaces) - 1:
+        raise DecodeError(f"one surface of the lens must hold STOP; got {stops or 'none'}")
+    return stops[0] - 1
 
 
 def _aperture(records: ZmxRecords, stop: int, scale: float) -> tuple[ApertureKind, float]:
     """Return the aperture; that of OBNA is put in later, when the entrance pupil is known."""
-    found = [r for key in _APERTURES if (r := last(records.system, key)) is not None]
-    if len(found) != 1:
-        given = ", ".join(record.key for record in found) or "none"
-        raise DecodeError(f"the aperture must be one of {', '.join(_APERTURES)}; got {given}")
-    record = found[0]
+    apertures = [r for key in _APERTURES if (r := last(records.system, key)) is not None]
+    if len(apertures) != 1:
+        keys = ", ".join(record.key for record in apertures) or "none"
+        raise DecodeError(f"the aperture must be one of {', '.join(_APERTURES)}; got {keys}")
+    record = apertures[0]
     if record.key == "FLOA":
         size = last(records.surfaces[stop + 1], "DIAM")
         if size is None or not size.number(0) > 0:
@@ -190,8 +190,8 @@ def _with_object_aperture(lens: Lens, system: Records) -> Lens:
 
 def _wavelengths(system: Records) -> tuple[tuple[float, ...], float]:
     """Return the wavelengths in um, increasing, each once, and the primary one."""
-    found = [*system.get("WAVM", []), *system.get("WAVE", [])]
-    listed = [(r.number(1), r.number(2, 1.0)) for r in sorted(found, key=lambda r: r.number(0))]
+    entries = [*system.get("WAVM", []), *system.get("WAVE", [])]
+    listed = [(r.number(1), r.number(2, 1.0)) for r in sorted(entries, key=lambda r: r.number(0))]
     old = last(system, "WAVL")
     if not listed and old is not None:
         listed = [(value, 1.0) for value in old.numbers()]
@@ -209,8 +209,8 @@ def _wavelengths(system: Records) -> tuple[tuple[float, ...], float]:
     if not 1 <= position <= len(listed):
         raise DecodeError(f"PWAV must be one of {len(listed)} wavelengths; got {position}")
     # a wavelength of weight 0 is not looked at, but may define the focus
-    seen = {wave for wave, weight in listed if weight} or {wave for wave, _ in listed}
-    return tuple(sorted(seen)), listed[position - 1][0]
+    weighted = {wave for wave, weight in listed if weight} or {wave for wave, _ in listed}
+    return tuple(sorted(weighted)), listed[position - 1][0]
 
 
 def _notes(records: ZmxRecords, surfaces: tuple[Surface, ...]) -> tuple[str, ...]:
@@ -245,13 +245,13 @@ def _glass_notes(
     records: ZmxRecords, surfaces: tuple[Surface, ...], order: GlassOrder
 ) -> tuple[str, ...]:
     """Return notes on glasses that are not of a catalogue that GCAT names: once for each."""
-    named = {c.name for c in (*order.own, *order.listed)} - {OLD_SCHOTT}
+    catalogues = {c.name for c in (*order.user_catalogues, *order.listed)} - {OLD_SCHOTT}
     notes: dict[str, str] = {}
     for block, surface in zip(records.surfaces[1:-1], surfaces, strict=True):
         glass = last(block, "GLAS")
         if glass is None or ":" in surface.glass or "-" not in surface.glass:
             continue
         name, _, catalogue = surface.glass.rpartition("-")
-        if catalogue not in named and glass.words[0].upper() == name.upper():
+        if catalogue not in catalogues and glass.words[0].upper() == name.upper():
             notes.setdefault(name, f"line {glass.line}: {name} is read as {surface.glass}")
     return tuple(notes.values())

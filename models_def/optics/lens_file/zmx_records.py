@@ -9,7 +9,7 @@ from camkit.errors import DecodeError
 
 MAX_SURFACES: Final = 1000
 MAX_NUMBER: Final = 1e12
-_SHOWN: Final = 40
+_MOST: Final = 40
 
 _SURFACE_KEYS: Final = frozenset(
     {"TYPE", "COMM", "STOP", "CURV", "DISZ", "GLAS", "CONI", "PARM", "DIAM", "MEMA", "CLAP", "FLAP"}
@@ -43,7 +43,7 @@ class Record:
             value = math.nan
         if not abs(value) <= MAX_NUMBER:
             raise DecodeError(
-                f"line {self.line}: {self.key} needs a finite number; got {word[:_SHOWN]!r}"
+                f"line {self.line}: {self.key} needs a finite number; got {word[:_MOST]!r}"
             )
         return value
 
@@ -102,11 +102,11 @@ def _check_number(record: Record, expected: int) -> None:
         raise DecodeError(f"line {record.line}: more than {MAX_SURFACES} surfaces")
     if record.number(0) != expected:
         raise DecodeError(
-            f"line {record.line}: expected SURF {expected}; got SURF {record.words[0][:_SHOWN]}"
+            f"line {record.line}: expected SURF {expected}; got SURF {record.words[0][:_MOST]}"
         )
 
 
 def last(records: Records, key: str) -> Record | None:
     """Return the last record of a key, or None: a later line replaces an earlier one."""
-    found = records.get(key)
-    return found[-1] if found else None
+    matches = records.get(key)
+    return matches[-1] if matches else None

@@ -66,7 +66,7 @@ def read_surface(records: Records, context: SurfaceContext) -> Surface:
         curvature_per_mm=_value(records, "CURV") / scale,
         thickness_mm=thickness.number(0) * scale,
         glass=glass.name,
-        material=own_glass(glass, context.order.own),
+        material=own_glass(glass, context.order.user_catalogues),
         semi_diameter_mm=_semi_diameter(records, context.number) * scale,
         conic=_value(records, "CONI"),
         even_asphere=_even_asphere(records, context),
@@ -91,40 +91,40 @@ def refuse_unsupported(records: Records, number: int) -> None:
             f"line {glass.line}: surface {number} is a mirror; camkit traces lenses only"
         )
     for key in _OBSTACLES:
-        found = last(records, key)
-        if found is not None:
+        record = last(records, key)
+        if record is not None:
             raise UnsupportedError(
-                f"line {found.line}: surface {number} has an aperture {key}; camkit has round "
+                f"line {record.line}: surface {number} has an aperture {key}; camkit has round "
                 "ones about the axis (CLAP from 0)"
             )
     for key, first in (("OBDC", 0), ("SCBD", 3)):
-        found = last(records, key)
-        if found is not None and any(found.number(i) for i in range(first, len(found.words))):
+        record = last(records, key)
+        if record is not None and any(record.number(i) for i in range(first, len(record.words))):
             raise UnsupportedError(
-                f"line {found.line}: surface {number} is tilted or decentred ({key}); "
+                f"line {record.line}: surface {number} is tilted or decentred ({key}); "
                 "camkit traces centred lenses"
             )
 
 
 def _value(records: Records, key: str) -> float:
-    found = last(records, key)
-    return found.number(0) if found else 0.0
+    record = last(records, key)
+    return record.number(0) if record else 0.0
 
 
 def _glass(records: Records, context: SurfaceContext) -> Glass:
-    found = last(records, "GLAS")
-    if found is None or not found.words or found.words[0].upper() == "AIR":
+    record = last(records, "GLAS")
+    if record is None or not record.words or record.words[0].upper() == "AIR":
         return AIR
-    name = found.words[0]
+    name = record.words[0]
     try:
         if name == MODEL_NAME:
             comment = last(records, "COMM")
-            numbers = [found.number(3), found.number(4), found.number(5, 0.0)]
+            numbers = [record.number(3), record.number(4), record.number(5, 0.0)]
             return read_model_glass(numbers, comment.text.strip() if comment else "", context.order)
         return find_zmx_glass(name, context.order)
     except ContractError as error:
-        where = f"line {found.line}: surface {context.number}"
-        raise ContractError(f"{where}: {error}{_model_hint(found)}") from error
+        where = f"line {record.line}: surface {context.number}"
+        raise ContractError(f"{where}: {error}{_model_hint(record)}") from error
 
 
 def _model_hint(glass: Record) -> str:

@@ -61,13 +61,15 @@ def _catalogue_names(lens: Lens) -> list[str]:
         names |= {gcat_name(c): None for c in makers if c.get(surface.glass) is not None}
     glasses = {surface.glass: surface.medium for surface in lens.surfaces}.values()
 
-    def named(order: list[str]) -> int:
+    def model_free_count(order: list[str]) -> int:
         read = glass_order(order, ())
-        return sum(MODEL_NAME not in glass_words(glass, read, own=False)[0] for glass in glasses)
+        return sum(
+            MODEL_NAME not in glass_words(glass, read, is_user_glass=False)[0] for glass in glasses
+        )
 
     if len(names) > _MAX_ORDERED:
         return list(names)
-    return max(map(list, itertools.permutations(names)), key=named)
+    return max(map(list, itertools.permutations(names)), key=model_free_count)
 
 
 def _system_lines(lens: Lens, catalogues: list[str]) -> list[str]:
@@ -137,7 +139,9 @@ def _surface_lines(lens: Lens, surface: Surface, position: int, order: GlassOrde
         )
     glass, comment = ("", "")
     if surface.glass != AIR.name:
-        glass, comment = glass_words(surface.medium, order, own=surface.material is not None)
+        glass, comment = glass_words(
+            surface.medium, order, is_user_glass=surface.material is not None
+        )
     kind = "EVENASPH" if surface.even_asphere else "STANDARD"
     lines = [
         f"SURF {position + 1}",

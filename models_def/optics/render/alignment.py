@@ -67,14 +67,14 @@ def scene_radius_mm(alignment: Alignment, heights_mm: NDArray[np.float64]) -> ND
     """
     distortion = alignment.distortion
     c1, c3, c5, c7 = distortion.coefficients[1]
-    wanted = heights_mm / distortion.radius_mm
-    r = wanted / c1
+    ratio = heights_mm / distortion.radius_mm
+    r = ratio / c1
     for _ in range(_NEWTON_STEPS):
         q = r * r
         slope = c1 + q * (3 * c3 + q * (5 * c5 + q * 7 * c7))
         if not (slope > 0).all():
             raise ContractError("the distortion folds inside the window; make the window smaller")
-        missed_by = wanted - r * (c1 + q * (c3 + q * (c5 + q * c7)))
+        missed_by = ratio - r * (c1 + q * (c3 + q * (c5 + q * c7)))
         if np.abs(missed_by).max() < _TOLERANCE:
             return np.asarray(r * (distortion.radius_mm * alignment.scene_scale))
         r = r + missed_by / slope
@@ -103,8 +103,8 @@ def align_reference(
     # near the axis the ratio is that of the polynomial's first term
     safe = height.clamp_min(1e-9)
     ratio = torch.from_numpy(scene_radius_mm(alignment, safe.numpy())) / safe
-    seen = look_up(texture, *((-v * ratio).expand(3, -1, -1) for v in (xs, ys[:, None])))
-    return averaged(seen, oversample)
+    samples = look_up(texture, *((-v * ratio).expand(3, -1, -1) for v in (xs, ys[:, None])))
+    return averaged(samples, oversample)
 
 
 def finer(window: Window, factor: int, margin_px: int = 0) -> Window:

@@ -130,22 +130,22 @@ def render(
     Returns:
         (3, h, w) in the type of the texture.
     """
-    chosen = sampling or Sampling()
+    settings = sampling or Sampling()
     labels = stop_labels(optics)
     waves = torch.from_numpy(response.wavelengths_um[[0, len(response.wavelengths_um) // 2, -1]])
     beams = find_beams(optics, labels, window.radius_mm, waves)
     light = light_at(optics, labels, beams, torch.zeros(1))[0]
-    tensors = optics.stopped(_wavelengths(response, chosen)).to(chosen.dtype)
-    job = _Job(texture, optics, window, chosen, beams, (tensors.aspheric, tensors.grooves))
+    tensors = optics.stopped(_wavelengths(response, settings)).to(settings.dtype)
+    job = _Job(texture, optics, window, settings, beams, (tensors.aspheric, tensors.grooves))
     numbers = (texture.values, labels.a, labels.b, light, *_fields(tensors))
-    made = _MeanOfPasses.apply(job, *numbers)  # type: ignore[no-untyped-call]
-    return cast("Tensor", made)
+    picture = _MeanOfPasses.apply(job, *numbers)  # type: ignore[no-untyped-call]
+    return cast("Tensor", picture)
 
 
 def _wavelengths(response: ChannelResponse, sampling: Sampling) -> Tensor:
     """Draw (pass, 3, spp), those of fresh gradients behind those of the picture."""
     passes = sampling.passes * (2 if sampling.fresh_gradient else 1)
-    drawn = [
+    waves_um = [
         draw_wavelengths(
             np.random.default_rng((sampling.seed, number, 0)),
             response,
@@ -154,7 +154,7 @@ def _wavelengths(response: ChannelResponse, sampling: Sampling) -> Tensor:
         )
         for number in range(passes)
     ]
-    return torch.from_numpy(np.stack(drawn))
+    return torch.from_numpy(np.stack(waves_um))
 
 
 def _fields(tensors: SurfaceTensors) -> tuple[Tensor, ...]:
@@ -205,13 +205,13 @@ class _MeanOfPasses(torch.autograd.Function):
     @once_differentiable
     def backward(ctx: Any, slope: Tensor) -> tuple[Tensor | None, ...]:
         """Sum the gradients over passes and chunks."""
-        job, needed = ctx.job, ctx.needs_input_grad[1:]
+        job, needs_slopes = ctx.job, ctx.needs_input_grad[1:]
         leaves = [
-            number.detach().requires_grad_(wanted)
-            for number, wanted in zip(ctx.saved_tensors, needed, strict=True)
+            number.detach().requires_grad_(needs_slope)
+            for number, needs_slope in zip(ctx.saved_tensors, needs_slopes, strict=True)
         ]
-        wanted = [leaf for leaf in leaves if leaf.requires_grad]
-        sums = [torch.zeros_like(leaf) for leaf in wanted]
+        free_leaves = [leaf for leaf in leaves if leaf.requires_grad]
+        sums = [torch.zeros_like(leaf) for leaf in free_leaves]
         passes = job.sampling.passes
         first = passes if job.sampling.fresh_gradient else 0
         for number in range(first, first + passes):
@@ -219,10 +219,10 @@ class _MeanOfPasses(torch.autograd.Function):
                 with torch.enable_grad():
                     part = _rows(job, number, rows, tuple(leaves))
                 share = slope[:, rows.start : rows.stop] / passes
-                found = torch.autograd.grad(part, wanted, share, allow_unused=True)
+                slopes = torch.autograd.grad(part, free_leaves, share, allow_unused=True)
                 sums = [
                     total if one is None else total + one
-                    for total, one in zip(sums, found, strict=True)
+                    for total, one in zip(sums, slopes, strict=True)
                 ]
         results = iter(sums)
         return (None, *(next(results) if leaf.requires_grad else None for leaf in leaves))
@@ -239,8 +239,8 @@ def _rows(job: _Job, number: int, rows: range, numbers: tuple[Tensor, ...]) -> T
     end = trace_to_scene(lens, start, job.optics.object_distance_mm)
     weight = light_of(start, end)
     texture = replace(job.texture, values=values)
-    seen = look_up(texture, end.x.transpose(0, 1), end.y.transpose(0, 1)).transpose(0, 1)
-    arrived = (weight * seen).mean(-1)
+    radiance = look_up(texture, end.x.transpose(0, 1), end.y.transpose(0, 1)).transpose(0, 1)
+    arrived = (weight * radiance).mean(-1)
     if sampling.illumination == "divided":
         picture = arrived / weight.mean(-1).clamp_min(_LEAST_LIGHT)
     else:
@@ -254,7 +254,7 @@ def _draw(
     """Draw sensor points and labels (pixels, 3, spp), and the radius (pixels, 1) of the discs."""
     sampling, window = job.sampling, job.window
     width = window.width_px
-    drawn = [
+    numbers = [
         pixel_numbers(
             np.random.default_rng((sampling.seed, number, row + 1)),
             3 * width,
@@ -263,7 +263,7 @@ def _draw(
         )
         for row in rows
     ]
-    u = torch.from_numpy(np.concatenate(drawn)).reshape(-1, 3, sampling.spp, 4)
+    u = torch.from_numpy(np.concatenate(numbers)).reshape(-1, 3, sampling.spp, 4)
     ys, xs = window.centres_mm()
     y = ys[rows.start : rows.stop, None].expand(-1, width).reshape(-1, 1, 1)
     x = xs.expand(len(rows), -1).reshape(-1, 1, 1)

@@ -45,10 +45,10 @@ class Optics:
 
     def stopped(self, wavelengths_um: Tensor) -> SurfaceTensors:
         """Return the tensors with the stop's rim in place."""
-        made = self.tensors(wavelengths_um)
-        rim = made.semi_diameter_mm.detach().clone()
+        tensors = self.tensors(wavelengths_um)
+        rim = tensors.semi_diameter_mm.detach().clone()
         rim[self.stop] = rim[self.stop].clamp(max=self.stop_radius_mm)
-        return replace(made, semi_diameter_mm=rim)
+        return replace(tensors, semi_diameter_mm=rim)
 
 
 def lens_optics(lens: Lens) -> Optics:
@@ -76,18 +76,18 @@ def free_optics(free: FreeLens, scaled: Tensor, object_distance_mm: float) -> Op
     """
 
     def tensors(wavelengths_um: Tensor) -> SurfaceTensors:
-        made = free.tensors(scaled[None], wavelengths_um.flatten())
+        tensors_of = free.tensors(scaled[None], wavelengths_um.flatten())
         return replace(
-            made,
-            curvature_per_mm=made.curvature_per_mm.flatten(),
-            conic=made.conic.flatten(),
-            even_asphere=made.even_asphere.flatten(1),
-            thickness_mm=made.thickness_mm.flatten(),
-            semi_diameter_mm=made.semi_diameter_mm.flatten(),
-            index=made.index.reshape(-1, *wavelengths_um.shape),
+            tensors_of,
+            curvature_per_mm=tensors_of.curvature_per_mm.flatten(),
+            conic=tensors_of.conic.flatten(),
+            even_asphere=tensors_of.even_asphere.flatten(1),
+            thickness_mm=tensors_of.thickness_mm.flatten(),
+            semi_diameter_mm=tensors_of.semi_diameter_mm.flatten(),
+            index=tensors_of.index.reshape(-1, *wavelengths_um.shape),
         )
 
-    present = free.made(scaled.detach())
+    present = free.lens_at(scaled.detach())
     return Optics(
         tensors=tensors,
         stop=free.lens.stop,

@@ -91,9 +91,9 @@ def trace_map(lens: Lens, response: ChannelResponse, grid: MapGrid) -> PsfMap:
     coarse = replace(response, wavelengths_um=grid.wavelengths_um, response=weights)
     kernels, light = [], []
     for depth_mm in grid.depths_mm:
-        placed = with_object_distance(lens, float(depth_mm))
+        lens_at = with_object_distance(lens, float(depth_mm))
         traced, _ = colour_kernels(
-            placed,
+            lens_at,
             coarse,
             grid.field_heights_mm,
             size_px=grid.kernel_px,
@@ -101,7 +101,7 @@ def trace_map(lens: Lens, response: ChannelResponse, grid: MapGrid) -> PsfMap:
             rays=grid.rays,
         )
         kernels.append(torch.from_numpy(traced))
-        light.append(_illumination(placed, grid))
+        light.append(_illumination(lens_at, grid))
     return PsfMap(
         kernels=torch.stack(kernels),
         depths_mm=grid.depths_mm,
@@ -193,5 +193,5 @@ def _block_kernels(psf_map: PsfMap, fine: Window, step_px: int) -> Tensor:
     )
     y, x = (v.flatten() for v in torch.meshgrid(ys, xs, indexing="ij"))
     heights = torch.from_numpy(psf_map.field_heights_mm)
-    made = turned_at(psf_map.kernels[0], heights, x, y)
-    return made.reshape(len(ys), len(xs), *made.shape[1:])
+    turned = turned_at(psf_map.kernels[0], heights, x, y)
+    return turned.reshape(len(ys), len(xs), *turned.shape[1:])

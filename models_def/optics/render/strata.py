@@ -67,11 +67,11 @@ def draw_wavelengths(
     if waves.size == 1:
         return np.full((3, spp), waves[0])
     fine = np.linspace(waves[0], waves[-1], _FINE_STEPS)
-    drawn = []
+    waves_um = []
     for row, share in zip(response.response, shares, strict=True):
         density = np.interp(fine, waves, row)
-        grown = np.concatenate([[0.0], np.cumsum(density[1:] + density[:-1])])
+        cumulative = np.concatenate([[0.0], np.cumsum(density[1:] + density[:-1])])
         # where nothing is sensed the sum stands still: each level keeps its first wavelength
-        levels, first = np.unique(grown / grown[-1], return_index=True)
-        drawn.append(np.interp(share, levels, fine[first]))
-    return np.stack(drawn)
+        levels, first = np.unique(cumulative / cumulative[-1], return_index=True)
+        waves_um.append(np.interp(share, levels, fine[first]))
+    return np.stack(waves_um)

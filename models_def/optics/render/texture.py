@@ -53,10 +53,10 @@ def look_up(texture: Texture, x_mm: Tensor, y_mm: Tensor) -> Tensor:
     column = texture.axis_px[1] - x_mm / texture.pitch_mm
     # pixel i of n lies at (2 i + 1) / n - 1
     place = torch.stack([(2 * column + 1) / columns - 1, (2 * row + 1) / rows - 1], dim=-1)
-    found = grid_sample(
+    samples = grid_sample(
         texture.values[:, None],
         place.to(texture.values.dtype),
         padding_mode="border",
         align_corners=False,
     )
-    return found[:, 0]
+    return samples[:, 0]

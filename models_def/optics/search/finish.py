@@ -18,17 +18,17 @@ def finished(problem: Problem, scaled: Tensor) -> Lens:
 
     The stop keeps its own size: it limits the beam.
     """
-    lens = problem.free.made(scaled)
+    lens = problem.free.lens_at(scaled)
     rim = torch.linspace(-1, 1, _RIM_RAYS, dtype=torch.float64)
     samples = replace(problem.samples, x=torch.zeros_like(rim), y=rim, weight=None)
     with torch.no_grad():
-        seen = [
-            trace_batch(replace(problem, samples=samples), scaled[None], d).seen
+        surface_rays = [
+            trace_batch(replace(problem, samples=samples), scaled[None], d).surface_rays
             for d in problem.depths_mm
         ]
     surfaces = []
     for i, surface in enumerate(lens.surfaces):
-        reach = max(float(torch.hypot(s[i].x, s[i].y).max()) for s in seen)
+        reach = max(float(torch.hypot(s[i].x, s[i].y).max()) for s in surface_rays)
         semi_mm = round(reach + _CLEARANCE_MM, 1)
         if i == lens.stop:
             semi_mm = (

@@ -92,9 +92,9 @@ def _variables(
             return []
         c = surface.curvature_per_mm
         reach = max(abs(c), 1 / abs(paraxial_data(lens).efl_mm))
-        return [_around("curvature", i, c, reach)]
+        return [_variable_near("curvature", i, c, reach)]
     if name == "conic":
-        return [_around("conic", i, surface.conic, CONIC_REACH)]
+        return [_variable_near("conic", i, surface.conic, CONIC_REACH)]
     if name == "thickness":
         if i == len(lens.surfaces) - 1:
             return []
@@ -109,17 +109,23 @@ def _variables(
 def _asphere_variables(lens: Lens, surface: Surface, i: int) -> list[Variable]:
     """Free r^4 and higher; the r^2 term is a curvature and stays."""
     radius_mm = min(surface.semi_diameter_mm, paraxial_data(lens).entrance_pupil_diameter_mm)
-    made = []
+    variables = []
     for term in range(1, max(_ASPHERE_TERMS, len(surface.even_asphere))):
-        own = surface.even_asphere[term] if term < len(surface.even_asphere) else 0.0
-        reach = max(2 * abs(own), _ASPHERE_SAG_MM / radius_mm ** (2 * term + 2))
-        made.append(
-            Variable(kind="even_asphere", surface=i, term=term, low=own - reach, high=own + reach)
+        coefficient = surface.even_asphere[term] if term < len(surface.even_asphere) else 0.0
+        reach = max(2 * abs(coefficient), _ASPHERE_SAG_MM / radius_mm ** (2 * term + 2))
+        variables.append(
+            Variable(
+                kind="even_asphere",
+                surface=i,
+                term=term,
+                low=coefficient - reach,
+                high=coefficient + reach,
+            )
         )
-    return made
+    return variables
 
 
-def _around(parameter: Parameter, i: int, value: float, reach: float) -> Variable:
+def _variable_near(parameter: Parameter, i: int, value: float, reach: float) -> Variable:
     return Variable(kind=parameter, surface=i, low=value - reach, high=value + reach)
 
 
@@ -150,23 +156,23 @@ def improve(
     rng = np.random.default_rng(seed)
     near = rng.uniform(-spread, spread, (max(starts, 1), len(begin)))
     near[0] = 0
-    drawn = (begin + torch.from_numpy(near)).clamp(0, 1)
+    starts_scaled = (begin + torch.from_numpy(near)).clamp(0, 1)
     free = min(round(anywhere * len(near)), len(near) - 1)
-    drawn[len(near) - free :] = torch.from_numpy(rng.uniform(0, 1, (free, len(begin))))
-    held = torch.zeros(len(begin), dtype=torch.bool)
-    scouted = descend(function, drawn, scout_steps, held)
-    kept = torch.cat([begin[None], scouted.scaled[: max(1, starts // 4)]])
-    found = descend(function, kept, steps, held)
+    starts_scaled[len(near) - free :] = torch.from_numpy(rng.uniform(0, 1, (free, len(begin))))
+    fixed = torch.zeros(len(begin), dtype=torch.bool)
+    scouted = descend(function, starts_scaled, scout_steps, fixed)
+    best_scaled = torch.cat([begin[None], scouted.scaled[: max(1, starts // 4)]])
+    descent = descend(function, best_scaled, steps, fixed)
     with torch.no_grad():
-        before = float((function(begin[None]) ** 2).sum())
-    merits = tuple(found.merits.tolist())
+        begin_merit = float((function(begin[None]) ** 2).sum())
+    merits = tuple(descent.merits.tolist())
     return Improvement(
-        scaled=found.scaled[0],
-        ends=found.scaled,
-        merit_before=before,
+        scaled=descent.scaled[0],
+        ends=descent.scaled,
+        merit_before=begin_merit,
         merit=merits[0],
         merits=merits,
-        evaluations=scouted.evaluations + found.evaluations,
+        evaluations=scouted.evaluations + descent.evaluations,
     )
 
 

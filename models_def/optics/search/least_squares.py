@@ -45,22 +45,22 @@ def jacobian(residuals: Residuals, scaled: Tensor) -> tuple[Tensor, Tensor]:
     return values[:, 0], slopes.transpose(1, 2)
 
 
-def descend(residuals: Residuals, scaled: Tensor, steps: int, held: Tensor) -> Descent:
+def descend(residuals: Residuals, scaled: Tensor, steps: int, fixed: Tensor) -> Descent:
     """Lower the sum of squares of every start; no start ends worse than it began.
 
     Args:
         residuals: What is squared and summed.
         scaled: (start, variable) in 0..1.
         steps: Tried steps of each start.
-        held: (variable,), numbers that stay.
+        fixed: (variable,), numbers that stay.
     """
     damping = torch.full((len(scaled), 1), 1e-2, dtype=torch.float64)
     with torch.no_grad():
         for _ in counted(range(steps), "lowering the merit", "steps"):
             value, slope = jacobian(residuals, scaled)
-            moved = _step(value, slope, scaled, damping, held)
-            better = (residuals(moved) ** 2).sum(1) < (value**2).sum(1)
-            scaled = torch.where(better[:, None], moved, scaled)
+            candidate = _step(value, slope, scaled, damping, fixed)
+            better = (residuals(candidate) ** 2).sum(1) < (value**2).sum(1)
+            scaled = torch.where(better[:, None], candidate, scaled)
             factor = torch.where(better, 0.3, 4.0)[:, None]
             damping = (damping * factor).clamp(*_DAMPING_RANGE)
         merits = (residuals(scaled) ** 2).sum(1)
@@ -74,11 +74,11 @@ def evaluations(starts: int, steps: int, variables: int) -> int:
     return starts * (steps * (variables + 2) + 1)
 
 
-def _step(value: Tensor, slope: Tensor, scaled: Tensor, damping: Tensor, held: Tensor) -> Tensor:
+def _step(value: Tensor, slope: Tensor, scaled: Tensor, damping: Tensor, fixed: Tensor) -> Tensor:
     normal = slope.transpose(1, 2) @ slope
     gradient = (slope.transpose(1, 2) @ value[..., None])[..., 0]
     # variables at a bound that would leave it, and held ones, stay
-    stuck = ((scaled <= 0) & (gradient > 0)) | ((scaled >= 1) & (gradient < 0)) | held
+    stuck = ((scaled <= 0) & (gradient > 0)) | ((scaled >= 1) & (gradient < 0)) | fixed
     diagonal = normal.diagonal(dim1=1, dim2=2)
     weight = torch.where(stuck, 1e12, damping * diagonal + 1e-9)
     change = torch.linalg.solve(normal + torch.diag_embed(weight), -gradient)

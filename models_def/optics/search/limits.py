@@ -43,7 +43,7 @@ class Limits:
 def limit_residuals(
     limits: Limits,
     tensors: SurfaceTensors,
-    seen: list[Rays],
+    surface_rays: list[Rays],
     *,
     solved: int | None,
     glass: tuple[bool, ...],
@@ -53,12 +53,12 @@ def limit_residuals(
     Args:
         limits: The limits.
         tensors: (surface, start, 1, 1, 1).
-        seen: Rays on every surface, (start, field, wave, ray); heights are those of living rays.
+        surface_rays: On every surface, (start, field, wave, ray); heights are those of living rays.
         solved: The surface whose curvature is solved for.
         glass: Whether the medium after each surface is glass.
     """
     gaps, curvature = (t[..., 0, 0, 0] for t in (tensors.thickness_mm, tensors.curvature_per_mm))
-    rho = [reach_rho(rays, tensors.thickness_mm[0]) for rays in seen]
+    rho = [reach_rho(rays, tensors.thickness_mm[0]) for rays in surface_rays]
     least = [limits.min_edge_mm if inside else limits.min_air_mm for inside in glass[:-1]]
     # a stop is a plane in air: it may stand where a surface bulges through it
     real = [before or after for before, after in zip((False, *glass), glass, strict=False)]
@@ -77,16 +77,16 @@ def limit_residuals(
     return torch.cat([row.T for row in rows], dim=1) * _PENALTY_PER_MM
 
 
-def ray_residuals(tensors: SurfaceTensors, launched: Rays, seen: Sequence[Rays]) -> Tensor:
+def ray_residuals(tensors: SurfaceTensors, launched: Rays, surface_rays: Sequence[Rays]) -> Tensor:
     """Return residuals (start, field) of rays that are lost or near to it.
 
     Args:
         tensors: (surface, start, 1, 1, 1).
         launched: (start, field, 1, ray), those that bound the beam.
-        seen: On every surface, (start, field, wave, ray).
+        surface_rays: On every surface, (start, field, wave, ray).
     """
     # the logarithm, as rays that pass far beyond a surface would drown all else
-    paid = torch.log1p(ray_penalty(tensors, launched, seen)).mean((-2, -1))
+    paid = torch.log1p(ray_penalty(tensors, launched, surface_rays)).mean((-2, -1))
     # the root has a finite slope where nothing is paid
     return _PENALTY_PER_MM * (torch.sqrt(paid + _SOFT**2) - _SOFT)
 

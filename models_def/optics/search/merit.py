@@ -23,26 +23,26 @@ _LOST_RAY: Final = 1.0
 
 
 def spot_residuals(
-    landed: Rays, core_mm: float, merit: Merit = "sum_abs", *, fields: int = 0
+    landings: Rays, core_mm: float, merit: Merit = "sum_abs", *, fields: int = 0
 ) -> Tensor:
     """Return residuals (start, residual) in mm (sqrt(mm) for `sum_abs`).
 
     Args:
-        landed: (start, field, wave, LEAD + ray) on the sensor, see `beam`; half the pupil,
+        landings: (start, field, wave, LEAD + ray) on the sensor, see `beam`; half the pupil,
             x >= 0, so that the centroid lies on x = 0.
         core_mm: s.
         merit: Which.
         fields: How many fields, from the axis, count; 0 for all. Of the others only lost rays do.
     """
-    alive = landed.valid[..., LEAD:].to(landed.x.dtype)
-    x, y = landed.x[..., LEAD:], landed.y[..., LEAD:]
+    alive = landings.valid[..., LEAD:].to(landings.x.dtype)
+    x, y = landings.x[..., LEAD:], landings.y[..., LEAD:]
     count = alive.sum((-2, -1), keepdim=True).clamp_min(1)
     dy = y - (y * alive).sum((-2, -1), keepdim=True) / count
     scale = _scale(x**2 + dy**2, core_mm, merit) * alive
     counted = fields or scale.shape[1]
     scale = scale * (torch.arange(scale.shape[1]) < counted)[:, None, None]
-    lost = (1 - alive) * _LOST_RAY
-    pairs = torch.stack([x * scale + lost, dy * scale], dim=-1)
+    penalty = (1 - alive) * _LOST_RAY
+    pairs = torch.stack([x * scale + penalty, dy * scale], dim=-1)
     each = pairs[0, :counted].numel() // 2
     residuals: Tensor = pairs.flatten(1) / each**0.5
     return residuals

@@ -21,61 +21,63 @@ from camkit.models_def.optics.tracing.profile import sag, sag_slope
 
 BARRIER: Final = 0.05
 _TINY: Final = 1e-6
-_WITHIN: Final = 1 - 1e-3
+_INNER_SHARE: Final = 1 - 1e-3
 
 
 def ray_penalty(
-    tensors: SurfaceTensors, launched: Rays, seen: Sequence[Rays], barrier: float = BARRIER
+    tensors: SurfaceTensors, launched: Rays, surface_rays: Sequence[Rays], barrier: float = BARRIER
 ) -> Tensor:
     """Return the penalty of each ray (shape of the rays); differentiable, also for lost rays.
 
     Args:
         tensors: The lens.
         launched: At the vertex plane of the first surface.
-        seen: From `trace`, all surfaces.
+        surface_rays: From `trace`, all surfaces.
         barrier: The margin below which a ray pays.
 
     Raises:
-        ContractError: If `seen` does not belong to all surfaces, or the barrier is not in 0..1.
+        ContractError: If `surface_rays` misses a surface, or the barrier is not in 0..1.
     """
-    if len(seen) != len(tensors.aspheric):
-        raise ContractError(f"expected {len(tensors.aspheric)} surfaces in seen; got {len(seen)}")
+    if len(surface_rays) != len(tensors.aspheric):
+        raise ContractError(
+            f"expected {len(tensors.aspheric)} surfaces in seen; got {len(surface_rays)}"
+        )
     if not 0 < barrier < 1:
         raise ContractError(f"barrier must lie in 0..1; got {barrier}")
-    total = torch.zeros_like(seen[-1].x)
-    before, depth = launched, launched.z
-    for i, on in enumerate(seen):
-        margins = _margins(tensors, before, depth, on, i)
-        cost = torch.zeros_like(on.x)
+    total = torch.zeros_like(surface_rays[-1].x)
+    incoming, depth = launched, launched.z
+    for i, hits in enumerate(surface_rays):
+        margins = _margins(tensors, incoming, depth, hits, i)
+        cost = torch.zeros_like(hits.x)
         for margin in margins:
             cost = cost + torch.relu(1 - margin / barrier) ** 2
         # a lost ray whose margins do not say why, as one that did not converge
-        cost = torch.where(on.valid | (cost > 0), cost, 1.0)
-        total = total + torch.where(before.valid, cost, 0.0)
-        before, depth = on, on.z - tensors.thickness_mm[i]
+        cost = torch.where(hits.valid | (cost > 0), cost, 1.0)
+        total = total + torch.where(incoming.valid, cost, 0.0)
+        incoming, depth = hits, hits.z - tensors.thickness_mm[i]
     return total
 
 
 def _margins(
-    tensors: SurfaceTensors, before: Rays, depth: Tensor, on: Rays, i: int
+    tensors: SurfaceTensors, incoming: Rays, depth: Tensor, hits: Rays, i: int
 ) -> list[Tensor]:
     c, k = tensors.curvature_per_mm[i], tensors.conic[i]
-    way = -depth / before.n
-    x, y = before.x + way * before.l, before.y + way * before.m
+    way = -depth / incoming.n
+    x, y = incoming.x + way * incoming.l, incoming.y + way * incoming.m
     # the conic, as in `tracing.kernel`; a ray that misses it is judged where it passes nearest
-    a = c * (1 + k * before.n**2)
-    b = before.n - c * (x * before.l + y * before.m)
+    a = c * (1 + k * incoming.n**2)
+    b = incoming.n - c * (x * incoming.l + y * incoming.m)
     g = c * (x**2 + y**2)
     square = b**2 - a * g
-    away = b + torch.sqrt(square.clamp_min(_TINY))
-    near = g / torch.where(away > _TINY, away, 1.0)
-    hit_x = torch.where(on.valid, on.x, x + near * before.l)
-    hit_y = torch.where(on.valid, on.y, y + near * before.m)
+    denominator = b + torch.sqrt(square.clamp_min(_TINY))
+    near = g / torch.where(denominator > _TINY, denominator, 1.0)
+    hit_x = torch.where(hits.valid, hits.x, x + near * incoming.l)
+    hit_y = torch.where(hits.valid, hits.y, y + near * incoming.m)
     rho = hit_x**2 + hit_y**2
     exists = 1 - (1 + k) * c**2 * rho
     terms = tensors.even_asphere[i] if tensors.aspheric[i] else tensors.even_asphere[i][:0]
     lean = 2 * sag_slope(c, k, terms, rho)
-    facing = before.n - lean * (hit_x * before.l + hit_y * before.m)
+    facing = incoming.n - lean * (hit_x * incoming.l + hit_y * incoming.m)
     ratio = tensors.index[i] / tensors.index[i + 1]
     transmits = 1 - ratio**2 * (1 - facing**2 / (1 + lean**2 * rho))
     inside = 1 - rho / tensors.semi_diameter_mm[i] ** 2
@@ -119,6 +121,6 @@ def edge_gaps(tensors: SurfaceTensors, reaches: Sequence[Tensor]) -> Tensor:
 
 def _height(tensors: SurfaceTensors, i: int, rho: Tensor) -> Tensor:
     c, k = tensors.curvature_per_mm[i], tensors.conic[i]
-    rim = _WITHIN / ((1 + k) * c**2).clamp_min(_TINY)
+    rim = _INNER_SHARE / ((1 + k) * c**2).clamp_min(_TINY)
     terms = tensors.even_asphere[i] if tensors.aspheric[i] else tensors.even_asphere[i][:0]
     return sag(c, k, terms, torch.minimum(rho, rim))

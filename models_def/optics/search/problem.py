@@ -74,8 +74,8 @@ class Problem:
 
         From another one the image lies off the sensor, larger or smaller: that is no distortion.
         """
-        own = self.free.lens.object_distance_mm
-        return own if own in self.depths_mm else self.depths_mm[0]
+        distance_mm = self.free.lens.object_distance_mm
+        return distance_mm if distance_mm in self.depths_mm else self.depths_mm[0]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,15 +86,15 @@ class Traced:
         reference: The lenses at the reference wavelength.
         tensors: The lenses at all wavelengths.
         launched: The rays before the first surface, (start, field, 1, LEAD + ray).
-        landed: (start, field, wave, LEAD + ray) on the sensor, see `beam`.
-        seen: The same on every surface.
+        landings: (start, field, wave, LEAD + ray) on the sensor, see `beam`.
+        surface_rays: The same on every surface.
     """
 
     reference: SurfaceTensors
     tensors: SurfaceTensors
     launched: Rays
-    landed: Rays
-    seen: list[Rays]
+    landings: Rays
+    surface_rays: list[Rays]
 
 
 def trace_batch(
@@ -123,16 +123,22 @@ def trace_batch(
         object_distance_mm,
         problem.vignetting,
     )
-    seen: list[Rays] = []
-    landed = trace(tensors, rays, seen=seen)
-    return Traced(reference=reference, tensors=tensors, launched=rays, landed=landed, seen=seen)
+    surface_rays: list[Rays] = []
+    landings = trace(tensors, rays, seen=surface_rays)
+    return Traced(
+        reference=reference,
+        tensors=tensors,
+        launched=rays,
+        landings=landings,
+        surface_rays=surface_rays,
+    )
 
 
 def valid_share(problem: Problem, scaled: Tensor) -> Tensor:
     """Return the share of rays that reach the sensor (start,), over fields, colours and depths."""
     with torch.no_grad():
         shares = [
-            trace_batch(problem, scaled, d).landed.valid[..., LEAD:].double().flatten(1).mean(1)
+            trace_batch(problem, scaled, d).landings.valid[..., LEAD:].double().flatten(1).mean(1)
             for d in problem.depths_mm
         ]
     return torch.stack(shares).mean(0)
@@ -144,7 +150,7 @@ def residuals(problem: Problem, scaled: Tensor) -> Tensor:
     for distance_mm in problem.depths_mm:
         traced = trace_batch(problem, scaled, distance_mm)
         spots = spot_residuals(
-            traced.landed, problem.core_mm, problem.merit, fields=problem.merit_fields
+            traced.landings, problem.core_mm, problem.merit, fields=problem.merit_fields
         )
         parts.append(spots / math.sqrt(len(problem.depths_mm)))
         if distance_mm == problem.limited_mm:
@@ -159,17 +165,19 @@ def limits_of(problem: Problem, traced: Traced, distance_mm: float) -> Tensor:
         limit_residuals(
             limits,
             traced.tensors,
-            traced.seen,
+            traced.surface_rays,
             solved=free.solved,
             glass=tuple(s.glass != "air" for s in free.lens.surfaces),
         ),
         ray_residuals(
-            traced.tensors, leading(traced.launched), [leading(rays) for rays in traced.seen]
+            traced.tensors,
+            leading(traced.launched),
+            [leading(rays) for rays in traced.surface_rays],
         ),
     ]
     if math.isfinite(limits.distortion) and len(problem.slopes) > 1:
         middle = len(problem.wavelengths_um) // 2
-        chief = traced.landed.y[:, 1:, middle, 0]
+        chief = traced.landings.y[:, 1:, middle, 0]
         ideal = problem.slopes[1:] * _image_scale_mm(traced.reference, distance_mm)
         parts.append(distortion_residuals(limits, chief, ideal))
     return torch.cat(parts, dim=1)

@@ -33,14 +33,14 @@ class Pixels:
             raise ContractError(f"pitch_um must be > 0; got {self.pitch_um}")
 
 
-def splat_batch(landed: Rays, pixels: Pixels) -> Tensor:
+def splat_batch(landings: Rays, pixels: Pixels) -> Tensor:
     """Return kernels (start, field, colour, k, k) about the centroid of all colours.
 
     They sum to the share of the light that falls into the window.
     """
     size, scale = pixels.kernel_px, UM_PER_MM / pixels.pitch_um
-    alive = landed.valid[..., LEAD:].to(landed.x.dtype)
-    x, y = landed.x[..., LEAD:] * scale, landed.y[..., LEAD:] * scale
+    alive = landings.valid[..., LEAD:].to(landings.x.dtype)
+    x, y = landings.x[..., LEAD:] * scale, landings.y[..., LEAD:] * scale
     total = alive.sum((-2, -1), keepdim=True).clamp_min(1)
     # where the window lies is not a matter of the lens: no gradient through it
     middle = ((y * alive).sum((-2, -1), keepdim=True) / total).detach()

@@ -67,12 +67,12 @@ class FreeLens:
     rides: bool = True
 
     def __post_init__(self) -> None:
-        count, seen = len(self.lens.surfaces), set()
+        count, places = len(self.lens.surfaces), set()
         for variable in self.variables:
             place = (variable.kind, variable.surface, variable.term)
-            if not 0 <= variable.surface < count or place in seen:
+            if not 0 <= variable.surface < count or place in places:
                 raise ContractError(f"a variable needs a surface of its own; got {variable}")
-            seen.add(place)
+            places.add(place)
             if variable.kind == "curvature" and variable.surface == self.solved:
                 raise ContractError(f"the curvature of surface {self.solved} is solved: not free")
             last = variable.kind == "thickness" and variable.surface == count - 1
@@ -95,17 +95,17 @@ class FreeLens:
         """Return the lens itself as scaled variables (variable,), within the bounds."""
         span = (self.high - self.low).clamp_min(1e-300)
         flat, _ = self._flat()
-        own = torch.stack([flat[self._place(v)] for v in self.variables])
-        return ((own - self.low) / span).clamp(0, 1)
+        values = torch.stack([flat[self._place(v)] for v in self.variables])
+        return ((values - self.low) / span).clamp(0, 1)
 
     def outside(self) -> tuple[tuple[Variable, float], ...]:
         """Return variables whose value in the lens lies outside their bounds, with the value."""
         flat, _ = self._flat()
         values = [(v, float(flat[self._place(v)])) for v in self.variables]
         return tuple(
-            (v, own)
-            for v, own in values
-            if not v.low - _ROUNDING * abs(v.low) <= own <= v.high + _ROUNDING * abs(v.high)
+            (v, value)
+            for v, value in values
+            if not v.low - _ROUNDING * abs(v.low) <= value <= v.high + _ROUNDING * abs(v.high)
         )
 
     def tensors(self, scaled: Tensor, wavelengths_um: Tensor) -> SurfaceTensors:
@@ -124,7 +124,7 @@ class FreeLens:
             numbers, [count, count, count, count * terms + 1]
         )
         base = surface_tensors(self.lens, wavelengths_um)
-        made = SurfaceTensors(
+        lens_tensors = SurfaceTensors(
             curvature_per_mm=curvature,
             conic=conic,
             even_asphere=rest[:-1].reshape(count, terms, len(scaled)),
@@ -134,22 +134,22 @@ class FreeLens:
             aspheric=self._aspheric(),
             grooves=base.grooves,
         )
-        made = self._solve(made, rest[-1])
+        lens_tensors = self._solve(lens_tensors, rest[-1])
 
         def shaped(value: Tensor) -> Tensor:
             return value[..., None, None, None]
 
         return replace(
-            made,
-            curvature_per_mm=shaped(made.curvature_per_mm),
-            conic=shaped(made.conic),
-            even_asphere=shaped(made.even_asphere),
-            thickness_mm=shaped(made.thickness_mm),
-            semi_diameter_mm=shaped(made.semi_diameter_mm),
+            lens_tensors,
+            curvature_per_mm=shaped(lens_tensors.curvature_per_mm),
+            conic=shaped(lens_tensors.conic),
+            even_asphere=shaped(lens_tensors.even_asphere),
+            thickness_mm=shaped(lens_tensors.thickness_mm),
+            semi_diameter_mm=shaped(lens_tensors.semi_diameter_mm),
             index=base.index[..., None],
         )
 
-    def made(self, scaled: Tensor) -> Lens:
+    def lens_at(self, scaled: Tensor) -> Lens:
         """Return one lens (variable,) as a prescription; semi-diameters are those of `lens`."""
         wave = torch.tensor([self.lens.reference_wavelength_um], dtype=torch.float64)
         tensors = self.tensors(scaled.detach()[None], wave)
@@ -171,9 +171,9 @@ class FreeLens:
         )
 
     def _terms(self) -> int:
-        own = max(len(s.even_asphere) for s in self.lens.surfaces)
+        terms = max(len(s.even_asphere) for s in self.lens.surfaces)
         free = [v.term + 1 for v in self.variables if v.kind == "even_asphere"]
-        return max([own, *free])
+        return max([terms, *free])
 
     def _flat(self) -> tuple[Tensor, int]:
         """Return all numbers of the lens in one row: c, k, t of each surface, terms, defocus."""
@@ -207,8 +207,8 @@ class FreeLens:
 
     def _aspheric(self) -> tuple[bool, ...]:
         free = {v.surface for v in self.variables if v.kind == "even_asphere"}
-        own = {i for i, s in enumerate(self.lens.surfaces) if any(s.even_asphere) or s.grooves}
-        return tuple(i in free | own for i in range(len(self.lens.surfaces)))
+        aspheric = {i for i, s in enumerate(self.lens.surfaces) if any(s.even_asphere) or s.grooves}
+        return tuple(i in free | aspheric for i in range(len(self.lens.surfaces)))
 
     def _reference_index(self) -> Tensor:
         wave = torch.tensor([self.lens.reference_wavelength_um], dtype=torch.float64)
@@ -238,6 +238,6 @@ def solve_curvature(tensors: SurfaceTensors, surface: int, efl_mm: float) -> Ten
     for trial in (0.0, 1.0):
         curvature = tensors.curvature_per_mm.clone()
         curvature[surface] = trial * one
-        given = replace(tensors, curvature_per_mm=curvature)
-        slopes.append(trace_paraxial(given, one, torch.zeros_like(one), range(count))[1])
+        trial_tensors = replace(tensors, curvature_per_mm=curvature)
+        slopes.append(trace_paraxial(trial_tensors, one, torch.zeros_like(one), range(count))[1])
     return (-1 / efl_mm - slopes[0]) / (slopes[1] - slopes[0])

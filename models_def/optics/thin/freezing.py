@@ -87,7 +87,7 @@ def freeze_hazy(
     sensor: ColorSensor,
     grid: HazyGrid = FINE,
     *,
-    about: Middle | None = None,
+    middle: Middle | None = None,
     tell: Tell = lambda _: None,
 ) -> tuple[FrozenOptics, Facts]:
     """Freeze a lens that makes peaks and haze.
@@ -96,7 +96,7 @@ def freeze_hazy(
         lens: With its grooves as they are.
         sensor: Size, pitch and response.
         grid: How finely.
-        about: What light is gathered about; None to choose, see `find_middles`.
+        middle: What light is gathered about; None to choose, see `find_middles`.
         tell: Takes a line for every field.
 
     Returns:
@@ -112,7 +112,7 @@ def freeze_hazy(
     cell_px, rays = grid.cell_px, grid.rays
     pitch_um = sensor.pixel_pitch_um
     corner_px = corner_height_mm(sensor) / to_mm(pitch_um)
-    middles = find_middles(lens, corner_px, pitch_um, rays, about)
+    middles = find_middles(lens, corner_px, pitch_um, rays, middle)
     angles = np.linspace(0.0, middles.corner_rad, fields)
     heights = middles.heights_px(lens, angles, pitch_um, rays)
     response_um, _ = sensor.response_arrays()
@@ -122,18 +122,18 @@ def freeze_hazy(
     reach = MOST_CELLS // 2
     core = np.zeros((fields, wavelengths, 2 * core_px + 1, 2 * core_px + 1))
     haze = np.zeros((fields, wavelengths, MOST_CELLS, MOST_CELLS))
-    wanted = np.zeros((fields, wavelengths))
+    haze_light = np.zeros((fields, wavelengths))
     places = list(enumerate(zip(angles, heights, strict=True)))
     for field, (angle, height) in counted(places, "tracing", "fields"):
         for fine, of_sample in zip(fine_um, bands.numpy().T, strict=True):
-            landed = land_light(lens, float(angle), float(fine), pitch_um, rays)
-            parts = _split(landed, float(height), corner_px, core_px, cell_px)
+            landings = land_light(lens, float(angle), float(fine), pitch_um, rays)
+            parts = _split(landings, float(height), corner_px, core_px, cell_px)
             for sample in np.flatnonzero(of_sample):
                 core[field, sample] += of_sample[sample] * parts.core
                 haze[field, sample] += of_sample[sample] * parts.haze
-                wanted[field, sample] += of_sample[sample] * parts.within
-        tell(f"field {field + 1} of {fields}: {middles.about} at {height:.0f} px")
-    cells = _side_holding(haze, wanted, ENERGY)
+                haze_light[field, sample] += of_sample[sample] * parts.inner_haze
+        tell(f"field {field + 1} of {fields}: {middles.middle} at {height:.0f} px")
+    cells = _side_holding(haze, haze_light, ENERGY)
     cut = slice(reach - cells // 2, reach + cells // 2 + 1)
     haze = haze[..., cut, cut]
     core *= light[:, None, None, None]
@@ -151,7 +151,7 @@ def freeze_hazy(
         distortion=_distortion(lens, angles, field_mm, len(sensor.channels)),
         relative_illumination=illumination,
     )
-    found = Haze(
+    haze_file = Haze(
         kernels=rounded((haze / most)[:, None].astype(np.float32)),
         core_share=(share / most)[:, None],
         field_heights_mm=field_mm,
@@ -162,17 +162,17 @@ def freeze_hazy(
     )
     near = share / (share + haze.sum(axis=(-2, -1)))
     facts: Facts = {
-        "about": middles.about,
+        "about": middles.middle,
         "fields": fields,
         "wavelengths": wavelengths,
         "core_px": core_px,
         "cell_px": cell_px,
         "cells": cells,
         "core_share": float(near.min()),
-        "haze_kept": float(_kept(haze / light[:, None, None, None], wanted).min()),
+        "haze_kept": float(_energy(haze / light[:, None, None, None], haze_light).min()),
         "corner_illumination": float(illumination[-1]),
     }
-    return FrozenOptics(psf=psf, haze=found), rounded_facts(facts)
+    return FrozenOptics(psf=psf, haze=haze_file), rounded_facts(facts)
 
 
 def arriving(angles_rad: Array, heights_px: Array) -> Array:
@@ -208,8 +208,8 @@ def peaks_off_px(lens: Lens, psf: FrozenPsf, *, rays: int = RAYS) -> float:
     pitch_um = psf.pixel_pitch_um
     frozen_px = psf.field_heights_mm[1:] / to_mm(pitch_um)
     middles = find_middles(lens, float(frozen_px[-1]), pitch_um, rays)
-    found = middles.heights_px(lens, np.arctan(ideal_mm[1:] / efl_mm), pitch_um, rays)
-    return float(np.abs(found - frozen_px).max())
+    traced_px = middles.heights_px(lens, np.arctan(ideal_mm[1:] / efl_mm), pitch_um, rays)
+    return float(np.abs(traced_px - frozen_px).max())
 
 
 def check_peaks(lens: Lens, psf: FrozenPsf, path: Path) -> None:
@@ -249,11 +249,11 @@ def flat_light(
     edges = np.linspace(0.0, corner, _RINGS + 1)
     light = np.zeros(_RINGS)
     for angle in (np.arange(_ANGLES) + 0.5) * step:
-        found = land_light(
+        landings = land_light(
             lens, float(angle), lens.reference_wavelength_um, pitch_um, max(rays // 20, 500)
         )
-        radius = np.hypot(found.x_px, found.y_px)
-        weight = found.share * math.sin(angle) * math.cos(angle)
+        radius = np.hypot(landings.x_px, landings.y_px)
+        weight = landings.share * math.sin(angle) * math.cos(angle)
         light += np.histogram(radius, bins=edges, weights=weight)[0]
     middles = (edges[1:] + edges[:-1]) / 2
     dense = light / (edges[1:] ** 2 - edges[:-1] ** 2)
@@ -271,7 +271,7 @@ class _Parts:
 
     core: Array
     haze: Array
-    within: float
+    inner_haze: float
 
 
 def _split(
@@ -282,50 +282,52 @@ def _split(
     faded = (distance - FADE_PX * core_px / CORE_PX) / (core_px * (1 - FADE_PX / CORE_PX))
     near = light.share * (0.5 + 0.5 * np.cos(np.pi * np.clip(faded, 0, 1)))
     far = light.share - near
-    core = _laid(np.rint(x), np.rint(y), near, 2 * core_px + 1)
+    core = _cell_light(np.rint(x), np.rint(y), near, 2 * core_px + 1)
     haze = np.zeros((MOST_CELLS, MOST_CELLS))
     # the mean over points of a cell: a triangle two cells wide
     left, top = np.floor(x / cell_px), np.floor(y / cell_px)
-    for right, across in ((0, 1 - (x / cell_px - left)), (1, x / cell_px - left)):
-        for below, down in ((0, 1 - (y / cell_px - top)), (1, y / cell_px - top)):
-            haze += _laid(left + right, top + below, far * across * down, MOST_CELLS)
+    for right, column_share in ((0, 1 - (x / cell_px - left)), (1, x / cell_px - left)):
+        for row_step, row_share in ((0, 1 - (y / cell_px - top)), (1, y / cell_px - top)):
+            haze += _cell_light(
+                left + right, top + row_step, far * column_share * row_share, MOST_CELLS
+            )
     inside = np.hypot(light.x_px, light.y_px) <= corner_px
     return _Parts(
         core=(core + core[:, ::-1]) / 2,
         haze=(haze + haze[:, ::-1]) / 2,
-        within=float(far[inside].sum()),
+        inner_haze=float(far[inside].sum()),
     )
 
 
-def _laid(x: Array, y: Array, share: Array, side: int) -> Array:
+def _cell_light(x: Array, y: Array, share: Array, side: int) -> Array:
     """Sum shares on a grid whose middle is 0; what falls beside it is left out."""
     half = side // 2
     inside = (np.abs(x) <= half) & (np.abs(y) <= half) & (share > 0)
     place = (y[inside] + half) * side + x[inside] + half
-    made = np.bincount(place.astype(np.intp), share[inside], minlength=side * side)
-    return np.asarray(made.reshape(side, side))
+    sums = np.bincount(place.astype(np.intp), share[inside], minlength=side * side)
+    return np.asarray(sums.reshape(side, side))
 
 
-def _side_holding(haze: Array, wanted: Array, energy: float) -> int:
+def _side_holding(haze: Array, light: Array, energy: float) -> int:
     """Return the least odd side in cells that holds the haze which can reach the frame."""
     most = int(haze.shape[-1])
     for side in range(1, most, 2):
         cut = slice(most // 2 - side // 2, most // 2 + side // 2 + 1)
-        if (_kept(haze[..., cut, cut], wanted) >= energy).all():
+        if (_energy(haze[..., cut, cut], light) >= energy).all():
             return side
-    if (_kept(haze, wanted) < energy).any():
+    if (_energy(haze, light) < energy).any():
         raise ContractError(
-            f"cells of {most} x {most} hold {_kept(haze, wanted).min():.4f} of the haze, wanted "
+            f"cells of {most} x {most} hold {_energy(haze, light).min():.4f} of the haze, wanted "
             f"{energy}; use larger cells"
         )
     return most
 
 
-def _kept(haze: Array, wanted: Array) -> Array:
+def _energy(haze: Array, light: Array) -> Array:
     """Return the share that is held of what is wanted; of next to nothing all is."""
-    held = haze.sum(axis=(-2, -1))
-    there = wanted > LEAST_HAZE
-    share = np.divide(held, wanted, out=np.ones_like(held), where=there)
+    cell_sums = haze.sum(axis=(-2, -1))
+    there = light > LEAST_HAZE
+    share = np.divide(cell_sums, light, out=np.ones_like(cell_sums), where=there)
     return np.asarray(np.minimum(share, 1.0))
 
 
@@ -338,6 +340,6 @@ def _distortion(lens: Lens, angles_rad: Array, field_mm: Array, channels: int) -
     ideal = paraxial_data(lens).efl_mm * np.tan(angles_rad) / radius_mm
     terms = min(_TERMS, len(ideal) - 1)
     powers = np.stack([ideal ** (2 * k + 1) for k in range(terms)], axis=1)
-    found = np.zeros(_TERMS)
-    found[:terms], *_ = np.linalg.lstsq(powers[1:], field_mm[1:] / radius_mm, rcond=None)
-    return RadialDistortion(coefficients=np.tile(found, (channels, 1)), radius_mm=radius_mm)
+    coefficients = np.zeros(_TERMS)
+    coefficients[:terms], *_ = np.linalg.lstsq(powers[1:], field_mm[1:] / radius_mm, rcond=None)
+    return RadialDistortion(coefficients=np.tile(coefficients, (channels, 1)), radius_mm=radius_mm)

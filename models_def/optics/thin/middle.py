@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from camkit.errors import ContractError
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.spot import chief_heights, slopes_for_heights
-from camkit.models_def.optics.thin.peak import land_light, peak_height_px, within
+from camkit.models_def.optics.thin.peak import land_light, peak_height_px, share_within
 from camkit.units import to_mm
 
 Array = NDArray[np.float64]
@@ -36,11 +36,11 @@ class Middles:
     """The places about which the light of a lens is gathered.
 
     Attributes:
-        about: What it is.
+        middle: What it is.
         corner_rad: Field angle whose middle lies at the corner.
     """
 
-    about: Middle
+    middle: Middle
     corner_rad: float
 
     def heights_px(self, lens: Lens, angles_rad: Array, pitch_um: float, rays: int) -> Array:
@@ -49,19 +49,19 @@ class Middles:
         Raises:
             ContractError: If no light arrives.
         """
-        if self.about == CHIEF_RAY:
+        if self.middle == CHIEF_RAY:
             slopes = torch.from_numpy(np.tan(angles_rad))
             with torch.no_grad():
-                found = chief_heights(lens, slopes).numpy() / to_mm(pitch_um)
+                traced_px = chief_heights(lens, slopes).numpy() / to_mm(pitch_um)
         else:
             wave_um = lens.reference_wavelength_um
-            found = np.array([height_px(lens, a, wave_um, pitch_um, rays) for a in angles_rad])
-        found[angles_rad == 0] = 0.0
-        return np.asarray(found, np.float64)
+            traced_px = np.array([height_px(lens, a, wave_um, pitch_um, rays) for a in angles_rad])
+        traced_px[angles_rad == 0] = 0.0
+        return np.asarray(traced_px, np.float64)
 
 
 def find_middles(
-    lens: Lens, corner_px: float, pitch_um: float, rays: int, about: Middle | None = None
+    lens: Lens, corner_px: float, pitch_um: float, rays: int, middle: Middle | None = None
 ) -> Middles:
     """Choose what the light of a lens is gathered about: peaks where the corner has one.
 
@@ -70,27 +70,27 @@ def find_middles(
         corner_px: Of the sensor, from the axis.
         pitch_um: Of the pixels.
         rays: In half the stop.
-        about: What was chosen for another state of the lens, and holds; None to choose.
+        middle: What was chosen for another state of the lens, and holds; None to choose.
 
     Raises:
         ContractError: If neither a peak nor a chief ray reaches the corner.
     """
-    if about == CHIEF_RAY:
+    if middle == CHIEF_RAY:
         return _chief_rays(lens, corner_px, pitch_um)
     try:
         corner_rad = corner_angle_rad(lens, corner_px, pitch_um, rays)
     except ContractError as error:
-        if about == PEAK:
+        if middle == PEAK:
             raise
         try:
             return _chief_rays(lens, corner_px, pitch_um)
         except ContractError:
             raise error from None
-    if about == PEAK:
-        return Middles(about=PEAK, corner_rad=corner_rad)
+    if middle == PEAK:
+        return Middles(middle=PEAK, corner_rad=corner_rad)
     light = land_light(lens, corner_rad, lens.reference_wavelength_um, pitch_um, rays)
-    if within(light, peak_height_px(light), NEAR_PX) >= LEAST_NEAR:
-        return Middles(about=PEAK, corner_rad=corner_rad)
+    if share_within(light, peak_height_px(light), NEAR_PX) >= LEAST_NEAR:
+        return Middles(middle=PEAK, corner_rad=corner_rad)
     return _chief_rays(lens, corner_px, pitch_um)
 
 
@@ -105,10 +105,10 @@ def corner_angle_rad(lens: Lens, corner_px: float, pitch_um: float, rays: int) -
     for _ in range(_CORNER_STEPS):
         middle = (low + high) / 2
         try:
-            beyond = height_px(lens, middle, wave_um, pitch_um, rays) > corner_px
+            is_outside = height_px(lens, middle, wave_um, pitch_um, rays) > corner_px
         except ContractError:
-            beyond = True  # no light arrives from so far
-        low, high = (low, middle) if beyond else (middle, high)
+            is_outside = True  # no light arrives from so far
+        low, high = (low, middle) if is_outside else (middle, high)
     if abs(height_px(lens, low, wave_um, pitch_um, rays) / corner_px - 1) > 0.01:
         raise ContractError(
             f"no peak of {lens.name} reaches the corner, {corner_px:.0f} px from the axis: its "
@@ -129,4 +129,4 @@ def height_px(lens: Lens, angle_rad: float, wave_um: float, pitch_um: float, ray
 def _chief_rays(lens: Lens, corner_px: float, pitch_um: float) -> Middles:
     corner_mm = torch.tensor([corner_px * to_mm(pitch_um)], dtype=torch.float64)
     slope = float(slopes_for_heights(lens, corner_mm)[0])
-    return Middles(about=CHIEF_RAY, corner_rad=math.atan(slope))
+    return Middles(middle=CHIEF_RAY, corner_rad=math.atan(slope))

@@ -56,24 +56,24 @@ def partitioned_phase(
 
     References: Sun 2021, eq. (3.4).
     """
-    across = np.linspace(-apertures.radius_mm, apertures.radius_mm, _POINTS)
+    offsets_mm = np.linspace(-apertures.radius_mm, apertures.radius_mm, _POINTS)
     # the chord of the disc over the meridian is what a point of it stands for
-    chord = np.sqrt(np.sqrt(np.clip(apertures.radius_mm**2 - across**2, 0, None)))
+    chord = np.sqrt(np.sqrt(np.clip(apertures.radius_mm**2 - offsets_mm**2, 0, None)))
     count = len(apertures.centres_mm)
-    rows, wanted = [], []
+    rows, targets = [], []
     for i, (angle_rad, centre_mm) in enumerate(
         zip(apertures.field_angles_rad, apertures.centres_mm, strict=True)
     ):
-        radius = centre_mm + across
+        radius = centre_mm + offsets_mm
         height_mm = distance_mm * float(np.tan(angle_rad))
         constant = np.zeros((len(radius), count))
         constant[:, i] = 1
         powers = radius[:, None] ** (2 * np.arange(1, terms + 1))
         rows.append(np.concatenate([powers, constant], axis=1) * chord[:, None])
         phase = ideal_phase(radius, angle_rad, height_mm, distance_mm, wavelength_um)
-        wanted.append(phase * chord)
+        targets.append(phase * chord)
     matrix = np.concatenate(rows)
     # columns of one length: powers of r differ by many decades
     scale = np.linalg.norm(matrix, axis=0)
-    solution, *_ = np.linalg.lstsq(matrix / scale, np.concatenate(wanted), rcond=None)
+    solution, *_ = np.linalg.lstsq(matrix / scale, np.concatenate(targets), rcond=None)
     return np.asarray((solution / scale)[:terms])

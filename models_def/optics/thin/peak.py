@@ -41,13 +41,13 @@ class LandedLight:
         x_px: (ray,), >= 0 in the pupil.
         y_px: (ray,), from the axis.
         share: (ray,), of the light that enters; lost rays are left out.
-        lost: Share of the light by fate.
+        losses: Share of the light by fate.
     """
 
     x_px: Array
     y_px: Array
     share: Array
-    lost: dict[str, float]
+    losses: dict[str, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,18 +57,18 @@ class Peak:
     Attributes:
         field_angle_rad: Of the point.
         height_px: Of the peak, from the axis.
-        within: Share of the light within each of `RADII_PX` of the peak.
-        lost: Share of the light by fate; none for those that took none.
+        shares: Share of the light within each of `RADII_PX` of the peak.
+        losses: Share of the light by fate; none for those that took none.
     """
 
     field_angle_rad: float
     height_px: float
-    within: tuple[float, ...]
-    lost: dict[str, float]
+    shares: tuple[float, ...]
+    losses: dict[str, float]
 
     def within_px(self, radius_px: float) -> float:
         """Return the share within one of `RADII_PX`."""
-        return self.within[RADII_PX.index(radius_px)]
+        return self.shares[RADII_PX.index(radius_px)]
 
 
 def land_light(
@@ -83,23 +83,23 @@ def land_light(
     slope = torch.tensor([math.tan(field_angle_rad)], dtype=torch.float64)
     with torch.no_grad():
         launched, weight = pupil_rays(lens, tensors, half_disc(rays), slope)
-        landed = trace(tensors, launched)
+        landings = trace(tensors, launched)
     total = float(weight.sum())
     if not total > 0:
         raise ContractError("no light enters the stop; use smaller fields")
     share = (weight / total).numpy()
-    alive, fates = landed.valid.numpy(), landed.fate.numpy()
-    lost = {
+    alive, fates = landings.valid.numpy(), landings.fate.numpy()
+    losses = {
         fate.name.lower(): float(share[fates == fate].sum())
         for fate in Fate
         if fate is not Fate.VALID and (fates == fate).any()
     }
     scale = 1 / to_mm(pitch_um)
     return LandedLight(
-        x_px=(landed.x.numpy() * scale)[alive],
-        y_px=(landed.y.numpy() * scale)[alive],
+        x_px=(landings.x.numpy() * scale)[alive],
+        y_px=(landings.y.numpy() * scale)[alive],
         share=share[alive],
-        lost=lost,
+        losses=losses,
     )
 
 
@@ -122,7 +122,7 @@ def peak_height_px(light: LandedLight) -> float:
     wide = np.convolve(count, np.ones(int(2 * PEAK_PX / _BIN_PX)), "same")
     middles = edges[np.argsort(wide)[-_CANDIDATES:]]
     places = (middles[:, None] + np.array(_FINE_PX)).ravel()
-    best = float(max(places, key=lambda place: within(light, float(place), PEAK_PX)))
+    best = float(max(places, key=lambda place: share_within(light, float(place), PEAK_PX)))
     return _middle_of_point_px(light, best)
 
 
@@ -135,12 +135,12 @@ def _middle_of_point_px(light: LandedLight, best_px: float) -> float:
         if total <= 0:
             return best_px
         middle_px = float((light.share[near] * light.y_px[near]).sum()) / total
-    whole = within(light, middle_px, PEAK_PX)
-    smaller = within(light, middle_px, _INNER * PEAK_PX) >= _POINT_SHARE * whole > 0
+    whole = share_within(light, middle_px, PEAK_PX)
+    smaller = share_within(light, middle_px, _INNER * PEAK_PX) >= _POINT_SHARE * whole > 0
     return middle_px if smaller else best_px
 
 
-def within(light: LandedLight, height_px: float, radius_px: float) -> float:
+def share_within(light: LandedLight, height_px: float, radius_px: float) -> float:
     """Return the share of the light within a distance of a place on the meridian."""
     near = np.hypot(light.x_px, light.y_px - height_px) < radius_px
     return float(light.share[near].sum())
@@ -166,6 +166,6 @@ def measure_peak(
     return Peak(
         field_angle_rad=field_angle_rad,
         height_px=height_px,
-        within=tuple(within(light, height_px, radius) for radius in RADII_PX),
-        lost=light.lost,
+        shares=tuple(share_within(light, height_px, radius) for radius in RADII_PX),
+        losses=light.losses,
     )

@@ -184,11 +184,11 @@ def find_thin_recipe(path: Path) -> ThinRecipe:
     """
     if path.is_file() or path.name != str(path) or path.suffix:
         return read_thin_recipe(path)
-    own = RECIPES / f"{path}.toml"
-    if not own.is_file():
-        known = sorted(found.stem for found in RECIPES.glob("thin_*_lens.toml"))
-        raise ContractError(f"no recipe is called {path}; there are {', '.join(known)}, or a file")
-    return read_thin_recipe(own)
+    packaged = RECIPES / f"{path}.toml"
+    if not packaged.is_file():
+        names = sorted(file.stem for file in RECIPES.glob("thin_*_lens.toml"))
+        raise ContractError(f"no recipe is called {path}; there are {', '.join(names)}, or a file")
+    return read_thin_recipe(packaged)
 
 
 def read_thin_recipe(path: Path) -> ThinRecipe:

@@ -12,7 +12,7 @@ from camkit.models_def.optics.thin.peak import (
     Peak,
     land_light,
     measure_peak,
-    within,
+    share_within,
 )
 from camkit.models_def.optics.thin.waves import wave_shares
 from camkit.units import to_degrees, to_mm
@@ -84,7 +84,7 @@ def with_tool(lens: Lens, radius_um: float) -> Lens:
     return replace(lens, surfaces=tuple(surfaces))
 
 
-def between(angles_rad: Sequence[float]) -> tuple[float, ...]:
+def with_midpoints(angles_rad: Sequence[float]) -> tuple[float, ...]:
     """Return angles and the middles between them."""
     angles = np.array(sorted(angles_rad))
     middles = (angles[1:] + angles[:-1]) / 2
@@ -126,7 +126,7 @@ def report_peaks(
     ideal: list[Peak] = []
     waves: list[WavePeak] = []
 
-    def done() -> None:
+    def advance() -> None:
         if progress is not None:
             progress(len(real) + len(waves), total)
 
@@ -134,12 +134,12 @@ def report_peaks(
         ideal.append(measure_peak(ideal_lens, angle, wave_um, pitch_um, rays))
         same = ideal_lens == lens
         real.append(ideal[-1] if same else measure_peak(lens, angle, wave_um, pitch_um, rays))
-        done()
+        advance()
     for angle in wave_fields_rad:
         place_px = measure_peak(lens, angle, wave_um, pitch_um, rays).height_px
         for band in BANDS:
             waves.append(_wave_peak(lens, angle, band, place_px, pitch_um, rays))
-            done()
+            advance()
     return PeakReport(
         lens=lens, pitch_um=pitch_um, real=tuple(real), ideal=tuple(ideal), waves=tuple(waves)
     )
@@ -153,7 +153,7 @@ def _wave_peak(
     by_rays, by_waves = [], []
     for wave_um in band_wavelengths_um(band):
         light = land_light(lens, angle_rad, wave_um, pitch_um, rays)
-        by_rays.append([within(light, place_px, radius) for radius in WAVE_RADII_PX])
+        by_rays.append([share_within(light, place_px, radius) for radius in WAVE_RADII_PX])
         by_waves.append(wave_shares(lens, angle_rad, wave_um, place_px * pitch_mm, radii_mm))
     return WavePeak(
         field_angle_rad=angle_rad,
@@ -190,7 +190,7 @@ def _field(ideal: Peak, real: Peak) -> dict[str, Any]:
     def both(radius_px: float) -> dict[str, float]:
         return {"ideal": ideal.within_px(radius_px), "real": real.within_px(radius_px)}
 
-    alive = 1 - sum(real.lost.values())
+    alive = 1 - sum(real.losses.values())
     return {
         "field_angle_deg": round(to_degrees(real.field_angle_rad), 9),
         "peak_px": real.height_px,
@@ -199,31 +199,31 @@ def _field(ideal: Peak, real: Peak) -> dict[str, Any]:
         "within_50_px": real.within_px(50.0),
         "beyond_450_px": max(0.0, alive - real.within_px(450.0)),
         "beyond_900_px": max(0.0, alive - real.within_px(900.0)),
-        "lost": real.lost,
+        "lost": real.losses,
     }
 
 
-def to_text(told: dict[str, Any]) -> str:
+def to_text(report: dict[str, Any]) -> str:
     """Return the report, as `to_json` has it, as a table."""
     lines = [
         f"surface {g['surface']}: {g['walls']} walls, grooves of {g['groove_depth_um']:.2f} um"
         + (f", narrowest {g['narrowest_mm']:.3f} mm" if g["narrowest_mm"] else "")
-        for g in told["grooves"]
+        for g in report["grooves"]
     ]
     head = ("field", "peak, px", "5 px", "10 px", "50 px", ">450 px", ">900 px", "10 px ideal")
     lines.append(("{:>9}" * 7 + "{:>13}  lost").format(*head))
-    for f in told["fields"]:
-        lost = ", ".join(f"{k.replace('_', ' ')} {v:.3f}" for k, v in f["lost"].items())
+    for f in report["fields"]:
+        losses = ", ".join(f"{k.replace('_', ' ')} {v:.3f}" for k, v in f["lost"].items())
         near = [f["within_5_px"]["real"], f["within_10_px"]["real"], f["within_50_px"]]
         row = [*near, f["beyond_450_px"], f["beyond_900_px"]]
         shares = "".join(f"{v:9.3f}" for v in row) + f"{f['within_10_px']['ideal']:13.3f}"
-        lines.append(f"{f['field_angle_deg']:9.2f}{f['peak_px']:9.1f}{shares}  {lost}".rstrip())
-    least, ratio = told["within_10_px_least"], told["within_10_px_ratio"]
+        lines.append(f"{f['field_angle_deg']:9.2f}{f['peak_px']:9.1f}{shares}  {losses}".rstrip())
+    least, ratio = report["within_10_px_least"], report["within_10_px_ratio"]
     lines += [
         f"within 10 px, least of all fields: {least['real']:.3f} (ideal grooves "
         f"{least['ideal']:.3f}); largest / least {ratio['real']:.2f} ({ratio['ideal']:.2f})"
     ]
-    for w in told["waves"]:
+    for w in report["waves"]:
         near = w["within_10_px"]
         lines.append(
             f"{w['field_angle_deg']:.2f} degrees, {w['band']}: within 10 px {near['waves']:.3f} by "

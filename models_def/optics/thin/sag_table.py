@@ -56,8 +56,8 @@ def sag_table(surface: Surface, step_um: float) -> SagTable:
     walls = torch.zeros(0, dtype=torch.float64)
     if surface.grooves is not None:
         walls = wall_radii_mm(surface.profile, surface.grooves)
-        apart = (radius[:, None] - walls).abs() > 2 * _BESIDE_MM
-        radius = radius[apart.all(1)]
+        clear = (radius[:, None] - walls).abs() > 2 * _BESIDE_MM
+        radius = radius[clear.all(1)]
     end = torch.tensor([rim_mm], dtype=torch.float64)
     radius, _ = torch.cat([radius, walls - _BESIDE_MM, walls + _BESIDE_MM, end]).sort()
     height = surface.profile.height_mm(radius)

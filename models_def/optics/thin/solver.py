@@ -77,14 +77,14 @@ class _Search:
         return 1 + 2 * self.bends + self.recipe.partition.directions
 
     @property
-    def held(self) -> Tensor:
+    def fixed(self) -> Tensor:
         """Numbers that stay: those of a face without a profile."""
-        held = torch.zeros(self.count, dtype=torch.bool)
+        fixed = torch.zeros(self.count, dtype=torch.bool)
         if self.recipe.plate.faces != "both":
-            held[0] = True
+            fixed[0] = True
             first = 1 + (self.bends if self.recipe.plate.faces == "front" else 0)
-            held[first : first + self.bends] = True
-        return held
+            fixed[first : first + self.bends] = True
+        return fixed
 
     def scales(self) -> Tensor:
         """Return the step of each number that a scaled 1/2 stands for."""
@@ -96,7 +96,7 @@ class _Search:
         rest = [room_mm] * (partition.directions - 1) + [_FOCUS_MM]
         return torch.tensor([_BEND_PER_MM, *terms, *rest], dtype=torch.float64)
 
-    def meant(self, scaled: Tensor) -> tuple[PlateNumbers, Tensor]:
+    def plate_numbers(self, scaled: Tensor) -> tuple[PlateNumbers, Tensor]:
         """Return the plates (plate, 1, 1) and the centres (plate, direction) of their apertures."""
         plate = self.recipe.plate
         values = (2 * scaled - 1) * self.scales()
@@ -121,17 +121,17 @@ class _Search:
     def _curvatures(self, back: Tensor) -> tuple[Tensor, Tensor]:
         """Return the r^2 terms of both faces that keep the focal length."""
         plate = self.recipe.plate
-        excess, wanted = plate.index - 1, 1 / plate.efl_mm
+        excess, power = plate.index - 1, 1 / plate.efl_mm
         if plate.faces == "back":
-            return torch.zeros_like(back), torch.full_like(back, -wanted / (2 * excess))
-        behind = -2 * excess * back
-        ahead = (wanted - behind) / (1 - plate.thickness_mm / plate.index * behind)
+            return torch.zeros_like(back), torch.full_like(back, -power / (2 * excess))
+        back_curvature = -2 * excess * back
+        ahead = (power - back_curvature) / (1 - plate.thickness_mm / plate.index * back_curvature)
         return ahead / (2 * excess), back
 
-    def landed(self, scaled: Tensor) -> tuple[Tensor, Tensor]:
+    def landings(self, scaled: Tensor) -> tuple[Tensor, Tensor]:
         """Return x and y (plate, direction, ray) on the sensor."""
         plate, partition = self.recipe.plate, self.recipe.partition
-        numbers, centres = self.meant(scaled)
+        numbers, centres = self.plate_numbers(scaled)
         disc = half_disc(self.recipe.solver.rays)
         x = disc.x * partition.radius_mm + torch.zeros_like(centres)[..., None]
         y = disc.y * partition.radius_mm + centres[..., None]
@@ -141,7 +141,7 @@ class _Search:
 
     def residuals(self, scaled: Tensor) -> Tensor:
         """Return distances from the mean, whose squares sum to mean squares of spots in mm^2."""
-        x, y = self.landed(scaled)
+        x, y = self.landings(scaled)
         y = y - y.mean(-1, keepdim=True)
         weights = self.recipe.partition.weights or (1.0,) * x.shape[1]
         share = torch.tensor(weights, dtype=torch.float64)[:, None] / x.shape[-1]
@@ -160,7 +160,7 @@ class _Search:
         centres = (2 * begin[0, at] - 1) * room_mm
         meridional = self._partitioned([0.0, *centres.tolist()]) / self.scales().clamp_min(1e-300)
         begin[1] += 0.5 * meridional.clamp(-1, 1)
-        return torch.where(self.held, 0.5, begin)
+        return torch.where(self.fixed, 0.5, begin)
 
     def _partitioned(self, centres_mm: list[float]) -> Tensor:
         """Return the bends of the profile of eq. (3.4), on the back face unless it is a plane."""
@@ -173,14 +173,14 @@ class _Search:
         phase = partitioned_phase(apertures, plate.efl_mm, plate.wavelength_um, plate.terms)
         # glass that is higher at the back delays, at the front hastens
         height = phase * to_mm(plate.wavelength_um) / (2 * math.pi * (plate.index - 1))
-        found = torch.zeros(self.count, dtype=torch.float64)
+        variables = torch.zeros(self.count, dtype=torch.float64)
         front = plate.faces == "front"
         first = 1 if front else 1 + self.bends
         terms = torch.from_numpy(-height if front else height)
-        found[first : first + self.bends] = terms[1:]
+        variables[first : first + self.bends] = terms[1:]
         if not front:
-            found[0] = terms[0]
-        return found
+            variables[0] = terms[0]
+        return variables
 
 
 def solve_plate(recipe: ThinRecipe) -> SolvedPlate:
@@ -190,10 +190,10 @@ def solve_plate(recipe: ThinRecipe) -> SolvedPlate:
         ContractError: If rays of a virtual aperture are lost in the best plate.
     """
     search = _Search(recipe)
-    found = descend(search.residuals, search.starts(), recipe.solver.steps, search.held)
-    best = found.scaled[:1]
+    descent = descend(search.residuals, search.starts(), recipe.solver.steps, search.fixed)
+    best = descent.scaled[:1]
     with torch.no_grad():
-        (x, y), (numbers, centres) = search.landed(best), search.meant(best)
+        (x, y), (numbers, centres) = search.landings(best), search.plate_numbers(best)
     if not bool(torch.isfinite(x + y).all()):
         raise ContractError("no plate was found that passes the light; use a smaller corner_deg")
     heights = y.mean(-1)

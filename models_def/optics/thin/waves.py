@@ -81,11 +81,11 @@ def wave_shares(
         x = (torch.arange(count, dtype=torch.float64) + 0.5) * step
         y = torch.cat([-x.flip(0), x])
         light = _light(waves, 2 * math.pi / to_mm(wavelength_um), x, y + height_mm)
-        away = torch.hypot(x, y[:, None])
+        distance_mm = torch.hypot(x, y[:, None])
         # both halves; Parseval: the integral of |U|^2 is wavelength^2 times the energy of all rays
         scale = 2 * step**2 / (to_mm(wavelength_um) ** 2 * waves.energy)
         # points at the edge of a disc count by how much of their cell lies within
-        parts = (((radius - away) / step + 0.5).clamp(0, 1) for radius in radii_mm)
+        parts = (((radius - distance_mm) / step + 0.5).clamp(0, 1) for radius in radii_mm)
         return tuple(float((light * part).sum()) * scale for part in parts)
 
 
@@ -115,25 +115,25 @@ def _waves(
     slope = torch.tensor([math.tan(angle_rad)], dtype=torch.float64)
     samples, cell_mm2 = _lattice(lens, lattice_mm)
     rays, weight = pupil_rays(lens, tensors, samples, slope)
-    landed = trace(tensors, rays, path=True)
-    away = torch.hypot(landed.x, landed.y - height_mm)
-    near = landed.valid & (weight > 0) & (away < radius_mm + REACH_MM)
-    rays, landed, away = _cut(rays, near), _cut(landed, near), away[near]
-    turn = _turns(tensors, rays, landed, slope)
+    landings = trace(tensors, rays, path=True)
+    distance_mm = torch.hypot(landings.x, landings.y - height_mm)
+    near = landings.valid & (weight > 0) & (distance_mm < radius_mm + REACH_MM)
+    rays, landings, distance_mm = _cut(rays, near), _cut(landings, near), distance_mm[near]
+    turn = _turns(tensors, rays, landings, slope)
     density = torch.abs(turn[0] * turn[3] - turn[1] * turn[2])
     stretch = torch.sqrt(sum((part**2 for part in turn), torch.zeros_like(density)))
     number = 2 * math.pi / to_mm(wavelength_um)
-    tame = number * (away + radius_mm) * stretch * lattice_mm < math.pi
-    if landed.path_mm is None:
+    tame = number * (distance_mm + radius_mm) * stretch * lattice_mm < math.pi
+    if landings.path_mm is None:
         raise ContractError("the tracer gave no optical path")
     # path from the object's wave through the first vertex
-    path = landed.path_mm + rays.x * rays.l + rays.y * rays.m
+    path = landings.path_mm + rays.x * rays.l + rays.y * rays.m
     flux = weight[near] * cell_mm2
     return _Waves(
-        x=landed.x,
-        y=landed.y,
-        l=landed.l,
-        m=landed.m,
+        x=landings.x,
+        y=landings.y,
+        l=landings.l,
+        m=landings.m,
         path=path,
         amplitude=torch.where(tame, flux * torch.sqrt(density), 0.0),
         energy=2 * float(weight.sum()) * cell_mm2,
@@ -156,34 +156,34 @@ def _lattice(lens: Lens, step_mm: float) -> tuple[PupilSamples, float]:
     return PupilSamples(x=x[inside], y=y[inside]), (radius_mm / count) ** 2
 
 
-def _cut(rays: Rays, chosen: Tensor) -> Rays:
-    shape = chosen.shape
+def _cut(rays: Rays, mask: Tensor) -> Rays:
+    shape = mask.shape
     parts = {
-        name: getattr(rays, name).expand(shape)[chosen]
+        name: getattr(rays, name).expand(shape)[mask]
         for name in ("x", "y", "z", "l", "m", "n", "fate")
     }
-    path = None if rays.path_mm is None else rays.path_mm.expand(shape)[chosen]
+    path = None if rays.path_mm is None else rays.path_mm.expand(shape)[mask]
     return Rays(**parts, path_mm=path)
 
 
-def _turns(tensors: SurfaceTensors, rays: Rays, landed: Rays, slope: Tensor) -> list[Tensor]:
+def _turns(tensors: SurfaceTensors, rays: Rays, landings: Rays, slope: Tensor) -> list[Tensor]:
     """Return dl/dx, dm/dx, dl/dy, dm/dy by a ray close by.
 
     Of the rays to both sides that one counts which turns less: the other lies beyond a wall.
     """
-    found: list[Tensor] = []
+    turns: list[Tensor] = []
     for dx, dy in ((_PROBE_MM, 0.0), (0.0, _PROBE_MM)):
         pairs = []
         for sign in (1, -1):
             there = trace(tensors, launch(rays.x + sign * dx, rays.y + sign * dy, slope, math.inf))
-            turn = [(a - b) / (sign * _PROBE_MM) for a, b in _directions(there, landed)]
+            turn = [(a - b) / (sign * _PROBE_MM) for a, b in _directions(there, landings)]
             size = torch.where(there.valid, turn[0] ** 2 + turn[1] ** 2, math.inf)
             pairs.append((turn, size))
         (one, size), (other, other_size) = pairs
-        first, lost = size <= other_size, torch.isinf(size) & torch.isinf(other_size)
+        first, infinite = size <= other_size, torch.isinf(size) & torch.isinf(other_size)
         for a, b in zip(one, other, strict=True):
-            found.append(torch.where(lost, 0.0, torch.where(first, a, b)))
-    return found
+            turns.append(torch.where(infinite, 0.0, torch.where(first, a, b)))
+    return turns
 
 
 def _directions(a: Rays, b: Rays) -> tuple[tuple[Tensor, Tensor], tuple[Tensor, Tensor]]:

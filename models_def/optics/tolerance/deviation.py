@@ -135,8 +135,8 @@ def draw_deviations(
 
 def no_deviations(lens: Lens) -> Deviations:
     """Return one copy without errors."""
-    drawn = draw_deviations(lens, Tolerances(), range(1), 0)
-    return Deviations(**{name: np.zeros_like(value) for name, value in _arrays(drawn)})
+    deviations = draw_deviations(lens, Tolerances(), range(1), 0)
+    return Deviations(**{name: np.zeros_like(value) for name, value in _arrays(deviations)})
 
 
 def _arrays(deviations: Deviations) -> Iterator[tuple[str, Array]]:

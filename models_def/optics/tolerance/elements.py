@@ -5,15 +5,15 @@ from camkit.models_def.optics.prescription import Lens
 
 def glass_elements(lens: Lens) -> tuple[range, ...]:
     """Return the surfaces of each piece; a stop or a dummy in air belongs to none."""
-    found: list[range] = []
+    elements: list[range] = []
     start: int | None = None
     for i, surface in enumerate(lens.surfaces):
         if start is None and surface.glass != "air":
             start = i
         elif start is not None and surface.glass == "air":
-            found.append(range(start, i + 1))
+            elements.append(range(start, i + 1))
             start = None
     if start is not None:
         # the sensor lies in the glass
-        found.append(range(start, len(lens.surfaces)))
-    return tuple(found)
+        elements.append(range(start, len(lens.surfaces)))
+    return tuple(elements)

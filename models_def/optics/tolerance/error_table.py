@@ -60,16 +60,16 @@ def parse_tolerances(table: object) -> Tolerances:
         raise ContractError(f"[{TABLE}] must be a table; got {table!r:.80}")
     unknown = sorted(set(table) - set(KEYS) - _SETTINGS)
     if unknown:
-        known = ", ".join((*KEYS, *sorted(_SETTINGS)))
-        raise ContractError(f"[{TABLE}]: unknown keys {unknown}; known are {known}")
+        keys = ", ".join((*KEYS, *sorted(_SETTINGS)))
+        raise ContractError(f"[{TABLE}]: unknown keys {unknown}; known are {keys}")
     common = table.get("distribution", "uniform")
     widths: dict[str, Any] = dict.fromkeys(ERROR_CLASSES, ErrorWidth(half_width=0.0))
-    named: set[str] = set()
+    classes: set[str] = set()
     for key in (key for key in table if key in KEYS):
         error_class, unit = KEYS[key]
-        if error_class in named:
+        if error_class in classes:
             raise ContractError(f"[{TABLE}]: {key} names {error_class} again; keep one of the two")
-        named.add(error_class)
+        classes.add(error_class)
         widths[error_class] = _width(key, table[key], unit, common)
     return Tolerances(**widths, compensator=table.get("compensator", "paraxial"))
 
@@ -90,5 +90,7 @@ def _width(key: str, value: object, unit: float, common: Any) -> ErrorWidth:
 
 def in_file_units(error_class: ErrorClass, value: float) -> str:
     """Return an error as people write it, such as `0.2 %`."""
-    key, unit = next((key, unit) for key, (of, unit) in KEYS.items() if of == error_class)
+    key, unit = next(
+        (key, unit) for key, (file_class, unit) in KEYS.items() if file_class == error_class
+    )
     return f"{value / unit:.4g}{_UNIT_TEXTS.get(key.rpartition('_')[2], '')}"

@@ -163,7 +163,7 @@ def land(lens: Lens, deviations: Deviations, view: View, compensator: Compensato
             raise ContractError(
                 "the light of a Monte-Carlo sample is lost; use smaller errors or fields"
             )
-        rays, chief = _moved(rays, shift), _moved(chief, shift)
+        rays, chief = _shifted(rays, shift), _shifted(chief, shift)
     return Landing(
         rays=rays,
         weight=weight,
@@ -207,8 +207,8 @@ def _trace(
         **{k: getattr(rays, k).expand(shape).clone() for k in ("x", "y", "z", "l", "m", "n")},
         fate=rays.fate.expand(shape).clone(),
     )
-    landed = trace_misaligned(tensors, stands, rays)
-    return landed, torch.where(landed.valid, weight, 0.0)
+    landings = trace_misaligned(tensors, stands, rays)
+    return landings, torch.where(landings.valid, weight, 0.0)
 
 
 def _aimed(
@@ -224,17 +224,17 @@ def _aimed(
 
     def at_stop(x: Tensor, y: Tensor) -> Rays:
         launched = launch(x, y, slope, lens.object_distance_mm)
-        before = trace_misaligned(opened, stands, launched, end=lens.stop)
-        return meet(opened, stands[lens.stop], before, lens.stop)
+        incoming = trace_misaligned(opened, stands, launched, end=lens.stop)
+        return meet(opened, stands[lens.stop], incoming, lens.stop)
 
     blank = torch.zeros_like(tensors.thickness_mm[0] + rays.x)
     radius = lens.aperture_value
-    wanted = (view.samples.x * radius, view.samples.y * radius)
+    target = (view.samples.x * radius, view.samples.y * radius)
     begin = (rays.x + blank, rays.y + blank)
-    found = newton_aim(at_stop, wanted, begin, steps=_AIM_STEPS, fresh=_AIM_FRESH)
+    aim = newton_aim(at_stop, target, begin, steps=_AIM_STEPS, fresh=_AIM_FRESH)
     share = 1.0 if view.samples.weight is None else view.samples.weight * len(view.samples.x)
-    again = launch(found.x, found.y, slope, lens.object_distance_mm)
-    return marked(again, found.weight), found.weight * share
+    aimed = launch(aim.x, aim.y, slope, lens.object_distance_mm)
+    return marked(aimed, aim.weight), aim.weight * share
 
 
 def _refocus(
@@ -260,8 +260,8 @@ def _image_mm(lens: Lens, deviations: Deviations) -> Tensor:
     wave = torch.tensor([lens.reference_wavelength_um], dtype=torch.float64)
     tensors = fabricated_tensors(lens, deviations, wave)
     one = torch.ones_like(tensors.index[0] * tensors.curvature_per_mm[0])
-    far = math.isinf(lens.object_distance_mm)
-    height, slope = (one, 0 * one) if far else (lens.object_distance_mm * one, one)
+    distant = math.isinf(lens.object_distance_mm)
+    height, slope = (one, 0 * one) if distant else (lens.object_distance_mm * one, one)
     height, slope = trace_paraxial(tensors, height, slope, range(len(lens.surfaces)))
     return (-height / slope).reshape(-1)
 
@@ -282,6 +282,6 @@ def _spot_shift(rays: Rays, weight: Tensor) -> Tensor:
     return -both / (share * (tx**2 + ty**2)).sum((1, 2, 3))
 
 
-def _moved(rays: Rays, shift_mm: Tensor) -> Rays:
+def _shifted(rays: Rays, shift_mm: Tensor) -> Rays:
     way = shift_mm[:, None, None, None] / rays.n
     return replace(rays, x=rays.x + way * rays.l, y=rays.y + way * rays.m)

@@ -44,19 +44,19 @@ def copy_kernels(
     share = landing.weight / landing.weight.sum(-1, keepdim=True).clamp_min(1e-300)
     flat = spread_tents(row, column, share, size_px).flatten(-2)
     colored = torch.einsum("cw,sfwp->sfcp", color_weights.to(flat.dtype), flat)
-    kept = colored.sum(-1, keepdim=True)
-    if bool((kept <= 0).any()):
+    light = colored.sum(-1, keepdim=True)
+    if bool((light <= 0).any()):
         raise ContractError("no light reaches a kernel; check errors, focus and pixel pitch")
-    kernels = (colored / kept).reshape(*colored.shape[:3], size_px, size_px)
-    return kernels, kept[..., 0].amin(-1)
+    kernels = (colored / light).reshape(*colored.shape[:3], size_px, size_px)
+    return kernels, light[..., 0].amin(-1)
 
 
-def window_px(kernels: Tensor, lost: float) -> int:
-    """Return the least odd side about the centre outside which no kernel has more than `lost`.
+def window_px(kernels: Tensor, loss: float) -> int:
+    """Return the least odd side about the centre outside which no kernel has more than `loss`.
 
     Args:
         kernels: (..., k, k).
-        lost: Share of the light.
+        loss: Share of the light.
     """
     side = kernels.shape[-1]
     middle = side // 2
@@ -65,5 +65,5 @@ def window_px(kernels: Tensor, lost: float) -> int:
     flat = kernels.reshape(-1, side * side)
     by_ring = torch.zeros(len(flat), middle + 1, dtype=flat.dtype)
     inside = by_ring.index_add(1, ring, flat).cumsum(1).amin(0)
-    enough = inside >= inside[-1] - lost
+    enough = inside >= inside[-1] - loss
     return 2 * int(enough.to(torch.int8).argmax()) + 1

@@ -71,11 +71,11 @@ def _to_plane(rays: Rays) -> Rays:
     """Trace rays to z = 0; one that a strong tilt sent backwards is lost."""
     onward = rays.n > _MIN_COSINE
     way = torch.where(onward, -rays.z / torch.where(onward, rays.n, 1.0), 0.0)
-    lost = (rays.fate == Fate.VALID) & ~onward
+    backward = (rays.fate == Fate.VALID) & ~onward
     return replace(
         rays,
         x=rays.x + way * rays.l,
         y=rays.y + way * rays.m,
         z=torch.zeros_like(rays.z),
-        fate=torch.where(lost, int(Fate.MISSED), rays.fate).to(torch.int8),
+        fate=torch.where(backward, int(Fate.MISSED), rays.fate).to(torch.int8),
     )

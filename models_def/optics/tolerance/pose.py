@@ -80,20 +80,24 @@ def poses(
             deviations.element_tilt_rad,
         )
     )
-    found: list[Pose | None] = [None] * len(thickness_mm)
+    surface_poses: list[Pose | None] = [None] * len(thickness_mm)
     for number, element in enumerate(elements):
         whole = rotation(piece_tilt[:, :, number])
         depth = torch.zeros_like(thickness_mm[0])
         for i in element:
-            down = torch.zeros(*shift.shape[:2], 3, dtype=shift.dtype)
-            down[..., 2] = depth[:, None]
+            vertex_depth = torch.zeros(*shift.shape[:2], 3, dtype=shift.dtype)
+            vertex_depth[..., 2] = depth[:, None]
             # the vertex seen from the front vertex, then from its own nominal place
-            vertex = down + _flat(shift[:, :, i])
-            offset = (whole @ vertex[..., None])[..., 0] - down + _flat(piece_shift[:, :, number])
+            vertex = vertex_depth + _flat(shift[:, :, i])
+            offset = (
+                (whole @ vertex[..., None])[..., 0]
+                - vertex_depth
+                + _flat(piece_shift[:, :, number])
+            )
             turn = whole @ rotation(tilt[:, :, i])
-            found[i] = Pose(turn=turn[:, :, None, None], offset_mm=offset[:, :, None, None])
+            surface_poses[i] = Pose(turn=turn[:, :, None, None], offset_mm=offset[:, :, None, None])
             depth = depth + thickness_mm[i]
-    return found
+    return surface_poses
 
 
 def _flat(vector: Tensor) -> Tensor:

@@ -17,13 +17,13 @@ from typing import Final, NamedTuple
 import torch
 from torch import Tensor
 
-from camkit.models_def.optics.tracing.kernel import Kept, TraceSettings, rest
+from camkit.models_def.optics.tracing.kernel import RayRecord, TraceSettings, rest
 from camkit.models_def.optics.tracing.meeting import Numbers, State
 from camkit.models_def.optics.tracing.profile import TINY, polynomial
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Wanted:
+class GradientNeeds:
     """The gradients that are asked for; semi-diameters have none."""
 
     rays: bool
@@ -39,7 +39,7 @@ class Slopes(NamedTuple):
 
     end: State
     path: Tensor | None
-    seen: list[State | None]
+    states: list[State | None]
 
 
 class Gradients(NamedTuple):
@@ -83,10 +83,10 @@ class _Bent(NamedTuple):
 
 def pull_back(
     settings: TraceSettings,
-    wanted: Wanted,
+    needs: GradientNeeds,
     lens: Sequence[Numbers],
     launched: State,
-    kept: Kept,
+    record: RayRecord,
     slopes: Slopes,
     gather: Gather,
 ) -> Gradients:
@@ -94,44 +94,44 @@ def pull_back(
 
     Args:
         settings: As the trace had it.
-        wanted: What to compute.
+        needs: What to compute.
         lens: As the trace had it.
         launched: As the trace had them (lost ones at rest).
-        kept: Of the trace.
+        record: Of the trace.
         slopes: Of the loss by what the trace gave.
         gather: Sums a per-ray derivative to the shape of the number it belongs to.
     """
     total = Gradients(launched, [], [], [], [], [torch.zeros_like(lens[-1].after)])
-    g = rest(slopes.end, kept.fate, adaptive=settings.adaptive, n=0.0)
-    path = None if slopes.path is None else torch.where(kept.fate == 0, slopes.path, 0.0)
-    g = _leave_plane(wanted, lens[-1], kept.seen[-1], g, path, total, gather)
+    g = rest(slopes.end, record.fate, adaptive=settings.adaptive, n=0.0)
+    path = None if slopes.path is None else torch.where(record.fate == 0, slopes.path, 0.0)
+    g = _leave_plane(needs, lens[-1], record.states[-1], g, path, total, gather)
     for i in reversed(range(len(lens))):
-        p, hit, extra = lens[i], kept.seen[i], slopes.seen[i]
+        p, hit, extra = lens[i], record.states[i], slopes.states[i]
         if extra is not None:
-            extra = rest(extra, kept.fates[i], adaptive=settings.adaptive, n=0.0)
+            extra = rest(extra, record.fates[i], adaptive=settings.adaptive, n=0.0)
             g = State(*(a + b for a, b in zip(g, extra, strict=True)))
-        before = launched
+        incoming = launched
         if i:
-            last = kept.seen[i - 1]
-            before = last._replace(z=last.z - lens[i - 1].gap)
+            last = record.states[i - 1]
+            incoming = last._replace(z=last.z - lens[i - 1].gap)
         shape = _shape(p, hit, aspheric=settings.aspheric[i])
-        bent = _refraction(p, shape, before, hit, g, with_ratio=wanted.index)
-        way = (hit.z - before.z) / before.n
-        push = torch.addcmul(bent.x * before.l, bent.y, before.m)
-        push = torch.addcmul(push, bent.z, before.n)
+        bent = _refraction(p, shape, incoming, hit, g, with_ratio=needs.index)
+        way = (hit.z - incoming.z) / incoming.n
+        push = torch.addcmul(bent.x * incoming.l, bent.y, incoming.m)
+        push = torch.addcmul(push, bent.z, incoming.n)
         push = push if path is None else push + path * p.before
         push = push / bent.facing
         shape, bent, push, g = _tamed(shape, bent, push, g)
         aspheric = settings.aspheric[i]
-        _collect(p, wanted, shape, bent, push, total, gather, aspheric=aspheric)
-        if wanted.index:
+        _collect(p, needs, shape, bent, push, total, gather, aspheric=aspheric)
+        if needs.index:
             _collect_index(p, bent, None if path is None else path * way, total, gather)
-        if i or wanted.rays:
-            g = _before(p, g, shape, bent, push, way, hit)
-        if i and wanted.thickness:
+        if i or needs.rays:
+            g = _incoming_slopes(p, g, shape, bent, push, way, hit)
+        if i and needs.thickness:
             total.thickness.append(gather(-g.z, lens[i - 1].gap))
     return Gradients(
-        g if wanted.rays else None,
+        g if needs.rays else None,
         total.curvature[::-1],
         total.conic[::-1],
         total.even_asphere[::-1],
@@ -182,7 +182,7 @@ def _tamed(
 
 
 def _leave_plane(
-    wanted: Wanted,
+    needs: GradientNeeds,
     p: Numbers,
     hit: State,
     g: State,
@@ -194,10 +194,10 @@ def _leave_plane(
     slope = torch.addcmul(g.x * hit.l, g.y, hit.m)
     if path is not None:
         slope = slope + path * p.after
-        if wanted.index:
+        if needs.index:
             total.indices[0] = total.indices[0] - gather(path * back, p.after)
     slope = slope / hit.n
-    if wanted.thickness:
+    if needs.thickness:
         total.thickness.append(gather(slope, p.gap))
     return State(
         x=g.x,
@@ -220,10 +220,10 @@ def _shape(p: Numbers, hit: State, *, aspheric: bool) -> _Shape:
 
 
 def _refraction(
-    p: Numbers, shape: _Shape, before: State, hit: State, g: State, *, with_ratio: bool
+    p: Numbers, shape: _Shape, incoming: State, hit: State, g: State, *, with_ratio: bool
 ) -> _Bent:
     lean, length2 = shape.lean, shape.length2
-    facing = before.n - torch.addcmul(hit.x * before.l, hit.y, before.m) * lean
+    facing = incoming.n - torch.addcmul(hit.x * incoming.l, hit.y, incoming.m) * lean
     leaving = hit.n - torch.addcmul(hit.x * hit.l, hit.y, hit.m) * lean
     bend = (leaving - facing * p.ratio) / length2
     pull = (g.n - torch.addcmul(g.l * hit.x, g.m, hit.y) * lean) / length2
@@ -231,17 +231,17 @@ def _refraction(
     slope_length2 = pull * (p.rest2 / leaving - 2 * bend)
     shear = slope_length2 * lean
     # slopes by the first two parts of the normal (-q x, -q y, 1)
-    normal_x = torch.addcmul(bend * g.l, slope_facing, before.l)
+    normal_x = torch.addcmul(bend * g.l, slope_facing, incoming.l)
     normal_x = torch.addcmul(normal_x, shear, hit.x, value=-1)
-    normal_y = torch.addcmul(bend * g.m, slope_facing, before.m)
+    normal_y = torch.addcmul(bend * g.m, slope_facing, incoming.m)
     normal_y = torch.addcmul(normal_y, shear, hit.y, value=-1)
     slope_lean = -torch.addcmul(normal_x * hit.x, normal_y, hit.y)
     twist = slope_lean * _lean_slope(p, shape) * 2
     ratio = None
     if with_ratio:
-        along = torch.addcmul(g.l * before.l, g.m, before.m)
-        along = torch.addcmul(along, g.n, before.n)
-        ratio = along - pull * (facing + (length2 - facing * facing) * p.ratio / leaving)
+        projection = torch.addcmul(g.l * incoming.l, g.m, incoming.m)
+        projection = torch.addcmul(projection, g.n, incoming.n)
+        ratio = projection - pull * (facing + (length2 - facing * facing) * p.ratio / leaving)
     return _Bent(
         x=g.x + twist * hit.x - lean * normal_x,
         y=g.y + twist * hit.y - lean * normal_y,
@@ -261,7 +261,7 @@ def _lean_slope(p: Numbers, shape: _Shape) -> Tensor:
     return slope + polynomial(bends, shape.rho) if bends else slope
 
 
-def _before(
+def _incoming_slopes(
     p: Numbers,
     g: State,
     shape: _Shape,
@@ -288,7 +288,7 @@ def _before(
 
 def _collect(
     p: Numbers,
-    wanted: Wanted,
+    needs: GradientNeeds,
     shape: _Shape,
     bent: _Bent,
     push: Tensor,
@@ -299,15 +299,15 @@ def _collect(
 ) -> None:
     """Add the slopes by curvature, conic and polynomial: push h_p + slope_lean q_p."""
     inverse, rho = shape.inverse, shape.rho
-    if wanted.curvature or wanted.conic:
+    if needs.curvature or needs.conic:
         cube = bent.lean * inverse * inverse * inverse
         share = push * inverse / (1 + shape.root)
-        if wanted.curvature:
+        if needs.curvature:
             total.curvature.append(gather(torch.addcmul(cube, share, rho), p.c))
-        if wanted.conic:
+        if needs.conic:
             slope = (cube + share * rho / (1 + shape.root)) * rho * (p.c * p.c * p.c / 2)
             total.conic.append(gather(slope, p.k))
-    if wanted.even_asphere:
+    if needs.even_asphere:
         row: list[Tensor] = []
         power = torch.ones_like(rho)
         for j, term in enumerate(p.terms, start=1):

@@ -17,12 +17,12 @@ from typing import Final, NamedTuple
 import torch
 from torch import Tensor
 
-from camkit.models_def.optics.tracing.adjoint import Gradients, Slopes, Wanted, pull_back
+from camkit.models_def.optics.tracing.adjoint import GradientNeeds, Gradients, Slopes, pull_back
 from camkit.models_def.optics.tracing.gradient import FIXED, Eager, Engine, Task
 from camkit.models_def.optics.tracing.kernel import (
     NOT_CONVERGED,
-    Kept,
     LensTensors,
+    RayRecord,
     Result,
     TraceSettings,
     numbers,
@@ -80,26 +80,26 @@ class Fused:
         end = [_joined(column, rows, fate.shape) for column in zip(*parts, strict=True)]
         if any(settings.aspheric) and bool((end[6] == NOT_CONVERGED).any()):
             return Eager().run(settings, lens, rays, fate)
-        return Result(State(*end[:6]), end[7] if settings.path else None, Kept(end[6], [], []))
+        return Result(State(*end[:6]), end[7] if settings.path else None, RayRecord(end[6], [], []))
 
     def pull(self, task: Task, lens: LensTensors, rays: State, fate: Tensor) -> Gradients:
         """Return the gradients of a block, traced again in the same loop."""
-        if task.kept is not None:
+        if task.record is not None:
             return Eager().pull(task, lens, rays, fate)
-        wanted, path = task.wanted, task.slopes.path
-        loop = _backward(replace(task.settings, adaptive=False), wanted)
-        given = (*rays, fate, *task.slopes.end, *([] if path is None else [path]))
+        needs, path = task.needs, task.slopes.path
+        loop = _backward(replace(task.settings, adaptive=False), needs)
+        columns = (*rays, fate, *task.slopes.end, *([] if path is None else [path]))
         of_rays = [torch.empty_like(rays.x, memory_format=torch.contiguous_format) for _ in rays]
         of_lens = LensTensors(*(torch.zeros_like(v) for v in lens))
         for row in _rows(lens, fate.shape):
-            v = [value[row.rays].flatten() for value in given]
+            v = [value[row.rays].flatten() for value in columns]
             with _patience():
-                found = list(loop(row.lens, State(*v[:6]), v[6], State(*v[7:13]), *v[13:]))
-            for whole in of_rays if wanted.rays else []:
-                whole[row.rays] = found.pop(0).reshape(whole[row.rays].shape)
-            _add(wanted, of_lens, row, [float(g.sum()) for g in found])
+                slopes = list(loop(row.lens, State(*v[:6]), v[6], State(*v[7:13]), *v[13:]))
+            for whole in of_rays if needs.rays else []:
+                whole[row.rays] = slopes.pop(0).reshape(whole[row.rays].shape)
+            _add(needs, of_lens, row, [float(g.sum()) for g in slopes])
         return Gradients(
-            State(*of_rays) if wanted.rays else None,
+            State(*of_rays) if needs.rays else None,
             list(of_lens.curvature),
             list(of_lens.conic),
             [list(terms) for terms in of_lens.even_asphere],
@@ -137,15 +137,15 @@ def _rows(lens: LensTensors, shape: torch.Size) -> Iterator[_Row]:
     for at in itertools.product(*ranges):
         places: list[tuple[int | slice, ...]] = []
         for v, fixed in pairs:
-            own = [0 if v.shape[d] == 1 else at[d] for d in range(fixed - v.ndim, 0)]
-            places.append((*[whole] * fixed, *own))
+            index = [0 if v.shape[d] == 1 else at[d] for d in range(fixed - v.ndim, 0)]
+            places.append((*[whole] * fixed, *index))
         cut = LensTensors(*(v[place] for v, place in zip(lens, places, strict=True)))
         yield _Row(cut, at, tuple(places))
 
 
-def _add(wanted: Wanted, total: LensTensors, row: _Row, sums: list[float]) -> None:
+def _add(needs: GradientNeeds, total: LensTensors, row: _Row, sums: list[float]) -> None:
     """Add the sums over a row, in the order of `_columns`."""
-    *first, last = _flags(wanted)
+    *first, last = _flags(needs)
     flags = (*first, False, last)
     start = 0
     for value, place, flag in zip(total, row.places, flags, strict=True):
@@ -156,8 +156,8 @@ def _add(wanted: Wanted, total: LensTensors, row: _Row, sums: list[float]) -> No
             start += count
 
 
-def _flags(wanted: Wanted) -> tuple[bool, ...]:
-    return (wanted.curvature, wanted.conic, wanted.even_asphere, wanted.thickness, wanted.index)
+def _flags(needs: GradientNeeds) -> tuple[bool, ...]:
+    return (needs.curvature, needs.conic, needs.even_asphere, needs.thickness, needs.index)
 
 
 @functools.cache
@@ -165,26 +165,28 @@ def _forward(settings: TraceSettings) -> Loop:
     def fused(lens: LensTensors, rays: State, fate: Tensor) -> tuple[Tensor, ...]:
         result = run(settings, numbers(lens), rays, fate)
         path = () if result.path is None else (result.path,)
-        return (*result.end, result.kept.fate, *path)
+        return (*result.end, result.record.fate, *path)
 
     return torch.compile(fused, fullgraph=True, dynamic=True)
 
 
 @functools.cache
-def _backward(settings: TraceSettings, wanted: Wanted) -> Loop:
+def _backward(settings: TraceSettings, needs: GradientNeeds) -> Loop:
     def fused(
         lens: LensTensors, rays: State, fate: Tensor, end: State, path: Tensor | None = None
     ) -> tuple[Tensor, ...]:
         surfaces = numbers(lens)
-        kept = run(settings, surfaces, rays, fate).kept
+        record = run(settings, surfaces, rays, fate).record
         slopes = Slopes(end, path, [None] * len(surfaces))
         still = rest(rays, fate, adaptive=False)
         # sums are left to the caller: a reduction would end the loop
-        found = pull_back(settings, wanted, surfaces, still, kept, slopes, lambda value, _: value)
-        even = [term for row in found.even_asphere for term in row]
-        lists = [found.curvature, found.conic, even, found.thickness, found.indices]
-        chosen = [v for v, flag in zip(lists, _flags(wanted), strict=True) if flag]
-        return (*(found.rays or ()), *(v for column in chosen for v in column))
+        gradients = pull_back(
+            settings, needs, surfaces, still, record, slopes, lambda value, _: value
+        )
+        even = [term for row in gradients.even_asphere for term in row]
+        lists = [gradients.curvature, gradients.conic, even, gradients.thickness, gradients.indices]
+        needed_columns = [v for v, flag in zip(lists, _flags(needs), strict=True) if flag]
+        return (*(gradients.rays or ()), *(v for column in needed_columns for v in column))
 
     return torch.compile(fused, fullgraph=True, dynamic=True)
 

@@ -12,10 +12,10 @@ import torch
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
-from camkit.models_def.optics.tracing.adjoint import Gradients, Slopes, Wanted, pull_back
+from camkit.models_def.optics.tracing.adjoint import GradientNeeds, Gradients, Slopes, pull_back
 from camkit.models_def.optics.tracing.kernel import (
-    Kept,
     LensTensors,
+    RayRecord,
     Result,
     TraceSettings,
     numbers,
@@ -29,11 +29,11 @@ KEEP_BYTES: Final = 2**28
 
 
 class Task(NamedTuple):
-    """The backward half of a block; `kept` is None if it must be traced again."""
+    """The backward half of a block; `record` is None if it must be traced again."""
 
     settings: TraceSettings
-    wanted: Wanted
-    kept: Kept | None
+    needs: GradientNeeds
+    record: RayRecord | None
     slopes: Slopes
 
 
@@ -45,7 +45,7 @@ class Engine(Protocol):
         ...
 
     def run(self, settings: TraceSettings, lens: LensTensors, rays: State, fate: Tensor) -> Result:
-        """Trace a block; an empty `kept.seen` means that it need not be kept."""
+        """Trace a block; an empty `record.states` means that it need not be kept."""
         ...
 
     def pull(self, task: Task, lens: LensTensors, rays: State, fate: Tensor) -> Gradients:
@@ -67,11 +67,11 @@ class Eager:
     def pull(self, task: Task, lens: LensTensors, rays: State, fate: Tensor) -> Gradients:
         """Return the gradients of a block."""
         surfaces = numbers(lens)
-        kept = task.kept
-        if kept is None:
-            kept = run(task.settings, surfaces, rays, fate).kept
+        record = task.record
+        if record is None:
+            record = run(task.settings, surfaces, rays, fate).record
         rays = rest(rays, fate, adaptive=task.settings.adaptive)
-        return pull_back(task.settings, task.wanted, surfaces, rays, kept, task.slopes, _sum_to)
+        return pull_back(task.settings, task.needs, surfaces, rays, record, task.slopes, _sum_to)
 
 
 def _sum_to(value: Tensor, like: Tensor) -> Tensor:
@@ -134,7 +134,7 @@ def trace_tensors(
         lens: Tensors of one type and device, broadcasting against the rays.
         rays: Of the same type and device.
         fate: int8.
-        with_seen: Whether `kept.seen` and `kept.fates` of the result are filled.
+        with_seen: Whether `record.states` and `record.fates` of the result are filled.
     """
     spec = _Spec(settings, engine, with_seen)
     flat: tuple[Tensor, ...] = _Trace.apply(spec, fate, *rays, *lens)  # type: ignore[no-untyped-call]
@@ -142,17 +142,19 @@ def trace_tensors(
     return Result(
         State(*flat[:6]),
         flat[7] if settings.path else None,
-        Kept(flat[6], *_unflatten(flat[head:])),
+        RayRecord(flat[6], *_unflatten(flat[head:])),
     )
 
 
-def _flatten(kept: Kept) -> list[Tensor]:
-    return [v for state, fate in zip(kept.seen, kept.fates, strict=True) for v in (*state, fate)]
+def _flatten(record: RayRecord) -> list[Tensor]:
+    return [
+        v for state, fate in zip(record.states, record.fates, strict=True) for v in (*state, fate)
+    ]
 
 
 def _unflatten(flat: Sequence[Tensor]) -> tuple[list[State], list[Tensor]]:
-    seen = [State(*flat[i : i + 6]) for i in range(0, len(flat), 7)]
-    return seen, list(flat[6::7])
+    states = [State(*flat[i : i + 6]) for i in range(0, len(flat), 7)]
+    return states, list(flat[6::7])
 
 
 def _part(
@@ -186,11 +188,13 @@ class _Trace(torch.autograd.Function):
         whole: list[_Block | None] = [None]
         for block in blocks or whole:
             result = spec.engine.run(spec.settings, *_part(block, lens, rays, fate))
-            flat = _flatten(result.kept)
+            flat = _flatten(result.record)
             counts.append(len(flat) + 1 if keep and flat else 0)
-            saved += [result.kept.fate, *flat][: counts[-1]]
+            saved += [result.record.fate, *flat][: counts[-1]]
             path = [] if result.path is None else [result.path]
-            parts.append([*result.end, result.kept.fate, *path, *(flat if spec.with_seen else [])])
+            parts.append(
+                [*result.end, result.record.fate, *path, *(flat if spec.with_seen else [])]
+            )
         out = tuple(_join(v, blocks) for v in zip(*parts, strict=True))
         ctx.save_for_backward(fate, *tensors, *saved)
         ctx.spec, ctx.shape, ctx.blocks, ctx.counts = spec, shape, blocks, counts
@@ -205,7 +209,7 @@ class _Trace(torch.autograd.Function):
         saved = ctx.saved_tensors[13:]
         rays, lens = State(*(v.expand(ctx.shape) for v in tensors[:6])), LensTensors(*tensors[6:])
         needs = ctx.needs_input_grad[2:]
-        wanted = Wanted(
+        gradient_needs = GradientNeeds(
             rays=any(needs[:6]),
             curvature=needs[6],
             conic=needs[7],
@@ -220,15 +224,20 @@ class _Trace(torch.autograd.Function):
         parts: list[State] = []
         for block, count in zip(blocks, ctx.counts, strict=True):
             here, saved = saved[:count], saved[count:]
-            kept = Kept(here[0], *_unflatten(here[1:])) if here else None
+            record = RayRecord(here[0], *_unflatten(here[1:])) if here else None
             cut = [v if v is None or block is None else block.of(v) for v in slopes]
             part = _part(block, lens, rays, fate)
-            task = Task(ctx.spec.settings, wanted, kept, _slopes(ctx.spec.settings, cut, part[1].x))
-            found = ctx.spec.engine.pull(task, *part)
-            parts.append(found.rays)
-            _add(sums, found, block)
+            task = Task(
+                ctx.spec.settings,
+                gradient_needs,
+                record,
+                _slopes(ctx.spec.settings, cut, part[1].x),
+            )
+            gradients = ctx.spec.engine.pull(task, *part)
+            parts.append(gradients.rays)
+            _add(sums, gradients, block)
         of_rays: list[Tensor | None] = [None] * 6
-        if wanted.rays:
+        if gradient_needs.rays:
             joined = (_join(v, ctx.blocks) for v in zip(*parts, strict=True))
             of_rays = [v.sum_to_size(t.shape) for v, t in zip(joined, tensors[:6], strict=True)]
         return (None, None, *of_rays, *sums)
@@ -246,14 +255,21 @@ def _slopes(settings: TraceSettings, flat: Sequence[Tensor | None], like: Tensor
 
     head = 7 + settings.path
     rows = [flat[i : i + 6] for i in range(head, len(flat), 7)]
-    seen = [None if all(v is None for v in row) else state(row) for row in rows]
-    seen = seen or [None] * len(settings.aspheric)
-    return Slopes(state(flat[:6]), flat[7] if settings.path else None, seen)
+    states = [None if all(v is None for v in row) else state(row) for row in rows]
+    states = states or [None] * len(settings.aspheric)
+    return Slopes(state(flat[:6]), flat[7] if settings.path else None, states)
 
 
-def _add(sums: Sequence[Tensor | None], found: Gradients, block: _Block | None) -> None:
-    rows = [torch.stack(row) for row in found.even_asphere if row]
-    columns = [found.curvature, found.conic, rows, found.thickness, [], found.indices]
+def _add(sums: Sequence[Tensor | None], gradients: Gradients, block: _Block | None) -> None:
+    rows = [torch.stack(row) for row in gradients.even_asphere if row]
+    columns = [
+        gradients.curvature,
+        gradients.conic,
+        rows,
+        gradients.thickness,
+        [],
+        gradients.indices,
+    ]
     for total, values, fixed in zip(sums, columns, FIXED, strict=True):
         if total is not None and values:
             part = total if block is None else block.of(total, fixed)

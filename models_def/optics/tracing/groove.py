@@ -69,12 +69,12 @@ def ring_number(p: Numbers, rho: Tensor, groove: Groove) -> Tensor:
 def meet_grooves(p: Numbers, at: State, groove: Groove, *, adaptive: bool) -> GrooveMeeting:
     """Return the points at which rays from the vertex plane meet a grooved surface."""
     depth = groove.depth_mm
-    above = heights(p, torch.addcmul(at.x * at.x, at.y, at.y)).height
+    height = heights(p, torch.addcmul(at.x * at.x, at.y, at.y)).height
     if not groove.walls:
-        ring = torch.trunc(above / depth)
+        ring = torch.trunc(height / depth)
         return GrooveMeeting(_meet_ring(p, at, ring, groove, adaptive=adaptive), ring, None)
     # a relief of negative heights begins a depth before the vertex plane
-    lead = torch.where(above < 0, -depth / at.n, 0.0)
+    lead = torch.where(height < 0, -depth / at.n, 0.0)
     entered = ring_number(p, _rho(at, lead), groove)
     first = _meet_ring(p, at, entered, groove, adaptive=adaptive)
     # where the ray left the ring that it had entered, it may meet the next one
@@ -102,12 +102,12 @@ def _in_fillet(hit: Meeting, ring: Tensor, groove: Groove) -> Tensor:
     deep = hit.z.abs()
     # the foot is where the relief is deepest in the solid
     at_full_depth = (hit.z >= 0) == groove.solid_after
-    left = torch.where(at_full_depth, groove.depth_mm - deep, deep)
+    rest_mm = torch.where(at_full_depth, groove.depth_mm - deep, deep)
     # the ring around the vertex plane has no wall at height 0
     has_foot = at_full_depth | (ring != 0)
     slope = hit.lean.abs() * torch.sqrt(hit.rho)
     sine = slope / torch.sqrt(1 + slope * slope)
-    return has_foot & (left < groove.tool_radius_mm * (1 + sine) * slope)
+    return has_foot & (rest_mm < groove.tool_radius_mm * (1 + sine) * slope)
 
 
 def meets_again(

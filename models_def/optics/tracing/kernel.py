@@ -82,11 +82,11 @@ def numbers(lens: LensTensors) -> list[Numbers]:
     ]
 
 
-class Kept(NamedTuple):
+class RayRecord(NamedTuple):
     """The inputs of the adjoint: the last fate, rays on each surface and their fates."""
 
     fate: Tensor
-    seen: list[State]
+    states: list[State]
     fates: list[Tensor]
 
 
@@ -95,7 +95,7 @@ class Result(NamedTuple):
 
     end: State
     path: Tensor | None
-    kept: Kept
+    record: RayRecord
 
 
 def run(settings: TraceSettings, lens: Sequence[Numbers], rays: State, fate: Tensor) -> Result:
@@ -111,19 +111,19 @@ def run(settings: TraceSettings, lens: Sequence[Numbers], rays: State, fate: Ten
     # counted in the type of the rays: loops over bytes do not vectorise
     code, fate = fate, fate.to(state.x.dtype)
     path: Tensor | None = torch.zeros_like(state.x) if settings.path else None
-    seen: list[State] = []
+    states: list[State] = []
     fates: list[Tensor] = []
     shapes = zip(settings.aspheric, settings.grooves, strict=True)
     for p, shape in zip(lens, shapes, strict=True):
         state, way, now = cross(p, state, fate, shape, adaptive=settings.adaptive)
         code, fate = code if now is fate else now.to(torch.int8), now
         path = None if path is None else path + p.before * way
-        seen.append(state)
+        states.append(state)
         fates.append(code)
         state = state._replace(z=state.z - p.gap)
     state, way = to_plane(state)
     path = None if path is None else path + lens[-1].after * way
-    return Result(state, path, Kept(code, seen, fates))
+    return Result(state, path, RayRecord(code, states, fates))
 
 
 def rest(state: State, fate: Tensor, *, adaptive: bool, n: float = 1.0) -> State:
@@ -163,7 +163,7 @@ def cross(
     bend = (root - hit.facing * p.ratio) / hit.length2
     turn = bend * hit.lean
     lift = at.n * p.ratio
-    n = lift + bend if hit.up is None else torch.addcmul(lift, bend, hit.up)
+    n = lift + bend if hit.normal_z is None else torch.addcmul(lift, bend, hit.normal_z)
     bent = State(
         x=hit.x,
         y=hit.y,
@@ -174,48 +174,48 @@ def cross(
     )
     way = lead + hit.way
     transmits, onward = Bound(square, TINY), Bound(n, MIN_COSINE)
-    bounds = [*hit.exists, transmits, onward, *([hit.found] if hit.found else [])]
-    lost = _Lost()
+    bounds = [*hit.exists, transmits, onward, *([hit.converged] if hit.converged else [])]
+    losses = _GrooveLosses()
     if groove is not None and met is not None and met.wall is not None:
-        lost = _Lost(met.wall, meets_again(p, met, bent, groove, adaptive=adaptive))
-    inside = adaptive and bool(hit.rho.amax() <= p.reach.amin()) and not lost.any()
+        losses = _GrooveLosses(met.wall, meets_again(p, met, bent, groove, adaptive=adaptive))
+    inside = adaptive and bool(hit.rho.amax() <= p.reach.amin()) and not losses.any()
     if inside and all(bound.all() for bound in bounds):
         return rest(bent, fate, adaptive=True), way, fate
-    fate = torch.where(fate == 0, _judge(p, hit, (transmits, onward), lost), fate)
+    fate = torch.where(fate == 0, _judge(p, hit, (transmits, onward), losses), fate)
     return rest(bent, fate, adaptive=adaptive), way, fate
 
 
-class _Lost(NamedTuple):
+class _GrooveLosses(NamedTuple):
     """The rays that a groove took: at its wall, or by being met again; None for none."""
 
     wall: Tensor | None = None
-    again: Tensor | None = None
+    second_hit: Tensor | None = None
 
     def any(self) -> bool:
         """Return whether it took one."""
         return any(mask is not None and bool(mask.any()) for mask in self)
 
 
-def _judge(p: Numbers, hit: Meeting, bends: tuple[Bound, Bound], lost: _Lost) -> Tensor:
+def _judge(p: Numbers, hit: Meeting, bends: tuple[Bound, Bound], losses: _GrooveLosses) -> Tensor:
     """Return the first thing that is wrong with each ray, in the order of the light, as floats.
 
     Args:
         p: The surface.
         hit: Where they met it.
         bends: That a ray is refracted, and that it goes on.
-        lost: To grooves.
+        losses: To grooves.
     """
     transmits, onward = bends
     new = torch.zeros_like(hit.x)
-    if lost.again is not None:
-        new = torch.where(lost.again, SECOND_HIT, new)
+    if losses.second_hit is not None:
+        new = torch.where(losses.second_hit, SECOND_HIT, new)
     new = torch.where(onward.value > onward.least, new, MISSED)
     new = torch.where(transmits.value > transmits.least, new, TOTAL_REFLECTION)
-    if lost.wall is not None:
-        new = torch.where(lost.wall, GROOVE_WALL, new)
+    if losses.wall is not None:
+        new = torch.where(losses.wall, GROOVE_WALL, new)
     new = torch.where(hit.rho <= p.reach, new, VIGNETTED)
-    if hit.found is not None:
-        new = torch.where(hit.found.value > hit.found.least, new, NOT_CONVERGED)
+    if hit.converged is not None:
+        new = torch.where(hit.converged.value > hit.converged.least, new, NOT_CONVERGED)
     for bound in hit.exists:
         new = torch.where(bound.value > bound.least, new, MISSED)
     return new

@@ -76,9 +76,9 @@ class Bound(NamedTuple):
 class Meeting(NamedTuple):
     """Rays on a surface, before refraction.
 
-    The normal is N = (-lean x, -lean y, up), up = 1 if None; `length2` = N.N, `facing` = N.d,
+    The normal is N = (-lean x, -lean y, normal_z), where None is 1; `length2` = N.N, `facing` N.d,
     `facing2` its square. There is an intersection where all of `exists` holds, and it was found
-    where `found` does.
+    where `converged` does.
     """
 
     x: Tensor
@@ -87,12 +87,12 @@ class Meeting(NamedTuple):
     rho: Tensor
     way: Tensor
     lean: Tensor
-    up: Tensor | None
+    normal_z: Tensor | None
     length2: Tensor
     facing: Tensor
     facing2: Tensor
     exists: list[Bound]
-    found: Bound | None
+    converged: Bound | None
 
 
 def meet_conic(p: Numbers, at: State) -> Meeting:
@@ -101,7 +101,7 @@ def meet_conic(p: Numbers, at: State) -> Meeting:
     x, y = torch.addcmul(at.x, way, at.l), torch.addcmul(at.y, way, at.m)
     z = way * at.n
     rho = torch.addcmul(x * x, y, y)
-    up = 1 - z * p.kc
+    normal_z = 1 - z * p.kc
     return Meeting(
         x=x,
         y=y,
@@ -109,12 +109,12 @@ def meet_conic(p: Numbers, at: State) -> Meeting:
         rho=rho,
         way=way,
         lean=p.c,
-        up=up,
+        normal_z=normal_z,
         length2=1 - rho * p.pinch,
         facing=root,
         facing2=square,
-        exists=[*exists, Bound(up, MIN_SLOPE)],
-        found=None,
+        exists=[*exists, Bound(normal_z, MIN_SLOPE)],
+        converged=None,
     )
 
 
@@ -187,12 +187,12 @@ def meet_asphere(p: Numbers, at: State, *, adaptive: bool, drop: Tensor | None =
         rho=rho,
         way=way,
         lean=lean,
-        up=None,
+        normal_z=None,
         length2=length2,
         facing=facing,
         facing2=facing2,
         exists=exists,
-        found=Bound(-gap.abs(), -NEWTON_TOLERANCE_MM[way.dtype]),
+        converged=Bound(-gap.abs(), -NEWTON_TOLERANCE_MM[way.dtype]),
     )
 
 

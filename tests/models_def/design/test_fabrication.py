@@ -112,6 +112,6 @@ def test_captures_come_through_copies_and_gradients_reach_the_lens(parts: Design
 
 def test_without_a_change_a_batch_is_traced_as_it_is(parts: DesignParts) -> None:
     problem, scaled = parts.lens.problem, parts.lens.scaled().detach()[None]
-    plain = trace_batch(problem, scaled, torch.inf).landed.y
-    same = trace_batch(problem, scaled, torch.inf, lambda tensors, _reference: tensors).landed.y
+    plain = trace_batch(problem, scaled, torch.inf).landings.y
+    same = trace_batch(problem, scaled, torch.inf, lambda tensors, _reference: tensors).landings.y
     assert torch.equal(plain, same)

@@ -63,7 +63,7 @@ def test_from_far_off_the_best_start_loses_no_ray_and_keeps_the_focal_length(
     begin = problem.free.scaled()
     found = best_starts(problem, Starts(count=8))[0]
     assert float(valid_share(problem, found[None])) == 1
-    assert paraxial_data(problem.free.made(found)).efl_mm == pytest.approx(50, abs=1e-6)
+    assert paraxial_data(problem.free.lens_at(found)).efl_mm == pytest.approx(50, abs=1e-6)
     assert merit(problem, found) < 0.6 * merit(problem, begin)
 
 

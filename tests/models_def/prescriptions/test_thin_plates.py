@@ -10,14 +10,14 @@ from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.thin.peak import Peak, measure_peak
 from camkit.models_def.optics.thin.plate_lens import plate_lens
 from camkit.models_def.optics.thin.recipe import find_thin_recipe
-from camkit.models_def.optics.thin.report import between, with_ideal_grooves
+from camkit.models_def.optics.thin.report import with_ideal_grooves, with_midpoints
 from camkit.models_def.optics.thin.solver import solve_plate
 
 PITCH_UM = 5.96
 
 
 def _peaks(lens: Lens) -> list[Peak]:
-    return [measure_peak(lens, a, 0.55, PITCH_UM) for a in between(lens.field_angles_rad)]
+    return [measure_peak(lens, a, 0.55, PITCH_UM) for a in with_midpoints(lens.field_angles_rad)]
 
 
 def test_ideal_grooves_hold_an_eighth_of_the_light_in_every_field() -> None:

@@ -76,7 +76,7 @@ def optimize(
     problem = in_own_frame(problem, begin)
     with working(f"improving {lens.name}"):
         result = improve(problem, begin, starts=starts, spread=spread, steps=steps, seed=seed)
-    better = problem.free.made(result.scaled)
+    better = problem.free.lens_at(result.scaled)
     write_lens(better, out)
     notes = [
         *read_notes,

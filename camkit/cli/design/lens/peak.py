@@ -69,9 +69,9 @@ def measured(
     lens: "Lens", field_angles_rad: Sequence[float], pitch_um: float, *, waves: bool
 ) -> dict[str, Any]:
     """Return the report on a lens as JSON values; waves at the first, middle and last field."""
-    from camkit.models_def.optics.thin.report import between, report_peaks, to_json
+    from camkit.models_def.optics.thin.report import report_peaks, to_json, with_midpoints
 
-    fields = between(field_angles_rad)
+    fields = with_midpoints(field_angles_rad)
     wave_fields = sorted({0, len(fields) // 2, len(fields) - 1}) if waves else []
     with working("measuring peaks", unit="peaks", is_even=not waves) as task:
         peaks = report_peaks(

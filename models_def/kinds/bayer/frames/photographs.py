@@ -113,13 +113,13 @@ def freeze_copies(recipe: BayerRecipe, lens: Lens, tell: Tell) -> tuple[FrozenOp
     pitch_um = sensor.pixel_pitch_um
     corner_px = corner_height_mm(sensor) / to_mm(pitch_um)
     grid = HazyGrid(rays=COPY_RAYS)
-    about = find_middles(lens, corner_px, pitch_um, grid.rays).about
+    middle = find_middles(lens, corner_px, pitch_um, grid.rays).middle
     frozen: list[FrozenOptics] = []
     for number, copy in enumerate(focused_copies(lens, 1 + count, choices.seed)[1:]):
         stated_mm = choices.distance_of(number)
         distance_mm = lens.object_distance_mm if stated_mm is None else stated_mm
-        used = replace(copy, object_distance_mm=distance_mm)
-        frozen.append(freeze_hazy(used, sensor, grid, about=about)[0])
+        focused = replace(copy, object_distance_mm=distance_mm)
+        frozen.append(freeze_hazy(focused, sensor, grid, middle=middle)[0])
         at = "" if stated_mm is None else f" at {depth_name(stated_mm)}"
         tell(f"copy {len(frozen)} of {count} frozen{at}")
     return tuple(frozen)

@@ -49,7 +49,7 @@ def test_what_is_lost_counts_as_missing_and_the_rest_as_all() -> None:
         x_px=np.array([0.0, 30.0]),
         y_px=np.array([100.0, 1200.0]),
         share=np.array([0.5, 0.25]),
-        lost={"wall": 0.25},
+        losses={"wall": 0.25},
     )
     image = image_of(light, 100.0, 0.3, 6e-3, 0.8)
     assert image.lost_share == pytest.approx(0.25)

@@ -3,7 +3,7 @@ import pytest
 
 from camkit.models_def.kinds.spad.sampling import gaussian_psf
 from camkit.models_def.optics.dots.gerchberg_saxton import gerchberg_saxton
-from camkit.models_def.optics.dots.levels import descend, level_field, moved, rounded
+from camkit.models_def.optics.dots.levels import descend, level_field, rounded, shifted_orders
 from camkit.models_def.optics.dots.merit import Merit
 from camkit.models_def.optics.dots.orders import intensity, order_matrix, orders_of
 from camkit.models_def.optics.dots.target import to_target
@@ -21,7 +21,7 @@ def test_an_update_of_one_cell_is_the_sum_made_anew() -> None:
     level = np.random.default_rng(0).integers(0, LEVELS, (CELLS, CELLS))
     fields = level_field(LEVELS)
     dots = orders_of(fields[level], MATRIX)
-    tried = moved(dots, (3, 11), fields - fields[level[3, 11]], MATRIX)
+    tried = shifted_orders(dots, (3, 11), fields - fields[level[3, 11]], MATRIX)
     for number in range(LEVELS):
         level[3, 11] = number
         anew = orders_of(fields[level], MATRIX)

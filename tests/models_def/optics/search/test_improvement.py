@@ -31,7 +31,7 @@ def test_all_depths_count(near_problem: Problem) -> None:
     for depths in ((1000.0,), (1000.0, 700.0), (700.0,)):
         given = replace(near_problem, free=free, object_distances_mm=depths)
         found = improve(given, begin[-1:], starts=1, steps=20)
-        places.append(float(free.made(found.scaled).surfaces[-1].thickness_mm))
+        places.append(float(free.lens_at(found.scaled).surfaces[-1].thickness_mm))
     assert places[0] < places[1] < places[2]
 
 
@@ -50,7 +50,7 @@ def test_aspheric_terms_leave_the_power_alone(lens: Lens) -> None:
     assert all(v.term >= 1 for v in free.variables if v.kind == "even_asphere")
     scaled = free.scaled()
     scaled[0] = 1.0
-    assert paraxial_data(free.made(scaled)).efl_mm == pytest.approx(paraxial_data(lens).efl_mm)
+    assert paraxial_data(free.lens_at(scaled)).efl_mm == pytest.approx(paraxial_data(lens).efl_mm)
 
 
 def test_nothing_free_is_an_error_that_says_what_to_do(lens: Lens) -> None:

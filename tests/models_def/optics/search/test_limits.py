@@ -88,7 +88,7 @@ def test_the_slope_of_the_limits_brings_lost_rays_back(problem: Problem) -> None
     assert float(valid_share(given, bent.detach())) < 1
     traced = trace_batch(given, bent, torch.inf)
     rays = ray_residuals(
-        traced.tensors, leading(traced.launched), [leading(rays) for rays in traced.seen]
+        traced.tensors, leading(traced.launched), [leading(rays) for rays in traced.surface_rays]
     )
     (slope,) = torch.autograd.grad(rays.square().sum(), bent)
     assert float(slope) > 0

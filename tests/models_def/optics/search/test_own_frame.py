@@ -56,7 +56,7 @@ def test_vignetting_factors_are_those_of_rays_that_pass_the_rims() -> None:
     framed = in_own_frame(problem, begin)
     assert framed.vignetting is not None
     # all that is left passes, and it is as much as the tracer with rims lets through
-    seen = trace_batch(framed, begin[None], math.inf).seen
+    seen = trace_batch(framed, begin[None], math.inf).surface_rays
     for i in (0, len(lens.surfaces) - 1):
         reach = torch.hypot(seen[i].x, seen[i].y)[..., LEAD:]
         assert float(reach.max()) < 6.0 * 1.05, "an ellipse is a little more than what passes"

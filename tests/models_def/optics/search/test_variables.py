@@ -18,7 +18,7 @@ WAVES_UM = torch.tensor([0.48, 0.55, 0.65], dtype=torch.float64)
 
 def test_a_lens_made_of_its_own_numbers_is_that_lens(free: FreeLens, lens: Lens) -> None:
     unsolved = FreeLens(lens=lens, variables=free.variables)
-    for one, other in zip(unsolved.made(unsolved.scaled()).surfaces, lens.surfaces, strict=True):
+    for one, other in zip(unsolved.lens_at(unsolved.scaled()).surfaces, lens.surfaces, strict=True):
         assert one.curvature_per_mm == pytest.approx(other.curvature_per_mm, rel=1e-12)
         assert one.thickness_mm == pytest.approx(other.thickness_mm, rel=1e-12)
         assert one.conic == pytest.approx(other.conic, abs=1e-12)
@@ -37,7 +37,7 @@ def test_every_lens_keeps_the_focal_length_and_rides_on_its_image(free: FreeLens
     for _ in range(4):
         scaled = torch.rand(len(free.variables), generator=generator, dtype=torch.float64)
         scaled[-1] = 0.5  # no defocus
-        made = free.made(scaled)
+        made = free.lens_at(scaled)
         data = paraxial_data(made)
         assert data.efl_mm == pytest.approx(50.0, rel=1e-10)
         # the lens began out of focus: what it rides on is the image plus that
@@ -50,7 +50,7 @@ def test_a_batch_equals_its_lenses_one_by_one(free: FreeLens) -> None:
     batch = torch.rand(3, len(free.variables), generator=generator, dtype=torch.float64)
     together = free.tensors(batch, WAVES_UM)
     for i, scaled in enumerate(batch):
-        alone = surface_tensors(free.made(scaled), WAVES_UM)
+        alone = surface_tensors(free.lens_at(scaled), WAVES_UM)
         for name in ("curvature_per_mm", "conic", "thickness_mm"):
             found = getattr(together, name)[:, i, 0, 0, 0]
             torch.testing.assert_close(found, getattr(alone, name), rtol=1e-12, atol=1e-12)

@@ -21,14 +21,14 @@ RAYS = 2000
 
 def test_a_plate_has_peaks_and_an_asphere_has_none_far_out() -> None:
     plate = find_middles(read_lens(Path("thin-plate")), CORNER_PX, PITCH_UM, RAYS)
-    assert plate.about == PEAK
+    assert plate.middle == PEAK
     asphere = read_lens(Path("al2550-a"))
-    assert find_middles(asphere, CORNER_PX, 5.0, RAYS).about == PEAK  # 1.75 mm from the axis
-    assert find_middles(asphere, 3600.0, 5.96, RAYS).about == CHIEF_RAY
+    assert find_middles(asphere, CORNER_PX, 5.0, RAYS).middle == PEAK  # 1.75 mm from the axis
+    assert find_middles(asphere, 3600.0, 5.96, RAYS).middle == CHIEF_RAY
     # what was chosen for another distance holds
     for lens, about in ((read_lens(Path("thin-plate")), CHIEF_RAY), (asphere, PEAK)):
         told = find_middles(lens, 2000.0, 5.96, RAYS, about)
-        assert told.about == about
+        assert told.middle == about
         assert told.heights_px(lens, np.array([told.corner_rad]), 5.96, RAYS)[0] == pytest.approx(
             2000.0, rel=0.01
         )

@@ -7,17 +7,17 @@ import pytest
 from camkit.models_def.optics.grooves import Grooves
 from camkit.models_def.optics.thin.report import (
     band_wavelengths_um,
-    between,
     report_peaks,
     to_json,
     to_text,
     with_ideal_grooves,
+    with_midpoints,
 )
 from tests.thin_factory import perfect_lens
 
 
 def test_middles_stand_between_the_fields() -> None:
-    assert between([0.0, 0.2, 0.3]) == pytest.approx((0.0, 0.1, 0.2, 0.25, 0.3))
+    assert with_midpoints([0.0, 0.2, 0.3]) == pytest.approx((0.0, 0.1, 0.2, 0.25, 0.3))
 
 
 def test_bands_lie_about_their_colour() -> None:

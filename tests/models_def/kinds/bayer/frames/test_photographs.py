@@ -133,7 +133,7 @@ def test_copies_are_frozen_at_the_distances_of_the_recipe_in_turn(
     assert len(made) == 4
     assert seen == [500.0, 2000.0, np.inf, 500.0]
     assert told[1] == "copy 2 of 4 frozen at 2 m"
-    assert abouts == {find_middles(lens, 33.0, 5.96, 500).about}
+    assert abouts == {find_middles(lens, 33.0, 5.96, 500).middle}
     seen.clear()
     usual = replace(recipe, lens=replace(recipe.lens, copies=1, validation_copies=1))
     photographs.freeze_copies(usual, lens, told.append)

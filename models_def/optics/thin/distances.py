@@ -59,42 +59,42 @@ def freeze_distances(
         return freeze_hazy(replace(lens, object_distance_mm=distance_mm), sensor, grid)
 
     own_mm = lens.object_distance_mm
-    own, of_own = frozen(own_mm)
-    found = {own_mm: own}
+    focused, of_own = frozen(own_mm)
+    by_distance = {own_mm: focused}
     for distance_mm in (d for d in distances_mm if d != own_mm):
         try:
             optics, report = frozen(distance_mm)
         except ContractError as error:
-            said = f"left out, {error}"
+            verdict = f"left out, {error}"
         else:
-            about = report["about"]
-            said = "kept" if about == of_own["about"] else f"left out, by its {about}"
-            if about == of_own["about"]:
-                found[distance_mm] = optics
-        tell(f"object at {depth_name(distance_mm)}: {said}")
-    if len(found) == 1:
+            middle = report["about"]
+            verdict = "kept" if middle == of_own["about"] else f"left out, by its {middle}"
+            if middle == of_own["about"]:
+                by_distance[distance_mm] = optics
+        tell(f"object at {depth_name(distance_mm)}: {verdict}")
+    if len(by_distance) == 1:
         raise ContractError(f"{lens.name} is known at no other distance than its own")
-    return _stacked({distance: found[distance] for distance in sorted(found)}, own)
+    return _stacked({distance: by_distance[distance] for distance in sorted(by_distance)}, focused)
 
 
-def _stacked(found: dict[float, FrozenOptics], own: FrozenOptics) -> FrozenOptics:
+def _stacked(by_distance: dict[float, FrozenOptics], focused: FrozenOptics) -> FrozenOptics:
     """Stack distances side by side, with the places of one of them."""
-    hazes = [optics.haze for optics in found.values() if optics.haze is not None]
-    assert own.haze is not None
+    hazes = [optics.haze for optics in by_distance.values() if optics.haze is not None]
+    assert focused.haze is not None
     side = max(haze.kernels.shape[-1] for haze in hazes)
-    depths_mm = np.array(list(found))
+    depths_mm = np.array(list(by_distance))
 
     def padded(kernels: FloatArray) -> FloatArray:
-        around = (side - kernels.shape[-1]) // 2
-        return np.pad(kernels, [(0, 0)] * 3 + [(around, around)] * 2)
+        margin = (side - kernels.shape[-1]) // 2
+        return np.pad(kernels, [(0, 0)] * 3 + [(margin, margin)] * 2)
 
     psf = replace(
-        own.psf,
-        kernels=np.concatenate([optics.psf.kernels for optics in found.values()], axis=1),
+        focused.psf,
+        kernels=np.concatenate([optics.psf.kernels for optics in by_distance.values()], axis=1),
         depths_mm=depths_mm,
     )
     haze = replace(
-        own.haze,
+        focused.haze,
         kernels=np.concatenate([padded(haze.kernels) for haze in hazes], axis=1),
         core_share=np.concatenate([haze.core_share for haze in hazes], axis=1),
         depths_mm=depths_mm,

@@ -12,9 +12,9 @@ from camkit.bundle.sensor import Extent
 from camkit.errors import ContractError
 from camkit.haze import Haze
 from camkit.models_def.optics.thin import nearer
+from camkit.models_def.optics.thin.distances import freeze_distances
 from camkit.models_def.optics.thin.freezing import HazyGrid, freeze_hazy
 from camkit.models_def.optics.thin.middle import Middle
-from camkit.models_def.optics.thin.nearer import freeze_distances
 from tests.bundle_factory import tiny_sensor
 from tests.thin_factory import perfect_lens
 
