@@ -15,21 +15,21 @@ from camkit.cli.design.export import export
 from camkit.cli.design.fit_bank import fit_bank
 from camkit.cli.design.freeze import freeze
 from camkit.cli.design.freeze_norms import freeze_norms
-from camkit.cli.design.lens.app import lens_app
-from camkit.cli.design.plate.app import plate_app
+from camkit.cli.design.lens.lens_app import lens_app
+from camkit.cli.design.plate.plate_app import plate_app
 from camkit.cli.design.prepare import prepare
 from camkit.cli.design.train import train
 from camkit.cli.exit_code import ExitCode, exit_code_of
 from camkit.cli.groups import JUDGE, MAKE, MEASURE, USE, add_application, add_command
 from camkit.cli.interrupts import none_is_lost
-from camkit.cli.judge.analyse.app import analyse_app
+from camkit.cli.judge.analyse.analyse_app import analyse_app
 from camkit.cli.judge.bench import bench
 from camkit.cli.judge.check import check
 from camkit.cli.judge.doctor import doctor
 from camkit.cli.judge.stress import stress
 from camkit.cli.progress import showing_progress
 from camkit.cli.say import plain, say
-from camkit.cli.use.calibrate.app import calibrate_app
+from camkit.cli.use.calibrate.calibrate_app import calibrate_app
 from camkit.cli.use.info import info
 from camkit.cli.use.merge import merge
 from camkit.cli.use.plan import plan

@@ -8,7 +8,7 @@ The tools find it by `camkit.report.kind_finder`.
 from dataclasses import dataclass, field
 
 from camkit.report.bench.part import BenchPart
-from camkit.report.stress.part import StressPart
+from camkit.report.stress.stress_part import StressPart
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

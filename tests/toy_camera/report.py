@@ -8,11 +8,11 @@ import numpy as np
 from camkit.report.bench.part import BenchPart, RowMaker
 from camkit.report.bench.trial import Axes, Entrant, Ground, Skip, Trial
 from camkit.report.kind import ReportPart
-from camkit.report.stress.part import StressPart
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
 from camkit.report.stress.shot import Shot
+from camkit.report.stress.stress_part import StressPart
 from camkit.runtime.twin.exposure import Setting
 
 

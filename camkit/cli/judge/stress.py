@@ -12,7 +12,7 @@ from camkit.errors import ContractError
 from camkit.progress import Task, working
 
 if TYPE_CHECKING:
-    from camkit.report.stress.run import Progress
+    from camkit.report.stress.stress_run import Progress
 
 
 def stress(
@@ -54,8 +54,13 @@ def stress(
 ) -> None:
     """Sweep one degradation at a time and report where the network stops helping."""
     from camkit.bundle.reader import find_bundle, open_bundle
-    from camkit.report.stress.run import StressOptions, run_stress, scenarios_for, write_envelope
     from camkit.report.stress.scenario import choose
+    from camkit.report.stress.stress_run import (
+        StressOptions,
+        run_stress,
+        scenarios_for,
+        write_envelope,
+    )
 
     if list_:
         opened = None if bundle is None else open_bundle(find_bundle(bundle))

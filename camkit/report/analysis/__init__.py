@@ -10,7 +10,7 @@ In the order of the work of `camkit analyse field`:
     frozen_lens    a lens frozen so that it can be photographed with (needs torch)
     physical       a camera of physics alone around frozen optics
     recovery       whole frames photographed and restored, zone by zone
-    field          all of it, as JSON
+    lens_field     all of it, as JSON
     field_charts, field_page   on one page
 
 In the order of the work of `camkit analyse hallucination`:
@@ -19,6 +19,6 @@ In the order of the work of `camkit analyse hallucination`:
     perceptual     how different two pictures look
     patches        both, and the truth, patch by patch
     planted        the control: detail of ours
-    hallucination  all of it, as JSON
+    invented_detail   all of it, as JSON
     hallucination_page   on one page
 """

@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from camkit.report.analysis.field import THESIS_WIDTHS, FieldPoint, LensField
+from camkit.report.analysis.lens_field import THESIS_WIDTHS, FieldPoint, LensField
 from camkit.report.analysis.point_image import DIRECTIONS, PATCH_PX
 from camkit.report.figure import MARKS, Figure, Panel, chart, field_color, hide_ticks, new_figure
 

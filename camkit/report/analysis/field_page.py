@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import Final
 
 from camkit.report.analysis.bars import PAIRS, WHITE
-from camkit.report.analysis.field import THESIS_WIDTHS, FieldOptions, FieldPoint, LensField
 from camkit.report.analysis.field_charts import (
     draw_detection,
     draw_light,
@@ -12,6 +11,7 @@ from camkit.report.analysis.field_charts import (
     draw_peaks,
     draw_recovery,
 )
+from camkit.report.analysis.lens_field import THESIS_WIDTHS, FieldOptions, FieldPoint, LensField
 from camkit.report.figure import to_png
 from camkit.report.pages.page import Page, Picture, Section, Table, to_html
 from camkit.units import to_degrees

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.report.analysis.hallucination import PLANTED, TRUTH, Crop, Method, Report
+from camkit.report.analysis.invented_detail import PLANTED, TRUTH, Crop, Method, Report
 from camkit.report.analysis.patches import MEASURES, summary
 from camkit.report.analysis.point_image import Array
 from camkit.report.analysis.unexplained import LEVEL_PX

@@ -12,13 +12,13 @@ In the order of the work:
     score         the judge of cameras that photograph: PSNR in sensor geometry, and all else
     scenario      what a scenario is, a row that makes one, and how `scenarios/` is discovered
     scenarios/    tables of scenarios, a module for each family
-    part          what a kind of camera brings: scenes, examiner, scenarios
+    stress_part   what a kind of camera brings: scenes, examiner, scenarios
     sweep, curve  values x scenes, journalled so that a run may be resumed
     break_point   where a method stops helping, with its confidence
     measured_ranges   what the runtime may rely on: the `envelope` of the bundle
     report        JSON
     stress_chart, stress_page   curves, and one HTML page with the worst patches
-    run           all of it
+    stress_run    all of it
 
 The digital twin is that of the runtime (`camkit.runtime.twin`). Torch is not needed.
 """

@@ -5,7 +5,7 @@ that photographs says how in `shoot`, and gets PSNR, chi^2 and patches for every
 bundle. One with another judgement brings its own `measure`. Each says in `applies` for which
 bundles it is meant, by asking what a bundle states.
 
-A kind of camera may bring scenarios of its own (`camkit.report.stress.part`): they get the
+A kind of camera may bring scenarios of its own (`camkit.report.stress.stress_part`): they get the
 examiner and the scenes of that kind.
 """
 

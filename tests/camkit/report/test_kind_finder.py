@@ -12,11 +12,11 @@ from camkit.report.bench.part import BenchPart
 from camkit.report.kind import ReportPart
 from camkit.report.kind_finder import find_part
 from camkit.report.quality import expose
-from camkit.report.stress.part import StressPart
-from camkit.report.stress.run import StressOptions, run_stress
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scene import stress_scenes
 from camkit.report.stress.score import judge_of
+from camkit.report.stress.stress_part import StressPart
+from camkit.report.stress.stress_run import StressOptions, run_stress
 from camkit.report.stress.verdict import Outcome, Verdict
 from camkit.runtime.kind import runtime_part
 from camkit.runtime.kind_parts.picture_files import PICTURES

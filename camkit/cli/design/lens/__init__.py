@@ -1,6 +1,6 @@
 """`camkit lens`: commands for one lens file; all of them read .toml and .zmx.
 
-- `app`: the commands joined
+- `lens_app`: the commands joined
 - `show`: a lens on one page
 - `optimize`: a lens made better on spots
 - `tolerance`: fabricated copies, their yield, what to tighten first

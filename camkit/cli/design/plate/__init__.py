@@ -1,8 +1,8 @@
 """`camkit plate`: commands for one plate, a file or a built-in one by its name.
 
-- `app`: the commands joined
-- `show`: a plate on one page
-- `design`: a relief by gradients, from a recipe
+- `plate_app`: the commands joined
+- `plate_show`: a plate on one page
+- `plate_design`: a relief by gradients, from a recipe
 - `masks`: what it is etched through
 - `match`: a plate of dots for a PSF
 - `target`: that PSF, read

@@ -31,7 +31,7 @@ def masks(
 
     require_torch("camkit plate masks")
     from camkit.models_def.optics.diffraction.plate import read_plate
-    from camkit.report.pages.plate.masks import mask_paths, write_masks
+    from camkit.report.pages.plate.mask_files import mask_paths, write_masks
 
     if format_ not in ("png", "tiff"):
         raise ContractError(f"--format is png or tiff; got {format_!r}")

@@ -7,7 +7,7 @@ import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.cli.judge.analyse.outputs import deliver
-from camkit.cli.use.calibrate.outputs import Page, check_page
+from camkit.cli.use.calibrate.calibration_outputs import Page, check_page
 from camkit.errors import ContractError
 from camkit.progress import working
 
@@ -63,7 +63,7 @@ def field(
     frame_px = None if frame is None else _frame_px(frame)
     if pictures is not None and data is None:
         raise ContractError("pictures are those of a folder: give --data too, or no --pictures")
-    from camkit.report.analysis.field import FieldOptions, measure_field, to_json, to_text
+    from camkit.report.analysis.lens_field import FieldOptions, measure_field, to_json, to_text
     from camkit.report.analysis.subject import find_subject
     from camkit.report.quality import list_set, read_picture
 

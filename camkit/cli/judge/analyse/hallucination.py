@@ -7,11 +7,11 @@ import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.cli.judge.analyse.outputs import deliver
-from camkit.cli.use.calibrate.outputs import Page, check_page
+from camkit.cli.use.calibrate.calibration_outputs import Page, check_page
 from camkit.errors import ContractError
 
 if TYPE_CHECKING:
-    from camkit.report.analysis.hallucination import Options, Report
+    from camkit.report.analysis.invented_detail import Options, Report
 
 
 def hallucination(
@@ -49,7 +49,7 @@ def hallucination(
     if crops is not None:
         _check_crops(crops, overwrite=overwrite)
     from camkit.bundle.reader import find_bundle, open_bundle
-    from camkit.report.analysis.hallucination import analyse, to_json, to_text
+    from camkit.report.analysis.invented_detail import analyse, to_json, to_text
     from camkit.report.stress.scene import stress_scenes
 
     options = _options(iso, patch_px, sizes, vgg)
@@ -66,7 +66,7 @@ def hallucination(
 
 
 def _options(iso: float, patch_px: int, sizes: str | None, vgg: Path | None) -> "Options":
-    from camkit.report.analysis.hallucination import Options
+    from camkit.report.analysis.invented_detail import Options
     from camkit.report.analysis.perceptual import VGG, vgg_measure
 
     options = Options(

@@ -1,7 +1,7 @@
 """`camkit calibrate`: a camera measured on photographs of something known, by `camkit.calibrate`.
 
-app       the commands joined
-outputs   options and printed text that they share
+calibrate_app   the commands joined
+calibration_outputs   options and printed text that they share
 psf       the point spread function, from a bracket of a point, of a disc, or from an edge
 geometry  focal length, optical centre and distortion, from photographs of a checkerboard
 flat      relative illumination, from pictures of an uneven display in several poses

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
-from camkit.cli.use.calibrate.outputs import Out, Page, print_result, with_files
+from camkit.cli.use.calibrate.calibration_outputs import Out, Page, print_result, with_files
 
 if TYPE_CHECKING:
     from camkit.calibration.geometry.geometry import Geometry

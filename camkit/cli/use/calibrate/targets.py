@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
-from camkit.cli.use.calibrate.outputs import Page, print_result, with_files
+from camkit.cli.use.calibrate.calibration_outputs import Page, print_result, with_files
 
 LEVELS = "0,16,32,48,64,96,128,160,192,224,255"
 

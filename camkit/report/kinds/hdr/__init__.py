@@ -13,7 +13,7 @@ from camkit.report.kind import ReportPart
 from camkit.report.kinds.hdr.capture import photograph
 from camkit.report.kinds.hdr.hdr_rows import SCENARIOS
 from camkit.report.kinds.hdr.judge import hdr_judge_of
-from camkit.report.stress.part import StressPart
+from camkit.report.stress.stress_part import StressPart
 
 PART: Final = ReportPart(
     bench=BenchPart(photograph=photograph, positions=(0,), isos=(100.0,), source="night"),

@@ -3,6 +3,6 @@
 plate_facts    everything that is computed about a plate, and its JSON
 plate_charts   PSF, light along the streaks, relief
 plate_page     the page
-masks          what a plate is etched through, as images
+mask_files     what a plate is etched through, as images
 dots           a unit of a plate of dots as arrays, and its masks
 """

@@ -11,7 +11,7 @@ from camkit.models_def.optics.dots.effective import effective_psf
 from camkit.models_def.optics.dots.match import Match
 from camkit.models_def.optics.dots.target import FloatGrid, likeness
 from camkit.models_def.optics.dots.unit import DotPlate
-from camkit.report.pages.plate.masks import POLARITY, mask_facts, mask_image
+from camkit.report.pages.plate.mask_files import POLARITY, mask_facts, mask_image
 from camkit.runtime.output.part_file import write_together
 
 PLATE: Final = "plate.npz"

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from camkit.cli.use.calibrate.outputs import print_result, with_files
+from camkit.cli.use.calibrate.calibration_outputs import print_result, with_files
 
 RECORD: dict[str, Any] = {"rms_px": 0.25, "notes": ["small"]}
 OUT, PAGE = Path("facts.toml"), Path("page.html")

@@ -108,7 +108,7 @@ def test_what_is_no_png_is_refused() -> None:
 def test_the_page_needs_no_torch() -> None:
     code = (
         "import sys; sys.modules['torch'] = None; "
-        "import camkit.report.pages.page, camkit.cli.use.calibrate.app"
+        "import camkit.report.pages.page, camkit.cli.use.calibrate.calibrate_app"
     )
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
 

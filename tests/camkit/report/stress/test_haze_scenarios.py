@@ -14,11 +14,11 @@ from camkit.contracts import FloatArray
 from camkit.report.stress.consistency import residual
 from camkit.report.stress.kernel_change import with_transformed
 from camkit.report.stress.rig import Rig
-from camkit.report.stress.run import StressOptions, run_stress
 from camkit.report.stress.scenario import all_scenarios, choose
 from camkit.report.stress.scenarios.lens_rows import black_taken_off, with_split
 from camkit.report.stress.scene import Scene, stress_scenes
 from camkit.report.stress.score import Judge
+from camkit.report.stress.stress_run import StressOptions, run_stress
 from camkit.runtime.bank.haze import hazy_kernels
 from camkit.runtime.geometry.illumination import illumination_band
 from camkit.runtime.twin.exposure import Setting

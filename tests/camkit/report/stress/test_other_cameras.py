@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from camkit.report.stress.run import StressOptions, run_stress
 from camkit.report.stress.scenario import all_scenarios, choose
 from camkit.report.stress.score import judge_of
+from camkit.report.stress.stress_run import StressOptions, run_stress
 from tests.plain_bundle import SIZES, write_bankless_bundle, write_networkless_bundle
 
 

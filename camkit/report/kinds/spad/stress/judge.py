@@ -8,14 +8,14 @@ import numpy as np
 
 from camkit.bundle.reader import Bundle
 from camkit.contracts import FloatArray
-from camkit.report.kinds.spad.stress.scene import SpadScene
-from camkit.report.kinds.spad.stress.score import (
+from camkit.report.kinds.spad.stress.spad_scene import SpadScene
+from camkit.report.kinds.spad.stress.spad_score import (
     depth_errors,
     depth_outcome,
     picture_errors,
     picture_outcome,
 )
-from camkit.report.kinds.spad.stress.shot import (
+from camkit.report.kinds.spad.stress.spad_shot import (
     DepthSetting,
     DepthShot,
     PictureSetting,

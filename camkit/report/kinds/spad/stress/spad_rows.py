@@ -16,9 +16,9 @@ from camkit.contracts import FloatArray
 from camkit.errors import UnsupportedError
 from camkit.report.kinds.spad.stress.judge import SpadJudge
 from camkit.report.kinds.spad.stress.kernels import blurred, etched, opened, shift_kernel, turned
-from camkit.report.kinds.spad.stress.scene import SpadScene
-from camkit.report.kinds.spad.stress.score import OF_DEPTH, OF_PICTURES
-from camkit.report.kinds.spad.stress.shot import (
+from camkit.report.kinds.spad.stress.spad_scene import SpadScene
+from camkit.report.kinds.spad.stress.spad_score import OF_DEPTH, OF_PICTURES
+from camkit.report.kinds.spad.stress.spad_shot import (
     PHOTONS,
     DepthSetting,
     DepthShot,

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
-from camkit.report.kinds.spad.stress.scene import SpadScene
-from camkit.report.kinds.spad.stress.shot import (
+from camkit.report.kinds.spad.stress.spad_scene import SpadScene
+from camkit.report.kinds.spad.stress.spad_shot import (
     DepthSetting,
     DepthShot,
     PictureSetting,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.report.kinds.spad.bicubic import bicubic
-from camkit.report.kinds.spad.stress.shot import DepthShot, PictureShot
+from camkit.report.kinds.spad.stress.spad_shot import DepthShot, PictureShot
 from camkit.runtime.kinds.spad.finer.camera import FineCamera, white_of
 from camkit.runtime.kinds.spad.finer.depth import FineSharpener
 from camkit.runtime.kinds.spad.finer.pictures import finer_frames

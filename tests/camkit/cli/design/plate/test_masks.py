@@ -10,7 +10,7 @@ import pytest
 from camkit.cli.app import run
 from camkit.cli.exit_code import ExitCode
 from camkit.models_def.optics.diffraction.plate import read_plate
-from tests.camkit.cli.design.plate.test_show import PLATE
+from tests.camkit.cli.design.plate.test_plate_show import PLATE
 
 FLOAT32 = 1e-6
 

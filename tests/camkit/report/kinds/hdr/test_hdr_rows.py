@@ -8,9 +8,9 @@ import pytest
 from camkit.bundle.reader import Bundle
 from camkit.report.kinds.hdr import PART
 from camkit.report.kinds.hdr.judge import HdrJudge, HdrShot, hdr_judge_of
-from camkit.report.stress.run import StressOptions, run_stress, scenarios_for
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scene import Scene, stress_scenes
+from camkit.report.stress.stress_run import StressOptions, run_stress, scenarios_for
 from tests.hdr_bundle import write_hdr_bundle
 from tests.wide_bundle import write_wide_bundle
 

@@ -4,7 +4,7 @@ import pytest
 
 from camkit.bundle.reader import Bundle
 from camkit.report.kinds.spad.stress.judge import SpadJudge, spad_judge_of
-from camkit.report.kinds.spad.stress.scene import SpadScene, spad_scenes
+from camkit.report.kinds.spad.stress.spad_scene import SpadScene, spad_scenes
 from tests.spad_bundle import write_spad_bundle
 
 

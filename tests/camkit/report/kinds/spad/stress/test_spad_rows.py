@@ -12,9 +12,9 @@ from camkit.cli.app import run
 from camkit.errors import UnsupportedError
 from camkit.report.kinds.spad.stress import STRESS
 from camkit.report.kinds.spad.stress.judge import SpadJudge
-from camkit.report.kinds.spad.stress.scene import SpadScene
-from camkit.report.kinds.spad.stress.shot import DepthSetting, PictureSetting, PictureShot
 from camkit.report.kinds.spad.stress.spad_rows import gate_like
+from camkit.report.kinds.spad.stress.spad_scene import SpadScene
+from camkit.report.kinds.spad.stress.spad_shot import DepthSetting, PictureSetting, PictureShot
 from camkit.report.stress.scenario import Scenario, all_scenarios
 from camkit.runtime.kinds.spad.pulse import GaussianPulse
 

@@ -8,7 +8,7 @@ import pytest
 
 from camkit.bundle.reader import Bundle
 from camkit.errors import ContractError
-from camkit.report.kinds.spad.stress.scene import spad_scenes
+from camkit.report.kinds.spad.stress.spad_scene import spad_scenes
 from tests.spad_bundle import HEIGHT, SCALE, WIDTH
 
 

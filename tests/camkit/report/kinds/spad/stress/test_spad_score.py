@@ -6,9 +6,13 @@ import numpy as np
 import pytest
 
 from camkit.report.kinds.spad.stress.judge import SpadJudge
-from camkit.report.kinds.spad.stress.scene import SpadScene
-from camkit.report.kinds.spad.stress.score import depth_outcome, picture_errors, picture_outcome
-from camkit.report.kinds.spad.stress.shot import DepthSetting, DepthShot
+from camkit.report.kinds.spad.stress.spad_scene import SpadScene
+from camkit.report.kinds.spad.stress.spad_score import (
+    depth_outcome,
+    picture_errors,
+    picture_outcome,
+)
+from camkit.report.kinds.spad.stress.spad_shot import DepthSetting, DepthShot
 from camkit.report.stress.score import BEST_DB
 from camkit.runtime.kinds.spad.sharpen import Sharpened
 

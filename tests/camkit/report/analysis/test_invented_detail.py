@@ -7,7 +7,12 @@ import pytest
 
 from camkit.bundle.reader import Bundle
 from camkit.errors import ContractError
-from camkit.report.analysis.hallucination import (
+from camkit.report.analysis.hallucination_page import (
+    crop_png,
+    draw_histograms,
+    hallucination_html,
+)
+from camkit.report.analysis.invented_detail import (
     PLANTED,
     TRUTH,
     Options,
@@ -15,11 +20,6 @@ from camkit.report.analysis.hallucination import (
     analyse,
     to_json,
     to_text,
-)
-from camkit.report.analysis.hallucination_page import (
-    crop_png,
-    draw_histograms,
-    hallucination_html,
 )
 from camkit.report.analysis.patches import MEASURES, corners_of, overshoot_of, summary
 from camkit.report.analysis.planted import plant

@@ -21,11 +21,11 @@ from camkit.report.pages.page import to_html
 from camkit.report.stress.break_point import Break
 from camkit.report.stress.curve import Curve, breaks_of, curve_of
 from camkit.report.stress.measured_ranges import measured_ranges
-from camkit.report.stress.part import StressPart
 from camkit.report.stress.report import scenario_json, skipped_json
 from camkit.report.stress.scenario import Scenario, choose
 from camkit.report.stress.stress_chart import draw_curve
 from camkit.report.stress.stress_page import Swept, stress_page, worst_patches
+from camkit.report.stress.stress_part import StressPart
 from camkit.report.stress.sweep import Sweep, run_sweep, sweep_identity
 from camkit.report.stress.verdict import Examiner, SweptScene
 

@@ -14,9 +14,9 @@ from camkit.cli.app import run as run_command
 from camkit.errors import ContractError
 from camkit.report.stress.curve import curve_of
 from camkit.report.stress.measured_ranges import OPEN_HIGH, OPEN_LOW, measured_ranges
-from camkit.report.stress.run import StressOptions, run_stress, write_envelope
 from camkit.report.stress.scenario import Scenario, choose
 from camkit.report.stress.score import Judge
+from camkit.report.stress.stress_run import StressOptions, run_stress, write_envelope
 from camkit.report.stress.sweep import Point, read_points
 from camkit.report.stress.verdict import Outcome, Verdict
 from camkit.runtime.options import Options
@@ -60,7 +60,7 @@ def test_a_quick_run_gives_json_and_a_page_and_resumes(
     assert not re.search(r"(src|href)=['\"]?(https?:)?//", page)
 
     monkeypatch.setattr(Judge, "score", lambda *_: pytest.fail("measured again"))
-    monkeypatch.setattr("camkit.report.stress.run._write", lambda *_: None)
+    monkeypatch.setattr("camkit.report.stress.stress_run._write", lambda *_: None)
     assert json.loads(_stress(capsys, *call)[1]) == rows
 
 

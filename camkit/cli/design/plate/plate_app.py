@@ -4,10 +4,10 @@ from typing import Final
 
 import typer
 
-from camkit.cli.design.plate.design import design
 from camkit.cli.design.plate.masks import masks
 from camkit.cli.design.plate.match import match
-from camkit.cli.design.plate.show import show
+from camkit.cli.design.plate.plate_design import design
+from camkit.cli.design.plate.plate_show import show
 from camkit.cli.groups import add_command
 
 PLATE: Final = "Make a plate"
