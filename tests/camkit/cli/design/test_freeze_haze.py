@@ -9,7 +9,7 @@ import pytest
 from camkit.bundle.haze_file import read_haze
 from camkit.bundle.psf_file import read_psf
 from camkit.cli.exit_code import ExitCode
-from camkit.models_def.optics.thin import freezing, nearer
+from camkit.models_def.optics.thin import distances, freezing
 
 LENS = "thin-plate"
 FEW = freezing.HazyGrid(fields=3, wavelengths=2, rays=1000)
@@ -38,9 +38,9 @@ def test_other_distances_are_frozen_beside_it(
     camkit_command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(freezing.freeze_hazy, "__defaults__", (FEW,))
-    usual = dict(nearer.freeze_distances.__kwdefaults__)
+    usual = dict(distances.freeze_distances.__kwdefaults__)
     near = usual | {"distances_mm": (1000.0,), "grid": replace(FEW, rays=500)}
-    monkeypatch.setattr(nearer.freeze_distances, "__kwdefaults__", near)
+    monkeypatch.setattr(distances.freeze_distances, "__kwdefaults__", near)
     out, haze, psf, beside = (tmp_path / name for name in ("p.st", "h.st", "sp.st", "sh.st"))
     words = ("freeze", LENS, "-o", out, "--haze", haze, "--stress-out", psf)
     outcome = camkit_command(*words)
@@ -63,7 +63,7 @@ def test_nothing_is_written_where_no_other_distance_is_known(
 ) -> None:
     for made, few in (
         (freezing.freeze_hazy, {"fields": 3, "wavelengths": 2, "rays": 1000}),
-        (nearer.freeze_distances, {"distances_mm": (), "wavelengths": 2, "rays": 500}),
+        (distances.freeze_distances, {"distances_mm": (), "wavelengths": 2, "rays": 500}),
     ):
         monkeypatch.setattr(made, "__kwdefaults__", dict(made.__kwdefaults__) | few)
     files = [tmp_path / name for name in ("p.st", "h.st", "sp.st", "sh.st")]

@@ -11,7 +11,7 @@ from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.sensor import Extent
 from camkit.errors import ContractError
 from camkit.haze import Haze
-from camkit.models_def.optics.thin import nearer
+from camkit.models_def.optics.thin import distances
 from camkit.models_def.optics.thin.distances import freeze_distances
 from camkit.models_def.optics.thin.freezing import HazyGrid, freeze_hazy
 from camkit.models_def.optics.thin.middle import Middle
@@ -87,12 +87,12 @@ def test_no_other_distance_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
         return real(lens, *given, **chosen)
 
     lines: list[str] = []
-    monkeypatch.setattr(nearer, "freeze_hazy", refused)
+    monkeypatch.setattr(distances, "freeze_hazy", refused)
     kept = freeze_distances(LENS, SENSOR, distances_mm=(500.0, 580.0), tell=lines.append, grid=FEW)
     assert kept.psf.depths_mm.tolist() == [580.0, math.inf]
     assert lines == ["object at 0.5 m: left out, too wide", "object at 0.58 m: kept"]
     lines.clear()
-    monkeypatch.setattr(nearer, "freeze_hazy", other)
+    monkeypatch.setattr(distances, "freeze_hazy", other)
     with pytest.raises(ContractError, match="no other distance"):
         freeze_distances(LENS, SENSOR, distances_mm=(500.0,), tell=lines.append, grid=FEW)
     assert lines[0] == "object at 0.5 m: left out, by its chief ray"

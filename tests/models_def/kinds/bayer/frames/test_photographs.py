@@ -114,11 +114,11 @@ def test_copies_and_isos_to_choose_by_are_their_own(runs: Path) -> None:
 def test_copies_are_frozen_at_the_distances_of_the_recipe_in_turn(
     recipe: BayerRecipe, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    seen, abouts = [], set()
+    seen, middles = [], set()
 
-    def frozen(lens: Lens, *_: object, about: str, **__: object) -> tuple[FrozenOptics, None]:
+    def frozen(lens: Lens, *_: object, middle: str, **__: object) -> tuple[FrozenOptics, None]:
         seen.append(lens.object_distance_mm)
-        abouts.add(about)
+        middles.add(middle)
         return hazy_optics(), None
 
     monkeypatch.setattr(photographs, "freeze_hazy", frozen)
@@ -133,7 +133,7 @@ def test_copies_are_frozen_at_the_distances_of_the_recipe_in_turn(
     assert len(made) == 4
     assert seen == [500.0, 2000.0, np.inf, 500.0]
     assert told[1] == "copy 2 of 4 frozen at 2 m"
-    assert abouts == {find_middles(lens, 33.0, 5.96, 500).middle}
+    assert middles == {find_middles(lens, 33.0, 5.96, 500).middle}
     seen.clear()
     usual = replace(recipe, lens=replace(recipe.lens, copies=1, validation_copies=1))
     photographs.freeze_copies(usual, lens, told.append)
