@@ -62,7 +62,8 @@ class Checkout:
     @property
     def environment(self) -> dict[str, str]:
         """Return the variables of its children."""
-        return {**os.environ, "PYTHONPATH": str(self.root)}
+        # numpy's matrix products differ in their last bits by the number of their threads
+        return {**os.environ, "PYTHONPATH": str(self.root), "OMP_NUM_THREADS": "1"}
 
     def command(self, words: list[str]) -> tuple[subprocess.CompletedProcess[str], float]:
         """Run `camkit` with some words; return what it told, and its seconds."""
