@@ -19,10 +19,10 @@ from camkit.field_types import check_fields
 from camkit.picture_window import PictureWindow
 from camkit.runtime.machine.memory import mapping_of
 from camkit.runtime.metadata import Metadata
-from camkit.runtime.rows import Rows, RowSource
 
 if TYPE_CHECKING:
     from camkit.bundle.plane import Plane
+    from camkit.runtime.rows import Rows, RowSource
 
 SATURATION_SHARE: Final = 0.99
 """A sample at this share of the white level is taken as clipped.
@@ -225,7 +225,7 @@ class Capture:
             return sensor_plane.model_copy(update={"channels": RGB})
         return sensor_plane
 
-    def rows(self) -> RowSource:
+    def rows(self) -> "RowSource":
         """Return the samples as the file holds them."""
         return _Samples(self)
 
@@ -329,7 +329,7 @@ class _Samples:
         """Return (channel, h, w); a mosaic is one channel."""
         return self._capture.plane_shape
 
-    def read(self, top: int, bottom: int) -> Rows:
+    def read(self, top: int, bottom: int) -> "Rows":
         """Return rows top..bottom."""
         rows: Rows = self._capture.samples[..., top:bottom, :]
         return rows if rows.ndim == 3 else rows[None]

@@ -419,6 +419,7 @@ def test_the_decoder_starts_without_what_it_does_not_need() -> None:
     code = "import sys, camkit.runtime.raw_worker\nprint(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     needless = {"pydantic", "onnxruntime", "scipy", "cv2", "typer", "PIL", "tifffile", "fractions"}
+    needless |= {"concurrent.futures", "logging"}
     assert not set(done.stdout.split()) & needless
 
 
