@@ -9,9 +9,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.caller import option_text
-from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import ContractError
+from camkit.psf import FrozenPsf
 
 LEAST_CELL_PX: Final = 4
 MOST_CELL_PX: Final = 64

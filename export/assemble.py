@@ -21,6 +21,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.facts import NetworkFacts
 from camkit.bundle.frozen_optics import FrozenOptics, read_optics_file
 from camkit.bundle.golden import IMAGE, GoldenArrays
@@ -44,7 +45,6 @@ from camkit.bundle.stages import Dehaze, Stage, Wiener
 from camkit.bundle.stages import Parts as KnownParts
 from camkit.bundle.writer import write_bundle
 from camkit.caller import option_text
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.export.card import card_text, laws_text, preview_png
 from camkit.export.designed_optics import designed_members

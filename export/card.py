@@ -6,13 +6,14 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.golden import IMAGE, GoldenArrays
 from camkit.bundle.manifest import Manifest
 from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import Sensor
 from camkit.colorimetry import encode_srgb
-from camkit.contracts import FloatArray, depth_name
 from camkit.export.energy import energy_diameter_px, modulation
+from camkit.psf import depth_name
 from camkit.runtime.proof.laws.law import number_text
 from camkit.runtime.proof.laws.proof import MeasuredLaws
 

@@ -12,7 +12,6 @@ import torch
 
 from camkit.bundle.reader import PLATE, PRESCRIPTION
 from camkit.caller import option_text
-from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError
 from camkit.export.parts import Parts
 from camkit.models_def.optics.diffraction.plate import (
@@ -27,6 +26,7 @@ from camkit.models_def.optics.lens_file.lens_file import read_lens
 from camkit.models_def.optics.prescription import Lens, format_prescription, parse_prescription
 from camkit.models_def.optics.thin.freezing import check_peaks
 from camkit.models_def.training.checkpoint import Checkpoint
+from camkit.psf import FrozenPsf
 
 SAME_PLATE_SHARE: Final = 0.015
 """Of the light of the middle wavelength. Built-in plates frozen for one sensor differ by 0.029 and

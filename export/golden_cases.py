@@ -6,11 +6,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.golden import NO_SIZE, GoldenArrays
 from camkit.bundle.manifest import GoldenCase
 from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import MOSAIC, Extent
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.progress import working
 from camkit.runtime.kind import part_of

@@ -10,9 +10,9 @@ from typing import Final
 import numpy as np
 from torch import nn
 
+from camkit.arrays import FloatArray
 from camkit.bundle.container import MAX_BUNDLE_BYTES
 from camkit.bundle.facts import HaloError, NetworkFacts
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError, UnsupportedError
 from camkit.export.onnx_graph import check_parity, to_fp16, to_onnx
 from camkit.models_def.networks.instance_norm import live_norms

@@ -13,7 +13,7 @@ import torch
 from onnx import helper, numpy_helper
 from torch import nn
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError, ParityError, UnsupportedError
 from camkit.export.folding import fold_nodes
 from camkit.models_def.training.first_weights import PRELU

@@ -37,11 +37,12 @@ from camkit.bundle.stages import Illumination, Parts, Wiener
 from camkit.bundle.writer import write_bundle
 from camkit.calibration.measured_files import FlatFile, GeometryFile, NoiseFile
 from camkit.caller import option_text
-from camkit.contracts import FrozenPsf, RadialDistortion
 from camkit.errors import ContractError, DecodeError
 from camkit.export.golden_cases import add_outputs, photograph_all
 from camkit.export.proving import golden_members, with_activations, write_proved
 from camkit.haze import Haze
+from camkit.psf import FrozenPsf
+from camkit.radial import RadialDistortion
 from camkit.runtime.geometry.distortion import RANGE_MARGIN, check_distortion
 from camkit.units import to_mm
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from camkit.bundle.manifest import Manifest
 from camkit.bundle.sensor import BayerSensor
-from camkit.contracts import shifted_cfa
+from camkit.cfa import shifted_cfa
 from camkit.errors import ContractError
 from camkit.runtime.capture import Capture
 from camkit.runtime.options import Options, checked_origin

@@ -12,10 +12,13 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
+from camkit.bundle.sensor import InputContract
 from camkit.caller import option_text
-from camkit.contracts import CFA_PATTERNS, CfaPattern, FloatArray, InputContract, NoiseModel
+from camkit.cfa import CFA_PATTERNS, CfaPattern
 from camkit.errors import ContractError
 from camkit.field_types import check_fields
+from camkit.noise import NoiseModel
 from camkit.picture_window import PictureWindow
 from camkit.runtime.machine.memory import mapping_of
 from camkit.runtime.metadata import Metadata

@@ -7,9 +7,9 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.golden import IMAGE
 from camkit.caller import option_text
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 
 Write = Callable[[Path], None]

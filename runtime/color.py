@@ -11,6 +11,7 @@ from typing import Final, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.colorimetry import (
     ACES_WHITE,
     ACESCG_PRIMARIES,
@@ -24,7 +25,6 @@ from camkit.colorimetry import (
     rec709_to_acescg,
     rgb_to_xyz,
 )
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 
 OutputColor = Literal["rec709", "acescg", "camera"]

@@ -14,8 +14,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray, NoiseModel, cfa_channels
+from camkit.arrays import FloatArray
+from camkit.cfa import cfa_channels
 from camkit.errors import ContractError
+from camkit.noise import NoiseModel
 from camkit.runtime.capture import Capture
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.units import to_mm

@@ -11,10 +11,11 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.manifest import Range
 from camkit.caller import option_text
-from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
+from camkit.noise import NoiseModel
 from camkit.runtime.capture import Capture
 from camkit.runtime.options import OnUnsafe
 from camkit.runtime.signal.noise import REPAIR_MARGIN_PX, repair_mosaic, repair_planes

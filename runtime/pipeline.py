@@ -20,10 +20,10 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle, find_bundle, is_built_in, open_bundle
 from camkit.bundle.stages import Wiener
 from camkit.caller import option_list, option_text
-from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ContractError, UnsupportedError
 from camkit.field_types import check_value
 from camkit.kinds import Kind, find_kind

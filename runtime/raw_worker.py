@@ -24,8 +24,8 @@ from typing import Any, BinaryIO, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import NoiseModel
 from camkit.errors import ContractError, DecodeError
+from camkit.noise import NoiseModel
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.files import raw_checks
 from camkit.runtime.files.dng.jpeg_frames import frame_doubt

@@ -13,7 +13,7 @@ from typing import Any, Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.machine.slices import run_chunks
 

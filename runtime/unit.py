@@ -22,8 +22,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from camkit.bundle.reader import PRESCRIPTION, Bundle
-from camkit.contracts import focus_weights
 from camkit.errors import ContractError
+from camkit.psf import focus_weights
 from camkit.runtime.stage_finder import known_facts
 from camkit.side_file import read_side_toml
 

@@ -37,7 +37,8 @@ from camkit.bundle.stages import (
 )
 from camkit.bundle.stages.network import DEFAULT_ROLE
 from camkit.bundle.writer import write_bundle
-from camkit.contracts import FrozenPsf, RadialDistortion
+from camkit.psf import FrozenPsf
+from camkit.radial import RadialDistortion
 
 PITCH_UM = 6.0
 RNG = np.random.default_rng

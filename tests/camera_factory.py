@@ -3,7 +3,8 @@
 import numpy as np
 
 from camkit.bundle.sensor import BayerSensor, ChannelResponse, IsoNoise, LightSensor, nested_sensor
-from camkit.contracts import FrozenPsf, RadialDistortion
+from camkit.psf import FrozenPsf
+from camkit.radial import RadialDistortion
 from camkit.runtime.geometry.sensor_window import SensorWindow
 
 PITCH_UM = 5.96

@@ -7,7 +7,7 @@ import numpy as np
 from camkit.bundle.psf_file import psf_to_bytes
 from camkit.bundle.reader import Bundle, open_bundle
 from camkit.bundle.writer import write_bundle
-from camkit.contracts import FrozenPsf
+from camkit.psf import FrozenPsf
 from tests.bundle_factory import tiny_manifest, tiny_members, tiny_optics, tiny_psf, tiny_sensor
 from tests.psf_factory import gaussian_kernel
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import tifffile
 
-from camkit.contracts import NoiseModel
+from camkit.noise import NoiseModel
 from camkit.runtime.metadata import Metadata
 from camkit.runtime.output.dng import DngTags, camkit_description, write_bayer_dng
 

@@ -5,11 +5,13 @@ from typing import Any, Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.manifest import format_of
 from camkit.bundle.psf_file import psf_to_bytes
 from camkit.bundle.reader import Bundle, open_bundle
 from camkit.bundle.writer import write_bundle
-from camkit.contracts import FloatArray, FrozenPsf, RadialDistortion
+from camkit.psf import FrozenPsf
+from camkit.radial import RadialDistortion
 from tests.bundle_factory import PITCH_UM, tiny_manifest, tiny_sensor, tiny_stages
 from tests.psf_factory import gaussian_kernel
 

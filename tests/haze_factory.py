@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from camkit.contracts import FrozenPsf
 from camkit.haze import Haze
+from camkit.psf import FrozenPsf
 from tests.bundle_factory import tiny_psf
 
 CELL_PX = 8

@@ -3,7 +3,8 @@
 import numpy as np
 
 from camkit.bundle.frozen_optics import FrozenOptics
-from camkit.contracts import FrozenPsf, RadialDistortion
+from camkit.psf import FrozenPsf
+from camkit.radial import RadialDistortion
 from tests.bayer_recipe import RECIPE as PLAIN
 from tests.haze_factory import CELL_PX, tiny_haze
 

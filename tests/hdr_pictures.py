@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 
 
 def hdr_pair(side_px: int = 64) -> tuple[FloatArray, FloatArray]:

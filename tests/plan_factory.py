@@ -11,7 +11,7 @@ from camkit.bundle.reader import Bundle, open_bundle
 from camkit.bundle.stages import Wiener
 from camkit.bundle.stages.network import DEFAULT_ROLE
 from camkit.bundle.writer import write_bundle
-from camkit.contracts import RadialDistortion
+from camkit.radial import RadialDistortion
 from camkit.runtime.content import CELL_PX, LIGHT_PX, Content
 from camkit.runtime.plan.loss import LossModel, plan_entries
 from tests.bundle_factory import (

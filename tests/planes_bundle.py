@@ -21,7 +21,7 @@ from camkit.bundle.reader import Bundle, open_bundle
 from camkit.bundle.sensor import ChannelResponse, Extent, IsoNoise, PlanesSensor
 from camkit.bundle.stages import Parts, Stage
 from camkit.bundle.writer import write_bundle
-from camkit.contracts import FrozenPsf
+from camkit.psf import FrozenPsf
 from camkit.runtime.network.graph import inspect_graph
 from tests.bundle_factory import PITCH_UM, make_model, make_weight
 

@@ -3,13 +3,10 @@
 import numpy as np
 import scipy.fft
 
-from camkit.contracts import (
-    FloatArray,
-    FrozenPsf,
-    NoiseModel,
-    RadialDistortion,
-    grid_heights_mm,
-)
+from camkit.arrays import FloatArray
+from camkit.noise import NoiseModel
+from camkit.psf import FrozenPsf, grid_heights_mm
+from camkit.radial import RadialDistortion
 from camkit.runtime.bank.blocks import LocalPsf, to_otf
 from camkit.runtime.bank.psf import FieldKernels
 from camkit.runtime.geometry.sensor_window import SensorWindow

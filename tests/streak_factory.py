@@ -7,7 +7,8 @@ import numpy as np
 import scipy.signal
 from numpy.typing import NDArray
 
-from camkit.contracts import CfaPattern, FloatArray, cfa_channels
+from camkit.arrays import FloatArray
+from camkit.cfa import CfaPattern, cfa_channels
 from camkit.runtime.kinds.hdr.streaks.cells import COLOURS, Cells, cells_of, sample_sites
 from camkit.runtime.kinds.hdr.streaks.kernels import StreakKernels, streak_kernels
 from camkit.runtime.kinds.hdr.streaks.recovery import Recovery, Region

@@ -15,8 +15,8 @@ import time
 from pathlib import Path
 
 import camkit
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import find_bundle, open_bundle
-from camkit.contracts import FloatArray
 from camkit.runtime.files.picture import read_scene
 from camkit.runtime.twin.simulate import Simulation, write_capture
 from camkit.scenes import procedural_scene

@@ -20,10 +20,10 @@ from pathlib import Path
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.manifest import Threshold
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.bundle.writer import write_bundle
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.report.quality import list_set, read_picture
 from camkit.runtime.plan.loss import EXACT, plan_entries

@@ -36,11 +36,11 @@ from camkit.bundle.stages import (
 )
 from camkit.bundle.stages import StageEntry as Stage
 from camkit.bundle.writer import write_bundle
-from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError
 from camkit.export.card import with_laws_text
 from camkit.export.golden_cases import add_outputs
 from camkit.export.proving import with_activations, write_proved
+from camkit.psf import FrozenPsf
 from camkit.runtime.plan.bounded_networks import ENFORCE, bounded_stages
 from camkit.runtime.proof.laws.proof import measure_laws, with_laws
 

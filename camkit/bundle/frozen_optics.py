@@ -19,9 +19,10 @@ from camkit.bundle.psf_file import (
     read_tensors,
 )
 from camkit.bundle.streak_file import streaks_from_tensors, streaks_to_bytes
-from camkit.contracts import FrozenPsf, RadialDistortion
 from camkit.errors import ContractError
 from camkit.haze import Haze
+from camkit.psf import FrozenPsf
+from camkit.radial import RadialDistortion
 from camkit.streaks import StreakOptics
 
 PROFILES: Final = "profiles"

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from safetensors.numpy import save
 
+from camkit.arrays import FloatArray
 from camkit.bundle.psf_file import read_tensors
-from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ContractError
 
 MAX_SIDE_PX: Final = 1024

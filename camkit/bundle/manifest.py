@@ -38,8 +38,8 @@ from camkit.bundle.stages import (
 )
 from camkit.bundle.strict_json import read_json
 from camkit.bundle.upgrade import UpgradeError, upgrade
-from camkit.contracts import FrozenPsf
 from camkit.errors import BundleError, UnsupportedError
+from camkit.psf import FrozenPsf
 
 FORMAT_VERSION: Final = (2, 9)
 TOGETHER_VERSION: Final = (2, 4)

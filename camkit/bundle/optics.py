@@ -13,9 +13,10 @@ import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from camkit.bundle.entry import Entry, NonNegative, Positive, Since
-from camkit.contracts import RadialDistortion, RadialIllumination, Symmetry
 from camkit.errors import ContractError
 from camkit.haze import LEAST_CELL_PX, MOST_CELL_PX
+from camkit.psf import Symmetry
+from camkit.radial import RadialDistortion, RadialIllumination
 
 PSF: Final = "psf.safetensors"
 STREAKS: Final = "streaks.safetensors"
@@ -29,7 +30,7 @@ class FrozenPsfOptics(Entry):
         member: The file of the kernels; see camkit/bundle/psf_file.py.
         pixel_pitch_um: Pitch of the kernel samples.
         symmetry: How the kernels of other image points follow from those stored; see
-            `camkit.contracts.FrozenPsf`.
+            `camkit.psf.FrozenPsf`.
         object_distance_mm: Distance of focus from the first surface; None for infinity.
     """
 

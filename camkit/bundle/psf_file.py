@@ -19,8 +19,9 @@ from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from camkit.bundle.strict_json import read_json
-from camkit.contracts import FrozenPsf, RadialDistortion, Symmetry
 from camkit.errors import BundleError, ContractError
+from camkit.psf import FrozenPsf, Symmetry
+from camkit.radial import RadialDistortion
 from camkit.side_file import MOST_BYTES, read_side_bytes
 
 _AXES: Final = ("field_heights_mm", "depths_mm", "wavelengths_um", "relative_illumination")

@@ -41,9 +41,10 @@ from camkit.bundle.optics import (
     StreakEntry,
 )
 from camkit.bundle.psf_file import psf_from_bytes
-from camkit.contracts import FrozenPsf, RadialDistortion, RadialIllumination
 from camkit.errors import BundleError, ContractError
 from camkit.haze import Haze
+from camkit.psf import FrozenPsf
+from camkit.radial import RadialDistortion, RadialIllumination
 from camkit.streaks import StreakOptics
 
 SUFFIX: Final = ".camkit"

@@ -19,9 +19,9 @@ from camkit.calibration.noise.sensor_noise import NoiseFacts, measure_sensor
 from camkit.calibration.psf import measure_psf
 from camkit.calibration.record import to_toml
 from camkit.caller import option_text
-from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError
 from camkit.field_types import checked
+from camkit.psf import FrozenPsf
 from camkit.report.pages.calibration.flat_page import flat_html
 from camkit.report.pages.calibration.geometry_page import geometry_html
 from camkit.report.pages.calibration.noise_page import noise_html

@@ -7,8 +7,8 @@ from typing import Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.caller import option_text
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.merging.merge import clipped_rows

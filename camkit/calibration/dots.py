@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from camkit.calibration.lattice import FloatGrid
 from camkit.calibration.measured import MeasuredPsf
 from camkit.caller import option_text
-from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError, DecodeError
+from camkit.psf import FrozenPsf
 
 FINE: Final = 8
 """Parts of a pixel, along either axis, that lie inside a circle or outside."""

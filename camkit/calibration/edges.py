@@ -17,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import CfaPattern, cfa_channels
+from camkit.cfa import CfaPattern, cfa_channels
 from camkit.runtime.capture import Capture
 
 FloatLine = NDArray[np.float64]

@@ -17,11 +17,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.sensor import ColorSensor
 from camkit.calibration.edges import Edge, FloatGrid, FloatLine, find_edges
 from camkit.caller import option_text
-from camkit.contracts import FloatArray, FrozenPsf, focus_weights
 from camkit.errors import ContractError
+from camkit.psf import FrozenPsf, focus_weights
 from camkit.runtime.bank.psf import FieldKernels, color_kernels
 from camkit.runtime.capture import Capture
 from camkit.runtime.geometry.placement import place

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from camkit.contracts import CfaPattern, cfa_channels
+from camkit.cfa import CfaPattern, cfa_channels
 
 FloatGrid = NDArray[np.float64]
 

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from camkit.calibration.lattice import FloatGrid
 from camkit.calibration.peak import Field
 from camkit.caller import option_text
-from camkit.contracts import FrozenPsf, RadialDistortion
 from camkit.errors import ContractError
+from camkit.psf import FrozenPsf
+from camkit.radial import RadialDistortion
 from camkit.units import MM_PER_M
 
 COLOURS: Final = ("blue", "green", "red")

@@ -5,10 +5,11 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.calibration.lattice import FloatGrid, Lattice, filled
 from camkit.calibration.light import LightCore, background, border
 from camkit.caller import option_text
-from camkit.contracts import FloatArray, cfa_channels
+from camkit.cfa import cfa_channels
 from camkit.errors import DecodeError
 from camkit.runtime.merging.merge import Merged
 from camkit.runtime.merging.survey import Survey

@@ -9,8 +9,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.calibration.lattice import FloatGrid
-from camkit.contracts import FloatArray
 from camkit.runtime.capture import Capture
 from camkit.units import UM_PER_MM
 

@@ -13,8 +13,8 @@ from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.haze_file import read_haze, write_haze
 from camkit.bundle.psf_file import read_psf, write_psf
 from camkit.bundle.reader import Bundle
-from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError
+from camkit.psf import FrozenPsf
 from camkit.runtime.twin.truth import light_sensor
 from camkit.side_file import read_side_text
 

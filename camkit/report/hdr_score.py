@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
+from camkit.arrays import FloatArray
 from camkit.colorimetry import encode_srgb
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.report.pu21 import MOST_NITS, pu21_mean_square, pu21_ssim
 from camkit.scenes.saturation import CEILING

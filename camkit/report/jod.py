@@ -14,7 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import UnsupportedError
 from camkit.report.pu21 import LEAST_NITS, MOST_NITS
 

@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 from skimage.metrics import peak_signal_noise_ratio, structural_similarity
 
+from camkit.arrays import FloatArray
 from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.golden import IMAGE
 from camkit.bundle.reader import Bundle
 from camkit.colorimetry import encode_srgb
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.files.picture import read_light
 from camkit.runtime.geometry.sensor_window import centred_origin

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 
 LAMP_RADII_PX: Final = (1.5, 3.0, 6.0, 12.0)
 LAMP_LIGHTS: Final = (2.0, 8.0, 40.0, 200.0)

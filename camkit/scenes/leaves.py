@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.scenes.texture import Generator, cut_texture, draw_colour, draw_count
 
 LEAF_LAYERS: Final = 2.5

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.scenes.leaves import add_leaves, box_around
 from camkit.scenes.lettering import set_text

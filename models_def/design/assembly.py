@@ -7,7 +7,7 @@ from pathlib import Path
 import torch
 from torch import Tensor, nn
 
-from camkit.contracts import CFA_PATTERNS
+from camkit.cfa import CFA_PATTERNS
 from camkit.errors import ContractError
 from camkit.models_def.design.loop import DesignLoop, DesignParts
 from camkit.models_def.design.optics import WIDEST_PX, LensModule, fitting_window_px

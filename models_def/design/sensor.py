@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from torch import Tensor
 
-from camkit.contracts import CfaPattern
+from camkit.cfa import CfaPattern
 from camkit.errors import ContractError
 from camkit.models_def.sensors.demosaic import demosaic, mosaic
 from camkit.models_def.sensors.forward import blur

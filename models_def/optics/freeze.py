@@ -18,7 +18,6 @@ import numpy as np
 from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.sensor import ColorSensor
 from camkit.bundle.stages import Wiener
-from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError
 from camkit.models_def.optics.frozen import (
     FreezeGrid,
@@ -39,6 +38,7 @@ from camkit.models_def.optics.sampling import (
     mean_kernel_loss,
 )
 from camkit.models_def.sensors.wiener import PRIOR_EXPONENT, PRIOR_SCALE
+from camkit.psf import FrozenPsf
 
 Tell = Callable[[str], None]
 Facts = dict[str, int | float | str]

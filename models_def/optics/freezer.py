@@ -12,7 +12,6 @@ from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.sensor import ColorSensor
 from camkit.bundle.stages import Wiener
 from camkit.caller import option_text
-from camkit.contracts import depth_name
 from camkit.errors import ContractError, UnsupportedError
 from camkit.models_def.optics.diffraction.freezing import WINDOW, freeze_plate
 from camkit.models_def.optics.diffraction.plate_optics import PlateOptics
@@ -23,6 +22,7 @@ from camkit.models_def.optics.optics import Optics
 from camkit.models_def.optics.thin.distances import freeze_distances
 from camkit.models_def.optics.thin.freezing import freeze_hazy
 from camkit.progress import note, working
+from camkit.psf import depth_name
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

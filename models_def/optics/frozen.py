@@ -23,11 +23,11 @@ from torch import Tensor
 
 from camkit.bundle.sensor import ColorSensor
 from camkit.caller import option_text
-from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError
 from camkit.models_def.optics.optics import FieldLayout, FloatGrid, Optics, radial_layout
 from camkit.models_def.optics.psf import TracedPsf
 from camkit.progress import working
+from camkit.psf import FrozenPsf
 from camkit.runtime.bank.psf import wavelength_weights
 from camkit.units import MM_PER_M, UM_PER_MM
 

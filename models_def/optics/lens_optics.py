@@ -8,7 +8,6 @@ from typing import Final
 import numpy as np
 import torch
 
-from camkit.contracts import RadialDistortion
 from camkit.errors import ContractError
 from camkit.models_def.optics.analysis.illumination import relative_illumination_at
 from camkit.models_def.optics.distortion import trace_distortion
@@ -18,6 +17,7 @@ from camkit.models_def.optics.optics import FieldLayout, FloatGrid, radial_layou
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens, with_focus_shift
 from camkit.models_def.optics.psf import TracedPsf, trace_psf, with_object_distance
+from camkit.radial import RadialDistortion
 from camkit.units import UM_PER_MM
 
 RAYS: Final = 4096

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from camkit.bundle.psf_file import read_psf
-from camkit.contracts import FrozenPsf, RadialDistortion, depth_weights, grid_heights_mm
 from camkit.errors import ContractError
 from camkit.models_def.optics.optics import (
     FieldLayout,
@@ -25,6 +24,8 @@ from camkit.models_def.optics.optics import (
     uniform_layout,
 )
 from camkit.models_def.optics.psf import TracedPsf
+from camkit.psf import FrozenPsf, depth_weights, grid_heights_mm
+from camkit.radial import RadialDistortion
 from camkit.runtime.bank.psf import FieldKernels
 
 

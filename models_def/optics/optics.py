@@ -14,15 +14,16 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import RadialDistortion, Symmetry, grid_heights_mm
 from camkit.models_def.optics.psf import TracedPsf
+from camkit.psf import Symmetry, grid_heights_mm
+from camkit.radial import RadialDistortion
 
 FloatGrid = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FieldLayout:
-    """The positions over the field of the kernels; see `camkit.contracts.FrozenPsf`.
+    """The positions over the field of the kernels; see `camkit.psf.FrozenPsf`.
 
     Attributes:
         symmetry: How the kernels of other places follow.

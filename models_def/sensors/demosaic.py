@@ -6,7 +6,8 @@ Twin of `camkit.runtime.signal.demosaic` (method "fast"); `tests/parity` holds t
 import torch
 from torch import Tensor
 
-from camkit.contracts import CfaPattern, FloatArray, cfa_channels
+from camkit.arrays import FloatArray
+from camkit.cfa import CfaPattern, cfa_channels
 
 _CROSS = ((0, 0, -2, 0, 0), (0, 0, 4, 0, 0), (-2, 4, 8, 4, -2), (0, 0, 4, 0, 0), (0, 0, -2, 0, 0))
 _ALONG = (

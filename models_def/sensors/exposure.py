@@ -5,8 +5,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from camkit.arrays import FloatArray
 from camkit.bundle.sensor import BayerSensor
-from camkit.contracts import FloatArray
 from camkit.models_def.sensors.demosaic import mosaic
 
 

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageCms
 
+from camkit.arrays import FloatArray
 from camkit.colorimetry import decode_srgb
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError, DecodeError
 from camkit.models_def.training.recipe import SceneRecipe
 from camkit.scenes import procedural_scene

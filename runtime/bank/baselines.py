@@ -10,9 +10,10 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.stages import Wiener
-from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import UnsupportedError
+from camkit.noise import NoiseModel
 from camkit.runtime.bank.blocks import Block, BlockBank, BlockFilter, LocalPsf
 from camkit.runtime.bank.cross_channel import (
     CROSS_ROUNDS,

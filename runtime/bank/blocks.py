@@ -21,7 +21,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.bank.psf import FieldKernels
 from camkit.runtime.bank.spectrum import ComplexArray, apply_transfer, transform

@@ -33,7 +33,9 @@ import numpy as np
 import scipy.ndimage
 from numpy.typing import NDArray
 
-from camkit.contracts import CfaPattern, FloatArray, NoiseModel, cfa_channels
+from camkit.arrays import FloatArray
+from camkit.cfa import CfaPattern, cfa_channels
+from camkit.noise import NoiseModel
 from camkit.runtime.bank.blocks import to_otf
 from camkit.runtime.bank.cell_means import cell_count
 from camkit.runtime.bank.kernels_by_distance import KernelsByDistance, NearnessMap

@@ -20,9 +20,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.stages import Dehaze
-from camkit.contracts import FloatArray, FrozenPsf, depth_weights
 from camkit.haze import Haze
+from camkit.psf import FrozenPsf, depth_weights
 from camkit.runtime.bank.cell_means import cell_count
 from camkit.runtime.bank.place_blur import (
     AZIMUTHS,

@@ -30,9 +30,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.stages import Together
 from camkit.bundle.stages.together import BAND, BAND_STEP, Spread
-from camkit.contracts import FloatArray
 from camkit.runtime.bank.spectrum import (
     ComplexArray,
     from_packed,

@@ -89,7 +89,7 @@ class KernelsByDistance:
     """The kernels of a camera at as many distances as are told apart; safe to share.
 
     Kernels are linear in 1 / distance between the depths that are known, as
-    `camkit.contracts.depth_weights` has them.
+    `camkit.psf.depth_weights` has them.
     """
 
     def __init__(self, depths_mm: FloatGrid, kernels: Sequence[FieldKernels]) -> None:

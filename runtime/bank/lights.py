@@ -16,8 +16,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.stages import Wiener
-from camkit.contracts import FloatArray
 from camkit.runtime.bank.blocks import Block, taper_edges
 from camkit.runtime.bank.richardson_lucy import richardson_lucy
 from camkit.runtime.bank.spectrum import ComplexArray, apply_transfer

@@ -17,8 +17,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray, FrozenPsf, Symmetry, depth_weights, focus_weights
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
+from camkit.psf import FrozenPsf, Symmetry, depth_weights, focus_weights
 
 FloatGrid = NDArray[np.float64]
 
@@ -77,7 +78,7 @@ class FieldKernels:
     Attributes:
         kernels: (field, c, h, w) float32, odd sides; each kernel sums to 1.
         field_heights_mm: (field,); increasing from 0 unless the fields are a grid.
-        symmetry: Of the PSF; see `camkit.contracts.FrozenPsf`.
+        symmetry: Of the PSF; see `camkit.psf.FrozenPsf`.
         grid_x_mm: (column,), increasing; of a grid.
         grid_y_mm: (row,), increasing; of a grid.
     """

@@ -4,7 +4,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray, NoiseModel
+from camkit.arrays import FloatArray
+from camkit.noise import NoiseModel
 from camkit.runtime.bank.spectrum import apply_transfer
 
 CLIPPED_REACH_PX = 2

@@ -7,7 +7,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray, NoiseModel
+from camkit.arrays import FloatArray
+from camkit.noise import NoiseModel
 from camkit.runtime.bank.blocks import Block, BlockFilter
 from camkit.runtime.bank.richardson_lucy import background_of, richardson_lucy, spread_clipped
 from camkit.runtime.bank.spectrum import ComplexArray, apply_transfer, inverse, transform

@@ -16,8 +16,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.stages import Together, Wiener
-from camkit.contracts import FloatArray, NoiseModel
+from camkit.noise import NoiseModel
 from camkit.runtime.bank.blocks import Block, BlockFilter, PlaceKnowledge
 from camkit.runtime.bank.joint_colours import Transfer, restore_together, transfer_of
 from camkit.runtime.bank.lights import explain_lights

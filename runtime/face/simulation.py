@@ -14,10 +14,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.bundle.sensor import ColorSensor, Sensor
 from camkit.caller import option_list, option_text
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.field_types import checked
 from camkit.progress import working

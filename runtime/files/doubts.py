@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.caller import option_text
-from camkit.contracts import CfaPattern
+from camkit.cfa import CfaPattern
 from camkit.haze import Haze
 from camkit.runtime.capture import Capture
 from camkit.runtime.files.order.row_order import order_doubt

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import CfaPattern
+from camkit.cfa import CfaPattern
 from camkit.errors import DecodeError
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.files import raw_checks

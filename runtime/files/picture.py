@@ -18,9 +18,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.caller import option_text
 from camkit.colorimetry import apply_matrix
-from camkit.contracts import FloatArray
 from camkit.errors import DecodeError
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.files import raw_checks

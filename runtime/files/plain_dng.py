@@ -6,7 +6,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import CFA_PATTERNS
+from camkit.cfa import CFA_PATTERNS
 from camkit.errors import DecodeError
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.files import raw_checks

@@ -14,8 +14,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.caller import option_text
-from camkit.contracts import CFA_PATTERNS, CfaPattern, FloatArray
+from camkit.cfa import CFA_PATTERNS, CfaPattern
 from camkit.errors import DecodeError
 from camkit.runtime.files.tiff_tags import TagValue, TiffTags
 from camkit.runtime.machine.memory import release_pages

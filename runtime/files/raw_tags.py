@@ -12,7 +12,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import CfaPattern, NoiseModel, cfa_channels
+from camkit.cfa import CfaPattern, cfa_channels
+from camkit.noise import NoiseModel
 from camkit.runtime.files.raw_checks import sensor_directories
 from camkit.runtime.files.tiff_tags import TiffTags
 from camkit.runtime.metadata import Metadata, clean_text

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from camkit.caller import option_text
-from camkit.contracts import CfaPattern
+from camkit.cfa import CfaPattern
 from camkit.errors import DecodeError
 from camkit.runtime.files.doubts import is_noise
 from camkit.runtime.files.raw_checks import OVER_WHITE_SHARE, Levels, Samples, share_over_white

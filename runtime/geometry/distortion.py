@@ -10,8 +10,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import RadialDistortion
 from camkit.errors import ContractError
+from camkit.radial import RadialDistortion
 
 FloatGrid = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.progress import counted
 from camkit.runtime.geometry.sensor_window import SensorWindow

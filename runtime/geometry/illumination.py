@@ -5,7 +5,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray, FrozenPsf, RadialIllumination
+from camkit.arrays import FloatArray
+from camkit.psf import FrozenPsf
+from camkit.radial import RadialIllumination
 from camkit.runtime.geometry.sensor_window import FloatGrid, SensorWindow
 
 TABLE_SAMPLES: Final = 4096

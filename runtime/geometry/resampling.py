@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.stages.undistort import Interpolation
-from camkit.contracts import FloatArray
 
 Places = NDArray[np.int16]
 """(h, w, 2) columns and rows of samples."""

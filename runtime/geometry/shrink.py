@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 
 
 def shrunk(planes: FloatArray, times: int) -> FloatArray:

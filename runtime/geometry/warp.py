@@ -16,9 +16,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.stages.undistort import Interpolation, Overshoot
-from camkit.contracts import FloatArray, RadialDistortion
 from camkit.errors import ContractError, UnsupportedError
+from camkit.radial import RadialDistortion
 from camkit.runtime.cancel import check_wish
 from camkit.runtime.geometry.distortion import (
     check_distortion,

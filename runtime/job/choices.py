@@ -9,9 +9,9 @@ from typing import Final
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import StageEntry
 from camkit.caller import option_list, option_text
-from camkit.contracts import depth_weights
 from camkit.errors import ContractError
 from camkit.kinds import BAYER, Kind
+from camkit.psf import depth_weights
 from camkit.runtime.job.setup import DEVELOPMENT
 from camkit.runtime.options import Options, check_kind_options, given_options
 from camkit.runtime.plan.decision import DEVELOP, Work

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.stages import Demosaic
-from camkit.contracts import CfaPattern, FloatArray
+from camkit.cfa import CfaPattern
 from camkit.runtime.bank.cell_means import cell_means
 from camkit.runtime.job.job import Job
 

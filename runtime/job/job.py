@@ -15,8 +15,8 @@ import numpy as np
 from camkit.bundle.plane import Plane
 from camkit.bundle.reader import Bundle
 from camkit.colorimetry import Matrix
-from camkit.contracts import NoiseModel
 from camkit.errors import ContractError
+from camkit.noise import NoiseModel
 from camkit.runtime.cancel import Cancel
 from camkit.runtime.color import ColorStage
 from camkit.runtime.geometry.placement import Placement

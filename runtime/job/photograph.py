@@ -10,7 +10,7 @@ from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import BayerSensor
 from camkit.bundle.stages import StageEntry
 from camkit.caller import option_text
-from camkit.contracts import CfaPattern, shifted_cfa
+from camkit.cfa import CfaPattern, shifted_cfa
 from camkit.errors import ContractError
 from camkit.runtime.capture import COLOURS, Capture
 from camkit.runtime.content import Content, light_squares, measure_content

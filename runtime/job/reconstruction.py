@@ -11,8 +11,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.golden import IMAGE
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.cancel import Cancel, cancellable
 from camkit.runtime.clock import StageClock

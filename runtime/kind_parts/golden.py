@@ -3,10 +3,10 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from camkit.arrays import FloatArray
 from camkit.bundle.golden import GoldenArrays
 from camkit.bundle.manifest import GoldenCase
 from camkit.bundle.reader import Bundle
-from camkit.contracts import FloatArray
 
 Cases = Mapping[str, tuple[GoldenCase, GoldenArrays]]
 

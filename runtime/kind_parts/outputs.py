@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.capture_result import Result
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.options import Options

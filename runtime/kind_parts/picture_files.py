@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from camkit.arrays import FloatArray
 from camkit.bundle.golden import IMAGE
-from camkit.contracts import FloatArray
 from camkit.runtime.capture import Capture
 from camkit.runtime.capture_result import Result
 from camkit.runtime.job.reconstruction import Reconstruction

@@ -14,9 +14,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.caller import option_text
-from camkit.contracts import FloatArray, NoiseModel, cfa_channels
+from camkit.cfa import cfa_channels
 from camkit.errors import ContractError, DecodeError
+from camkit.noise import NoiseModel
 from camkit.runtime.capture import SATURATION_SHARE, Capture
 from camkit.runtime.merging.average import Average, BoolArray, Exposed
 from camkit.runtime.merging.exposures import exposure_factors

@@ -14,8 +14,8 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.colorimetry import decode_srgb
-from camkit.contracts import FloatArray
 from camkit.runtime.capture import SATURATION_SHARE
 
 ResponseName = Literal["linear", "srgb", "estimate"]

@@ -13,8 +13,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.caller import option_text
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.capture import Capture
 from camkit.runtime.color import color_stage

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.caller import option_text
-from camkit.contracts import NoiseModel
 from camkit.errors import ContractError, DecodeError
+from camkit.noise import NoiseModel
 from camkit.picture_window import PictureWindow, common_box
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.raw import is_picture, read_capture

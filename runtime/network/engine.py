@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import BundleError, ContractError, UnsupportedError
 from camkit.runtime.cancel import Cancel, Cancelled, watched
 from camkit.runtime.machine.memory import mapped_arrays

@@ -4,9 +4,10 @@ import math
 from collections.abc import Callable
 from typing import Final
 
+from camkit.arrays import FloatArray
 from camkit.caller import option_text
-from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
+from camkit.noise import NoiseModel
 
 BOUND_FACTOR: Final = 4.0
 BOUND_OFFSET: Final = 1.0

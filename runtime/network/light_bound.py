@@ -19,6 +19,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.light_bound import (
     BRIGHT_FROM,
     BRIGHT_NOISE,
@@ -30,7 +31,6 @@ from camkit.bundle.light_bound import (
     USUAL_BOUND,
     LightBound,
 )
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.rows import RowSource
 

@@ -11,8 +11,8 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.light_bound import CELL_PX, USUAL_BOUND, LightBound
-from camkit.contracts import FloatArray
 from camkit.runtime.network.light_bound import AddedLight, added_light, keep_bright, take_back
 from camkit.runtime.network.white_keeper import WhiteKeeper
 

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.network.tiling import Run, TileLimits, infer_bands, lay_windows
 from camkit.runtime.rows import ArrayRows

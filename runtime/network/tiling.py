@@ -23,8 +23,8 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.caller import option_text
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.cancel import Cancel, check_cancelled
 from camkit.runtime.network.guard import TileGuard, is_finite

@@ -12,8 +12,9 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.colorimetry import Matrix, OutputColours
-from camkit.contracts import FloatArray, NoiseModel
+from camkit.noise import NoiseModel
 from camkit.runtime.signal.stabilise import stabilise, stabilised_level, unstabilise
 
 _COLOURS: Final = 3

@@ -12,9 +12,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
+from camkit.arrays import FloatArray
 from camkit.bundle.facts import HaloError, NetworkFacts
 from camkit.caller import option_text
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.cancel import Cancel
 from camkit.runtime.network.cell_windows import (

@@ -18,9 +18,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.caller import option_text
-from camkit.contracts import CFA_PATTERNS, CfaPattern, FloatArray, NoiseModel, cfa_channels
+from camkit.cfa import CFA_PATTERNS, CfaPattern, cfa_channels
 from camkit.errors import ContractError
+from camkit.noise import NoiseModel
 from camkit.runtime.metadata import Metadata
 from camkit.runtime.output.directory import (
     Kind,

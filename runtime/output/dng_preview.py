@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from camkit.arrays import FloatArray
 from camkit.colorimetry import apply_matrix, rec709_from_camera
-from camkit.contracts import FloatArray
 from camkit.runtime.color import encode_uint8
 from camkit.runtime.output.jpeg import encode_jpeg
 

@@ -9,7 +9,7 @@ import Imath  # type: ignore[import-untyped]
 import numpy as np
 import OpenEXR
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.files.exr_attributes import exr_attributes
 from camkit.runtime.output.picture_writer import UPRIGHT, Codes, PictureFormat, PictureWriter

@@ -11,8 +11,8 @@ from typing import Final
 import numpy as np
 from PIL import Image
 
+from camkit.arrays import FloatArray
 from camkit.caller import option_text
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.color import encode_uint8
 from camkit.runtime.output.directory import Kind

@@ -5,8 +5,8 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.caller import option_text
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.output.dng import DngTags, open_linear_dng
 from camkit.runtime.output.dng_preview import Averages

@@ -12,7 +12,7 @@ from typing import Any, Final, Literal, Self, final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.color import ColorStage
 from camkit.runtime.geometry.turning import turn_back

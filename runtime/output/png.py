@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.color import encode_uint8, encode_uint16
 from camkit.runtime.output.exif import NOTHING, color_tags, exif_block
 from camkit.runtime.output.icc import icc_profile

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.color import encode_uint16
 from camkit.runtime.output.directory import (
     Kind,

@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 from PIL import Image
 
+from camkit.arrays import FloatArray
 from camkit.colorimetry import apply_matrix
-from camkit.contracts import FloatArray
 from camkit.runtime.color import ColorStage, color_stage, encode_uint8, to_rec709
 from camkit.runtime.geometry.turning import turn_back
 from camkit.runtime.output.dng_preview import Averages

@@ -9,8 +9,8 @@ import numpy as np
 
 from camkit.bundle.facts import NetworkFacts
 from camkit.bundle.stages import Wiener
-from camkit.contracts import NoiseModel
 from camkit.errors import ContractError
+from camkit.noise import NoiseModel
 from camkit.runtime.bank.blocks import Block, taper_edges
 from camkit.runtime.bank.wiener import place_knowledge, wiener_filter
 from camkit.runtime.network.engine import NetworkEngine

@@ -21,9 +21,9 @@ from camkit.bundle.container import read_container
 from camkit.bundle.facts import NetworkFacts
 from camkit.bundle.optics import PSF
 from camkit.bundle.reader import Bundle, open_bundle, read_container_manifest
-from camkit.contracts import depth_name
 from camkit.errors import CamkitError, ContractError, one_line
 from camkit.progress import working
+from camkit.psf import depth_name
 from camkit.runtime.kind import part_of
 from camkit.runtime.network.graph import COST_RTOL, check_graph
 from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES

@@ -4,10 +4,10 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.haze_golden import HazeGolden, haze_golden_from_bytes
 from camkit.bundle.reader import HAZE_GOLDEN, Bundle
 from camkit.bundle.stages import Dehaze
-from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ParityError
 from camkit.runtime.bank.cell_means import cell_count
 from camkit.runtime.bank.haze import CoarseBand, hazy_kernels, solve_coarse

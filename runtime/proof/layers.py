@@ -13,11 +13,11 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.facts import NetworkFacts
 from camkit.bundle.golden import NO_SIZE, GoldenArrays, golden_from_bytes
 from camkit.bundle.manifest import GoldenCase
 from camkit.bundle.reader import GOLDEN, Bundle, is_built_in
-from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ParityError
 from camkit.progress import counted
 from camkit.runtime.machine.limits import PROOF_MB, PROOF_WORK

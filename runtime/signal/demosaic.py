@@ -27,7 +27,8 @@ from typing import Final, Literal
 import cv2
 import numpy as np
 
-from camkit.contracts import CFA_PATTERNS, CfaPattern, FloatArray, cfa_channels
+from camkit.arrays import FloatArray
+from camkit.cfa import CFA_PATTERNS, CfaPattern, cfa_channels
 from camkit.errors import ContractError
 from camkit.runtime.signal.directional import DIRECTIONAL_REACH_PX, demosaic_tile
 

@@ -27,7 +27,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 
 # green 2, its change 1, weights 2, red and blue 1 + 1, refinement 1 + 1 + 1
 DIRECTIONAL_REACH_PX: Final = 10

@@ -15,8 +15,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray, NoiseModel
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
+from camkit.noise import NoiseModel
 from camkit.runtime.capture import Capture
 from camkit.runtime.signal.glow import MARGIN_PX, OUTLIER_SPREADS, glows, neighbours
 

@@ -7,8 +7,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray, NoiseModel
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
+from camkit.noise import NoiseModel
 from camkit.runtime.machine.slices import run_chunks
 from camkit.runtime.rows import PiecedRows, RowSource
 

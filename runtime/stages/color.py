@@ -6,9 +6,9 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.sensor import RGB
 from camkit.bundle.stages import Color
-from camkit.contracts import FloatArray
 from camkit.runtime.color import ColorStage, color_stage, to_output
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork

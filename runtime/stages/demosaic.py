@@ -7,7 +7,7 @@ import numpy as np
 
 from camkit.bundle.sensor import MOSAIC, RGB
 from camkit.bundle.stages import Demosaic
-from camkit.contracts import CfaPattern
+from camkit.cfa import CfaPattern
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream

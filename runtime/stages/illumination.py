@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from typing import Final
 
+from camkit.arrays import FloatArray
 from camkit.bundle.stages import Illumination
-from camkit.contracts import FloatArray
 from camkit.runtime.geometry.illumination import IlluminationGain
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork

@@ -6,13 +6,14 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.facts import NetworkFacts
 from camkit.bundle.light_bound import BRIGHT
 from camkit.bundle.light_bound import CELL_PX as LIGHT_CELL_PX
 from camkit.bundle.stages import Network
 from camkit.caller import option_text
-from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
+from camkit.noise import NoiseModel
 from camkit.runtime.color import rec709_of_planes
 from camkit.runtime.content import CELL_PX
 from camkit.runtime.envelope import findings, observe, verdict

@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 
 from camkit.bundle.stages import WhiteBalance
+from camkit.cfa import CfaPattern
 from camkit.colorimetry import camera_from_rec709
-from camkit.contracts import CfaPattern
 from camkit.runtime.job.job import Gains, Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream

@@ -13,8 +13,8 @@ from camkit.bundle.manifest import Manifest
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Wiener
 from camkit.caller import option_text
-from camkit.contracts import depth_name
 from camkit.errors import ContractError
+from camkit.psf import depth_name
 from camkit.runtime.bank.baselines import TUNED_ON, method_numbers, restoration_bank
 from camkit.runtime.bank.blocks import (
     BlockBank,

@@ -9,9 +9,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.sensor import BayerSensor, ColorSensor
-from camkit.contracts import CfaPattern, FloatArray, NoiseModel, cfa_channels
+from camkit.cfa import CfaPattern, cfa_channels
 from camkit.errors import ContractError
+from camkit.noise import NoiseModel
 from camkit.runtime.geometry.illumination import illumination_band
 from camkit.runtime.twin.light import Gains, Light
 

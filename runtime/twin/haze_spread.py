@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.bank.haze import enlarged
 from camkit.runtime.geometry.field_blur import KernelLookup, scatter_light
 from camkit.runtime.geometry.sensor_window import SensorWindow

@@ -11,11 +11,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.sensor import MOSAIC, BayerSensor, ColorSensor
 from camkit.colorimetry import apply_matrix, camera_from_rec709
-from camkit.contracts import FloatArray, FrozenPsf, depth_name
 from camkit.errors import ContractError
 from camkit.haze import Haze
+from camkit.psf import FrozenPsf, depth_name
 from camkit.runtime.bank.haze import hazy_kernels
 from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.geometry.field_blur import (

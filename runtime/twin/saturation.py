@@ -1,7 +1,7 @@
 """The exposure at which a share of a scene saturates the sensor of a camera."""
 
+from camkit.arrays import FloatArray
 from camkit.bundle.sensor import ColorSensor
-from camkit.contracts import FloatArray
 from camkit.runtime.twin.light import camera_space
 from camkit.scenes.saturation import CEILING, Saturation, saturating_exposure, saturation_at
 

@@ -10,12 +10,13 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.frozen_optics import psf_of_streaks
 from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import BayerSensor, ColorSensor, Sensor
-from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import ContractError, UnsupportedError
 from camkit.haze import Haze
+from camkit.psf import FrozenPsf
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.metadata import Metadata
 from camkit.runtime.output.dng import DngTags, camkit_description, write_bayer_dng

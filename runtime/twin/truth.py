@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.golden import IMAGE
 from camkit.bundle.manifest import Manifest
 from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import RGB, ColorSensor
 from camkit.colorimetry import apply_matrix, rec709_from_camera
-from camkit.contracts import FloatArray
 from camkit.errors import UnsupportedError
 from camkit.runtime.color import color_stage
 from camkit.runtime.geometry.warp import undistort_bands

@@ -36,7 +36,7 @@ SOURCES = (
     *(ROOT / "camkit" / name for name in ("bundle", "scenes", "calibrate", "calibration")),
     *(
         ROOT / "camkit" / f"{name}.py"
-        for name in ("contracts", "haze", "kinds", "colorimetry", "streaks")
+        for name in ("psf", "radial", "noise", "cfa", "haze", "kinds", "colorimetry", "streaks")
     ),
 )
 """All that programs may call; `camkit.cli` and `camkit.report` speak to the command line alone."""

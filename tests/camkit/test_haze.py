@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError
 from camkit.haze import Haze
+from camkit.psf import FrozenPsf
 from tests.bundle_factory import tiny_psf
 from tests.haze_factory import tiny_haze, with_kernels
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.streaks import (
     HAZE_STEP_PX,

@@ -14,7 +14,6 @@ from camkit.bundle.golden import IMAGE, golden_from_bytes
 from camkit.bundle.haze_file import write_haze
 from camkit.bundle.psf_file import write_psf
 from camkit.bundle.reader import GOLDEN, HAZE_GOLDEN, Bundle, open_bundle
-from camkit.contracts import FrozenPsf, RadialDistortion
 from camkit.errors import ContractError, ParityError
 from camkit.export import assemble
 from camkit.export.assemble import export_bundle
@@ -22,6 +21,8 @@ from camkit.export.network_facts import ExportedNetwork
 from camkit.export.parts import Parts
 from camkit.models_def.networks.catalog import build_network
 from camkit.models_def.training.checkpoint import Checkpoint, write_checkpoint
+from camkit.psf import FrozenPsf
+from camkit.radial import RadialDistortion
 from camkit.runtime.plan.loss import plan_entries
 from camkit.runtime.proof.golden_run import case_work
 from tests.deep_bundle import deep_psf

@@ -9,7 +9,6 @@ import pytest
 import torch
 
 from camkit.bundle.reader import PLATE, PLATE_HEIGHTS, PRESCRIPTION
-from camkit.contracts import FrozenPsf, RadialDistortion
 from camkit.errors import ContractError
 from camkit.export.designed_optics import SAME_PLATE_SHARE, designed_members
 from camkit.export.parts import Parts
@@ -27,6 +26,8 @@ from camkit.models_def.optics.diffraction.plate_optics import plate_kernels
 from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.prescription import format_prescription
 from camkit.models_def.training.checkpoint import Checkpoint
+from camkit.psf import FrozenPsf
+from camkit.radial import RadialDistortion
 
 BENCH = Bench(diameter_mm=2.0, focal_length_mm=20.0, focus_mm=2000.0)
 WAVELENGTHS_UM = (0.47, 0.55, 0.63)

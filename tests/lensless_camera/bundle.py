@@ -7,6 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.golden import IMAGE, GoldenArrays, golden_to_bytes
 from camkit.bundle.manifest import GoldenCase
@@ -14,7 +15,8 @@ from camkit.bundle.reader import Bundle, open_bundle
 from camkit.bundle.sensor import ChannelResponse, Extent, IsoNoise, PlanesSensor
 from camkit.bundle.stages import Color, Linearise
 from camkit.bundle.writer import write_bundle, write_physics
-from camkit.contracts import FloatArray, FrozenPsf, RadialDistortion
+from camkit.psf import FrozenPsf
+from camkit.radial import RadialDistortion
 from camkit.runtime.proof.golden_run import case_work
 from camkit.runtime.twin.simulate import SimulationOptions, photograph
 from camkit.runtime.twin.truth import ideal_picture

@@ -5,9 +5,9 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.manifest import Manifest
 from camkit.caller import option_text
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.job.job import Job

@@ -4,7 +4,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from camkit.contracts import CFA_PATTERNS
+from camkit.cfa import CFA_PATTERNS
 from camkit.models_def.sensors import demosaic as in_torch
 from camkit.runtime.signal import demosaic as in_numpy
 

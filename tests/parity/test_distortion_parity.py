@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from camkit.contracts import RadialDistortion
 from camkit.models_def.optics.distortion import fit_distortion
+from camkit.radial import RadialDistortion
 from camkit.runtime.geometry.distortion import distort_points
 
 RADIUS_MM = 21.489

@@ -8,11 +8,11 @@ import torch
 
 from camkit.bundle.sensor import BayerSensor, ColorSensor, Extent
 from camkit.colorimetry import apply_matrix, camera_from_rec709
-from camkit.contracts import FrozenPsf
 from camkit.models_def.sensors.demosaic import mosaic
 from camkit.models_def.sensors.exposure import expose as record
 from camkit.models_def.sensors.forward import block_centres_px, scatter
 from camkit.models_def.training.kind import read_recipe
+from camkit.psf import FrozenPsf
 from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.geometry.field_blur import scatter as runtime_scatter
 from camkit.runtime.geometry.sensor_window import SensorWindow

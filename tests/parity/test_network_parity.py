@@ -7,7 +7,7 @@ import pytest
 import torch
 from torch import nn
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.export.onnx_graph import to_onnx
 from camkit.models_def.networks.catalog import build_network
 from camkit.runtime.network.engine import NetworkEngine

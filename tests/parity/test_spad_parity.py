@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.models_def.kinds.spad import sampling as trained
 from camkit.models_def.kinds.spad.counting import Exposure
 from camkit.models_def.kinds.spad.evaluation import bicubic as trained_bicubic

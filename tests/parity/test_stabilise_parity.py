@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 import torch
 
-from camkit.contracts import NoiseModel
 from camkit.models_def.sensors import stabilise as in_torch
+from camkit.noise import NoiseModel
 from camkit.runtime.signal import stabilise as in_numpy
 
 TOLERANCE = 1e-6

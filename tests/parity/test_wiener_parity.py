@@ -3,10 +3,10 @@ import pytest
 import torch
 
 from camkit.bundle.stages import Wiener
-from camkit.contracts import NoiseModel
 from camkit.models_def.sensors.wiener import taper_edges as taper_torch
 from camkit.models_def.sensors.wiener import to_otf as to_otf_torch
 from camkit.models_def.sensors.wiener import wiener_restore
+from camkit.noise import NoiseModel
 from camkit.runtime.bank.blocks import Block, taper_edges, to_otf
 from camkit.runtime.bank.wiener import wiener_filter
 from tests.psf_factory import (

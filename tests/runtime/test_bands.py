@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from camkit.contracts import RadialDistortion
+from camkit.radial import RadialDistortion
 from camkit.runtime.clock import StageClock
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.geometry.warp import undistort_bands

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from camkit.contracts import CFA_PATTERNS
+from camkit.cfa import CFA_PATTERNS
 from camkit.errors import ContractError
 from camkit.runtime.capture import Capture, MosaicOptions
 

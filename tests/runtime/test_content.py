@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from camkit.contracts import FloatArray, NoiseModel
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
+from camkit.noise import NoiseModel
 from camkit.runtime.capture import Capture
 from camkit.runtime.content import (
     BLACK,

@@ -10,8 +10,8 @@ import pytest
 from camkit.bundle.manifest import Range
 from camkit.bundle.reader import open_bundle
 from camkit.bundle.writer import write_bundle
-from camkit.contracts import NoiseModel
 from camkit.errors import ContractError
+from camkit.noise import NoiseModel
 from camkit.runtime.batch import process
 from camkit.runtime.capture import Capture
 from camkit.runtime.envelope import QUANTITIES, findings, grey_noise, observe, verdict

@@ -8,7 +8,7 @@ import scipy.ndimage
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from camkit.contracts import NoiseModel
+from camkit.noise import NoiseModel
 from camkit.runtime.capture import Capture
 from camkit.runtime.pipeline import Pipeline, load
 

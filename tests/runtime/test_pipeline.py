@@ -11,10 +11,10 @@ import cv2
 import numpy as np
 import pytest
 
+from camkit.arrays import FloatArray
 from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.reader import Bundle, built_in_bundles, open_bundle
 from camkit.bundle.writer import write_bundle
-from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ContractError
 from camkit.runtime.batch import process
 from camkit.runtime.cancel import Cancelled

@@ -12,7 +12,7 @@ import tifffile
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from camkit.contracts import CFA_PATTERNS
+from camkit.cfa import CFA_PATTERNS
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime import raw, raw_worker
 from camkit.runtime.capture import Capture

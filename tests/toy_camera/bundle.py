@@ -16,7 +16,7 @@ from camkit.bundle.reader import Bundle, open_bundle
 from camkit.bundle.sensor import ChannelResponse, Extent, IsoNoise, PlanesSensor
 from camkit.bundle.stages import Color, Linearise, Network, Parts, Repair
 from camkit.bundle.writer import write_bundle
-from camkit.contracts import FrozenPsf
+from camkit.psf import FrozenPsf
 from camkit.runtime.network.graph import inspect_graph
 from camkit.runtime.network.ranges import node_activations
 from camkit.runtime.proof.golden_run import case_work

@@ -16,15 +16,16 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from camkit.arrays import FloatArray
 from camkit.bundle.facts import Port
 from camkit.bundle.psf_file import psf_to_bytes, read_psf, write_psf
 from camkit.bundle.stages import Color, Linearise, Network, Repair
-from camkit.contracts import FloatArray, FrozenPsf
 from camkit.models_def.sensors.forward import blur
 from camkit.models_def.sensors.stabilise import stabilise
 from camkit.models_def.training.kind import Design, Restorer, Score
 from camkit.models_def.training.pictures import SCENE_SEED, open_source
 from camkit.models_def.training.sample import Sample, SampleLayout
+from camkit.psf import FrozenPsf
 from camkit.runtime.bank.psf import FieldKernels, color_kernels
 from camkit.scenes import procedural_scene
 from tests.toy_camera.networks import build_toy_network

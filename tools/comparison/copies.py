@@ -6,8 +6,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.sensor import ColorSensor
-from camkit.contracts import FloatArray, FrozenPsf
+from camkit.psf import FrozenPsf
 from camkit.runtime.bank.psf import FieldKernels, color_kernels
 
 HEIGHTS: Final = (0.0, 0.25, 0.5, 0.75, 1.0)

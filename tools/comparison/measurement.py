@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.report.journal import append_journal, read_journal
 from camkit.report.quality import PsfSource, Shot, judge
 from tools.comparison.photograph import Photograph, Restorer

@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from skimage import restoration
 from skimage.restoration import uft
 
-from camkit.contracts import FloatArray, NoiseModel
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
+from camkit.noise import NoiseModel
 from camkit.runtime.bank.blocks import Block, BlockBank, BlockFilter, LocalPsf
 from camkit.runtime.bank.cross_channel import cross_channel_filter
 from camkit.runtime.bank.spectrum import ComplexArray, apply_transfer

@@ -11,11 +11,11 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Wiener
 from camkit.colorimetry import apply_matrix
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.report.quality import Shot, expose
 from camkit.runtime.bank.blocks import LocalPsf

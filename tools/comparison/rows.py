@@ -6,11 +6,12 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.optics import PSF
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Network, Wiener
-from camkit.contracts import FloatArray, depth_name
 from camkit.errors import ContractError
+from camkit.psf import depth_name
 from camkit.report.quality import BORDER_PX, FABRICATION_SEEDS, FIELD_SHARES
 from tools.capture.simulated import color_sensor
 from tools.comparison.measurement import Row, identity_of

@@ -15,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.golden import IMAGE, NO_SIZE, GoldenArrays, golden_to_bytes
 from camkit.bundle.manifest import GoldenCase, Manifest, manifest_without_networks
 from camkit.bundle.reader import CARD, GOLDEN
@@ -29,8 +30,8 @@ from camkit.bundle.stages import (
     WhiteBalance,
 )
 from camkit.bundle.writer import write_bundle
+from camkit.cfa import cfa_channels
 from camkit.colorimetry import D65, REC709_PRIMARIES, rgb_to_xyz
-from camkit.contracts import FloatArray, cfa_channels
 from camkit.export.proving import write_proved
 from camkit.runtime.proof.golden_run import case_work
 from tools.hdr.glare_twin import exposed_scene, photographed, two_point_star

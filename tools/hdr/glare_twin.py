@@ -16,7 +16,7 @@ from typing import Final, Literal
 import numpy as np
 import scipy.signal
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import CamkitError, ContractError
 from camkit.runtime.twin.truth import write_truth
 from camkit.scenes import named_scene

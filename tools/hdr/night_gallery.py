@@ -19,10 +19,10 @@ from typing import Final
 import numpy as np
 
 import camkit
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.bundle.sensor import BayerSensor
 from camkit.colorimetry import encode_srgb
-from camkit.contracts import FloatArray
 from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.network.engine import available_threads
 from camkit.runtime.twin.saturation import exposure_for_share

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import camkit
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import BayerSensor
 from camkit.colorimetry import apply_matrix, encode_srgb
-from camkit.contracts import FloatArray
 from camkit.runtime.geometry.illumination import divide_illumination
 from camkit.runtime.network.engine import available_threads
 from camkit.runtime.signal.demosaic import demosaic

@@ -14,7 +14,7 @@ from typing import Final
 import cv2
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from tools.pictures.captions import write_captioned, write_pixels
 from tools.pictures.front import write_front
 from tools.pictures.views import VIEWS, View

@@ -16,10 +16,10 @@ from typing import Final
 import numpy as np
 
 import camkit
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.bundle.stages import Deglare
 from camkit.colorimetry import encode_srgb
-from camkit.contracts import FloatArray
 from camkit.runtime.files.picture import read_light
 from camkit.runtime.kinds.hdr.deglare.removal import Glare, GlareSettings, find_glare
 from camkit.runtime.kinds.spad.finer.camera import FineCamera

@@ -12,9 +12,9 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle
 from camkit.colorimetry import apply_matrix, encode_srgb
-from camkit.contracts import FloatArray
 from camkit.report.quality import BORDER_PX, FIELD_SHARES, QUADRANTS, crop_origin
 from camkit.runtime.content import CELL_PX, CellArray, Content, lattice_shape, measure_content
 from camkit.runtime.job.reconstruction import Reconstruction

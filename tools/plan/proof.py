@@ -9,9 +9,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Wiener
-from camkit.contracts import FloatArray
 from camkit.report.figure import new_figure, to_png, to_svg
 from camkit.runtime.bank.blocks import lay_spans
 from camkit.runtime.job.reconstruction import Reconstruction

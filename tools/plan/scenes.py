@@ -13,7 +13,7 @@ from typing import Final
 import cv2
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.report.quality import read_picture
 from camkit.scenes import procedural_scene

@@ -17,8 +17,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.caller import option_text
-from camkit.contracts import FloatArray
 from camkit.errors import DecodeError
 
 FloatGrid = NDArray[np.float64]

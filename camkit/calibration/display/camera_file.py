@@ -17,8 +17,8 @@ from camkit.calibration.measured_files import (
     read_tone,
 )
 from camkit.colorimetry import decode_srgb
-from camkit.contracts import RadialIllumination
 from camkit.errors import DecodeError
+from camkit.radial import RadialIllumination
 from camkit.units import to_mm
 
 FloatGrid = NDArray[np.float64]

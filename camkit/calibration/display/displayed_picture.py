@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import DecodeError
 from camkit.regular_file import check_regular
 from camkit.runtime.files.formats.color_space import ADOBE_RGB, SRGB

@@ -18,8 +18,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.calibration.geometry.grey import to_codes
-from camkit.contracts import FloatArray
 
 FloatGrid = NDArray[np.float64]
 

@@ -18,6 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.calibration.display.alignment import Patch, align, map_places
 from camkit.calibration.display.camera_file import Illumination, Lens, Tone
 from camkit.calibration.display.primaries import Primaries, fit_primaries
@@ -29,7 +30,6 @@ from camkit.calibration.display.tiles import tile_shifts
 from camkit.calibration.display.view import View, colours_of, read_view
 from camkit.calibration.tone import exposures_of
 from camkit.caller import option_text
-from camkit.contracts import FloatArray
 from camkit.errors import CamkitError, ContractError, DecodeError
 from camkit.progress import counted
 from camkit.runtime.capture import Capture

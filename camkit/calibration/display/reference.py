@@ -11,10 +11,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.calibration.display.alignment import map_places
 from camkit.calibration.display.screen import Place
 from camkit.colorimetry import encode_srgb
-from camkit.contracts import FloatArray
 from camkit.errors import DecodeError
 
 FloatGrid = NDArray[np.float64]

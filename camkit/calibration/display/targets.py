@@ -17,13 +17,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.calibration.display.displayed_picture import read_shown
 from camkit.calibration.display.marks import NUMBERS, draw_word
 from camkit.calibration.display.screen import Place, Screen
 from camkit.calibration.geometry.board import Board
 from camkit.caller import option_text
 from camkit.colorimetry import encode_srgb
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError, DecodeError
 from camkit.side_file import read_side_toml
 

@@ -8,8 +8,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.calibration.display.camera_file import Illumination, Lens
-from camkit.contracts import FloatArray, cfa_channels
+from camkit.cfa import cfa_channels
 from camkit.errors import DecodeError
 from camkit.runtime.capture import Capture
 from camkit.runtime.merging.merge import clipped_rows

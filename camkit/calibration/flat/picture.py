@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import cfa_channels
+from camkit.cfa import cfa_channels
 from camkit.errors import DecodeError
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.merging.merge import clipped_rows

@@ -10,9 +10,9 @@ from typing import Final
 import cv2
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.calibration.geometry.board import Board
 from camkit.calibration.geometry.camera_model import FloatGrid
-from camkit.contracts import FloatArray
 
 _SIDE: Final = 0.5
 """Of the way between two corners: how far from an edge its sides are looked at."""

@@ -18,12 +18,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.calibration.geometry.blur import blur_px
 from camkit.calibration.geometry.board import Board
 from camkit.calibration.geometry.camera_model import FloatGrid
 from camkit.calibration.geometry.grey import to_codes
 from camkit.calibration.geometry.saddle import refine_saddles
-from camkit.contracts import FloatArray
 
 Codes = NDArray[np.uint8]
 Corners = NDArray[np.float32]

@@ -10,8 +10,8 @@ from typing import Any, Final
 import numpy as np
 
 from camkit.calibration.geometry.camera_model import Camera, FloatGrid
-from camkit.contracts import RadialDistortion
 from camkit.errors import ContractError
+from camkit.radial import RadialDistortion
 from camkit.runtime.geometry.distortion import RANGE_MARGIN, check_distortion
 
 PINHOLE_WIDEST_RAD: Final = np.radians(89.0)

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import DecodeError
 from camkit.regular_file import check_regular
 from camkit.runtime.files.picture import read_scene

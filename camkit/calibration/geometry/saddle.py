@@ -12,8 +12,8 @@ from typing import Final
 import cv2
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.calibration.geometry.camera_model import FloatGrid
-from camkit.contracts import FloatArray
 
 MOST_SAMPLES: Final = 24
 """From the middle of a window to its side."""

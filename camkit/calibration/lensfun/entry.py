@@ -26,8 +26,8 @@ from camkit.calibration.lensfun.models import TERMS, Distortion, Vignetting
 from camkit.calibration.lensfun.source import Source, read_source
 from camkit.calibration.lensfun.xml import ROOT
 from camkit.caller import option_text
-from camkit.contracts import RadialDistortion, RadialIllumination
 from camkit.errors import ContractError, DecodeError
+from camkit.radial import RadialDistortion, RadialIllumination
 from camkit.runtime.geometry.distortion import check_distortion, undistort_points
 
 FloatGrid = NDArray[np.float64]

@@ -10,8 +10,9 @@ from camkit.bundle.optics import LensProfile
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.calibration.lensfun.models import FULL_FRAME_MM
 from camkit.calibration.measured_files import GeometryFile, read_geometry
-from camkit.contracts import FrozenPsf, RadialDistortion, RadialIllumination
 from camkit.errors import DecodeError
+from camkit.psf import FrozenPsf
+from camkit.radial import RadialDistortion, RadialIllumination
 from camkit.runtime.geometry.distortion import reference_channel
 from camkit.units import to_mm
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from camkit.calibration.noise.site import BLOCK_PX, FloatGrid, SitePair, site_pair
 from camkit.caller import option_text
-from camkit.contracts import cfa_channels
+from camkit.cfa import cfa_channels
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.merging.survey import check_alike, read_frame, without_pixels

@@ -98,7 +98,7 @@ def _laws_text(laws: dict[str, dict[str, Any]]) -> dict[str, dict[str, str]]:
 
 def _describe_psf(bundle: "Bundle") -> dict[str, Any] | None:
     from camkit.bundle.optics import PSF
-    from camkit.contracts import depth_name
+    from camkit.psf import depth_name
 
     if PSF not in bundle.names:
         return None

@@ -118,7 +118,7 @@ def _line(facts: Mapping[str, Any], *, with_saturation: bool) -> str:
     if "counts" in facts:
         shape = "x".join(map(str, facts["shape"]))
         return f"{', '.join(facts['files'])}: {facts['array']} {shape}, {facts['counts']} counts"
-    from camkit.contracts import depth_name
+    from camkit.psf import depth_name
 
     width, height = facts["size"]
     line = f"{facts['path']}: {width}x{height}, ISO {facts['iso']:g}"

@@ -14,8 +14,8 @@ import numpy as np
 from scipy.stats import norm
 
 from camkit.bundle.sensor import ColorSensor
-from camkit.contracts import NoiseModel
 from camkit.errors import ContractError
+from camkit.noise import NoiseModel
 from camkit.report.analysis.point_image import Array, Direction, PointImage
 from camkit.runtime.twin.exposure import Setting, levels_of, noise_of, record, variance_of
 

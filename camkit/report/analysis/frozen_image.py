@@ -5,9 +5,9 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.sensor import ColorSensor
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.report.analysis.point_image import (
     DIRECTIONS,

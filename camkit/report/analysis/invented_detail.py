@@ -16,9 +16,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle
 from camkit.colorimetry import encode_srgb
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.progress import counted
 from camkit.report.analysis.patches import MEASURES, Patch, corners_of, measure_patches, summary

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.report.analysis.bars import Bars, see_bars
 from camkit.report.analysis.point_image import (

@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 import scipy.ndimage
 
+from camkit.arrays import FloatArray
 from camkit.colorimetry import encode_srgb
-from camkit.contracts import FloatArray
 from camkit.report.analysis.perceptual import Measure
 from camkit.report.analysis.point_image import Array
 from camkit.report.quality import BORDER_PX

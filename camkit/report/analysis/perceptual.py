@@ -13,7 +13,7 @@ from typing import Final
 import cv2
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.report.analysis.point_image import Array
 
 SUBSTITUTE: Final = "gradient magnitude dissimilarity, 3 scales"

@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 
 PERIOD_PX: Final = 16
 STRENGTH: Final = 0.5

@@ -13,9 +13,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle
 from camkit.colorimetry import encode_srgb
-from camkit.contracts import FloatArray
 from camkit.report.quality import BORDER_PX
 from camkit.report.stress.rig import INPUT, Method, Rig, usual_sizes
 from camkit.runtime.geometry.sensor_window import SensorWindow

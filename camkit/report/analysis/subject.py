@@ -29,8 +29,8 @@ from camkit.bundle.reader import (
     open_bundle,
 )
 from camkit.bundle.sensor import BayerSensor, ColorSensor
-from camkit.contracts import RadialDistortion
 from camkit.errors import ContractError, UnsupportedError
+from camkit.radial import RadialDistortion
 from camkit.report.analysis.frozen_image import frozen_images, sensor_heights_mm
 from camkit.report.analysis.physical import write_camera
 from camkit.report.analysis.point_image import Band, PointImage

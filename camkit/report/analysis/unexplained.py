@@ -16,7 +16,7 @@ from typing import Final
 import cv2
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.report.analysis.point_image import Array
 from camkit.report.stress.consistency import CLIPPED_REACH_PX, near
 from camkit.report.stress.shot import Shot

@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
+from camkit.arrays import FloatArray
 from camkit.bundle.golden import IMAGE
 from camkit.bundle.reader import Bundle, open_bundle
-from camkit.contracts import FloatArray
 from camkit.errors import CamkitError
 from camkit.report.bench.known_captures import KnownCapture
 from camkit.report.bench.metric import Metric

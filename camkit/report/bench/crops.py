@@ -6,9 +6,9 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.golden import IMAGE
 from camkit.colorimetry import decode_srgb, encode_srgb
-from camkit.contracts import FloatArray
 from camkit.report.bench.accuracy import INPUT, Key
 from camkit.report.bench.known_captures import KnownCapture
 from camkit.report.figure import encode_png, levels_of

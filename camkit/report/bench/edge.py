@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from camkit.bundle.golden import IMAGE
 from camkit.bundle.manifest import Manifest
 from camkit.bundle.reader import Bundle
-from camkit.contracts import cfa_channels
+from camkit.cfa import cfa_channels
 from camkit.errors import CamkitError
 from camkit.report.bench.accuracy import Key, Restorers, score_key
 from camkit.report.bench.known_captures import KnownCapture, known_capture

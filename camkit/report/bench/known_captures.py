@@ -18,13 +18,13 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.golden import IMAGE, GoldenArrays, golden_from_bytes
 from camkit.bundle.manifest import GoldenCase
 from camkit.bundle.reader import GOLDEN, PRESCRIPTION, Bundle
 from camkit.bundle.sensor import ColorSensor
 from camkit.colorimetry import encode_srgb
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.report.bench.part import BenchPart
 from camkit.report.fabricated_optics import fabricated_optics

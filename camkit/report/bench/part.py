@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from camkit.arrays import FloatArray
 from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.reader import Bundle
-from camkit.contracts import FloatArray
 from camkit.report.bench.metric import Metric
 from camkit.report.bench.trial import Axes, Entrant, Ground, Skip, Trial
 from camkit.report.quality import FIELD_SHARES, Exposed, Shot, expose

@@ -17,7 +17,7 @@ import numpy as np
 import scipy.ndimage
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.report.stress.shot import Shot
 from camkit.runtime.geometry.field_blur import scatter, scatter_light
 from camkit.runtime.geometry.shrink import shrunk

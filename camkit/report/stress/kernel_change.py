@@ -5,7 +5,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.twin.haze_spread import HazeLens
 from camkit.runtime.twin.light import KernelChange, Lens, with_kernels
 

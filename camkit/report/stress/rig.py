@@ -12,10 +12,10 @@ from typing import Any, Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.manifest import Manifest
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Network
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.report.kind_finder import check_photographs
 from camkit.report.sensor_geometry import in_sensor_geometry

@@ -6,8 +6,8 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.report.quality import FIELD_SHARES, QUADRANTS, crop_origin, list_set, read_picture
 from camkit.runtime.twin.truth import picture_scale

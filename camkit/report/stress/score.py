@@ -13,9 +13,9 @@ import numpy as np
 import scipy.ndimage
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle
 from camkit.colorimetry import encode_srgb
-from camkit.contracts import FloatArray
 from camkit.report.stress.consistency import (
     CLIPPED_REACH_PX,
     Scale,

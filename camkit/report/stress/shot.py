@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.bundle.sensor import ColorSensor
-from camkit.contracts import NoiseModel
+from camkit.noise import NoiseModel
 from camkit.report.stress.scene import Scene
 from camkit.runtime.capture import Capture
 from camkit.runtime.twin.light import Light

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

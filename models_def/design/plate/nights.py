@@ -10,8 +10,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from camkit.arrays import FloatArray
 from camkit.colorimetry import camera_from_rec709
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.models_def.design.plate.recording import Pixels
 from camkit.models_def.kinds.hdr.recipe import HdrRecipe

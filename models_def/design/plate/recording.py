@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from camkit.contracts import CfaPattern
+from camkit.cfa import CfaPattern
 from camkit.models_def.sensors.demosaic import demosaic, mosaic
 
 

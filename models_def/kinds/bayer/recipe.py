@@ -8,11 +8,11 @@ from typing import Any, Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.light_bound import LightBound
 from camkit.bundle.sensor import BayerSensor
 from camkit.bundle.stages import Dehaze, Together, Wiener
 from camkit.bundle.stages.network import DEFAULT_ROLE
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.scene_light import DisplayRecipe, WildRecipe
 from camkit.models_def.toml_table import section, table_digest, typed

@@ -16,10 +16,10 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from camkit.arrays import FloatArray
 from camkit.bundle.facts import Port
 from camkit.bundle.light_bound import BRIGHT
 from camkit.colorimetry import camera_from_rec709
-from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.psf_bank import PsfBank
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
@@ -29,6 +29,7 @@ from camkit.models_def.sensors.exposure import expose
 from camkit.models_def.sensors.stabilise import stabilise
 from camkit.models_def.sensors.wiener import to_otf, wiener_restore
 from camkit.models_def.training.sample import Batch, Finish, Sample, SampleLayout
+from camkit.noise import NoiseModel
 from camkit.units import MM_PER_M
 
 CLIPPED_REACH_PX: Final = 4

@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.colorimetry import (
     D65,
     REC709_PRIMARIES,
@@ -22,7 +23,6 @@ from camkit.colorimetry import (
     rec709_of_light,
     rgb_to_xyz,
 )
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.models_def.training.recipe import check_share
 

@@ -10,8 +10,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from camkit.arrays import FloatArray
 from camkit.colorimetry import apply_matrix, camera_from_rec709, encode_srgb
-from camkit.contracts import FloatArray
 from camkit.models_def.kinds.bayer.psf_bank import PsfBank
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.kinds.bayer.samples import (

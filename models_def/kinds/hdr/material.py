@@ -8,9 +8,9 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.frozen_optics import psf_of_streaks
 from camkit.bundle.streak_file import read_streaks, streaks_to_bytes, write_streaks
-from camkit.contracts import FloatArray
 from camkit.models_def.kinds.hdr.recipe import HdrRecipe
 from camkit.models_def.optics.diffraction.plate import plate_members, read_plate
 from camkit.models_def.optics.diffraction.plate_streaks import plate_streaks

@@ -12,9 +12,10 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from camkit.arrays import FloatArray
 from camkit.bundle.facts import Port
+from camkit.cfa import CfaPattern
 from camkit.colorimetry import camera_from_rec709, rec709_from_camera
-from camkit.contracts import CfaPattern, FloatArray, NoiseModel
 from camkit.models_def.kinds.hdr.material import HdrMaterial
 from camkit.models_def.kinds.hdr.recipe import HdrRecipe
 from camkit.models_def.sensors.demosaic import developed
@@ -22,6 +23,7 @@ from camkit.models_def.sensors.exposure import expose
 from camkit.models_def.sensors.stabilise import stabilise
 from camkit.models_def.sensors.wiener import to_otf
 from camkit.models_def.training.sample import Sample, SampleLayout
+from camkit.noise import NoiseModel
 from camkit.runtime.kinds.hdr.streaks.cells import cells_of, sample_sites
 from camkit.runtime.kinds.hdr.streaks.kernels import StreakKernels, streak_kernels
 from camkit.runtime.kinds.hdr.streaks.painting import Painter

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.models_def.training.pictures import SceneSource, open_scenes
 from camkit.models_def.training.recipe import SceneRecipe

@@ -15,8 +15,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from camkit.arrays import FloatArray
 from camkit.colorimetry import luma
-from camkit.contracts import FloatArray
 from camkit.models_def.kinds.spad.counting import Exposure
 from camkit.models_def.kinds.spad.samples import photograph
 from camkit.models_def.kinds.spad.sampling import Sampling

@@ -11,8 +11,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from camkit.arrays import FloatArray
 from camkit.bundle.psf_file import read_psf, write_psf
-from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import ContractError
 from camkit.models_def.kinds.spad.sampling import (
     FINE_PITCH_UM,
@@ -21,6 +21,7 @@ from camkit.models_def.kinds.spad.sampling import (
     gaussian_psf,
 )
 from camkit.models_def.optics.measured import measured_psf
+from camkit.psf import FrozenPsf
 
 LOGITS: Final = "plate.logits"
 """Name of the logits among the weights of a network that is trained with its plate."""

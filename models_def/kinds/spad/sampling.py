@@ -20,9 +20,10 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from camkit.contracts import PSF_SUM_TOLERANCE, FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.models_def.networks.bicubic import PHASE, SCALE
+from camkit.psf import PSF_SUM_TOLERANCE
 from camkit.runtime.kinds.spad.finer.linear import Grid
 from camkit.runtime.kinds.spad.finer.sampling import (
     GAUSSIAN_PIXELS,

@@ -8,10 +8,10 @@ from typing import Any, Final
 
 from torch import nn
 
+from camkit.arrays import FloatArray
 from camkit.bundle.golden import IMAGE
 from camkit.bundle.psf_file import psf_to_bytes
 from camkit.bundle.stages import Correct, Stage, SuperResolve
-from camkit.contracts import FloatArray
 from camkit.errors import UnsupportedError
 from camkit.models_def.kinds.spad.fitter import FITTING
 from camkit.models_def.kinds.spad.networks import build_spad_network

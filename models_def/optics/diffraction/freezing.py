@@ -12,10 +12,10 @@ from typing import Final
 import numpy as np
 import torch
 
+from camkit.arrays import FloatArray
 from camkit.bundle.frozen_optics import FrozenOptics, psf_of_streaks
 from camkit.bundle.sensor import ColorSensor
 from camkit.caller import option_text
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.models_def.optics.diffraction.plate_optics import PlateOptics
 from camkit.models_def.optics.diffraction.plate_streaks import plate_streaks

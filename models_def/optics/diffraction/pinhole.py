@@ -14,10 +14,10 @@ import scipy.fft
 import torch
 from numpy.typing import NDArray
 
-from camkit.contracts import RadialDistortion
 from camkit.errors import ContractError
 from camkit.models_def.optics.optics import FieldLayout, FloatGrid, radial_layout
 from camkit.models_def.optics.psf import TracedPsf
+from camkit.radial import RadialDistortion
 from camkit.units import to_mm
 
 WAVELENGTHS_UM: Final = (0.42, 0.463, 0.507, 0.55, 0.593, 0.637, 0.68)

@@ -16,12 +16,12 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from camkit.contracts import RadialDistortion
 from camkit.errors import ContractError
 from camkit.models_def.optics.diffraction.plate import Plate
 from camkit.models_def.optics.diffraction.wave import PixelGrid
 from camkit.models_def.optics.optics import FieldLayout, FloatGrid, uniform_layout
 from camkit.models_def.optics.psf import TracedPsf
+from camkit.radial import RadialDistortion
 from camkit.units import MM_PER_M
 
 REFERENCE_UM: Final = 0.55

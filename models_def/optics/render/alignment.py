@@ -15,13 +15,13 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from camkit.contracts import RadialDistortion
 from camkit.errors import ContractError
 from camkit.models_def.optics.distortion import trace_distortion
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.render.texture import Texture, look_up
 from camkit.models_def.optics.render.window import Window
+from camkit.radial import RadialDistortion
 
 _NEWTON_STEPS: Final = 20
 _TOLERANCE: Final = 1e-10

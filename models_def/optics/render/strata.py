@@ -9,7 +9,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 from torch import Tensor
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.models_def.optics.kernel_bank import ChannelResponse
 
 _FINE_STEPS: Final = 1024

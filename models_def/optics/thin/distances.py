@@ -10,9 +10,9 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.sensor import ColorSensor
-from camkit.contracts import FloatArray, depth_name
 from camkit.errors import ContractError
 from camkit.models_def.optics.freeze import Facts, Tell
 from camkit.models_def.optics.prescription import Lens
@@ -22,6 +22,7 @@ from camkit.models_def.optics.thin.freezing import (
     HazyGrid,
     freeze_hazy,
 )
+from camkit.psf import depth_name
 
 DISTANCES_MM: Final = (500.0, 1000.0, 2000.0, 4000.0, 10_000.0, math.inf)
 COARSE: Final = HazyGrid(fields=LEAST_FIELDS, wavelengths=3, rays=COPY_RAYS)

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.sensor import ColorSensor
-from camkit.contracts import FrozenPsf, RadialDistortion
 from camkit.errors import ContractError
 from camkit.haze import MOST_CELLS, Haze
 from camkit.models_def.optics.distortion import refuse_other_lens
@@ -30,6 +29,8 @@ from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.thin.middle import MOST_RAD, Middle, corner_angle_rad, find_middles
 from camkit.models_def.optics.thin.peak import LandedLight, land_light
 from camkit.progress import counted
+from camkit.psf import FrozenPsf
+from camkit.radial import RadialDistortion
 from camkit.units import to_mm
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import CfaPattern
+from camkit.cfa import CfaPattern
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.files.dng.corrections import Correction
 from camkit.runtime.files.dng.dng_levels import BlackMap, black_map, white_levels

@@ -13,7 +13,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import CfaPattern, FloatArray, cfa_channels
+from camkit.arrays import FloatArray
+from camkit.cfa import CfaPattern, cfa_channels
 from camkit.runtime.capture import SATURATION_SHARE
 from camkit.runtime.files.dng.dng_levels import BlackMap
 from camkit.runtime.files.dng.opcodes import FieldGains

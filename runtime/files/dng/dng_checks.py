@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from camkit.contracts import CfaPattern
+from camkit.cfa import CfaPattern
 from camkit.errors import DecodeError
 from camkit.runtime.files.dng.dng_levels import BLACK, BLACK_REPEAT, DELTA_H, DELTA_V, WHITE
 from camkit.runtime.files.dng.masked_areas import MASKED_AREAS

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.files.dng.picture_tags import DngPicture, numbers_of, whole_of
 
 BLACK_REPEAT: Final = 50713

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.files.dng.picture_tags import DngPicture, Rectangle, numbers_of
 
 MASKED_AREAS: Final = 50830

@@ -5,7 +5,7 @@ Numbers of compressions, layouts and colours: DNG specification 1.7.1, chapters 
 
 from typing import Final
 
-from camkit.contracts import CFA_PATTERNS
+from camkit.cfa import CFA_PATTERNS
 from camkit.errors import DecodeError
 from camkit.runtime.files.dng.picture_tags import (
     LOSSY_JPEG,

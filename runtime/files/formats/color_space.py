@@ -11,6 +11,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.colorimetry import (
     D65,
     REC709_PRIMARIES,
@@ -21,7 +22,6 @@ from camkit.colorimetry import (
     decode_srgb,
     rgb_to_xyz,
 )
-from camkit.contracts import FloatArray
 
 FloatGrid = NDArray[np.float64]
 Curve = Callable[[FloatGrid], FloatGrid]

@@ -17,8 +17,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.colorimetry import D65, REC709_PRIMARIES, Matrix, rgb_to_xyz
-from camkit.contracts import FloatArray
 from camkit.errors import DecodeError
 from camkit.picture_window import PictureWindow
 from camkit.runtime.files.exr_attributes import metadata_of_exr

@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.colorimetry import (
     D65,
     REC709_PRIMARIES,
@@ -17,7 +18,6 @@ from camkit.colorimetry import (
     rgb_to_xyz,
     white_xyz,
 )
-from camkit.contracts import FloatArray
 from camkit.errors import DecodeError
 from camkit.runtime.files.formats.icc_profile import PCS_WHITE
 from camkit.runtime.files.formats.tiff_page import (

@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.kinds.spad.pulse import Pulse
 from camkit.runtime.kinds.spad.time_axis import TimeAxis

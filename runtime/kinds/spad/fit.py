@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.cancel import check_wish
 from camkit.runtime.kinds.spad.bank import Bank, Scorer
 from camkit.runtime.kinds.spad.bound import information

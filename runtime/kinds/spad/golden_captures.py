@@ -9,10 +9,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.golden import GoldenArrays
 from camkit.bundle.manifest import GoldenCase
 from camkit.bundle.reader import Bundle
-from camkit.contracts import FloatArray
 from camkit.runtime.kind_parts.golden import Cases, GoldenCaptures
 from camkit.runtime.kinds.spad.finer.camera import FineCamera, network_planes
 from camkit.runtime.kinds.spad.timing import LIGHT_M_PER_PS

@@ -10,7 +10,7 @@ References: dissertation, eq. (4.9), with a background beside it.
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.kinds.spad.bank import Banded, Bank
 from camkit.runtime.kinds.spad.fit import (
     LEAST_RATE,

@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.kinds.spad.fit import LEAST_SIGNAL, MOST_AT_ONCE, Fitter
 from camkit.runtime.kinds.spad.time_axis import Orientation
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.cancel import check_wish
 from camkit.runtime.kinds.spad.evidence import threshold_for
 from camkit.runtime.kinds.spad.fit import Fit, Fitter

@@ -15,7 +15,7 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.cancel import check_wish
 from camkit.runtime.kinds.spad.bank import make_bank
 from camkit.runtime.kinds.spad.fit import Fit, Fitter

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.cancel import check_wish
 from camkit.runtime.kinds.spad.bank import Bank
 from camkit.runtime.kinds.spad.fit import Fit

@@ -17,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.kinds.spad.bank import Banded, Bank
 from camkit.runtime.kinds.spad.fit import Fit
 from camkit.runtime.kinds.spad.template_cubics import Floats, TemplateCubics

@@ -6,9 +6,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Color, Undistort
-from camkit.contracts import FloatArray
 from camkit.runtime.job.choices import known_options
 from camkit.runtime.kind import part_of
 from camkit.runtime.options import Options

@@ -13,10 +13,10 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Network
 from camkit.colorimetry import encode_srgb
-from camkit.contracts import FloatArray
 from camkit.runtime.proof.laws.darkroom import PLACES, Darkroom, Exposed, reason_not_judged
 from camkit.runtime.proof.laws.law import SHARE, Law
 from camkit.scenes.charts import lamp_chart, patch_chart

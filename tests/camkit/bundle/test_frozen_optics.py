@@ -23,8 +23,8 @@ from camkit.bundle.reader import bundle_from_bytes, open_bundle
 from camkit.bundle.stages import Highlights, Linearise
 from camkit.bundle.streak_file import streaks_to_bytes
 from camkit.bundle.writer import bundle_to_bytes
-from camkit.contracts import FrozenPsf
 from camkit.errors import BundleError
+from camkit.psf import FrozenPsf
 from tests.bundle_factory import tiny_manifest, tiny_members, tiny_psf, write_tiny_bundle
 from tests.hdr_bundle import four_lines, write_hdr_bundle
 from tests.streak_factory import small_streaks

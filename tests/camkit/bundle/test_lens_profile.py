@@ -13,8 +13,8 @@ from camkit.bundle.manifest import manifest_to_bytes, read_manifest
 from camkit.bundle.reader import Bundle, bundle_from_bytes
 from camkit.bundle.stages import Illumination, Undistort, Wiener
 from camkit.bundle.writer import bundle_to_bytes
-from camkit.contracts import RadialIllumination
 from camkit.errors import BundleError
+from camkit.radial import RadialIllumination
 from tests.bundle_factory import tiny_members, tiny_stages
 from tests.profile_bundle import profile_manifest, tiny_profile
 

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from safetensors.numpy import load, save
 
 from camkit.bundle.psf_file import psf_from_bytes, psf_to_bytes, read_psf, write_psf
-from camkit.contracts import FrozenPsf, RadialDistortion, Symmetry, grid_heights_mm
 from camkit.errors import BundleError
+from camkit.psf import FrozenPsf, Symmetry, grid_heights_mm
+from camkit.radial import RadialDistortion
 from tests.bundle_factory import tiny_psf
 from tests.focus_bundle import SHIFTS_UM, focus_psf
 from tests.psf_factory import grid_psf, streak_kernel, uniform_psf

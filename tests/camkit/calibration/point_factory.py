@@ -7,7 +7,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import NoiseModel, cfa_channels
+from camkit.cfa import cfa_channels
+from camkit.noise import NoiseModel
 from camkit.runtime.metadata import Metadata
 from camkit.runtime.output.dng import write_bayer_dng
 from tests.dng_factory import grey_tags

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from camkit.calibration.darks import Darks
-from camkit.contracts import NoiseModel
 from camkit.errors import ContractError, DecodeError
+from camkit.noise import NoiseModel
 from camkit.runtime.merging.merge import merge
 from camkit.runtime.merging.survey import Survey, survey
 from tests.camkit.calibration.point_factory import (

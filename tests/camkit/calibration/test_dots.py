@@ -6,8 +6,9 @@ import pytest
 from camkit.bundle.psf_file import psf_to_bytes
 from camkit.calibration.dots import dots_psf, see_dots
 from camkit.calibration.measured import MeasuredPsf, RedSamples
-from camkit.contracts import FrozenPsf, RadialDistortion
 from camkit.errors import ContractError, DecodeError
+from camkit.psf import FrozenPsf
+from camkit.radial import RadialDistortion
 
 PITCH_UM, SPACING_UM = 3.45, 37.5
 RNG = np.random.default_rng(0)

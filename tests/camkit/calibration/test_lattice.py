@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from camkit.calibration.lattice import Lattice, filled
-from camkit.contracts import CfaPattern, cfa_channels
+from camkit.cfa import CfaPattern, cfa_channels
 
 
 def _of(cfa: CfaPattern, colour: int) -> tuple[Lattice, np.ndarray, np.ndarray]:

@@ -10,8 +10,8 @@ import pytest
 from camkit.calibration.darks import Darks
 from camkit.calibration.measured import MeasuredPsf, PsfOptions
 from camkit.calibration.psf import measure_psf
-from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError, DecodeError
+from camkit.psf import FrozenPsf
 from camkit.runtime.merging.survey import Survey, survey
 from tests.camkit.calibration.haze_factory import Hazy
 from tests.camkit.calibration.point_factory import (

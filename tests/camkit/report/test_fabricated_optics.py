@@ -7,8 +7,8 @@ import pytest
 from camkit.bundle.psf_file import psf_to_bytes
 from camkit.bundle.reader import Bundle, open_bundle
 from camkit.bundle.writer import write_bundle
-from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError
+from camkit.psf import FrozenPsf
 from camkit.report import fabricated_optics as fabricated
 from camkit.report.fabricated_optics import fabricated_optics, lens_text
 from tests.bundle_factory import tiny_manifest, tiny_members, tiny_psf, tiny_sensor

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.kinds.hdr.night import night_scene
 from camkit.scenes.saturation import (

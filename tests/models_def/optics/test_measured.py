@@ -11,7 +11,6 @@ import torch
 from camkit.bundle.psf_file import write_psf
 from camkit.bundle.sensor import ChannelResponse, Extent, IsoNoise, PlanesSensor
 from camkit.bundle.stages import Wiener
-from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError
 from camkit.models_def.optics import freeze as freeze_module
 from camkit.models_def.optics import sampling
@@ -27,6 +26,7 @@ from camkit.models_def.optics.measured import (
 from camkit.models_def.optics.optics import Optics, radial_layout
 from camkit.models_def.optics.optics_file import read_optics
 from camkit.models_def.sensors.forward import blur
+from camkit.psf import FrozenPsf
 from camkit.runtime.bank.psf import color_kernels
 from tests.psf_factory import coma_kernels, frozen_psf, streak_kernel
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from camkit.contracts import CFA_PATTERNS, cfa_channels
+from camkit.cfa import CFA_PATTERNS, cfa_channels
 from camkit.models_def.sensors.exposure import expose
 from tests.camera_factory import make_sensor
 

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from camkit.bundle.stages import Wiener
-from camkit.contracts import NoiseModel
 from camkit.errors import UnsupportedError
+from camkit.noise import NoiseModel
 from camkit.runtime.bank.baselines import (
     admm_tv_filter,
     block_filter,

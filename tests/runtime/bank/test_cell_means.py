@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from camkit.contracts import CFA_PATTERNS, CfaPattern, FloatArray, cfa_channels
+from camkit.arrays import FloatArray
+from camkit.cfa import CFA_PATTERNS, CfaPattern, cfa_channels
 from camkit.runtime.bank.cell_means import cell_count, cell_means
 from camkit.runtime.rows import ArrayRows
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from camkit.contracts import NoiseModel
+from camkit.noise import NoiseModel
 from camkit.runtime.bank.blocks import Block, to_otf
 from camkit.runtime.bank.cross_channel import (
     Colour,

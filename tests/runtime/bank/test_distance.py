@@ -6,7 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from camkit.contracts import CfaPattern, FloatArray, NoiseModel, cfa_channels
+from camkit.arrays import FloatArray
+from camkit.cfa import CfaPattern, cfa_channels
+from camkit.noise import NoiseModel
 from camkit.runtime.bank import distance
 from camkit.runtime.bank.blocks import to_otf
 from camkit.runtime.bank.cell_means import cell_means

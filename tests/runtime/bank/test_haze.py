@@ -6,9 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from camkit.arrays import FloatArray
 from camkit.bundle.stages import Dehaze
-from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import ContractError
+from camkit.psf import FrozenPsf
 from camkit.runtime.bank.haze import (
     MARGIN_CELLS,
     CoarseBand,

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from camkit.arrays import FloatArray
 from camkit.bundle.stages import Together, Wiener
 from camkit.bundle.stages.together import BAND, BAND_STEP, Spread
-from camkit.contracts import FloatArray
 from camkit.runtime.bank.baselines import restoration_bank
 from camkit.runtime.bank.blocks import Block, BlockBank, to_otf
 from camkit.runtime.bank.joint_colours import CORNER_FREQUENCY, restore_together, transfer_of

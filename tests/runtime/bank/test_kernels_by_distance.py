@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from camkit.contracts import depth_weights
+from camkit.psf import depth_weights
 from camkit.runtime.bank.kernels_by_distance import (
     INTERVALS,
     MEAN,

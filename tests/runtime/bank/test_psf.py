@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError
+from camkit.psf import FrozenPsf
 from camkit.runtime.bank.psf import FieldKernels, color_kernels, wavelength_weights
 from tests.deep_bundle import deep_psf
 from tests.psf_factory import coma_kernels, frozen_psf, grid_psf, streak_kernel, uniform_psf

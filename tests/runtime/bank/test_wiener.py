@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camkit.bundle.stages import Wiener
-from camkit.contracts import NoiseModel
+from camkit.noise import NoiseModel
 from camkit.runtime.bank.baselines import restoration_bank
 from camkit.runtime.bank.blocks import (
     Block,

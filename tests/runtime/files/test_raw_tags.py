@@ -3,7 +3,7 @@ import math
 
 import pytest
 
-from camkit.contracts import NoiseModel
+from camkit.noise import NoiseModel
 from camkit.runtime.files import raw_tags
 from camkit.runtime.files.exif_tags import metadata_of
 from camkit.runtime.files.raw_tags import SensorPlace

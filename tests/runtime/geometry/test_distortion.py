@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from camkit.contracts import RadialDistortion
 from camkit.errors import ContractError
+from camkit.radial import RadialDistortion
 from camkit.runtime.geometry.distortion import (
     check_distortion,
     distort_points,

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.geometry import field_blur as scatter_module
 from camkit.runtime.geometry.field_blur import (

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from camkit.contracts import FrozenPsf
+from camkit.psf import FrozenPsf
 from camkit.runtime.geometry.illumination import (
     GAIN_SAMPLES,
     IlluminationGain,

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from camkit.arrays import FloatArray
 from camkit.bundle.stages.undistort import Interpolation
-from camkit.contracts import FloatArray
 from camkit.runtime.geometry.resampling import (
     FLOOR,
     SIDES_PX,

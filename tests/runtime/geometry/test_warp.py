@@ -5,9 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from camkit.arrays import FloatArray
 from camkit.bundle.stages.undistort import Interpolation
-from camkit.contracts import FloatArray, RadialDistortion
 from camkit.errors import ContractError, UnsupportedError
+from camkit.radial import RadialDistortion
 from camkit.runtime.geometry.resampling import FLOOR
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.geometry.warp import Warp, distort_array, undistort_bands

@@ -9,8 +9,8 @@ import pytest
 from camkit.bundle.plane import Grid
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Color, Linearise
-from camkit.contracts import NoiseModel
 from camkit.errors import ContractError
+from camkit.noise import NoiseModel
 from tests.bundle_factory import tiny_sensor
 from tests.job_factory import OWN_BALANCE, SHAPE, made_job, made_mosaic, made_planes, start
 from tests.planes_bundle import planes_sensor, write_planes_bundle

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from camkit.arrays import FloatArray
 from camkit.bundle.chain import CAPTURE, capture_plane
 from camkit.bundle.frozen_optics import FrozenOptics, psf_of_streaks
 from camkit.bundle.manifest import Manifest, planes_of
@@ -36,7 +37,6 @@ from camkit.bundle.stages import (
 )
 from camkit.bundle.writer import write_bundle
 from camkit.colorimetry import rec709_from_camera
-from camkit.contracts import FloatArray
 from camkit.runtime.bank.baselines import restoration_bank
 from camkit.runtime.bank.blocks import LocalPsf
 from camkit.runtime.bank.cell_means import cell_means

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from camkit.arrays import FloatArray
 from camkit.bundle.facts import Port
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Color, Linearise, Network, Repair, Wiener
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.capture import Capture
 from camkit.runtime.job import walker

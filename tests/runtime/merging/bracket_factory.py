@@ -6,8 +6,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.colorimetry import encode_srgb
-from camkit.contracts import FloatArray, NoiseModel
+from camkit.noise import NoiseModel
 from camkit.runtime.metadata import Metadata
 from camkit.runtime.output.dng import write_bayer_dng
 from tests.dng_factory import grey_tags

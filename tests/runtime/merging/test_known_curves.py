@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.colorimetry import encode_srgb
-from camkit.contracts import FloatArray
 from camkit.runtime.merging.known_curves import known_curve, misfit_codes, power_response
 from camkit.runtime.merging.merge import choose_response, merge
 from camkit.runtime.merging.response import srgb_response

@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from camkit.contracts import FloatArray, NoiseModel
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError, DecodeError
+from camkit.noise import NoiseModel
 from camkit.runtime.merging.merge import choose_response, merge
 from camkit.runtime.merging.response import srgb_response
 from camkit.runtime.merging.survey import Survey, read_frame, survey

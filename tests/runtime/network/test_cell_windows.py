@@ -5,7 +5,7 @@ import threading
 import numpy as np
 import pytest
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.cancel import Cancelled
 from camkit.runtime.network.cell_windows import (

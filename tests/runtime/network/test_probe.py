@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.probe import halo_error_curve, perturbation_reach

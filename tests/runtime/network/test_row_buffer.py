@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.network.row_buffer import RowBuffer
 from camkit.runtime.rows import ArrayRows

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import CamkitError, ContractError
 from camkit.runtime.cancel import Cancelled
 from camkit.runtime.network.engine import NetworkEngine

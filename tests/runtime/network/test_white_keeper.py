@@ -6,8 +6,9 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from camkit.arrays import FloatArray
 from camkit.colorimetry import Matrix
-from camkit.contracts import FloatArray, NoiseModel
+from camkit.noise import NoiseModel
 from camkit.runtime.network.white_keeper import white_keeper
 from camkit.runtime.signal.stabilise import stabilise, unstabilise
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from camkit.arrays import FloatArray
 from camkit.bundle.facts import HaloError, Port
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.windows import (

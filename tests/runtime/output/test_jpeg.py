@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.color import color_stage, encode_uint8
 from camkit.runtime.output.icc import icc_profile

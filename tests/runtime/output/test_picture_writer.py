@@ -5,7 +5,7 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.color import color_stage
 from camkit.runtime.geometry.turning import turn

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import tifffile
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.color import color_stage, encode_uint16
 from camkit.runtime.output.icc import icc_profile

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.color import OutputColor, color_stage, to_output
 from camkit.runtime.output.preview_file import LONGEST_PREVIEW_PX, preview_path
 from camkit.runtime.output.tone_mapping import ToneMappedPreview, tone_mapped

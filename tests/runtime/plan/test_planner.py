@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from camkit.arrays import FloatArray
 from camkit.bundle.facts import Port
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Linearise, Network
 from camkit.bundle.stages.network import DEFAULT_ROLE
-from camkit.contracts import FloatArray
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import pytest
 
+from camkit.arrays import FloatArray
 from camkit.bundle.facts import NetworkFacts
 from camkit.bundle.stages import Wiener
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.plan.speed import (

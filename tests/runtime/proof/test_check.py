@@ -11,6 +11,7 @@ import pytest
 from onnx import helper
 from pydantic import ValidationError
 
+from camkit.arrays import FloatArray
 from camkit.bundle.facts import NetworkFacts, Port
 from camkit.bundle.golden import NO_SIZE, GoldenArrays, golden_from_bytes, golden_to_bytes
 from camkit.bundle.manifest import GoldenCase, Manifest
@@ -18,7 +19,6 @@ from camkit.bundle.reader import GOLDEN, Bundle, open_bundle
 from camkit.bundle.stages import Color, Linearise, Network
 from camkit.bundle.stages.network import DEFAULT_ROLE
 from camkit.bundle.writer import write_bundle
-from camkit.contracts import FloatArray
 from camkit.errors import CamkitError, ContractError
 from camkit.runtime.machine.limits import BANK_WORK, PROOF_MB, PROOF_WORK, Limit
 from camkit.runtime.options import Options

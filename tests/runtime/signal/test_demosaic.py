@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from camkit.contracts import CFA_PATTERNS, cfa_channels
+from camkit.cfa import CFA_PATTERNS, cfa_channels
 from camkit.errors import ContractError
 from camkit.runtime.signal.demosaic import (
     DEMOSAIC_MARGIN_PX,

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from camkit.contracts import CFA_PATTERNS, CfaPattern, FloatArray, cfa_channels
+from camkit.arrays import FloatArray
+from camkit.cfa import CFA_PATTERNS, CfaPattern, cfa_channels
 from camkit.runtime.signal.demosaic import demosaic, demosaic_part
 
 ROUNDING = 2e-5

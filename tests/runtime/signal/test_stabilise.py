@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from camkit.contracts import NoiseModel
 from camkit.errors import ContractError
+from camkit.noise import NoiseModel
 from camkit.runtime.rows import ArrayRows
 from camkit.runtime.signal.stabilise import StackedRows, familiar_noise, stabilise, unstabilise
 from tests.psf_factory import with_noise

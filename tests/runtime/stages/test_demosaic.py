@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camkit.bundle.stages import Demosaic, Linearise, WhiteBalance
-from camkit.contracts import CFA_PATTERNS, CfaPattern
+from camkit.cfa import CFA_PATTERNS, CfaPattern
 from camkit.runtime.capture import Capture
 from camkit.runtime.job.stream import Stream
 from camkit.runtime.signal.demosaic import DemosaicMethod, apply_gains, demosaic

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 import camkit
+from camkit.arrays import FloatArray
 from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.manifest import Manifest, planes_of
 from camkit.bundle.reader import Bundle, open_bundle
 from camkit.bundle.stages import Dehaze, Wiener
 from camkit.bundle.writer import write_bundle
-from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ContractError
 from camkit.runtime.bank.cell_means import cell_means
 from camkit.runtime.bank.haze import few_of

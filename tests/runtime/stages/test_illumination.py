@@ -11,7 +11,7 @@ from camkit.bundle.plane import Grid
 from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import Extent
 from camkit.bundle.stages import Illumination, Linearise, Network
-from camkit.contracts import FrozenPsf
+from camkit.psf import FrozenPsf
 from camkit.runtime.geometry.illumination import divide_illumination, illumination_band
 from tests.bundle_factory import PITCH_UM
 from tests.job_factory import (

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from camkit.arrays import FloatArray
 from camkit.bundle.facts import Port
 from camkit.bundle.manifest import Range
 from camkit.bundle.reader import Bundle, open_bundle
 from camkit.bundle.stages import Color, Linearise, Network, Wiener
 from camkit.bundle.writer import write_bundle
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.signal.stabilise import stabilise, unstabilise

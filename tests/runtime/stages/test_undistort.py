@@ -10,7 +10,7 @@ from camkit.bundle.facts import Port
 from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import Extent
 from camkit.bundle.stages import Linearise, Network, Undistort
-from camkit.contracts import RadialDistortion
+from camkit.radial import RadialDistortion
 from camkit.runtime.geometry.warp import Warp, undistort_bands
 from camkit.runtime.rows import ArrayRows
 from tests.bundle_factory import PITCH_UM

@@ -5,8 +5,8 @@ import pytest
 
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import WhiteBalance
+from camkit.cfa import CFA_PATTERNS, CfaPattern
 from camkit.colorimetry import camera_from_rec709
-from camkit.contracts import CFA_PATTERNS, CfaPattern
 from camkit.runtime.signal.demosaic import apply_gains
 from tests.bundle_factory import tiny_sensor
 from tests.job_factory import (

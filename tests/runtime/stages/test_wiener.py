@@ -7,13 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from camkit.arrays import FloatArray
 from camkit.bundle.facts import Port
 from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import Extent, PlanesSensor
 from camkit.bundle.stages import Linearise, Network, Together, Wiener
 from camkit.bundle.writer import write_bundle
-from camkit.contracts import FloatArray, FrozenPsf, NoiseModel
 from camkit.errors import BundleError
+from camkit.noise import NoiseModel
+from camkit.psf import FrozenPsf
 from camkit.runtime.bank.baselines import restoration_bank
 from camkit.runtime.bank.blocks import LocalPsf
 from camkit.runtime.bank.kernels_by_distance import NearnessMap

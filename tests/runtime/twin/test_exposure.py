@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from camkit.arrays import FloatArray
 from camkit.bundle.sensor import BayerSensor, PlanesSensor
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.geometry.illumination import illumination_band
 from camkit.runtime.geometry.sensor_window import SensorWindow

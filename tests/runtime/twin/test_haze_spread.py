@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.bank.haze import hazy_kernels
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.options import Options

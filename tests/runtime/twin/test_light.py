@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from camkit.arrays import FloatArray
 from camkit.bundle.sensor import Extent, PlanesSensor
 from camkit.colorimetry import camera_from_rec709
-from camkit.contracts import FloatArray, FrozenPsf, RadialDistortion
 from camkit.errors import ContractError
+from camkit.psf import FrozenPsf
+from camkit.radial import RadialDistortion
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.geometry.warp import Warp
 from camkit.runtime.twin.light import (

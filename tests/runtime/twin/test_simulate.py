@@ -8,9 +8,10 @@ import pytest
 import rawpy
 import tifffile
 
+from camkit.arrays import FloatArray
 from camkit.colorimetry import camera_from_rec709
-from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import ContractError, UnsupportedError
+from camkit.psf import FrozenPsf
 from camkit.runtime.geometry.illumination import illumination_band
 from camkit.runtime.raw import read_capture
 from camkit.runtime.twin.exposure import sample_mosaic

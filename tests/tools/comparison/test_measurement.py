@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle
 from camkit.colorimetry import decode_srgb
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.report.quality import Shot
 from tests.psf_factory import texture

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages.network import DEFAULT_ROLE
-from camkit.contracts import FloatArray
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.plan.speed import Speed
 from tests.plan_factory import HEIGHT_PX, WIDTH_PX, write_planned_bundle

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle
-from camkit.contracts import FloatArray
 from camkit.report.bench.known_captures import bench_scene, drawn_scene
 from camkit.report.quality import Shot, list_set
 

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import camkit.runtime.kinds.hdr.streaks
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import CamkitError, ContractError
 from camkit.report.bench.metrics.hdr import METRIC
 from camkit.report.kinds.hdr.capture import photograph

@@ -12,9 +12,9 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle, open_bundle
 from camkit.bundle.sensor import BayerSensor
-from camkit.contracts import FloatArray
 from camkit.export.assemble import export_bundle
 from camkit.export.parts import Parts
 from camkit.models_def.kinds.hdr.samples import develop

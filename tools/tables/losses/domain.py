@@ -14,7 +14,6 @@ import torch
 from torch import Tensor
 
 from camkit.colorimetry import rec709_from_camera
-from camkit.contracts import depth_name
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.frames.samples import TileMaker
 from camkit.models_def.kinds.bayer.samples import NOT_JUDGED
@@ -23,6 +22,7 @@ from camkit.models_def.training.adversarial.views import Views, make_views
 from camkit.models_def.training.kind import Restorer, SampleMaker, read_recipe, training_kind
 from camkit.models_def.training.losses import ssim
 from camkit.models_def.training.sample import Sample, SampleLayout
+from camkit.psf import depth_name
 from tools.tables.losses.classical import with_method
 
 METRICS: Final = ("psnr_db", "ssim", "perceptual")

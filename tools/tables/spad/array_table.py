@@ -24,8 +24,8 @@ import torch
 from torch import Tensor, nn
 from torch.utils.flop_counter import FlopCounterMode
 
+from camkit.arrays import FloatArray
 from camkit.bundle.stages import SuperResolve
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.models_def.kinds.spad.counting import Exposure
 from camkit.models_def.kinds.spad.evaluation import SETS, bicubic, evaluate_each, read_set

@@ -27,6 +27,7 @@ import numpy as np
 import torch
 from torch import nn
 
+from camkit.arrays import FloatArray
 from camkit.bundle.facts import NetworkFacts
 from camkit.bundle.frozen_optics import read_optics_file
 from camkit.bundle.manifest import Manifest, planes_of
@@ -34,7 +35,6 @@ from camkit.bundle.reader import CARD
 from camkit.bundle.stages import Correct, Parts, Stage, SuperResolve
 from camkit.bundle.writer import write_bundle
 from camkit.colorimetry import encode_srgb, luma
-from camkit.contracts import FloatArray
 from camkit.errors import CamkitError, ContractError, ParityError
 from camkit.export.assemble import LICENCE, PACKAGES
 from camkit.export.card import card_text

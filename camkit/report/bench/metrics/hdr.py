@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.report.bench.metric import Column, Metric
 from camkit.report.hdr_score import (
     ALIGNED,

@@ -1,6 +1,6 @@
 """PSNR and SSIM on sRGB values, by the protocol of `camkit.report.quality`."""
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.report.bench.metric import Column, Metric
 from camkit.report.quality import judge
 

@@ -6,9 +6,9 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import Sensor
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.report.kind_finder import check_photographs
 from camkit.runtime.files.picture import read_light

@@ -11,9 +11,10 @@ import numpy as np
 import scipy.ndimage
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.reader import Bundle
-from camkit.contracts import CfaPattern, FloatArray, cfa_channels
+from camkit.cfa import CfaPattern, cfa_channels
 from camkit.report.quality import Exposed, Shot, expose
 from camkit.report.sensor_geometry import in_sensor_geometry
 from camkit.runtime.capture import Capture

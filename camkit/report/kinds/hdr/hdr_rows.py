@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.report.kinds.hdr.judge import HdrJudge, HdrShot
 from camkit.report.kinds.hdr.lights import (
     dimmed,

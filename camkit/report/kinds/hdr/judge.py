@@ -13,9 +13,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.frozen_optics import psf_of_streaks
 from camkit.bundle.reader import Bundle
-from camkit.contracts import FloatArray, FrozenPsf
+from camkit.psf import FrozenPsf
 from camkit.report.hdr_score import mu_law, psnr_db, stops_rmse
 from camkit.report.kinds.hdr.capture import clipped_planes, developer
 from camkit.report.kinds.hdr.lights import exposed_night

@@ -6,9 +6,9 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import ColorSensor
-from camkit.contracts import FloatArray
 from camkit.report.stress.scene import SCENE_SEED, WHITE, Scene
 from camkit.runtime.kinds.hdr.night import night_scene
 from camkit.runtime.twin.saturation import exposure_for_share

@@ -17,7 +17,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.report.kinds.spad.score import psnr_db, ssim
 from camkit.report.kinds.spad.ways import Method, Way
 from camkit.runtime.kinds.spad.finer.camera import network_planes

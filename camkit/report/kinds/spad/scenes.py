@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.colorimetry import encode_srgb, luma
-from camkit.contracts import FloatArray
 from camkit.report.quality import list_set, read_picture
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from camkit.scenes import procedural_scene

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from skimage.metrics import structural_similarity
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 
 MOST_DB: Final = 100.0
 SIGMA_PX: Final = 1.5

@@ -19,9 +19,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Sharpen
-from camkit.contracts import FloatArray
 from camkit.report.bench.timed.process_run import Job, run_job
 from camkit.report.bench.trial import Skip
 from camkit.report.kinds.spad.scenes import drawn_pictures

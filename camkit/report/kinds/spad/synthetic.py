@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.kinds.spad.bank import Bank, make_bank
 from camkit.runtime.kinds.spad.bound import information
 from camkit.runtime.kinds.spad.pulse import GatedPulse

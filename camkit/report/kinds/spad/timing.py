@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import curve_fit
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.report.kinds.spad.synthetic import AXIS, PULSE, Light, bound_ps, draw
 from camkit.runtime.kinds.spad.sharpen import Sharpener, Way
 

@@ -15,8 +15,8 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle, built_in_bundles, open_bundle
-from camkit.contracts import FloatArray
 from camkit.report.bench.trial import Skip
 from camkit.report.kinds.spad.bicubic import bicubic
 from camkit.runtime.kinds.spad.finer.camera import FineCamera

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import BayerSensor, PlanesSensor
 from camkit.calibration.peak import light_within
-from camkit.contracts import FrozenPsf
+from camkit.psf import FrozenPsf
 from camkit.report.figure import Figure, channel_color, chart, new_figure, to_png
 from camkit.report.pages.calibration.lensfun_page import POINTS, half_diagonal_mm, placed_along
 from camkit.report.pages.page import Page, Picture, Section, Table, sentences, to_html

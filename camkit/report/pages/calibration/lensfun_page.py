@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from camkit.bundle.sensor import Extent
 from camkit.calibration.lensfun.entry import Entry
 from camkit.calibration.lensfun.ordinary import LensBundle
-from camkit.contracts import RadialDistortion
+from camkit.radial import RadialDistortion
 from camkit.report.figure import BLUE, Figure, chart, new_figure, to_png
 from camkit.report.pages.page import Page, Picture, Section, Table, sentences, to_html
 from camkit.runtime.geometry.distortion import distort_points

@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.report.stress.rig import Method, Rig
 from camkit.report.stress.scenario import has_networks, row

@@ -6,9 +6,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle
-from camkit.contracts import FloatArray, FrozenPsf
 from camkit.haze import without_pedestal
+from camkit.psf import FrozenPsf
 from camkit.report.stress.kernel_change import with_transformed
 from camkit.report.stress.lamps import LIGHTS, Spectrum
 from camkit.report.stress.rig import Rig

@@ -4,7 +4,7 @@ from typing import Final
 
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.report.limb import limb_errors
 from camkit.report.satellites import satellites
 from camkit.report.stress.scenario import has_room, row

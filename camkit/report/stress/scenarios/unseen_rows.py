@@ -4,7 +4,7 @@ from typing import Final
 
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.report.stress.lamps import DAYLIGHT_K, tint
 from camkit.report.stress.scenario import row
 from camkit.report.stress.scene import WHITE, Scene

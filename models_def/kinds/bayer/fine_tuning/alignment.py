@@ -14,9 +14,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.sensor import BayerSensor
 from camkit.colorimetry import apply_matrix, encode_srgb
-from camkit.contracts import FloatArray, RadialDistortion
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.fine_tuning.homography import (
     WORK_SIDE_PX,
@@ -27,6 +27,7 @@ from camkit.models_def.kinds.bayer.fine_tuning.homography import (
     warp_to,
 )
 from camkit.models_def.kinds.bayer.psf_bank import PsfBank
+from camkit.radial import RadialDistortion
 from camkit.runtime.geometry.distortion import distort_points, undistort_points
 from camkit.units import to_mm
 

@@ -18,9 +18,9 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.caller import option_text
 from camkit.colorimetry import camera_from_rec709
-from camkit.contracts import FloatArray, NoiseModel, RadialDistortion
 from camkit.errors import ContractError, DecodeError
 from camkit.models_def.kinds.bayer.fine_tuning.alignment import CLIPPED_ABOVE, AlignedPair, Aligner
 from camkit.models_def.kinds.bayer.fine_tuning.homography import Homography, warp_to
@@ -37,6 +37,8 @@ from camkit.models_def.training.adversarial.fitter import Mix
 from camkit.models_def.training.pictures import list_pictures, read_picture, to_linear
 from camkit.models_def.training.pool import cut_patch
 from camkit.models_def.training.sample import Batch, Sample
+from camkit.noise import NoiseModel
+from camkit.radial import RadialDistortion
 from camkit.side_file import read_side_toml
 from camkit.units import to_mm
 

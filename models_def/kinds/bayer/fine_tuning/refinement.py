@@ -8,7 +8,6 @@ import numpy as np
 import torch
 
 from camkit.colorimetry import rec709_from_camera
-from camkit.contracts import RadialDistortion
 from camkit.models_def.kinds.bayer.fine_tuning.pairs import read_pairs
 from camkit.models_def.kinds.bayer.material import BayerMaterial
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe, FineTuningRecipe
@@ -25,6 +24,7 @@ from camkit.models_def.training.first_weights import read_first_weights
 from camkit.models_def.training.fitter import BETAS, Fitter
 from camkit.models_def.training.recipe import ContentRecipe, NetworkRecipe
 from camkit.models_def.training.refinement import FineTuningOptions, Refinement
+from camkit.radial import RadialDistortion
 
 NAME: Final = "fine_tuned"
 OPPONENT_SEED: Final = 2

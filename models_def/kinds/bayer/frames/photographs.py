@@ -16,13 +16,13 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.chain import rewired
 from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.reader import PRESCRIPTION, Bundle
 from camkit.bundle.stages import Network
 from camkit.bundle.writer import write_physics
 from camkit.colorimetry import apply_matrix, camera_from_rec709
-from camkit.contracts import FloatArray, depth_name
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.frames.tiles import (
     PARTS,
@@ -42,6 +42,7 @@ from camkit.models_def.optics.thin.freezing import COPY_RAYS, HazyGrid, freeze_h
 from camkit.models_def.optics.thin.middle import find_middles
 from camkit.models_def.training.kind import training_kind
 from camkit.models_def.training.pictures import DrawnShares, SceneSource, list_pictures, open_scenes
+from camkit.psf import depth_name
 from camkit.runtime.bank.haze import hazy_kernels
 from camkit.runtime.geometry.illumination import illumination_band
 from camkit.runtime.options import Options

@@ -21,7 +21,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.psf_bank import PsfBank, read_bank, write_bank
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe

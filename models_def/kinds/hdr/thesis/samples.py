@@ -19,9 +19,9 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.facts import Port
 from camkit.colorimetry import camera_from_rec709
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.models_def.kinds.hdr.material import HdrMaterial
 from camkit.models_def.kinds.hdr.recipe import HdrRecipe

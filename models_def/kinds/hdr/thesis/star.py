@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.models_def.kinds.hdr.thesis_recipe import GlareRecipe
 
 

@@ -19,7 +19,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 
 SCALES: Final = (50.0, 20.0, 10.0, 5.0, 2.5, 1.2, 0.6, 0.3, 0.15)
 """Of the penalty, in units of the level of a place, from the first step to the last."""

@@ -19,7 +19,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.kinds.hdr.deglare.overview import Overview
 from camkit.runtime.kinds.hdr.deglare.slant import Slant
 

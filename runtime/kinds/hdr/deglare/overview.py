@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 
 MOST_PX: Final = 768
 """Longer side of an overview, at most."""

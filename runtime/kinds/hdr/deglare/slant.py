@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 
 MOST_RAD = math.radians(45)

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.scenes.texture import Generator, cut_texture, make_texture
 
 SLOPES: Final = (0.7, 1.0, 1.3)

@@ -4,7 +4,7 @@ from typing import Final
 
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.kinds.hdr.night.canvas import (
     Canvas,
     cover,

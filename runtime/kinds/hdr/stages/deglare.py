@@ -6,9 +6,9 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.manifest import Manifest
 from camkit.bundle.stages import Deglare
-from camkit.contracts import FloatArray
 from camkit.errors import BundleError
 from camkit.runtime.cancel import check_cancelled
 from camkit.runtime.job.job import Gains, Job

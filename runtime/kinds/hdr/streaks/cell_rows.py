@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

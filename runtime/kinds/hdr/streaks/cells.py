@@ -15,7 +15,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import CfaPattern, FloatArray, cfa_channels
+from camkit.arrays import FloatArray
+from camkit.cfa import CfaPattern, cfa_channels
 from camkit.errors import ContractError
 from camkit.runtime.kinds.hdr.streaks.shapes import pooled
 

@@ -24,7 +24,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.kinds.hdr.streaks.convolution import Spread
 
 COARSE: Final = (1.0, 0.3, 0.1, 0.03, 0.012, 0.006)

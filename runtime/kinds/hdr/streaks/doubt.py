@@ -15,7 +15,7 @@ import numpy as np
 import scipy.ndimage
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.kinds.hdr.streaks.cell_rows import rows_of_cells
 from camkit.runtime.kinds.hdr.streaks.cells import PITCH_PX
 from camkit.runtime.kinds.hdr.streaks.shapes import widened

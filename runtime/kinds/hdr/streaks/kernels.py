@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.kinds.hdr.streaks.cells import COLOURS, Sites, cell_kernel, coarser_kernel
 

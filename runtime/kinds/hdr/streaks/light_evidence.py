@@ -16,7 +16,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.kinds.hdr.streaks.convolution import spreading
 from camkit.runtime.kinds.hdr.streaks.descent import gradient, usable_cells
 from camkit.runtime.kinds.hdr.streaks.shapes import repeated

@@ -16,8 +16,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.colorimetry import Matrix, OutputColours
-from camkit.contracts import FloatArray
 from camkit.runtime.kinds.hdr.streaks.cell_rows import Lattice
 from camkit.runtime.kinds.hdr.streaks.cells import COLOURS, PITCH_PX, Sites
 from camkit.runtime.kinds.hdr.streaks.doubt import settled

@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.kinds.hdr.streaks.cells import COLOURS, Cells, coarser
 from camkit.runtime.kinds.hdr.streaks.convolution import Convolution, spreading
 from camkit.runtime.kinds.hdr.streaks.descent import COARSE_STEPS, not_outshining, seek_lights

@@ -15,7 +15,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.kinds.hdr.streaks.cells import Cells
 from camkit.runtime.kinds.hdr.streaks.convolution import spreading
 from camkit.runtime.kinds.hdr.streaks.descent import FAINTEST, FINE_STEPS, seek_lights

@@ -19,7 +19,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.kinds.hdr.streaks.cells import COLOURS, PITCH_PX, Cells
 from camkit.runtime.kinds.hdr.streaks.recovery import Recovery, Region
 

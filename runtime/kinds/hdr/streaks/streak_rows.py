@@ -14,7 +14,7 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.kinds.hdr.streaks.cell_rows import Lattice
 from camkit.runtime.kinds.hdr.streaks.cells import COLOURS, PITCH_PX
 from camkit.runtime.kinds.hdr.streaks.convolution import spreading

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.cancel import check_wish
 from camkit.runtime.job.stream import Stream
 from camkit.runtime.kinds.spad.captures.photon_capture import PhotonCapture

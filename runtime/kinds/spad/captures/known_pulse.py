@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.job.job import Job
 from camkit.runtime.kinds.spad.captures.photon_capture import PhotonCapture, photons_of
 from camkit.runtime.kinds.spad.guess_pulse import guess_pulse

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import DecodeError
 from camkit.runtime.kinds.spad.files.axes import axes_of
 from camkit.runtime.kinds.spad.files.counts_file import (

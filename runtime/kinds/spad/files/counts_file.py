@@ -10,8 +10,8 @@ from typing import Any, Final, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.caller import option_text
-from camkit.contracts import FloatArray
 from camkit.errors import DecodeError
 
 CountsKind = Literal["histogram", "counts", "stamps"]

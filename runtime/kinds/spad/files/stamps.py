@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.cancel import check_wish
 from camkit.runtime.kinds.spad.files.counts_file import ARRIVALS, CountsFile, checked_size

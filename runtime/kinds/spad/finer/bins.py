@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.cancel import current_wish
 from camkit.runtime.kinds.spad.finer.camera import FineCamera, white_of
 from camkit.runtime.kinds.spad.hot_pixels import MOST_DEAD, painted_over

@@ -15,12 +15,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.manifest import Manifest
 from camkit.bundle.reader import Bundle, is_built_in
 from camkit.bundle.sensor import SpadSensor
 from camkit.bundle.stages import SuperResolve
 from camkit.caller import option_text
-from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ContractError
 from camkit.runtime.cancel import Cancel, check_cancelled
 from camkit.runtime.kinds.spad.finer.covariance import PictureCovariance

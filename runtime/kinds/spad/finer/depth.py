@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.kinds.spad.evidence import threshold_for
 from camkit.runtime.kinds.spad.finer.bins import SHARPER, FineBins, finer_bins
 from camkit.runtime.kinds.spad.finer.camera import FineCamera

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.cancel import Cancel, check_cancelled
 from camkit.runtime.kinds.spad.finer.camera import FineCamera, white_of
 

@@ -13,8 +13,8 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.stages import SuperResolve
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.kinds.spad.finer.linear import Grid
 

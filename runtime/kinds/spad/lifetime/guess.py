@@ -4,8 +4,8 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.caller import option_text
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.kinds.spad.lifetime.decay import Decay
 from camkit.runtime.kinds.spad.lifetime.fitter import LifetimeFitter

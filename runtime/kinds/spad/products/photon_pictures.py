@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.cancel import cancellable
 from camkit.runtime.capture_result import Result, Write
 from camkit.runtime.job.reconstruction import Reconstruction

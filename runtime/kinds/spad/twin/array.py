@@ -9,7 +9,7 @@ References: Sun 2021, eq. (4.1).
 
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.kinds.spad.finer.linear import Grid
 

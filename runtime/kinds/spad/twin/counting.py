@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.kinds.spad.files.counts_file import MOST_COUNT
 from camkit.runtime.kinds.spad.time_axis import Orientation

@@ -10,9 +10,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import SuperResolve
-from camkit.contracts import FloatArray
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from camkit.runtime.kinds.spad.finer.pictures import SURE, finer_frames
 from camkit.runtime.kinds.spad.twin.counting import Disturbances, count_frames

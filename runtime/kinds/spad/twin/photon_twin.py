@@ -13,8 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.kinds.spad.captures.photon_capture import times_of_bundle
 from camkit.runtime.kinds.spad.files.npz import read_npz

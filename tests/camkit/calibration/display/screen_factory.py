@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from camkit.calibration.geometry.camera_model import MODELS, Camera, project
 from camkit.calibration.record import to_toml
-from camkit.contracts import cfa_channels
+from camkit.cfa import cfa_channels
 from camkit.runtime.metadata import Metadata
 from camkit.runtime.output.dng import DngTags, write_bayer_dng
 

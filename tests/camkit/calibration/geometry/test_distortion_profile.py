@@ -6,8 +6,8 @@ import pytest
 from camkit.calibration.geometry.camera_model import MODELS, project
 from camkit.calibration.geometry.coverage import coverage_of, seen_cells
 from camkit.calibration.geometry.distortion_profile import fit_radial, profile_of
-from camkit.contracts import RadialDistortion
 from camkit.errors import ContractError
+from camkit.radial import RadialDistortion
 from camkit.runtime.geometry.distortion import check_distortion, distort_points, undistort_points
 from tests.camkit.calibration.geometry.board_factory import camera_of
 

@@ -22,8 +22,8 @@ from camkit.calibration.lensfun.entry import (
 from camkit.calibration.lensfun.models import Distortion, Vignetting
 from camkit.calibration.lensfun.source import Source, read_source
 from camkit.calibration.record import to_toml
-from camkit.contracts import RadialDistortion, RadialIllumination
 from camkit.errors import ContractError, DecodeError
+from camkit.radial import RadialDistortion, RadialIllumination
 from camkit.runtime.geometry.distortion import distort_points
 from tests.bundle_factory import tiny_sensor, write_tiny_bundle
 from tests.data_folder import data_path

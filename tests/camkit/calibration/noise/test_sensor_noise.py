@@ -8,7 +8,7 @@ import pytest
 
 from camkit.bundle.reader import open_bundle
 from camkit.calibration.noise.sensor_noise import measure_sensor
-from camkit.contracts import CfaPattern
+from camkit.cfa import CfaPattern
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.twin.simulate import SimulationOptions, photograph, write_capture

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from camkit.contracts import NoiseModel
 from camkit.errors import ContractError
+from camkit.noise import NoiseModel
 from camkit.report.analysis.bars import (
     CONFIDENCE,
     WHITE,

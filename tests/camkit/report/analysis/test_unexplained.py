@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.report.analysis.unexplained import LEVEL_PX, Unexplained, unexplained
 from camkit.report.stress.rig import Rig
 from camkit.report.stress.scene import stress_scenes

@@ -9,12 +9,12 @@ import cv2
 import numpy as np
 import pytest
 
+from camkit.arrays import FloatArray
 from camkit.bundle.golden import IMAGE, GoldenArrays, golden_to_bytes
 from camkit.bundle.manifest import GoldenCase
 from camkit.bundle.reader import Bundle, open_bundle
 from camkit.bundle.writer import write_bundle
 from camkit.colorimetry import decode_srgb
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.report.bench.accuracy import (
     INPUT,

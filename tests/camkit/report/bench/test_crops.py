@@ -4,9 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
+from camkit.arrays import FloatArray
 from camkit.bundle.golden import IMAGE
 from camkit.colorimetry import decode_srgb, encode_srgb
-from camkit.contracts import FloatArray
 from camkit.report.bench.accuracy import INPUT
 from camkit.report.bench.crops import (
     SHARP,

@@ -10,12 +10,12 @@ import numpy as np
 import OpenEXR
 import pytest
 
+from camkit.arrays import FloatArray
 from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.manifest import NOT_TRAINED
 from camkit.bundle.reader import Bundle
 from camkit.bundle.writer import write_bundle
 from camkit.cli.judge.bench import _lines
-from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ContractError, DecodeError
 from camkit.kinds import find_kind
 from camkit.report.bench import known_captures, line_up, run

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from camkit.arrays import FloatArray
 from camkit.bundle.haze_file import haze_to_bytes
 from camkit.bundle.psf_file import psf_to_bytes
 from camkit.bundle.reader import Bundle, open_bundle
 from camkit.bundle.writer import write_bundle
-from camkit.contracts import FloatArray
 from camkit.report.stress.consistency import residual
 from camkit.report.stress.kernel_change import with_transformed
 from camkit.report.stress.rig import Rig

@@ -5,7 +5,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from camkit.contracts import CFA_PATTERNS, cfa_channels
+from camkit.cfa import CFA_PATTERNS, cfa_channels
 from camkit.models_def.design.plate.recording import Pixels, recorded, whole_kernels
 from camkit.models_def.kinds.hdr.samples import develop
 from camkit.models_def.sensors.exposure import expose

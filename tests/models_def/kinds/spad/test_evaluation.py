@@ -8,7 +8,7 @@ import pytest
 import torch
 from skimage.metrics import structural_similarity
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.models_def.kinds.spad.counting import Exposure
 from camkit.models_def.kinds.spad.evaluation import (
     MOST_DB,

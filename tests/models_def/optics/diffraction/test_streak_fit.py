@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.models_def.optics.diffraction.streak_fit import (
     NoStreaksError,
     _haze,

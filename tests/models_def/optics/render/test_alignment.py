@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import torch
 
-from camkit.contracts import RadialDistortion
 from camkit.errors import ContractError
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.render.alignment import (
@@ -18,6 +17,7 @@ from camkit.models_def.optics.render.alignment import (
 from camkit.models_def.optics.render.texture import Texture
 from camkit.models_def.optics.render.window import Window, centred_window, corner_window
 from camkit.models_def.optics.spot import slopes_for_heights
+from camkit.radial import RadialDistortion
 
 # of a pixel of 6 um, over the whole field of the duet
 FIT_PX = 0.1

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.facts import Port
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Highlights, Network
-from camkit.contracts import FloatArray
 from camkit.runtime.capture import Capture
 from camkit.runtime.content import CELL_PX, LIGHT_PX
 from camkit.runtime.job.walker import Walk

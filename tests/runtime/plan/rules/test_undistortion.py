@@ -7,7 +7,7 @@ import pytest
 
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Undistort
-from camkit.contracts import RadialDistortion
+from camkit.radial import RadialDistortion
 from camkit.runtime.geometry.placement import place
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.geometry.warp import Warp

@@ -6,8 +6,8 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle
-from camkit.contracts import FloatArray
 from camkit.report.kinds.spad.stress.spad_scene import SpadScene
 from camkit.report.kinds.spad.stress.spad_score import (
     depth_errors,

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import convolve
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.report.kinds.spad.bicubic import REACH, cubic
 from camkit.runtime.kinds.spad.finer.sampling import point_kernel

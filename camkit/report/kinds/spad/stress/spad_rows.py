@@ -9,10 +9,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Sharpen, SuperResolve
 from camkit.calibration.dots import ACTIVE_UM
-from camkit.contracts import FloatArray
 from camkit.errors import UnsupportedError
 from camkit.report.kinds.spad.stress.judge import SpadJudge
 from camkit.report.kinds.spad.stress.kernels import blurred, etched, opened, shift_kernel, turned

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.report.kinds.spad.scenes import coded_luminance
 from camkit.report.quality import list_set, read_picture

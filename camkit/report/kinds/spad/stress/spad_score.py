@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.report.kinds.spad.stress.spad_shot import DepthShot
 from camkit.report.stress.score import BEST_DB, worst_patch
 from camkit.report.stress.verdict import Outcome

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.report.kinds.spad.stress.spad_scene import SpadScene
 from camkit.report.kinds.spad.stress.spad_shot import (
     DepthSetting,

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.report.kinds.spad.bicubic import bicubic
 from camkit.report.kinds.spad.stress.spad_shot import DepthShot, PictureShot
 from camkit.runtime.kinds.spad.finer.camera import FineCamera, white_of

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle
-from camkit.contracts import FloatArray
 from camkit.report.kinds.hdr.capture import (
     capture_of,
     clipped_planes,

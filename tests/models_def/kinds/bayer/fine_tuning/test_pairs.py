@@ -8,11 +8,11 @@ import pytest
 import torch
 
 from camkit.colorimetry import camera_from_rec709, encode_srgb
-from camkit.contracts import RadialDistortion
 from camkit.errors import ContractError, DecodeError
 from camkit.models_def.kinds.bayer.fine_tuning.homography import map_points
 from camkit.models_def.kinds.bayer.fine_tuning.pairs import read_capture, read_pairs
 from camkit.models_def.kinds.bayer.samples import corner_height_mm
+from camkit.radial import RadialDistortion
 from camkit.scenes import procedural_scene
 
 TRUE = np.array([[0.9, -0.03, 35.0], [0.03, 0.9, 15.0], [3e-5, -2e-5, 1.0]])

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.kinds.hdr.deglare.removal import Glare, GlareSettings, find_glare
 from tools.hdr.glare_twin import Shot, exposed_scene, photographed, psnr_db, two_point_star
 

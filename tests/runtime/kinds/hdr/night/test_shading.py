@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.kinds.hdr.night.canvas import Canvas
 from camkit.runtime.kinds.hdr.night.shading import CELL_PX, _cells, _irradiance, shade
 

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.kinds.hdr.night.bokeh import add_blur, add_bokeh
 from camkit.runtime.kinds.hdr.night.canvas import Canvas, new_canvas
 from camkit.runtime.kinds.hdr.night.facade import Building, add_building, add_near_window

@@ -11,12 +11,12 @@ import pytest
 import tifffile
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.bundle.chain import capture_plane
 from camkit.bundle.manifest import Manifest, planes_of
 from camkit.bundle.reader import Bundle, open_bundle
 from camkit.bundle.stages import Color, Deglare, Demosaic, JoinError, Linearise, Parts
 from camkit.bundle.stages.entry import StageEntry
-from camkit.contracts import FloatArray
 from camkit.errors import BundleError
 from camkit.runtime.cancel import Cancelled
 from camkit.runtime.capture import Capture

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import (
     Color,
@@ -21,7 +22,6 @@ from camkit.bundle.stages import (
     Wiener,
 )
 from camkit.colorimetry import rec709_from_camera
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.cancel import Cancelled

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.signal import fftconvolve
 
-from camkit.contracts import CFA_PATTERNS, CfaPattern, FloatArray, cfa_channels
+from camkit.arrays import FloatArray
+from camkit.cfa import CFA_PATTERNS, CfaPattern, cfa_channels
 from camkit.errors import ContractError
 from camkit.runtime.kinds.hdr.streaks.cells import (
     Cells,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.kinds.hdr.streaks.convolution import Convolution
 from camkit.runtime.kinds.hdr.streaks.descent import (
     BRIGHTEST,

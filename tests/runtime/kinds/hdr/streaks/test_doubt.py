@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from camkit.contracts import CfaPattern, FloatArray
+from camkit.arrays import FloatArray
+from camkit.cfa import CfaPattern
 from camkit.runtime.kinds.hdr.streaks import doubt
 from camkit.runtime.kinds.hdr.streaks.cells import PITCH_PX, sample_sites
 from camkit.runtime.kinds.hdr.streaks.doubt import BLOCK_PX, MARGIN_PX, RUN, settled

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from camkit.contracts import CfaPattern
+from camkit.cfa import CfaPattern
 from camkit.errors import ContractError
 from camkit.runtime.kinds.hdr.streaks.cells import cell_kernel, coarser_kernel, sample_sites
 from camkit.runtime.kinds.hdr.streaks.kernels import CORE_CELLS, streak_kernels

@@ -6,7 +6,7 @@ import scipy.ndimage
 import scipy.signal
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.kinds.hdr.streaks.convolution import Convolution
 from camkit.runtime.kinds.hdr.streaks.light_evidence import (
     ENOUGH,

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from camkit.contracts import CfaPattern, FloatArray
+from camkit.arrays import FloatArray
+from camkit.cfa import CfaPattern
 from camkit.runtime.kinds.hdr.streaks.cells import COLOURS
 from camkit.runtime.kinds.hdr.streaks.painting import DIMMEST, Painter, _untinted
 from camkit.runtime.kinds.hdr.streaks.recovery import Recovery, recover

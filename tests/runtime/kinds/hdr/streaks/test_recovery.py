@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from camkit.contracts import CfaPattern, FloatArray
+from camkit.arrays import FloatArray
+from camkit.cfa import CfaPattern
 from camkit.runtime.kinds.hdr.streaks import recovery
 from camkit.runtime.kinds.hdr.streaks.cells import Cells, cells_of, coarser, sample_sites
 from camkit.runtime.kinds.hdr.streaks.recovery import MOST_CLIPPED, Recovery, recover, veil_of

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.kinds.hdr.streaks.cells import Cells, coarser
 from camkit.runtime.kinds.hdr.streaks.convolution import spreading
 from camkit.runtime.kinds.hdr.streaks.kernels import StreakKernels

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.kinds.hdr.streaks.rims import (
     AROUND_PX,
     MARGIN_PX,

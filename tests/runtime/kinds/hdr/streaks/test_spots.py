@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from camkit.contracts import CfaPattern, FloatArray
+from camkit.arrays import FloatArray
+from camkit.cfa import CfaPattern
 from camkit.runtime.kinds.hdr.streaks import spots
 from camkit.runtime.kinds.hdr.streaks.cells import COLOURS, cells_of, sample_sites
 from camkit.runtime.kinds.hdr.streaks.recovery import Recovery, recover

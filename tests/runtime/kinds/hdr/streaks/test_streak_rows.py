@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.runtime.kinds.hdr.streaks import streak_rows
 from camkit.runtime.kinds.hdr.streaks.cell_rows import Lattice
 from camkit.runtime.kinds.hdr.streaks.cells import COLOURS

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from camkit.contracts import FloatArray
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.report.kinds.spad.stress.kernels import (
     blurred,

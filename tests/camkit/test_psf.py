@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from camkit.contracts import depth_name, depth_weights, focus_weights
 from camkit.errors import ContractError
+from camkit.psf import depth_name, depth_weights, focus_weights
 from tests.deep_bundle import deep_psf
 
 DEPTHS_MM = np.array([500.0, 700.0, 1000.0, 1500.0])

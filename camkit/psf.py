@@ -1,10 +1,4 @@
-"""Types shared by design time and use time: CFA, inputs, noise, frozen PSF, radial distortion.
-
-Signals are linear with 1.0 = white level (after black subtraction). Arrays are [y, x], pixel
-centres at integers. Sensor positions are in millimetres from the optical axis, +x to the right
-and +y down the rows; the axis lies at the picture centre ((w - 1) / 2, (h - 1) / 2) of the full
-sensor unless its extent states another `optical_centre_px`.
-"""
+"""The PSF of a camera, frozen on a grid of fields, depths and wavelengths, and its weights."""
 
 from dataclasses import dataclass
 from typing import Final, Literal, get_args
@@ -12,22 +6,13 @@ from typing import Final, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.arrays import FloatArray
 from camkit.caller import option_text
 from camkit.errors import ContractError
+from camkit.radial import RadialDistortion, RadialIllumination
 from camkit.units import MM_PER_M
 
-CfaPattern = Literal["RGGB", "BGGR", "GRBG", "GBRG"]
-CFA_PATTERNS: Final[tuple[CfaPattern, ...]] = get_args(CfaPattern)
-
-InputContract = Literal[
-    "raw_bayer_v1", "linear_rgb_v1", "linear_planes_v1", "spad_counts_v1", "spad_histogram_v1"
-]
-"""raw_bayer_v1: (h, w) mosaic in DN; linear_rgb_v1: (3, h, w) and linear_planes_v1: (c, h, w)
-linear, 1.0 = white level; spad_counts_v1: (h, w) and spad_histogram_v1: (t, h, w) photons."""
-
 Symmetry = Literal["radial", "uniform", "grid"]
-
-FloatArray = NDArray[np.float32]
 
 PSF_SUM_TOLERANCE: Final = 1e-4
 DEPTH_RTOL: Final = 1e-6
@@ -35,141 +20,6 @@ DEPTH_RTOL: Final = 1e-6
 LEAST_HEIGHT_MM: Final = 1e-6
 MOST_HEIGHT_MM: Final = 1e6
 """Of the last field, where there are several."""
-
-
-def cfa_channels(cfa: CfaPattern) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Return the colour index (0 R, 1 G, 2 B) at each position of the 2x2 cell.
-
-    Args:
-        cfa: Letters in reading order of the cell whose corner is pixel (0, 0).
-    """
-    if cfa not in CFA_PATTERNS:
-        raise ContractError(f"CFA must be one of {', '.join(CFA_PATTERNS)}; got {cfa!r}")
-    index = ["RGB".index(letter) for letter in cfa]
-    return (index[0], index[1]), (index[2], index[3])
-
-
-def shifted_cfa(cfa: CfaPattern, origin_px: tuple[int, int]) -> CfaPattern:
-    """Return the pattern that a crop of a mosaic begins with.
-
-    Args:
-        cfa: Letters in reading order of the cell whose corner is pixel (0, 0) of the sensor.
-        origin_px: (x, y) of the first pixel of the crop.
-    """
-    x, y = origin_px
-    letters = "".join(cfa[(y + dy) % 2 * 2 + (x + dx) % 2] for dy in (0, 1) for dx in (0, 1))
-    return next(pattern for pattern in CFA_PATTERNS if pattern == letters)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NoiseModel:
-    """Signal-dependent noise of a linear signal: variance = shot * signal + read_variance.
-
-    Attributes:
-        shot: Variance per unit of signal, one per channel.
-        read_variance: Variance at zero signal, one per channel.
-    References: Foi et al. 2008; DNG specification 1.7, NoiseProfile.
-    """
-
-    shot: tuple[float, ...]
-    read_variance: tuple[float, ...]
-
-    def __post_init__(self) -> None:
-        values = np.array([*self.shot, *self.read_variance], dtype=np.float64)
-        same = 0 < len(self.shot) == len(self.read_variance)
-        if not same or not np.isfinite(values).all() or (values < 0).any():
-            raise ContractError(
-                "noise needs one finite value >= 0 of each kind for every channel; "
-                f"got {self.shot}, {self.read_variance}"
-            )
-
-    def with_gains(self, gains: tuple[float, ...]) -> "NoiseModel":
-        """Return the noise of the signal after multiplication by one gain per channel."""
-        return NoiseModel(
-            shot=tuple(s * g for s, g in zip(self.shot, gains, strict=True)),
-            read_variance=tuple(v * g * g for v, g in zip(self.read_variance, gains, strict=True)),
-        )
-
-    def raised(self, factors: tuple[float, ...]) -> "NoiseModel":
-        """Return the noise whose variance is multiplied by one factor per channel."""
-        return NoiseModel(
-            shot=tuple(s * f for s, f in zip(self.shot, factors, strict=True)),
-            read_variance=tuple(v * f for v, f in zip(self.read_variance, factors, strict=True)),
-        )
-
-    def at_least(self, other: "NoiseModel") -> "NoiseModel":
-        """Return the noise that is nowhere below another one of as many channels."""
-        return NoiseModel(
-            shot=tuple(map(max, self.shot, other.shot)),
-            read_variance=tuple(map(max, self.read_variance, other.read_variance)),
-        )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RadialDistortion:
-    """Radial distortion per channel: r_d = xi r (1 + k1 r^2 + k2 r^4 + k3 r^6) + even powers.
-
-    Attributes:
-        coefficients: (channel, 4) float64; xi * (1, k1, k2, k3), for radii in units of
-            `radius_mm`. r is the ideal (undistorted) radius, r_d the radius on the sensor.
-        radius_mm: The unit of r and r_d: half the diagonal of the sensor.
-        even_coefficients: (channel, 3) float64; b of b0 r^2 + b1 r^4 + b2 r^6, which models of
-            measured lenses have besides; None for none.
-    References: Sun 2021, eq. (6.10) and (6.11).
-    """
-
-    coefficients: NDArray[np.float64]
-    radius_mm: float
-    even_coefficients: NDArray[np.float64] | None = None
-
-    def __post_init__(self) -> None:
-        shape = self.coefficients.shape
-        if (
-            len(shape) != 2
-            or shape[1] != 4
-            or not shape[0]
-            or not np.isfinite(self.coefficients).all()
-        ):
-            raise ContractError(f"distortion needs finite (channel, 4) coefficients; got {shape}")
-        even = self.even_coefficients
-        if even is not None and (even.shape != (shape[0], 3) or not np.isfinite(even).all()):
-            raise ContractError(
-                f"even powers of distortion need finite ({shape[0]}, 3) coefficients; got "
-                f"{even.shape}"
-            )
-        if not (np.isfinite(self.radius_mm) and self.radius_mm > 0):
-            raise ContractError(f"distortion radius_mm must be > 0; got {self.radius_mm}")
-
-    def row(self, channel: int) -> NDArray[np.float64]:
-        """Return the coefficients of a channel: (4,), or (7,) with those of even powers behind."""
-        if self.even_coefficients is None:
-            return np.asarray(self.coefficients[channel])
-        return np.concatenate([self.coefficients[channel], self.even_coefficients[channel]])
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RadialIllumination:
-    """Relative illumination over the distance from the optical axis.
-
-    Attributes:
-        heights_mm: (n,) float64, increasing from 0.
-        light: (n,) float64 > 0, 1 on the axis; between heights linear in their square, constant
-            beyond the last.
-    """
-
-    heights_mm: NDArray[np.float64]
-    light: NDArray[np.float64]
-
-    def __post_init__(self) -> None:
-        heights, light = self.heights_mm, self.light
-        if heights.ndim != 1 or not heights.size or heights.shape != light.shape:
-            raise ContractError(
-                f"illumination needs one value for each height; got {light.shape}, {heights.shape}"
-            )
-        if heights[0] != 0 or not np.isfinite(heights).all() or (np.diff(heights) <= 0).any():
-            raise ContractError("heights of illumination must increase from 0")
-        if not ((light > 0) & np.isfinite(light)).all():
-            raise ContractError("relative illumination needs finite values > 0")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
