@@ -17,7 +17,7 @@ from torch import Tensor
 
 from camkit.arrays import FloatArray
 from camkit.errors import ContractError
-from camkit.models_def.sensors.psf import turned_at
+from camkit.models_def.sensors.turned_kernels import turned_at
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -33,7 +33,7 @@ from camkit.models_def.kinds.bayer.samples import (
     Developed,
     finish_shot,
 )
-from camkit.models_def.training.adversarial.fitter import Mix
+from camkit.models_def.training.adversarial.picture_fitter import Mix
 from camkit.models_def.training.pictures import list_pictures, read_picture, to_linear
 from camkit.models_def.training.pool import cut_patch
 from camkit.models_def.training.sample import Batch, Sample

@@ -38,7 +38,7 @@ from camkit.models_def.kinds.bayer.samples import tint_crop
 from camkit.models_def.optics.frozen import corner_height_mm
 from camkit.models_def.optics.kernel_bank import focused_copies
 from camkit.models_def.optics.prescription import Lens, format_prescription
-from camkit.models_def.optics.thin.freezing import COPY_RAYS, HazyGrid, freeze_hazy
+from camkit.models_def.optics.thin.hazy_freezing import COPY_RAYS, HazyGrid, freeze_hazy
 from camkit.models_def.optics.thin.middle import find_middles
 from camkit.models_def.training.kind import training_kind
 from camkit.models_def.training.pictures import DrawnShares, SceneSource, list_pictures, open_scenes

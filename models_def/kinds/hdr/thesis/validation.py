@@ -11,8 +11,8 @@ from torch import Tensor
 from camkit.models_def.kinds.hdr.recipe import HdrRecipe
 from camkit.models_def.kinds.hdr.samples import draw_corner
 from camkit.models_def.kinds.hdr.scenes import LightSource, exposed
+from camkit.models_def.kinds.hdr.thesis.coded_samples import CodedCamera, coded_sample, layout_of
 from camkit.models_def.kinds.hdr.thesis.networks import to_light
-from camkit.models_def.kinds.hdr.thesis.samples import CodedCamera, coded_sample, layout_of
 from camkit.models_def.kinds.hdr.validation import ISOS, MOST_DB, SEED
 from camkit.models_def.training.kind import Restorer, Score, mean_score
 from camkit.scenes.saturation import CEILING

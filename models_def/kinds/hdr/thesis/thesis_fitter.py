@@ -16,19 +16,19 @@ from torch import Tensor
 from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.models_def.kinds.hdr.thesis.chain import ThesisChain
-from camkit.models_def.kinds.hdr.thesis.losses import (
+from camkit.models_def.kinds.hdr.thesis.networks import (
+    THESIS_NAMES,
+    BetweenRoots,
+    build_thesis_network,
+    to_light,
+)
+from camkit.models_def.kinds.hdr.thesis.thesis_losses import (
     exclusion_loss,
     fused_loss,
     perceptual_loss,
     saturated_loss,
     total_loss,
     unsaturated_loss,
-)
-from camkit.models_def.kinds.hdr.thesis.networks import (
-    THESIS_NAMES,
-    BetweenRoots,
-    build_thesis_network,
-    to_light,
 )
 from camkit.models_def.kinds.hdr.thesis_recipe import ThesisRecipe
 from camkit.models_def.networks.vgg import VggLevels, file_digest, take_vgg
