@@ -35,7 +35,7 @@ class Result:
         sections: What stages found of the capture, by the names of the sidecar: `hdr`, `glare`.
     """
 
-    arrays: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    arrays: Mapping[str, NDArray[Any]] = field(default_factory=dict, repr=False)
     shape: tuple[int, ...] = ()
     orientation: int = 1
     writers: Mapping[str, Write] = field(default_factory=dict)
@@ -54,8 +54,8 @@ class Result:
         """
         if IMAGE not in self.arrays:
             raise ContractError(
-                f"this capture gives {', '.join(self.arrays) or 'no arrays'}, not an image; see "
-                "`arrays` of the result"
+                f"this capture gives {', '.join(self.arrays) or 'no arrays'}, not an image; `run` "
+                "returns them, in `arrays` of its result"
             )
         return self.arrays[IMAGE]
 

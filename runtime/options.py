@@ -12,7 +12,7 @@ from camkit.caller import option_list, option_text
 from camkit.errors import ContractError
 from camkit.field_types import check_fields, check_value
 from camkit.kinds import Kind, KindOption, all_kinds
-from camkit.runtime.unit import Unit
+from camkit.runtime.unit import Unit, read_unit
 from camkit.units import MM_PER_M
 
 Mode = Literal["exact", "fast", "whole"]
@@ -162,6 +162,8 @@ def kind_option_names() -> list[str]:
 def with_choices(options: Options, choices: Mapping[str, object]) -> Options:
     """Return options with single ones chosen by name, those that a kind brings among them.
 
+    A camera body may be given by its TOML file.
+
     Raises:
         ContractError: If one is unknown, or cannot be what it was given.
     """
@@ -169,6 +171,8 @@ def with_choices(options: Options, choices: Mapping[str, object]) -> Options:
     kind_names = kind_option_names()
     check_names(choices, {*plain_names(), *kind_names})
     plain = {name: value for name, value in choices.items() if name not in kind_names}
+    if isinstance(body := plain.get("unit"), str | PathLike):
+        plain["unit"] = read_unit(Path(body))
     of_kind = dict(options.of_kind)
     of_kind |= {
         name: _text_of(name, choices[name]) for name in kind_names if choices.get(name) is not None

@@ -37,7 +37,6 @@ from camkit.runtime.job.reconstruction import Reconstruction, check_out
 from camkit.runtime.job.setup import Setup
 from camkit.runtime.job.stream import Stream
 from camkit.runtime.kind import kind_without_bundle, part_of, runtime_part
-from camkit.runtime.kind_parts.picture_files import result_of
 from camkit.runtime.network.engine import NetworkEngine, available_threads
 from camkit.runtime.network.tiling import Progress
 from camkit.runtime.options import (
@@ -357,8 +356,15 @@ class Pipeline:
 
         Raises:
             DecodeError: If the file cannot be read.
-            ContractError: If capture and bundle do not fit each other.
+            ContractError: If capture and bundle do not fit each other, or captures of this kind
+                become products that have no rows to hand on.
         """
+        summary = self.part.outputs.summary
+        if summary is None:
+            raise ContractError(
+                f"captures of the kind {self.kind.name} become whole products, not bands of a "
+                "picture: use `run`"
+            )
         began = time.perf_counter()
         with self._opened(file, mosaic, origin_px, cancel) as capture:
             decode_s = time.perf_counter() - began
@@ -367,7 +373,7 @@ class Pipeline:
             for band in work.bands():
                 on_band(top, band)
                 top += band.shape[1]
-            result = result_of(work, {})
+            result = summary(work)
         return replace(result, seconds={"decode": decode_s, **result.seconds})
 
     def process_array(

@@ -7,6 +7,7 @@ Options that a kind of somebody else's package brings are taken at run time all 
 from os import PathLike
 from typing import Literal, TypedDict
 
+from camkit.runtime.files.in_memory import FilePath
 from camkit.runtime.options import (
     Assumption,
     DemosaicMethod,
@@ -56,7 +57,7 @@ class LoadKeywords(KindKeywords, total=False):
     max_mem_bytes: int | None
     threads: int | None
     tile_px: int | None
-    unit: Unit | None
+    unit: Unit | FilePath | None
     dtype: Dtype
     provider: Provider
 

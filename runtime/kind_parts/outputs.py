@@ -52,6 +52,8 @@ class Outputs:
         identity: (options, capture's file) -> what decides the products beyond these two, such as
             the content of a file that the options name; plain JSON values.
         facts: (capture on its way, how it is written) -> what the sidecar says of the capture.
+        summary: Capture on its way, whose rows are all out -> its result without arrays; None where
+            products are whole things that cannot be handed on in bands of rows.
     """
 
     names: Callable[[Path, Options, WriteOptions], tuple[str, ...]]
@@ -61,3 +63,4 @@ class Outputs:
     reserved_bytes: Callable[[Any, WriteOptions], int] = _no_bytes
     identity: Callable[[Options, Path], Mapping[str, Any]] = _nothing
     facts: Callable[[Reconstruction, WriteOptions], Mapping[str, Any]] = _nothing
+    summary: Callable[[Reconstruction], Result] | None = None

@@ -29,9 +29,11 @@ def _files(work: Reconstruction, write: WriteOptions) -> FileSet:
         return _write_picture(parts[0], work, write, *parts[1:])
 
     extra = (PREVIEW_SUFFIX,) if write.preview else ()
-    return FileSet(
-        suffixes=(write.suffix, *extra), write=written, result=lambda: result_of(work, {})
-    )
+    return FileSet(suffixes=(write.suffix, *extra), write=written, result=lambda: _summary(work))
+
+
+def _summary(work: Reconstruction) -> Result:
+    return result_of(work, {})
 
 
 def result_of(work: Reconstruction, arrays: Mapping[str, FloatArray]) -> Result:
@@ -110,5 +112,6 @@ PICTURES: Final = Outputs(
     format=lambda write: write.picture,
     reserved_bytes=_reserved_bytes,
     facts=_facts,
+    summary=_summary,
 )
 """What photographs become."""

@@ -14,7 +14,7 @@ from camkit.runtime.kinds.spad.products.archive import write_archive
 from camkit.runtime.kinds.spad.products.float_pictures import write_exr, write_tiff
 from camkit.runtime.kinds.spad.products.points import write_points
 from camkit.runtime.kinds.spad.products.preview import depth_picture, write_preview
-from camkit.runtime.kinds.spad.products.record import told_pulse, told_way
+from camkit.runtime.kinds.spad.products.record import told_pulse, told_way, total_photons
 from camkit.runtime.kinds.spad.pulse import FWHM_PER_SIGMA, GaussianPulse, Pulse
 from camkit.runtime.kinds.spad.sharpen import Sharpened
 from camkit.runtime.kinds.spad.stages.sharpen import Depths
@@ -76,7 +76,7 @@ def make_depth(work: Reconstruction, capture: PhotonCapture, product: str) -> Re
             *work.warnings,
             *capture.late_notes(),
         ),
-        sections={"spad": _section(sharpened, depths, hot)},
+        sections={"spad": _section(sharpened, depths, capture, hot)},
     )
 
 
@@ -127,7 +127,9 @@ def _arrays(
     return arrays
 
 
-def _section(sharpened: Sharpened, depths: Depths, hot: list[list[int]]) -> Mapping[str, Any]:
+def _section(
+    sharpened: Sharpened, depths: Depths, capture: PhotonCapture, hot: list[list[int]]
+) -> Mapping[str, Any]:
     sides, counts = np.unique(sharpened.pooled[sharpened.valid], return_counts=True)
     return {
         "pixels": int(sharpened.hot[0].size),
@@ -136,7 +138,7 @@ def _section(sharpened: Sharpened, depths: Depths, hot: list[list[int]]) -> Mapp
         "blind": int(depths.pixels.blind.sum()),
         "pile_up": round(float(depths.pixels.worst.max(initial=0.0)), 4),
         "pooled": {str(s): int(n) for s, n in zip(sides.tolist(), counts.tolist(), strict=True)},
-        "photons": float(np.round(sharpened.intensity[0].sum(), 1)),
+        "photons": total_photons(sharpened.intensity[0], capture.shape),
     }
 
 

@@ -21,7 +21,7 @@ from camkit.runtime.kinds.spad.products.preview import (
     white_of_flight,
     write_preview,
 )
-from camkit.runtime.kinds.spad.products.record import told_axis, told_finer
+from camkit.runtime.kinds.spad.products.record import told_axis, told_finer, total_photons
 from camkit.runtime.kinds.spad.products.video import write_video
 
 
@@ -100,5 +100,5 @@ def _result(
         record=record,
         seconds=work.seconds,
         warnings=warnings,
-        sections={"spad": {"photons": float(frames.sum(dtype="float64").round(1))}},
+        sections={"spad": {"photons": total_photons(frames, work.capture.shape)}},
     )

@@ -3,6 +3,9 @@
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
+from camkit.arrays import FloatArray
 from camkit.bundle.stages import SuperResolve
 from camkit.runtime.job.job import Job
 from camkit.runtime.kinds.spad.captures.photon_capture import photons_of
@@ -50,3 +53,14 @@ def told_pulse(pulse: Pulse, *, is_guessed: bool) -> Mapping[str, Any]:
     else:
         shape = {"measured_from_ps": pulse.start_ps, "measured_to_ps": pulse.end_ps}
     return {"pulse": {**shape, "guessed": is_guessed}}
+
+
+def total_photons(frames: FloatArray, shape: tuple[int, int]) -> float:
+    """Return the photons of a capture, rounded to 0.1.
+
+    Args:
+        frames: (..., h, w) photons of a pixel of the array, perhaps on a finer grid.
+        shape: Pixels of the array, (rows, columns).
+    """
+    share = shape[0] * shape[1] / (frames.shape[-2] * frames.shape[-1])
+    return float((frames.sum(dtype=np.float64) * share).round(1))
