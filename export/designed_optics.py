@@ -24,7 +24,7 @@ from camkit.models_def.optics.diffraction.wave import PixelGrid
 from camkit.models_def.optics.distortion import check_distortion
 from camkit.models_def.optics.lens_file.lens_file import read_lens
 from camkit.models_def.optics.prescription import Lens, format_prescription, parse_prescription
-from camkit.models_def.optics.thin.freezing import check_peaks
+from camkit.models_def.optics.thin.hazy_freezing import check_peaks
 from camkit.models_def.training.checkpoint import Checkpoint
 from camkit.psf import FrozenPsf
 

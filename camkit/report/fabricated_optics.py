@@ -104,7 +104,7 @@ def _trace(bundle: Bundle, text: str, seed: int, depth_mm: float) -> FrozenOptic
     from camkit.models_def.optics.kernel_bank import focused_copies
     from camkit.models_def.optics.lens_optics import LensOptics
     from camkit.models_def.optics.prescription import parse_prescription
-    from camkit.models_def.optics.thin.freezing import (
+    from camkit.models_def.optics.thin.hazy_freezing import (
         COPY_RAYS,
         LEAST_FIELDS,
         HazyGrid,

@@ -11,8 +11,8 @@ import torch
 from torch import Tensor, nn
 
 from camkit.models_def.design.assembly import parts_of
+from camkit.models_def.design.design_recipe import DesignRecipe, recipe_digest
 from camkit.models_def.design.loop import DesignLoop, Progress
-from camkit.models_def.design.recipe import DesignRecipe, recipe_digest
 from camkit.models_def.design.run_files import RunFiles, RunOptions
 from camkit.models_def.design.starts import Starts
 from camkit.models_def.optics.lens_file.lens_file import write_lens

@@ -18,8 +18,8 @@ from camkit.errors import ContractError
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import half_disc
 from camkit.models_def.optics.search.improvement import improve
-from camkit.models_def.optics.search.merit import MERITS, Merit
 from camkit.models_def.optics.search.problem import Problem
+from camkit.models_def.optics.search.spot_residuals import MERITS, Merit
 
 _PUPIL_RAYS = 24
 

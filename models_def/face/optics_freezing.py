@@ -19,7 +19,7 @@ from camkit.runtime.files.in_memory import FilePath, optional_path
 from camkit.runtime.output.part_file import refuse_existing
 
 if TYPE_CHECKING:
-    from camkit.models_def.optics.optics import Optics
+    from camkit.models_def.optics.freezable_optics import Optics
 
 AUTO: Final = "auto"
 DEFAULT_RECIPE: Final = "duet.toml"

@@ -19,6 +19,7 @@ from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.sensor import ColorSensor
 from camkit.bundle.stages import Wiener
 from camkit.errors import ContractError
+from camkit.models_def.optics.freezable_optics import Optics
 from camkit.models_def.optics.frozen import (
     FreezeGrid,
     Frozen,
@@ -27,8 +28,7 @@ from camkit.models_def.optics.frozen import (
     with_focus,
 )
 from camkit.models_def.optics.lens_optics import LensOptics
-from camkit.models_def.optics.optics import Optics
-from camkit.models_def.optics.sampling import (
+from camkit.models_def.optics.sampling_loss import (
     Bench,
     Loss,
     block_loss,

@@ -15,12 +15,12 @@ from camkit.caller import option_text
 from camkit.errors import ContractError, UnsupportedError
 from camkit.models_def.optics.diffraction.freezing import WINDOW, freeze_plate
 from camkit.models_def.optics.diffraction.plate_optics import PlateOptics
+from camkit.models_def.optics.freezable_optics import Optics
 from camkit.models_def.optics.freeze import LOSS_LIMIT_DB, Facts, Tell, freeze_samples
 from camkit.models_def.optics.frozen import FreezeGrid, freeze_stress
 from camkit.models_def.optics.lens_optics import LensOptics
-from camkit.models_def.optics.optics import Optics
 from camkit.models_def.optics.thin.distances import freeze_distances
-from camkit.models_def.optics.thin.freezing import freeze_hazy
+from camkit.models_def.optics.thin.hazy_freezing import freeze_hazy
 from camkit.progress import note, working
 from camkit.psf import depth_name
 

@@ -24,7 +24,7 @@ from torch import Tensor
 from camkit.bundle.sensor import ColorSensor
 from camkit.caller import option_text
 from camkit.errors import ContractError
-from camkit.models_def.optics.optics import FieldLayout, FloatGrid, Optics, radial_layout
+from camkit.models_def.optics.freezable_optics import FieldLayout, FloatGrid, Optics, radial_layout
 from camkit.models_def.optics.psf import TracedPsf
 from camkit.progress import working
 from camkit.psf import FrozenPsf

@@ -12,8 +12,8 @@ from camkit.errors import ContractError
 from camkit.models_def.optics.analysis.illumination import relative_illumination_at
 from camkit.models_def.optics.distortion import trace_distortion
 from camkit.models_def.optics.focus import focus_shift_mm
+from camkit.models_def.optics.freezable_optics import FieldLayout, FloatGrid, radial_layout
 from camkit.models_def.optics.kernel_bank import focused_copies
-from camkit.models_def.optics.optics import FieldLayout, FloatGrid, radial_layout
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens, with_focus_shift
 from camkit.models_def.optics.psf import TracedPsf, trace_psf, with_object_distance
@@ -29,7 +29,7 @@ _STEP_UM: Final = 5.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LensOptics:
-    """A lens of revolution; fulfils `camkit.models_def.optics.optics.Optics`.
+    """A lens of revolution; fulfils `camkit.models_def.optics.freezable_optics.Optics`.
 
     Distortion and illumination are those at the lens's own object distance.
 

@@ -16,7 +16,7 @@ from torch import Tensor
 
 from camkit.bundle.psf_file import read_psf
 from camkit.errors import ContractError
-from camkit.models_def.optics.optics import (
+from camkit.models_def.optics.freezable_optics import (
     FieldLayout,
     FloatGrid,
     grid_layout,
@@ -31,7 +31,7 @@ from camkit.runtime.bank.psf import FieldKernels
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeasuredOptics:
-    """Optics known by kernels; fulfils `camkit.models_def.optics.optics.Optics`.
+    """Optics known by kernels; fulfils `camkit.models_def.optics.freezable_optics.Optics`.
 
     Attributes:
         psf: The kernels, at any pitch.

@@ -5,10 +5,10 @@ from typing import Final
 
 from camkit.models_def.optics.diffraction.plate import is_plate, read_plate
 from camkit.models_def.optics.diffraction.plate_optics import PlateOptics
+from camkit.models_def.optics.freezable_optics import Optics
 from camkit.models_def.optics.lens_file.lens_file import read_lens
 from camkit.models_def.optics.lens_optics import LensOptics
 from camkit.models_def.optics.measured import read_measured
-from camkit.models_def.optics.optics import Optics
 
 MEASURED: Final = ".safetensors"
 

@@ -12,7 +12,7 @@ from camkit.bundle.reader import PLATE, PLATE_HEIGHTS, PRESCRIPTION
 from camkit.errors import ContractError
 from camkit.export.designed_optics import SAME_PLATE_SHARE, designed_members
 from camkit.export.parts import Parts
-from camkit.models_def.optics.diffraction.fabrication import Etching
+from camkit.models_def.optics.diffraction.etching import Etching
 from camkit.models_def.optics.diffraction.geometry import Bench
 from camkit.models_def.optics.diffraction.patterns import PeakPattern, StarPattern
 from camkit.models_def.optics.diffraction.plate import (

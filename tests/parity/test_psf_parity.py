@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from camkit.models_def.sensors.psf import turned_at
+from camkit.models_def.sensors.turned_kernels import turned_at
 from camkit.runtime.bank.psf import FieldKernels
 from tests.psf_factory import coma_kernels
 

@@ -18,11 +18,11 @@ from camkit.models_def.optics.lens_file.lens_file import read_lens
 from camkit.models_def.optics.paraxial import paraxial_image, with_paraxial_focus
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.psf import trace_psf, with_object_distance
-from camkit.models_def.optics.render.alignment import averaged, fit_alignment
+from camkit.models_def.optics.render.lens_view import Optics, lens_optics
 from camkit.models_def.optics.render.monte_carlo import Sampling, render
-from camkit.models_def.optics.render.optics import Optics, lens_optics
 from camkit.models_def.optics.render.psf_map import MapGrid, render_by_map, trace_map
 from camkit.models_def.optics.render.texture import Texture
+from camkit.models_def.optics.render.texture_alignment import averaged, fit_alignment
 from camkit.models_def.optics.render.window import centred_window
 from camkit.models_def.optics.spot import slopes_for_heights
 from camkit.models_def.optics.trace import Rays, SurfaceTensors, trace

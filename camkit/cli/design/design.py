@@ -67,7 +67,7 @@ def design(
     from camkit.cli.design.design_time import require_torch
 
     require_torch("camkit design")
-    from camkit.models_def.design.recipe import read_design, with_choices
+    from camkit.models_def.design.design_recipe import read_design, with_choices
     from camkit.models_def.design.run import DesignOptions, DesignRun
 
     if resume and overwrite:

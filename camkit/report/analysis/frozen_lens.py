@@ -10,11 +10,11 @@ from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.sensor import ColorSensor
 from camkit.errors import ContractError
 from camkit.models_def.optics.diffraction.pinhole import Pinhole
+from camkit.models_def.optics.freezable_optics import Optics
 from camkit.models_def.optics.frozen import FreezeGrid, freeze
 from camkit.models_def.optics.lens_optics import LensOptics
-from camkit.models_def.optics.optics import Optics
 from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.thin.freezing import freeze_hazy
+from camkit.models_def.optics.thin.hazy_freezing import freeze_hazy
 
 SMALL: Final = FreezeGrid(fields=13, wavelengths=5, energy=0.995, max_side_px=151)
 WIDE: Final = FreezeGrid(fields=7, wavelengths=3, energy=0.9, max_side_px=801)

@@ -18,7 +18,7 @@ from camkit.models_def.optics.analysis.illumination import relative_illumination
 from camkit.models_def.optics.frozen import corner_height_mm
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.thin.freezing import flat_light
+from camkit.models_def.optics.thin.hazy_freezing import flat_light
 from camkit.models_def.optics.thin.middle import corner_angle_rad
 from camkit.models_def.optics.thin.peak import LandedLight, land_light, peak_height_px, share_within
 from camkit.report.analysis.point_image import (

@@ -7,7 +7,7 @@ from typing import Final
 import torch
 
 from camkit.errors import ContractError
-from camkit.models_def.design.plate.recipe import MapKind, PlateRecipe
+from camkit.models_def.design.plate.plate_recipe import MapKind, PlateRecipe
 from camkit.models_def.optics.diffraction.heights import (
     FullMap,
     GratingMap,

@@ -21,9 +21,9 @@ from camkit.models_def.design.plate.nights import TRAIN_SEED, VALID_SEED, Nights
 from camkit.models_def.design.plate.reader_recipe import ReaderRecipe
 from camkit.models_def.design.plate.recording import recorded, whole_kernels
 from camkit.models_def.kinds.hdr.recipe import HdrRecipe
-from camkit.models_def.kinds.hdr.thesis.losses import EPSILON, GAMMA, HUBER
+from camkit.models_def.kinds.hdr.thesis.coded_samples import layout_of
 from camkit.models_def.kinds.hdr.thesis.networks import THESIS_NAMES
-from camkit.models_def.kinds.hdr.thesis.samples import layout_of
+from camkit.models_def.kinds.hdr.thesis.thesis_losses import EPSILON, GAMMA, HUBER
 from camkit.models_def.kinds.hdr.validation import MOST_DB
 from camkit.models_def.networks.catalog import build_network, check_patch
 from camkit.models_def.sensors.forward import blur

@@ -14,7 +14,7 @@ fitting                by what a picture looks like, and against a critic: FITTI
 """
 
 from camkit.models_def.kinds.bayer.bank_fit import BANK_FITTING
-from camkit.models_def.kinds.bayer.fine_tuning.refinement import REFINING
+from camkit.models_def.kinds.bayer.fine_tuning.bayer_refinement import REFINING
 from camkit.models_def.kinds.bayer.fitting import FITTING
 from camkit.models_def.kinds.bayer.frames.preparation import PREPARING
 from camkit.models_def.kinds.bayer.training import PART

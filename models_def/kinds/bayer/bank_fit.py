@@ -98,20 +98,22 @@ def spread_of(bank: PsfBank, recipe: BayerRecipe) -> Spread:
     """
     errors = (-recipe.data.depth_error, recipe.data.depth_error)
     count = len(bank.copy_heights_mm)
-    chosen = np.unique(np.linspace(0, count - 1, min(HEIGHTS, count)).round().astype(int))
+    indices = np.unique(np.linspace(0, count - 1, min(HEIGHTS, count)).round().astype(int))
     places = np.hypot(np.fft.fftfreq(GRID_PX)[:, None], np.fft.rfftfreq(GRID_PX)[None])
     variance = []
-    for index in chosen:
+    for index in indices:
         height = float(bank.copy_heights_mm[index])
         gaps = [
-            (_transfer(bank, height, copy) - _known(bank, height, recipe, copy, error)).abs()
+            (
+                _transfer(bank, height, copy) - _frozen_transfer(bank, height, recipe, copy, error)
+            ).abs()
             for copy in range(bank.training_copies)
             for error in (errors if recipe.estimates_depth else (0.0,))
         ]
         mean = torch.stack(gaps).square().mean(dim=0)[0].numpy().astype(np.float64)
         variance.append(tuple(_line(of_colour, places) for of_colour in mean))
     return Spread(
-        heights_mm=tuple(float(h) for h in bank.copy_heights_mm[chosen]),
+        heights_mm=tuple(float(h) for h in bank.copy_heights_mm[indices]),
         frequencies=FREQUENCIES,
         variance=tuple(variance),
     )
@@ -121,12 +123,12 @@ def _transfer(bank: PsfBank, height_mm: float, copy: int) -> Tensor:
     return to_otf(bank.blur_kernels(copy, 0.0, height_mm), (GRID_PX, GRID_PX))
 
 
-def _known(
+def _frozen_transfer(
     bank: PsfBank, height_mm: float, recipe: BayerRecipe, copy: int, error: float = 0.0
 ) -> Tensor:
     """Return the transfer that a bank takes a copy's for; `error` is of the nearness, in 1/m."""
-    told = told_depth(recipe, copy, error) if recipe.estimates_depth else None
-    return to_otf(bank.frozen_kernels(0.0, height_mm, told), (GRID_PX, GRID_PX))
+    depth = told_depth(recipe, copy, error) if recipe.estimates_depth else None
+    return to_otf(bank.frozen_kernels(0.0, height_mm, depth), (GRID_PX, GRID_PX))
 
 
 def transfer_errors(bank: PsfBank, recipe: BayerRecipe) -> tuple[float, ...]:
@@ -140,10 +142,10 @@ def transfer_errors(bank: PsfBank, recipe: BayerRecipe) -> tuple[float, ...]:
     squares, powers = np.zeros(len(bank.copies)), np.zeros(len(bank.copies))
     for height in bank.copy_heights_mm.tolist():
         for copy in range(len(bank.copies)):
-            frozen = _known(bank, height, recipe, copy)[..., inside]
-            own = _transfer(bank, height, copy)[..., inside]
-            squares[copy] += float((own - frozen).abs().square().sum())
-            powers[copy] += float(own.abs().square().sum())
+            frozen = _frozen_transfer(bank, height, recipe, copy)[..., inside]
+            transfer = _transfer(bank, height, copy)[..., inside]
+            squares[copy] += float((transfer - frozen).abs().square().sum())
+            powers[copy] += float(transfer.abs().square().sum())
     wrong, whole = (sums.reshape(-1, bank.depths).sum(axis=1) for sums in (squares, powers))
     return tuple(float(error) for error in np.sqrt(wrong / whole))
 
@@ -183,10 +185,16 @@ def fit_bank(
         )
     tell(f"{len(cases)} samples, {samples - len(cases)} left out for clipped light")
     errors = transfer_errors(bank, recipe)
-    own_errors, unseen = errors[: -bank.validation_copies], errors[-bank.validation_copies :]
-    tell(f"transfer of copies off by {_told(own_errors)}; of those to choose by {_told(unseen)}")
+    training_errors, validation_errors = (
+        errors[: -bank.validation_copies],
+        errors[-bank.validation_copies :],
+    )
+    tell(
+        f"transfer of copies off by {_errors_text(training_errors)}; "
+        f"of those to choose by {_errors_text(validation_errors)}"
+    )
     first = FIRST.model_copy(update={"spread": spread_of(bank, recipe)})
-    held, own = cases[::HELD_OUT], [c for i, c in enumerate(cases) if i % HELD_OUT]
+    held_out, training_cases = cases[::HELD_OUT], [c for i, c in enumerate(cases) if i % HELD_OUT]
     values = _to_values(first).requires_grad_()
     optimiser = torch.optim.Adam([values], lr=RATE, betas=(0.9, 0.99))
     rng = np.random.default_rng(seed)
@@ -195,25 +203,25 @@ def fit_bank(
             group["lr"] = LAST_RATE + (RATE - LAST_RATE) * (1 - step / steps)
         optimiser.zero_grad()
         losses = [
-            torch.log(_error(own[i], first, _to_numbers(values), alone))
-            for i in rng.integers(len(own), size=BATCH)
+            torch.log(_error(training_cases[i], first, _to_numbers(values), alone))
+            for i in rng.integers(len(training_cases), size=BATCH)
         ]
         torch.stack(losses).mean().backward()  # type: ignore[no-untyped-call]
         optimiser.step()
         with torch.no_grad():  # at an end of its range it may turn back
             values[FOLLOW].clamp_(0, 1)
         if (step + 1) % max(steps // 5, 1) == 0:
-            tell(f"step {step + 1}: {_gain_db(held, first, values, alone):.2f} dB over alone")
+            tell(f"step {step + 1}: {_gain_db(held_out, first, values, alone):.2f} dB over alone")
     together = _rounded(first, values.detach())
     return BankFit(
         together=together,
-        gain_db=_gain_db(held, together, _to_values(together), alone),
+        gain_db=_gain_db(held_out, together, _to_values(together), alone),
         samples=len(cases),
         steps=steps,
     )
 
 
-def _told(errors: Sequence[float]) -> str:
+def _errors_text(errors: Sequence[float]) -> str:
     return ", ".join(f"{error:.2f}" for error in errors)
 
 
@@ -235,22 +243,27 @@ def _cut(
 ) -> Sequence[Developed]:
     tiles = frames.tiles("train", pictures)
     rng = np.random.default_rng(seed)
-    chosen = rng.permutation(len(tiles))[:count]
-    return [draw_developed(rng, tiles.read(int(i)), recipe, frames.bank) for i in chosen]
+    indices = rng.permutation(len(tiles))[:count]
+    return [draw_developed(rng, tiles.read(int(i)), recipe, frames.bank) for i in indices]
 
 
 def _case(developed: Developed, recipe: BayerRecipe) -> _Case:
-    given = developed.given
-    shot, read = torch.tensor(given.noise.shot), torch.tensor(given.noise.read_variance)
-    facts = block_facts(developed.planes, given.frozen, *given.met, recipe.wiener)
+    circumstances = developed.circumstances
+    shot, read = (
+        torch.tensor(circumstances.noise.shot),
+        torch.tensor(circumstances.noise.read_variance),
+    )
+    facts = block_facts(developed.planes, circumstances.frozen, *circumstances.met, recipe.wiener)
     target = target_of(developed, recipe)
-    plain = wiener_restore(developed.planes, given.frozen, *given.met, recipe.wiener)
+    plain = wiener_restore(
+        developed.planes, circumstances.frozen, *circumstances.met, recipe.wiener
+    )
     return _Case(
         planes=facts.planes,
         otf=facts.otf,
         level=facts.level,
         variance=facts.variance,
-        height_mm=given.height_mm,
+        height_mm=circumstances.height_mm,
         target=target,
         shot=shot,
         read=read,
@@ -297,14 +310,14 @@ def _to_values(together: Together) -> Tensor:
 
 def _to_numbers(values: Tensor) -> Numbers:
     colours = (len(values) - 5) // 2
-    exponent, follow, scale, own, mistrust = values[2 * colours :]
+    exponent, follow, scale, own_power, mistrust = values[2 * colours :]
     return Numbers(
         noise=values[:colours],
         noise_rise=values[colours : 2 * colours],
         scale=scale.exp(),
         exponent=exponent,
         follow=follow.clamp(0, 1),
-        own=own.exp(),
+        own=own_power.exp(),
         mistrust=mistrust.exp(),
     )
 
@@ -339,12 +352,16 @@ def _rounded(first: Together, values: Tensor) -> Together:
 
 def _check_folder(prescription: str, options: BankFitOptions) -> None:
     """Refuse a folder in which a relative path of the recipe to its lens would break."""
-    own, other = options.recipe_folder.resolve(), options.output_folder
-    if other is None or other.resolve() == own or Path(prescription).is_absolute():
+    recipe_folder, output_folder = options.recipe_folder.resolve(), options.output_folder
+    if (
+        output_folder is None
+        or output_folder.resolve() == recipe_folder
+        or Path(prescription).is_absolute()
+    ):
         return
-    if (own / prescription).is_file():
+    if (recipe_folder / prescription).is_file():
         raise ContractError(
-            f"the recipe names its lens {prescription} relative to itself; write to {own}"
+            f"the recipe names its lens {prescription} relative to itself; write to {recipe_folder}"
         )
 
 

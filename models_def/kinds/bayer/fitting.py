@@ -3,13 +3,13 @@
 from pathlib import Path
 from typing import Final
 
+from camkit.models_def.kinds.bayer.fine_tuning.bayer_refinement import trace_recipe_distortion
 from camkit.models_def.kinds.bayer.fine_tuning.pairs import read_pairs
-from camkit.models_def.kinds.bayer.fine_tuning.refinement import trace_recipe_distortion
 from camkit.models_def.kinds.bayer.material import BayerMaterial
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.networks.catalog import build_network
-from camkit.models_def.training.adversarial.fitter import Mix
-from camkit.models_def.training.adversarial.fitting import picture_fitting
+from camkit.models_def.training.adversarial.picture_fitter import Mix
+from camkit.models_def.training.adversarial.picture_fitting import picture_fitting
 from camkit.models_def.training.fitting import FitRequest, OwnFitting
 
 

@@ -64,7 +64,7 @@ def _trace(recipe: BayerRecipe, lens: Lens) -> PsfBank:
         places.append((copies[0], lens.object_distance_mm))
     kernels = []
     for copy, depth_mm in counted(places, "tracing the lens and its copies", "copies"):
-        traced, kept = colour_kernels(
+        traced, energy = colour_kernels(
             with_object_distance(copy, depth_mm),
             response,
             heights,
@@ -72,9 +72,9 @@ def _trace(recipe: BayerRecipe, lens: Lens) -> PsfBank:
             pitch_um=recipe.sensor.pixel_pitch_um,
             rays=choices.rays,
         )
-        if kept < LEAST_ENERGY:
+        if energy < LEAST_ENERGY:
             raise ContractError(
-                f"kernels of {choices.kernel_px} px hold {kept:.3f} of the light, less than "
+                f"kernels of {choices.kernel_px} px hold {energy:.3f} of the light, less than "
                 f"{LEAST_ENERGY}; raise lens.kernel_px"
             )
         kernels.append(traced)

@@ -17,7 +17,7 @@ from torch import Tensor
 
 from camkit.arrays import FloatArray
 from camkit.errors import ContractError
-from camkit.models_def.sensors.psf import turned_at
+from camkit.models_def.sensors.turned_kernels import turned_at
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,11 +48,15 @@ class PsfBank:
 
     def __post_init__(self) -> None:
         count = self.copies.shape[0] if self.copies.ndim == 5 else 0
-        kept = self.validation_copies
-        if min(self.depths, kept) < 1 or count % self.depths or count < (1 + kept) * self.depths:
+        validation = self.validation_copies
+        if (
+            min(self.depths, validation) < 1
+            or count % self.depths
+            or count < (1 + validation) * self.depths
+        ):
             raise ContractError(
                 "copies must be (copy times depth, field, 3, h, w), one to train on at least and "
-                f"the last {kept} for validation; got {self.copies.shape} with {self.depths} "
+                f"the last {validation} for validation; got {self.copies.shape} with {self.depths} "
                 "depth(s)"
             )
         if self.frozen.ndim != 4 or self.copies.shape[2] != 3 or self.frozen.shape[1] != 3:
@@ -136,10 +140,15 @@ def read_bank(path: Path) -> PsfBank:
     """Read a file of `write_bank`."""
     with np.load(path, allow_pickle=False) as arrays:
         depths = int(arrays["depths"]) if "depths" in arrays else 1
-        unseen = int(arrays["validation_copies"]) if "validation_copies" in arrays else 1
-        apart = arrays.get("frozen_depths")
-        kept = {name: arrays[name] for name in _ARRAYS}
-        return PsfBank(**kept, depths=depths, frozen_depths=apart, validation_copies=unseen)
+        validation_copies = int(arrays["validation_copies"]) if "validation_copies" in arrays else 1
+        frozen_depths = arrays.get("frozen_depths")
+        required = {name: arrays[name] for name in _ARRAYS}
+        return PsfBank(
+            **required,
+            depths=depths,
+            frozen_depths=frozen_depths,
+            validation_copies=validation_copies,
+        )
 
 
 def _at(kernels: FloatArray, heights_mm: NDArray[np.float64], x_mm: float, y_mm: float) -> Tensor:

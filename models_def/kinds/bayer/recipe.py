@@ -30,7 +30,7 @@ from camkit.models_def.training.recipe import (
 )
 
 ROLES: Final = (DEFAULT_ROLE,)
-OWN: Final = (
+OWN_KEYS: Final = (
     *("object_distance_mm", "scale", "light", "haze", "wiener", "lens", "frames"),
     "fine_tuning",
 )
@@ -159,8 +159,8 @@ class BayerDataRecipe(DataRecipe):
         clean = ("edge_share", "night_share", "patch_share")
         for name in clean:
             check_share(f"data.{name}", getattr(self, name))
-        named = " + ".join(f"data.{name}" for name in clean)
-        check_share(named, sum(getattr(self, name) for name in clean))
+        sum_name = " + ".join(f"data.{name}" for name in clean)
+        check_share(sum_name, sum(getattr(self, name) for name in clean))
         check_share("data.light_share", self.light_share)
         check_share("data.designed_share", self.designed_share)
         check_share("data.lamp_share", self.lamp_share)
@@ -189,7 +189,7 @@ class BayerDataRecipe(DataRecipe):
         return {name: value for name, value in asdict(self).items() if name not in absent}
 
     @property
-    def drawn(self) -> DrawnShares:
+    def drawn_shares(self) -> DrawnShares:
         """Shares of drawn scenes whose truth is known to the last pixel."""
         return DrawnShares(
             edge=self.edge_share,
@@ -204,7 +204,7 @@ class BayerDataRecipe(DataRecipe):
         Draws only where a recipe asks for it: others keep their samples.
         """
         if self.display is not None:
-            return self.display.shown(scene)
+            return self.display.shown_light(scene)
         light = scene if self.wild is None else self.wild.lit(rng, scene)
         return light, light
 
@@ -381,7 +381,7 @@ def to_bayer_recipe(table: Mapping[str, Any]) -> BayerRecipe:
             frames without a haze.
     """
     table = with_new_names(table, _OLDER)
-    common = common_tables(table, kind_keys=OWN, roles=ROLES)
+    common = common_tables(table, kind_keys=OWN_KEYS, roles=ROLES)
     if "frames" in table and "haze" not in table:
         raise ContractError("[frames] is for a lens with a haze; there is no table [haze]")
     return BayerRecipe(
@@ -405,8 +405,10 @@ def _data(table: Any) -> BayerDataRecipe:
     if not isinstance(table, Mapping):
         raise ContractError(f"data must be a table; got {table!r}")
     kinds = {"display": DisplayRecipe, "wild": WildRecipe}
-    own: dict[str, Any] = {k: section(f"data.{k}", kinds[k], table[k]) for k in kinds if k in table}
-    return section("data", BayerDataRecipe, {**table, **own})
+    sections: dict[str, Any] = {
+        k: section(f"data.{k}", kinds[k], table[k]) for k in kinds if k in table
+    }
+    return section("data", BayerDataRecipe, {**table, **sections})
 
 
 def _fine_tuning(table: Any) -> FineTuningRecipe:

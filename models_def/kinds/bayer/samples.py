@@ -42,7 +42,7 @@ LAYOUT: Final = SampleLayout(
     outputs=(Port(name="clean", channels=3),),
 )
 """What the networks take and give. A lens of revolution blurs every way, so samples may turn."""
-KEPT: Final = Port(name="kept", channels=1)
+KEPT_PORT: Final = Port(name="kept", channels=1)
 """The share of a network's change that is kept beside clipped samples, where light is bounded."""
 MOST_GAIN: Final = 3.5
 """Of a white balance; daylight and lamps need 1 to 3."""
@@ -70,7 +70,7 @@ class Exposure:
         designed: Whether it is the lens as designed, at the distance of the copy, and no copy.
         gains: White balance (R, G, B); None for that of the sensor's illuminant.
         cast: What the light of each channel is multiplied by, behind the white balance.
-        told: Number of the depth whose kernels the Wiener filter has, between two where the
+        filter_depth: Number of the depth whose kernels the Wiener filter has, between two where the
             distance is estimated; None for the mean over the depths.
     """
 
@@ -83,7 +83,7 @@ class Exposure:
     factor: float = 1.0
     borders: Sides = (False, False, False, False)
     drift: tuple[float, float] = (1.0, 0.0)
-    told: float | None = None
+    filter_depth: float | None = None
     designed: bool = False
     gains: tuple[float, float, float] | None = None
     cast: tuple[float, float, float] = (1.0, 1.0, 1.0)
@@ -139,13 +139,13 @@ class Developed:
         planes: (1, 3, S, S) linear, white balanced, with surroundings of `margin_px`.
         unknown: (1, 1, S, S) bool, where the sensor clipped.
         true: (1, 3, s, s) sharp light of the middle, illumination contained.
-        given: Noise, gains, kernels and light.
+        circumstances: Noise, gains, kernels and light.
     """
 
     planes: Tensor
     unknown: Tensor
     true: Tensor
-    given: Circumstances
+    circumstances: Circumstances
 
 
 def scene_side_px(recipe: BayerRecipe, bank: PsfBank) -> int:
@@ -187,7 +187,7 @@ def draw_exposure(rng: Generator, recipe: BayerRecipe, bank: PsfBank) -> Exposur
         data.known_depth_share > 0 and rng.random() < data.known_depth_share
     ):
         error = rng.normal() * data.depth_error if data.depth_error else 0.0
-        exposure = replace(exposure, told=told_depth(recipe, exposure.copy, error))
+        exposure = replace(exposure, filter_depth=told_depth(recipe, exposure.copy, error))
     if data.designed_share > 0 and rng.random() < data.designed_share:
         exposure = replace(exposure, designed=True)
     if data.light_share > 0 and rng.random() < data.light_share:
@@ -212,7 +212,7 @@ def told_depth(recipe: BayerRecipe, copy: int, error: float = 0.0) -> float:
 
 def layout_of(recipe: BayerRecipe) -> SampleLayout:
     """Return the layout of a recipe's samples."""
-    return LAYOUT if recipe.light is None else replace(LAYOUT, masks=(KEPT,))
+    return LAYOUT if recipe.light is None else replace(LAYOUT, masks=(KEPT_PORT,))
 
 
 def finish_of(recipe: BayerRecipe) -> Finish | None:
@@ -223,10 +223,10 @@ def finish_of(recipe: BayerRecipe) -> Finish | None:
 
     def finish(output: Tensor, batch: Batch) -> Tensor:
         front = batch.inputs["wiener"].to(output.device)
-        kept = batch.masks[KEPT.name].to(output.device)
+        kept_share = batch.masks[KEPT_PORT.name].to(output.device)
         # without the noise of reading, which is little there
         bright = BRIGHT**0.5 / batch.weight.to(output.device)
-        return bounded(output, front, kept, bound, scale=recipe.scale, bright=bright)
+        return bounded(output, front, kept_share, bound, scale=recipe.scale, bright=bright)
 
     return finish
 
@@ -340,13 +340,13 @@ def photograph(
     frozen = bank.frozen_kernels(
         exposure.block_x_mm,
         exposure.block_y_mm,
-        exposure.told,
+        exposure.filter_depth,
     )
     return Developed(
         planes=planes,
         unknown=unknown,
         true=cut_middle(true, data.sample_px) * illumination,
-        given=Circumstances(
+        circumstances=Circumstances(
             noise=noise,
             gains=gains,
             frozen=frozen,
@@ -358,14 +358,14 @@ def photograph(
 
 def filtered(developed: Developed, recipe: BayerRecipe) -> Tensor:
     """Return (1, 3, S, S) of developed planes behind the recipe's bank, linear."""
-    given = developed.given
+    circumstances = developed.circumstances
     return wiener_restore(
         developed.planes,
-        given.frozen,
-        *given.met,
+        circumstances.frozen,
+        *circumstances.met,
         recipe.wiener,
         developed.unknown,
-        height_mm=given.height_mm,
+        height_mm=circumstances.height_mm,
     )
 
 
@@ -377,8 +377,8 @@ def finish_shot(developed: Developed, recipe: BayerRecipe, restored: Tensor | No
         recipe: Camera and sample sizes.
         restored: (1, 3, S, S) of another filter than the recipe's bank, linear.
     """
-    planes, given, data = developed.planes, developed.given, recipe.data
-    noise = given.noise
+    planes, circumstances, data = developed.planes, developed.circumstances, recipe.data
+    noise = circumstances.noise
     shot, read = torch.tensor(noise.shot), torch.tensor(noise.read_variance)
     restored = filtered(developed, recipe) if restored is None else restored
     stable = [
@@ -391,7 +391,7 @@ def finish_shot(developed: Developed, recipe: BayerRecipe, restored: Tensor | No
     target = torch.where(target == NOT_JUDGED, stable[1], target)
     inputs = {port.name: x[0] for port, x in zip(LAYOUT.inputs, stable, strict=True)}
     if recipe.light is not None:
-        inputs[KEPT.name] = cut_middle(keep_share(developed.unknown), data.sample_px)[0]
+        inputs[KEPT_PORT.name] = cut_middle(keep_share(developed.unknown), data.sample_px)[0]
     return Shot(
         sample=Sample(
             inputs=inputs,
@@ -399,18 +399,23 @@ def finish_shot(developed: Developed, recipe: BayerRecipe, restored: Tensor | No
             weight=recipe.scale * shot.sqrt(),
         ),
         noise=noise,
-        illumination=given.illumination,
+        illumination=circumstances.illumination,
     )
 
 
 def target_of(developed: Developed, recipe: BayerRecipe) -> Tensor:
     """Return (1, 3, s, s) the target of a sample, stabilised; NOT_JUDGED if unknown."""
-    data, given = recipe.data, developed.given
-    shot, read = torch.tensor(given.noise.shot), torch.tensor(given.noise.read_variance)
+    data, circumstances = recipe.data, developed.circumstances
+    shot, read = (
+        torch.tensor(circumstances.noise.shot),
+        torch.tensor(circumstances.noise.read_variance),
+    )
     bright = developed.true.clamp(max=data.target_max)
     target = stabilise(bright, shot, read, scale=recipe.scale)
-    lost = _lost(developed.true, cut_middle(developed.unknown, data.sample_px), given.gains)
-    return torch.where(lost, torch.tensor(NOT_JUDGED), target)
+    highlights = _clipped_highlights(
+        developed.true, cut_middle(developed.unknown, data.sample_px), circumstances.gains
+    )
+    return torch.where(highlights, torch.tensor(NOT_JUDGED), target)
 
 
 def _drifted(kernels: Tensor, size: float, turn: float) -> Tensor:
@@ -421,11 +426,11 @@ def _drifted(kernels: Tensor, size: float, turn: float) -> Tensor:
     matrix = torch.tensor([[[cos, sin, 0.0], [-sin, cos, 0.0]]], dtype=kernels.dtype)
     shape = list(kernels.shape)
     grid = torch.nn.functional.affine_grid(matrix, shape, align_corners=True)
-    moved = torch.nn.functional.grid_sample(kernels, grid, align_corners=True)
-    return moved / moved.sum((-2, -1), keepdim=True)
+    turned = torch.nn.functional.grid_sample(kernels, grid, align_corners=True)
+    return turned / turned.sum((-2, -1), keepdim=True)
 
 
-def _lost(true: Tensor, unknown: Tensor, gains: tuple[float, float, float]) -> Tensor:
+def _clipped_highlights(true: Tensor, unknown: Tensor, gains: tuple[float, float, float]) -> Tensor:
     """Mark (1, 1, s, s) highlights that clipped: their light is unknown."""
     if not bool(unknown.any()):
         return unknown

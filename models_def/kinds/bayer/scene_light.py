@@ -81,15 +81,15 @@ class DisplayRecipe:
     def to_rec709(self) -> Matrix:
         """Return the (3, 3) matrix from the display's light to linear Rec.709; not adapted."""
         red, green, blue = (_point(one) for one in self.primaries)
-        own = rgb_to_xyz((red, green, blue), _point(self.white))
-        return np.asarray(np.linalg.inv(rgb_to_xyz(REC709_PRIMARIES, D65)) @ own)
+        to_xyz = rgb_to_xyz((red, green, blue), _point(self.white))
+        return np.asarray(np.linalg.inv(rgb_to_xyz(REC709_PRIMARIES, D65)) @ to_xyz)
 
     def codes(self, picture: FloatArray) -> FloatArray:
         """Return the input of the display, 0..1 in steps, of linear Rec.709."""
         top = np.float32(2**self.bits - 1)
         return np.asarray(np.rint(encode_srgb(picture) * top) / top, dtype=np.float32)
 
-    def shown(self, picture: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def shown_light(self, picture: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Compute the light of a shown picture.
 
         Args:
@@ -99,11 +99,11 @@ class DisplayRecipe:
             The light of the display, and what a sample should become; (3, h, w) each.
         """
         codes = self.codes(picture)
-        told = decode_srgb(codes)
-        light = told if self.gamma == 0 else codes ** np.float32(self.gamma)
+        coded_light = decode_srgb(codes)
+        light = coded_light if self.gamma == 0 else codes ** np.float32(self.gamma)
         black = np.float32(1 / self.contrast)
         emitted = apply_matrix(self.to_rec709, black + (1 - black) * light)
-        return emitted, emitted if self.calibrated else told
+        return emitted, emitted if self.calibrated else coded_light
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -62,7 +62,7 @@ class BayerMaker:
         self, recipe: BayerRecipe, bank: PsfBank, pictures: Path | None, seed: int
     ) -> None:
         self._recipe, self._bank, self._seed = recipe, bank, seed
-        self._source = open_scenes(recipe.data, pictures, drawn_shares=recipe.data.drawn)
+        self._source = open_scenes(recipe.data, pictures, drawn_shares=recipe.data.drawn_shares)
 
     def developed(self, index: int) -> Developed:
         """Photograph a crop of a scene, and develop it."""
@@ -89,13 +89,13 @@ class BayerTraining:
 
     def design(self, recipe: BayerRecipe) -> Design:
         """Return the stages of every camera of this kind, with the recipe's bank."""
-        wiener, before = recipe.wiener, recipe.wiener.takes[0]
+        wiener, picture = recipe.wiener, recipe.wiener.takes[0]
         if recipe.haze is not None:
-            (before,) = recipe.haze.gives
-            wiener = wiener.model_copy(update={"takes": (before, *wiener.takes[1:])})
+            (picture,) = recipe.haze.gives
+            wiener = wiener.model_copy(update={"takes": (picture, *wiener.takes[1:])})
         masks = () if recipe.light is None else wiener.takes[1:]
         network = Network(
-            takes=(before, *wiener.gives, *masks), scale=recipe.scale, light=recipe.light
+            takes=(picture, *wiener.gives, *masks), scale=recipe.scale, light=recipe.light
         )
         hazy = () if recipe.haze is None else (recipe.haze,)
         restoring: tuple[Stage, ...] = (*hazy, wiener, network)

@@ -121,11 +121,11 @@ def _middle(picture: NDArray[np.uint8], side: int) -> NDArray[np.uint8]:
 def _exposure(recipe: BayerRecipe, bank: PsfBank, share: float, iso: float, turn: int) -> Exposure:
     height = share * corner_height_mm(recipe)
     number = sum(divmod(turn, len(FIELD_SHARES)))
-    depth, unseen = number % bank.depths, number // bank.depths % bank.validation_copies
+    depth, validation_copy = number % bank.depths, number // bank.depths % bank.validation_copies
     azimuth = turn * GOLDEN_ANGLE_RAD
     x_mm, y_mm = height * np.cos(azimuth), height * np.sin(azimuth)
     offset = BLOCK_OFFSET_PX * recipe.sensor.pixel_pitch_um / 1000
-    copy = bank.training_copies + unseen * bank.depths + depth
+    copy = bank.training_copies + validation_copy * bank.depths + depth
     error = recipe.data.depth_error * (1 - 2 * (turn % 2))
     return Exposure(
         x_mm=float(x_mm),
@@ -134,7 +134,7 @@ def _exposure(recipe: BayerRecipe, bank: PsfBank, share: float, iso: float, turn
         block_y_mm=float(y_mm + offset * np.sin(3 * azimuth)),
         copy=copy,
         iso=iso,
-        told=told_depth(recipe, copy, error) if recipe.estimates_depth else None,
+        filter_depth=told_depth(recipe, copy, error) if recipe.estimates_depth else None,
     )
 
 

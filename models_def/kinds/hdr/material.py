@@ -60,7 +60,7 @@ def compute_material(recipe: HdrRecipe, recipe_folder: Path, cache_folder: Path)
         ContractError: If there is no such plate, or it writes no streaks.
     """
     del cache_folder
-    beside = recipe_folder / recipe.plate.file
-    plate = read_plate(beside if beside.is_file() else Path(recipe.plate.file))
+    beside_recipe = recipe_folder / recipe.plate.file
+    plate = read_plate(beside_recipe if beside_recipe.is_file() else Path(recipe.plate.file))
     streaks = plate_streaks(plate, recipe.sensor, side_px=recipe.plate.side_px)
     return HdrMaterial(streaks=streaks, designed=plate_members(plate))

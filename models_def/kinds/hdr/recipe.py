@@ -21,7 +21,7 @@ from camkit.models_def.training.recipe import (
 ROLES: Final = ("highlights",)
 REFERENCE_ROLES: Final = ("split", "highlight", "fusion", "whole")
 """Of networks that are compared with, see `thesis`; no bundle holds them."""
-OWN: Final = ("object_distance_mm", "scale", "plate", "thesis", "glare")
+OWN_KEYS: Final = ("object_distance_mm", "scale", "plate", "thesis", "glare")
 CAMERA_PARTS: Final = ("name", "object_distance_mm", "scale", "sensor", "plate")
 """What says which camera it is; how its networks are trained may differ."""
 
@@ -113,7 +113,9 @@ def to_hdr_recipe(table: Mapping[str, Any]) -> HdrRecipe:
     Raises:
         ContractError: If a key is unknown, missing or wrong, or the sensor has no mosaic.
     """
-    common = common_tables(table, kind_keys=OWN, roles=(*ROLES, *REFERENCE_ROLES), main=ROLES[0])
+    common = common_tables(
+        table, kind_keys=OWN_KEYS, roles=(*ROLES, *REFERENCE_ROLES), main=ROLES[0]
+    )
     return HdrRecipe(
         name=common.name,
         kind=common.kind,
@@ -143,8 +145,8 @@ def samples_digest(recipe: HdrRecipe, seed: int) -> str:
 
 def reference_digest(recipe: HdrRecipe, role: str, seed: int) -> str:
     """Return a hash of all that decides the samples of a reference role."""
-    own = {"role": role, "optics": recipe.thesis.optics}
+    settings = {"role": role, "optics": recipe.thesis.optics}
     if recipe.thesis.optics == "glare":
-        own |= {key: str(value) for key, value in asdict(recipe.glare).items()}
-    text = samples_digest(recipe, seed) + json.dumps(own, sort_keys=True)
+        settings |= {key: str(value) for key, value in asdict(recipe.glare).items()}
+    text = samples_digest(recipe, seed) + json.dumps(settings, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()

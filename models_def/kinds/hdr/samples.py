@@ -106,9 +106,9 @@ class HdrCamera:
         sensor = self.recipe.sensor
         raw, clipped = expose(blurred, self.gains, sensor, iso, rng)
         cells = cells_of(raw[None], clipped[None], self._kernels.sites)
-        found = recover(cells, self._kernels, least_samples=1)
+        recovery = recover(cells, self._kernels, least_samples=1)
         rgb = develop(raw, self.gains, sensor.cfa)
-        lit = self._lit(raw, rgb, clipped, found)
+        lit = self._lit(raw, rgb, clipped, recovery)
         return Shot(
             rgb=rgb,
             lit=lit,
@@ -118,11 +118,11 @@ class HdrCamera:
         )
 
     def _lit(
-        self, raw: FloatArray, rgb: FloatArray, clipped: NDArray[np.bool_], found: Recovery
+        self, raw: FloatArray, rgb: FloatArray, clipped: NDArray[np.bool_], recovery: Recovery
     ) -> FloatArray:
         """Render lights in, as the stage `highlights` does that is given the mosaic."""
-        painter, cfa = Painter(found, self._to_rec709), self.recipe.sensor.cfa
-        if found.blind:
+        painter, cfa = Painter(recovery, self._to_rec709), self.recipe.sensor.cfa
+        if recovery.blind:
             lit = rgb.copy()
             painter.paint(lit, 0, self.gains)
             return lit
@@ -174,8 +174,8 @@ def draw_corner(rng: Generator, shot: Located, recipe: HdrRecipe) -> tuple[int, 
     if not len(places) or rng.random() >= data.light_share:
         return int(rng.integers(free)), int(rng.integers(free))
     # the brightest of a few, as most clipped pixels are of the faintest lights
-    found = places[rng.integers(len(places), size=LIGHT_CANDIDATES)]
-    at = found[np.argmax(shot.sharp[:, found[:, 0], found[:, 1]].max(axis=0))]
+    candidates = places[rng.integers(len(places), size=LIGHT_CANDIDATES)]
+    at = candidates[np.argmax(shot.sharp[:, candidates[:, 0], candidates[:, 1]].max(axis=0))]
     jitter = rng.integers(-data.sample_px // 3, data.sample_px // 3 + 1, size=2)
     top, left = np.clip(at - data.sample_px // 2 + jitter, 0, free - 1)
     return int(top), int(left)

@@ -36,9 +36,9 @@ from camkit.models_def.kinds.hdr.samples import (
     sample_of,
 )
 from camkit.models_def.kinds.hdr.scenes import LightSource, exposed, open_lights
-from camkit.models_def.kinds.hdr.thesis.fitter import FITTING
+from camkit.models_def.kinds.hdr.thesis.coded_samples import CodedCamera, CodedMaker, layout_of
 from camkit.models_def.kinds.hdr.thesis.networks import THESIS_NAMES, build_thesis_network
-from camkit.models_def.kinds.hdr.thesis.samples import CodedCamera, CodedMaker, layout_of
+from camkit.models_def.kinds.hdr.thesis.thesis_fitter import FITTING
 from camkit.models_def.kinds.hdr.thesis.validation import CodedJudge, make_coded_judge
 from camkit.models_def.kinds.hdr.validation import HdrJudge, make_shots
 from camkit.models_def.networks.catalog import build_network, lights_px

@@ -54,15 +54,15 @@ def make_shots(
     """Photograph scenes; the shots are in the order of their ISOs."""
     data = recipe.data
     source = open_lights(data, pictures)
-    made = []
+    shots = []
     for number in range(CAPTURES):
         rng = np.random.default_rng((SEED, number))
         scene = source.draw(rng, data.capture_px + 2 * data.surround_px)
         share = SHARES[number % len(SHARES)]
         scene = exposed(scene, camera.matrix, camera.gains, share)
         iso = ISOS[number % len(ISOS)]
-        made.append((iso, camera.photograph(scene, iso, rng, data.surround_px)))
-    return tuple(sorted(made, key=lambda pair: pair[0]))
+        shots.append((iso, camera.photograph(scene, iso, rng, data.surround_px)))
+    return tuple(sorted(shots, key=lambda pair: pair[0]))
 
 
 def _psnr_db(shot: Shot, restore: Restorer, recipe: HdrRecipe) -> float:

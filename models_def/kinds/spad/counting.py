@@ -17,7 +17,7 @@ from torch import Tensor
 
 from camkit.errors import ContractError
 
-TOLD: Final = 3.0
+NOISE_DEVIATIONS: Final = 3.0
 """Deviations in the plane that tells a network of noise."""
 FAINT: Final = 1e-4
 """Light below which the slope of its deviation is no longer followed."""
@@ -77,7 +77,7 @@ def told_planes(counts: Tensor, exposure: Exposure) -> Tensor:
     """Return light and noise (b, 2, h, w) of counts (b, 1, h, w); see the head of the module."""
     white = exposure.white_counts
     light = (counts - exposure.dark_counts) / white
-    return torch.cat([light, TOLD * torch.sqrt(counts + 1) / white], dim=1)
+    return torch.cat([light, NOISE_DEVIATIONS * torch.sqrt(counts + 1) / white], dim=1)
 
 
 def expose(light: Tensor, exposure: Exposure, rng: Generator) -> Tensor:
@@ -104,8 +104,8 @@ def count_softly(light: Tensor, photons: Tensor, generator: torch.Generator) -> 
     Returns:
         (b, 1, h, w) counts over photons.
     """
-    held = light.detach().clamp(min=0)
-    counts = torch.poisson(held * photons, generator=generator)
+    detached = light.detach().clamp(min=0)
+    counts = torch.poisson(detached * photons, generator=generator)
     root = torch.sqrt(light.clamp(min=FAINT))
-    gap = (counts / photons - held) / root.detach()
+    gap = (counts / photons - detached) / root.detach()
     return light + gap * root

@@ -53,9 +53,9 @@ def read_luminance(path: Path) -> FloatArray:
         DecodeError: If it cannot be decoded.
     """
     coded = np.asarray(read_picture(path).transpose(2, 0, 1) / 255, dtype=np.float32)
-    found = luma(coded)
-    height, width = (n // SCALE * SCALE for n in found.shape)
-    return np.ascontiguousarray(found[:height, :width])
+    luminance = luma(coded)
+    height, width = (n // SCALE * SCALE for n in luminance.shape)
+    return np.ascontiguousarray(luminance[:height, :width])
 
 
 def read_set(folder: Path) -> tuple[FloatArray, ...]:
@@ -63,9 +63,9 @@ def read_set(folder: Path) -> tuple[FloatArray, ...]:
     return tuple(read_luminance(path) for path in list_pictures(folder))
 
 
-def psnr_db(found: Tensor, truth: Tensor) -> float:
+def psnr_db(picture: Tensor, truth: Tensor) -> float:
     """Return the PSNR in dB, white = 1, at most `MOST_DB`."""
-    error = float((found.double() - truth.double()).square().mean())
+    error = float((picture.double() - truth.double()).square().mean())
     return min(float(-10 * np.log10(max(error, 1e-30))), MOST_DB)
 
 
@@ -93,8 +93,8 @@ def evaluate(
         seed: Of the noise; every picture has its own.
     """
     scores = evaluate_each(pictures, sampling, exposure, restore, seed=seed)
-    found, alike = np.mean(scores, axis=0)
-    return PictureScore(psnr_db=float(found), ssim=float(alike), pictures=len(scores))
+    mean_psnr, mean_ssim = np.mean(scores, axis=0)
+    return PictureScore(psnr_db=float(mean_psnr), ssim=float(mean_ssim), pictures=len(scores))
 
 
 def evaluate_each(
@@ -117,5 +117,5 @@ def _compare(
     fine: Tensor, sampling: Sampling, exposure: Exposure, restore: Restorer, seed: tuple[int, int]
 ) -> tuple[float, float]:
     planes = photograph(fine, sampling, exposure, np.random.default_rng(seed))
-    found = restore(planes).clamp(0, 1)
-    return psnr_db(found, fine), float(ssim(found, fine))
+    restored = restore(planes).clamp(0, 1)
+    return psnr_db(restored, fine), float(ssim(restored, fine))

@@ -33,8 +33,8 @@ def _loss(fitter: Fitter, batch: Batch, step: int, progress: float) -> Tensor:
     network = cast("JointCamera", fitter.network)
     light = count_softly(network.see(sharp), deviation.square().reciprocal(), generator)
     with fitter.precision(progress):
-        found = network.read(light, deviation)
-    errors = (found.float() - batch.target).square().mean((1, 2, 3))
+        output = network.read(light, deviation)
+    errors = (output.float() - batch.target).square().mean((1, 2, 3))
     return training_loss(schedule.loss, errors)
 
 

@@ -6,7 +6,7 @@ import torch
 from torch import Tensor, nn
 
 from camkit.errors import ContractError
-from camkit.models_def.kinds.spad.counting import TOLD
+from camkit.models_def.kinds.spad.counting import NOISE_DEVIATIONS
 from camkit.models_def.kinds.spad.plate_psf import SoftmaxPsf
 from camkit.models_def.kinds.spad.sampling import GAUSSIAN_SIGMA, see_through
 from camkit.models_def.networks.back_projection import BackProjection, BackProjectionConfig
@@ -40,7 +40,7 @@ class JointCamera(nn.Module):
 
     def read(self, light: Tensor, deviation: Tensor) -> Tensor:
         """Return the picture from counted light (b, 1, h, w) and 1 / sqrt(N) (b, 1, 1, 1)."""
-        noise = TOLD * deviation * torch.sqrt(light.clamp(min=0) + deviation.square())
+        noise = NOISE_DEVIATIONS * deviation * torch.sqrt(light.clamp(min=0) + deviation.square())
         return torch.as_tensor(self.network(torch.cat([light, noise], dim=1)))
 
     def forward(self, planes: Tensor) -> Tensor:

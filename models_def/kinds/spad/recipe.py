@@ -16,7 +16,7 @@ from camkit.models_def.training.recipe import DataRecipe, Recipe, common_tables,
 ROLES: Final = ("upscale",)
 PLATE: Final = "plate"
 """Role of a network that is trained with its plate; no bundle holds it."""
-OWN: Final = ("sampling", "times")
+OWN_KEYS: Final = ("sampling", "times")
 CAMERA_PARTS: Final = ("name", "sensor", "sampling", "times")
 """What says which camera it is; how its networks are trained may differ."""
 
@@ -107,7 +107,7 @@ def to_spad_recipe(table: Mapping[str, Any]) -> SpadRecipe:
     Raises:
         ContractError: If a key is unknown, missing or wrong, or the sensor counts no photons.
     """
-    common = common_tables(table, kind_keys=OWN, roles=(*ROLES, PLATE), main=ROLES[0])
+    common = common_tables(table, kind_keys=OWN_KEYS, roles=(*ROLES, PLATE), main=ROLES[0])
     if not isinstance(common.sensor, SpadSensor):
         raise ContractError(
             f'this kind of camera counts photons; sensor.type must be "spad", got '

@@ -33,10 +33,10 @@ def layout_of(recipe: SpadRecipe, role: str) -> SampleLayout:
             inputs=(Port(name="sharp", channels=1), Port(name="deviation", channels=1)),
             outputs=(Port(name="fine", channels=1),),
         )
-    told = (Port(name="noise", channels=1),) if recipe.data.told else ()
+    noise = (Port(name="noise", channels=1),) if recipe.data.told else ()
     # the phase is not in the middle of a pixel, so what is turned is another camera's sample
     return SampleLayout(
-        inputs=(Port(name="light", channels=1), *told),
+        inputs=(Port(name="light", channels=1), *noise),
         outputs=(Port(name="fine", channels=1, scale=SCALE),),
         turned=False,
     )
@@ -84,9 +84,9 @@ class SpadMaker:
         wide = draw_luminance(self._source, rng, side)
         planes = photograph(wide, self._sampling, data.exposure(photons), rng)
         inner = slice(MARGIN_PX, MARGIN_PX + data.sample_px)
-        seen = planes[0, :, inner, inner]
+        middle = planes[0, :, inner, inner]
         fine = slice(SCALE * inner.start, SCALE * inner.stop)
-        inputs = {"light": seen[:1]} | ({"noise": seen[1:]} if data.told else {})
+        inputs = {"light": middle[:1]} | ({"noise": middle[1:]} if data.told else {})
         return _sample(inputs, wide[0, :, fine, fine])
 
 

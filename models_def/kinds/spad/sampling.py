@@ -149,5 +149,5 @@ def make_sampling(
         if mode not in _KERNELS:
             raise ContractError(f"sampling must be one of {', '.join(MODES)}; got {mode!r}")
         kernel = _KERNELS[mode](phase) if sigma is None else gaussian_psf(sigma)
-    chosen: Mode = mode  # type: ignore[assignment]
-    return Sampling(mode=chosen, kernel=kernel, phase=phase)
+    valid_mode: Mode = mode  # type: ignore[assignment]
+    return Sampling(mode=valid_mode, kernel=kernel, phase=phase)

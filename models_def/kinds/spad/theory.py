@@ -66,18 +66,18 @@ def covariance_of(crops: Iterable[NDArray[np.floating]]) -> Covariance:
     Raises:
         ContractError: If there is no crop.
     """
-    held = [np.asarray(crop, np.float64) for crop in crops]
-    if not held:
+    arrays = [np.asarray(crop, np.float64) for crop in crops]
+    if not arrays:
         raise ContractError("a covariance needs at least one crop")
-    mean = float(np.mean([crop.mean() for crop in held]))
-    side = held[0].shape[0] + LAGS + 1
-    total = np.zeros((side, held[0].shape[1] + LAGS + 1))
-    for crop in held:
+    mean = float(np.mean([crop.mean() for crop in arrays]))
+    side = arrays[0].shape[0] + LAGS + 1
+    total = np.zeros((side, arrays[0].shape[1] + LAGS + 1))
+    for crop in arrays:
         spectrum = np.fft.rfft2(crop - mean, s=total.shape)
         total += np.fft.irfft2(np.abs(spectrum) ** 2, s=total.shape)
     lags = np.arange(-LAGS, LAGS + 1)
-    pairs = [n - np.abs(lags) for n in held[0].shape]
-    values = total[np.ix_(lags, lags)] / (len(held) * np.outer(*pairs))
+    pairs = [n - np.abs(lags) for n in arrays[0].shape]
+    values = total[np.ix_(lags, lags)] / (len(arrays) * np.outer(*pairs))
     return Covariance(values=torch.from_numpy(values), mean=mean)
 
 
@@ -95,8 +95,8 @@ def wiener_error(
     values = covariance.values
     kernel = kernel.double()
     # a sample is sum p(u) I(x - u), so it has C(d + u) in common with a sub-pixel d beside it
-    seen = _spread(values, kernel.flip(0, 1))
-    twice = _spread(seen, kernel)
+    shared = _spread(values, kernel.flip(0, 1))
+    twice = _spread(shared, kernel)
     at = torch.arange(-REACH, REACH + 1) * SCALE
     rows, columns = (v.flatten() for v in torch.meshgrid(at, at, indexing="ij"))
     middle = twice.shape[0] // 2
@@ -105,11 +105,11 @@ def wiener_error(
     matrix = matrix + noise * torch.eye(len(matrix), dtype=torch.float64)
     inside = torch.arange(SCALE) - phase
     fine_rows, fine_columns = (v.flatten() for v in torch.meshgrid(inside, inside, indexing="ij"))
-    middle = seen.shape[0] // 2
-    cross = seen[middle + fine_rows[:, None] - rows, middle + fine_columns[:, None] - columns]
-    told = (cross * torch.linalg.solve(matrix, cross.T).T).sum(1)
+    middle = shared.shape[0] // 2
+    cross = shared[middle + fine_rows[:, None] - rows, middle + fine_columns[:, None] - columns]
+    explained = (cross * torch.linalg.solve(matrix, cross.T).T).sum(1)
     centre = values.shape[0] // 2
-    return torch.as_tensor((values[centre, centre] - told).mean())
+    return torch.as_tensor((values[centre, centre] - explained).mean())
 
 
 def best_gaussian(covariance: Covariance, photons: float) -> float:

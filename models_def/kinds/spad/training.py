@@ -105,8 +105,10 @@ class SpadTraining:
         del cache_folder
         plan = recipe.sampling
         learned = None if plan.psf is None else read_plate_psf(recipe_folder / plan.psf)
-        made = make_sampling(plan.mode, kernel=learned, sigma=plan.sigma, phase=recipe.sensor.phase)
-        return SpadMaterial(kernel=made.kernel)
+        sampling = make_sampling(
+            plan.mode, kernel=learned, sigma=plan.sigma, phase=recipe.sensor.phase
+        )
+        return SpadMaterial(kernel=sampling.kernel)
 
     def read_material(self, folder: Path) -> SpadMaterial:
         """Read the kernel that a trainer wrote."""

@@ -63,8 +63,8 @@ class SpadJudge:
         with torch.no_grad():
             return self._mean([restore(shot.planes) for shot in self.shots])
 
-    def _mean(self, found: Sequence[Tensor]) -> Score:
-        pairs = zip(self.shots, found, strict=True)
+    def _mean(self, pictures: Sequence[Tensor]) -> Score:
+        pairs = zip(self.shots, pictures, strict=True)
         every = [psnr_db(picture.clamp(0, 1), shot.fine) for shot, picture in pairs]
         return mean_score(every, by_photons=[f"{shot.photons:.0f}" for shot in self.shots])
 
@@ -95,9 +95,9 @@ def _take(
     rng = np.random.default_rng((SEED, number))
     fine = draw_luminance(source, rng, CROP_PX // SCALE * SCALE)
     exposure = recipe.data.exposure(photons)
-    seen = photograph(fine, sampling, exposure, rng)
-    planes = seen if recipe.data.told else seen[:, :1]
+    light_and_noise = photograph(fine, sampling, exposure, rng)
+    planes = light_and_noise if recipe.data.told else light_and_noise[:, :1]
     if role == PLATE:
         deviation = torch.full_like(fine, 1 / np.sqrt(exposure.white_counts))
         planes = torch.cat([fine, deviation], dim=1)
-    return Photograph(photons=photons, planes=planes, light=seen[:, :1], fine=fine)
+    return Photograph(photons=photons, planes=planes, light=light_and_noise[:, :1], fine=fine)

@@ -21,7 +21,7 @@ from camkit.models_def.optics.pupil import (
     with_open_apertures,
 )
 from camkit.models_def.optics.render.beam import light_of, rays_from, stop_labels
-from camkit.models_def.optics.render.optics import lens_optics
+from camkit.models_def.optics.render.lens_view import lens_optics
 from camkit.models_def.optics.reverse import reverse, trace_to_scene
 from camkit.models_def.optics.trace import Rays, refract, trace
 

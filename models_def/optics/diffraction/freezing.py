@@ -20,9 +20,9 @@ from camkit.errors import ContractError
 from camkit.models_def.optics.diffraction.plate_optics import PlateOptics
 from camkit.models_def.optics.diffraction.plate_streaks import plate_streaks
 from camkit.models_def.optics.diffraction.streak_fit import NoStreaksError
+from camkit.models_def.optics.freezable_optics import FloatGrid
 from camkit.models_def.optics.freeze import Facts, Tell, depths_text, rounded_facts
 from camkit.models_def.optics.frozen import FINE_WAVELENGTHS, FreezeGrid, freeze
-from camkit.models_def.optics.optics import FloatGrid
 from camkit.runtime.bank.psf import wavelength_weights
 
 WAVELENGTH_COUNTS: Final = (3, 4, 5, 7, 9, 13)

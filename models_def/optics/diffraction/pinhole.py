@@ -15,7 +15,7 @@ import torch
 from numpy.typing import NDArray
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.optics import FieldLayout, FloatGrid, radial_layout
+from camkit.models_def.optics.freezable_optics import FieldLayout, FloatGrid, radial_layout
 from camkit.models_def.optics.psf import TracedPsf
 from camkit.radial import RadialDistortion
 from camkit.units import to_mm
@@ -30,7 +30,7 @@ REFERENCE_UM: Final = 0.55
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pinhole:
-    """A round hole; fulfils `camkit.models_def.optics.optics.Optics`.
+    """A round hole; fulfils `camkit.models_def.optics.freezable_optics.Optics`.
 
     Attributes:
         diameter_mm: Of the hole.

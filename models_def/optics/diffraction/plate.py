@@ -38,7 +38,7 @@ from torch import Tensor
 
 from camkit.bundle.reader import PLATE, PLATE_HEIGHTS, SUFFIX, built_in_bundles, open_bundle
 from camkit.errors import ContractError
-from camkit.models_def.optics.diffraction.fabrication import Etching
+from camkit.models_def.optics.diffraction.etching import Etching
 from camkit.models_def.optics.diffraction.geometry import Bench
 from camkit.models_def.optics.diffraction.map_numbers import HEIGHTS, MAX_CELLS, map_of
 from camkit.models_def.optics.diffraction.patterns import PATTERNS, Pattern

@@ -19,7 +19,7 @@ from torch import Tensor
 from camkit.errors import ContractError
 from camkit.models_def.optics.diffraction.plate import Plate
 from camkit.models_def.optics.diffraction.wave import PixelGrid
-from camkit.models_def.optics.optics import FieldLayout, FloatGrid, uniform_layout
+from camkit.models_def.optics.freezable_optics import FieldLayout, FloatGrid, uniform_layout
 from camkit.models_def.optics.psf import TracedPsf
 from camkit.radial import RadialDistortion
 from camkit.units import MM_PER_M
@@ -66,7 +66,7 @@ def plate_kernels(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlateOptics:
-    """A plate before a thin lens; fulfils `camkit.models_def.optics.optics.Optics`.
+    """A plate before a thin lens; fulfils `camkit.models_def.optics.freezable_optics.Optics`.
 
     Attributes:
         plate: The plate and its bench.

@@ -9,7 +9,7 @@ References: Rouf 2011, Glare encoding of high dynamic range images; Metzler 2020
 
 from typing import Final
 
-from camkit.models_def.optics.diffraction.fabrication import Etching
+from camkit.models_def.optics.diffraction.etching import Etching
 from camkit.models_def.optics.diffraction.geometry import Bench
 from camkit.models_def.optics.diffraction.patterns import (
     CrossPattern,

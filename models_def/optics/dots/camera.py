@@ -8,7 +8,7 @@ import torch
 
 from camkit.calibration.dots import ACTIVE_UM, SPACING_UM
 from camkit.errors import ContractError
-from camkit.models_def.optics.diffraction.fabrication import Etching
+from camkit.models_def.optics.diffraction.etching import Etching
 from camkit.models_def.optics.glass.catalogue import find_glass
 from camkit.models_def.optics.glass.dispersion import refractive_index
 from camkit.units import UM_PER_MM

@@ -8,7 +8,7 @@ import torch
 from numpy.typing import NDArray
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.diffraction.fabrication import Etching, mask_layers
+from camkit.models_def.optics.diffraction.etching import Etching, mask_layers
 from camkit.models_def.optics.dots.camera import DotCamera
 from camkit.models_def.optics.dots.levels import LevelGrid
 from camkit.models_def.optics.dots.orders import intensity, order_matrix, orders_of

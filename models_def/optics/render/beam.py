@@ -25,7 +25,7 @@ from torch import Tensor
 from camkit.errors import ContractError
 from camkit.models_def.optics.paraxial import trace_paraxial
 from camkit.models_def.optics.pupil import half_disc
-from camkit.models_def.optics.render.optics import Optics
+from camkit.models_def.optics.render.lens_view import Optics
 from camkit.models_def.optics.reverse import launch_with_slopes, reverse, trace_to_scene
 from camkit.models_def.optics.trace import Rays, SurfaceTensors
 

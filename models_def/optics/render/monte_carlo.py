@@ -40,7 +40,7 @@ from camkit.models_def.optics.render.beam import (
     rays_from,
     stop_labels,
 )
-from camkit.models_def.optics.render.optics import Optics
+from camkit.models_def.optics.render.lens_view import Optics
 from camkit.models_def.optics.render.strata import draw_wavelengths, pixel_numbers, to_disc
 from camkit.models_def.optics.render.texture import Texture, look_up
 from camkit.models_def.optics.render.window import Window

@@ -16,19 +16,19 @@ from camkit.errors import ContractError
 from camkit.models_def.optics.kernel_bank import ChannelResponse, colour_kernels
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.psf import with_object_distance
-from camkit.models_def.optics.render.alignment import (
+from camkit.models_def.optics.render.beam import find_beams, light_at, stop_labels
+from camkit.models_def.optics.render.lens_view import lens_optics
+from camkit.models_def.optics.render.monte_carlo import Illumination
+from camkit.models_def.optics.render.texture import Texture
+from camkit.models_def.optics.render.texture_alignment import (
     Alignment,
     align_reference,
     averaged,
     finer,
 )
-from camkit.models_def.optics.render.beam import find_beams, light_at, stop_labels
-from camkit.models_def.optics.render.monte_carlo import Illumination
-from camkit.models_def.optics.render.optics import lens_optics
-from camkit.models_def.optics.render.texture import Texture
 from camkit.models_def.optics.render.window import Window
 from camkit.models_def.sensors.forward import BLOCK_STEP_PX, block_centres_px, scatter
-from camkit.models_def.sensors.psf import turned_at
+from camkit.models_def.sensors.turned_kernels import turned_at
 from camkit.runtime.bank.psf import wavelength_weights
 
 

@@ -10,14 +10,14 @@ from torch import Tensor
 from camkit.errors import ContractError
 from camkit.models_def.optics.paraxial import trace_paraxial
 from camkit.models_def.optics.pupil import PupilSamples, half_disc
-from camkit.models_def.optics.search.beam import LEAD, launch_beam, leading
+from camkit.models_def.optics.search.beam_launch import LEAD, launch_beam, leading
 from camkit.models_def.optics.search.limits import (
     Limits,
     distortion_residuals,
     limit_residuals,
     ray_residuals,
 )
-from camkit.models_def.optics.search.merit import MERITS, Merit, spot_residuals
+from camkit.models_def.optics.search.spot_residuals import MERITS, Merit, spot_residuals
 from camkit.models_def.optics.search.variables import FreeLens
 from camkit.models_def.optics.trace import Rays, SurfaceTensors, trace
 

@@ -7,7 +7,7 @@ from torch import Tensor
 
 from camkit.errors import ContractError
 from camkit.models_def.optics.psf import spread_tents
-from camkit.models_def.optics.search.beam import LEAD
+from camkit.models_def.optics.search.beam_launch import LEAD
 from camkit.models_def.optics.trace import Rays
 from camkit.units import UM_PER_MM
 

@@ -16,7 +16,7 @@ from camkit.bundle.sensor import ColorSensor
 from camkit.errors import ContractError
 from camkit.models_def.optics.freeze import Facts, Tell
 from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.thin.freezing import (
+from camkit.models_def.optics.thin.hazy_freezing import (
     COPY_RAYS,
     LEAST_FIELDS,
     HazyGrid,

@@ -4,8 +4,8 @@ from typing import Final
 
 from camkit.models_def.optics.grooves import Grooves
 from camkit.models_def.optics.prescription import Lens, Surface
-from camkit.models_def.optics.thin.recipe import ThinRecipe
 from camkit.models_def.optics.thin.solver import SolvedPlate, back_radius_mm
+from camkit.models_def.optics.thin.thin_recipe import ThinRecipe
 
 # rims beyond the clear aperture: rays meet the relief a little outside, bent light further
 _FRONT_MM: Final = 0.1

@@ -17,8 +17,8 @@ from camkit.errors import ContractError
 from camkit.models_def.optics.pupil import half_disc
 from camkit.models_def.optics.search.least_squares import descend
 from camkit.models_def.optics.thin.partition import VirtualApertures, partitioned_phase
-from camkit.models_def.optics.thin.recipe import Faces, PlateTable, ThinRecipe
 from camkit.models_def.optics.thin.skew import PlateNumbers, trace_plate
+from camkit.models_def.optics.thin.thin_recipe import Faces, PlateTable, ThinRecipe
 from camkit.units import UM_PER_MM, to_mm
 
 # ranges of the search: what a term may move the rim, curvature terms, sensor

@@ -3,7 +3,7 @@ from typing import Any
 
 import pytest
 
-from camkit.models_def.design.recipe import DesignRecipe, to_design
+from camkit.models_def.design.design_recipe import DesignRecipe, to_design
 from tests.small_design import small_design
 
 

@@ -8,9 +8,9 @@ import pytest
 import torch
 
 from camkit.models_def.design.assembly import parts_of
+from camkit.models_def.design.design_recipe import DesignRecipe, NetworkChoice, read_design
 from camkit.models_def.design.fabrication import Copy, draw_copy, made_with
 from camkit.models_def.design.loop import DesignLoop, DesignParts
-from camkit.models_def.design.recipe import DesignRecipe, NetworkChoice, read_design
 from camkit.models_def.design.starts import Starts
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import FabricationErrors, Lens

@@ -6,9 +6,9 @@ import pytest
 import torch
 
 from camkit.models_def.design.assembly import parts_of
+from camkit.models_def.design.design_recipe import DesignRecipe, to_design
 from camkit.models_def.design.loop import DesignLoop
 from camkit.models_def.design.loss import design_loss
-from camkit.models_def.design.recipe import DesignRecipe, to_design
 
 
 def make_loop(recipe: DesignRecipe) -> DesignLoop:

@@ -9,7 +9,7 @@ import torch
 
 from camkit.errors import ContractError
 from camkit.models_def.design import starts
-from camkit.models_def.design.recipe import DesignRecipe
+from camkit.models_def.design.design_recipe import DesignRecipe
 from camkit.models_def.design.run import DesignOptions, DesignRun
 from camkit.models_def.design.starts import Starts
 from camkit.models_def.optics.lens_file.lens_file import read_lens
@@ -80,7 +80,7 @@ def test_the_view_shows_fixed_patches(recipe: DesignRecipe, tmp_path: Path) -> N
 WORKER = """
 import json, sys, tomllib
 from pathlib import Path
-from camkit.models_def.design.recipe import to_design
+from camkit.models_def.design.design_recipe import to_design
 from camkit.models_def.design.run import DesignOptions, DesignRun
 table = json.loads(Path(sys.argv[1]).read_text())
 run = DesignRun(to_design(table), DesignOptions(out_dir=Path(sys.argv[2])))

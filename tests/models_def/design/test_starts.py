@@ -7,8 +7,8 @@ import torch
 
 from camkit.errors import ContractError
 from camkit.models_def.design.assembly import parts_of, problem_of
+from camkit.models_def.design.design_recipe import DesignRecipe, to_design, with_choices
 from camkit.models_def.design.loop import DesignLoop, DesignParts
-from camkit.models_def.design.recipe import DesignRecipe, to_design, with_choices
 from camkit.models_def.design.starts import (
     Starts,
     best_judged,

@@ -11,12 +11,12 @@ from camkit.bundle.sensor import BayerSensor, nested_sensor
 from camkit.bundle.stages import Wiener
 from camkit.errors import ContractError
 from camkit.models_def.optics import freeze as freeze_module
-from camkit.models_def.optics import sampling
+from camkit.models_def.optics import sampling_loss
 from camkit.models_def.optics.freeze import between_mm, choose_depths
 from camkit.models_def.optics.frozen import FreezeGrid, freeze
 from camkit.models_def.optics.lens_optics import LensOptics
 from camkit.models_def.optics.prescription import read_prescription
-from camkit.models_def.optics.sampling import (
+from camkit.models_def.optics.sampling_loss import (
     Bench,
     block_loss,
     frozen_loss,
@@ -38,12 +38,12 @@ def duet(rays: int = 400) -> LensOptics:
 
 
 def _shrink(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(sampling, "PLACES", 2)
-    patch.setattr(sampling, "TRUE_WAVELENGTHS", 5)
-    patch.setattr(sampling, "OFFSETS", (-0.8, 0.8))
-    patch.setattr(sampling, "BLOCK_HEIGHTS", (0.9,))
-    patch.setattr(sampling, "PROBE_SCENES", 1)
-    patch.setattr(sampling, "REFERENCE_PX", 512)
+    patch.setattr(sampling_loss, "PLACES", 2)
+    patch.setattr(sampling_loss, "TRUE_WAVELENGTHS", 5)
+    patch.setattr(sampling_loss, "OFFSETS", (-0.8, 0.8))
+    patch.setattr(sampling_loss, "BLOCK_HEIGHTS", (0.9,))
+    patch.setattr(sampling_loss, "PROBE_SCENES", 1)
+    patch.setattr(sampling_loss, "REFERENCE_PX", 512)
 
 
 @pytest.fixture(scope="module")
@@ -145,7 +145,7 @@ def test_cheapest_block_grid_that_loses_little_is_taken(
     monkeypatch.setattr(
         freeze_module,
         "block_loss",
-        lambda _psf, _bench, grid, _probes: sampling.Loss(
+        lambda _psf, _bench, grid, _probes: sampling_loss.Loss(
             mean_db=known[grid.block_px], worst_db=1.0
         ),
     )
@@ -164,7 +164,7 @@ def test_blocks_that_overlap_less_than_kernels_reach_are_not_tried(
     monkeypatch.setattr(freeze_module, "BLOCKS", ((240, near), (384, far)))
     monkeypatch.setattr(freeze_module, "make_probes", lambda *_: ())
     monkeypatch.setattr(
-        freeze_module, "block_loss", lambda *_: sampling.Loss(mean_db=0.1, worst_db=1.0)
+        freeze_module, "block_loss", lambda *_: sampling_loss.Loss(mean_db=0.1, worst_db=1.0)
     )
     own = bench.settings.model_copy(update={"block_px": 384, "overlap_px": far})
     settings, _ = freeze_module.choose_blocks(bench.nominal, replace(bench, settings=own))
@@ -218,7 +218,7 @@ def test_freezing_at_several_depths_reports_those_kept_and_the_loss_between(
     sensor: BayerSensor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     _shrink(monkeypatch)
-    monkeypatch.setattr(sampling, "PATCH_PX", 192)
+    monkeypatch.setattr(sampling_loss, "PATCH_PX", 192)
     monkeypatch.setattr(freeze_module, "FIELD_COUNTS", (5,))
     monkeypatch.setattr(freeze_module, "WAVELENGTH_COUNTS", (3,))
     monkeypatch.setattr(freeze_module, "BLOCKS", ((384, 160),))
@@ -242,8 +242,8 @@ def test_without_depths_a_lens_is_frozen_at_its_own_distance(
 ) -> None:
     lens = replace(read_prescription(DUET), object_distance_mm=3e4)
     near = LensOptics(lens=lens, rays=100)
-    monkeypatch.setattr(sampling, "PLACES", 1)
-    monkeypatch.setattr(sampling, "TRUE_WAVELENGTHS", 1)
+    monkeypatch.setattr(sampling_loss, "PLACES", 1)
+    monkeypatch.setattr(sampling_loss, "TRUE_WAVELENGTHS", 1)
     bench = make_bench(near, sensor, SETTINGS, copies=0)
     assert (bench.depths_mm, bench.focus_mm) == ((3e4,), 3e4)
     grid = FreezeGrid(fields=2, wavelengths=1, energy=0.9)

@@ -9,6 +9,7 @@ import torch
 from camkit.bundle.psf_file import read_psf, write_psf
 from camkit.bundle.sensor import BayerSensor, ChannelResponse, Extent, IsoNoise
 from camkit.errors import ContractError
+from camkit.models_def.optics.freezable_optics import grid_layout, radial_layout
 from camkit.models_def.optics.frozen import (
     FreezeGrid,
     corner_height_mm,
@@ -23,7 +24,6 @@ from camkit.models_def.optics.frozen import (
 from camkit.models_def.optics.kernel_bank import ChannelResponse as ChannelShares
 from camkit.models_def.optics.kernel_bank import colour_kernels, gaussian_response
 from camkit.models_def.optics.lens_optics import LensOptics
-from camkit.models_def.optics.optics import grid_layout, radial_layout
 from camkit.models_def.optics.prescription import read_prescription
 from camkit.runtime.bank.psf import color_kernels, wavelength_weights
 

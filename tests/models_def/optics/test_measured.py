@@ -13,7 +13,8 @@ from camkit.bundle.sensor import ChannelResponse, Extent, IsoNoise, PlanesSensor
 from camkit.bundle.stages import Wiener
 from camkit.errors import ContractError
 from camkit.models_def.optics import freeze as freeze_module
-from camkit.models_def.optics import sampling
+from camkit.models_def.optics import sampling_loss
+from camkit.models_def.optics.freezable_optics import Optics, radial_layout
 from camkit.models_def.optics.freeze import freeze_samples
 from camkit.models_def.optics.frozen import FreezeGrid, freeze, freeze_stress
 from camkit.models_def.optics.lens_optics import LensOptics
@@ -23,7 +24,6 @@ from camkit.models_def.optics.measured import (
     read_measured,
     resampled,
 )
-from camkit.models_def.optics.optics import Optics, radial_layout
 from camkit.models_def.optics.optics_file import read_optics
 from camkit.models_def.sensors.forward import blur
 from camkit.psf import FrozenPsf
@@ -106,8 +106,8 @@ def test_streaks_of_a_grid_fall_where_direct_convolution_puts_them(sensor: Plane
 def test_a_file_is_frozen_with_its_losses(
     sensor: PlanesSensor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sampling, "PATCH_PX", 192)
-    monkeypatch.setattr(sampling, "PLACES", 3)
+    monkeypatch.setattr(sampling_loss, "PATCH_PX", 192)
+    monkeypatch.setattr(sampling_loss, "PLACES", 3)
     monkeypatch.setattr(freeze_module, "BLOCKS", ((256, 64),))
     write_psf(tmp_path / "streaks.safetensors", grid().psf)
     optics = read_optics(tmp_path / "streaks.safetensors")

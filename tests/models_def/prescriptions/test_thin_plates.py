@@ -9,9 +9,9 @@ from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.thin.peak import Peak, measure_peak
 from camkit.models_def.optics.thin.plate_lens import plate_lens
-from camkit.models_def.optics.thin.recipe import find_thin_recipe
 from camkit.models_def.optics.thin.report import with_ideal_grooves, with_midpoints
 from camkit.models_def.optics.thin.solver import solve_plate
+from camkit.models_def.optics.thin.thin_recipe import find_thin_recipe
 
 PITCH_UM = 5.96
 

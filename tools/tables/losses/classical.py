@@ -34,7 +34,7 @@ def by_block(method: str) -> Method:
     """Return a method of the runtime (see `block_filter`) on a sample as one block."""
 
     def restore(developed: Developed, recipe: BayerRecipe) -> Tensor:
-        shot, settings = developed.given, recipe.wiener
+        shot, settings = developed.circumstances, recipe.wiener
         planes, kernels = developed.planes[0].numpy(), shot.frozen[0].numpy()
         otf = to_otf(kernels, planes.shape[-1])
         block = Block(

@@ -109,8 +109,8 @@ def _problem(lens: "Lens", vary: str | None, *, merit: str, core_mm: float, rays
     from camkit.models_def.optics.pupil import half_disc
     from camkit.models_def.optics.search.improvement import free_lens, refracting_surfaces
     from camkit.models_def.optics.search.limits import Limits
-    from camkit.models_def.optics.search.merit import MERITS
     from camkit.models_def.optics.search.problem import Problem
+    from camkit.models_def.optics.search.spot_residuals import MERITS
 
     if merit not in MERITS:
         raise ContractError(f"--merit is one of {', '.join(MERITS)}; got {merit!r}")

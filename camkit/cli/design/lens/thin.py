@@ -39,9 +39,9 @@ def thin(
     from camkit.errors import UnsupportedError
     from camkit.models_def.optics.lens_file.lens_file import ready_for_lens, write_lens
     from camkit.models_def.optics.thin.plate_lens import plate_lens
-    from camkit.models_def.optics.thin.recipe import find_thin_recipe
     from camkit.models_def.optics.thin.report import to_text, with_tool
     from camkit.models_def.optics.thin.solver import solve_plate
+    from camkit.models_def.optics.thin.thin_recipe import find_thin_recipe
     from camkit.units import to_degrees
 
     if out.suffix.lower() != ".toml":

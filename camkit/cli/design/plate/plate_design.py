@@ -13,7 +13,7 @@ from camkit.errors import ContractError
 from camkit.progress import left_text, working
 
 if TYPE_CHECKING:
-    from camkit.models_def.design.plate.loop import Moment
+    from camkit.models_def.design.plate.plate_loop import Moment
 
 
 def design(
@@ -48,8 +48,8 @@ def design(
     from camkit.cli.design.design_time import require_torch
 
     require_torch("camkit plate design")
-    from camkit.models_def.design.plate.recipe import read_plate_recipe, with_plate_choices
-    from camkit.models_def.design.plate.run import PlateRun, PlateRunOptions
+    from camkit.models_def.design.plate.plate_recipe import read_plate_recipe, with_plate_choices
+    from camkit.models_def.design.plate.plate_run import PlateRun, PlateRunOptions
 
     if resume and overwrite:
         raise ContractError("--resume continues, --overwrite starts again: use one of them")

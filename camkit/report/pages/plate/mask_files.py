@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.diffraction.fabrication import Etching, mask_layers
+from camkit.models_def.optics.diffraction.etching import Etching, mask_layers
 from camkit.models_def.optics.diffraction.plate import Plate
 from camkit.runtime.output.part_file import write_together
 

@@ -66,12 +66,12 @@ class Aligner:
         self._centre = np.array([sensor.width_px - 1, sensor.height_px - 1]) / 2
         self._pitch_mm = to_mm(sensor.pixel_pitch_um)
 
-    def align(self, capture: FloatArray, shown: FloatArray) -> AlignedPair:
+    def align(self, capture: FloatArray, reference: FloatArray) -> AlignedPair:
         """Align a pair.
 
         Args:
             capture: (3, h, w) linear camera colours, 1.0 = white level.
-            shown: (3, m, n) linear Rec.709 of the reference.
+            reference: (3, m, n) linear Rec.709.
 
         Raises:
             ContractError: If the capture has not the size of the sensor, or the two cannot be
@@ -85,26 +85,26 @@ class Aligner:
             )
         # One step of the lattice is a pixel of the picture that is matched.
         step = -(-max(capture.shape[1:]) // WORK_SIDE_PX)
-        seen = self._ideal_grey(capture, step)
-        found = find_homography(_encoded(shown.mean(0)), _encoded(seen))
-        pair = self._pair(capture, shown, found, step)
-        light = apply_matrix(self._fit_colours(pair), shown)
+        grey = self._ideal_grey(capture, step)
+        homography = find_homography(_encoded(reference.mean(0)), _encoded(grey))
+        pair = self._pair(capture, reference, homography, step)
+        light = apply_matrix(self._fit_colours(pair), reference)
         # In the capture's own colours and in linear light, blur and noise are all that differs.
-        found = refine_homography(found, light.mean(0), seen)
-        return self._pair(capture, light, found, step)
+        homography = refine_homography(homography, light.mean(0), grey)
+        return self._pair(capture, light, homography, step)
 
     def _pair(
-        self, capture: FloatArray, reference: FloatArray, found: Homography, step: int
+        self, capture: FloatArray, reference: FloatArray, homography: Homography, step: int
     ) -> AlignedPair:
         """Return a pair by a homography to every step-th pixel."""
-        matrix = np.diag([step, step, 1.0]) @ found.matrix
+        matrix = np.diag([step, step, 1.0]) @ homography.matrix
         matrix = matrix / matrix[2, 2]
         back = np.linalg.inv(matrix)
 
         def to_reference(points_px: Points) -> Points:
             return map_points(back, self._undistorted(points_px))
 
-        full = replace(found, matrix=matrix, residual_px=step * found.residual_px)
+        full = replace(homography, matrix=matrix, residual_px=step * homography.residual_px)
         return AlignedPair(
             capture=capture, reference=reference, to_reference=to_reference, homography=full
         )
@@ -126,19 +126,19 @@ class Aligner:
         grid = np.mgrid[0:height:step, 0:width:step][::-1].reshape(2, -1).T.astype(np.float64)
         points = self._distorted(grid)
         at = points.reshape(-(-height // step), -(-width // step), 2)
-        seen, _ = warp_to(_smooth(capture, step), at[..., 0], at[..., 1])
+        colours, _ = warp_to(_smooth(capture, step), at[..., 0], at[..., 1])
         light = self.illumination(points).reshape(at.shape[:2])
-        return np.asarray(seen.mean(0) / light, dtype=np.float32)
+        return np.asarray(colours.mean(0) / light, dtype=np.float32)
 
     def _distorted(self, points_px: Points) -> Points:
         """Return where ideal positions fall on the sensor, both in pixels of the capture."""
-        return self._moved(distort_points, points_px)
+        return self._displaced(distort_points, points_px)
 
     def _undistorted(self, points_px: Points) -> Points:
         """Undo `_distorted`."""
-        return self._moved(undistort_points, points_px)
+        return self._displaced(undistort_points, points_px)
 
-    def _moved(
+    def _displaced(
         self, move: Callable[[Points, RadialDistortion], Points], points_px: Points
     ) -> Points:
         if self._distortion is None:
@@ -149,22 +149,24 @@ class Aligner:
         """Fit the (3, 3) matrix from the reference's Rec.709 to camera colours as captured."""
         step = COLOUR_STEP_PX
         height, width = (side // step * step for side in pair.capture.shape[1:])
-        taken = pair.capture[:, :height, :width]
-        coarse = taken.reshape(3, height // step, step, width // step, step).mean((2, 4))
-        clipped = taken.max(0).reshape(height // step, step, width // step, step).max((1, 3))
+        capture = pair.capture[:, :height, :width]
+        coarse = capture.reshape(3, height // step, step, width // step, step).mean((2, 4))
+        clipped = capture.max(0).reshape(height // step, step, width // step, step).max((1, 3))
         rows, columns = np.mgrid[0 : height // step, 0 : width // step]
         points = np.stack([columns, rows], -1).reshape(-1, 2) * step + (step - 1) / 2.0
         at = pair.to_reference(points).reshape(*rows.shape, 2)
         # The reference is smoothed as far as one step of the capture reaches in it.
         reach = max(1, round(float(np.linalg.norm(at[0, 1] - at[0, 0]))))
-        shown, inside = warp_to(_smooth(pair.reference, reach), at[..., 0], at[..., 1])
+        reference, inside = warp_to(_smooth(pair.reference, reach), at[..., 0], at[..., 1])
         # A step at the edge of the plane also holds what lies beside it.
         whole = cv2.erode(inside.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
         good = whole & (clipped < CLIPPED_ABOVE)
         if good.sum() < LEAST_COLOUR_POINTS:
             raise ContractError("the reference covers too little of the capture, or all is clipped")
         light = self.illumination(points).reshape(rows.shape)[good]
-        solution, *_ = np.linalg.lstsq((shown[:, good] * light).T, coarse[:, good].T, rcond=None)
+        solution, *_ = np.linalg.lstsq(
+            (reference[:, good] * light).T, coarse[:, good].T, rcond=None
+        )
         return np.asarray(solution.T, dtype=np.float64)
 
 

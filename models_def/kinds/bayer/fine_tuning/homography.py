@@ -84,7 +84,9 @@ def find_homography(reference: FloatArray, capture: FloatArray) -> Homography:
     )
 
 
-def refine_homography(found: Homography, reference: FloatArray, capture: FloatArray) -> Homography:
+def refine_homography(
+    homography: Homography, reference: FloatArray, capture: FloatArray
+) -> Homography:
     """Improve a homography with a reference that resembles the capture more; as `find_homography`.
 
     Raises:
@@ -92,9 +94,9 @@ def refine_homography(found: Homography, reference: FloatArray, capture: FloatAr
     """
     scales = _work_scales(reference, capture)
     small = [_shrunk(p, s) for p, s in zip((reference, capture), scales, strict=True)]
-    start = _scaling(scales[1]) @ found.matrix @ np.linalg.inv(_scaling(scales[0]))
+    start = _scaling(scales[1]) @ homography.matrix @ np.linalg.inv(_scaling(scales[0]))
     matrix, correlation = _refined(small[0], small[1], start / start[2, 2])
-    return replace(found, matrix=_at_full_size(matrix, scales), correlation=correlation)
+    return replace(homography, matrix=_at_full_size(matrix, scales), correlation=correlation)
 
 
 def _work_scales(*pictures: FloatArray) -> tuple[float, float]:
@@ -154,8 +156,8 @@ def _scaling(scale: float) -> Matrix:
 def _matches(reference: FloatArray, capture: FloatArray) -> tuple[Matrix, Matrix]:
     """Return (n, 2) positions of features in the one and their likely partners in the other."""
     sift = cv2.SIFT.create(nfeatures=MOST_FEATURES)
-    found = [sift.detectAndCompute(_to_bytes(p), None) for p in (reference, capture)]
-    (points, words), (partners, other) = found
+    features = [sift.detectAndCompute(_to_bytes(p), None) for p in (reference, capture)]
+    (points, words), (partners, other) = features
     if words is None or other is None or min(len(words), len(other)) < LEAST_MATCHES:
         raise ContractError(
             "reference and capture must show a textured plane; too few features were found "
@@ -232,12 +234,12 @@ def _as_sharp(
     Against a sharper reference Gauss-Newton overshoots, and may leave.
     """
     inside = _is_inner(at_px[:, 0], at_px[:, 1], picture.shape)
-    seen = _sampled(picture, at_px[inside].astype(np.float32))
+    samples = _sampled(picture, at_px[inside].astype(np.float32))
     blurred = [
         cv2.GaussianBlur(reference, (0, 0), np.hypot(blur, _SMOOTH_PX)).ravel()[keep]
         for blur in _BLURS_PX
     ]
-    alike = [np.corrcoef(one[inside], seen)[0, 1] for one in blurred]
+    alike = [np.corrcoef(one[inside], samples)[0, 1] for one in blurred]
     return np.asarray(blurred[int(np.nanargmax(alike))])
 
 
@@ -264,7 +266,7 @@ def _newton_step(
     keep = _is_inner(at[:, 0], at[:, 1], pictures[0].shape)
     if keep.sum() < _LEAST_PIXELS:
         raise ContractError("reference and capture hardly overlap; is it the right pair?")
-    seen, along_x, along_y = (_sampled(p, at[keep]) for p in pictures)
+    samples, along_x, along_y = (_sampled(p, at[keep]) for p in pictures)
     rays = grid[keep] / depth[keep]
     # d unit / d matrix, times the slope of the picture in units.
     pull_x, pull_y = along_x * from_unit[0, 0], along_y * from_unit[1, 1]
@@ -277,8 +279,8 @@ def _newton_step(
         -np.ones((keep.sum(), 1)),
     ]
     system = np.concatenate(columns, axis=1)
-    solution = np.linalg.solve(system.T @ system, -system.T @ seen)
-    return solution[:8], float(np.corrcoef(seen, truth[keep])[0, 1])
+    solution = np.linalg.solve(system.T @ system, -system.T @ samples)
+    return solution[:8], float(np.corrcoef(samples, truth[keep])[0, 1])
 
 
 def _sampled(picture: FloatArray, at_px: FloatArray) -> Matrix:

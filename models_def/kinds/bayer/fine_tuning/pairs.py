@@ -33,7 +33,7 @@ from camkit.models_def.kinds.bayer.samples import (
     Developed,
     finish_shot,
 )
-from camkit.models_def.training.adversarial.fitter import Mix
+from camkit.models_def.training.adversarial.picture_fitter import Mix
 from camkit.models_def.training.pictures import list_pictures, read_picture, to_linear
 from camkit.models_def.training.pool import cut_patch
 from camkit.models_def.training.sample import Batch, Sample
@@ -67,13 +67,13 @@ class PairSamples:
 
     def draw_batch(self, rng: Generator, count: int, patch_px: int) -> Batch:
         """Draw random patches of random samples, turned and flipped."""
-        chosen = rng.integers(len(self.planes), size=count)
-        cut = [cut_patch(rng, self.planes[i], self.targets[i], patch_px, LAYOUT) for i in chosen]
+        indices = rng.integers(len(self.planes), size=count)
+        cut = [cut_patch(rng, self.planes[i], self.targets[i], patch_px, LAYOUT) for i in indices]
         planes, targets = (
             torch.from_numpy(np.stack(patches).astype(np.float32))
             for patches in zip(*cut, strict=True)
         )
-        weight = torch.from_numpy(self.weights[chosen])
+        weight = torch.from_numpy(self.weights[indices])
         return Batch(inputs=LAYOUT.by_name(planes), target=targets, weight=weight)
 
     def mixer(self, share: float, seed: int) -> Mix:
@@ -90,14 +90,14 @@ class PairSamples:
             real = int(np.floor(share * count + rounds_up))
             if real == 0:
                 return batch
-            drawn = self.draw_batch(np.random.default_rng((seed, 3, step)), real, patch_px)
+            real_batch = self.draw_batch(np.random.default_rng((seed, 3, step)), real, patch_px)
             return Batch(
                 inputs={
                     name: torch.cat([planes, batch.inputs[name][real:]])
-                    for name, planes in drawn.inputs.items()
+                    for name, planes in real_batch.inputs.items()
                 },
-                target=torch.cat([drawn.target, batch.target[real:]]),
-                weight=torch.cat([drawn.weight, batch.weight[real:]]),
+                target=torch.cat([real_batch.target, batch.target[real:]]),
+                weight=torch.cat([real_batch.weight, batch.weight[real:]]),
             )
 
         return mix
@@ -203,10 +203,10 @@ def _read_settings(path: Path, recipe: BayerRecipe) -> PairSettings:
 
 def _partner(capture: Path) -> Path:
     folder = capture.parent.parent / "reference"
-    found = [p for p in list_pictures(folder) if p.stem == capture.stem]
-    if len(found) != 1:
-        raise ContractError(f"{folder} must hold one picture {capture.stem}.*; got {len(found)}")
-    return found[0]
+    partners = [p for p in list_pictures(folder) if p.stem == capture.stem]
+    if len(partners) != 1:
+        raise ContractError(f"{folder} must hold one picture {capture.stem}.*; got {len(partners)}")
+    return partners[0]
 
 
 def _draw_place(rng: Generator, pair: AlignedPair, recipe: BayerRecipe) -> tuple[int, int]:
@@ -228,10 +228,10 @@ def _cut(
     rng: Generator,
     pair: AlignedPair,
     place: tuple[int, int],
-    given: tuple[Aligner, PsfBank, NoiseModel, PairSettings],
+    setup: tuple[Aligner, PsfBank, NoiseModel, PairSettings],
     recipe: BayerRecipe,
 ) -> Sample:
-    aligner, bank, noise, settings = given
+    aligner, bank, noise, settings = setup
     data, (x, y) = recipe.data, place
     margin, side = data.margin_px, data.sample_px
     centre_px = np.array([place]) + (side - 1) / 2
@@ -240,12 +240,12 @@ def _cut(
     illumination = float(aligner.illumination(centre_px)[0])
     window = np.s_[:, y - margin : y + side + margin, x - margin : x + side + margin]
     planes = torch.from_numpy(pair.capture[window].copy())[None]
-    shown, inside = _warped(pair, place, side)
+    reference, inside = _warped(pair, place, side)
     developed = Developed(
         planes=planes,
         unknown=planes.amax(1, keepdim=True) >= CLIPPED_ABOVE,
-        true=torch.from_numpy(shown * np.float32(illumination)).clamp(min=0)[None],
-        given=Circumstances(
+        true=torch.from_numpy(reference * np.float32(illumination)).clamp(min=0)[None],
+        circumstances=Circumstances(
             noise=noise,
             gains=settings.gains,
             frozen=bank.frozen_kernels(float(block_x_mm), float(block_y_mm)),

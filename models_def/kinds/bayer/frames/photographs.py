@@ -38,7 +38,7 @@ from camkit.models_def.kinds.bayer.samples import tint_crop
 from camkit.models_def.optics.frozen import corner_height_mm
 from camkit.models_def.optics.kernel_bank import focused_copies
 from camkit.models_def.optics.prescription import Lens, format_prescription
-from camkit.models_def.optics.thin.freezing import COPY_RAYS, HazyGrid, freeze_hazy
+from camkit.models_def.optics.thin.hazy_freezing import COPY_RAYS, HazyGrid, freeze_hazy
 from camkit.models_def.optics.thin.middle import find_middles
 from camkit.models_def.training.kind import training_kind
 from camkit.models_def.training.pictures import DrawnShares, SceneSource, list_pictures, open_scenes
@@ -149,14 +149,14 @@ def prepare_frames(
         ContractError: As `check_frames`.
     """
     check_frames(recipe, sources.pictures)
-    folder, chosen = frames_folder(runs, recipe), recipe.frames
+    folder, choices = frames_folder(runs, recipe), recipe.frames
     folder.mkdir(parents=True, exist_ok=True)
     first_unseen = len(sources.copies) - recipe.lens.validation_copies
     plans = {
-        PARTS[0]: (chosen.count, chosen.tiles, range(first_unseen)),
+        PARTS[0]: (choices.count, choices.tiles, range(first_unseen)),
         PARTS[1]: (
-            chosen.validation_count,
-            chosen.validation_tiles,
+            choices.validation_count,
+            choices.validation_tiles,
             range(first_unseen, len(sources.copies)),
         ),
     }
@@ -165,7 +165,7 @@ def prepare_frames(
         bundle = physics_bundle(recipe, sources.optics, Path(scratch) / "physics.camkit")
         for part, (frames, tiles, copies) in plans.items():
             studio = _Studio(recipe, sources, part, bundle, tiles)
-            counts[part] = frames * chosen.shots * tiles
+            counts[part] = frames * choices.shots * tiles
             store = create_tiles(folder, part, counts[part], recipe)
             for number in range(frames):
                 studio.fill(store, number, copies[number % len(copies)])
@@ -179,10 +179,10 @@ def prepare_frames(
 def physics_bundle(recipe: BayerRecipe, optics: FrozenOptics, out: Path) -> Bundle:
     """Write the camera of a recipe without its networks, and open it."""
     design = training_kind(recipe.kind).design(recipe)
-    kept = [stage for stage in design.stages if not isinstance(stage, Network)]
-    stages = rewired(kept, design.stages)
-    named = {"kind": recipe.kind, "name": recipe.name}
-    return write_physics(out, stages, recipe.sensor, optics, design.object_distance_mm, **named)
+    physics = [stage for stage in design.stages if not isinstance(stage, Network)]
+    stages = rewired(physics, design.stages)
+    identity = {"kind": recipe.kind, "name": recipe.name}
+    return write_physics(out, stages, recipe.sensor, optics, design.object_distance_mm, **identity)
 
 
 class _Studio:
@@ -200,7 +200,7 @@ class _Studio:
             sources.pictures[part],
             picture_share=1.0 if self._choosing else None,
             first_scene=-data.procedural_scenes if self._choosing else 0,
-            drawn_shares=DrawnShares() if self._choosing else data.drawn,
+            drawn_shares=DrawnShares() if self._choosing else data.drawn_shares,
         )
 
     def fill(self, store: Tiles, number: int, copy: int) -> None:
@@ -211,7 +211,7 @@ class _Studio:
         window = scene_window(scene, recipe.sensor, None)
         scene, truth = recipe.data.lit(rng, scene)
         matrix, _ = camera_from_rec709(np.array(recipe.sensor.color_matrix))
-        lit = scene if scene.min() >= 0 else _seen(scene, matrix)
+        lit = scene if scene.min() >= 0 else _visible_part(scene, matrix)
         optics = self._sources.copies[copy]
         light = light_of(
             lit,
@@ -281,14 +281,14 @@ class _Studio:
             white_balance=light.gains,  # type: ignore[arg-type]
             origin_px=(0, 0),
         )
-        kept = self._pipeline.start(capture).keep(haze.gives[0])
-        rows = kept.rows()
-        assert kept.noise_rise is not None
-        red, green, blue = kept.noise_rise()
+        dehazed = self._pipeline.start(capture).keep(haze.gives[0])
+        rows = dehazed.rows()
+        assert dehazed.noise_rise is not None
+        red, green, blue = dehazed.noise_rise()
         return np.asarray(rows.read(0, rows.shape[1]), np.float32), (red, green, blue)
 
 
-def _seen(scene: FloatArray, matrix: NDArray[np.float64]) -> FloatArray:
+def _visible_part(scene: FloatArray, matrix: NDArray[np.float64]) -> FloatArray:
     """Return a scene (3, h, w) of colours outside Rec.709 without what no channel sees."""
     camera = np.maximum(apply_matrix(matrix, scene), 0)
     back = np.asarray(np.linalg.inv(matrix), np.float64)
@@ -336,12 +336,12 @@ def _with_surroundings(
 ) -> NDArray[Any]:
     """Cut a square and what lies around it; mirrored beyond the border of the frame."""
 
-    def along(first: int, length: int) -> NDArray[np.intp]:
+    def indices(first: int, length: int) -> NDArray[np.intp]:
         at = np.abs(np.arange(first - margin_px, first + inner_px + margin_px))
         return np.where(at < length, at, 2 * (length - 1) - at)
 
     height, width = planes.shape[-2:]
-    rows, columns = along(top, height), along(left, width)
+    rows, columns = indices(top, height), indices(left, width)
     return np.ascontiguousarray(planes[:, rows[:, None], columns])
 
 

@@ -16,7 +16,7 @@ from camkit.models_def.kinds.bayer.frames.photographs import (
 from camkit.models_def.kinds.bayer.frames.tiles import HEADER, PARTS, frames_folder
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.optics.lens_file.lens_file import find_lens
-from camkit.models_def.optics.thin.freezing import check_peaks
+from camkit.models_def.optics.thin.hazy_freezing import check_peaks
 from camkit.models_def.training.preparing import PrepareOptions, Tell
 
 

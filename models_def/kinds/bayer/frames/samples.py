@@ -42,7 +42,7 @@ def developed(
         planes=torch.from_numpy(tile.planes)[None],
         unknown=torch.from_numpy(tile.clipped)[None, None],
         true=torch.from_numpy(tile.sharp)[None],
-        given=Circumstances(
+        circumstances=Circumstances(
             noise=recipe.sensor.noise_at(tile.iso).with_gains(gains),
             noise_rise=tile.noise_rise,
             gains=gains,
@@ -109,7 +109,7 @@ def validation_captures(
             ValidationCapture(
                 shot=shot,
                 sharp=encode_srgb(apply_matrix(to_rec709, tile.sharp / shot.illumination)),
-                field_share=min(FIELD_SHARES, key=lambda known: abs(known - share)),
+                field_share=min(FIELD_SHARES, key=lambda field: abs(field - share)),
                 iso=tile.iso,
                 copy=tile.copy - bank.training_copies,
             )

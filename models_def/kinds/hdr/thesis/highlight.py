@@ -70,8 +70,8 @@ class HighlightUnet(nn.Module):
             skips.append(x)
         skips.pop()
         for i in reversed(range(len(skips))):
-            up = self.ups[i](nn.functional.interpolate(x, scale_factor=2, mode="nearest"))
-            x = self.decoders[i](torch.cat([up, skips[i]], dim=1))
+            upsampled = self.ups[i](nn.functional.interpolate(x, scale_factor=2, mode="nearest"))
+            x = self.decoders[i](torch.cat([upsampled, skips[i]], dim=1))
         return clip(self.last(x), 1, MOST_LIGHT)
 
 

@@ -30,8 +30,8 @@ class BetweenRoots(nn.Module):
 
     def linear(self, light: Tensor) -> Tensor:
         """Return (b, 3 m, h, w) linear from (b, 3 n, h, w) linear."""
-        found = self.body(*torch.split(light, PICTURE, dim=1))
-        return torch.cat(found, dim=1) if isinstance(found, tuple) else torch.as_tensor(found)
+        output = self.body(*torch.split(light, PICTURE, dim=1))
+        return torch.cat(output, dim=1) if isinstance(output, tuple) else torch.as_tensor(output)
 
     def forward(self, roots: Tensor) -> Tensor:
         """Return (b, 3 m, h, w) roots from (b, 3 n, h, w) roots."""

@@ -26,14 +26,14 @@ def star_kernel(glare: GlareRecipe, angle_rad: float) -> FloatArray:
     """
     reach = glare.reach_px
     rows = np.arange(-reach, reach + 1)
-    across = -np.tan(angle_rad) * rows
+    offsets = -np.tan(angle_rad) * rows
     # one sample of the line per row stands for its length within that row
     length = 1 / math.cos(angle_rad)
     light = glare.beta * length * np.exp(-glare.m * length * np.abs(rows))
     kernel = np.zeros((2 * reach + 1, 2 * reach + 1))
-    left = np.floor(across).astype(int)
-    share = across - left
-    for column, part in ((left, 1 - share), (left + 1, share)):
+    left_columns = np.floor(offsets).astype(int)
+    share = offsets - left_columns
+    for column, part in ((left_columns, 1 - share), (left_columns + 1, share)):
         inside = np.abs(column) <= reach
         kernel[rows[inside] + reach, column[inside] + reach] += (light * part)[inside]
     kernel[reach, reach] = glare.alpha

@@ -11,8 +11,8 @@ from torch import Tensor
 from camkit.models_def.kinds.hdr.recipe import HdrRecipe
 from camkit.models_def.kinds.hdr.samples import draw_corner
 from camkit.models_def.kinds.hdr.scenes import LightSource, exposed
+from camkit.models_def.kinds.hdr.thesis.coded_samples import CodedCamera, coded_sample, layout_of
 from camkit.models_def.kinds.hdr.thesis.networks import to_light
-from camkit.models_def.kinds.hdr.thesis.samples import CodedCamera, coded_sample, layout_of
 from camkit.models_def.kinds.hdr.validation import ISOS, MOST_DB, SEED
 from camkit.models_def.training.kind import Restorer, Score, mean_score
 from camkit.scenes.saturation import CEILING
@@ -60,8 +60,8 @@ class CodedJudge:
         peak = 1.0 if self.role == "split" else CEILING
         every = []
         with torch.no_grad():
-            for _, given, truth in self.samples:
-                gap = to_light(restore(given)).clamp(max=peak) - to_light(truth).clamp(max=peak)
+            for _, planes, truth in self.samples:
+                gap = to_light(restore(planes)).clamp(max=peak) - to_light(truth).clamp(max=peak)
                 mean = max(float(gap.double().square().mean()), 1e-30)
                 every.append(min(float(10 * np.log10(peak**2 / mean)), MOST_DB))
         return mean_score(every, by_iso=[f"{iso:g}" for iso, *_ in self.samples])
@@ -71,7 +71,7 @@ def make_coded_judge(
     recipe: HdrRecipe, role: str, camera: CodedCamera, source: LightSource
 ) -> CodedJudge:
     """Photograph scenes, cut to a sample about a light each; in the order of their ISOs."""
-    made, layout, data = [], layout_of(recipe, role), recipe.data
+    samples, layout, data = [], layout_of(recipe, role), recipe.data
     for number in range(SAMPLES):
         rng = np.random.default_rng((SEED, number))
         scene = source.draw(rng, data.capture_px + 2 * data.surround_px)
@@ -79,5 +79,5 @@ def make_coded_judge(
         iso = ISOS[number % len(ISOS)]
         shot = camera.photograph(scene, iso, rng)
         sample = coded_sample(shot, draw_corner(rng, shot, recipe), recipe, role)
-        made.append((iso, sample.stacked(layout)[None], sample.target[None]))
-    return CodedJudge(role=role, samples=tuple(sorted(made, key=lambda sample: sample[0])))
+        samples.append((iso, sample.stacked(layout)[None], sample.target[None]))
+    return CodedJudge(role=role, samples=tuple(sorted(samples, key=lambda sample: sample[0])))

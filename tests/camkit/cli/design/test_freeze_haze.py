@@ -9,16 +9,16 @@ import pytest
 from camkit.bundle.haze_file import read_haze
 from camkit.bundle.psf_file import read_psf
 from camkit.cli.exit_code import ExitCode
-from camkit.models_def.optics.thin import distances, freezing
+from camkit.models_def.optics.thin import distances, hazy_freezing
 
 LENS = "thin-plate"
-FEW = freezing.HazyGrid(fields=3, wavelengths=2, rays=1000)
+FEW = hazy_freezing.HazyGrid(fields=3, wavelengths=2, rays=1000)
 
 
 def test_a_lens_is_frozen_as_core_and_haze(
     camkit_command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(freezing.freeze_hazy, "__defaults__", (FEW,))
+    monkeypatch.setattr(hazy_freezing.freeze_hazy, "__defaults__", (FEW,))
     out, haze, report = (tmp_path / "frozen" / name for name in ("p.st", "h.st", "r.json"))
     words = ("freeze", LENS, "-o", out, "--haze", haze, "--report", report, "--json")
     outcome = camkit_command(*words)
@@ -37,7 +37,7 @@ def test_a_lens_is_frozen_as_core_and_haze(
 def test_other_distances_are_frozen_beside_it(
     camkit_command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(freezing.freeze_hazy, "__defaults__", (FEW,))
+    monkeypatch.setattr(hazy_freezing.freeze_hazy, "__defaults__", (FEW,))
     usual = dict(distances.freeze_distances.__kwdefaults__)
     near = usual | {"distances_mm": (1000.0,), "grid": replace(FEW, rays=500)}
     monkeypatch.setattr(distances.freeze_distances, "__kwdefaults__", near)
@@ -62,7 +62,7 @@ def test_nothing_is_written_where_no_other_distance_is_known(
     camkit_command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for made, few in (
-        (freezing.freeze_hazy, {"fields": 3, "wavelengths": 2, "rays": 1000}),
+        (hazy_freezing.freeze_hazy, {"fields": 3, "wavelengths": 2, "rays": 1000}),
         (distances.freeze_distances, {"distances_mm": (), "wavelengths": 2, "rays": 500}),
     ):
         monkeypatch.setattr(made, "__kwdefaults__", dict(made.__kwdefaults__) | few)

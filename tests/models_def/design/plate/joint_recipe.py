@@ -3,10 +3,10 @@
 from pathlib import Path
 from typing import Any
 
+from camkit.models_def.design.plate.plate_recipe import PlateRecipe, to_plate_recipe
 from camkit.models_def.design.plate.reader import PlateReader, open_reader
 from camkit.models_def.design.plate.reader_recipe import ReaderRecipe
-from camkit.models_def.design.plate.recipe import PlateRecipe, to_plate_recipe
-from tests.models_def.design.plate.test_recipe import RECIPES, table
+from tests.models_def.design.plate.test_plate_recipe import RECIPES, table
 
 TABLES = """
 [data]

@@ -8,7 +8,7 @@ import torch
 
 from camkit.errors import ContractError
 from camkit.models_def.design.plate.maps import begin_map
-from camkit.models_def.design.plate.recipe import PlateRecipe, to_plate_recipe
+from camkit.models_def.design.plate.plate_recipe import PlateRecipe, to_plate_recipe
 from camkit.models_def.optics.diffraction.geometry import Bench
 from camkit.models_def.optics.diffraction.heights import (
     FullMap,
@@ -25,7 +25,7 @@ from camkit.models_def.optics.diffraction.patterns import (
     StarPattern,
 )
 from camkit.models_def.optics.diffraction.plate import Plate, pattern_plate, write_plate
-from tests.models_def.design.plate.test_recipe import table
+from tests.models_def.design.plate.test_plate_recipe import table
 
 BENCH = Bench(diameter_mm=2.0, focal_length_mm=25.0, focus_mm=2000.0)
 STREAK = {"near_um": 30.0, "far_um": 120.0, "share": 0.06}

@@ -10,8 +10,9 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.design.plate.loop import PlateLoop
 from camkit.models_def.design.plate.maps import begin_map
+from camkit.models_def.design.plate.plate_loop import PlateLoop
+from camkit.models_def.design.plate.plate_recipe import PlateRecipe
 from camkit.models_def.design.plate.reader import (
     PlateReader,
     open_reader,
@@ -19,9 +20,8 @@ from camkit.models_def.design.plate.reader import (
     reader_digest,
 )
 from camkit.models_def.design.plate.reader_recipe import ReaderRecipe
-from camkit.models_def.design.plate.recipe import PlateRecipe
 from tests.models_def.design.plate.joint_recipe import READER, joint, reader_of, write_camera
-from tests.models_def.design.plate.test_recipe import RECIPES
+from tests.models_def.design.plate.test_plate_recipe import RECIPES
 
 
 @pytest.fixture

@@ -60,7 +60,7 @@ def test_a_fitted_bank_beats_the_one_of_each_colour_alone(recipe, coloured, tmp_
     grey = 0.3 + 0.2 * np.sign(np.sin(x / 5) * np.cos(y / 7))
     crop = (grey * np.array([0.9, 1.0, 0.8])[:, None, None]).astype(np.float32)
     shot = photograph(crop, exposure, recipe, coloured, rng)
-    given = shot.given
+    given = shot.circumstances
     noise = [shot.planes.new_tensor(v) for v in (given.noise.shot, given.noise.read_variance)]
     margin = recipe.data.margin_px
     errors = [

@@ -155,7 +155,7 @@ def test_a_bank_that_finds_the_distance_is_told_it_with_an_error(recipe, bank):
         data=replace(recipe.data, depth_error=0.2),
     )
     drawn = [draw_exposure(np.random.default_rng(i), finds, deep) for i in range(400)]
-    inside = [e.told - e.copy % 2 for e in drawn if 0 < e.told < 1]
+    inside = [e.filter_depth - e.copy % 2 for e in drawn if 0 < e.filter_depth < 1]
     assert len(inside) > 150, "half of the errors lead beyond the depths, and end there"
     # depths lie 1 / m apart, so numbers of depths are errors in 1 / m
     assert np.std([*inside, *(-np.array(inside))]) == pytest.approx(0.2, rel=0.15)
@@ -174,16 +174,18 @@ def test_the_filter_knows_the_depth_of_some_samples(recipe, bank):
         data=replace(recipe.data, known_depth_share=0.25),
     )
     drawn = [draw_exposure(np.random.default_rng(i), some, deep) for i in range(400)]
-    assert 70 < sum(e.told is not None for e in drawn) < 130
-    assert all(e.told in (None, e.copy % 2) for e in drawn), "exactly, where no error is asked for"
+    assert 70 < sum(e.filter_depth is not None for e in drawn) < 130
+    assert all(e.filter_depth in (None, e.copy % 2) for e in drawn), (
+        "exactly, where no error is asked for"
+    )
     unaware = [draw_exposure(np.random.default_rng(i), recipe, deep) for i in range(400)]
-    assert [replace(e, told=None) for e in drawn] == unaware, "the rest is drawn as ever"
+    assert [replace(e, filter_depth=None) for e in drawn] == unaware, "the rest is drawn as ever"
     side = scene_side_px(some, deep)
     crop = np.random.default_rng(1).random((3, side, side), dtype=np.float32)
     planes = {
         (depth, known): make_shot(
             crop,
-            replace(drawn[0], copy=depth, told=depth if known else None),
+            replace(drawn[0], copy=depth, filter_depth=depth if known else None),
             some,
             deep,
             np.random.default_rng(2),

@@ -34,7 +34,7 @@ def read(tables):
 def test_light_of_a_display_has_steps_of_its_codes():
     ramp = grey(*np.linspace(0, 1, 5001))
     for bits in (4, 8):
-        light, _ = DisplayRecipe(bits=bits, contrast=1e9).shown(ramp)
+        light, _ = DisplayRecipe(bits=bits, contrast=1e9).shown_light(ramp)
         levels = np.unique(light[1].round(7))
         assert len(levels) == 2**bits
         # each is the light of a code, and the nearest code in the tone of sRGB
@@ -45,7 +45,7 @@ def test_light_of_a_display_has_steps_of_its_codes():
 
 
 def test_black_is_white_over_contrast_and_white_stays():
-    light, _ = DisplayRecipe(contrast=200.0).shown(grey(0.0, 1.0, 7.0, -1.0))
+    light, _ = DisplayRecipe(contrast=200.0).shown_light(grey(0.0, 1.0, 7.0, -1.0))
     np.testing.assert_allclose(light[:, 0], grey(1 / 200, 1, 1, 1 / 200)[:, 0], rtol=1e-5)
 
 
@@ -53,7 +53,7 @@ def test_a_display_of_rec709_shows_what_it_is_told():
     np.testing.assert_allclose(DisplayRecipe().to_rec709, np.eye(3), atol=1e-12)
     codes = np.random.default_rng(0).integers(0, 256, (3, 5, 7)) / 255
     picture = decode_srgb(codes.astype(np.float32))
-    light, truth = DisplayRecipe(contrast=1e9).shown(picture)
+    light, truth = DisplayRecipe(contrast=1e9).shown_light(picture)
     np.testing.assert_allclose(light, picture, atol=1e-6)
     assert truth is light
 
@@ -64,24 +64,24 @@ def test_primaries_are_where_the_recipe_has_them():
     for channel, (x, y) in enumerate(WIDE):
         told = np.zeros((3, 1, 1), np.float32)
         told[channel] = 1
-        xyz = to_xyz @ display.shown(told)[0][:, 0, 0].astype(np.float64)
+        xyz = to_xyz @ display.shown_light(told)[0][:, 0, 0].astype(np.float64)
         np.testing.assert_allclose(xyz[:2] / xyz.sum(), (x, y), atol=1e-5)
-    white, _ = display.shown(grey(1.0))
+    white, _ = display.shown_light(grey(1.0))
     np.testing.assert_allclose(white[:, 0, 0], 1, atol=1e-5)
-    other, _ = DisplayRecipe(white=(0.34, 0.35)).shown(grey(1.0))
+    other, _ = DisplayRecipe(white=(0.34, 0.35)).shown_light(grey(1.0))
     xyz = to_xyz @ other[:, 0, 0].astype(np.float64)
     np.testing.assert_allclose(xyz[:2] / xyz.sum(), (0.34, 0.35), atol=1e-5)
 
 
 def test_gamma_is_a_power_of_the_codes():
-    light, _ = DisplayRecipe(gamma=2.0, contrast=1e9).shown(decode_srgb(grey(51 / 255)))
+    light, _ = DisplayRecipe(gamma=2.0, contrast=1e9).shown_light(decode_srgb(grey(51 / 255)))
     np.testing.assert_allclose(light, 0.04, rtol=1e-4)
 
 
 def test_without_calibration_the_truth_is_the_picture_as_coded():
     picture = np.random.default_rng(1).uniform(0, 1, (3, 4, 4)).astype(np.float32)
     display = DisplayRecipe(primaries=WIDE, contrast=100.0, gamma=2.4, calibrated=False)
-    light, truth = display.shown(picture)
+    light, truth = display.shown_light(picture)
     np.testing.assert_allclose(truth, decode_srgb(display.codes(picture)), atol=1e-7)
     assert np.abs(light - truth).max() > 0.01
 

@@ -17,7 +17,7 @@ from camkit.models_def.optics.paraxial import with_paraxial_focus
 from camkit.models_def.optics.prescription import Lens, Surface, read_prescription
 from camkit.models_def.optics.psf import with_object_distance
 from camkit.models_def.optics.render.beam import find_beams, light_at, stop_labels
-from camkit.models_def.optics.render.optics import lens_optics
+from camkit.models_def.optics.render.lens_view import lens_optics
 from tests.physics.reference_lenses import cooke_triplet
 
 DUET = Path(__file__).resolve().parents[4] / "models_def" / "prescriptions" / "duet.toml"

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from camkit.errors import ContractError
 from camkit.models_def.optics.diffraction.pinhole import Pinhole
-from camkit.models_def.optics.optics import radial_layout
+from camkit.models_def.optics.freezable_optics import radial_layout
 
 
 def _light(hole: Pinhole, wave_um: float, side_px: int, **places: float) -> NDArray[np.float64]:

@@ -9,7 +9,7 @@ from safetensors.torch import save
 from camkit.bundle.reader import PLATE, PLATE_HEIGHTS
 from camkit.bundle.writer import write_bundle
 from camkit.errors import ContractError
-from camkit.models_def.optics.diffraction.fabrication import Etching
+from camkit.models_def.optics.diffraction.etching import Etching
 from camkit.models_def.optics.diffraction.geometry import Bench
 from camkit.models_def.optics.diffraction.plate import (
     PLATES,

@@ -13,8 +13,8 @@ from camkit.models_def.optics.diffraction.gratings import Streaks, chirped_grati
 from camkit.models_def.optics.diffraction.plate import Plate, write_plate
 from camkit.models_def.optics.diffraction.plate_optics import PlateOptics, plate_kernels
 from camkit.models_def.optics.diffraction.wave import PixelGrid
+from camkit.models_def.optics.freezable_optics import Optics, radial_layout
 from camkit.models_def.optics.lens_optics import LensOptics
-from camkit.models_def.optics.optics import Optics, radial_layout
 from camkit.models_def.optics.optics_file import read_optics
 
 PITCH_UM = 6.0

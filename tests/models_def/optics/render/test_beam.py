@@ -7,7 +7,7 @@ from camkit.errors import ContractError
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.render.beam import find_beams, light_at, rays_from, stop_labels
-from camkit.models_def.optics.render.optics import lens_optics
+from camkit.models_def.optics.render.lens_view import lens_optics
 from camkit.models_def.optics.reverse import trace_to_scene
 
 WAVES = torch.tensor([0.46, 0.54, 0.6], dtype=torch.float64)

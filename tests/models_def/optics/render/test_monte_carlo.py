@@ -9,8 +9,8 @@ from torch import Tensor
 from camkit.errors import ContractError
 from camkit.models_def.optics.kernel_bank import ChannelResponse
 from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.render.lens_view import Optics, lens_optics
 from camkit.models_def.optics.render.monte_carlo import Illumination, Sampling, render
-from camkit.models_def.optics.render.optics import Optics, lens_optics
 from camkit.models_def.optics.render.texture import Texture
 from camkit.models_def.optics.render.window import Window, centred_window
 from camkit.models_def.optics.trace import SurfaceTensors, surface_tensors

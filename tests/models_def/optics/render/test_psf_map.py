@@ -7,7 +7,6 @@ import torch
 from camkit.errors import ContractError
 from camkit.models_def.optics.kernel_bank import ChannelResponse
 from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.render.alignment import align_reference, fit_alignment
 from camkit.models_def.optics.render.psf_map import (
     MapGrid,
     PsfMap,
@@ -16,6 +15,7 @@ from camkit.models_def.optics.render.psf_map import (
     trace_map,
 )
 from camkit.models_def.optics.render.texture import Texture
+from camkit.models_def.optics.render.texture_alignment import align_reference, fit_alignment
 from camkit.models_def.optics.render.window import Window
 
 

@@ -8,8 +8,8 @@ from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.search.finish import finished
 from camkit.models_def.optics.search.improvement import free_lens, improve, refracting_surfaces
-from camkit.models_def.optics.search.merit import MERITS, Merit
 from camkit.models_def.optics.search.problem import Problem
+from camkit.models_def.optics.search.spot_residuals import MERITS, Merit
 
 
 @pytest.mark.parametrize("merit", MERITS)

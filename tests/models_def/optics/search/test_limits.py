@@ -3,7 +3,7 @@ from dataclasses import replace
 import pytest
 import torch
 
-from camkit.models_def.optics.search.beam import leading
+from camkit.models_def.optics.search.beam_launch import leading
 from camkit.models_def.optics.search.limits import Limits, ray_residuals
 from camkit.models_def.optics.search.problem import (
     Problem,

@@ -9,7 +9,7 @@ import torch
 
 from camkit.models_def.optics.prescription import Lens, read_prescription
 from camkit.models_def.optics.pupil import half_disc, hexapolar
-from camkit.models_def.optics.search.beam import LEAD
+from camkit.models_def.optics.search.beam_launch import LEAD
 from camkit.models_def.optics.search.improvement import free_lens, refracting_surfaces
 from camkit.models_def.optics.search.limits import Limits
 from camkit.models_def.optics.search.own_frame import in_own_frame, too_small_rims

@@ -13,7 +13,7 @@ from camkit.errors import ContractError
 from camkit.haze import Haze
 from camkit.models_def.optics.thin import distances
 from camkit.models_def.optics.thin.distances import freeze_distances
-from camkit.models_def.optics.thin.freezing import HazyGrid, freeze_hazy
+from camkit.models_def.optics.thin.hazy_freezing import HazyGrid, freeze_hazy
 from camkit.models_def.optics.thin.middle import Middle
 from tests.bundle_factory import tiny_sensor
 from tests.thin_factory import perfect_lens

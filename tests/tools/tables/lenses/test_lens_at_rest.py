@@ -7,8 +7,8 @@ import pytest
 import torch
 
 from camkit.models_def.design.assembly import parts_of
-from camkit.models_def.design.optics import LensModule
-from camkit.models_def.design.recipe import DesignRecipe, to_design
+from camkit.models_def.design.design_recipe import DesignRecipe, to_design
+from camkit.models_def.design.lens_module import LensModule
 from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.paraxial import paraxial_data, paraxial_image
 from camkit.models_def.optics.prescription import Lens

@@ -8,8 +8,8 @@ import pytest
 import torch
 
 from camkit.errors import ContractError
+from camkit.models_def.kinds.bayer.fine_tuning.bayer_refinement import make_refinement
 from camkit.models_def.kinds.bayer.fine_tuning.pairs import PairSamples
-from camkit.models_def.kinds.bayer.fine_tuning.refinement import make_refinement
 from camkit.models_def.kinds.bayer.samples import LAYOUT
 from camkit.models_def.training.kind import to_recipe
 from camkit.models_def.training.refinement import FineTuningOptions

@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from camkit.models_def.kinds.hdr.thesis.samples import PORTS
+from camkit.models_def.kinds.hdr.thesis.coded_samples import PORTS
 from camkit.models_def.kinds.hdr.thesis.validation import SAMPLES, CodedJudge
 from camkit.models_def.training.kind import training_kind
 

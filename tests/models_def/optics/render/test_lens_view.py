@@ -6,7 +6,7 @@ import torch
 
 from camkit.errors import ContractError
 from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.render.optics import free_optics, lens_optics
+from camkit.models_def.optics.render.lens_view import free_optics, lens_optics
 from camkit.models_def.optics.search.variables import FreeLens, Variable
 
 EXACT = 1e-12

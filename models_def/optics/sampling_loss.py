@@ -17,8 +17,8 @@ from torch import Tensor
 
 from camkit.bundle.sensor import RGB, ColorSensor
 from camkit.bundle.stages import Wiener
+from camkit.models_def.optics.freezable_optics import FieldLayout, FloatGrid, Optics, radial_layout
 from camkit.models_def.optics.frozen import FreezeGrid, corner_height_mm, freeze_at
-from camkit.models_def.optics.optics import FieldLayout, FloatGrid, Optics, radial_layout
 from camkit.models_def.sensors.wiener import to_otf, wiener_restore
 from camkit.psf import FrozenPsf
 from camkit.runtime.bank.psf import color_kernels

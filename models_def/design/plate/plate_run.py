@@ -10,10 +10,10 @@ import torch
 
 from camkit.errors import ContractError
 from camkit.models_def.design.plate.goal import Reached
-from camkit.models_def.design.plate.loop import Moment, PlateLoop
 from camkit.models_def.design.plate.maps import begin_map
+from camkit.models_def.design.plate.plate_loop import Moment, PlateLoop
+from camkit.models_def.design.plate.plate_recipe import PlateRecipe, plate_recipe_digest
 from camkit.models_def.design.plate.reader import PlateReader, open_reader, reader_digest
-from camkit.models_def.design.plate.recipe import PlateRecipe, plate_recipe_digest
 from camkit.models_def.design.run_files import RunFiles, RunOptions
 from camkit.models_def.optics.diffraction.heights import FullMap
 from camkit.models_def.optics.diffraction.map_numbers import numbers_of

@@ -17,8 +17,8 @@ from camkit.models_def.networks.vgg import file_digest
 from camkit.models_def.optics.distortion import trace_distortion
 from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.training.adversarial.content import Conv33, Features
-from camkit.models_def.training.adversarial.fitter import Mix, PictureParts, picture_fitter
 from camkit.models_def.training.adversarial.opponents import OpponentPlan
+from camkit.models_def.training.adversarial.picture_fitter import Mix, PictureParts, picture_fitter
 from camkit.models_def.training.adversarial.relativistic import Relativistic
 from camkit.models_def.training.first_weights import read_first_weights
 from camkit.models_def.training.fitter import BETAS, Fitter

@@ -9,8 +9,13 @@ import torch
 
 from camkit.errors import ContractError
 from camkit.models_def.design.assembly import parts_of, problem_of
+from camkit.models_def.design.design_recipe import (
+    read_design,
+    recipe_digest,
+    to_design,
+    with_choices,
+)
 from camkit.models_def.design.loop import DesignLoop
-from camkit.models_def.design.recipe import read_design, recipe_digest, to_design, with_choices
 from camkit.models_def.design.starts import Starts
 from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.paraxial import paraxial_data

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.thin.recipe import find_thin_recipe, read_thin_recipe
+from camkit.models_def.optics.thin.thin_recipe import find_thin_recipe, read_thin_recipe
 
 RECIPE = Path(__file__).resolve().parents[4] / "models_def" / "recipes" / "thin_plate_lens.toml"
 

@@ -7,9 +7,9 @@ from typing import Any, Final, Literal, get_args
 
 from camkit.errors import ContractError
 from camkit.models_def.design.front import Front
+from camkit.models_def.design.lens_module import MoveUnits
 from camkit.models_def.design.loop import DesignSchedule
 from camkit.models_def.design.loss import DesignLoss
-from camkit.models_def.design.optics import MoveUnits
 from camkit.models_def.design.starts import Starts
 from camkit.models_def.networks.catalog import NETWORK_NAMES
 from camkit.models_def.optics.prescription import FabricationErrors

@@ -15,8 +15,8 @@ from camkit.colorimetry import rec709_from_camera
 from camkit.errors import ContractError
 from camkit.models_def.networks.vgg import file_digest
 from camkit.models_def.training.adversarial.content import Relu32
-from camkit.models_def.training.adversarial.fitter import Mix, PictureParts, picture_fitter
 from camkit.models_def.training.adversarial.opponents import OpponentPlan
+from camkit.models_def.training.adversarial.picture_fitter import Mix, PictureParts, picture_fitter
 from camkit.models_def.training.adversarial.sharp import SharpCrops
 from camkit.models_def.training.adversarial.wasserstein import Wasserstein
 from camkit.models_def.training.fitter import BETAS, Fitter, NetworkBuilder

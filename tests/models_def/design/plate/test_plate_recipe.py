@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from camkit.errors import ContractError
-from camkit.models_def.design.plate.recipe import (
+from camkit.models_def.design.plate.plate_recipe import (
     plate_recipe_digest,
     read_plate_recipe,
     to_plate_recipe,

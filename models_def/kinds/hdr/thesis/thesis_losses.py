@@ -25,25 +25,25 @@ _LEAST_NORM: Final = 1e-6
 
 
 def perceptual_loss(
-    found: Sequence[Tensor], wanted: Sequence[Tensor], weights: Sequence[float] = LAYER_WEIGHTS
+    output: Sequence[Tensor], truth: Sequence[Tensor], weights: Sequence[float] = LAYER_WEIGHTS
 ) -> Tensor:
     """Return the weighted mean |difference| of features, eq. (5.7).
 
     Args:
-        found: (b, c, h, w) features of each layer, of what a network gave.
-        wanted: Likewise, of the truth.
+        output: (b, c, h, w) features of each layer, of what a network gave.
+        truth: Likewise, of what it should give.
         weights: nu of each layer.
 
     Raises:
         ContractError: If the layers are not as many as the weights.
     """
-    if not len(found) == len(wanted) == len(weights) > 0:
+    if not len(output) == len(truth) == len(weights) > 0:
         raise ContractError(
-            f"features of {len(weights)} layers are compared; got {len(found)}, {len(wanted)}"
+            f"features of {len(weights)} layers are compared; got {len(output)}, {len(truth)}"
         )
     terms = [
         weight * (one - other).abs().mean()
-        for one, other, weight in zip(found, wanted, weights, strict=True)
+        for one, other, weight in zip(output, truth, weights, strict=True)
     ]
     return torch.stack(terms).sum()
 

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from camkit.errors import ContractError
-from camkit.models_def.kinds.bayer.fine_tuning.refinement import REFINING, make_refinement
+from camkit.models_def.kinds.bayer.fine_tuning.bayer_refinement import REFINING, make_refinement
 from camkit.models_def.training.checkpoint import load_network, read_checkpoint
 from camkit.models_def.training.log import read_log
 from camkit.models_def.training.refinement import FineTuningOptions, refining_kind

@@ -3,8 +3,8 @@ from dataclasses import replace
 import torch
 
 from camkit.models_def.design.assembly import parts_of
-from camkit.models_def.design.optics import whitening
-from camkit.models_def.design.recipe import DesignRecipe
+from camkit.models_def.design.design_recipe import DesignRecipe
+from camkit.models_def.design.lens_module import whitening
 from camkit.models_def.optics.search.problem import Problem, residuals
 
 

@@ -6,7 +6,8 @@ import torch
 
 from camkit.errors import ContractError
 from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.render.alignment import (
+from camkit.models_def.optics.render.texture import Texture
+from camkit.models_def.optics.render.texture_alignment import (
     Alignment,
     align_reference,
     averaged,
@@ -14,7 +15,6 @@ from camkit.models_def.optics.render.alignment import (
     fit_alignment,
     scene_radius_mm,
 )
-from camkit.models_def.optics.render.texture import Texture
 from camkit.models_def.optics.render.window import Window, centred_window, corner_window
 from camkit.models_def.optics.spot import slopes_for_heights
 from camkit.radial import RadialDistortion

@@ -10,7 +10,7 @@ import pytest
 from camkit.bundle.sensor import BayerSensor, Extent
 from camkit.errors import ContractError
 from camkit.haze import Haze
-from camkit.models_def.optics.thin.freezing import (
+from camkit.models_def.optics.thin.hazy_freezing import (
     HazyGrid,
     _distortion,
     arriving,

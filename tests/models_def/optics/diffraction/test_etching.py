@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.diffraction.fabrication import Etching, mask_layers
+from camkit.models_def.optics.diffraction.etching import Etching, mask_layers
 
 
 def test_levels_fill_the_range_and_the_error_is_half_a_step() -> None:

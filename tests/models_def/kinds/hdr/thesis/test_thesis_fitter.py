@@ -7,8 +7,8 @@ import pytest
 import torch
 
 from camkit.errors import ContractError
-from camkit.models_def.kinds.hdr.thesis.fitter import FITTING, ThesisLoss, thesis_fitter
-from camkit.models_def.kinds.hdr.thesis.samples import PORTS, layout_of
+from camkit.models_def.kinds.hdr.thesis.coded_samples import PORTS, layout_of
+from camkit.models_def.kinds.hdr.thesis.thesis_fitter import FITTING, ThesisLoss, thesis_fitter
 from camkit.models_def.networks.vgg import VggLevels
 from camkit.models_def.training.checkpoint import load_network, read_checkpoint
 from camkit.models_def.training.fitting import FitRequest

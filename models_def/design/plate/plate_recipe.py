@@ -8,7 +8,7 @@ from typing import Any, Final, Literal, get_args
 from camkit.errors import ContractError
 from camkit.models_def.design.plate.goal import Goal
 from camkit.models_def.design.plate.reader_recipe import ReaderRecipe
-from camkit.models_def.optics.diffraction.fabrication import Etching
+from camkit.models_def.optics.diffraction.etching import Etching
 from camkit.models_def.optics.diffraction.geometry import Bench
 from camkit.models_def.toml_table import check_keys, section, table_digest, typed
 from camkit.side_file import read_side_toml

@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from camkit.errors import ContractError
-from camkit.models_def.kinds.hdr.thesis.losses import (
+from camkit.models_def.kinds.hdr.thesis.thesis_losses import (
     exclusion_loss,
     fused_loss,
     perceptual_loss,

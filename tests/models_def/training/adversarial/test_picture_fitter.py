@@ -14,8 +14,8 @@ from camkit.models_def.kinds.bayer import fitting
 from camkit.models_def.kinds.bayer.fine_tuning.pairs import PairSamples
 from camkit.models_def.kinds.bayer.samples import LAYOUT
 from camkit.models_def.networks.catalog import build_network
-from camkit.models_def.training.adversarial.fitter import PictureParts, picture_fitter
-from camkit.models_def.training.adversarial.fitting import critic_plan
+from camkit.models_def.training.adversarial.picture_fitter import PictureParts, picture_fitter
+from camkit.models_def.training.adversarial.picture_fitting import critic_plan
 from camkit.models_def.training.adversarial.sharp import SharpCrops
 from camkit.models_def.training.checkpoint import read_checkpoint
 from camkit.models_def.training.fitter import patch_objective

@@ -13,7 +13,7 @@ from typing import Final, Literal, get_args
 import torch
 from torch import Tensor
 
-from camkit.models_def.optics.search.beam import LEAD
+from camkit.models_def.optics.search.beam_launch import LEAD
 from camkit.models_def.optics.trace import Rays
 
 Merit = Literal["rms", "sum_abs", "energy"]

@@ -16,19 +16,19 @@ from torch import Tensor
 from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.models_def.kinds.hdr.thesis.chain import ThesisChain
-from camkit.models_def.kinds.hdr.thesis.losses import (
+from camkit.models_def.kinds.hdr.thesis.networks import (
+    THESIS_NAMES,
+    BetweenRoots,
+    build_thesis_network,
+    to_light,
+)
+from camkit.models_def.kinds.hdr.thesis.thesis_losses import (
     exclusion_loss,
     fused_loss,
     perceptual_loss,
     saturated_loss,
     total_loss,
     unsaturated_loss,
-)
-from camkit.models_def.kinds.hdr.thesis.networks import (
-    THESIS_NAMES,
-    BetweenRoots,
-    build_thesis_network,
-    to_light,
 )
 from camkit.models_def.kinds.hdr.thesis_recipe import ThesisRecipe
 from camkit.models_def.networks.vgg import VggLevels, file_digest, take_vgg
@@ -63,8 +63,8 @@ class ThesisLoss:
     def of(self, fitter: Fitter, batch: Batch, step: int, progress: float) -> Tensor:
         """Return the loss of a batch."""
         del step
-        given, target = (to_light(x.to(fitter.device)) for x in (batch.planes, batch.target))
-        terms = self._terms(self, cast("BetweenRoots", fitter.network), given, target)
+        light, target = (to_light(x.to(fitter.device)) for x in (batch.planes, batch.target))
+        terms = self._terms(self, cast("BetweenRoots", fitter.network), light, target)
         for name, value in terms.items():
             fitter.note(name, value)
         return self._total(terms, progress, torch.zeros((), device=fitter.device))
@@ -82,11 +82,11 @@ class ThesisLoss:
         total = total_loss(unsaturated, saturated, terms.get("fused", zero))
         return total + recipe.streak_weight * terms.get("streaks", zero)
 
-    def perceptual(self, found: Tensor, wanted: Tensor) -> Tensor:
+    def perceptual(self, output: Tensor, target: Tensor) -> Tensor:
         """Return the perceptual loss of (b, 3, h, w) linear pictures."""
         with torch.no_grad():
-            truth = self.features(wanted)
-        return perceptual_loss(self.features(found)[1:], truth[1:])
+            truth = self.features(target)
+        return perceptual_loss(self.features(output)[1:], truth[1:])
 
 
 def thesis_fitter(request: FitRequest) -> Fitter:
@@ -101,8 +101,8 @@ def thesis_fitter(request: FitRequest) -> Fitter:
     return fitter
 
 
-def _split_terms(loss: ThesisLoss, network: BetweenRoots, given: Tensor, target: Tensor) -> Terms:
-    clean, streaks = torch.split(network.linear(given), 3, dim=1)
+def _split_terms(loss: ThesisLoss, network: BetweenRoots, light: Tensor, target: Tensor) -> Terms:
+    clean, streaks = torch.split(network.linear(light), 3, dim=1)
     terms = {
         "clean": loss.perceptual(clean, target[:, :3]),
         "exclusion": exclusion_loss(clean, streaks),
@@ -113,23 +113,23 @@ def _split_terms(loss: ThesisLoss, network: BetweenRoots, given: Tensor, target:
 
 
 def _highlight_terms(
-    loss: ThesisLoss, network: BetweenRoots, given: Tensor, target: Tensor
+    loss: ThesisLoss, network: BetweenRoots, light: Tensor, target: Tensor
 ) -> Terms:
-    return {"lights": loss.perceptual(network.linear(given), target)}
+    return {"lights": loss.perceptual(network.linear(light), target)}
 
 
-def _fusion_terms(loss: ThesisLoss, network: BetweenRoots, given: Tensor, target: Tensor) -> Terms:
+def _fusion_terms(loss: ThesisLoss, network: BetweenRoots, light: Tensor, target: Tensor) -> Terms:
     del loss
-    return {"fused": fused_loss(network.linear(given), target)}
+    return {"fused": fused_loss(network.linear(light), target)}
 
 
-def _whole_terms(loss: ThesisLoss, network: BetweenRoots, given: Tensor, target: Tensor) -> Terms:
-    found = cast("ThesisChain", network.body).outputs(given)
+def _whole_terms(loss: ThesisLoss, network: BetweenRoots, light: Tensor, target: Tensor) -> Terms:
+    outputs = cast("ThesisChain", network.body).outputs(light)
     return {
-        "clean": loss.perceptual(found.clean, target.clamp(max=1)),
-        "exclusion": exclusion_loss(found.clean, found.streaks),
-        "lights": loss.perceptual(found.lights, target.clamp(1, CEILING)),
-        "fused": fused_loss(found.fused, target),
+        "clean": loss.perceptual(outputs.clean, target.clamp(max=1)),
+        "exclusion": exclusion_loss(outputs.clean, outputs.streaks),
+        "lights": loss.perceptual(outputs.lights, target.clamp(1, CEILING)),
+        "fused": fused_loss(outputs.fused, target),
     }
 
 
@@ -167,10 +167,10 @@ class ThesisFitting:
 
 
 def _check(request: FitRequest) -> None:
-    wanted = OF_ROLE[request.role]
-    if request.entry.network != wanted:
+    network = OF_ROLE[request.role]
+    if request.entry.network != network:
         raise ContractError(
-            f"the network of the role {request.role} is {wanted}; got {request.entry.network}"
+            f"the network of the role {request.role} is {network}; got {request.entry.network}"
         )
     if request.entry.schedule.precision != "float32":
         raise ContractError(

@@ -18,8 +18,8 @@ import torch
 from torch import Tensor
 
 from camkit.models_def.design.plate.goal import Reached, goal_loss, masks_of, reached
+from camkit.models_def.design.plate.plate_recipe import PlateRecipe
 from camkit.models_def.design.plate.reader import Picture, PlateReader
-from camkit.models_def.design.plate.recipe import PlateRecipe
 from camkit.models_def.optics.diffraction.map_numbers import HeightMap
 from camkit.models_def.optics.diffraction.wave import PixelGrid, plate_psf
 from camkit.models_def.optics.glass.catalogue import find_glass

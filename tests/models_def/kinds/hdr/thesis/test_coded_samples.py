@@ -7,14 +7,14 @@ import torch
 from camkit.errors import ContractError
 from camkit.models_def.kinds.hdr.samples import spread_light
 from camkit.models_def.kinds.hdr.scenes import open_lights
-from camkit.models_def.kinds.hdr.thesis.networks import to_light
-from camkit.models_def.kinds.hdr.thesis.samples import (
+from camkit.models_def.kinds.hdr.thesis.coded_samples import (
     PORTS,
     CodedCamera,
     CodedMaker,
     coded_sample,
     layout_of,
 )
+from camkit.models_def.kinds.hdr.thesis.networks import to_light
 from camkit.models_def.training.recipe import SceneRecipe
 
 SIDE, SURROUND = 96, 8

@@ -1,8 +1,8 @@
 import pytest
 import torch
 
-from camkit.models_def.optics.search.beam import LEAD
-from camkit.models_def.optics.search.merit import MERITS, Merit, spot_residuals
+from camkit.models_def.optics.search.beam_launch import LEAD
+from camkit.models_def.optics.search.spot_residuals import MERITS, Merit, spot_residuals
 from camkit.models_def.optics.trace import Rays
 
 

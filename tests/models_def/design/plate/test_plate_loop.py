@@ -5,10 +5,10 @@ from typing import Any
 import pytest
 import torch
 
-from camkit.models_def.design.plate.loop import PlateLoop
 from camkit.models_def.design.plate.maps import begin_map
-from camkit.models_def.design.plate.recipe import to_plate_recipe
-from tests.models_def.design.plate.test_recipe import table
+from camkit.models_def.design.plate.plate_loop import PlateLoop
+from camkit.models_def.design.plate.plate_recipe import to_plate_recipe
+from tests.models_def.design.plate.test_plate_recipe import table
 
 ETCHING = {"range_um": 0.3, "levels": 8}
 
