@@ -30,12 +30,12 @@ def section(where: str, kind: type[T], table: Any) -> T:
     return kind(**{k: typed(f"{where}.{k}", v, hints[k]) for k, v in table.items()})
 
 
-def check_keys(where: str, table: Mapping[str, Any], known: set[str]) -> None:
+def check_keys(where: str, table: Mapping[str, Any], keys: set[str]) -> None:
     """Refuse keys that are not known."""
-    unknown = sorted(set(table) - known)
+    unknown = sorted(set(table) - keys)
     if unknown:
         raise ContractError(
-            f"{where}: unknown key {unknown[0]!r}; known are {', '.join(sorted(known))}"
+            f"{where}: unknown key {unknown[0]!r}; known are {', '.join(sorted(keys))}"
         )
 
 
@@ -50,8 +50,8 @@ def typed(where: str, value: Any, kind: Any) -> Any:
         return tuple(typed(f"{where}[{i}]", v, inner) for i, v in enumerate(value))
     if get_origin(kind) is Literal:
         if value not in get_args(kind):
-            known = ", ".join(map(str, get_args(kind)))
-            raise ContractError(f"{where} must be one of {known}; got {value!r}")
+            choices = ", ".join(map(str, get_args(kind)))
+            raise ContractError(f"{where} must be one of {choices}; got {value!r}")
         return value
     kind = get_origin(kind) or kind
     if kind is float and isinstance(value, int) and not isinstance(value, bool):

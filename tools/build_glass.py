@@ -80,8 +80,8 @@ SCHOTT_POWERS = [0.0, 2.0, -2.0, -4.0, -6.0, -8.0]
 
 def field(text: str, key: str) -> list[float]:
     """Return the numbers that stand behind a key of a database file; none if it is not there."""
-    found = re.search(rf"^\s*-?\s*{key}: *([-+0-9.eE ]+)$", text, re.MULTILINE)
-    return [float(word) for word in found[1].split()] if found else []
+    match = re.search(rf"^\s*-?\s*{key}: *([-+0-9.eE ]+)$", text, re.MULTILINE)
+    return [float(word) for word in match[1].split()] if match else []
 
 
 def dispersion(text: str) -> tuple[str, list[float]] | None:
@@ -101,8 +101,8 @@ def dispersion(text: str) -> tuple[str, list[float]] | None:
         return None
     amounts, powers = [numbers[0], *numbers[1::2]], [0.0, *numbers[2::2]]
     if kind[1] == "5":
-        wanted = [-2.0 * i for i in range(len(powers))]
-        return ("cauchy", amounts) if powers == wanted else None
+        cauchy_powers = [-2.0 * i for i in range(len(powers))]
+        return ("cauchy", amounts) if powers == cauchy_powers else None
     if powers == SCHOTT_POWERS[: len(powers)]:
         return "schott", amounts + [0.0] * (6 - len(amounts))
     return "powers", [v for pair in zip(amounts, powers, strict=True) for v in pair if pair[0]]
@@ -111,14 +111,14 @@ def dispersion(text: str) -> tuple[str, list[float]] | None:
 def entry(path: Path, name: str, source: str = "") -> str | None:
     """Return a glass as a line of JSON; None where its formula is none of ours."""
     text = path.read_text(encoding="utf-8")
-    found = dispersion(text)
-    if found is None or "n_is_absolute: true" in text:
+    formula = dispersion(text)
+    if formula is None or "n_is_absolute: true" in text:
         return None
-    row = [name, found[0], field(text, "wavelength_range"), *stated(text), found[1]]
+    row = [name, formula[0], field(text, "wavelength_range"), *printed_numbers(text), formula[1]]
     return json.dumps([*row, source] if source else row, separators=(",", ":"))
 
 
-def stated(text: str) -> list[float | None]:
+def printed_numbers(text: str) -> list[float | None]:
     """Return the printed n_d and V_d, where they are stated."""
     return [next(iter(field(text, key)), None) for key in ("nd", "Vd")]
 
@@ -142,30 +142,33 @@ def classic_rows(text: str) -> list[str]:
     section = text.split("#---", maxsplit=1)[0]
     table = [line.split() for line in section.splitlines() if line and not line.startswith("#")]
     listed = {name: (*map(float, numbers[:3]), BASE_UM) for name, *numbers in table}
-    known = {c.name: c for c in builtin_catalogues() if not c.literature and c.name != CLASSIC}
-    today = known.pop("Schott")
-    seen = [g for c in (today, *known.values()) for g in c.glasses if holds(g)]
-    curves = torch.stack([refractive_index(glass, WAVES_UM) for glass in seen])
+    catalogues = {c.name: c for c in builtin_catalogues() if not c.literature and c.name != CLASSIC}
+    today = catalogues.pop("Schott")
+    glasses = [g for c in (today, *catalogues.values()) for g in c.glasses if holds(g)]
+    curves = torch.stack([refractive_index(glass, WAVES_UM) for glass in glasses])
     successors = [trade_name_of(g).removeprefix("N-") for g in today.glasses]
     rows = []
     for name in sorted({*listed, *successors}):
         if today.with_trade_name(name):
             continue
-        said = []
+        curves_of_name = []
         if name in listed:
             glass = Glass(name=name, formula="buchdahl", coefficients=listed[name], source="V")
-            said.append(refractive_index(glass, WAVES_UM))
-        others = [g for c in known.values() for g in c.with_trade_name(name) if holds(g)]
-        said += [refractive_index(g, WAVES_UM) for g in others]
+            curves_of_name.append(refractive_index(glass, WAVES_UM))
+        others = [g for c in catalogues.values() for g in c.with_trade_name(name) if holds(g)]
+        curves_of_name += [refractive_index(g, WAVES_UM) for g in others]
         for successor in today.with_trade_name(f"N-{name}"):
-            own = refractive_index(successor, WAVES_UM)
-            if any(float((own - curve).abs().max()) <= THE_SAME for curve in said):
+            curve_of_successor = refractive_index(successor, WAVES_UM)
+            if any(
+                float((curve_of_successor - curve).abs().max()) <= THE_SAME
+                for curve in curves_of_name
+            ):
                 facts = [successor.formula, successor.range_um, None, None, successor.coefficients]
                 source = f"{CLASSIC_SOURCE}: as N-{name}, whose coefficients these are"
                 rows.append(json.dumps([name, *facts, source], separators=(",", ":")))
                 break
         else:
-            if name in listed and borne_out(curves - said[0]):
+            if name in listed and borne_out(curves - curves_of_name[0]):
                 row = [name, "buchdahl", CLASSIC_UM, None, None, listed[name]]
                 rows.append(json.dumps(row, separators=(",", ":")))
             elif name in listed:
@@ -179,10 +182,10 @@ def holds(glass: Glass) -> bool:
     return low_um <= float(WAVES_UM[0]) and high_um >= float(WAVES_UM[-1])
 
 
-def borne_out(apart: torch.Tensor) -> bool:
+def borne_out(differences: torch.Tensor) -> bool:
     """Return whether any of the curves has this index and dispersion."""
-    shift = apart.mean(1, keepdim=True)
-    bent = (apart - shift).abs().amax(1)
+    shift = differences.mean(1, keepdim=True)
+    bent = (differences - shift).abs().amax(1)
     return bool(((shift[:, 0].abs() <= BORNE_OUT_INDEX) & (bent <= BORNE_OUT_DISPERSION)).any())
 
 

@@ -61,11 +61,11 @@ def main() -> None:
     confetti = procedural_scene(arguments.seed, height, width)
     photo = read_scene(PHOTO)
     half_way = (width * 3 - photo.shape[2]) // 2, (height * 3 - photo.shape[1]) // 2
-    taken = {
+    simulations = {
         "confetti": take(confetti, bundle, (width, height), iso=arguments.iso),
         "photo": take(photo, bundle, half_way, iso=arguments.iso),
     }
-    for name, simulation in taken.items():
+    for name, simulation in simulations.items():
         write_capture(out_dir / f"{name}.dng", simulation, sensor, bundle.manifest.name)
         shape = "x".join(map(str, simulation.samples.shape[::-1]))
         print(f"{out_dir / name}.dng: {shape} at {simulation.window.origin_px}")
@@ -77,7 +77,7 @@ def main() -> None:
     for name, suffix in (("confetti", "exr"), ("photo", "png")):
         _process(out_dir / f"{name}.dng", arguments.bundle, out_dir, suffix)
     picture = out_dir / "before_after.png"
-    _show_quality(taken, arguments.bundle, arguments.iso, picture)
+    _show_quality(simulations, arguments.bundle, arguments.iso, picture)
     print(f"all of it in {time.perf_counter() - began:.0f} s")
     print(f"Open {picture} first.")
 
@@ -100,7 +100,7 @@ def _process(capture: Path, bundle: str, out_dir: Path, suffix: str) -> None:
         print(f"  note: {warning}")
 
 
-def _show_quality(taken: dict[str, Simulation], name: str, iso: float, picture: Path) -> None:
+def _show_quality(simulations: dict[str, Simulation], name: str, iso: float, picture: Path) -> None:
     """Compare crops with the sharp scenes, in sensor geometry."""
     bundle = open_bundle(find_bundle(name))
     network = camkit.load(name, undistort=False)
@@ -115,7 +115,7 @@ def _show_quality(taken: dict[str, Simulation], name: str, iso: float, picture: 
     print(f"{'':<10}{'share of half field':<20}" + f"{'dB':>10}" * len(heads))
     rows: dict[str, dict[str, FloatArray]] = {}
     for scene, field in (("photo", 0.5), *(("confetti", field) for field in FIELDS)):
-        simulation = taken[scene]
+        simulation = simulations[scene]
         # the photograph lies half way out, and its middle is shown
         place = Place.along_diagonal(simulation.samples.shape, (CROP_PX, CROP_PX), field)
         *tiles, sharp = crop_pictures(simulation, bundle, [*methods.values()], place, iso=iso)

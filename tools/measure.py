@@ -58,17 +58,17 @@ def main() -> None:
 def measure_speed(arguments: argparse.Namespace) -> None:
     """Measure `camkit process` to EXR in fresh processes, sizes taken in turn; medians."""
     sizes = arguments.sizes.split(",")
-    found: dict[str, list[dict[str, float]]] = {size: [] for size in sizes}
+    runs_of_size: dict[str, list[dict[str, float]]] = {size: [] for size in sizes}
     with tempfile.TemporaryDirectory() as folder:
         for _ in range(arguments.runs):
             for size in sizes:
                 words = ("--bundle", arguments.bundle, "--size", size, "--out-dir", folder)
                 result = _camkit("process", str(arguments.capture), "--json", "--overwrite", *words)
-                found[size].append({**result["seconds"], "peak_mb": result["peak_rss_mb"]})
-    stages = [name for name in found[sizes[0]][0] if name != "peak_mb"]
+                runs_of_size[size].append({**result["seconds"], "peak_mb": result["peak_rss_mb"]})
+    stages = [name for name in runs_of_size[sizes[0]][0] if name != "peak_mb"]
     print("| size | " + " | ".join(stages) + " | all | neither network nor bank | peak MB |")
     print("|" + "---|" * (len(stages) + 4))
-    for size, runs in found.items():
+    for size, runs in runs_of_size.items():
         median = {key: statistics.median(run[key] for run in runs) for key in runs[0]}
         totals = [sum(run[name] for name in stages) for run in runs]
         rest = [sum(run[name] for name in stages if name not in TRANSFORMS) for run in runs]
@@ -142,8 +142,8 @@ def measure_raws(arguments: argparse.Namespace) -> None:
 def _camkit(*words: str) -> dict[str, Any]:
     command = [sys.executable, "-m", "camkit", *words]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
-    found: dict[str, Any] = json.loads(done.stdout) if done.stdout.strip() else {}
-    return found
+    report: dict[str, Any] = json.loads(done.stdout) if done.stdout.strip() else {}
+    return report
 
 
 if __name__ == "__main__":

@@ -68,12 +68,12 @@ def main() -> None:
                 peak = captures.peak_mb(words, files=files)
                 each_s = (time.perf_counter() - began) / files
                 shares.append(peak / cap)
-                told = (f"{each_s:.1f}", f"{cap:.0f}", f"{peak:.0f}")
-                cells = (name, size, format_, megapixels, jobs, *told)
+                numbers = (f"{each_s:.1f}", f"{cap:.0f}", f"{peak:.0f}")
+                cells = (name, size, format_, megapixels, jobs, *numbers)
                 print(f"| {' | '.join(cells)} | {shares[-1]:.3f} |", flush=True)
-    above = sum(share > 1 for share in shares)
+    over_cap = sum(share > 1 for share in shares)
     print(
-        f"{len(shares)} runs, {above} above the cap; largest {max(shares):.3f} of it, "
+        f"{len(shares)} runs, {over_cap} above the cap; largest {max(shares):.3f} of it, "
         f"median {statistics.median(shares):.3f}"
     )
 
@@ -133,10 +133,10 @@ class Captures:
                 env=child_environment(),
             ) as child:
                 watch = PssWatch(child.pid)
-                told = child.communicate()[0]
+                output = child.communicate()[0]
                 peak = watch.stop()
             if child.returncode:
-                raise SystemExit(f"{' '.join(command)}\n{told}")
+                raise SystemExit(f"{' '.join(command)}\n{output}")
             return peak
 
 
@@ -178,8 +178,8 @@ def _pss_mb(pid: int) -> float:
         text = Path(f"/proc/{pid}/smaps_rollup").read_text()
     except OSError:
         return 0.0
-    found = text.partition("\nPss:")[2].split(maxsplit=1)
-    return int(found[0]) * 1024 / 1e6 if found else 0.0
+    words = text.partition("\nPss:")[2].split(maxsplit=1)
+    return int(words[0]) * 1024 / 1e6 if words else 0.0
 
 
 def write_stretched(bundle: Bundle, path: Path, width: int, height: int) -> None:

@@ -79,14 +79,16 @@ def _calibrate(options: argparse.Namespace) -> int:
         iso = ISOS[number % len(ISOS)]
         simulation = photograph(bundle, scene, number=number, iso=iso)
         captures.append(measure_cells(bundle, targets, f"{name} ISO {iso:g}", simulation))
-        spent = time.process_time() - began
-        print(f"{number + 1:3d} {captures[-1].name}: {spent:.0f} CPU s", file=sys.stderr)
-    made = fit_model(captures, work, small)
+        cpu_s = time.process_time() - began
+        print(f"{number + 1:3d} {captures[-1].name}: {cpu_s:.0f} CPU s", file=sys.stderr)
+    calibration = fit_model(captures, work, small)
     entries = plan_entries(
-        made.model, adaptive_cost_db=made.adaptive[0], draft_cost_db=made.draft[0]
+        calibration.model,
+        adaptive_cost_db=calibration.adaptive[0],
+        draft_cost_db=calibration.draft[0],
     )
-    _print_calibration(made, captures)
-    for target in made.model.lines:
+    _print_calibration(calibration, captures)
+    for target in calibration.model.lines:
         sums = [c.errors[target].sum() / c.errors[EXACT].sum() for c in captures]
         print(f"{target} everywhere loses {np.mean(10 * np.log10(sums)):.2f} dB")
     if options.out is not None:
@@ -102,8 +104,8 @@ def _scenes(options: argparse.Namespace) -> Iterator[tuple[str, FloatArray]]:
     """Return names and (3, h, w) scenes with even sides, pictures spread over the folder."""
     if options.data is not None:
         paths = list_set(options.data)
-        chosen = np.unique(np.linspace(0, len(paths) - 1, options.pictures).astype(int))
-        for index in chosen:
+        indices = np.unique(np.linspace(0, len(paths) - 1, options.pictures).astype(int))
+        for index in indices:
             picture = read_picture(paths[index], SIDE_PX)
             height, width = (side // 2 * 2 for side in picture.shape[1:])
             yield paths[index].name, np.ascontiguousarray(picture[:, :height, :width])
@@ -146,17 +148,17 @@ def _store(path: Path, entries: dict[str, Threshold]) -> None:
     print(f"wrote the plan into {path}")
 
 
-def _print_calibration(made: Calibration, captures: list[CaptureCells]) -> None:
-    print(f"{len(captures)} captures, {made.cells} cells")
-    for target, line in made.model.lines.items():
+def _print_calibration(calibration: Calibration, captures: list[CaptureCells]) -> None:
+    print(f"{len(captures)} captures, {calibration.cells} cells")
+    for target, line in calibration.model.lines.items():
         level, detail, noise, field = line
         print(
             f"{target:8s} level {level:7.2f}  detail {detail:5.2f}  noise {noise:5.2f}  "
-            f"field {field:5.2f}  spread {made.spread[target]:.2f}"
+            f"field {field:5.2f}  spread {calibration.spread[target]:.2f}"
         )
     for name, value, (mean, worst) in (
-        ("adaptive", made.model.adaptive_db, made.adaptive),
-        ("draft", made.model.draft_db, made.draft),
+        ("adaptive", calibration.model.adaptive_db, calibration.adaptive),
+        ("draft", calibration.model.draft_db, calibration.draft),
     ):
         print(f"{name}: predicted {value:.3f} dB, lost {mean:.3f} dB mean, {worst:.3f} dB worst")
 

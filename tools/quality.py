@@ -150,9 +150,9 @@ def tune(arguments: argparse.Namespace, bundle: Bundle) -> None:
     trials = []
     began = time.perf_counter()
     with ThreadPoolExecutor(max_workers=arguments.jobs) as pool:
-        tried = pool.map(lambda shot: try_peers(take(shot), bundle, peers), shots)
-        for number, found in enumerate(tried, start=1):
-            trials += found
+        trials_of_shots = pool.map(lambda shot: try_peers(take(shot), bundle, peers), shots)
+        for number, trials_of_shot in enumerate(trials_of_shots, start=1):
+            trials += trials_of_shot
             print(
                 f"{number}/{len(shots)} captures, {time.perf_counter() - began:.0f} s", flush=True
             )
@@ -245,15 +245,15 @@ def measure_missing(
     """Measure what the journal lacks and add it there."""
     shots = list_shots(arguments)
     done = finished_rows(read_measurements(journal))
-    work = [(shot, left) for shot in shots if (left := open_rows(shot, rows, done))]
+    work = [(shot, open_methods) for shot in shots if (open_methods := open_rows(shot, rows, done))]
     print(f"{len(shots)} captures, {len(work)} to do, {len(rows)} methods", flush=True)
     take = photographer(arguments, bundle)
     began = time.perf_counter()
     finished = measure_all(work, take, jobs=arguments.jobs, limit_s=arguments.limit_seconds)
-    for number, found in enumerate(finished, start=1):
-        append_measurements(journal, found)
+    for number, measurements in enumerate(finished, start=1):
+        append_measurements(journal, measurements)
         if number in (3, 10) or number % 25 == 0 or number == len(work):
-            show_pace(found, number, len(work), time.perf_counter() - began)
+            show_pace(measurements, number, len(work), time.perf_counter() - began)
 
 
 def chosen_methods(arguments: argparse.Namespace, bundle: Bundle) -> list[str]:
@@ -289,11 +289,11 @@ def list_shots(arguments: argparse.Namespace) -> list[Shot]:
     return sorted(shots, key=lambda shot: (shot.number, shot.position))
 
 
-def show_pace(found: list[Measurement], number: int, count: int, elapsed_s: float) -> None:
+def show_pace(measurements: list[Measurement], number: int, count: int, elapsed_s: float) -> None:
     """Print how far a run is and what it costs."""
     left_min = elapsed_s / number * (count - number) / 60
     each = f"{elapsed_s / number:.2f} s ({time.process_time() / number:.2f} s of processor) each"
-    costs = ", ".join(f"{m.method} {m.seconds:.2f}" for m in found)
+    costs = ", ".join(f"{m.method} {m.seconds:.2f}" for m in measurements)
     print(f"{number}/{count}, {each}, {left_min:.0f} min left; {costs}")
     sys.stdout.flush()
 
@@ -310,8 +310,8 @@ def read_report(path: Path) -> dict[str, Any]:
     """Read the report of an earlier run; empty without one."""
     if not path.exists():
         return {}
-    found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    return found
+    report: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return report
 
 
 def write_report(path: Path, report: dict[str, Any]) -> None:

@@ -93,11 +93,11 @@ def repack(
             members[PSF] = psf_to_bytes(_psf_of_same_lens(psf, bundle.psf))
         if changes or psf is not None:
             manifest = _changed(manifest, changes)
-            made = write_bundle(trial, manifest, members)
+            changed = write_bundle(trial, manifest, members)
             golden = golden_from_bytes(members[GOLDEN])
             cases = {case.name: (case, golden[case.name]) for case in manifest.golden}
-            members[GOLDEN] = golden_to_bytes(add_outputs(made, cases))
-            manifest = manifest.model_copy(update={"networks": with_activations(made, cases)})
+            members[GOLDEN] = golden_to_bytes(add_outputs(changed, cases))
+            manifest = manifest.model_copy(update={"networks": with_activations(changed, cases)})
         laws = measure_laws(write_bundle(trial, manifest, members))
         manifest = with_laws(manifest, laws)
         if CARD in members and manifest.laws is not None:
@@ -144,8 +144,8 @@ def _psf_of_same_lens(path: Path, old: FrozenPsf) -> FrozenPsf:
         ContractError: If its distortion, which no two lenses share, is not that of the old one.
     """
     new = read_psf(path)
-    bent, before = new.distortion.coefficients, old.distortion.coefficients
-    if bent.shape != before.shape or not np.allclose(bent, before, rtol=1e-9):
+    bent, old_coefficients = new.distortion.coefficients, old.distortion.coefficients
+    if bent.shape != old_coefficients.shape or not np.allclose(bent, old_coefficients, rtol=1e-9):
         raise ContractError(f"{path} was frozen from another lens than the bundle's: train anew")
     return new
 

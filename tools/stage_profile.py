@@ -81,14 +81,14 @@ class ThreadWatch:
         self.names |= {t.native_id or 0: t.name for t in threading.enumerate()}
         for task in Path("/proc/self/task").iterdir():
             try:
-                spent = int((task / "schedstat").read_text(encoding="ascii").split()[0])
+                nanoseconds = int((task / "schedstat").read_text(encoding="ascii").split()[0])
             except (OSError, IndexError):
                 continue  # the thread has ended meanwhile
-            self.cpu_s[int(task.name)] = spent / 1e9
+            self.cpu_s[int(task.name)] = nanoseconds / 1e9
 
     def by_thread(self) -> dict[str, float]:
         """Sum the CPU seconds of main thread, Python threads by name, and native threads."""
-        found: dict[str, float] = defaultdict(float)
+        seconds_of: dict[str, float] = defaultdict(float)
         for thread, seconds in self.cpu_s.items():
             name = self.names.get(thread, "onnxruntime and OpenCV")
             if thread == os.getpid():
@@ -97,8 +97,8 @@ class ThreadWatch:
                 name = "slices and blocks"
             elif name.startswith("camkit-writer"):
                 name = "writer"
-            found[name] += seconds
-        return found
+            seconds_of[name] += seconds
+        return seconds_of
 
 
 def run_again(arguments: argparse.Namespace) -> str:
@@ -145,19 +145,19 @@ def _profile_once(arguments: argparse.Namespace) -> dict[str, Any]:
     wall["decode"] = time.perf_counter() - began
     cpu["decode"] = _cpu_s() - began_cpu
     work = pipeline.start(capture)
-    with _watched(work.clock) as seen:
+    with _watched(work.clock) as threads:
         wall |= _written(work, arguments.format)
         all_s = time.perf_counter() - began
     cpu |= work.clock.cpu_seconds
-    rest = all_s - sum(spent for name, spent in wall.items() if name.split()[0] in TRANSFORMS)
+    rest = all_s - sum(seconds for name, seconds in wall.items() if name.split()[0] in TRANSFORMS)
     total = {"all": all_s, "neither network nor FFT": rest, "start": start_s}
     total["peak MB"] = max(peak_rss_mb(), capture.decoder_peak_mb)
     total["process CPU"] = _cpu_s()
     return {
         "wall": wall,
         "cpu": cpu,
-        "rss_mb": seen.rss_mb,
-        "threads": seen.by_thread(),
+        "rss_mb": threads.rss_mb,
+        "threads": threads.by_thread(),
         "total": total,
     }
 
@@ -165,16 +165,16 @@ def _profile_once(arguments: argparse.Namespace) -> dict[str, Any]:
 @contextmanager
 def _watched(clock: StageClock) -> Iterator[ThreadWatch]:
     """Measure the work of the block from a thread beside it."""
-    seen, ended = ThreadWatch(clock), threading.Event()
+    thread_watch, ended = ThreadWatch(clock), threading.Event()
 
     def watch() -> None:
         while not ended.wait(WATCH_S):
-            seen.take()
+            thread_watch.take()
 
     watcher = threading.Thread(target=watch, name="profile")
     watcher.start()
     try:
-        yield seen
+        yield thread_watch
     finally:
         ended.set()
         watcher.join()
@@ -192,24 +192,24 @@ def _written(work: Reconstruction, format_: str) -> dict[str, float]:
             with open_writer(part, format_, picture) as writer:
                 with BandQueue(writer) as queue:
                     for band in work.bands():
-                        before = time.perf_counter()
+                        start_s = time.perf_counter()
                         queue.write(band)
-                        waited += time.perf_counter() - before
-                    before = time.perf_counter()
-                waited += time.perf_counter() - before
+                        waited += time.perf_counter() - start_s
+                    start_s = time.perf_counter()
+                waited += time.perf_counter() - start_s
             wall = {**work.seconds, "write": waited}
-            before = time.perf_counter()
+            start_s = time.perf_counter()
             file_sha256(part)
-            wall["hash"] = time.perf_counter() - before
-            before = time.perf_counter()
-        wall["sync"] = time.perf_counter() - before
+            wall["hash"] = time.perf_counter() - start_s
+            start_s = time.perf_counter()
+        wall["sync"] = time.perf_counter() - start_s
     return wall
 
 
 def _cpu_s() -> float:
     """Return the processor time of this process and of the children that have ended."""
-    spent = os.times()
-    return spent.user + spent.system + spent.children_user + spent.children_system
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
 
 
 def profile_layers(arguments: argparse.Namespace) -> None:
@@ -238,8 +238,8 @@ def _profile_network(arguments: argparse.Namespace, bundle: Bundle, role: str) -
     for name, seconds in sorted(times.items(), key=lambda item: -item[1]):
         mac = next((macs[key] for key in _keys(name) if key in macs), 0.0)
         speed = f"{mac / seconds / 1e9:.0f} | {mac / seconds / 1e9 / peak:.0%}" if mac else " | "
-        shown = f"{seconds * 1e3:.1f} | {seconds / total:.1%}"
-        print(f"| {name} | {operators[name]} | {shown} | {speed} |")
+        milliseconds = f"{seconds * 1e3:.1f} | {seconds / total:.1%}"
+        print(f"| {name} | {operators[name]} | {milliseconds} | {speed} |")
     done = all_macs / total / 1e9
     print(f"| all | | {total * 1e3:.1f} | | {done:.0f} | {done / peak:.0%} |")
 
@@ -297,16 +297,16 @@ def _count_macs(data: bytes, side: int) -> tuple[float, dict[str, float]]:
         for value in (*inferred.graph.value_info, *inferred.graph.output)
     }
     weights = {tensor.name: list(tensor.dims) for tensor in model.graph.initializer}
-    made: dict[str, float] = {}
-    named: dict[str, float] = {}
+    by_output: dict[str, float] = {}
+    by_name: dict[str, float] = {}
     for node in model.graph.node:
         if node.op_type == "Conv" and node.input[1] in weights:
             _, depth, *kernel = weights[node.input[1]]
             size = float(np.prod(shapes[node.output[0]]) * depth * np.prod(kernel))
-            made[node.output[0]] = named[node.name or node.output[0]] = size
-        elif node.op_type in ACTIVATIONS and node.input[0] in made:
-            named[node.name or node.output[0]] = made[node.input[0]]
-    return sum(made.values()), named
+            by_output[node.output[0]] = by_name[node.name or node.output[0]] = size
+        elif node.op_type in ACTIVATIONS and node.input[0] in by_output:
+            by_name[node.name or node.output[0]] = by_output[node.input[0]]
+    return sum(by_output.values()), by_name
 
 
 if __name__ == "__main__":

@@ -54,10 +54,10 @@ def main(words: Sequence[str] | None = None) -> int:
 
 def bundle_faults(root: Path) -> Iterator[str]:
     """Yield what is wrong between the bundles of a checkout and their list."""
-    lines, found = read_lines(root), _bundle_lines(root)
-    for name in sorted(lines.keys() - found.keys()):
+    lines, bundle_lines = read_lines(root), _bundle_lines(root)
+    for name in sorted(lines.keys() - bundle_lines.keys()):
         yield f"{LIST}: there is no bundle {name}; take its line out"
-    for name, line in found.items():
+    for name, line in bundle_lines.items():
         listed = lines.get(name)
         if listed is None:
             yield f"{LIST} lacks {name}: {_hint(name)}"
@@ -90,16 +90,16 @@ def update_lines(root: Path, names: Sequence[str]) -> None:
     Raises:
         SystemExit: If one is no bundle, or its bytes changed and its version did not.
     """
-    lines, found = read_lines(root), _bundle_lines(root)
+    lines, bundle_lines = read_lines(root), _bundle_lines(root)
     for name in names:
-        if name not in found:
-            raise SystemExit(f"there is no bundle {name}; there are {', '.join(found)}")
+        if name not in bundle_lines:
+            raise SystemExit(f"there is no bundle {name}; there are {', '.join(bundle_lines)}")
         listed = lines.get(name)
-        if listed is not None and listed["version"] == found[name]["version"]:
-            if listed != found[name]:
-                raise SystemExit(_same_version(name, found[name]))
+        if listed is not None and listed["version"] == bundle_lines[name]["version"]:
+            if listed != bundle_lines[name]:
+                raise SystemExit(_same_version(name, bundle_lines[name]))
             continue
-        lines[name] = found[name]
+        lines[name] = bundle_lines[name]
     text = "".join(
         f'{name} = {{version = "{line["version"]}", sha256 = "{line["sha256"]}", '
         f"bytes = {line['bytes']}}}\n"
@@ -116,15 +116,15 @@ def read_lines(root: Path) -> dict[str, Line]:
 
 def _bundle_lines(root: Path) -> dict[str, Line]:
     """Return the lines that the bundles of a checkout should have."""
-    found = {}
+    lines = {}
     for path in sorted((root / BUNDLES).glob("*.camkit")):
         content = path.read_bytes()
-        found[path.stem] = {
+        lines[path.stem] = {
             "version": open_bundle(path).manifest.version,
             "sha256": hashlib.sha256(content).hexdigest(),
             "bytes": len(content),
         }
-    return found
+    return lines
 
 
 def _hint(name: str) -> str:
@@ -141,8 +141,8 @@ def _same_version(name: str, line: Line) -> str:
 def _tracked_files(root: Path) -> list[str]:
     """Return the names of the files that git tracks."""
     words = ["git", "-C", str(root), "ls-files", "-z"]
-    told = subprocess.run(words, capture_output=True, text=True, check=True)
-    return [name for name in told.stdout.split("\0") if name]
+    listing = subprocess.run(words, capture_output=True, text=True, check=True)
+    return [name for name in listing.stdout.split("\0") if name]
 
 
 if __name__ == "__main__":

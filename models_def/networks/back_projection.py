@@ -50,22 +50,22 @@ def _conv(inputs: int, outputs: int, size_px: int) -> nn.Sequential:
     return nn.Sequential(conv, nn.PReLU())
 
 
-def _up(width: int) -> nn.Sequential:
+def _magnified(width: int) -> nn.Sequential:
     conv = nn.ConvTranspose2d(width, width, KERNEL_PX, STRIDE, PADDING)
     return nn.Sequential(conv, nn.PReLU())
 
 
-def _down(width: int) -> nn.Sequential:
+def _reduced(width: int) -> nn.Sequential:
     return nn.Sequential(nn.Conv2d(width, width, KERNEL_PX, STRIDE, PADDING), nn.PReLU())
 
 
 class Projection(nn.Module):
     """A unit: to the other resolution, back, and the error of that taken there too."""
 
-    def __init__(self, given: int, width: int, *, up: bool) -> None:
+    def __init__(self, maps: int, width: int, *, magnifies: bool) -> None:
         super().__init__()
-        self.merge = _conv(given * width, width, 1) if given > 1 else nn.Identity()
-        there, back = (_up, _down) if up else (_down, _up)
+        self.merge = _conv(maps * width, width, 1) if maps > 1 else nn.Identity()
+        there, back = (_magnified, _reduced) if magnifies else (_reduced, _magnified)
         self.there, self.back, self.error = there(width), back(width), there(width)
 
     def forward(self, earlier: Tensor) -> Tensor:
@@ -87,8 +87,12 @@ class BackProjection(nn.Module):
         self.features = nn.Sequential(
             _conv(config.in_channels, config.first_width, 3), _conv(config.first_width, width, 1)
         )
-        self.ups = nn.ModuleList(Projection(max(1, i), width, up=True) for i in range(stages))
-        self.downs = nn.ModuleList(Projection(i + 1, width, up=False) for i in range(stages - 1))
+        self.ups = nn.ModuleList(
+            Projection(max(1, i), width, magnifies=True) for i in range(stages)
+        )
+        self.downs = nn.ModuleList(
+            Projection(i + 1, width, magnifies=False) for i in range(stages - 1)
+        )
         self.picture = nn.Conv2d(stages * width, 1, 3, padding=1)
         for layer in self.modules():
             if isinstance(layer, nn.Conv2d | nn.ConvTranspose2d):
@@ -100,7 +104,7 @@ class BackProjection(nn.Module):
         coarse = self.features(planes)
         fine = [self.ups[0](coarse)]
         coarse_maps: list[Tensor] = []
-        for up, down in zip(list(self.ups)[1:], self.downs, strict=True):
-            coarse_maps.append(down(torch.cat(fine, 1)))
-            fine.append(up(torch.cat(coarse_maps, 1)))
+        for magnify, reduce in zip(list(self.ups)[1:], self.downs, strict=True):
+            coarse_maps.append(reduce(torch.cat(fine, 1)))
+            fine.append(magnify(torch.cat(coarse_maps, 1)))
         return torch.as_tensor(self.picture(torch.cat(fine, 1)))

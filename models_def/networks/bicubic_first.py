@@ -78,7 +78,7 @@ class Srcnn(nn.Module):
 
     def forward(self, planes: Tensor) -> Tensor:
         """Return the picture (b, 1, 4 h, 4 w) from (b, in_channels, h, w)."""
-        return _through(self.layers, self.finer(planes))
+        return _layered(self.layers, self.finer(planes))
 
 
 class Vdsr(nn.Module):
@@ -97,7 +97,7 @@ class Vdsr(nn.Module):
     def forward(self, planes: Tensor) -> Tensor:
         """Return the picture (b, 1, 4 h, 4 w) from (b, in_channels, h, w)."""
         fine: Tensor = self.finer(planes)
-        return _through(self.layers, fine) + fine[:, :1]
+        return _layered(self.layers, fine) + fine[:, :1]
 
 
 def _convolutions(channels: Sequence[int], kernels_px: Sequence[int]) -> nn.ModuleList:
@@ -111,7 +111,7 @@ def _convolutions(channels: Sequence[int], kernels_px: Sequence[int]) -> nn.Modu
     return layers
 
 
-def _through(layers: nn.ModuleList, x: Tensor) -> Tensor:
+def _layered(layers: nn.ModuleList, x: Tensor) -> Tensor:
     """Return the picture behind the layers, a ReLU between them."""
     for layer in list(layers)[:-1]:
         x = functional.relu(layer(x))

@@ -105,13 +105,13 @@ def freeze_norms(live: nn.Module, frozen: nn.Module, pictures: Sequence[Tensor])
             f"expected a network with live norms and its twin with frozen ones; got {len(places)} "
             f"and {len(norms)}"
         )
-    seen: dict[str, list[tuple[Tensor, Tensor]]] = {name: [] for name in places}
-    with _watched(live, seen):
+    statistics: dict[str, list[tuple[Tensor, Tensor]]] = {name: [] for name in places}
+    with _watched(live, statistics):
         for picture in pictures:
             live(picture)
     weights = dict(live.state_dict())
     for name, norm in norms.items():
-        means, variances = (torch.cat(parts) for parts in zip(*seen[name], strict=True))
+        means, variances = (torch.cat(parts) for parts in zip(*statistics[name], strict=True))
         norm.take(means.mean(0), variances.mean(0))
         weights |= {f"{name}.mean": norm.mean, f"{name}.scale": norm.scale}
     frozen.load_state_dict(weights)
@@ -119,17 +119,21 @@ def freeze_norms(live: nn.Module, frozen: nn.Module, pictures: Sequence[Tensor])
 
 
 @contextmanager
-def _watched(network: nn.Module, seen: dict[str, list[tuple[Tensor, Tensor]]]) -> Iterator[None]:
+def _watched(
+    network: nn.Module, statistics: dict[str, list[tuple[Tensor, Tensor]]]
+) -> Iterator[None]:
     """Record the (b, c) means and variances of the inputs of named parts."""
 
     def keeper(name: str) -> Any:
-        def keep(_part: nn.Module, given: tuple[Tensor, ...]) -> None:
-            variance, mean = torch.var_mean(given[0], dim=(2, 3), correction=0)
-            seen[name].append((mean, variance))
+        def keep(_part: nn.Module, inputs: tuple[Tensor, ...]) -> None:
+            variance, mean = torch.var_mean(inputs[0], dim=(2, 3), correction=0)
+            statistics[name].append((mean, variance))
 
         return keep
 
-    hooks = [network.get_submodule(name).register_forward_pre_hook(keeper(name)) for name in seen]
+    hooks = [
+        network.get_submodule(name).register_forward_pre_hook(keeper(name)) for name in statistics
+    ]
     try:
         yield
     finally:

@@ -152,10 +152,10 @@ class LeanUnet(nn.Module):
         """
         x = nn.functional.leaky_relu(self.head(planes), NEGATIVE_SLOPE)
         skips = []
-        for encoder, down in zip(self.encoders, self.downs, strict=True):
+        for encoder, halving in zip(self.encoders, self.downs, strict=True):
             x = encoder(x)
             skips.append(x)
-            x = nn.functional.leaky_relu(down(x), NEGATIVE_SLOPE)
+            x = nn.functional.leaky_relu(halving(x), NEGATIVE_SLOPE)
         x = self.middle(x)
         for i in reversed(range(len(skips))):
             x = self.decoders[i](self.ups[i](x) + skips[i])

@@ -39,7 +39,7 @@ def keep_share(unknown: Tensor) -> Tensor:
 def bounded(
     output: Tensor,
     front: Tensor,
-    kept: Tensor | None,
+    keep: Tensor | None,
     bound: LightBound,
     *,
     scale: float,
@@ -50,27 +50,27 @@ def bounded(
     Args:
         output: (b, c, h, w) of a network, stabilised; h, w multiples of the side of a cell.
         front: (b, c, h, w), the plane that it improves on.
-        kept: (b, 1, h, w) of `keep_share`; None for 1 everywhere.
+        keep: (b, 1, h, w) of `keep_share`; None for 1 everywhere.
         bound: Of the manifest.
         scale: Divisor of the stabilising transform.
         bright: (b, c) stabilised value of `BRIGHT` in every channel.
     """
     output = functional.relu(output)
     both, more = output + front, output - front
-    if kept is not None:
-        both = both * kept
-    moved, weight = _smoothed(_means(more * both)), _smoothed(_means(both))
-    change = moved / weight.clamp(min=_TINY)
+    if keep is not None:
+        both = both * keep
+    weighted, weight = _smoothed(_means(more * both)), _smoothed(_means(both))
+    change = weighted / weight.clamp(min=_TINY)
     excess = change
     if not bound.admits_detail_alone:
         limit = _limit(_means(front), bound, scale)
         excess = change - torch.maximum(torch.minimum(change, limit), -limit)
-    taken = functional.interpolate(
+    surplus = functional.interpolate(
         excess, scale_factor=CELL_PX, mode="bilinear", align_corners=False
     )
-    restored = output - taken
-    if kept is not None:
-        restored = front + kept * (restored - front)
+    restored = output - surplus
+    if keep is not None:
+        restored = front + keep * (restored - front)
     if not bound.keeps_bright:
         return restored
     white = (front / bright[:, :, None, None]).amin(dim=1, keepdim=True)
@@ -93,7 +93,7 @@ def _smoothed(cells: Tensor) -> Tensor:
 def _limit(level: Tensor, bound: LightBound, scale: float) -> Tensor:
     mean = _smoothed(level)
     cell = (0.5 / scale / CELL_PX) ** 2
-    beyond = (_smoothed(level.square()) - mean.square() - NOISE_OF_CELLS * cell).clamp(min=0)
+    variance = (_smoothed(level.square()) - mean.square() - NOISE_OF_CELLS * cell).clamp(min=0)
     light = (bound.light / 2 * mean).square()
     noise = bound.noise**2 * cell / CELLS_AVERAGED
-    return (bound.spread**2 * beyond + light + noise).sqrt()
+    return (bound.spread**2 * variance + light + noise).sqrt()

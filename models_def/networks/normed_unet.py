@@ -78,17 +78,17 @@ class NormedUnet(nn.Module):
         self.stride_px = 2**self.config.stages
         widths, frozen = self.config.widths, self.config.frozen
         first, pairs = widths[0], list(pairwise(widths))
-        seen = COLOURS if self.config.capture_only else self.in_channels
-        self.head = nn.Sequential(_conv(seen, first, 3), nn.PReLU(), _halving(first, first))
+        inputs = COLOURS if self.config.capture_only else self.in_channels
+        self.head = nn.Sequential(_conv(inputs, first, 3), nn.PReLU(), _halving(first, first))
         self.downs = nn.ModuleList(
             nn.Sequential(nn.PReLU(), _halving(a, b), picture_norm(b, frozen=frozen))
             for a, b in pairs
         )
         # The innermost stage is given no skip of its own.
-        given = [2 * b for _, b in pairs[:-1]] + [widths[-1]]
+        depths = [2 * b for _, b in pairs[:-1]] + [widths[-1]]
         self.ups = nn.ModuleList(
             nn.Sequential(nn.PReLU(), _doubling(n, a), picture_norm(a, frozen=frozen))
-            for n, (a, _) in zip(given, pairs, strict=True)
+            for n, (a, _) in zip(depths, pairs, strict=True)
         )
         self.tail = nn.Sequential(
             nn.PReLU(), _doubling(2 * first, first), nn.PReLU(), _conv(first, COLOURS, 3)
@@ -106,16 +106,16 @@ class NormedUnet(nn.Module):
         Returns:
             (b, 3, h, w) float32, stabilised.
         """
-        seen = planes[:, :COLOURS] if self.config.capture_only else planes
-        x = self.head(seen)
+        inputs = planes[:, :COLOURS] if self.config.capture_only else planes
+        x = self.head(inputs)
         skips = []
-        for down in self.downs:
+        for halving in self.downs:
             skips.append(x)
-            x = down(x)
+            x = halving(x)
         for i in reversed(range(len(skips))):
             x = torch.cat((self.ups[i](x), skips[i]), dim=1)
         restored: Tensor = self.tail(x)
-        return seen[:, -COLOURS:] + restored if self.config.residual else restored
+        return inputs[:, -COLOURS:] + restored if self.config.residual else restored
 
 
 def _conv(inputs: int, outputs: int, size: int) -> nn.Conv2d:

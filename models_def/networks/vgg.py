@@ -116,18 +116,18 @@ def take_vgg(network: nn.Module, path: Path) -> None:
             torchvision's name and shape.
     """
     state = _read_tensors(path)
-    wanted = network.state_dict()
-    for name, tensor in wanted.items():
-        found = state.get(name)
-        if not isinstance(found, Tensor) or found.shape != tensor.shape:
-            got = "nothing" if found is None else f"{tuple(getattr(found, 'shape', ()))}"
+    expected = network.state_dict()
+    for name, tensor in expected.items():
+        stored = state.get(name)
+        if not isinstance(stored, Tensor) or stored.shape != tensor.shape:
+            got = "nothing" if stored is None else f"{tuple(getattr(stored, 'shape', ()))}"
             raise ContractError(
                 f"{path.name} is no VGG-19 of torchvision (vgg19, not vgg19_bn): expected {name} "
                 f"of shape {tuple(tensor.shape)}, got {got}"
             )
-        if not bool(torch.isfinite(found).all()):
+        if not bool(torch.isfinite(stored).all()):
             raise ContractError(f"{path.name}: {name} holds NaN or inf; fetch the file again")
-    network.load_state_dict({name: state[name].float() for name in wanted})
+    network.load_state_dict({name: state[name].float() for name in expected})
 
 
 def file_digest(path: Path) -> str:

@@ -61,7 +61,7 @@ class SurfaceTensors:
     aspheric: tuple[bool, ...]
     grooves: tuple[Groove | None, ...] = ()
 
-    def to(self, target: torch.dtype | torch.device) -> Self:
+    def converted(self, target: torch.dtype | torch.device) -> Self:
         """Return the same lens in another type or on another device."""
         return replace(
             self,
@@ -158,7 +158,7 @@ def trace(
     rays: Rays,
     *,
     surfaces: range | None = None,
-    seen: list[Rays] | None = None,
+    surface_rays: list[Rays] | None = None,
     path: bool = False,
     compiled: bool = False,
 ) -> Rays:
@@ -172,11 +172,11 @@ def trace(
         tensors: The lens.
         rays: At the vertex plane of the first surface to be traced (any z is taken along).
         surfaces: Which surfaces, in order; all by default.
-        seen: Receives the rays on each surface, after refraction, relative to its vertex.
+        surface_rays: Receives the rays on each surface, after refraction, relative to its vertex.
         path: Whether `path_mm` of the result is the optical path: that of the given rays (or 0)
             plus the sum of index times way up to the final plane.
         compiled: Fuse the lens into one loop by `torch.compile`: worth its minute of compilation
-            for many rays. Without a C++ compiler, or with `seen`, this is the plain trace.
+            for many rays. Without a C++ compiler, or with `surface_rays`, this is the plain trace.
 
     Returns:
         Rays on the plane that lies the last thickness after the last surface (z = 0 there).
@@ -184,15 +184,15 @@ def trace(
     order = surfaces if surfaces is not None else range(len(tensors.aspheric))
     if not order:
         return rays
-    result = _trace(tensors, rays, order, seen=seen, path=path, compiled=compiled)
+    result = _trace(tensors, rays, order, surface_rays=surface_rays, path=path, compiled=compiled)
     return replace(result, z=torch.zeros_like(result.z))
 
 
 def refract(tensors: SurfaceTensors, rays: Rays, i: int) -> Rays:
     """Trace rays onto surface i, judge them, and bend them (Snell); they stay on it."""
-    seen: list[Rays] = []
-    _trace(tensors, rays, range(i, i + 1), seen=seen)
-    return seen[0]
+    surface_rays: list[Rays] = []
+    _trace(tensors, rays, range(i, i + 1), surface_rays=surface_rays)
+    return surface_rays[0]
 
 
 def _trace(
@@ -200,7 +200,7 @@ def _trace(
     rays: Rays,
     surfaces: range,
     *,
-    seen: list[Rays] | None = None,
+    surface_rays: list[Rays] | None = None,
     path: bool = False,
     compiled: bool = False,
 ) -> Rays:
@@ -222,11 +222,15 @@ def _trace(
     dtype = functools.reduce(torch.promote_types, (v.dtype for v in (*lens, *state)))
     lens = LensTensors(*(v.to(dtype) for v in lens))
     state = State(*(v.to(dtype) for v in state))
-    engine = compiled_engine() if compiled and seen is None else Eager()
-    result = trace_tensors(settings, engine, lens, state, rays.fate, with_seen=seen is not None)
-    if seen is not None:
+    engine = compiled_engine() if compiled and surface_rays is None else Eager()
+    result = trace_tensors(
+        settings, engine, lens, state, rays.fate, with_surfaces=surface_rays is not None
+    )
+    if surface_rays is not None:
         states = zip(result.record.states, result.record.fates, strict=True)
-        seen += [Rays(**surface_state._asdict(), fate=fate) for surface_state, fate in states]
+        surface_rays += [
+            Rays(**surface_state._asdict(), fate=fate) for surface_state, fate in states
+        ]
     length = result.path
     if length is not None and rays.path_mm is not None:
         length = length + rays.path_mm

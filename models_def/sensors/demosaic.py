@@ -10,7 +10,7 @@ from camkit.arrays import FloatArray
 from camkit.cfa import CfaPattern, cfa_channels
 
 _CROSS = ((0, 0, -2, 0, 0), (0, 0, 4, 0, 0), (-2, 4, 8, 4, -2), (0, 0, 4, 0, 0), (0, 0, -2, 0, 0))
-_ALONG = (
+_ROW = (
     (0, 0, 1, 0, 0),
     (0, -2, 0, -2, 0),
     (-2, 8, 10, 8, -2),
@@ -51,18 +51,18 @@ def demosaic(mosaic: Tensor, cfa: CfaPattern) -> Tensor:
 
     References: Malvar, He, Cutler 2004, figure 2.
     """
-    along = torch.tensor(_ALONG, dtype=mosaic.dtype, device=mosaic.device)
+    row = torch.tensor(_ROW, dtype=mosaic.dtype, device=mosaic.device)
     cross = torch.tensor(_CROSS, dtype=mosaic.dtype, device=mosaic.device)
     diagonal = torch.tensor(_DIAGONAL, dtype=mosaic.dtype, device=mosaic.device)
-    bank = torch.stack([cross, along, along.T, diagonal])[:, None] / 16
+    bank = torch.stack([cross, row, row.T, diagonal])[:, None] / 16
     padded = torch.nn.functional.pad(mosaic[:, None], (2, 2, 2, 2), mode="reflect")
-    cross_of, beside, above, diagonal_of = torch.nn.functional.conv2d(padded, bank).unbind(1)
+    cross_of, row_of, column_of, diagonal_of = torch.nn.functional.conv2d(padded, bank).unbind(1)
     at = _cell_masks(mosaic.shape[-2:], cfa, mosaic)
     red_rows, blue_rows = _row_mask(at[0]), _row_mask(at[2])
     green_of_red, green_of_blue = at[1] * red_rows, at[1] * blue_rows
-    red = at[0] * mosaic + green_of_red * beside + green_of_blue * above + at[2] * diagonal_of
+    red = at[0] * mosaic + green_of_red * row_of + green_of_blue * column_of + at[2] * diagonal_of
     green = at[1] * mosaic + (at[0] + at[2]) * cross_of
-    blue = at[2] * mosaic + green_of_blue * beside + green_of_red * above + at[0] * diagonal_of
+    blue = at[2] * mosaic + green_of_blue * row_of + green_of_red * column_of + at[0] * diagonal_of
     return torch.stack([red, green, blue], dim=1)
 
 

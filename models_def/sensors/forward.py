@@ -60,8 +60,8 @@ class _Convolution(torch.autograd.Function):
         size = next_fast_len(h, real=True), next_fast_len(w, real=True)
         spectra = _spectrum(planes, size), _spectrum(kernels, size)
         # each factor is what leads the slope to the other one
-        needed = zip(reversed(spectra), ctx.needs_input_grad, strict=True)
-        ctx.save_for_backward(*(s if need else None for s, need in needed))
+        factors = zip(reversed(spectra), ctx.needs_input_grad, strict=True)
+        ctx.save_for_backward(*(s if need else None for s, need in factors))
         ctx.sides = planes.shape, kernels.shape, size
         spread: Tensor = torch.fft.irfft2(spectra[0] * spectra[1], size)
         return spread[..., kh - 1 : h, kw - 1 : w]
@@ -74,16 +74,16 @@ class _Convolution(torch.autograd.Function):
         planes, kernels, size = ctx.sides
         (h, w), (kh, kw) = planes[-2:], kernels[-2:]
         of_kernels, of_planes = ctx.saved_tensors
-        placed = pad(slope, (kw - 1, size[1] - w, kh - 1, size[0] - h))
-        spectrum = _spectrum(placed, size)
+        padded = pad(slope, (kw - 1, size[1] - w, kh - 1, size[0] - h))
+        spectrum = _spectrum(padded, size)
 
         def correlated(other: Tensor | None, shape: torch.Size) -> Tensor | None:
             if other is None:
                 return None
             product = spectrum * other.conj()
             lead = (*shape[:-2], *product.shape[-2:])
-            found: Tensor = torch.fft.irfft2(product.sum_to_size(lead), size)
-            return found[..., : shape[-2], : shape[-1]]
+            gradient: Tensor = torch.fft.irfft2(product.sum_to_size(lead), size)
+            return gradient[..., : shape[-2], : shape[-1]]
 
         return correlated(of_kernels, planes), correlated(of_planes, kernels)
 
@@ -151,8 +151,8 @@ def _spans(length: int, step_px: int, like: Tensor) -> list[Span]:
     spans = []
     for index in range(count):
         weights = [_weight((x + 0.5) / pitch - index - 0.5, index, count) for x in range(length)]
-        used = [x for x, weight in enumerate(weights) if weight > 0]
-        first, last = used[0], used[-1] + 1
+        weighted = [x for x, weight in enumerate(weights) if weight > 0]
+        first, last = weighted[0], weighted[-1] + 1
         spans.append((first, last, like.new_tensor(weights[first:last])))
     return spans
 

@@ -135,14 +135,14 @@ def restore_together(
     q, r, _ = gathered(coarse, prior[coarse])
     expected = r + prior[coarse] * r.square()
     inside = (f2[coarse[2:]] >= BAND[0] ** 2) & (f2[coarse[2:]] <= BAND[1] ** 2)
-    known = (prior[coarse] / (1 + prior[coarse] * r)).square()
-    seen = (known * (q.real.square() + q.imag.square()))[..., inside].sum(-1)
-    measured = (seen / (known * expected)[..., inside].sum(-1))[..., None, None]
+    gain = (prior[coarse] / (1 + prior[coarse] * r)).square()
+    power_of_band = (gain * (q.real.square() + q.imag.square()))[..., inside].sum(-1)
+    measured = (power_of_band / (gain * expected)[..., inside].sum(-1))[..., None, None]
     scene = prior * measured.clamp(min=LEAST_MEASURED) ** numbers.follow
     q, r, d = gathered((slice(None),) * 4, scene)
     light = scene * q / (1 + scene * r)
     rest = numbers.own * scene * a.square() * otf.conj() * (spectrum - u * light) / d
-    found = a * light + rest
-    found[..., 0, 0] = spectrum[..., 0, 0]
-    restored: Tensor = torch.fft.irfft2(found, s=size)
+    sharp_spectrum = a * light + rest
+    sharp_spectrum[..., 0, 0] = spectrum[..., 0, 0]
+    restored: Tensor = torch.fft.irfft2(sharp_spectrum, s=size)
     return restored

@@ -128,8 +128,8 @@ def wiener_restore(
     rounds, power = settings.clip_iterations, settings.clip_power
     lights = richardson_lucy(patches, otf, background, rounds, unknown, power=power)
     near = _nearness(saturated, settings.clip_reach_px, like=patches)
-    left = (patches - _filter(lights, otf)).masked_fill(unknown, 0)
-    unexplained = (left.square() * near).mean(dim=(-2, -1)) * clipped_patch[..., 0, 0]
+    remainder = (patches - _filter(lights, otf)).masked_fill(unknown, 0)
+    unexplained = (remainder.square() * near).mean(dim=(-2, -1)) * clipped_patch[..., 0, 0]
     lights = torch.where(clipped_patch, lights * near, 0)
     residual = (patches - _filter(lights, otf)).masked_fill(unknown, 0)
     variance = torch.maximum(variance, unexplained)

@@ -20,7 +20,7 @@ from camkit.models_def.training.kind import special_part
 _REST: Final = r"[ \t]*(?:#.*)?\n(?:(?!\[).*\n|\n)*"
 WIENER: Final = re.compile(r"^\[wiener\]" + _REST, re.MULTILINE)
 TOGETHER: Final = re.compile(r"^\[wiener\.together(?:\.spread)?\]" + _REST, re.MULTILINE)
-_TRIED: Final = Together(
+_EXAMPLE: Final = Together(
     noise=(0.0,),
     noise_rise=(0.0,),
     scale=1.0,
@@ -106,7 +106,7 @@ def check_text(recipe: str) -> None:
     Raises:
         ContractError: As `with_bank`.
     """
-    with_bank(recipe, _TRIED)
+    with_bank(recipe, _EXAMPLE)
 
 
 def with_bank(recipe: str, together: Together) -> str:
@@ -116,10 +116,10 @@ def with_bank(recipe: str, together: Together) -> str:
         ContractError: If it has no such table, or says them in another way than this writes them.
     """
     plain = TOGETHER.sub("", recipe if recipe.endswith("\n") else recipe + "\n")
-    found = WIENER.search(plain)
-    if found is None:
+    heading = WIENER.search(plain)
+    if heading is None:
         raise ContractError("the recipe has no table [wiener] to put the numbers into")
-    head, rest = plain[: found.end()].rstrip("\n"), plain[found.end() :]
+    head, rest = plain[: heading.end()].rstrip("\n"), plain[heading.end() :]
     text = f"{head}\n\n{bank_table(together)}\n{rest}"
     try:
         table = tomllib.loads(text)

@@ -70,7 +70,7 @@ class Checkpoint:
     best_db: float | None = None
 
     @property
-    def chosen(self) -> State:
+    def exported(self) -> State:
         """Return the weights that are exported and that others begin with."""
         return self.best or self.average
 
@@ -133,18 +133,18 @@ def to_checkpoint(path: Path, table: dict[str, Any]) -> Checkpoint:
     return Checkpoint(**entries, designed=designed)
 
 
-def _designed(path: Path, found: Any) -> dict[str, bytes]:
+def _designed(path: Path, entry: Any) -> dict[str, bytes]:
     """Return the bytes of what was written as tensors.
 
     Raises:
         ContractError: If it was not.
     """
-    known = isinstance(found, dict) and all(
-        isinstance(data, Tensor) and data.dtype == torch.uint8 for data in found.values()
+    is_bytes = isinstance(entry, dict) and all(
+        isinstance(data, Tensor) and data.dtype == torch.uint8 for data in entry.values()
     )
-    if not known:
+    if not is_bytes:
         raise ContractError(f"checkpoint {path} has wrong entries: designed")
-    return {name: data.numpy().tobytes() for name, data in found.items()}
+    return {name: data.numpy().tobytes() for name, data in entry.items()}
 
 
 def recipe_of(checkpoint: Checkpoint) -> Recipe:
@@ -161,7 +161,7 @@ def load_network(checkpoint: Checkpoint) -> nn.Module:
     kind = training_kind(recipe_of(checkpoint).kind)
     network = kind.build_network(checkpoint.network, **checkpoint.config)
     try:
-        network.load_state_dict(checkpoint.chosen)
+        network.load_state_dict(checkpoint.exported)
     except RuntimeError as error:
         raise ContractError(f"the weights do not fit {checkpoint.network}: {error}") from error
     return network.eval()

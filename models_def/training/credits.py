@@ -26,10 +26,10 @@ def describe_data(data: DataRecipe, pictures: Path | None) -> str:
     files = list_pictures(pictures)
     share = 100 * data.picture_share
     licences = _licences(pictures / "README.md", {p.name for p in files})
-    stated = ", ".join(f"{name}: {count}" for name, count in sorted(licences.items()))
+    licence_text = ", ".join(f"{name}: {count}" for name, count in sorted(licences.items()))
     return (
         f"{len(files)} photographs of {pictures.name} ({share:.0f} % of the samples; "
-        f"licences {stated or 'not stated'}) and {scenes}"
+        f"licences {licence_text or 'not stated'}) and {scenes}"
     )
 
 
@@ -49,14 +49,14 @@ def joined_credits(texts: Iterable[str]) -> str:
 
 def _licences(readme: Path, names: set[str]) -> Counter[str]:
     """Count the licences of the named files, without their remarks in brackets."""
-    found: Counter[str] = Counter()
+    licences: Counter[str] = Counter()
     if not readme.is_file():
-        return found
+        return licences
     for line in readme.read_text(encoding="utf-8").splitlines():
         row = ROW.match(line.strip())
         if row is None or row["file"] not in names:
             continue
         cells = [cell.strip() for cell in row["rest"].split("|")]
         if len(cells) > LICENCE_COLUMN:
-            found[cells[LICENCE_COLUMN].split(" (")[0]] += 1
-    return found
+            licences[cells[LICENCE_COLUMN].split(" (")[0]] += 1
+    return licences

@@ -46,12 +46,12 @@ class FirstWeights:
 
     def credit(self, data: str) -> str:
         """Return the text for the card on the first weights; `data` is the training data since."""
-        before = self.training_data
-        if data and before.startswith(data):
-            before = "the same" + before.removeprefix(data)
+        data_before = self.training_data
+        if data and data_before.startswith(data):
+            data_before = "the same" + data_before.removeprefix(data)
         once = f"{FIRST_WEIGHTS}{self.whose}, trained on the same"
         # parts of one training are told once
-        return f"{FIRST_WEIGHTS}{self.whose}, trained on {before}".replace(once + once, once)
+        return f"{FIRST_WEIGHTS}{self.whose}, trained on {data_before}".replace(once + once, once)
 
 
 def read_first_weights(source: Path, size: str, role: str = DEFAULT_ROLE) -> FirstWeights:
@@ -76,7 +76,7 @@ def read_first_weights(source: Path, size: str, role: str = DEFAULT_ROLE) -> Fir
         source=str(source),
         whose=f"{recipe_of(saved).name} {saved.size}",
         training_data=saved.training_data,
-        state=saved.chosen,
+        state=saved.exported,
     )
 
 
@@ -104,9 +104,9 @@ def take_first_weights(network: nn.Module, first: FirstWeights) -> tuple[str, ..
     return tuple(first.state)
 
 
-def _fits(network: nn.Module, found: Mapping[str, Tensor]) -> bool:
-    wanted = {name: tensor.shape for name, tensor in network.state_dict().items()}
-    return wanted == {name: tensor.shape for name, tensor in found.items()}
+def _fits(network: nn.Module, state: Mapping[str, Tensor]) -> bool:
+    shapes = {name: tensor.shape for name, tensor in network.state_dict().items()}
+    return shapes == {name: tensor.shape for name, tensor in state.items()}
 
 
 def _of_design(source: Path, table: Mapping[str, Any]) -> FirstWeights:

@@ -23,7 +23,7 @@ from camkit.models_def.training.schedule import ema_decay, learning_rate, update
 
 ANOTHER_LOSS: Final = "the checkpoint was trained by another loss; start without resume"
 BETAS: Final = (0.9, 0.999)
-_OWN: Final = "generator"
+_NETWORK: Final = "generator"
 """Key of the network's own optimiser where a checkpoint holds further states."""
 
 NetworkBuilder = Callable[..., nn.Module]
@@ -186,10 +186,12 @@ class Fitter:
 
     def optimizer_state(self) -> dict[str, Any]:
         """Return everything else that a step changes: tensors and plain numbers."""
-        own, states = self._optimizer.state_dict(), self.objective.states
+        network, states = self._optimizer.state_dict(), self.objective.states
         if states is None:
-            return own
-        return {_OWN: own} | {name: dict(part.state_dict()) for name, part in states.items()}
+            return network
+        return {_NETWORK: network} | {
+            name: dict(part.state_dict()) for name, part in states.items()
+        }
 
     def load(self, weights: State, average: State, optimizer: dict[str, Any]) -> None:
         """Restore a saved state.
@@ -198,12 +200,12 @@ class Fitter:
             ContractError: If it was saved by another fitter.
         """
         states = self.objective.states
-        table = {_OWN: optimizer} if states is None else optimizer
-        if table.keys() != {_OWN, *(states or {})} or "param_groups" not in table[_OWN]:
+        table = {_NETWORK: optimizer} if states is None else optimizer
+        if table.keys() != {_NETWORK, *(states or {})} or "param_groups" not in table[_NETWORK]:
             raise ContractError(ANOTHER_LOSS)
         self.network.load_state_dict(weights)
         self.averaged.load_state_dict(average)
-        self._optimizer.load_state_dict(table[_OWN])
+        self._optimizer.load_state_dict(table[_NETWORK])
         for name, part in (states or {}).items():
             part.load_state_dict(table[name])
 

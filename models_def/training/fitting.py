@@ -78,10 +78,10 @@ def own_fitting(kind: str, request: FitRequest) -> OwnFitting | None:
     Raises:
         ContractError: If something is missing, or files were given in vain.
     """
-    brought: FittingKind | None = special_part(kind, "FITTING")
-    found = None if brought is None else brought.fitting(request)
-    if found is not None:
-        return found
+    part: FittingKind | None = special_part(kind, "FITTING")
+    fitting = None if part is None else part.fitting(request)
+    if fitting is not None:
+        return fitting
     whose = f"{request.entry.network} in the role {request.role!r}"
     if request.entry.schedule.loss in PICTURE_LOSSES:
         raise ContractError(

@@ -85,7 +85,7 @@ def mean_score(every_db: Sequence[float], **labels: Sequence[str]) -> Score:
     parts = {
         name: {
             label: float(
-                np.mean([db for db, of in zip(every_db, each, strict=True) if of == label])
+                np.mean([db for db, value in zip(every_db, each, strict=True) if value == label])
             )
             for label in dict.fromkeys(each)
         }

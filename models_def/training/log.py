@@ -59,14 +59,14 @@ def read_parts(paths: Sequence[Path]) -> list[dict[str, Any]]:
         ContractError: If a line is not a JSON object with a step.
     """
     entries: list[dict[str, Any]] = []
-    before = dict.fromkeys(_COUNTED, 0.0)
+    totals = dict.fromkeys(_COUNTED, 0.0)
     for path in paths:
         part = read_log(path)
         entries += [
-            {**e, **{key: e[key] + before[key] for key in _COUNTED & e.keys()}} for e in part
+            {**e, **{key: e[key] + totals[key] for key in _COUNTED & e.keys()}} for e in part
         ]
         for key in _COUNTED:
-            before[key] += max((e[key] for e in part if key in e), default=0)
+            totals[key] += max((e[key] for e in part if key in e), default=0)
     return entries
 
 
@@ -90,7 +90,7 @@ def plot_logs(logs: Mapping[str, Path | Sequence[Path]], chart: Path) -> None:
             left.plot(*zip(*losses, strict=True), label=name, linewidth=0.8)
         if scores:
             right.plot(*zip(*scores, strict=True), label=name, marker=".")
-        floors |= {round(max(known), 2) for e in entries if (known := _baselines(e))}
+        floors |= {round(max(baselines), 2) for e in entries if (baselines := _baselines(e))}
     for number, floor in enumerate(sorted(floors)):
         label = "_" if number else "without a network"
         right.axhline(floor, color="grey", linestyle=":", label=label)

@@ -67,12 +67,12 @@ def overshoots(output: Tensor, target: Tensor, weight: Tensor) -> Tensor:
         (b,) in the square-root domain.
     """
     judged = target >= 0
-    known = torch.where(judged, target, -torch.inf)
-    most = max_pool2d(known, RANGE_PX, 1, RANGE_PX // 2)
-    unknown = torch.where(judged, -target, -torch.inf)
-    least = -max_pool2d(unknown, RANGE_PX, 1, RANGE_PX // 2)
-    beyond = torch.relu(output - most) + torch.relu(least - output)
-    gap = torch.where(judged, beyond, 0.0) * weight[:, :, None, None]
+    valid = torch.where(judged, target, -torch.inf)
+    most = max_pool2d(valid, RANGE_PX, 1, RANGE_PX // 2)
+    negated = torch.where(judged, -target, -torch.inf)
+    least = -max_pool2d(negated, RANGE_PX, 1, RANGE_PX // 2)
+    excess = torch.relu(output - most) + torch.relu(least - output)
+    gap = torch.where(judged, excess, 0.0) * weight[:, :, None, None]
     return gap.square().sum((1, 2, 3)) / judged.sum((1, 2, 3)).clamp(min=1)
 
 

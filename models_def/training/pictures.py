@@ -41,12 +41,12 @@ def list_pictures(folder: Path | None) -> tuple[Path, ...]:
         return ()
     if not folder.is_dir():
         raise ContractError(f"the picture folder {folder} is not there")
-    found = sorted(p for p in folder.iterdir() if p.suffix.lower() in PICTURE_ENDINGS)
-    if not found:
+    pictures = sorted(p for p in folder.iterdir() if p.suffix.lower() in PICTURE_ENDINGS)
+    if not pictures:
         raise ContractError(
             f"{folder} holds no picture with an ending of {', '.join(PICTURE_ENDINGS)}"
         )
-    return tuple(found)
+    return tuple(pictures)
 
 
 def read_picture(path: Path) -> NDArray[np.uint8]:
@@ -80,19 +80,19 @@ def _profile(path: Path) -> bytes | None:
 def _to_srgb(picture: NDArray[np.uint8], profile: bytes, name: str) -> NDArray[np.uint8]:
     """Return a picture in sRGB by LittleCMS; one that says it is sRGB is left as it is."""
     try:
-        known = ImageCms.ImageCmsProfile(io.BytesIO(profile))
-        space = known.profile.xcolor_space.strip()
-        described = ImageCms.getProfileDescription(known)
+        embedded = ImageCms.ImageCmsProfile(io.BytesIO(profile))
+        space = embedded.profile.xcolor_space.strip()
+        described = ImageCms.getProfileDescription(embedded)
         if described.lower().startswith("srgb"):
             return picture
         if space not in ("RGB", "GRAY"):
             raise DecodeError(f"{name} has a colour profile of {space}; convert it to RGB")
-        given = Image.fromarray(picture if space == "RGB" else picture[..., 0])
+        source = Image.fromarray(picture if space == "RGB" else picture[..., 0])
         srgb = ImageCms.createProfile("sRGB")
-        made = ImageCms.profileToProfile(given, known, srgb, outputMode="RGB")
+        converted = ImageCms.profileToProfile(source, embedded, srgb, outputMode="RGB")
     except (OSError, ImageCms.PyCMSError) as error:
         raise DecodeError(f"{name} has a colour profile that cannot be applied: {error}") from error
-    return np.array(made, dtype=np.uint8)
+    return np.array(converted, dtype=np.uint8)
 
 
 def to_linear(picture: NDArray[np.uint8]) -> FloatArray:
@@ -126,7 +126,7 @@ class SceneSource:
         picture_share: Probability of a picture rather than a procedural scene.
         scenes: Number of different procedural scenes.
         scene_px: Their side.
-        drawn: How often something else is drawn.
+        drawn_shares: How often something else is drawn.
         first_scene: Number of the first procedural scene; others draw other scenes.
     """
 
@@ -134,8 +134,8 @@ class SceneSource:
     picture_share: float
     scenes: int
     scene_px: int
-    _held: dict[int, NDArray[Any]]
-    drawn: DrawnShares = DrawnShares()
+    _cache: dict[int, NDArray[Any]]
+    drawn_shares: DrawnShares = DrawnShares()
     first_scene: int = 0
 
     def draw_crop(self, rng: Generator, side_px: int) -> FloatArray:
@@ -144,19 +144,19 @@ class SceneSource:
         Returns:
             (3, side_px, side_px) float32 linear Rec.709; a smaller picture is mirrored outwards.
         """
-        lit = self.drawn.lamp > 0 and rng.random() < self.drawn.lamp
+        lit = self.drawn_shares.lamp > 0 and rng.random() < self.drawn_shares.lamp
         crop = self._draw_unlit(rng, side_px)
         return with_lamps(rng, crop) if lit else crop
 
     def _draw_unlit(self, rng: Generator, side_px: int) -> FloatArray:
-        asked = self.drawn
-        shares = (asked.edge, edges), (asked.night, night), (asked.patch, patches)
+        odds = self.drawn_shares
+        shares = (odds.edge, edges), (odds.night, night), (odds.patch, patches)
         if sum(share for share, _ in shares):
-            drawn = rng.random()  # only where asked for: other recipes keep their samples
+            chance = rng.random()  # only where asked for: other recipes keep their samples
             for share, draw in shares:
-                if drawn < share:
+                if chance < share:
                     return draw(rng, side_px)
-                drawn -= share
+                chance -= share
         picture = self._draw_picture(rng)
         crops = [_cut(rng, picture, side_px) for _ in range(CANDIDATES)]
         best = max(crops, key=_liveliness)
@@ -169,16 +169,16 @@ class SceneSource:
         from_file = bool(self.pictures) and rng.random() < self.picture_share
         if from_file:
             key = int(rng.integers(len(self.pictures)))
-            if key not in self._held:
-                self._held[key] = read_picture(self.pictures[key])
-            return self._held[key]
+            if key not in self._cache:
+                self._cache[key] = read_picture(self.pictures[key])
+            return self._cache[key]
         number = int(rng.integers(self.scenes))
         key = -1 - number
-        if key not in self._held:
+        if key not in self._cache:
             seed = SCENE_SEED + self.first_scene + number
             scene = procedural_scene(seed, self.scene_px, self.scene_px)
-            self._held[key] = scene.transpose(1, 2, 0).astype(np.float16)
-        return self._held[key]
+            self._cache[key] = scene.transpose(1, 2, 0).astype(np.float16)
+        return self._cache[key]
 
 
 def open_source(
@@ -187,7 +187,7 @@ def open_source(
     picture_share: float,
     scenes: int,
     scene_px: int,
-    drawn: DrawnShares = DrawnShares(),
+    drawn_shares: DrawnShares = DrawnShares(),
     first_scene: int = 0,
 ) -> SceneSource:
     """Open a source of crops; without a folder it is procedural only."""
@@ -196,8 +196,8 @@ def open_source(
         picture_share=picture_share,
         scenes=scenes,
         scene_px=scene_px,
-        _held={},
-        drawn=drawn,
+        _cache={},
+        drawn_shares=drawn_shares,
         first_scene=first_scene,
     )
 
@@ -207,7 +207,7 @@ def open_scenes(
     folder: Path | None,
     *,
     picture_share: float | None = None,
-    drawn: DrawnShares = DrawnShares(),
+    drawn_shares: DrawnShares = DrawnShares(),
     first_scene: int = 0,
 ) -> SceneSource:
     """Open the scenes of a recipe, see `open_source`; None takes the recipe's share of pictures."""
@@ -216,7 +216,7 @@ def open_scenes(
         picture_share=data.picture_share if picture_share is None else picture_share,
         scenes=data.procedural_scenes,
         scene_px=data.scene_px,
-        drawn=drawn,
+        drawn_shares=drawn_shares,
         first_scene=first_scene,
     )
 
@@ -225,8 +225,8 @@ def _cut(rng: Generator, picture: NDArray[Any], side_px: int) -> NDArray[Any]:
     height, width, _ = picture.shape
     missing = (max(0, side_px - height), max(0, side_px - width), 0)
     if any(missing):
-        before = [(m // 2, m - m // 2) for m in missing]
-        picture = np.pad(picture, before, mode="symmetric")
+        margins = [(m // 2, m - m // 2) for m in missing]
+        picture = np.pad(picture, margins, mode="symmetric")
         height, width, _ = picture.shape
     y = int(rng.integers(height - side_px + 1))
     x = int(rng.integers(width - side_px + 1))

@@ -70,10 +70,10 @@ class PoolFiles:
 
     def __init__(self, folder: Path, size: int, side_px: int, layout: SampleLayout) -> None:
         self.size, self.layout = size, layout
-        given, wanted = layout.stored_channels, layout.output_channels
-        shape, fine = (size, given, side_px, side_px), layout.scale * side_px
+        stored_channels, output_channels = layout.stored_channels, layout.output_channels
+        shape, fine = (size, stored_channels, side_px, side_px), layout.scale * side_px
         self.planes: NDArray[np.float16] = _map(folder / "planes.f16", np.float16, shape)
-        shape = (size, wanted, fine, fine)
+        shape = (size, output_channels, fine, fine)
         self.targets: NDArray[np.float16] = _map(folder / "targets.f16", np.float16, shape)
         self.weights: NDArray[np.float32] = _map(folder / "weights.f32", np.float32, shape[:2])
         self.slots: NDArray[np.int64] = _map(folder / "slots.i64", np.int64, (size,))
@@ -202,14 +202,14 @@ class SamplePool:
         self._ensure(low, end)
         rng = np.random.default_rng((self._seed, 1, step))
         files, layout = self._files, self._files.layout
-        fine_px, given, wanted = (
+        fine_px, stored_channels, output_channels = (
             layout.scale * patch_px,
             layout.stored_channels,
             layout.output_channels,
         )
-        planes = np.empty((batch, given, patch_px, patch_px), dtype=np.float32)
-        targets = np.empty((batch, wanted, fine_px, fine_px), dtype=np.float32)
-        weights = np.empty((batch, wanted), dtype=np.float32)
+        planes = np.empty((batch, stored_channels, patch_px, patch_px), dtype=np.float32)
+        targets = np.empty((batch, output_channels, fine_px, fine_px), dtype=np.float32)
+        weights = np.empty((batch, output_channels), dtype=np.float32)
         for k in range(batch):
             slot = int(rng.integers(low, end)) % files.size
             planes[k], targets[k] = cut_patch(
@@ -261,11 +261,11 @@ def open_pool(
         role: Whose samples; None for a recipe of one role.
     """
     recipe = read_recipe(recipe_path)
-    chosen = recipe.role(role)
+    pool_role = recipe.role(role)
     job = PoolJob(
-        folder=pool_folder(folder, recipe, chosen, material, pictures, seed=seed),
+        folder=pool_folder(folder, recipe, pool_role, material, pictures, seed=seed),
         recipe=recipe,
-        role=chosen,
+        role=pool_role,
         material=material,
         pictures=pictures,
         seed=seed,
@@ -275,8 +275,12 @@ def open_pool(
     material.write(job.folder)
     text = recipe_path.read_text(encoding="utf-8")
     (job.folder / RECIPE).write_text(text, encoding="utf-8")
-    given = {"pictures": None if pictures is None else str(pictures), "seed": seed, "role": chosen}
-    (job.folder / JOB).write_text(json.dumps(given), encoding="utf-8")
+    entries = {
+        "pictures": None if pictures is None else str(pictures),
+        "seed": seed,
+        "role": pool_role,
+    }
+    (job.folder / JOB).write_text(json.dumps(entries), encoding="utf-8")
     return SamplePool(job, files, maker)
 
 
@@ -298,14 +302,14 @@ def pool_folder(
 def read_job(folder: Path) -> PoolJob:
     """Read what a worker needs from a pool's folder."""
     recipe = read_recipe(folder / RECIPE)
-    given = json.loads((folder / JOB).read_text(encoding="utf-8"))
+    entries = json.loads((folder / JOB).read_text(encoding="utf-8"))
     return PoolJob(
         folder=folder,
         recipe=recipe,
-        role=given["role"],
+        role=entries["role"],
         material=training_kind(recipe.kind).read_material(folder),
-        pictures=None if given["pictures"] is None else Path(given["pictures"]),
-        seed=int(given["seed"]),
+        pictures=None if entries["pictures"] is None else Path(entries["pictures"]),
+        seed=int(entries["seed"]),
     )
 
 

@@ -25,5 +25,7 @@ def multiplies_bfloat16(device: torch.device) -> bool:
     """Return whether a device multiplies bfloat16 itself; of devices but CPUs it is assumed."""
     if device.type != "cpu":
         return True
-    known = torch.cpu.get_capabilities()
-    return any(known.get(name, False) for name in ("avx512_bf16", "amx_bf16", "sve_bf16", "bf16"))
+    capabilities = torch.cpu.get_capabilities()
+    return any(
+        capabilities.get(name, False) for name in ("avx512_bf16", "amx_bf16", "sve_bf16", "bf16")
+    )

@@ -289,7 +289,7 @@ class CommonTables:
 def common_tables(
     table: Mapping[str, Any],
     *,
-    own: Iterable[str],
+    kind_keys: Iterable[str],
     roles: Sequence[str],
     main: str | None = None,
 ) -> CommonTables:
@@ -297,14 +297,14 @@ def common_tables(
 
     Args:
         table: The whole recipe.
-        own: Keys of its kind.
+        kind_keys: Keys of its kind.
         roles: Of the networks of its kind.
         main: The role of [networks.SIZE]; None for the only one.
 
     Raises:
         ContractError: If a key is unknown, missing or wrong.
     """
-    check_keys("recipe", table, {*COMMON, *own})
+    check_keys("recipe", table, {*COMMON, *kind_keys})
     schedule = own_schedule("schedule", table.get("schedule", {}), ScheduleRecipe())
     return CommonTables(
         name=typed("name", table.get("name"), str),
@@ -363,10 +363,10 @@ def own_schedule(where: str, table: Any, base: ScheduleRecipe) -> ScheduleRecipe
         raise ContractError(f"{where} must be a table; got {table!r}")
     whole = asdict(base) | dict(table)
     for name, kind in (("content", ContentRecipe), ("critic", CriticRecipe)):
-        own = table.get(name, {})
-        if not isinstance(own, Mapping):
-            raise ContractError(f"{where}.{name} must be a table; got {own!r}")
-        whole[name] = section(f"{where}.{name}", kind, asdict(getattr(base, name)) | dict(own))
+        changes = table.get(name, {})
+        if not isinstance(changes, Mapping):
+            raise ContractError(f"{where}.{name} must be a table; got {changes!r}")
+        whole[name] = section(f"{where}.{name}", kind, asdict(getattr(base, name)) | dict(changes))
     return section(where, ScheduleRecipe, whole)
 
 
@@ -402,13 +402,13 @@ def _networks(
 ) -> dict[str, dict[str, NetworkRecipe]]:
     if not isinstance(table, Mapping) or not table:
         raise ContractError("a recipe needs at least one table [networks.SIZE]")
-    found: dict[str, dict[str, NetworkRecipe]] = {}
+    networks: dict[str, dict[str, NetworkRecipe]] = {}
     for name, entry in table.items():
         if not isinstance(entry, Mapping):
             raise ContractError(f"networks.{name} must be a table; got {entry!r}")
         if name in roles and not isinstance(entry.get("network"), str):
             for size, one in entry.items():
-                found.setdefault(name, {})[size] = _network(
+                networks.setdefault(name, {})[size] = _network(
                     f"networks.{name}.{size}", one, schedule
                 )
             continue
@@ -417,8 +417,10 @@ def _networks(
                 f"networks.{name} is of no role; write [networks.ROLE.{name}] with one of the "
                 f"roles {', '.join(roles)}"
             )
-        found.setdefault(main or roles[0], {})[name] = _network(f"networks.{name}", entry, schedule)
-    return found
+        networks.setdefault(main or roles[0], {})[name] = _network(
+            f"networks.{name}", entry, schedule
+        )
+    return networks
 
 
 def _network(where: str, entry: Any, schedule: ScheduleRecipe) -> NetworkRecipe:

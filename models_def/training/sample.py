@@ -52,7 +52,7 @@ class SampleLayout:
         """Samples along a side of the outputs for one of the inputs."""
         return self.outputs[0].scale
 
-    def named(self, planes: Tensor) -> dict[str, Tensor]:
+    def by_name(self, planes: Tensor) -> dict[str, Tensor]:
         """Split (b, channels, h, w) of all inputs, or inputs and masks, by their names."""
         ports = self.inputs
         if planes.shape[1] != self.input_channels:
@@ -62,9 +62,9 @@ class SampleLayout:
 
     def batch(self, planes: Tensor, target: Tensor, weight: Tensor) -> "Batch":
         """Return the patches of a step from (b, stored channels, p, p) planes."""
-        named = self.named(planes)
-        masks = {port.name: named.pop(port.name) for port in self.masks}
-        return Batch(inputs=named, target=target, weight=weight, masks=masks)
+        inputs = self.by_name(planes)
+        masks = {port.name: inputs.pop(port.name) for port in self.masks}
+        return Batch(inputs=inputs, target=target, weight=weight, masks=masks)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,10 +90,10 @@ class Sample:
         ports = layout.inputs + layout.masks
         planes = torch.cat([self.inputs[port.name] for port in ports])
         side = layout.scale * planes.shape[-1]
-        wanted = (layout.output_channels, side, side)
-        if len(planes) != layout.stored_channels or tuple(self.target.shape) != wanted:
+        shape = (layout.output_channels, side, side)
+        if len(planes) != layout.stored_channels or tuple(self.target.shape) != shape:
             raise ContractError(
-                f"a sample must have {layout.stored_channels} channels and a target of {wanted}; "
+                f"a sample must have {layout.stored_channels} channels and a target of {shape}; "
                 f"got {tuple(planes.shape)} and {tuple(self.target.shape)}"
             )
         return planes

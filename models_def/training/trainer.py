@@ -49,7 +49,7 @@ from camkit.progress import Task, duration, left_text, note, working
 from camkit.stopwatch import Stopwatch
 
 LOG_STEPS: Final = 50
-Made = TypeVar("Made")
+Returned = TypeVar("Returned")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -198,7 +198,7 @@ def train(
         first = read_first_weights(options.start, options.size, role)
     if first is not None:
         take_first_weights(network, first)
-    own = None
+    fitting = None
     if refinement is None:
         request = FitRequest(
             recipe=recipe,
@@ -211,7 +211,7 @@ def train(
             pairs=options.pairs,
             recipe_folder=recipe_path.parent,
         )
-        own = own_fitting(recipe.kind, request)
+        fitting = own_fitting(recipe.kind, request)
     path = checkpoint_path(recipe, options, refinement)
     if path.exists() and not (options.resume or options.overwrite):
         raise ContractError(
@@ -229,7 +229,7 @@ def train(
     what = f"training {recipe.name} {_label(role, options.size)}"
     with pool, working(what, total=1.0, writes_lines=True) as task:
         pool.start_workers(options.workers)
-        run = _Run(recipe_path, kind, material, options, refinement, first, own, stopwatch)
+        run = _Run(recipe_path, kind, material, options, refinement, first, fitting, stopwatch)
         run.loop(pool, task)
     return run.result()
 
@@ -242,13 +242,13 @@ def check_layout(name: str, network: nn.Module, layout: SampleLayout) -> None:
     """
     stride_px: Any = network.stride_px
     side_px = 4 * stride_px
-    given = torch.zeros(1, layout.input_channels, side_px, side_px)
-    wanted = (1, layout.output_channels, layout.scale * side_px, layout.scale * side_px)
+    planes = torch.zeros(1, layout.input_channels, side_px, side_px)
+    shape = (1, layout.output_channels, layout.scale * side_px, layout.scale * side_px)
     was_training = network.training
     network.eval()
     try:
         with torch.no_grad():
-            got = tuple(torch.as_tensor(network(given)).shape)
+            got = tuple(torch.as_tensor(network(planes)).shape)
     except RuntimeError as error:
         raise ContractError(
             f"{name} does not take the {layout.input_channels} channels of its role "
@@ -256,8 +256,8 @@ def check_layout(name: str, network: nn.Module, layout: SampleLayout) -> None:
         ) from error
     finally:
         network.train(was_training)
-    if got != wanted:
-        raise ContractError(f"{name} must make {wanted} of {tuple(given.shape)}; it makes {got}")
+    if got != shape:
+        raise ContractError(f"{name} must make {shape} of {tuple(planes.shape)}; it makes {got}")
 
 
 def checkpoint_path(recipe: Recipe, options: TrainOptions, refinement: Refinement | None) -> Path:
@@ -282,7 +282,7 @@ class _Run:
         options: TrainOptions,
         refinement: Refinement | None,
         first: FirstWeights | None,
-        own: OwnFitting | None,
+        fitting: OwnFitting | None,
         stopwatch: Stopwatch,
     ) -> None:
         self.stopwatch = stopwatch
@@ -295,9 +295,9 @@ class _Run:
         self.judge: Judge = kind.judge(self.recipe, self.role, material, options.valid_folder)
         data = describe_data(self.recipe.data, options.data_folder)
         self.data = data + ("" if first is None else first.credit(data))
-        if own is not None:
-            self.data += own.credit
-            self.fitter = own.make(material)
+        if fitting is not None:
+            self.data += fitting.credit
+            self.fitter = fitting.make(material)
         elif refinement is None:
             objective = patch_objective(kind.finish(self.recipe, self.role))
             self.fitter = Fitter(
@@ -314,20 +314,20 @@ class _Run:
         self.loss: float | None = None
         self.spent_s = (0.0, 0.0)
         # a loss of its own, an adversary say, wants something else than the decibels
-        self.picks_best = refinement is None and own is None
+        self.picks_best = refinement is None and fitting is None
         self.best: State = {}
         self.best_db: float | None = None
         if options.resume:
             self._restore(read_checkpoint(self.path))
-        until = self.step if options.resume else None
-        self.log = RunLog(self.path.with_suffix(".jsonl"), keep_until_step=until)
+        last_step = self.step if options.resume else None
+        self.log = RunLog(self.path.with_suffix(".jsonl"), keep_until_step=last_step)
         self.closing_s: dict[str, tuple[float, float]] = {}
         self.setup_shares = (0.0, 0.0)
         self.baselines = dict(self._closing("judge", self.judge.baselines))
 
     def _restore(self, saved: Checkpoint) -> None:
-        known = (self.material_digest, self.role, self.entry.network, dict(self.entry.config))
-        if (saved.bank_digest, saved.role, saved.network, saved.config) != known:
+        identity = (self.material_digest, self.role, self.entry.network, dict(self.entry.config))
+        if (saved.bank_digest, saved.role, saved.network, saved.config) != identity:
             raise ContractError(
                 f"{self.path} was trained with other kernels or another network; "
                 "start without resume"
@@ -345,13 +345,13 @@ class _Run:
     def cpu_s(self, pool: SamplePool) -> float:
         return self.cpu_before_s + self.stopwatch.cpu_s() + pool.workers_cpu_s()
 
-    def _closing(self, name: str, work: Callable[[], Made]) -> Made:
+    def _closing(self, name: str, work: Callable[[], Returned]) -> Returned:
         """Run the work of the end of a run once, and record its (wall, CPU) seconds."""
         begin = self.stopwatch.wall_s(), self.stopwatch.cpu_s()
-        made = work()
+        returned = work()
         wall_s, cpu_s = self.stopwatch.wall_s(), self.stopwatch.cpu_s()
         self.closing_s[name] = wall_s - begin[0], cpu_s - begin[1]
-        return made
+        return returned
 
     def loop(self, pool: SamplePool, task: Task) -> None:
         """Fit until the schedule, the time or the asked step ends; checkpoint and validate."""
@@ -395,11 +395,11 @@ class _Run:
         """Return the shares of the wall and the CPU time that are spent, the end of the run too."""
         options = self.options
         walls_s, cpus_s = zip(*self.closing_s.values(), strict=True)
-        spent = (
+        budgets = (
             (self.elapsed_s() + sum(walls_s), options.max_minutes),
             (self.cpu_s(pool) + sum(cpus_s), options.max_cpu_minutes),
         )
-        wall, cpu = (0.0 if most is None else seconds / (60 * most) for seconds, most in spent)
+        wall, cpu = (0.0 if most is None else seconds / (60 * most) for seconds, most in budgets)
         return wall, cpu
 
     def _progress(self, pool: SamplePool) -> float:
@@ -440,9 +440,9 @@ class _Run:
         ends = [f"{self.steps} steps"]
         budgets = {"minutes": self.options.max_minutes, "CPU-minutes": self.options.max_cpu_minutes}
         ends += [f"{most:g} {unit}" for unit, most in budgets.items() if most is not None]
-        known = "".join(f", {name} {db:.2f} dB" for name, db in self.baselines.items())
+        baseline_text = "".join(f", {name} {db:.2f} dB" for name, db in self.baselines.items())
         every = f"a line at every validation, about every {duration(self.options.validate_s)}"
-        return f"{self.path.stem}: {' or '.join(ends)}{known}; {every}"
+        return f"{self.path.stem}: {' or '.join(ends)}{baseline_text}; {every}"
 
     def _line(self, pool: SamplePool, task: Task, valid_db: float) -> str:
         """Return the line of a validation."""

@@ -70,7 +70,7 @@ def test_axial_marginal_ray_passes_the_listed_heights_and_sags() -> None:
     )
     seen: list[Rays] = []
     pupil = _column(1.0, 0.8, 0.6, 0.4)
-    landed = trace(double_gauss(), rays_at(0 * pupil, 25 * pupil, 0.0), seen=seen)
+    landed = trace(double_gauss(), rays_at(0 * pupil, 25 * pupil, 0.0), surface_rays=seen)
     assert [float(on.y[0]) for on in seen] == pytest.approx(heights, abs=SIX_DIGITS)
     assert [float(on.z[0]) for on in seen] == pytest.approx(sags, abs=SIX_DIGITS)
     assert float(landed.m[0] / landed.n[0]) == pytest.approx(-0.258832, abs=SIX_DIGITS)
@@ -104,7 +104,7 @@ def test_real_chief_rays_are_those_of_the_listing(
     middle = PupilSamples(x=_column(0.0), y=_column(0.0))
     aimed = aim(double_gauss(), STOP, middle, slope, math.inf)
     seen: list[Rays] = []
-    landed = trace(double_gauss(), launch(aimed.x, aimed.y, slope, math.inf), seen=seen)
+    landed = trace(double_gauss(), launch(aimed.x, aimed.y, slope, math.inf), surface_rays=seen)
     assert float(landed.y) == pytest.approx(image_y_mm, abs=SIX_DIGITS)
     assert float(seen[0].y) == pytest.approx(first_y_mm, abs=SIX_DIGITS)
     assert float(-aimed.y / slope) == pytest.approx(pupil_mm, abs=6e-5)

@@ -34,7 +34,7 @@ def _marginal(lens: Lens, wavelength_um: float) -> tuple[Rays, list[Rays]]:
     height = torch.tensor(lens.aperture_value / 2, dtype=torch.float64)
     seen: list[Rays] = []
     zero = torch.zeros_like(height)
-    return trace(tensors, launch(zero, height, zero, torch.inf), seen=seen), seen
+    return trace(tensors, launch(zero, height, zero, torch.inf), surface_rays=seen), seen
 
 
 def test_al2550_marginal_ray_meets_the_heights_in_the_maker_s_file() -> None:

@@ -95,7 +95,7 @@ def _forward_light(lens: Lens, heights_mm: tuple[float, ...]) -> list[float]:
     p, q = tilt * torch.cos(2 * math.pi * random[3]), tilt * torch.sin(2 * math.pi * random[3])
     n = torch.rsqrt(1 + p**2 + q**2)
     start = Rays(x=x, y=y, z=0 * x, l=p * n, m=q * n, n=n, fate=torch.zeros(count).to(torch.int8))
-    landed = trace(optics.stopped(torch.tensor(0.54)).to(torch.float32), start)
+    landed = trace(optics.stopped(torch.tensor(0.54)).converted(torch.float32), start)
     height, light = torch.hypot(landed.x, landed.y), torch.where(landed.valid, n**4, 0.0)
     rings = []
     for middle in heights_mm:

@@ -155,7 +155,7 @@ def test_every_ray_keeps_n_sine_of_its_angle_at_every_surface() -> None:
     generator = torch.Generator().manual_seed(3)
     x, y = 4 * torch.rand(2, 200, dtype=torch.float64, generator=generator) - 2
     start = rays_at(x, y - 4.0, math.tan(math.radians(20)))
-    landed = trace(tensors, start, seen=seen)
+    landed = trace(tensors, start, surface_rays=seen)
     assert bool(landed.valid.all())
     index, before = tensors.index, start
     skew = start.x * start.m - start.y * start.l

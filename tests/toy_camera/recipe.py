@@ -90,7 +90,7 @@ def to_toy_recipe(table: Mapping[str, Any]) -> ToyRecipe:
     Raises:
         ContractError: Naming the key.
     """
-    common = common_tables(table, own=("optics",), roles=ROLES)
+    common = common_tables(table, kind_keys=("optics",), roles=ROLES)
     if not isinstance(common.sensor, PlanesSensor) or common.sensor.channels != ("Y",):
         raise ContractError('the toy camera is grey: sensor.channels must be ["Y"]')
     return ToyRecipe(

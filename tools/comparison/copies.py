@@ -32,8 +32,8 @@ def transfer_error(
         focus_um: Of the unit, where the frozen PSF knows such.
     """
     response = sensor.response_arrays()
-    known = color_kernels(frozen, *response, focus_um=focus_um)
-    return relative_error(transfers(known), transfers(color_kernels(copy, *response)))
+    kernels = color_kernels(frozen, *response, focus_um=focus_um)
+    return relative_error(transfers(kernels), transfers(color_kernels(copy, *response)))
 
 
 def relative_error(ours: Transfer, theirs: Transfer) -> float:

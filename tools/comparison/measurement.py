@@ -135,10 +135,12 @@ def by_capture(measurements: Iterable[Measurement], methods: Sequence[str]) -> l
     for m in measurements:
         rows.setdefault(m.capture, {})[m.method] = m
     table = []
-    for found in rows.values():
-        first = next(iter(found.values()))
+    for by_method in rows.values():
+        first = next(iter(by_method.values()))
         values = [
-            [getattr(found[name], column) for column in VALUE_COLUMNS] if name in found else None
+            [getattr(by_method[name], column) for column in VALUE_COLUMNS]
+            if name in by_method
+            else None
             for name in methods
         ]
         table.append([*(getattr(first, column) for column in CAPTURE_COLUMNS), *values])
@@ -149,20 +151,20 @@ def measure(
     shot: Shot, rows: Sequence[Row], photograph: Callable[[Shot], Photograph]
 ) -> list[Measurement]:
     """Photograph once and measure every row on it."""
-    taken = photograph(shot)
-    found = []
+    capture = photograph(shot)
+    measurements = []
     for row in rows:
         began = time.perf_counter()
-        restored: FloatArray = row.restore(taken)
+        restored: FloatArray = row.restore(capture)
         seconds = time.perf_counter() - began
-        score = judge(restored, taken.sharp)
-        found.append(
+        score = judge(restored, capture.sharp)
+        measurements.append(
             Measurement(
                 psf=shot.psf,
                 set_name=shot.set_name,
                 picture=shot.picture.name,
                 position=shot.position,
-                height_mm=round(taken.height_mm, 3),
+                height_mm=round(capture.height_mm, 3),
                 iso=shot.iso,
                 seed=shot.fabrication_seed if shot.psf == "fresh" else None,
                 method=row.name,
@@ -173,7 +175,7 @@ def measure(
                 identity=row.identity,
             )
         )
-    return found
+    return measurements
 
 
 def measure_all(
@@ -199,4 +201,4 @@ def measure_all(
         return measure(item[0], item[1], photograph)
 
     with ThreadPoolExecutor(max_workers=jobs) as pool:
-        yield from (found for found in pool.map(one, work) if found)
+        yield from (measurements for measurements in pool.map(one, work) if measurements)

@@ -16,11 +16,11 @@ TITLES: Final = {
     "M": "network M",
     "L": "network L",
 }
-BEFORE: Final = " before"
+EARLIER: Final = " before"
 """Ends the name of a row of the bundle that was there before."""
 
 
 def title_of(name: str) -> str:
     """Return what a row is called in tables."""
-    plain = name.removesuffix(BEFORE)
+    plain = name.removesuffix(EARLIER)
     return TITLES.get(plain, plain) + name[len(plain) :]

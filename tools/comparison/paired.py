@@ -11,15 +11,15 @@ from typing import Any, Final
 import numpy as np
 
 from tools.comparison.measurement import Measurement
-from tools.comparison.names import BEFORE, CLASSICAL, TITLES, title_of
+from tools.comparison.names import CLASSICAL, EARLIER, TITLES, title_of
 from tools.tables.records import markdown_table
 
 OURS: Final = ("bank", "S", "M", "L")
 CLASSIC: Final = "best classical"
 AIMS_DB: Final = {
     ("bank", CLASSIC): 0.5,
-    ("S", "M" + BEFORE): 0.0,
-    ("M", "M" + BEFORE): 0.2,
+    ("S", "M" + EARLIER): 0.0,
+    ("M", "M" + EARLIER): 0.2,
     ("M", CLASSIC): 2.4,
 }
 
@@ -31,13 +31,13 @@ def pairs_of(methods: Sequence[str], best_classical: str | None) -> list[tuple[s
     classical method, M with rivals.
     """
     ours = [name for name in methods if name in OURS]
-    pairs = [(name, name + BEFORE) for name in ours if name + BEFORE in methods]
-    if "S" in methods and "M" + BEFORE in methods:
-        pairs.append(("S", "M" + BEFORE))
+    pairs = [(name, name + EARLIER) for name in ours if name + EARLIER in methods]
+    if "S" in methods and "M" + EARLIER in methods:
+        pairs.append(("S", "M" + EARLIER))
     if best_classical is not None:
         pairs += [(name, best_classical) for name in ours]
-    known = {*TITLES, *(name + BEFORE for name in TITLES)}
-    return pairs + [("M", name) for name in methods if "M" in methods and name not in known]
+    titled = {*TITLES, *(name + EARLIER for name in TITLES)}
+    return pairs + [("M", name) for name in methods if "M" in methods and name not in titled]
 
 
 def best_classical(measurements: Iterable[Measurement]) -> str | None:
@@ -53,21 +53,21 @@ def paired_gains(
     measurements: Sequence[Measurement], pairs: Sequence[tuple[str, str]]
 ) -> list[dict[str, Any]]:
     """Return every pair's gain over all captures, by ISO and by place, as plain JSON values."""
-    found = []
-    for method, over in pairs:
-        gains = _differences(measurements, method, over)
+    entries = []
+    for method, reference in pairs:
+        gains = _differences(measurements, method, reference)
         if gains:
-            found.append(
+            entries.append(
                 {
                     "method": method,
-                    "over": over,
-                    "aim_db": _aim(method, over),
+                    "over": reference,
+                    "aim_db": _aim(method, reference),
                     "all": _gain(gains),
                     "by_iso": _split(gains, lambda m: f"{m.iso:g}"),
                     "by_position": _split(gains, lambda m: str(m.position)),
                 }
             )
-    return found
+    return entries
 
 
 def to_lines(gains: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -96,8 +96,8 @@ def _aim_cell(gain: Mapping[str, Any]) -> str:
     return f"{aim:+.1f}: {'reached' if gain['all']['db'] >= aim else 'missed'}"
 
 
-def _aim(method: str, over: str) -> float | None:
-    return AIMS_DB.get((method, CLASSIC if over in CLASSICAL else over))
+def _aim(method: str, reference: str) -> float | None:
+    return AIMS_DB.get((method, CLASSIC if reference in CLASSICAL else reference))
 
 
 def _cell(gain: Mapping[str, Any]) -> str:
@@ -106,13 +106,13 @@ def _cell(gain: Mapping[str, Any]) -> str:
 
 
 def _differences(
-    measurements: Sequence[Measurement], method: str, over: str
+    measurements: Sequence[Measurement], method: str, reference: str
 ) -> list[tuple[Measurement, float]]:
-    known = {m.capture: m.psnr_db for m in measurements if m.method == over}
+    reference_db = {m.capture: m.psnr_db for m in measurements if m.method == reference}
     return [
-        (m, m.psnr_db - known[m.capture])
+        (m, m.psnr_db - reference_db[m.capture])
         for m in measurements
-        if m.method == method and m.capture in known
+        if m.method == method and m.capture in reference_db
     ]
 
 

@@ -67,14 +67,14 @@ def photograph(shot: Shot, scene: FloatArray, bundle: Bundle, lens: FrozenOptics
     )
 
 
-def finish_planes(planes: FloatArray, taken: Photograph, bundle: Bundle) -> FloatArray:
+def finish_planes(planes: FloatArray, capture: Photograph, bundle: Bundle) -> FloatArray:
     """Return linear Rec.709 of white-balanced camera planes, vignetting divided out.
 
     These are the last stages of the pipeline, for planes that a foreign method restored.
     """
-    red, green, blue = taken.simulation.white_balance
+    red, green, blue = capture.simulation.white_balance
     raised = recover_highlights(planes, (red, green, blue))
-    even = divide_illumination(raised, 0, bundle.psf, taken.simulation.window)
+    even = divide_illumination(raised, 0, bundle.psf, capture.simulation.window)
     return apply_matrix(rec709_of(color_sensor(bundle)), even)
 
 
@@ -93,8 +93,8 @@ def bundle_restorer(bundle: Bundle, *, method: str = "net", size: str = "M") -> 
         bundle, Options(method=method, size=size, undistort=False, vignetting=True, threads=1)
     )
 
-    def restore(taken: Photograph) -> FloatArray:
-        return pipeline.start(captured(pipeline, taken.simulation)).fill()
+    def restore(capture: Photograph) -> FloatArray:
+        return pipeline.start(captured(pipeline, capture.simulation)).fill()
 
     return restore
 

@@ -36,11 +36,11 @@ class Mean:
 
 def comparable(measurements: Sequence[Measurement], methods: Sequence[str]) -> list[Measurement]:
     """Keep the captures on which every method of the comparison was measured."""
-    seen: dict[tuple[object, ...], set[str]] = {}
+    methods_of: dict[tuple[object, ...], set[str]] = {}
     for m in measurements:
-        seen.setdefault(m.capture, set()).add(m.method)
-    wanted = set(methods)
-    return [m for m in measurements if m.method in wanted and wanted <= seen[m.capture]]
+        methods_of.setdefault(m.capture, set()).add(m.method)
+    compared = set(methods)
+    return [m for m in measurements if m.method in compared and compared <= methods_of[m.capture]]
 
 
 def means(
@@ -54,11 +54,11 @@ def means(
     return {
         key: {
             method: Mean(
-                psnr_db=float(np.mean([m.psnr_db for m in found])),
-                ssim=float(np.mean([m.ssim for m in found])),
-                count=len(found),
+                psnr_db=float(np.mean([m.psnr_db for m in group])),
+                ssim=float(np.mean([m.ssim for m in group])),
+                count=len(group),
             )
-            for method, found in by_method.items()
+            for method, group in by_method.items()
         }
         for key, by_method in sorted(groups.items())
     }
@@ -86,23 +86,23 @@ def gains(by_method: Mapping[str, Mean], network: str = "M") -> dict[str, Any]:
 
 def summarise(measurements: Sequence[Measurement], methods: Sequence[str]) -> dict[str, Any]:
     """Return all means and gains as plain JSON values, for each kind of PSF."""
-    kept = comparable(measurements, methods)
+    common = comparable(measurements, methods)
     summary: dict[str, Any] = {}
-    for psf in sorted({m.psf for m in kept}, reverse=True):
-        of_psf = [m for m in kept if m.psf == psf]
+    for psf in sorted({m.psf for m in common}, reverse=True):
+        of_psf = [m for m in common if m.psf == psf]
         overall = means(of_psf)[()]
         by_iso = means(of_psf, "iso")
         by_copy = means((m for m in of_psf if m.seed is not None), "seed")
         summary[psf] = {
             "overall": _plain(overall),
-            "by_iso": {f"{iso:g}": _plain(found) for (iso,), found in by_iso.items()},
+            "by_iso": {f"{iso:g}": _plain(mean_of) for (iso,), mean_of in by_iso.items()},
             "by_set": _nested(means(of_psf, "set_name", "iso")),
             "by_position": _nested(means(of_psf, "position", "iso")),
             "height_mm": _heights(of_psf),
-            "by_copy": {str(seed): _plain(found) for (seed,), found in by_copy.items()},
+            "by_copy": {str(seed): _plain(mean_of) for (seed,), mean_of in by_copy.items()},
             "gains": paired_gains(of_psf, pairs_of(methods, best_classical(of_psf))),
             "gain_of_m": gains(overall),
-            "gain_of_m_by_iso": {f"{iso:g}": gains(found) for (iso,), found in by_iso.items()},
+            "gain_of_m_by_iso": {f"{iso:g}": gains(mean_of) for (iso,), mean_of in by_iso.items()},
         }
     return summary
 
@@ -139,13 +139,13 @@ def to_markdown(report: Mapping[str, Any]) -> str:
     return "\n".join(lines).rstrip() + "\n"
 
 
-def _plain(found: Mapping[str, Mean]) -> dict[str, Any]:
-    return {name: mean.to_json() for name, mean in found.items()}
+def _plain(mean_of: Mapping[str, Mean]) -> dict[str, Any]:
+    return {name: mean.to_json() for name, mean in mean_of.items()}
 
 
-def _nested(found: Mapping[tuple[Any, ...], Mapping[str, Mean]]) -> dict[str, Any]:
+def _nested(groups: Mapping[tuple[Any, ...], Mapping[str, Mean]]) -> dict[str, Any]:
     nested: dict[str, Any] = {}
-    for (group, iso), by_method in found.items():
+    for (group, iso), by_method in groups.items():
         nested.setdefault(str(group), {})[f"{iso:g}"] = _plain(by_method)
     return nested
 
@@ -183,7 +183,7 @@ def _table(
     """Return a table with a line per method and PSNR / SSIM per ISO and over all."""
     heads = ["PSNR in dB / SSIM", *(f"ISO {iso}" for iso in by_iso), "all"]
     cells = [
-        [title_of(n), *(_cell(found[n]) for found in by_iso.values()), _cell(overall[n])]
+        [title_of(n), *(_cell(scores[n]) for scores in by_iso.values()), _cell(overall[n])]
         for n in methods
     ]
     count = overall[methods[0]]["n"]
@@ -197,7 +197,7 @@ def _copy_lines(
     if not by_copy:
         return []
     heads = [f"{seed}, off by {errors.get(seed, float('nan')):.2f}" for seed in by_copy]
-    cells = [[title_of(n), *(_cell(found[n]) for found in by_copy.values())] for n in methods]
+    cells = [[title_of(n), *(_cell(scores[n]) for scores in by_copy.values())] for n in methods]
     table = markdown_table(["seed, relative error of the transfer", *heads], cells)
     return ["### By copy of the lens", "", table, ""]
 
@@ -206,9 +206,11 @@ def _groups(groups: Mapping[str, Any], methods: Sequence[str], what: str) -> lis
     """Return a table per ISO with a column per group."""
     lines = []
     for iso in next(iter(groups.values())):
-        there = {name: found[iso] for name, found in groups.items() if iso in found}
-        heads = [f"{name}, n = {found[methods[0]]['n']}" for name, found in there.items()]
-        cells = [[title_of(n), *(_cell(found[n]) for found in there.values())] for n in methods]
+        scores_at_iso = {name: scores[iso] for name, scores in groups.items() if iso in scores}
+        heads = [f"{name}, n = {scores[methods[0]]['n']}" for name, scores in scores_at_iso.items()]
+        cells = [
+            [title_of(n), *(_cell(scores[n]) for scores in scores_at_iso.values())] for n in methods
+        ]
         lines += [markdown_table([f"ISO {iso}, {what}", *heads], cells), ""]
     return lines
 

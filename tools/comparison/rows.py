@@ -15,7 +15,7 @@ from camkit.psf import depth_name
 from camkit.report.quality import BORDER_PX, FABRICATION_SEEDS, FIELD_SHARES
 from tools.capture.simulated import color_sensor
 from tools.comparison.measurement import Row, identity_of
-from tools.comparison.names import BEFORE, CLASSICAL
+from tools.comparison.names import CLASSICAL, EARLIER
 from tools.comparison.peers import PEERS, Setting, part_sides
 from tools.comparison.photograph import (
     PROTOCOL_VERSION,
@@ -59,7 +59,7 @@ def make_rows(
     tuned: Tuned,
     isos: Sequence[float],
     lens: str,
-    before: Bundle | None = None,
+    earlier: Bundle | None = None,
 ) -> list[Row]:
     """Make the rows in the order of the tables.
 
@@ -70,7 +70,7 @@ def make_rows(
         tuned: Parameters of the classical peers.
         isos: Sensitivities that parameters are needed for.
         lens: Text of the prescription, part of what decides a measurement.
-        before: The bundle as it was: its bank and networks become rows beside those of today.
+        earlier: The bundle as it was: its bank and networks become rows beside those of today.
 
     Raises:
         ContractError: If a name is unknown, a parameter is not tuned or another bundle is not of
@@ -83,11 +83,13 @@ def make_rows(
         lens,
     )
     rows = [_row(bundle, name, tuned, isos, base) for name in methods]
-    if before is not None:
-        check_camera(before, bundle)
-        old = [n for n in methods if n in BANK_METHODS or n in before.manifest.sizes]
-        found = (_row(before, name, tuned, isos, identity_of(base, BEFORE)) for name in old)
-        rows += [replace(row, name=row.name + BEFORE) for row in found]
+    if earlier is not None:
+        check_camera(earlier, bundle)
+        old = [n for n in methods if n in BANK_METHODS or n in earlier.manifest.sizes]
+        earlier_rows = (
+            _row(earlier, name, tuned, isos, identity_of(base, EARLIER)) for name in old
+        )
+        rows += [replace(row, name=row.name + EARLIER) for row in earlier_rows]
     for rival in rivals:
         check_camera(rival.bundle, bundle)
         rows.append(
@@ -139,21 +141,21 @@ def _row(bundle: Bundle, name: str, tuned: Tuned, isos: Sequence[float], base: s
             restore=bundle_restorer(bundle, size=name),
             identity=identity_of(base, *_network_parts(bundle, name)),
         )
-    known = (*("input", *PEERS, *BANK_METHODS), *bundle.manifest.sizes)
-    raise ContractError(f"methods are {', '.join(known)}; got {name!r}")
+    names = (*("input", *PEERS, *BANK_METHODS), *bundle.manifest.sizes)
+    raise ContractError(f"methods are {', '.join(names)}; got {name!r}")
 
 
 def _developer(bundle: Bundle) -> Restorer:
-    def restore(taken: Photograph) -> FloatArray:
-        return finish_planes(taken.local.planes, taken, bundle)
+    def restore(capture: Photograph) -> FloatArray:
+        return finish_planes(capture.local.planes, capture, bundle)
 
     return restore
 
 
 def _peer_restorer(bundle: Bundle, name: str, values: dict[float, Setting]) -> Restorer:
-    def restore(taken: Photograph) -> FloatArray:
-        planes = PEERS[name].restore(taken.local, values[taken.simulation.iso])
-        return finish_planes(planes, taken, bundle)
+    def restore(capture: Photograph) -> FloatArray:
+        planes = PEERS[name].restore(capture.local, values[capture.simulation.iso])
+        return finish_planes(planes, capture, bundle)
 
     return restore
 
@@ -168,8 +170,8 @@ def _network_parts(bundle: Bundle, size: str) -> tuple[object, ...]:
     )
 
 
-def _stage_json(bundle: Bundle, wanted: type[Wiener] | type[Network]) -> str | None:
-    stages = [stage.model_dump_json() for stage in bundle.manifest.stages_of(wanted)]
+def _stage_json(bundle: Bundle, stage_type: type[Wiener] | type[Network]) -> str | None:
+    stages = [stage.model_dump_json() for stage in bundle.manifest.stages_of(stage_type)]
     return "\n".join(stages) or None
 
 

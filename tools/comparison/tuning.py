@@ -26,19 +26,19 @@ class Trial:
     psnr_db: float
 
 
-def try_peers(taken: Photograph, bundle: Bundle, peers: Sequence[str]) -> list[Trial]:
+def try_peers(capture: Photograph, bundle: Bundle, peers: Sequence[str]) -> list[Trial]:
     """Try every setting of the peers on a capture."""
-    found = []
+    trials = []
     for name in peers:
         for setting in PEERS[name].settings:
-            planes = PEERS[name].restore(taken.local, setting)
-            restored = finish_planes(planes, taken, bundle)
+            planes = PEERS[name].restore(capture.local, setting)
+            restored = finish_planes(planes, capture, bundle)
             # without SSIM, which takes nine tenths of the time of judging
-            psnr_db = psnr(*inner_srgb(restored, taken.sharp))
-            found.append(
-                Trial(peer=name, iso=taken.simulation.iso, setting=setting, psnr_db=psnr_db)
+            psnr_db = psnr(*inner_srgb(restored, capture.sharp))
+            trials.append(
+                Trial(peer=name, iso=capture.simulation.iso, setting=setting, psnr_db=psnr_db)
             )
-    return found
+    return trials
 
 
 def choose(trials: Iterable[Trial]) -> tuple[Tuned, dict[str, dict[str, dict[str, float]]]]:
@@ -59,8 +59,10 @@ def choose(trials: Iterable[Trial]) -> tuple[Tuned, dict[str, dict[str, dict[str
 
 def at_edge(peer: str, setting: Setting) -> list[str]:
     """Return the parameters whose chosen value is the first or last candidate."""
-    chosen = zip(PEERS[peer].parameters, PEERS[peer].candidates, setting, strict=True)
-    return [name for name, tried, value in chosen if value in (tried[0], tried[-1])]
+    parameters = zip(PEERS[peer].parameters, PEERS[peer].candidates, setting, strict=True)
+    return [
+        name for name, candidates, value in parameters if value in (candidates[0], candidates[-1])
+    ]
 
 
 def tuned_to_json(tuned: Tuned) -> dict[str, dict[str, dict[str, float]]]:
@@ -85,9 +87,9 @@ def tuned_from_json(table: Mapping[str, Mapping[str, Any]]) -> Tuned:
         names = PEERS[peer].parameters if peer in PEERS else ()
         for iso, values in by_iso.items():
             if not names or not isinstance(values, Mapping) or set(values) != set(names):
-                wanted = ", ".join(names) or f"those of {', '.join(PEERS)}"
+                expected = ", ".join(names) or f"those of {', '.join(PEERS)}"
                 raise ContractError(
-                    f"tuned parameters of {peer} must be {wanted}; got {values}; tune again"
+                    f"tuned parameters of {peer} must be {expected}; got {values}; tune again"
                 )
             tuned.setdefault(peer, {})[float(iso)] = tuple(float(values[n]) for n in names)
     return tuned

@@ -16,7 +16,7 @@ import numpy as np
 
 from tools.evidence.checkout import HERE, Checkout
 from tools.evidence.samples import file_samples
-from tools.evidence.scrubbed import told_values
+from tools.evidence.scrubbed import printed_values
 
 SCENES: Final = HERE / "tools" / "scenes"
 SURFACES: Final = "surfaces.npz"
@@ -69,12 +69,12 @@ def simulate_captures(checkout: Checkout, bundle: str) -> tuple[list[Capture], d
         camera = HOSTS.get((bundle, name), bundle)
         path = checkout.work / f"{bundle}-{name}{'.dng' if is_photograph else '.npz'}"
         line = ["simulate", *words, "--bundle", camera, "--out", path.name, "--json"]
-        told, seconds = checkout.command(line)
+        process, seconds = checkout.command(line)
         options = {"force_bundle": True} if is_photograph and camera != bundle else {}
         captures.append(Capture(name=name, path=path, is_photograph=is_photograph, options=options))
         samples = file_samples(path) if path.exists() else None
-        found = told_values(told, checkout.folders)
-        entries[f"{bundle} {name} simulate"] = {**found, "samples": samples, "seconds": seconds}
+        values = printed_values(process, checkout.folders)
+        entries[f"{bundle} {name} simulate"] = {**values, "samples": samples, "seconds": seconds}
     if not is_photograph:
         frames = checkout.work / f"{bundle}-frames.npz"
         _write_frames(captures[0].path, frames)

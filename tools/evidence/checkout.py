@@ -37,8 +37,8 @@ class Checkout:
     def commit(self) -> str:
         """Return its commit, with a plus where files differ from it; empty outside git."""
         words = ["git", "-C", str(self.root), "describe", "--always", "--abbrev=8", "--dirty=+"]
-        told = subprocess.run(words, capture_output=True, text=True, check=False)
-        return told.stdout.strip()
+        process = subprocess.run(words, capture_output=True, text=True, check=False)
+        return process.stdout.strip()
 
     @property
     def bundles(self) -> list[str]:
@@ -68,7 +68,7 @@ class Checkout:
     def command(self, words: list[str]) -> tuple[subprocess.CompletedProcess[str], float]:
         """Run `camkit` with some words; return what it told, and its seconds."""
         began = time.perf_counter()
-        told = subprocess.run(
+        process = subprocess.run(
             [sys.executable, "-P", "-m", "camkit", *words],
             cwd=self.work,
             env=self.environment,
@@ -76,7 +76,7 @@ class Checkout:
             text=True,
             check=False,
         )
-        return told, time.perf_counter() - began
+        return process, time.perf_counter() - began
 
 
 class Worker:

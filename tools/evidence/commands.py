@@ -7,7 +7,7 @@ from typing import Any, Final
 from tools.evidence.captures import SCENES, Capture
 from tools.evidence.checkout import Checkout
 from tools.evidence.samples import file_samples
-from tools.evidence.scrubbed import told_values
+from tools.evidence.scrubbed import printed_values
 
 Words = tuple[str, ...]
 
@@ -66,13 +66,13 @@ def run_commands(
     lines += JUDGED.get(bundle, ()) if is_judged else ()
     for line in lines:
         where = ("--out-dir", OUT) if line[0] in {"plan", "process"} else ()
-        told, seconds = checkout.command([*line, *where, "--json"])
-        found = told_values(told, checkout.folders)
+        process, seconds = checkout.command([*line, *where, "--json"])
+        values = printed_values(process, checkout.folders)
         folder = checkout.work / OUT
         files = {path.name: file_samples(path) for path in sorted(folder.glob("*"))}
         shutil.rmtree(folder, ignore_errors=True)
         name = " ".join(line).replace(f"{SCENES}", "SCENES")
-        yield f"camkit {name}", {**found, "files": files, "seconds": seconds}
+        yield f"camkit {name}", {**values, "files": files, "seconds": seconds}
 
 
 def _usual(bundle: str, captures: list[Capture]) -> Iterator[Words]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 MISSING: Final = "(missing)"
-SHOWN: Final = 60
+VALUE_WIDTH: Final = 60
 """Characters of a value."""
 
 
@@ -66,4 +66,4 @@ def _differences(path: str, old: Any, new: Any) -> Iterator[str]:
         for place, pair in enumerate(zip(old, new, strict=True)):
             yield from _differences(f"{path}[{place}]", *pair)
     elif old != new:
-        yield f"{path.lstrip('.') or 'entry'}: {str(old)[:SHOWN]} -> {str(new)[:SHOWN]}"
+        yield f"{path.lstrip('.') or 'entry'}: {str(old)[:VALUE_WIDTH]} -> {str(new)[:VALUE_WIDTH]}"

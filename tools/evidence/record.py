@@ -56,8 +56,10 @@ def make_record(
                 name = f"{job['bundle'] or 'none'} {capture} {way_name(options)}"
                 entries[name] = worker.ask(job)
         folders = (*checkout.folders, f"{data}/") if data is not None else checkout.folders
-        kept = {name: _scrubbed_entry(entry, folders) for name, entry in sorted(entries.items())}
-        return {"commit": checkout.commit, "entries": kept}
+        scrubbed_entries = {
+            name: _scrubbed_entry(entry, folders) for name, entry in sorted(entries.items())
+        }
+        return {"commit": checkout.commit, "entries": scrubbed_entries}
 
 
 def job_of(bundle: str | None, capture: Capture, way: Options) -> dict[str, Any]:

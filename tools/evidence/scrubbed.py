@@ -38,13 +38,13 @@ def _is_dropped(key: str, value: Any) -> bool:
     )
 
 
-def told_values(told: CompletedProcess[str], folders: Sequence[str]) -> dict[str, Any]:
+def printed_values(process: CompletedProcess[str], folders: Sequence[str]) -> dict[str, Any]:
     """Return the JSON that a command printed, and how it ended."""
-    found: dict[str, Any] = {"exit": told.returncode}
-    found["json"] = scrubbed(list(_json_values(told.stdout)), folders)
-    if told.returncode:
-        found["error"] = scrubbed(told.stderr.strip().splitlines()[-1:], folders)
-    return found
+    values: dict[str, Any] = {"exit": process.returncode}
+    values["json"] = scrubbed(list(_json_values(process.stdout)), folders)
+    if process.returncode:
+        values["error"] = scrubbed(process.stderr.strip().splitlines()[-1:], folders)
+    return values
 
 
 def _json_values(text: str) -> Iterator[Any]:

@@ -30,24 +30,24 @@ def compare_seconds(roots: tuple[Path, Path], bundles: list[str] | None, rounds:
         print(f"{'':<28}{'A':>9}{'B':>9}{'B / A':>9}")
         ratios = []
         starts = [[c.command(list(START))[1] for c in (first, second)] for _ in range(rounds)]
-        ratios.append(_told("camkit " + " ".join(START), starts))
+        ratios.append(_print_ratio("camkit " + " ".join(START), starts))
         for bundle in bundles or sorted({*first.bundles} & {*second.bundles}):
             for capture in simulate_captures(first, bundle)[0]:
                 words = {**job_of(bundle, capture, {}), "planned": False}
                 pairs = []
                 for number in range(rounds + 1):
                     order = workers[:: 1 if number % 2 else -1]
-                    told: dict[int, Any] = {
+                    seconds: dict[int, Any] = {
                         id(worker): worker.ask(words).get("seconds") for worker in order
                     }
-                    if number and None not in told.values():  # the first round warms up
-                        pairs.append([told[id(worker)] for worker in workers])
+                    if number and None not in seconds.values():  # the first round warms up
+                        pairs.append([seconds[id(worker)] for worker in workers])
                 if pairs:
-                    ratios.append(_told(f"{bundle} {capture.name}", pairs))
+                    ratios.append(_print_ratio(f"{bundle} {capture.name}", pairs))
         print(f"median ratio B / A: {statistics.median(ratios):.3f}")
 
 
-def _told(name: str, pairs: list[list[float]]) -> float:
+def _print_ratio(name: str, pairs: list[list[float]]) -> float:
     """Print the medians of pairs of seconds; return the median of their ratios."""
     first, second = (statistics.median(some) for some in zip(*pairs, strict=True))
     ratio = statistics.median(b / a for a, b in pairs)

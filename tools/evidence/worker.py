@@ -41,11 +41,11 @@ class Answerer:
         began = time.perf_counter()
         try:
             pipeline = self._ready(job)
-            found = _golden(pipeline, job) if "case" in job else _product(pipeline, job)
+            entry = _golden(pipeline, job) if "case" in job else _product(pipeline, job)
         except camkit.CamkitError as error:
             return {"refused": f"{type(error).__name__}: {error}"}
-        found.setdefault("seconds", time.perf_counter() - began)
-        return found
+        entry.setdefault("seconds", time.perf_counter() - began)
+        return entry
 
     def _ready(self, job: dict[str, Any]) -> Any:
         words = (job["bundle"], job.get("kind"), job["options"])
@@ -62,16 +62,16 @@ def _product(pipeline: Any, job: dict[str, Any]) -> dict[str, Any]:
     plan = pipeline.plan(path) if job.get("planned", True) else None
     began = time.perf_counter()
     if job["is_photograph"]:
-        made = pipeline.process(path)
-        arrays = {"image": made.image}
+        output = pipeline.process(path)
+        arrays = {"image": output.image}
     else:
-        made = pipeline.make(path)
-        arrays = dict(made.arrays)
+        output = pipeline.make(path)
+        arrays = dict(output.arrays)
     seconds = time.perf_counter() - began
     return {
         "hashes": {name: array_hash(array) for name, array in arrays.items()},
-        "warnings": list(made.warnings),
-        "sections": dict(made.sections),
+        "warnings": list(output.warnings),
+        "sections": dict(output.sections),
         "plan": plan,
         "seconds": seconds,
     }

@@ -79,11 +79,11 @@ def build(out: Path, deglare: Deglare) -> int:
     with tempfile.TemporaryDirectory() as folder:
         bare = write_bundle(Path(folder) / "bare.camkit", manifest, {})
         arrays = {}
-        for name, (case, known) in cases.items():
-            made = case_work(bare, case, known, None).fill()
-            outputs = {IMAGE: {NO_SIZE: made}}
+        for name, (case, arrays_of_case) in cases.items():
+            picture = case_work(bare, case, arrays_of_case, None).fill()
+            outputs = {IMAGE: {NO_SIZE: picture}}
             arrays[name] = GoldenArrays(
-                capture=known.capture, reference=known.reference, outputs=outputs
+                capture=arrays_of_case.capture, reference=arrays_of_case.reference, outputs=outputs
             )
         members = {GOLDEN: golden_to_bytes(arrays), CARD: CARD_TEXT.encode()}
         golden = tuple(case for case, _ in cases.values())
@@ -135,8 +135,8 @@ def _case(name: str) -> tuple[GoldenCase, GoldenArrays]:
         iso=100,
         white_balance=(1.0, 1.0, 1.0),
     )
-    capture = shot.seen if name == "planes" else mosaic_of(shot.seen)
-    return case, GoldenArrays(capture=capture, reference=shot.wanted)
+    capture = shot.picture if name == "planes" else mosaic_of(shot.picture)
+    return case, GoldenArrays(capture=capture, reference=shot.truth)
 
 
 def mosaic_of(planes: FloatArray) -> NDArray[np.uint16]:

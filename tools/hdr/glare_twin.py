@@ -39,12 +39,12 @@ class Shot:
     """A photograph through the star, and what it should have been.
 
     Attributes:
-        seen: (3, h, w) float32: clips at 1, with noise, in steps of 12 bits.
-        wanted: (3, h, w) float32: the scene without streaks, clipped at 1.
+        picture: (3, h, w) float32: clips at 1, with noise, in steps of 12 bits.
+        truth: (3, h, w) float32: the scene without streaks, clipped at 1.
     """
 
-    seen: FloatArray
-    wanted: FloatArray
+    picture: FloatArray
+    truth: FloatArray
 
 
 def two_point_star(
@@ -57,13 +57,13 @@ def two_point_star(
     offset = SECTION_STEP_PX * np.arange(-4, 5)
     section = np.clip(1 - np.abs(offset), 0, None)
     core = np.ones((1, 1, 1, 1), np.float32)
-    down = math.pi / 2 - angle_rad
+    downward_rad = math.pi / 2 - angle_rad
     return StreakOptics(
         core=core,
         bare_core=core,
         profiles=np.broadcast_to(profile, (1, 1, 2, profile.size)).astype(np.float32),
         sections=np.broadcast_to(section, (1, 2, section.size)).astype(np.float32),
-        angles_rad=np.array([down, down + math.pi]),
+        angles_rad=np.array([downward_rad, downward_rad + math.pi]),
         haze=np.zeros((1, 1, 1, 1), np.float32),
         depths_mm=np.array([np.inf]),
         wavelengths_um=np.array([0.55]),
@@ -74,8 +74,8 @@ def two_point_star(
 def exposed_scene(name: str, height: int, width: int) -> FloatArray:
     """Return a scene (3, h, w) exposed so that some of it saturates."""
     scene = named_scene(name, height, width)
-    found = saturating_exposure(scene, np.eye(3), (1.0, 1.0, 1.0), SATURATED)
-    return with_exposure(scene, found.exposure)
+    saturation = saturating_exposure(scene, np.eye(3), (1.0, 1.0, 1.0), SATURATED)
+    return with_exposure(scene, saturation.exposure)
 
 
 def photographed(scene: FloatArray, star: StreakOptics | None, seed: int = 0) -> Shot:
@@ -94,15 +94,15 @@ def photographed(scene: FloatArray, star: StreakOptics | None, seed: int = 0) ->
     sigma = np.sqrt(READ_NOISE**2 + SHOT_NOISE * np.clip(light, 0, 1))
     noisy = np.clip(light + rng.standard_normal(light.shape) * sigma, 0, 1)
     return Shot(
-        seen=(np.round(noisy * STEPS) / STEPS).astype(np.float32),
-        wanted=np.minimum(scene, 1).astype(np.float32),
+        picture=(np.round(noisy * STEPS) / STEPS).astype(np.float32),
+        truth=np.minimum(scene, 1).astype(np.float32),
     )
 
 
 def psnr_db(picture: FloatArray, shot: Shot, level: float) -> float:
     """Return the PSNR of what is no light, linear, peak 1."""
-    dim = shot.seen.max(axis=0) < level
-    return float(-10 * np.log10(np.mean((picture - shot.wanted)[:, dim] ** 2, dtype=np.float64)))
+    dim = shot.picture.max(axis=0) < level
+    return float(-10 * np.log10(np.mean((picture - shot.truth)[:, dim] ** 2, dtype=np.float64)))
 
 
 def main(words: Sequence[str] | None = None) -> None:
@@ -124,8 +124,8 @@ def main(words: Sequence[str] | None = None) -> None:
         width, height = arguments.size_px
         scene = exposed_scene(arguments.scene, height, width)
         shot = photographed(scene, two_point_star(math.radians(arguments.angle)))
-        wanted = [(arguments.output, shot.seen), (arguments.truth, shot.wanted)]
-        for path, picture in wanted:
+        files = [(arguments.output, shot.picture), (arguments.truth, shot.truth)]
+        for path, picture in files:
             if path is not None:
                 write_truth(_new_exr(path), picture)
     except CamkitError as error:

@@ -104,9 +104,9 @@ def night_pictures(bundle: Bundle, dng: Path) -> dict[str, tuple[FloatArray, flo
             f"{bundle.manifest.name} has no mosaic; the gallery shows cameras with one"
         )
     scene = named_scene(SCENE, *SIDES_PX)
-    found = exposure_for_share(scene, sensor, SHARE)
+    saturation = exposure_for_share(scene, sensor, SHARE)
     options = SimulationOptions(seed=1, workers=available_threads(None))
-    shot = photograph(with_exposure(scene, found.exposure), bundle, options)
+    shot = photograph(with_exposure(scene, saturation.exposure), bundle, options)
     write_capture(dng, shot, sensor, bundle.manifest.name)
     truth = ideal_picture(shot, bundle)
     pipelines = {
@@ -114,8 +114,8 @@ def night_pictures(bundle: Bundle, dng: Path) -> dict[str, tuple[FloatArray, flo
         "physics": camkit.load(bundle.path, method="physics"),
         "network": camkit.load(bundle.path),
     }
-    made = {way: pipeline.process(dng).image for way, pipeline in pipelines.items()}
-    return {way: (picture, _psnr_db(picture, truth)) for way, picture in made.items()} | {
+    pictures = {way: pipeline.process(dng).image for way, pipeline in pipelines.items()}
+    return {way: (picture, _psnr_db(picture, truth)) for way, picture in pictures.items()} | {
         "truth": (truth, math.inf)
     }
 
@@ -162,11 +162,11 @@ def _kernels(bundle: Bundle) -> dict[str, FloatArray]:
     sensor = bundle.manifest.sensor
     assert sensor.type == "bayer"
     kernels = color_kernels(bundle.psf, *sensor.response_arrays()).at(0.0, 0.0)
-    shown = 1 + np.log10(np.maximum(kernels / kernels.max(), 10.0**-DECADES)) / DECADES
-    names = (f"{colour}, {shown.shape[1]} px wide" for colour in ("red", "green", "blue"))
+    greys = 1 + np.log10(np.maximum(kernels / kernels.max(), 10.0**-DECADES)) / DECADES
+    names = (f"{colour}, {greys.shape[1]} px wide" for colour in ("red", "green", "blue"))
     return {
         name: np.broadcast_to(kernel, (3, *kernel.shape))
-        for name, kernel in zip(names, shown, strict=True)
+        for name, kernel in zip(names, greys, strict=True)
     }
 
 

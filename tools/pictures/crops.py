@@ -93,9 +93,9 @@ def crop_pictures(
     """Return a crop as taken, by every pipeline, and sharp; (3, h, w), sRGB values."""
     (x, y), (wide, tall) = place.corner_px, place.size_px
     left, top = max(x - margin_px, 0), max(y - margin_px, 0)
-    around = np.s_[top : y + tall + margin_px, left : x + wide + margin_px]
-    shown = np.s_[:, y - top : y - top + tall, x - left : x - left + wide]
-    mosaic = np.ascontiguousarray(simulation.samples[around])
+    window = np.s_[top : y + tall + margin_px, left : x + wide + margin_px]
+    crop = np.s_[:, y - top : y - top + tall, x - left : x - left + wide]
+    mosaic = np.ascontiguousarray(simulation.samples[window])
     x0, y0 = (int(v) for v in simulation.window.origin_px)
     red, green, blue = simulation.white_balance
     pictures = [_as_taken(mosaic, simulation, bundle, (x0 + left, y0 + top))]
@@ -106,7 +106,7 @@ def crop_pictures(
         pictures.append(image)
     sharp = simulation.clean[..., y : y + tall, x : x + wide]
     matrix = rec709_of(mosaic_sensor(bundle))
-    tiles = (*(picture[shown] for picture in pictures), apply_matrix(matrix, sharp))
+    tiles = (*(picture[crop] for picture in pictures), apply_matrix(matrix, sharp))
     return [encode_srgb(tile) for tile in tiles]
 
 

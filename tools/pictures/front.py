@@ -47,18 +47,20 @@ def write_front(path: Path, bench: Path = BENCH) -> None:
 
 def restored_rows(record: Mapping[str, Any]) -> dict[str, dict[str, Mapping[str, Any]]]:
     """Return camera -> way (the filter, or a size of the network) -> row, of cameras with both."""
-    found: dict[str, dict[str, Mapping[str, Any]]] = {}
+    rows_of_camera: dict[str, dict[str, Mapping[str, Any]]] = {}
     for row in record["rows"]:
         way = row["method"] if row["size"] is None else row["size"]
         if way in MARKS and row["error"] is None and _is_default(row, record):
-            found.setdefault(row["bundle"], {})[way] = row
-    return {camera: rows for camera, rows in found.items() if FILTER in rows and len(rows) > 1}
+            rows_of_camera.setdefault(row["bundle"], {})[way] = row
+    return {
+        camera: rows for camera, rows in rows_of_camera.items() if FILTER in rows and len(rows) > 1
+    }
 
 
 def _is_default(row: Mapping[str, Any], record: Mapping[str, Any]) -> bool:
     """Return whether a row is of exact tiles in fp32 on all threads of the CPU."""
-    wanted = {"mode": "exact", "dtype": "fp32", "provider": "cpu"}
-    is_plain = all(row.get(name) in (None, value) for name, value in wanted.items())
+    defaults = {"mode": "exact", "dtype": "fp32", "provider": "cpu"}
+    is_plain = all(row.get(name) in (None, value) for name, value in defaults.items())
     return is_plain and row["threads"] == record["machine"]["threads"] and not row["variant"]
 
 

@@ -56,9 +56,9 @@ def _write_small(out_dir: Path, name: str, view: View) -> Path:
     """Write what was taken beside what was restored."""
     path = out_dir / f"{name}-small.jpg"
     row, *_ = view.rows.values()
-    taken, restored, _ = map(_small, row.values())
-    gap = np.ones((3, taken.shape[1], GAP_PX), np.float32)
-    page = np.clip(np.concatenate([taken, gap, restored], axis=2), 0, 1)
+    captured, restored, _ = map(_small, row.values())
+    gap = np.ones((3, captured.shape[1], GAP_PX), np.float32)
+    page = np.clip(np.concatenate([captured, gap, restored], axis=2), 0, 1)
     pixels = (page * 255 + 0.5).astype(np.uint8).transpose(1, 2, 0)[..., ::-1]
     write_pixels(path, pixels)
     return path

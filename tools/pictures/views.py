@@ -61,14 +61,14 @@ class Photograph:
 
     Attributes:
         scene: File in `SCENES`.
-        of: What it shows, and whose it is.
+        subject: What it shows, and whose it is.
         middle: (x, y) of what is shown, as shares of the photograph.
         depth_mm: Object distance; None for the only one that the camera knows.
         iso: Sensitivity.
     """
 
     scene: str
-    of: str
+    subject: str
     middle: tuple[float, float]
     depth_mm: float | None = None
     iso: float = 100.0
@@ -88,13 +88,13 @@ class Photograph:
         )
         place = Place(corner_px=(corner[0], corner[1]), size_px=(SIDE_PX, SIDE_PX))
         pipeline = camkit.load(name, undistort=False)
-        taken, restored, truth = crop_pictures(
+        developed, restored, truth = crop_pictures(
             shot, bundle, [pipeline], place, iso=self.iso, margin_px=max(width, height)
         )
-        decibels = (psnr_db(taken, truth, BORDER_PX), psnr_db(restored, truth, BORDER_PX))
-        far = "" if self.depth_mm is None else f", {self.depth_mm / 1000:g} m away"
-        what = f"{self.of}{far}, half way between axis and corner"
-        return _view(bundle, {what: (taken, restored, truth)}, decibels)
+        decibels = (psnr_db(developed, truth, BORDER_PX), psnr_db(restored, truth, BORDER_PX))
+        distance = "" if self.depth_mm is None else f", {self.depth_mm / 1000:g} m away"
+        what = f"{self.subject}{distance}, half way between axis and corner"
+        return _view(bundle, {what: (developed, restored, truth)}, decibels)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,12 +141,12 @@ class Windshield:
         bundle = open_bundle(find_bundle(name))
         scene = exposed_scene(f"night:{self.seed}", 384, 512)
         shot = photographed(scene, two_point_star(np.deg2rad(self.angle_deg)), self.seed)
-        glare, cleared = _deglared(shot.seen)
+        glare, cleared = _deglared(shot.picture)
         level = glare.settings.level
-        decibels = [streaks_psnr_db(picture, shot, level) for picture in (shot.seen, cleared)]
-        part = around_brightest(shot.seen, SIDE_PX, SIDE_PX)
-        shown = [encode_srgb(picture[part]) for picture in (shot.seen, cleared, shot.wanted)]
-        row = {"A synthetic night behind a wiped windshield": shown}
+        decibels = [streaks_psnr_db(picture, shot, level) for picture in (shot.picture, cleared)]
+        part = around_brightest(shot.picture, SIDE_PX, SIDE_PX)
+        tiles = [encode_srgb(picture[part]) for picture in (shot.picture, cleared, shot.truth)]
+        row = {"A synthetic night behind a wiped windshield": tiles}
         return _view(bundle, row, (decibels[0], decibels[1]))
 
 
@@ -156,12 +156,12 @@ class Photons:
 
     Attributes:
         scene: File in `SCENES`.
-        of: What it shows, and whose it is.
+        subject: What it shows, and whose it is.
         photons: Of a pixel that sees white.
     """
 
     scene: str
-    of: str
+    subject: str
     photons: float
 
     def __call__(self, name: str) -> View:
@@ -174,30 +174,32 @@ class Photons:
             capture = Path(folder) / "counts.npz"
             write_recorded(capture, recorded)
             camkit.process(capture, bundle=name, out_dir=Path(folder) / "out")
-            with np.load(Path(folder) / "out" / "counts.npz") as made:
-                restored = made["intensity"] / self.photons
+            with np.load(Path(folder) / "out" / "counts.npz") as products:
+                restored = products["intensity"] / self.photons
         truth = fitted(luminance(light), camera)
         scale = camera.scale
         counted = (recorded.values / self.photons).astype(np.float32)
-        taken = counted.repeat(scale, axis=0).repeat(scale, axis=1)
-        *both, sharp = (encode_srgb(np.clip(p, 0, 1))[None] for p in (taken, restored, truth))
+        coarse = counted.repeat(scale, axis=0).repeat(scale, axis=1)
+        *both, sharp = (encode_srgb(np.clip(p, 0, 1))[None] for p in (coarse, restored, truth))
         decibels = [psnr_db(picture, sharp, 1) for picture in both]
-        shown = [np.broadcast_to(picture, (3, *truth.shape)) for picture in (*both, sharp)]
+        tiles = [np.broadcast_to(picture, (3, *truth.shape)) for picture in (*both, sharp)]
         rows, columns = counted.shape
-        title = f"{self.of}, counted by {columns}x{rows} pixels of single photons"
-        return _view(bundle, {title: shown}, (decibels[0], decibels[1]))
+        title = f"{self.subject}, counted by {columns}x{rows} pixels of single photons"
+        return _view(bundle, {title: tiles}, (decibels[0], decibels[1]))
 
 
 VIEWS: Final[Mapping[str, Callable[[str], View]]] = MappingProxyType(
     {
-        "duet": Photograph(scene="coffee.png", of=COFFEE, middle=(0.55, 0.5)),
-        "duet-joint": Photograph(scene="chelsea.png", of=CAT, middle=(0.5, 0.45)),
-        "trio-edof": Photograph(scene="chelsea.png", of=CAT, middle=(0.5, 0.45), depth_mm=700.0),
-        "thin-plate": Photograph(scene="coffee.png", of=COFFEE, middle=(0.55, 0.5)),
+        "duet": Photograph(scene="coffee.png", subject=COFFEE, middle=(0.55, 0.5)),
+        "duet-joint": Photograph(scene="chelsea.png", subject=CAT, middle=(0.5, 0.45)),
+        "trio-edof": Photograph(
+            scene="chelsea.png", subject=CAT, middle=(0.5, 0.45), depth_mm=700.0
+        ),
+        "thin-plate": Photograph(scene="coffee.png", subject=COFFEE, middle=(0.55, 0.5)),
         "streak-hdr": Night(stops=(0, -4)),
         "streak-rank1": Night(stops=(0, -4)),
         "deglare": Windshield(seed=6, angle_deg=5.0),
-        "spad-sr": Photons(scene="chelsea.png", of=CAT, photons=3000.0),
+        "spad-sr": Photons(scene="chelsea.png", subject=CAT, photons=3000.0),
     }
 )
 
@@ -218,7 +220,7 @@ def _exposure(stop: int) -> str:
     return f"{-stop} stops darker" if stop else "as exposed"
 
 
-def _deglared(seen: FloatArray) -> tuple[Glare, FloatArray]:
+def _deglared(picture: FloatArray) -> tuple[Glare, FloatArray]:
     """Remove the streaks from a picture (3, h, w) that clips at 1, as the bundle does."""
     entry = Deglare()
     settings = GlareSettings(
@@ -227,8 +229,8 @@ def _deglared(seen: FloatArray) -> tuple[Glare, FloatArray]:
         reach=entry.reach,
         level=entry.level,
     )
-    _, height, width = seen.shape
-    glare = find_glare(lambda: lambda top, bottom: seen[:, top:bottom], height, width, settings)
-    cleared = seen.copy()
+    _, height, width = picture.shape
+    glare = find_glare(lambda: lambda top, bottom: picture[:, top:bottom], height, width, settings)
+    cleared = picture.copy()
     glare.paint(cleared, 0, (1.0, 1.0, 1.0))
     return glare, cleared

@@ -90,10 +90,10 @@ def start(pipeline: Pipeline, simulation: Simulation) -> Reconstruction:
 
 def cell_sums(squares: FloatArray) -> CellArray:
     """Sum (h, w) over the lattice cells, without a border of BORDER_PX."""
-    kept = np.zeros(squares.shape, dtype=np.float64)
+    inner = np.zeros(squares.shape, dtype=np.float64)
     inside = np.s_[BORDER_PX:-BORDER_PX, BORDER_PX:-BORDER_PX]
-    kept[inside] = squares[inside]
-    rows = np.add.reduceat(kept, np.arange(0, squares.shape[0], CELL_PX), axis=0)
+    inner[inside] = squares[inside]
+    rows = np.add.reduceat(inner, np.arange(0, squares.shape[0], CELL_PX), axis=0)
     sums = np.add.reduceat(rows, np.arange(0, squares.shape[1], CELL_PX), axis=1)
     return np.asarray(sums.reshape(lattice_shape(*squares.shape)))
 
@@ -105,17 +105,17 @@ def cell_errors(restored: FloatArray, sharp: FloatArray) -> CellArray:
 
 def pipelines(bundle: Bundle) -> Mapping[str, Pipeline]:
     """Return a pipeline per target, in sensor geometry, on one thread."""
-    made = {
+    by_target = {
         EXACT: Pipeline(bundle, Options(size=REFERENCE, undistort=False, threads=1)),
         WIENER_TARGET: Pipeline(bundle, Options(method="wiener", undistort=False, threads=1)),
     }
     for size in bundle.manifest.sizes:
         if size != REFERENCE:
-            made[size] = Pipeline(bundle, Options(size=size, undistort=False, threads=1))
+            by_target[size] = Pipeline(bundle, Options(size=size, undistort=False, threads=1))
     # where nothing else is done to a cell, the haze is taken out of it all the same
     least = "haze" if bundle.manifest.has_haze else DEVELOP
-    made[PLAIN_TARGET] = Pipeline(bundle, Options(method=least, undistort=False, threads=1))
-    return made
+    by_target[PLAIN_TARGET] = Pipeline(bundle, Options(method=least, undistort=False, threads=1))
+    return by_target
 
 
 def measure_cells(

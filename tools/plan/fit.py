@@ -61,16 +61,16 @@ def fit_model(captures: Sequence[CaptureCells], work: TierWork, small: str | Non
     Raises:
         ContractError: If there are too few cells.
     """
-    chosen = [_counted(capture) for capture in captures]
-    design = np.concatenate([_design(c, m) for c, m in zip(captures, chosen, strict=True)])
+    masks = [_counted(capture) for capture in captures]
+    design = np.concatenate([_design(c, m) for c, m in zip(captures, masks, strict=True)])
     if design.shape[0] < 4 * design.shape[1]:
         raise ContractError(f"{design.shape[0]} cells are too few to fit; give more pictures")
     lines, spread = {}, {}
     for target in captures[0].errors:
-        wanted = np.concatenate(
-            [_per_px(c, target)[m] for c, m in zip(captures, chosen, strict=True)]
+        errors_per_px = np.concatenate(
+            [_per_px(c, target)[m] for c, m in zip(captures, masks, strict=True)]
         )
-        lines[target], spread[target] = _fit(design, wanted)
+        lines[target], spread[target] = _fit(design, errors_per_px)
     model = LossModel(lines=lines, adaptive_db=0.0, draft_db=0.0)
     free = replace(work, full_halo_px=0, small_halo_px=0)
     adaptive_db, adaptive = _largest(captures, model, free, small, MEAN_DB, WORST_DB)
@@ -110,12 +110,14 @@ def _per_px(capture: CaptureCells, target: str) -> np.ndarray:
     return np.asarray(np.maximum(extra, LEAST_EXTRA * np.maximum(exact, 1e-9)))
 
 
-def _fit(design: np.ndarray, wanted: np.ndarray) -> tuple[tuple[float, float, float, float], float]:
+def _fit(
+    design: np.ndarray, errors_per_px: np.ndarray
+) -> tuple[tuple[float, float, float, float], float]:
     """Fit the logarithm, then scale to the sum; give the line and the spread."""
-    line, *_ = np.linalg.lstsq(design, np.log(wanted), rcond=None)
+    line, *_ = np.linalg.lstsq(design, np.log(errors_per_px), rcond=None)
     predicted = np.exp(design @ line)
-    spread = float(np.std(np.log(wanted / predicted)))
-    line[0] += np.log(wanted.sum() / predicted.sum())
+    spread = float(np.std(np.log(errors_per_px / predicted)))
+    line[0] += np.log(errors_per_px.sum() / predicted.sum())
     level, detail, noise, field = (float(v) for v in line)
     return (level, detail, noise, field), spread
 
@@ -130,10 +132,10 @@ def _largest(
 ) -> tuple[float, tuple[float, float]]:
     """Return the largest predicted loss that keeps both limits, and the losses it leads to."""
     for loss_db in _LOSSES_DB:
-        lost = [true_loss_db(c, model, work, small, loss_db) for c in captures]
-        if np.mean(lost) <= mean_db and max(lost) <= worst_db:
-            return loss_db, (float(np.mean(lost)), float(max(lost)))
-    return _LOSSES_DB[-1], (float(np.mean(lost)), float(max(lost)))
+        losses_db = [true_loss_db(c, model, work, small, loss_db) for c in captures]
+        if np.mean(losses_db) <= mean_db and max(losses_db) <= worst_db:
+            return loss_db, (float(np.mean(losses_db)), float(max(losses_db)))
+    return _LOSSES_DB[-1], (float(np.mean(losses_db)), float(max(losses_db)))
 
 
 def true_loss_db(

@@ -101,10 +101,10 @@ def _pictures(subject: str, data: Path | None) -> list[Path]:
 
 
 def _picture(start: Path) -> Path:
-    found = sorted(start.parent.glob(f"{start.name}*"))
-    if not found:
+    paths = sorted(start.parent.glob(f"{start.name}*"))
+    if not paths:
         raise ContractError(f"no picture {start}*: give the folder that holds valid_open and hdr")
-    return found[0]
+    return paths[0]
 
 
 def _even_picture(path: Path, most_px: int) -> FloatArray:
@@ -126,8 +126,8 @@ def bokeh(seed: int, height: int, width: int) -> FloatArray:
     """Return a sharp subject before a background far out of focus."""
     rng = np.random.default_rng(seed)
     sharp = np.minimum(procedural_scene(seed, height, width), 1.5)
-    far = np.minimum(procedural_scene(seed + 50, height, width), 1.5)
-    blurred = np.stack([cv2.GaussianBlur(p, (0, 0), _BACKGROUND_SIGMA_PX) for p in far])
+    background = np.minimum(procedural_scene(seed + 50, height, width), 1.5)
+    blurred = np.stack([cv2.GaussianBlur(p, (0, 0), _BACKGROUND_SIGMA_PX) for p in background])
     mask = _spot(rng, height, width, share=0.3)
     return np.asarray(mask * sharp + (1 - mask) * blurred, dtype=np.float32)
 
@@ -142,9 +142,9 @@ def sky(seed: int, height: int, width: int) -> FloatArray:
     rng = np.random.default_rng(seed)
     ground = np.minimum(procedural_scene(seed, height, width), 1.0)
     horizon = height * rng.uniform(0.45, 0.75)
-    down = np.linspace(0, 1, height)[:, None] * np.ones((1, width))
+    height_share = np.linspace(0, 1, height)[:, None] * np.ones((1, width))
     top, low = np.array([0.12, 0.25, 0.55]), np.array([0.55, 0.65, 0.75])
-    air = top[:, None, None] + (low - top)[:, None, None] * down
+    air = top[:, None, None] + (low - top)[:, None, None] * height_share
     edge = np.clip(np.arange(height)[:, None] - horizon + 0.5, 0, 1)
     return np.asarray(air * (1 - edge) + ground * edge, dtype=np.float32)
 

@@ -110,9 +110,9 @@ def read_recipe(path: Path) -> LensRecipe:
     surfaces = table.pop("surface", [])
     if not isinstance(surfaces, list):
         raise ContractError("surfaces of a lens recipe must be written as [[surface]] tables")
-    made = [section(f"surface[{i}]", SurfaceRecipe, t) for i, t in enumerate(surfaces)]
+    surface_recipes = [section(f"surface[{i}]", SurfaceRecipe, t) for i, t in enumerate(surfaces)]
     # the tables are surfaces already: they pass the type check of their field as they are
-    return section("lens recipe", LensRecipe, {**table, "surfaces": made})
+    return section("lens recipe", LensRecipe, {**table, "surfaces": surface_recipes})
 
 
 def _check_range(bounds: Range) -> None:

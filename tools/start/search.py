@@ -40,14 +40,14 @@ def design(recipe: LensRecipe) -> DesignResult:
     """
     problem = problem_of(recipe)
     free = problem.free
-    held = free.high <= free.low
+    fixed = free.high <= free.low
     rng = np.random.default_rng(recipe.seed)
-    drawn = torch.from_numpy(rng.uniform(0, 1, (recipe.starts, len(free.variables))))
+    starts = torch.from_numpy(rng.uniform(0, 1, (recipe.starts, len(free.variables))))
     merit: Residuals = lambda scaled: residuals(problem, scaled)  # noqa: E731
-    scouted = descend(merit, drawn, recipe.scout_steps, held)
-    found = descend(merit, scouted.scaled[: recipe.kept], recipe.steps, held)
-    merits = tuple(found.merits.tolist())
-    lens = finished(problem, found.scaled[0])
+    scouted = descend(merit, starts, recipe.scout_steps, fixed)
+    refined = descend(merit, scouted.scaled[: recipe.kept], recipe.steps, fixed)
+    merits = tuple(refined.merits.tolist())
+    lens = finished(problem, refined.scaled[0])
     return DesignResult(lens=with_rounded_numbers(lens), merit=merits[0], merits=merits)
 
 

@@ -381,7 +381,7 @@ def to_bayer_recipe(table: Mapping[str, Any]) -> BayerRecipe:
             frames without a haze.
     """
     table = with_new_names(table, _OLDER)
-    common = common_tables(table, own=OWN_KEYS, roles=ROLES)
+    common = common_tables(table, kind_keys=OWN_KEYS, roles=ROLES)
     if "frames" in table and "haze" not in table:
         raise ContractError("[frames] is for a lens with a haze; there is no table [haze]")
     return BayerRecipe(

@@ -62,7 +62,7 @@ class BayerMaker:
         self, recipe: BayerRecipe, bank: PsfBank, pictures: Path | None, seed: int
     ) -> None:
         self._recipe, self._bank, self._seed = recipe, bank, seed
-        self._source = open_scenes(recipe.data, pictures, drawn=recipe.data.drawn_shares)
+        self._source = open_scenes(recipe.data, pictures, drawn_shares=recipe.data.drawn_shares)
 
     def developed(self, index: int) -> Developed:
         """Photograph a crop of a scene, and develop it."""

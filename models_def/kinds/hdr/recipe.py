@@ -113,7 +113,9 @@ def to_hdr_recipe(table: Mapping[str, Any]) -> HdrRecipe:
     Raises:
         ContractError: If a key is unknown, missing or wrong, or the sensor has no mosaic.
     """
-    common = common_tables(table, own=OWN_KEYS, roles=(*ROLES, *REFERENCE_ROLES), main=ROLES[0])
+    common = common_tables(
+        table, kind_keys=OWN_KEYS, roles=(*ROLES, *REFERENCE_ROLES), main=ROLES[0]
+    )
     return HdrRecipe(
         name=common.name,
         kind=common.kind,

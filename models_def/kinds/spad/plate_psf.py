@@ -85,7 +85,7 @@ def _of_checkpoint(path: Path) -> FloatArray:
     # the reader of checkpoints asks the kinds for their parts, of which this is one
     from camkit.models_def.training.checkpoint import read_checkpoint
 
-    average = read_checkpoint(path).chosen
+    average = read_checkpoint(path).exported
     if LOGITS not in average:
         raise ContractError(f"{path} is of a network that was not trained with its plate")
     return np.asarray(softmax_psf(average[LOGITS]).numpy(), dtype=np.float32)

@@ -107,7 +107,7 @@ def to_spad_recipe(table: Mapping[str, Any]) -> SpadRecipe:
     Raises:
         ContractError: If a key is unknown, missing or wrong, or the sensor counts no photons.
     """
-    common = common_tables(table, own=OWN_KEYS, roles=(*ROLES, PLATE), main=ROLES[0])
+    common = common_tables(table, kind_keys=OWN_KEYS, roles=(*ROLES, PLATE), main=ROLES[0])
     if not isinstance(common.sensor, SpadSensor):
         raise ContractError(
             f'this kind of camera counts photons; sensor.type must be "spad", got '

@@ -28,14 +28,14 @@ class Match:
 
     Attributes:
         plate: As etched.
-        reached: Of its dots.
+        etched: Of its dots.
         gerchberg_saxton: Of the best start, with any phase.
         refined: Of the phases before they became levels.
         rounded: Of levels by rounding alone.
     """
 
     plate: DotPlate
-    reached: Likeness
+    etched: Likeness
     gerchberg_saxton: Likeness
     refined: Likeness
     rounded: Likeness
@@ -86,7 +86,7 @@ def match_dots(
     first = _plate(camera, rounded(refined[best][0], levels), levels)
     return Match(
         plate=plate,
-        reached=likeness(plate.light, target),
+        etched=likeness(plate.light, target),
         gerchberg_saxton=likeness(phase_light(begun[best]), target),
         refined=likeness(phase_light(refined[best][0]), target),
         rounded=likeness(first.light, target),

@@ -132,7 +132,7 @@ def find_beams(
         points = half_disc(_SEARCH_RAYS)
         x, y = SEARCH_RADIUS * points.x.float(), SEARCH_RADIUS * points.y.float()
         heights = torch.linspace(0, radius_mm, _SEARCH_HEIGHTS)
-        tensors = optics.stopped(wavelengths_um[:, None]).to(torch.float32)
+        tensors = optics.stopped(wavelengths_um[:, None]).converted(torch.float32)
         rays = rays_from(labels_of_type(labels), x * 0, heights[:, None, None], x, y)
         passed = _to_scene(optics, tensors, rays).valid.any(1)
         top = torch.where(passed, y, -torch.inf).amax(1)

@@ -135,7 +135,7 @@ def render(
     waves = torch.from_numpy(response.wavelengths_um[[0, len(response.wavelengths_um) // 2, -1]])
     beams = find_beams(optics, labels, window.radius_mm, waves)
     light = light_at(optics, labels, beams, torch.zeros(1))[0]
-    tensors = optics.stopped(_wavelengths(response, settings)).to(settings.dtype)
+    tensors = optics.stopped(_wavelengths(response, settings)).converted(settings.dtype)
     job = _Job(texture, optics, window, settings, beams, (tensors.aspheric, tensors.grooves))
     numbers = (texture.values, labels.a, labels.b, light, *_fields(tensors))
     picture = _MeanOfPasses.apply(job, *numbers)  # type: ignore[no-untyped-call]

@@ -124,7 +124,7 @@ def trace_batch(
         problem.vignetting,
     )
     surface_rays: list[Rays] = []
-    landings = trace(tensors, rays, seen=surface_rays)
+    landings = trace(tensors, rays, surface_rays=surface_rays)
     return Traced(
         reference=reference,
         tensors=tensors,

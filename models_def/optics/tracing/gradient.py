@@ -114,7 +114,7 @@ class _Spec(NamedTuple):
 
     settings: TraceSettings
     engine: Engine
-    with_seen: bool
+    with_surfaces: bool
 
 
 def trace_tensors(
@@ -124,7 +124,7 @@ def trace_tensors(
     rays: State,
     fate: Tensor,
     *,
-    with_seen: bool = False,
+    with_surfaces: bool = False,
 ) -> Result:
     """Trace rays, differentiable by rays and lens (not twice, not in forward mode).
 
@@ -134,9 +134,9 @@ def trace_tensors(
         lens: Tensors of one type and device, broadcasting against the rays.
         rays: Of the same type and device.
         fate: int8.
-        with_seen: Whether `record.states` and `record.fates` of the result are filled.
+        with_surfaces: Whether `record.states` and `record.fates` of the result are filled.
     """
-    spec = _Spec(settings, engine, with_seen)
+    spec = _Spec(settings, engine, with_surfaces)
     flat: tuple[Tensor, ...] = _Trace.apply(spec, fate, *rays, *lens)  # type: ignore[no-untyped-call]
     head = 7 + settings.path
     return Result(
@@ -193,7 +193,7 @@ class _Trace(torch.autograd.Function):
             saved += [result.record.fate, *flat][: counts[-1]]
             path = [] if result.path is None else [result.path]
             parts.append(
-                [*result.end, result.record.fate, *path, *(flat if spec.with_seen else [])]
+                [*result.end, result.record.fate, *path, *(flat if spec.with_surfaces else [])]
             )
         out = tuple(_join(v, blocks) for v in zip(*parts, strict=True))
         ctx.save_for_backward(fate, *tensors, *saved)

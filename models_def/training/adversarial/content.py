@@ -75,9 +75,9 @@ def gram(features: Tensor) -> Tensor:
     return flat @ flat.transpose(1, 2) / (flat.shape[1] * flat.shape[2])
 
 
-def gram_loss(found: Tensor, wanted: Tensor) -> Tensor:
+def gram_loss(fake: Tensor, real: Tensor) -> Tensor:
     """Return the 1-norm of the difference of Gram matrices, eq. (3.7); the mean over the batch."""
-    return (gram(found) - gram(wanted)).abs().sum((1, 2)).mean()
+    return (gram(fake) - gram(real)).abs().sum((1, 2)).mean()
 
 
 def content_terms(views: Views, recipe: ContentRecipe, features: Features | None) -> Terms:
@@ -92,10 +92,10 @@ def content_terms(views: Views, recipe: ContentRecipe, features: Features | None
     if features is None or not recipe.looks:
         return terms
     with torch.no_grad():
-        wanted = features(views.real)
-    found = features(views.seen)
+        real = features(views.real)
+    fake = features(views.fake)
     if recipe.gram_weight:
-        terms["gram"] = recipe.gram_weight, gram_loss(found, wanted)
+        terms["gram"] = recipe.gram_weight, gram_loss(fake, real)
     if recipe.feature_weight:
-        terms["features"] = recipe.feature_weight, (found - wanted).square().mean()
+        terms["features"] = recipe.feature_weight, (fake - real).square().mean()
     return terms

@@ -88,7 +88,7 @@ class Opponents:
         plan = self.plan
         draw = torch.Generator().manual_seed(self._draw_seed * STEP_SEED + step)
         rng = np.random.default_rng((self._draw_seed, SHARP_SEED, step))
-        fake = views.seen.detach()
+        fake = views.fake.detach()
         for group in self.optimizer.param_groups:
             group["lr"] = plan.learning_rate * decay
         self.networks.requires_grad_(requires_grad=True)
@@ -113,7 +113,7 @@ class Opponents:
         return {
             self._label("adversarial", name): (
                 self.plan.weights[name],
-                self.plan.game.opinion(judge, views.real, views.seen),
+                self.plan.game.opinion(judge, views.real, views.fake),
             )
             for name, judge in self.networks.items()
         }

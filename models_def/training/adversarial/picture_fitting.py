@@ -109,15 +109,15 @@ def _check_files(request: FitRequest, schedule: ScheduleRecipe) -> None:
 
 def _credit(request: FitRequest, schedule: ScheduleRecipe) -> str:
     """Return the further training data of the weights, for the card."""
-    said = [f"; by the loss {schedule.loss}"]
+    parts = [f"; by the loss {schedule.loss}"]
     if schedule.content.looks and request.vgg is None:
-        said.append("random features in place of VGG-19")
+        parts.append("random features in place of VGG-19")
     elif request.vgg is not None:
         digest = file_digest(request.vgg)[:16]
-        said.append(f"VGG-19 features of {request.vgg.name} (sha256 {digest}...)")
-    said += _named("sharp pictures", request.sharp) + _named("real pairs", request.pairs)
-    return ", ".join(said)
+        parts.append(f"VGG-19 features of {request.vgg.name} (sha256 {digest}...)")
+    parts += _source("sharp pictures", request.sharp) + _source("real pairs", request.pairs)
+    return ", ".join(parts)
 
 
-def _named(what: str, folder: Path | None) -> list[str]:
+def _source(what: str, folder: Path | None) -> list[str]:
     return [] if folder is None else [f"{what} of {folder.name}"]

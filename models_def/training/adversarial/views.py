@@ -21,14 +21,14 @@ class Views:
         output: (b, 3, h, w) square-root domain.
         target: Likewise.
         judged: (b, 3, h, w) bool.
-        seen: (b, 3, h, w) sRGB of the output, in 0..1.
+        fake: (b, 3, h, w) sRGB of the output, in 0..1.
         real: Likewise of the target.
     """
 
     output: Tensor
     target: Tensor
     judged: Tensor
-    seen: Tensor
+    fake: Tensor
     real: Tensor
 
 
@@ -48,7 +48,7 @@ def make_views(output: Tensor, target: Tensor, weight: Tensor, to_rec709: Tensor
         output=root,
         target=true,
         judged=judged,
-        seen=to_display(root, to_rec709),
+        fake=to_display(root, to_rec709),
         real=to_display(true, to_rec709).detach(),
     )
 

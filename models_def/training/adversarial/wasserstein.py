@@ -50,8 +50,8 @@ def gradient_penalty(critic: Critic, real: Tensor, fake: Tensor, draw: torch.Gen
         draw: Of the place between them, one for each picture; on the CPU.
     """
     share = torch.rand(len(real), 1, 1, 1, generator=draw).to(real.device)
-    between = (share * real + (1 - share) * fake).detach().requires_grad_()
-    (gradient,) = torch.autograd.grad(critic(between).sum(), between, create_graph=True)
+    mixture = (share * real + (1 - share) * fake).detach().requires_grad_()
+    (gradient,) = torch.autograd.grad(critic(mixture).sum(), mixture, create_graph=True)
     steepness = gradient.flatten(1).square().sum(1).clamp(min=LEAST_SQUARE).sqrt()
     return (steepness - 1).square().mean()
 

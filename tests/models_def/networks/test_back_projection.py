@@ -31,15 +31,15 @@ def test_a_picture_becomes_four_times_as_fine() -> None:
     assert BackProjection(SMALL)(torch.rand(2, 1, 5, 7)).shape == (2, 1, 20, 28)
 
 
-@pytest.mark.parametrize("up", [True, False])
-def test_a_unit_adds_the_error_of_its_way_back(up: bool) -> None:
+@pytest.mark.parametrize("magnifies", [True, False])
+def test_a_unit_adds_the_error_of_its_way_back(magnifies: bool) -> None:
     """The equations written out with the layers of the unit."""
     torch.manual_seed(0)
-    unit = Projection(1, 4, up=up)
+    unit = Projection(1, 4, magnifies=magnifies)
     x = torch.rand(1, 4, 8, 8)
     first = unit.there(x)
     assert torch.allclose(unit(x), first + unit.error(unit.back(first) - x))
-    assert unit(x).shape[-1] == (32 if up else 2)
+    assert unit(x).shape[-1] == (32 if magnifies else 2)
 
 
 def test_every_unit_sees_all_earlier_maps() -> None:

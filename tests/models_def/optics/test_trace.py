@@ -64,7 +64,9 @@ def test_rays_land_on_the_surface(even_asphere: tuple[float, ...]) -> None:
     tensors = _tensors(surface)
     y = torch.linspace(-9, 9, 41, dtype=torch.float64)
     seen: list = []
-    trace(tensors, launch(torch.full_like(y, 0.5), y, torch.tensor(0.2), math.inf), seen=seen)
+    trace(
+        tensors, launch(torch.full_like(y, 0.5), y, torch.tensor(0.2), math.inf), surface_rays=seen
+    )
     on = seen[0]
     assert bool(on.valid.all())
     height = sag(_column(1 / 25)[0], _column(-0.7)[0], _column(*even_asphere), on.x**2 + on.y**2)

@@ -100,13 +100,13 @@ def test_8_bit_values_are_decoded_by_the_srgb_curve():
 
 
 def test_scenes_behind_the_first_ones_are_others():
-    def drawn(**first):
+    def drawn_shares(**first):
         source = open_source(None, picture_share=0.0, scenes=2, scene_px=32, **first)
         return {float(source.draw_crop(np.random.default_rng(i), 32).sum()) for i in range(8)}
 
-    assert drawn() == drawn(first_scene=0)
-    assert len(drawn()) == 2
-    assert not drawn() & drawn(first_scene=-2)
+    assert drawn_shares() == drawn_shares(first_scene=0)
+    assert len(drawn_shares()) == 2
+    assert not drawn_shares() & drawn_shares(first_scene=-2)
 
 
 @pytest.mark.parametrize("side", [16, 64, 200])
@@ -147,17 +147,21 @@ def test_missing_empty_and_broken_sources_are_refused(tmp_path):
 
 
 def test_a_source_draws_edges_and_nights_as_often_as_it_is_told() -> None:
-    def drawn(shares: DrawnShares) -> list[np.ndarray]:
-        source = open_source(None, picture_share=0, scenes=2, scene_px=96, drawn=shares)
+    def drawn_shares(shares: DrawnShares) -> list[np.ndarray]:
+        source = open_source(None, picture_share=0, scenes=2, scene_px=96, drawn_shares=shares)
         rng = np.random.default_rng(0)
         return [source.draw_crop(rng, 48) for _ in range(60)]
 
-    flat = [np.median(np.abs(np.diff(crop[1]))) < 1e-6 for crop in drawn(DrawnShares(edge=0.5))]
+    flat = [
+        np.median(np.abs(np.diff(crop[1]))) < 1e-6 for crop in drawn_shares(DrawnShares(edge=0.5))
+    ]
     assert 15 < sum(flat) < 45
-    assert not any(np.median(np.abs(np.diff(crop[1]))) < 1e-6 for crop in drawn(DrawnShares()))
-    dark = [np.median(crop) < 0.01 for crop in drawn(DrawnShares(night=1.0))]
+    assert not any(
+        np.median(np.abs(np.diff(crop[1]))) < 1e-6 for crop in drawn_shares(DrawnShares())
+    )
+    dark = [np.median(crop) < 0.01 for crop in drawn_shares(DrawnShares(night=1.0))]
     assert np.mean(dark) > 0.5
-    patches = drawn(DrawnShares(patch=1.0))
+    patches = drawn_shares(DrawnShares(patch=1.0))
     deepest = min(float((crop.min(axis=0) / crop.max(axis=0)).min()) for crop in patches)
     assert deepest < 0.05, "no deep primary among the patches"
     assert all(np.median(np.abs(np.diff(crop[1]))) < 1e-6 for crop in patches)
@@ -166,7 +170,7 @@ def test_a_source_draws_edges_and_nights_as_often_as_it_is_told() -> None:
 def test_lamps_are_put_into_as_many_crops_as_it_is_told(tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "grey.png"), np.full((64, 64, 3), 90, np.uint8))
     source = open_source(
-        tmp_path, picture_share=1, scenes=1, scene_px=64, drawn=DrawnShares(lamp=0.5)
+        tmp_path, picture_share=1, scenes=1, scene_px=64, drawn_shares=DrawnShares(lamp=0.5)
     )
     rng = np.random.default_rng(0)
     lit = [source.draw_crop(rng, 48).max() > 1 for _ in range(60)]

@@ -32,7 +32,7 @@ ROLES = ("first", "second")
 
 
 def made(roles=ROLES, **changes):
-    common = common_tables(TABLE | changes, own=(), roles=roles)
+    common = common_tables(TABLE | changes, kind_keys=(), roles=roles)
     return Recipe(
         name=common.name,
         kind=common.kind,

@@ -2,7 +2,7 @@
 
 from subprocess import CompletedProcess
 
-from tools.evidence.scrubbed import scrubbed, told_values
+from tools.evidence.scrubbed import printed_values, scrubbed
 
 
 def test_clocks_memory_versions_and_folders_are_left_out() -> None:
@@ -26,5 +26,5 @@ def test_clocks_memory_versions_and_folders_are_left_out() -> None:
 
 def test_a_command_may_print_several_values_and_fail() -> None:
     told = CompletedProcess([], 1, stdout='{"a": 1}\n{\n"b": 2\n}\nno JSON\n', stderr="x\nwhy\n")
-    found = told_values(told, ())
+    found = printed_values(told, ())
     assert found == {"exit": 1, "json": [{"a": 1}, {"b": 2}, "no JSON"], "error": ["why"]}

@@ -36,8 +36,8 @@ def test_the_star_has_two_equal_arms_of_the_stated_share_and_angle(fading: Fadin
 def test_clean_optics_leave_noise_alone() -> None:
     scene = exposed_scene("night:6", 64, 80)
     shot = photographed(scene, None)
-    assert 45 < psnr_db(shot.seen, shot, 0.9) < 56
-    assert shot.seen.max() == 1
+    assert 45 < psnr_db(shot.picture, shot, 0.9) < 56
+    assert shot.picture.max() == 1
 
 
 def test_a_photograph_and_its_truth_are_written_and_nothing_is_replaced(tmp_path: Path) -> None:

@@ -67,7 +67,7 @@ def test_a_photograph_is_taken_restored_and_cut_alike(
     monkeypatch.setattr(views, "SCENES", tmp_path)
     monkeypatch.setattr(views, "SIDE_PX", SIDE)
     monkeypatch.setattr(views, "BORDER_PX", 2)
-    view = views.Photograph(scene="scene.png", of="Noise", middle=(0.9, 0.1))
+    view = views.Photograph(scene="scene.png", subject="Noise", middle=(0.9, 0.1))
     made = view(str(write_tiny_bundle(tmp_path)))
     check(made, SIDE)
     assert "Noise" in next(iter(made.rows))
@@ -94,7 +94,7 @@ def test_photons_are_counted_and_made_finer(
 ) -> None:
     write_scene(tmp_path)
     monkeypatch.setattr(views, "SCENES", tmp_path)
-    view = views.Photons(scene="scene.png", of="Noise", photons=3000.0)("spad-sr")
+    view = views.Photons(scene="scene.png", subject="Noise", photons=3000.0)("spad-sr")
     ((title, pictures),) = view.rows.items()
     assert "64x32" in title
     assert {picture.shape for picture in pictures.values()} == {(3, 128, 256)}

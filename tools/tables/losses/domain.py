@@ -57,8 +57,8 @@ class Domain:
         scores = [
             (
                 _psnr_db(views),
-                float(ssim(views.seen, views.real)),
-                float(gram_loss(features(views.seen), features(views.real))),
+                float(ssim(views.fake, views.real)),
+                float(gram_loss(features(views.fake), features(views.real))),
             )
             for views in self._views(restore)
         ]
@@ -79,7 +79,7 @@ class Domain:
 
 
 def _psnr_db(views: Views) -> float:
-    error = max(float((views.seen - views.real).square().mean()), LEAST_ERROR)
+    error = max(float((views.fake - views.real).square().mean()), LEAST_ERROR)
     return -10 * float(np.log10(error))
 
 

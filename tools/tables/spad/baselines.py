@@ -179,7 +179,7 @@ def read_baseline(runs: Path, role: str, pictures: Sequence[FloatArray]) -> Base
     recipe = recipe_of(checkpoint)
     assert isinstance(recipe, SpadRecipe)
     sampling = sampling_of(recipe, PART.prepare(recipe, path.parent, path.parent))
-    slim = {name: round_mantissa(value) for name, value in checkpoint.chosen.items()}
+    slim = {name: round_mantissa(value) for name, value in checkpoint.exported.items()}
     network = with_plain_borders(load_network(replace(checkpoint, average=slim)))
     loss_db = _loss_db(load_network(checkpoint), network, sampling, pictures)
     if loss_db > MOST_LOSS_DB:

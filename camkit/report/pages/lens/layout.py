@@ -74,7 +74,7 @@ def _ray_paths(facts: LensFacts, field: int) -> tuple[Tensor, Tensor]:
     slopes = facts.slopes[field : field + 1]
     beams = launch_beams(lens, slopes, wave, fan, facts.pupil.definition)
     history: list[Rays] = []
-    last_rays = trace(beams.tensors, beams.rays, seen=history)
+    last_rays = trace(beams.tensors, beams.rays, surface_rays=history)
     z, y = [], []
     vertices = _vertices(lens)
     for rays, place in zip([*history, last_rays], vertices, strict=True):

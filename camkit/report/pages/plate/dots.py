@@ -57,7 +57,7 @@ def write_dots(match: Match, target: FloatGrid, folder: Path) -> dict[str, Any]:
         if path not in files:
             path.unlink()
     return {
-        **match.reached.to_json(),
+        **match.etched.to_json(),
         "levels": plate.levels,
         "cell_um": plate.camera.cell_um,
         "step_um": plate.etching.step_um,

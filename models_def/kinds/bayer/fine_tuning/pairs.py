@@ -74,7 +74,7 @@ class PairSamples:
             for patches in zip(*cut, strict=True)
         )
         weight = torch.from_numpy(self.weights[indices])
-        return Batch(inputs=LAYOUT.named(planes), target=targets, weight=weight)
+        return Batch(inputs=LAYOUT.by_name(planes), target=targets, weight=weight)
 
     def mixer(self, share: float, seed: int) -> Mix:
         """Return a function that replaces the first patches of a batch by patches of real pairs.

@@ -200,7 +200,7 @@ class _Studio:
             sources.pictures[part],
             picture_share=1.0 if self._choosing else None,
             first_scene=-data.procedural_scenes if self._choosing else 0,
-            drawn=DrawnShares() if self._choosing else data.drawn_shares,
+            drawn_shares=DrawnShares() if self._choosing else data.drawn_shares,
         )
 
     def fill(self, store: Tiles, number: int, copy: int) -> None:

@@ -28,11 +28,11 @@ def test_eight_levels_are_nearer_to_the_psf_than_the_thesis_was(name: str) -> No
     began = time.process_time()
     found = match_dots(target, DotCamera(), 8, np.random.default_rng(0), starts=1)
     assert time.process_time() - began < 60
-    assert found.reached.correlation >= 0.9996
-    assert found.reached.rmse <= 0.0061
-    assert found.reached.efficiency >= 0.85
+    assert found.etched.correlation >= 0.9996
+    assert found.etched.rmse <= 0.0061
+    assert found.etched.efficiency >= 0.85
     # descent wins back what rounding loses
-    assert found.rounded.rmse > 3 * found.reached.rmse
+    assert found.rounded.rmse > 3 * found.etched.rmse
     assert found.gerchberg_saxton.rmse > found.refined.rmse
     # and so the array sees it, through 16x16 units and its round areas
     seen = likeness(effective_psf(found.plate.height_um, DotCamera()), target)
@@ -45,7 +45,7 @@ def test_one_seed_gives_one_plate() -> None:
     target = to_target(gaussian_psf(1.84))
     one, two = (match_dots(target, SMALL, 4, np.random.default_rng(5), starts=1) for _ in range(2))
     np.testing.assert_array_equal(one.plate.level, two.plate.level)
-    assert one.reached == two.reached
+    assert one.etched == two.etched
 
 
 @pytest.mark.parametrize("levels", [-2, 0, 1, 6, 128])

@@ -19,7 +19,7 @@ def _ball(curvature: float) -> SurfaceTensors:
 def _pays(lens: SurfaceTensors, y: torch.Tensor) -> tuple[torch.Tensor, Rays]:
     launched = rays_at(torch.zeros_like(y), y, 0.0)
     seen: list[Rays] = []
-    landed = trace(lens, launched, seen=seen)
+    landed = trace(lens, launched, surface_rays=seen)
     return ray_penalty(lens, launched, seen), landed
 
 
@@ -76,7 +76,7 @@ def test_an_edge_lies_at_the_height_of_living_rays() -> None:
     lens = replace(lens, thickness_mm=lens.thickness_mm.requires_grad_())
     y = torch.tensor([3.0, 50.0], dtype=F64)
     seen: list[Rays] = []
-    landed = trace(lens, rays_at(0 * y, y, 0.0), seen=seen)
+    landed = trace(lens, rays_at(0 * y, y, 0.0), surface_rays=seen)
     assert landed.fate.tolist() == [Fate.VALID, Fate.MISSED]
     edges = edge_gaps(lens, [reach_rho(rays, lens.thickness_mm[0]) for rays in seen])
     sag = 20 - math.sqrt(20**2 - 3**2)

@@ -100,11 +100,11 @@ def test_adjoint_equals_autograd_of_an_unrolled_trace(lens: SurfaceTensors) -> N
 
 
 def test_gradient_flows_from_the_rays_on_each_surface() -> None:
-    """`seen` is differentiable too, for limits on heights and angles."""
+    """`surface_rays` are differentiable too, for limits on heights and angles."""
     free, leaves = _free(cooke_tensors())
     x, y, _ = _bundle(7)
     seen: list[Rays] = []
-    trace(free, rays_at(x, y, 0.2), seen=seen)
+    trace(free, rays_at(x, y, 0.2), surface_rays=seen)
     total = sum((on.y**2 + on.z * on.m).sum() for on in seen)
     grads = torch.autograd.grad(total, leaves)
     step = 1e-6
@@ -116,7 +116,11 @@ def test_gradient_flows_from_the_rays_on_each_surface() -> None:
                 moved[i] += sign * step
                 name = LEAVES[next(j for j, v in enumerate(leaves) if v is leaf)]
                 there: list[Rays] = []
-                trace(replace(cooke_tensors(), **{name: moved}), rays_at(x, y, 0.2), seen=there)
+                trace(
+                    replace(cooke_tensors(), **{name: moved}),
+                    rays_at(x, y, 0.2),
+                    surface_rays=there,
+                )
                 values.append(float(sum((on.y**2 + on.z * on.m).sum() for on in there)))
             difference = (values[0] - values[1]) / (2 * step)
             assert float(grad[i]) == pytest.approx(difference, rel=1e-5, abs=1e-6)
@@ -220,7 +224,7 @@ def test_no_lens_of_the_box_gives_nan_in_value_or_gradient(seed: int, single: bo
     n = 1 / torch.sqrt(1 + slope**2)
     rays = replace(rays_at(x, y, 0.0), m=slope * n, n=n)
     seen: list[Rays] = []
-    landed = trace(lens, rays, seen=seen, path=True)
+    landed = trace(lens, rays, surface_rays=seen, path=True)
     assert set(landed.fate.tolist()) <= set(Fate)
     total = sum((on.x**2 + on.y + on.z * on.m).sum() for on in (landed, *seen))
     total = total + landed.path_mm.sum()

@@ -167,7 +167,7 @@ def test_single_precision_gives_the_same_fates_but_at_edges() -> None:
     single = Rays(
         **{n: getattr(rays, n).float() for n in ("x", "y", "z", "l", "m", "n")}, fate=rays.fate
     )
-    found, wanted = refract(tensors.to(torch.float32), single, 0), refract(tensors, rays, 0)
+    found, wanted = refract(tensors.converted(torch.float32), single, 0), refract(tensors, rays, 0)
     assert (found.fate == wanted.fate).float().mean() > 0.998
     both = found.valid & wanted.valid & ((found.z - wanted.z).abs() < 1e-2)
     assert torch.allclose(found.z[both].double(), wanted.z[both], atol=1e-5)

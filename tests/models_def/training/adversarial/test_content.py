@@ -96,7 +96,7 @@ def test_only_terms_that_count_are_computed():
     terms = content_terms(seen, recipe, Relu32(None))
     assert {name: weight for name, (weight, _) in terms.items()} == {"gram": 2.0, "features": 0.5}
     phi = Relu32(None)
-    expected = gram_loss(phi(seen.seen), phi(seen.real))
+    expected = gram_loss(phi(seen.fake), phi(seen.real))
     assert float(terms["gram"][1]) == pytest.approx(float(expected), rel=1e-5)
     (_, l1) = content_terms(seen, ContentRecipe(), None)["l1"]
     assert float(l1) == pytest.approx(float(pixel_loss(seen)))

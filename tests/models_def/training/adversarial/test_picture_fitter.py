@@ -49,7 +49,7 @@ def batch(seed=0):
     draw = torch.Generator().manual_seed(seed)
     planes = torch.rand(2, 6, 32, 32, generator=draw)
     target = torch.rand(2, 3, 32, 32, generator=draw)
-    return Batch(inputs=LAYOUT.named(planes), target=target, weight=torch.ones(2, 3))
+    return Batch(inputs=LAYOUT.by_name(planes), target=target, weight=torch.ones(2, 3))
 
 
 def equal(one, other):

@@ -37,7 +37,7 @@ def batch_of(recipe, role):
     layout = layout_of(recipe, role)
     planes = torch.rand(2, layout.input_channels, 32, 32)
     target = torch.rand(2, layout.output_channels, 32, 32) * (1 if role == "split" else 3)
-    return Batch(inputs=layout.named(planes), target=target, weight=torch.ones(target.shape[:2]))
+    return Batch(inputs=layout.by_name(planes), target=target, weight=torch.ones(target.shape[:2]))
 
 
 @pytest.mark.parametrize(

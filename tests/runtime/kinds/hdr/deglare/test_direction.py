@@ -15,7 +15,7 @@ SCENE = exposed_scene("night:6", 192, 256)
 
 def _found(angle_deg: float | None, noise: int = 0) -> Direction | None:
     star = None if angle_deg is None else two_point_star(math.radians(angle_deg), "exponential")
-    seen = photographed(SCENE, star, noise).seen
+    seen = photographed(SCENE, star, noise).picture
     overview = overview_of(lambda a, b: seen[:, a:b], *seen.shape[1:], 0.9)
     return find_direction(overview, LEAST, MOST)
 

@@ -43,33 +43,33 @@ def shot() -> Shot:
 
 @pytest.fixture(scope="module")
 def glare(shot: Shot) -> Glare:
-    return _found(shot.seen)
+    return _found(shot.picture)
 
 
 def test_a_night_scene_gains_six_decibels(shot: Shot, glare: Glare) -> None:
-    cleared = _cleared(glare, shot.seen)
-    assert psnr_db(cleared, shot, 0.9) > psnr_db(shot.seen, shot, 0.9) + 6
+    cleared = _cleared(glare, shot.picture)
+    assert psnr_db(cleared, shot, 0.9) > psnr_db(shot.picture, shot, 0.9) + 6
 
 
 def test_lights_are_untouched_and_nothing_becomes_brighter(shot: Shot, glare: Glare) -> None:
-    cleared = _cleared(glare, shot.seen)
-    light = (shot.seen >= 0.9).any(axis=0)
+    cleared = _cleared(glare, shot.picture)
+    light = (shot.picture >= 0.9).any(axis=0)
     assert light.sum() > 100
-    np.testing.assert_array_equal(cleared[:, light], shot.seen[:, light])
-    assert (cleared <= shot.seen).all()
+    np.testing.assert_array_equal(cleared[:, light], shot.picture[:, light])
+    assert (cleared <= shot.picture).all()
     assert cleared.min() >= 0
 
 
 def test_no_pixel_ends_below_its_smooth_surroundings(shot: Shot, glare: Glare) -> None:
     assert glare.slant is not None
     floor = glare.slant.resampled(glare.floor, 0, SHAPE[0])
-    assert (_cleared(glare, shot.seen) >= np.minimum(shot.seen, floor)).all()
+    assert (_cleared(glare, shot.picture) >= np.minimum(shot.picture, floor)).all()
     assert floor.max() > 0
 
 
 def test_rows_painted_in_bands_are_those_of_the_whole(shot: Shot, glare: Glare) -> None:
-    whole = _cleared(glare, shot.seen)
-    parts = shot.seen.copy()
+    whole = _cleared(glare, shot.picture)
+    parts = shot.picture.copy()
     for top in range(0, SHAPE[0], 7):
         glare.paint(parts[:, top : top + 7], top, (1.0, 1.0, 1.0))
     np.testing.assert_array_equal(parts, whole)
@@ -79,15 +79,15 @@ def test_gains_multiply_the_streaks(shot: Shot, glare: Glare) -> None:
     gains = (2.0, 1.0, 0.5)
     gain = np.array(gains, np.float32)[:, None, None]
     np.testing.assert_array_equal(
-        _cleared(glare, shot.seen * gain, gains), _cleared(glare, shot.seen) * gain
+        _cleared(glare, shot.picture * gain, gains), _cleared(glare, shot.picture) * gain
     )
 
 
 def test_frames_with_other_noise_differ_by_little_more_than_their_noise(shot: Shot) -> None:
     other = _shot(seed=1)
-    made = [_cleared(_found(one.seen), one.seen) for one in (shot, other)]
-    dim = (shot.seen.max(axis=0) < 0.9) & (other.seen.max(axis=0) < 0.9)
-    noise = float(np.std((shot.seen - other.seen)[:, dim]))
+    made = [_cleared(_found(one.picture), one.picture) for one in (shot, other)]
+    dim = (shot.picture.max(axis=0) < 0.9) & (other.picture.max(axis=0) < 0.9)
+    noise = float(np.std((shot.picture - other.picture)[:, dim]))
     assert float(np.std((made[0] - made[1])[:, dim])) < 1.3 * noise
 
 
@@ -121,4 +121,4 @@ def test_the_work_can_be_stopped(shot: Shot) -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        find_glare(_opened(shot.seen), *SHAPE, SETTINGS, stop)
+        find_glare(_opened(shot.picture), *SHAPE, SETTINGS, stop)

@@ -47,7 +47,7 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
 @pytest.fixture(scope="module")
 def seen() -> FloatArray:
     scene = exposed_scene("night:6", *SHAPE)
-    return photographed(scene, two_point_star(math.radians(-5)), 3).seen
+    return photographed(scene, two_point_star(math.radians(-5)), 3).picture
 
 
 def _capture(pipeline: Pipeline, samples: NDArray[Any]) -> Capture:
