@@ -35,8 +35,6 @@ BRIGHT_FROM: Final = 0.7
 """Of the stabilised value of `BRIGHT`: below it a pixel may become as dark as it will."""
 BRIGHT_NOISE: Final = 8.0
 """Standard deviations of the noise by which such a pixel may become darker: grain is removed."""
-MASK_REACH_PX: Final = BOUND_REACH_PX + NEAR_PX[1]
-"""From a pixel to the farthest clipped sample that it depends on."""
 
 
 class LightBound(Entry):

@@ -20,8 +20,6 @@ CORE_PX: Final = 3.0
 """A star of the scenes ends within it."""
 ANNULUS_PX: Final = 12.0
 RING_PX: Final = 16.0
-APART_PX: Final = ANNULUS_PX + RING_PX
-"""Stars at least this far from each other do not disturb each other's numbers."""
 LEAST_STAR: Final = 0.02
 """Of the brightest pixel of a picture of stars: the brightest of a star."""
 MEDIAN_OF_NORMAL: Final = 0.6745
@@ -50,8 +48,8 @@ def satellites(picture: FloatArray, truth: FloatArray) -> Satellites:
 
     Args:
         picture: (3, h, w) linear.
-        truth: (3, h, w) linear: stars on a dark sky, `APART_PX` from each other. Those that have
-            no sky all around them are left out.
+        truth: (3, h, w) linear: stars on a dark sky, `ANNULUS_PX` and `RING_PX` together from each
+            other. Those that have no sky all around them are left out.
     """
     stars = find_stars(truth)
     noise = _noise(picture, stars)

@@ -1,4 +1,4 @@
-"""Starts of a joint design: the lens as given, disturbed, or the best of many starts.
+"""Starts of a joint design: the lens as given, or the best of many starts.
 
 A joint design descends from its start, and its pictures carry little information about a lens whose
 rays are lost. Damped least squares on spots costs a fraction of a second a start, handles stiff and
@@ -15,7 +15,6 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import half_disc
 from camkit.models_def.optics.search.improvement import improve
 from camkit.models_def.optics.search.problem import Problem
@@ -115,26 +114,3 @@ def best_judged(lenses: Tensor, judge: Callable[[Tensor], float]) -> Tensor:
         return lenses[0]
     marks = [judge(scaled) for scaled in lenses]
     return lenses[int(np.nanargmax(marks))]
-
-
-def disturbed(
-    lens: Lens, rng: np.random.Generator, *, curvature_share: float, focus_mm: float
-) -> Lens:
-    """Return a lens with random errors of every curvature and of its sensor's place.
-
-    Args:
-        lens: As it should be.
-        rng: Of the draws.
-        curvature_share: Each curvature is multiplied by 1 + u, u uniform in +- this.
-        focus_mm: The sensor is moved by a length uniform in +- this.
-    """
-    count = len(lens.surfaces)
-    factors = 1 + rng.uniform(-curvature_share, curvature_share, count)
-    moved_mm = float(rng.uniform(-focus_mm, focus_mm))
-    surfaces = [
-        replace(s, curvature_per_mm=s.curvature_per_mm * float(factor))
-        for s, factor in zip(lens.surfaces, factors, strict=True)
-    ]
-    last = surfaces[-1]
-    surfaces[-1] = replace(last, thickness_mm=last.thickness_mm + moved_mm)
-    return replace(lens, surfaces=tuple(surfaces))

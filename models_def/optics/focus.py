@@ -5,7 +5,6 @@ on a sensor moved by s is x + s l / n, and a path to a point on it grows linearl
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final, Literal, get_args
 
@@ -15,12 +14,7 @@ from torch import Tensor
 from camkit.errors import ContractError
 from camkit.models_def.optics.paraxial import paraxial_image
 from camkit.models_def.optics.prescription import Lens, with_focus_shift
-from camkit.models_def.optics.pupil import (
-    PupilDefinition,
-    PupilSamples,
-    half_disc,
-    pupil_rays,
-)
+from camkit.models_def.optics.pupil import half_disc, pupil_rays
 from camkit.models_def.optics.trace import Rays, surface_tensors, trace
 
 FocusMerit = Literal["paraxial", "spot", "wavefront"]
@@ -28,15 +22,7 @@ FOCUS_MERITS: Final[tuple[FocusMerit, ...]] = get_args(FocusMerit)
 _RAYS: Final = 256
 
 
-def focus_shift_mm(
-    lens: Lens,
-    merit: FocusMerit,
-    *,
-    field_weights: Sequence[float] | None = None,
-    wavelength_weights: Sequence[float] | None = None,
-    samples: PupilSamples | None = None,
-    definition: PupilDefinition = "stop",
-) -> float:
+def focus_shift_mm(lens: Lens, merit: FocusMerit) -> float:
     """Return the distance by which the sensor should move away from the lens.
 
     Args:
@@ -45,30 +31,23 @@ def focus_shift_mm(
             square radius about the centroid of all wavelengths of a field. `wavefront`: the
             least variance of the wavefront, tilt of each field and piston of each wavelength
             removed.
-        field_weights: One per field; equal by default.
-        wavelength_weights: One per wavelength; equal by default.
-        samples: Of the pupil; 256 stratified points of its half by default.
-        definition: See `pupil`.
 
     Raises:
-        ContractError: If the merit or the number of weights is wrong, or no ray arrives.
+        ContractError: If the merit is wrong, or no ray arrives.
     """
     if merit not in FOCUS_MERITS:
         raise ContractError(f"the merit must be one of {', '.join(FOCUS_MERITS)}; got {merit}")
     if merit == "paraxial":
         return paraxial_image(lens).distance_mm - lens.surfaces[-1].thickness_mm
-    pupil = half_disc(_RAYS) if samples is None else samples
     slopes = torch.tan(torch.tensor(lens.field_angles_rad, dtype=torch.float64))
     waves = torch.tensor(lens.wavelengths_um, dtype=torch.float64)
     with torch.no_grad():
         tensors = surface_tensors(lens, waves[:, None])
         slope = slopes[:, None, None].expand(-1, len(waves), 1)
-        rays, weight = pupil_rays(lens, tensors, pupil, slope, definition=definition)
+        rays, weight = pupil_rays(lens, tensors, half_disc(_RAYS), slope, definition="stop")
         rays = replace(rays, path_mm=launch_path_mm(rays, lens.object_distance_mm))
         landings = trace(tensors, rays, path=True)
         weight = torch.where(landings.valid, weight, 0.0)
-        weight = weight * _weights(field_weights, len(slopes), "field")[:, None, None]
-        weight = weight * _weights(wavelength_weights, len(waves), "wavelength")[:, None]
         if not bool(weight.sum() > 0):
             raise ContractError(f"no ray of {lens.name} reaches the sensor; it cannot be focused")
         return _spot_shift(landings, weight) if merit == "spot" else _wave_shift(landings, weight)
@@ -90,14 +69,6 @@ def launch_path_mm(rays: Rays, object_distance_mm: float) -> Tensor:
     if math.isinf(object_distance_mm):
         return rays.x * rays.l + rays.y * rays.m + rays.z * rays.n
     return (rays.z + object_distance_mm) / rays.n
-
-
-def _weights(weights: Sequence[float] | None, count: int, what: str) -> Tensor:
-    if weights is None:
-        return torch.ones(count, dtype=torch.float64)
-    if len(weights) != count or not all(w >= 0 for w in weights):
-        raise ContractError(f"expected {count} {what} weights >= 0; got {list(weights)}")
-    return torch.tensor(weights, dtype=torch.float64)
 
 
 def _spot_shift(landings: Rays, weight: Tensor) -> float:

@@ -23,10 +23,10 @@ from camkit.models_def.optics.render.monte_carlo import Sampling, render
 from camkit.models_def.optics.render.psf_map import MapGrid, render_by_map, trace_map
 from camkit.models_def.optics.render.texture import Texture
 from camkit.models_def.optics.render.texture_alignment import averaged, fit_alignment
-from camkit.models_def.optics.render.window import centred_window
 from camkit.models_def.optics.spot import slopes_for_heights
 from camkit.models_def.optics.trace import Rays, SurfaceTensors, trace
 from camkit.scenes import procedural_scene
+from tests.models_def.optics.render.centred import centred_window
 
 DUET = Path(__file__).parents[2] / "models_def" / "prescriptions" / "duet.toml"
 GREEN = ChannelResponse(wavelengths_um=np.array([0.54]), response=np.ones((3, 1)), source="test")

@@ -10,7 +10,7 @@ capture confirms what a method added, above 0 it denies it. Detail that the opti
 is denied by no capture; only the truth knows it.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -38,7 +38,6 @@ WORST: Final = 16
 TRUTH: Final = "truth"
 """The method whose chi^2 must be about 1."""
 PLANTED: Final = " planted"
-Tell = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,5 +11,5 @@ In the order in which data flows (every result states its pupil, see `camkit...o
 - `wavefront`: optical path differences at the exit pupil
 - `wave_psf`: the diffraction PSF summed from them
 - `mtf`: contrast from rays or from a PSF, and its diffraction limit
-- `psf_model`: whether a lens needs waves, and the cheaper PSF that is right
+- `psf_model`: whether a lens needs waves, and why
 """

@@ -9,10 +9,7 @@ from torch import Tensor
 from camkit.models_def.optics.analysis.first_order import airy_radius_mm
 from camkit.models_def.optics.analysis.sampling import Pupil
 from camkit.models_def.optics.analysis.spots import rms_about_centroid, spot_diagram
-from camkit.models_def.optics.analysis.wave_psf import trace_wave_psf
 from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.psf import TracedPsf, trace_psf
-from camkit.models_def.optics.spot import chief_heights
 from camkit.units import UM_PER_MM
 
 PsfRegime = Literal["geometric", "wave"]
@@ -64,26 +61,3 @@ def psf_model(lens: Lens, slopes: Tensor, wavelengths_um: Tensor) -> PsfModel:
     if not bool(torch.isfinite(ratio).any()):
         reason = "geometric: no ray arrives at any field, so there is nothing to compare"
     return PsfModel(regime=regime, blur_mm=blur, airy_mm=airy, reason=reason)
-
-
-def lens_psf(
-    lens: Lens, slopes: Tensor, wavelengths_um: Tensor, size_px: int, pitch_um: float
-) -> TracedPsf:
-    """Return the PSF of fields by the cheaper model that is right, every ray aimed at the stop.
-
-    Args:
-        lens: The prescription.
-        slopes: (field,), tan of the field angles.
-        wavelengths_um: (wavelength,).
-        size_px: Odd kernel side.
-        pitch_um: Sensor pitch.
-
-    Returns:
-        Kernels (field, wavelength, size, size) as `psf.trace_psf` gives them.
-
-    Raises:
-        ContractError: If a chief ray is lost, or no light falls into a kernel.
-    """
-    if psf_model(lens, slopes, wavelengths_um).regime == "wave":
-        return trace_wave_psf(lens, slopes, wavelengths_um, size_px, pitch_um)
-    return trace_psf(lens, chief_heights(lens, slopes), wavelengths_um, size_px, pitch_um)

@@ -10,7 +10,6 @@ from torch import Tensor
 from camkit.errors import ContractError
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.search.variables import FreeLens
 from camkit.models_def.optics.trace import SurfaceTensors, surface_tensors
 
 
@@ -63,35 +62,4 @@ def lens_optics(lens: Lens) -> Optics:
         stop_radius_mm=paraxial_data(lens).stop_semi_diameter_mm,
         object_distance_mm=lens.object_distance_mm,
         reference_wavelength_um=lens.reference_wavelength_um,
-    )
-
-
-def free_optics(free: FreeLens, scaled: Tensor, object_distance_mm: float) -> Optics:
-    """Return the optics of a lens of a search, with gradients to its free numbers.
-
-    Args:
-        free: The lens and what is free.
-        scaled: (variable,), in 0..1.
-        object_distance_mm: From the first vertex.
-    """
-
-    def tensors(wavelengths_um: Tensor) -> SurfaceTensors:
-        tensors_of = free.tensors(scaled[None], wavelengths_um.flatten())
-        return replace(
-            tensors_of,
-            curvature_per_mm=tensors_of.curvature_per_mm.flatten(),
-            conic=tensors_of.conic.flatten(),
-            even_asphere=tensors_of.even_asphere.flatten(1),
-            thickness_mm=tensors_of.thickness_mm.flatten(),
-            semi_diameter_mm=tensors_of.semi_diameter_mm.flatten(),
-            index=tensors_of.index.reshape(-1, *wavelengths_um.shape),
-        )
-
-    present = free.lens_at(scaled.detach())
-    return Optics(
-        tensors=tensors,
-        stop=free.lens.stop,
-        stop_radius_mm=paraxial_data(present).stop_semi_diameter_mm,
-        object_distance_mm=object_distance_mm,
-        reference_wavelength_um=free.lens.reference_wavelength_um,
     )

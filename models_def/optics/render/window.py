@@ -55,18 +55,6 @@ class Window:
         return self.top_mm + rows * self.pitch_mm, self.left_mm + columns * self.pitch_mm
 
 
-def centred_window(height_px: int, width_px: int, pitch_um: float) -> Window:
-    """Return a window whose middle lies on the axis."""
-    pitch_mm = pitch_um / UM_PER_MM
-    return Window(
-        height_px=height_px,
-        width_px=width_px,
-        pitch_um=pitch_um,
-        top_mm=-(height_px - 1) / 2 * pitch_mm,
-        left_mm=-(width_px - 1) / 2 * pitch_mm,
-    )
-
-
 def corner_window(height_px: int, width_px: int, pitch_um: float) -> Window:
     """Return a window whose first corner lies on the axis: one quadrant of a sensor."""
     half_mm = pitch_um / UM_PER_MM / 2

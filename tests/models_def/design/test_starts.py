@@ -13,7 +13,6 @@ from camkit.models_def.design.starts import (
     Starts,
     best_judged,
     best_starts,
-    disturbed,
 )
 from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.paraxial import paraxial_data
@@ -33,7 +32,13 @@ def far_off(recipe: DesignRecipe, lens: Lens, seed: int) -> Problem:
     optics = replace(recipe.optics, efl_mm=50.0, solved_surface=4)
     given = replace(recipe, variables=(*wide, *recipe.variables), optics=optics)
     rng = np.random.default_rng(seed)
-    return problem_of(given, disturbed(lens, rng, curvature_share=0.5, focus_mm=2.0))
+    factors = 1 + rng.uniform(-0.5, 0.5, len(lens.surfaces))
+    *surfaces, last = (
+        replace(s, curvature_per_mm=s.curvature_per_mm * float(factor))
+        for s, factor in zip(lens.surfaces, factors, strict=True)
+    )
+    last = replace(last, thickness_mm=last.thickness_mm + float(rng.uniform(-2.0, 2.0)))
+    return problem_of(given, replace(lens, surfaces=(*surfaces, last)))
 
 
 def merit(problem: Problem, scaled: torch.Tensor) -> float:
@@ -137,20 +142,6 @@ def test_a_lens_that_is_to_stay_is_not_searched_for(
     table["starts"] = {"count": 8, "spread": 0.3}
     lens = parts_of(with_choices(to_design(table), **kept)).lens
     assert torch.equal(lens.begin, lens.problem.free.scaled())
-
-
-def test_a_disturbed_lens_is_off_by_no_more_than_asked(lens: Lens) -> None:
-    drawn = [
-        disturbed(lens, np.random.default_rng(i), curvature_share=0.1, focus_mm=2.0)
-        for i in range(40)
-    ]
-    pairs = [(s, t) for d in drawn for s, t in zip(d.surfaces, lens.surfaces, strict=True)]
-    bent = [s.curvature_per_mm / t.curvature_per_mm - 1 for s, t in pairs if t.curvature_per_mm]
-    assert 0.09 < max(abs(b) for b in bent) <= 0.1
-    moved = [d.surfaces[-1].thickness_mm - lens.surfaces[-1].thickness_mm for d in drawn]
-    assert 1.7 < max(abs(m) for m in moved) <= 2.0
-    inner = {tuple(s.thickness_mm for s in d.surfaces[:-1]) for d in drawn}
-    assert inner == {tuple(s.thickness_mm for s in lens.surfaces[:-1])}
 
 
 @pytest.mark.parametrize(

@@ -51,15 +51,6 @@ def test_foci_of_spherical_aberration_lie_where_third_order_says() -> None:
     assert wave / spot == pytest.approx(0.75, rel=0.01)
 
 
-def test_weights_choose_fields_and_colours() -> None:
-    lens = _lens(COLOURS)
-    blue = focus_shift_mm(lens, "spot", wavelength_weights=(1, 0, 0))
-    red = focus_shift_mm(lens, "spot", wavelength_weights=(0, 0, 1))
-    assert red > blue
-    axis = focus_shift_mm(lens, "spot", field_weights=(1, 0))
-    assert axis > focus_shift_mm(lens, "spot", field_weights=(0, 1))
-
-
 def test_a_near_object_focuses_behind_the_focal_point() -> None:
     lens = replace(cooke_triplet(), object_distance_mm=1000.0)
     shift = focus_shift_mm(lens, "paraxial")
@@ -69,8 +60,6 @@ def test_a_near_object_focuses_behind_the_focal_point() -> None:
     assert focus_shift_mm(lens, "wavefront") == pytest.approx(shift, abs=0.3)
 
 
-def test_unknown_merits_and_wrong_weights_are_refused() -> None:
+def test_unknown_merits_are_refused() -> None:
     with pytest.raises(ContractError, match="merit"):
         focus_shift_mm(_lens(), "sharp")  # type: ignore[arg-type]
-    with pytest.raises(ContractError, match="weights"):
-        focus_shift_mm(_lens(), "spot", field_weights=(1.0,))

@@ -8,7 +8,6 @@ from camkit.bundle.light_bound import (
     BOUND_REACH_PX,
     BRIGHT_FROM,
     CELL_PX,
-    MASK_REACH_PX,
     NEAR_PX,
     USUAL_BOUND,
     LightBound,
@@ -125,7 +124,8 @@ def test_far_from_clipped_samples_a_window_gives_the_bits_of_one_without_any() -
     bound = LightBound(spread=0.2)
     with_mask = _bounded(front, output, keep_share(mask), bound)
     without = _bounded(front, output, None, bound)
-    far = np.s_[:, 4 + MASK_REACH_PX + 1 :, 4 + MASK_REACH_PX + 1 :]
+    first = 4 + BOUND_REACH_PX + max(NEAR_PX) + 1
+    far = np.s_[:, first:, first:]
     np.testing.assert_array_equal(with_mask[far], without[far])
 
 
@@ -171,7 +171,6 @@ def test_a_pixel_reaches_as_far_as_stated_and_no_further() -> None:
         rows = np.nonzero(moved.any(axis=1))[0]
         reached = max(reached, y - rows.min(), rows.max() - y)
     assert reached == BOUND_REACH_PX
-    assert BOUND_REACH_PX + max(NEAR_PX) == MASK_REACH_PX
 
 
 def test_the_rows_computed_at_once_do_not_change_a_bit(monkeypatch: pytest.MonkeyPatch) -> None:

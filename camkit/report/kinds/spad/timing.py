@@ -92,20 +92,6 @@ def measure(light: Light, pixels: int, turns: int) -> list[dict[str, Any]]:
     return rows
 
 
-def false_alarms(background: float, pixels: int) -> dict[str, Any]:
-    """Return the share of pixels of background alone that are believed, alone and pooled."""
-    rng = np.random.default_rng(int(1000 * background))
-    rates: dict[str, list[float]] = {"1": [], "auto": []}
-    ways = {pool: Sharpener(AXIS, PULSE, Way(pool=pool)) for pool in ("1", "auto")}
-    size = SHAPE[0] * SHAPE[1]
-    for _ in range(max(1, pixels // size)):
-        cube = rng.poisson(background, (*SHAPE, AXIS.bins)).astype(np.float32)
-        for pool, sharpener in ways.items():
-            rates[pool].append(float(sharpener.strip(cube).valid.mean()))
-    columns = {f"pool_{pool}": round(float(np.mean(shares)), 6) for pool, shares in rates.items()}
-    return {"background": background, **columns}
-
-
 def _by_camkit(method: str) -> Callable[[FloatArray], Estimates]:
     def fit(counts: FloatArray) -> Estimates:
         sharpener = Sharpener(AXIS, PULSE, Way(method=method, pool="1"))  # type: ignore[arg-type]

@@ -13,7 +13,6 @@ References: The bh TCSPC Handbook, FIFO data format of the SPC-130 and SPC-150 m
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -28,53 +27,16 @@ from camkit.runtime.kinds.spad.files.counts_file import CountsFile, Hints
 from camkit.runtime.kinds.spad.files.stamps import StampsFile
 
 RECORD_BYTES: Final = 4
-MACRO_TICKS: Final = 4096
 LAST_ADC: Final = 4095
 ROUTINGS: Final = 16
 MICRO_BYTES: Final = 4
 """Bytes that a photon takes while the parts are put together."""
 MARKER: Final = np.uint32(1 << 28)
-OVERFLOW: Final = np.uint32(1 << 30)
 NO_PHOTON: Final = np.uint32(1 << 31)
-OVERFLOWS: Final = np.uint32((1 << 28) - 1)
 TAC_STEP: Final = re.compile(rb"SP_TAC_TC,F,([0-9.eE+-]+)\]")
 SET_BYTES: Final = 1_000_000
 AT_ONCE: Final = 500_000
 """Records that are decoded at once."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Photons:
-    """The photons of a stream, in the order they came.
-
-    Attributes:
-        macro: (n,) ticks of the clock since the beginning.
-        micro: (n,) time within the cycle, in steps of the TAC.
-        routing: (n,) which detector.
-    """
-
-    macro: NDArray[np.int64]
-    micro: NDArray[np.uint16]
-    routing: NDArray[np.uint8]
-
-
-def decode_spc(data: bytes) -> Photons:
-    """Decode a stream.
-
-    Raises:
-        DecodeError: If it is not whole records, or has no header.
-    """
-    records = checked_records(np.frombuffer(data, np.uint8))
-    is_over, is_none = (records & OVERFLOW) > 0, (records & NO_PHOTON) > 0
-    many = np.where(is_none, records & OVERFLOWS, 1)
-    overflows = np.cumsum(np.where(is_over, many, 0).astype(np.int64))
-    is_photon = _are_photons(records)
-    photons = records[is_photon]
-    return Photons(
-        macro=(photons & 0xFFF).astype(np.int64) + MACRO_TICKS * overflows[is_photon],
-        micro=_micro(photons),
-        routing=_routing(photons),
-    )
 
 
 def checked_records(data: NDArray[np.uint8]) -> NDArray[np.uint32]:

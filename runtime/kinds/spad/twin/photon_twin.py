@@ -36,7 +36,6 @@ from camkit.runtime.kinds.spad.twin.scene import light_in_flight, light_of_depth
 from camkit.runtime.kinds.spad.twin.working import WORKING_POINTS
 from camkit.runtime.twin.light import LUMINANCE
 
-SCENE_SUFFIX: Final = ".npz"
 SCENE_ARRAYS: Final = frozenset({"depth_m", "albedo", "transient"})
 MOST_BYTES: Final = 2_000_000_000
 S_PER_PS: Final = 1e-12

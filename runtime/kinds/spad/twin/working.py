@@ -24,11 +24,6 @@ class WorkingPoint:
         """Return the time for which a picture, or a step, is counted."""
         return self.frames * self.frame_us * 1e-6
 
-    @property
-    def rate_hz(self) -> float:
-        """Return the pictures, or steps, of a second."""
-        return 1 / self.time_s
-
 
 WORKING_POINTS: Final = {
     "intensity": WorkingPoint(frames=100, frame_us=52.0),

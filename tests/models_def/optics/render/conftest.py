@@ -15,8 +15,9 @@ from camkit.models_def.optics.paraxial import paraxial_image, with_paraxial_focu
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.psf import with_object_distance
 from camkit.models_def.optics.render.texture import Texture
-from camkit.models_def.optics.render.window import Window, centred_window
+from camkit.models_def.optics.render.window import Window
 from camkit.scenes import procedural_scene
+from tests.models_def.optics.render.centred import centred_window
 
 PRESCRIPTIONS = Path(__file__).parents[4] / "models_def" / "prescriptions"
 

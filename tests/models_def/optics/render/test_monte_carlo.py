@@ -12,8 +12,9 @@ from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.render.lens_view import Optics, lens_optics
 from camkit.models_def.optics.render.monte_carlo import Illumination, Sampling, render
 from camkit.models_def.optics.render.texture import Texture
-from camkit.models_def.optics.render.window import Window, centred_window
+from camkit.models_def.optics.render.window import Window
 from camkit.models_def.optics.trace import SurfaceTensors, surface_tensors
+from tests.models_def.optics.render.centred import centred_window
 
 SMALL = Sampling(spp=9, passes=2)
 RELATIVE_FLOAT32 = 1e-5

@@ -15,9 +15,10 @@ from camkit.models_def.optics.render.texture_alignment import (
     fit_alignment,
     scene_radius_mm,
 )
-from camkit.models_def.optics.render.window import Window, centred_window, corner_window
+from camkit.models_def.optics.render.window import Window, corner_window
 from camkit.models_def.optics.spot import slopes_for_heights
 from camkit.radial import RadialDistortion
+from tests.models_def.optics.render.centred import centred_window
 
 # of a pixel of 6 um, over the whole field of the duet
 FIT_PX = 0.1

@@ -14,7 +14,7 @@ from camkit.errors import ContractError, DecodeError, UnsupportedError
 from camkit.runtime.kinds.spad.files import stamps
 from camkit.runtime.kinds.spad.files.counts_file import CountsFile, Hints
 from camkit.runtime.kinds.spad.files.open_counts import open_counts
-from camkit.runtime.kinds.spad.files.spc import decode_spc
+from camkit.runtime.kinds.spad.files.spc import checked_records, micro_times, photons_of_routing
 from tests.data_folder import data_path
 from tests.spad_files import (
     AXES,
@@ -293,20 +293,19 @@ def _spc(*records: int) -> bytes:
 
 def test_a_stream_is_decoded_record_by_record() -> None:
     photon = 0x04D70C16  # ADC 0x4d7, routing 0, macro 0xc16
-    found = decode_spc(
-        _spc(
-            photon,
-            0xC000000A,  # ten overflows, no photon
-            photon | 2 << 12,
-            photon | 1 << 30,  # a photon with one overflow
-            photon | 1 << 28,  # a marker
-            photon | 1 << 31,  # no photon
-            photon | 1 << 29,  # a photon after a gap
-        )
+    stream = _spc(
+        photon,
+        0xC000000A,  # ten overflows, no photon
+        photon | 2 << 12,
+        photon | 1 << 30,  # a photon with one overflow
+        photon | 1 << 28,  # a marker
+        photon | 1 << 31,  # no photon
+        photon | 1 << 29,  # a photon after a gap
     )
-    assert found.macro.tolist() == [0xC16 + 4096 * n for n in (0, 10, 11, 11)]
-    assert found.micro.tolist() == [4095 - 0x4D7] * 4
-    assert found.routing.tolist() == [0, 2, 0, 0]
+    records = checked_records(np.frombuffer(stream, np.uint8))
+    assert photons_of_routing(records)[:3].tolist() == [3, 0, 1]
+    for routing, photons in ((0, 3), (2, 1)):
+        assert np.concatenate([*micro_times(records, routing)]).tolist() == [4095 - 0x4D7] * photons
 
 
 def test_a_stream_that_is_none_is_refused(tmp_path: Path) -> None:
@@ -345,6 +344,7 @@ def test_real_files_hold_what_is_known_of_them() -> None:
         assert found.shape[:2] == (height, width)
         assert found.sum(dtype=np.float64) == photons
     listed = np.loadtxt(folder / "bh_test_noise.asc", dtype=np.int64)
-    photons_of = decode_spc((folder / "bh_test_noise.spc").read_bytes())
-    np.testing.assert_array_equal(photons_of.macro, listed[:, 0])
-    np.testing.assert_array_equal(photons_of.micro, listed[:, 1])
+    records = checked_records(np.fromfile(folder / "bh_test_noise.spc", np.uint8))
+    (routing,) = np.flatnonzero(photons_of_routing(records)).tolist()
+    micro = np.concatenate([*micro_times(records, routing)])
+    np.testing.assert_array_equal(micro, listed[:, 1])

@@ -347,7 +347,7 @@ def test_light_in_flight_of_other_times_is_refused() -> None:
 
 
 def test_the_working_points_are_those_of_the_prototype() -> None:
-    assert WORKING_POINTS["high_speed"].rate_hz == pytest.approx(1250)
+    assert WORKING_POINTS["high_speed"].time_s == pytest.approx(1 / 1250)
     assert WORKING_POINTS["intensity"].time_s == pytest.approx(5.2e-3)
     assert WORKING_POINTS["depth"].time_s == pytest.approx(0.078)
 
