@@ -34,7 +34,6 @@ from camkit.models_def.training.kind import (
     Judge,
     Material,
     Score,
-    TrainingKind,
     build_role,
     read_recipe,
     training_kind,
@@ -229,7 +228,16 @@ def train(
     what = f"training {recipe.name} {_label(role, options.size)}"
     with pool, working(what, total=1.0, writes_lines=True) as task:
         pool.start_workers(options.workers)
-        run = _Run(recipe_path, kind, material, options, refinement, first, fitting, stopwatch)
+        run = _Run(
+            recipe,
+            material,
+            options,
+            toml=recipe_path.read_text(encoding="utf-8"),
+            refinement=refinement,
+            first=first,
+            fitting=fitting,
+            stopwatch=stopwatch,
+        )
         run.loop(pool, task)
     return run.result()
 
@@ -276,10 +284,11 @@ class _Run:
 
     def __init__(
         self,
-        recipe_path: Path,
-        kind: TrainingKind[Any, Any],
+        recipe: Recipe,
         material: Material,
         options: TrainOptions,
+        *,
+        toml: str,
         refinement: Refinement | None,
         first: FirstWeights | None,
         fitting: OwnFitting | None,
@@ -287,19 +296,19 @@ class _Run:
     ) -> None:
         self.stopwatch = stopwatch
         self.options, self.material_digest = options, material.digest()
-        self.toml = recipe_path.read_text(encoding="utf-8")
+        self.recipe, self.toml = recipe, toml
         self.designed = dict(material.designed)
-        self.recipe: Recipe = read_recipe(recipe_path)
-        self.role = self.recipe.role(options.role)
-        self.entry = self.recipe.network(options.size, self.role)
-        self.judge: Judge = kind.judge(self.recipe, self.role, material, options.valid_folder)
-        data = describe_data(self.recipe.data, options.data_folder)
+        self.role = recipe.role(options.role)
+        self.entry = recipe.network(options.size, self.role)
+        kind = training_kind(recipe.kind)
+        self.judge: Judge = kind.judge(recipe, self.role, material, options.valid_folder)
+        data = describe_data(recipe.data, options.data_folder)
         self.data = data + ("" if first is None else first.credit(data))
         if fitting is not None:
             self.data += fitting.credit
             self.fitter = fitting.make(material)
         elif refinement is None:
-            objective = patch_objective(kind.finish(self.recipe, self.role))
+            objective = patch_objective(kind.finish(recipe, self.role))
             self.fitter = Fitter(
                 self.entry, kind.build_network, options.device, first, objective=objective
             )
@@ -308,7 +317,7 @@ class _Run:
             self.entry = replace(self.entry, schedule=refinement.schedule)
             self.fitter = refinement.make_fitter(self.entry, material)
         self.steps = options.steps or self.entry.schedule.steps
-        self.path = checkpoint_path(self.recipe, options, refinement)
+        self.path = checkpoint_path(recipe, options, refinement)
         self.step, self.elapsed_before_s, self.cpu_before_s = 0, 0.0, 0.0
         self.valid: Score | None = None
         self.loss: float | None = None

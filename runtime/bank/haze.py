@@ -21,20 +21,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.arrays import FloatArray
-from camkit.bundle.stages import Dehaze
 from camkit.haze import Haze
 from camkit.psf import FrozenPsf, depth_weights
 from camkit.runtime.bank.cell_means import cell_count
 from camkit.runtime.bank.place_blur import (
-    AZIMUTHS,
-    TERMS_AT_ONCE,
     FewKernels,
     NodeKernels,
     PlaceBlur,
     few_kernels,
     lay_nodes,
 )
-from camkit.runtime.bank.place_undo import cores_differ, filter_side, undoing_kernels
+from camkit.runtime.bank.place_undo import cores_differ, undoing_kernels
 from camkit.runtime.bank.psf import FieldKernels, color_kernels, wavelength_weights
 from camkit.runtime.geometry.sensor_window import SensorWindow
 
@@ -42,8 +39,6 @@ MARGIN_CELLS: Final = 16
 """Of the scene around the capture, mirrored: its light hazes the rim."""
 DAMPING: Final = 1e-3
 CORE_TERMS: Final = 16
-BYTES_PER_CELL: Final = 400
-"""Of how the cells lie between the nodes, and pictures in cells."""
 LEAST_RESPONSE: Final = 1e-3
 """Of a picture of ones, in a cell that hardly any light reaches."""
 
@@ -68,9 +63,9 @@ class HazyKernels:
     """
 
     core: FieldKernels
-    coarse_core: "Lit"
-    haze: "Lit"
-    coarse: "Lit"
+    coarse_core: "LightKernels"
+    haze: "LightKernels"
+    coarse: "LightKernels"
     cell_px: int
     differ: bool = False
 
@@ -87,7 +82,7 @@ class HazyKernels:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Lit:
+class LightKernels:
     """Kernels of sum 1, and the light that they hold.
 
     Attributes:
@@ -110,9 +105,9 @@ class Lit:
         """Return the light (c,) of an image point, interpolated as the kernels are."""
         return self.kernels.interpolate(self.light, x_mm, y_mm)
 
-    def scaled(self, ratio: float) -> "Lit":
+    def scaled(self, ratio: float) -> "LightKernels":
         """Return the kernels scaled about their centres; see `FieldKernels.scaled`."""
-        return Lit(kernels=self.kernels.scaled(ratio), light=self.light)
+        return LightKernels(kernels=self.kernels.scaled(ratio), light=self.light)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -218,9 +213,9 @@ def hazy_kernels(
     narrow = in_cells(core.kernels, haze.cell_px) * light[..., None, None]
     return HazyKernels(
         core=core,
-        coarse_core=_lit(narrow, core),
-        haze=_lit(wide, core),
-        coarse=_lit(_added(wide, narrow), core),
+        coarse_core=_light_kernels(narrow, core),
+        haze=_light_kernels(wide, core),
+        coarse=_light_kernels(_added(wide, narrow), core),
         cell_px=haze.cell_px,
         differ=cores_differ(haze),
     )
@@ -257,13 +252,13 @@ def _added(wide: FloatGrid, narrow: FloatGrid) -> FloatGrid:
     return total
 
 
-def _lit(kernels: FloatGrid, like: FieldKernels) -> Lit:
+def _light_kernels(kernels: FloatGrid, like: FieldKernels) -> LightKernels:
     light = kernels.sum(axis=(-2, -1))
     # a kernel without light is even
     even = 1 / kernels[0, 0].size
     unit = np.full(kernels.shape, even)
     np.divide(kernels, light[..., None, None], out=unit, where=light[..., None, None] > 0)
-    return Lit(
+    return LightKernels(
         kernels=FieldKernels(
             kernels=unit.astype(np.float32),
             field_heights_mm=like.field_heights_mm,
@@ -336,10 +331,10 @@ def solve_coarse(
 
 
 @lru_cache(maxsize=KEPT_TERMS)
-def few_of(lit: Lit, terms: int) -> tuple[FewKernels, ...]:
+def few_of(kernels: LightKernels, terms: int) -> tuple[FewKernels, ...]:
     """Return the few kernels of every channel; kept, since all captures of a camera need them."""
-    nodes = NodeKernels(lit.kernels, lit.light)
-    return tuple(few_kernels(nodes.of(c), terms) for c in range(lit.light.shape[1]))
+    nodes = NodeKernels(kernels.kernels, kernels.light)
+    return tuple(few_kernels(nodes.of(c), terms) for c in range(kernels.light.shape[1]))
 
 
 def few_are_kept() -> bool:
@@ -348,10 +343,10 @@ def few_are_kept() -> bool:
 
 
 @lru_cache(maxsize=KEPT_CAMERAS)
-def filters_of(lit: Lit, terms: int) -> tuple[FewKernels, ...]:
+def filters_of(kernels: LightKernels, terms: int) -> tuple[FewKernels, ...]:
     """Return few kernels of the filters of every channel, see `place_undo`; kept as `few_of`."""
-    nodes = NodeKernels(lit.kernels, lit.light)
-    channels = range(lit.light.shape[1])
+    nodes = NodeKernels(kernels.kernels, kernels.light)
+    channels = range(kernels.light.shape[1])
     return tuple(few_kernels(undoing_kernels(nodes.of(c)), terms) for c in channels)
 
 
@@ -360,52 +355,3 @@ def _mirrored(cells: FloatArray) -> FloatArray:
     if min(cells.shape) < 2:
         return np.pad(cells, MARGIN_CELLS, mode="edge")
     return np.pad(cells, MARGIN_CELLS, mode="reflect")
-
-
-def coarse_work(entry: Dehaze, channels: int) -> float:
-    """Return the transforms per pixel, without the margins of the cells.
-
-    Filters for every place add less than as much again.
-    """
-    return channels * (entry.terms + CORE_TERMS) * (entry.rounds + 2) / entry.shrink**2
-
-
-def kept_bytes(entry: Dehaze, haze: Haze, channels: int, kernel_scale: float = 1.0) -> int:
-    """Return memory of what is kept of optics, see `few_of`; arguments as of `solving_bytes`."""
-    side = int(haze.kernels.shape[-1] * kernel_scale) + 3
-    fields = 2 * haze.kernels.shape[0]
-    samples = side**2 * (entry.terms + fields)
-    if cores_differ(haze):
-        samples += filter_side(side) ** 2 * entry.terms
-    return int(4 * samples * channels)
-
-
-def solving_bytes(
-    entry: Dehaze, haze: Haze, channels: int, size_px: tuple[int, int], kernel_scale: float = 1.0
-) -> int:
-    """Return the memory in which the scene of a capture is found.
-
-    Args:
-        entry: The manifest's stage.
-        haze: Of the optics.
-        channels: Colours.
-        size_px: (width, height) of the capture.
-        kernel_scale: What the kernels are scaled by.
-    """
-    side = int(haze.kernels.shape[-1] * kernel_scale) + 3
-    sides = [cell_count(length, entry.shrink) + 2 * MARGIN_CELLS for length in size_px]
-    cells = sides[0] * sides[1]
-    spectrum = (sides[0] + side) * (sides[1] + side)
-    nodes = AZIMUTHS * haze.kernels.shape[0]
-    # a quarter of all places in every colour, and twice those of one colour while few are found
-    places = 4 * nodes * side**2 * (2.25 + channels / 4)
-    terms = max(entry.terms, CORE_TERMS)
-    blur_bytes = terms * (4 * spectrum + 16 * cells)
-    blur_bytes += 4 * spectrum * -(-terms // TERMS_AT_ONCE)
-    if cores_differ(haze):
-        wide = filter_side(side)
-        blur_bytes += entry.terms * (4 * (sides[0] + wide) * (sides[1] + wide) + 16 * cells)
-        places += 12 * nodes * wide**2
-    # the kernels of all places are gone before few of them are laid over the picture
-    most = max(places, blur_bytes + BYTES_PER_CELL * cells)
-    return int(kept_bytes(entry, haze, channels, kernel_scale) + most)

@@ -99,5 +99,3 @@ PROOF_WORK: Final = Limit(
     variable="CAMKIT_MAX_PROOF_WORK", default=3e12, unit="operations in a proof"
 )
 """The same as operations in all: about a minute on two cores."""
-
-LIMITS: Final = (NETWORK_WORK, BANK_WORK, PROOF_MB, PROOF_WORK)

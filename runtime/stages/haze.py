@@ -15,13 +15,11 @@ from camkit.runtime.bank.haze import (
     KEPT_CAMERAS,
     CoarseBand,
     HazyKernels,
-    coarse_work,
     few_are_kept,
     hazy_kernels,
-    kept_bytes,
     solve_coarse,
-    solving_bytes,
 )
+from camkit.runtime.bank.haze_costs import coarse_work, kept_bytes, solving_bytes
 from camkit.runtime.cancel import cancellable
 from camkit.runtime.job.coarse_cells import cells_of
 from camkit.runtime.job.job import Job

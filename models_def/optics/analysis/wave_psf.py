@@ -17,10 +17,8 @@ from torch import Tensor
 
 from camkit.errors import ContractError
 from camkit.models_def.optics.analysis.sampling import disc_quadrature
-from camkit.models_def.optics.analysis.wavefront import Wavefront, trace_wavefront
-from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.psf import TracedPsf
-from camkit.models_def.optics.pupil import PupilDefinition, PupilSamples
+from camkit.models_def.optics.analysis.wavefront import Wavefront
+from camkit.models_def.optics.pupil import PupilSamples
 from camkit.units import UM_PER_MM, to_mm
 
 MAX_WAVE_RAYS: Final = 100_000
@@ -84,71 +82,6 @@ def pupil_for_reach(reach_mm: float, wavelength_um: float, aperture: float) -> P
             f"{MAX_WAVE_RAYS}; a blur of that size is geometric: use the geometric PSF"
         )
     return disc_quadrature(rings, arms)
-
-
-def wave_kernels(wavefront: Wavefront, size_px: int, pitch_um: float, oversample: int) -> TracedPsf:
-    """Return kernels (field, wavelength, size, size) as `psf.splat` does: pixels are tents.
-
-    Args:
-        wavefront: Sampled for the window.
-        size_px: Odd kernel side.
-        pitch_um: Sensor pitch.
-        oversample: Odd; points per pixel and axis.
-
-    Raises:
-        ContractError: If a number is even.
-    """
-    if size_px < 1 or size_px % 2 == 0 or oversample < 1 or oversample % 2 == 0:
-        raise ContractError(
-            f"kernel side and oversampling must be odd; got {size_px} and {oversample}"
-        )
-    count = (size_px + 1) * oversample
-    place_px = (torch.arange(count, dtype=torch.float64) - (count - 1) / 2) / oversample
-    place_mm = place_px * pitch_um / UM_PER_MM
-    light = irradiance_per_mm2(wavefront, place_mm, place_mm)
-    tent = _tent_weights(place_px, size_px, oversample) * pitch_um / UM_PER_MM
-    kernels = tent @ light @ tent.T
-    energy = kernels.sum((-2, -1))
-    return TracedPsf(kernels=kernels / energy[..., None, None], energy_kept=energy)
-
-
-def _tent_weights(place_px: Tensor, size_px: int, oversample: int) -> Tensor:
-    """Return weights (pixel, point) that integrate over the tents of pixels.
-
-    The midpoint rule with its first correction (Euler and Maclaurin): what it lacks comes from
-    the kinks of the tent, which lie between points.
-    """
-    pixel = torch.arange(size_px, dtype=torch.float64) - (size_px - 1) / 2
-    distance_px = torch.abs(place_px - pixel[:, None])
-    half = 0.5 / oversample
-    top, foot = (torch.abs(distance_px - place) < 1.5 * half for place in (0.0, 1.0))
-    kinks = (2 * top.to(torch.float64) - foot.to(torch.float64)) / (48 * oversample**2)
-    return (1 - distance_px).clamp_min(0.0) / oversample + kinks
-
-
-def trace_wave_psf(
-    lens: Lens,
-    slopes: Tensor,
-    wavelengths_um: Tensor,
-    size_px: int,
-    pitch_um: float,
-    *,
-    definition: PupilDefinition = "stop",
-) -> TracedPsf:
-    """Trace the wave PSF of fields; see `psf.trace_psf` for the kernels.
-
-    Raises:
-        ContractError: If the blur is too wide for it (see `pupil_for_reach`).
-    """
-    coarse = trace_wavefront(lens, slopes, wavelengths_um, disc_quadrature(6, 16), definition)
-    aperture = widest_aperture(coarse)
-    shortest = float(wavelengths_um.min())
-    reach = math.sqrt(0.5) * (size_px + 1) * pitch_um / UM_PER_MM + float(coarse.miss_mm.max())
-    samples = pupil_for_reach(reach, shortest, aperture)
-    fine_um = shortest / (6 * aperture)
-    oversample = 2 * math.ceil((pitch_um / fine_um - 1) / 2) + 1
-    wavefront = trace_wavefront(lens, slopes, wavelengths_um, samples, definition)
-    return wave_kernels(wavefront, size_px, pitch_um, max(1, oversample))
 
 
 def widest_aperture(wavefront: Wavefront) -> float:

@@ -110,7 +110,12 @@ def fit_pooled(
         if side > 1 and pool == "auto":
             near = np.flatnonzero(good)
             good[near] = are_believed(
-                *(fitter.bank, cube, sound, rows[near], fit_of_rows(new, near), side),
+                bank=fitter.bank,
+                cube=cube,
+                sound=sound,
+                rows=rows[near],
+                fit=fit_of_rows(new, near),
+                side=side,
                 rate=false_alarms / len(sides),
             )
         elif side > 1:

@@ -1,26 +1,21 @@
 """The coarse band: flat stays flat, what a slow model blurs comes back, rows do as the whole."""
 
-import tracemalloc
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from camkit.arrays import FloatArray
-from camkit.bundle.stages import Dehaze
 from camkit.errors import ContractError
 from camkit.psf import FrozenPsf
 from camkit.runtime.bank.haze import (
     MARGIN_CELLS,
     CoarseBand,
     HazyKernels,
-    coarse_work,
     enlarged,
-    few_of,
     hazy_kernels,
     in_cells,
     solve_coarse,
-    solving_bytes,
 )
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from tests.bundle_factory import tiny_psf, tiny_sensor
@@ -183,24 +178,3 @@ def test_a_psf_of_other_samples_is_refused() -> None:
     other: FrozenPsf = replace(tiny_psf(), pixel_pitch_um=5.0)
     with pytest.raises(ContractError, match="haze is of pixels of 6"):
         hazy_kernels(other, tiny_haze(), *RESPONSE)
-
-
-@pytest.mark.parametrize("terms", [1, 32])
-def test_no_more_memory_is_taken_than_is_said(terms: int) -> None:
-    width, height = 3000, 2000
-    cells = np.random.default_rng(0).random((3, 250, 375), dtype=np.float32)
-    said = solving_bytes(Dehaze(shrink=8, terms=terms), tiny_haze(), 3, (width, height))
-    few_of.cache_clear()
-    tracemalloc.start()
-    solve_coarse(cells, cells > 2, _kernels(), _window(width, height), terms=terms, rounds=2)
-    _, most = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert 0.3 * said < most <= said
-
-
-def test_more_terms_and_larger_captures_cost_more() -> None:
-    few, many = Dehaze(terms=8), Dehaze(terms=64)
-    assert coarse_work(many, 3) > 2 * coarse_work(few, 3)
-    sizes = [solving_bytes(few, tiny_haze(), 3, size) for size in ((96, 64), (6000, 4000))]
-    assert sizes[0] < sizes[1] < solving_bytes(many, tiny_haze(), 3, (6000, 4000))
-    assert sizes[0] < solving_bytes(few, tiny_haze(), 3, (96, 64), 4.0)

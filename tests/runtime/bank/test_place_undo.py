@@ -13,8 +13,8 @@ from camkit.runtime.bank.haze import (
     few_of,
     hazy_kernels,
     solve_coarse,
-    solving_bytes,
 )
+from camkit.runtime.bank.haze_costs import solving_bytes
 from camkit.runtime.bank.place_blur import PlaceBlur, lay_nodes
 from camkit.runtime.bank.place_undo import DAMPING, cores_differ, filter_side, undoing_kernels
 from camkit.runtime.geometry.sensor_window import SensorWindow

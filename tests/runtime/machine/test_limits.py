@@ -6,7 +6,7 @@ import re
 import pytest
 
 from camkit.errors import BundleError, ContractError
-from camkit.runtime.machine.limits import LIMITS, NETWORK_WORK, Limit
+from camkit.runtime.machine.limits import Limit
 
 LIMIT = Limit(variable="CAMKIT_MAX_TEST", default=100.0, unit="tests")
 
@@ -39,10 +39,3 @@ def test_the_refusal_names_a_setting_that_does(
 
 def test_what_stays_within_is_admitted() -> None:
     LIMIT.check(100.0, "the bank")
-
-
-def test_every_limit_has_its_own_variable() -> None:
-    names = [limit.variable for limit in LIMITS]
-    assert NETWORK_WORK in LIMITS
-    assert len(set(names)) == len(names)
-    assert all(re.fullmatch("CAMKIT_MAX_[A-Z_]+", name) for name in names)

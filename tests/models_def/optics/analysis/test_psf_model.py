@@ -6,9 +6,7 @@ import torch
 
 from camkit.models_def.optics.analysis.psf_model import psf_model
 from camkit.models_def.optics.analysis.spots import field_slopes
-from camkit.models_def.optics.analysis.wave_psf import trace_wave_psf
 from camkit.models_def.optics.prescription import read_prescription
-from camkit.models_def.optics.psf import trace_psf
 from tests.physics.reference_lenses import thorlabs_al2550
 
 DUET = Path(__file__).resolve().parents[4] / "models_def" / "prescriptions" / "duet.toml"
@@ -24,7 +22,7 @@ def test_lens_with_wide_blur_is_traced_by_rays() -> None:
     assert float((found.blur_mm / found.airy_mm).min()) > 5
 
 
-def test_sharp_lens_is_summed_from_waves_and_its_kernel_is_wider_than_its_rays() -> None:
+def test_sharp_lens_is_summed_from_waves() -> None:
     """AL2550-A at 780 nm: rays meet within 63 pm, the Airy disc is 2.1 um in radius."""
     lens = thorlabs_al2550()
     slopes = torch.zeros(1, dtype=torch.float64)
@@ -33,10 +31,6 @@ def test_sharp_lens_is_summed_from_waves_and_its_kernel_is_wider_than_its_rays()
     assert found.regime == "wave"
     # 1.22 wavelength / (2 sin u) with sin u = 11.5 / f for a lens without coma
     assert float(found.airy_mm) == pytest.approx(1.21967 * 0.78e-3 * 50.0016 / 23, rel=0.05)
-    kernel = trace_wave_psf(lens, slopes, waves, 9, 1.0).kernels[0, 0]
-    rays = trace_psf(lens, slopes, waves, 9, 1.0).kernels[0, 0]
-    assert float(rays[4, 4]) > 0.99
-    assert float(kernel[4, 4]) < 0.3
 
 
 def test_lens_without_light_is_told_so() -> None:
