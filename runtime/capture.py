@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.arrays import FloatArray
-from camkit.bundle.sensor import InputContract
+from camkit.arrays import FloatArray, InputContract
 from camkit.caller import option_text
 from camkit.cfa import CFA_PATTERNS, CfaPattern
 from camkit.errors import ContractError

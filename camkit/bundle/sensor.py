@@ -15,17 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from camkit.arrays import InputContract
 from camkit.bundle.entry import Entry, NonNegative, Positive
 from camkit.bundle.plane import Axes, Plane
 from camkit.cfa import CfaPattern
 from camkit.errors import ContractError, UnsupportedError
 from camkit.noise import NoiseModel
-
-InputContract = Literal[
-    "raw_bayer_v1", "linear_rgb_v1", "linear_planes_v1", "spad_counts_v1", "spad_histogram_v1"
-]
-"""raw_bayer_v1: (h, w) mosaic in DN; linear_rgb_v1: (3, h, w) and linear_planes_v1: (c, h, w)
-linear, 1.0 = white level; spad_counts_v1: (h, w) and spad_histogram_v1: (t, h, w) photons."""
 
 RGB: Final = ("R", "G", "B")
 MOSAIC: Final = ("cfa",)

@@ -80,7 +80,10 @@ def test_products_in_memory_are_the_same(capture: Path) -> None:
 
 def test_products_are_no_picture(capture: Path) -> None:
     pipeline = camkit.load(None, kind="counting")
-    with pytest.raises(ContractError, match=r"this capture gives sums, not an image; see `arrays`"):
+    with pytest.raises(
+        ContractError,
+        match=r"this capture gives sums, not an image; `run` returns them, in `arrays`",
+    ):
         _ = pipeline.process(capture).image
     with pytest.raises(ContractError, match="out is filled with a picture"):
         pipeline.run(capture, out=np.zeros((3, 4, 5), np.float32))
