@@ -5,7 +5,8 @@ can choose a module.
 """
 
 from functools import cache
-from importlib import metadata, util
+from importlib import import_module, metadata, util
+from types import ModuleType
 
 from camkit.errors import ContractError
 
@@ -32,6 +33,22 @@ def load_entry_point(point: metadata.EntryPoint, what: str) -> object:
         raise ContractError(
             f"the {what} {point.name!r} cannot be loaded from {point.value!r}: {error}"
         ) from error
+
+
+def load_part(name: str, what: str) -> ModuleType:
+    """Import a module that a package names.
+
+    Args:
+        name: Of the module.
+        what: What it does, for the message.
+
+    Raises:
+        ContractError: If that fails.
+    """
+    try:
+        return import_module(name)
+    except (ImportError, AttributeError, NameError, SyntaxError) as error:
+        raise ContractError(f"{what} cannot be loaded from {name}: {error}") from error
 
 
 def has_module(name: str) -> bool:

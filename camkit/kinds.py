@@ -22,7 +22,7 @@ from pathlib import PurePath
 from types import ModuleType
 from typing import Final, Literal
 
-from camkit.entry_points import entry_points, has_module, load_entry_point
+from camkit.entry_points import entry_points, has_module, load_entry_point, load_part
 from camkit.errors import ContractError, UnsupportedError
 
 GROUP: Final = "camkit.kinds"
@@ -91,13 +91,16 @@ class Kind:
 
         Raises:
             UnsupportedError: If that floor knows nothing of it.
+            ContractError: If what a package brings fails.
         """
         name = self._module(floor)
         if not has_module(name):
             raise UnsupportedError(
                 f"cameras of the kind {self.name!r} have no part in {floor}: add the package {name}"
             )
-        return importlib.import_module(name)
+        if not self.home:
+            return importlib.import_module(name)
+        return load_part(name, f"the kind of camera {self.name!r}")
 
     def has_part(self, floor: Floor) -> bool:
         """Return whether a floor knows something of this kind."""
@@ -173,6 +176,25 @@ def all_kinds() -> list[Kind]:
         with contextlib.suppress(ContractError):
             kinds.setdefault(name, find_kind(name))
     return list(kinds.values())
+
+
+def kinds_of_packages() -> dict[str, str]:
+    """Return the kinds that packages bring by name: "ready", or why they are refused."""
+    states = {}
+    for name in sorted(entry_points(GROUP)):
+        try:
+            states[name] = _broken_part(find_kind(name)) or "ready"
+        except ContractError as error:
+            states[name] = str(error)
+    return states
+
+
+def _broken_part(kind: Kind) -> str:
+    try:
+        kind.part("runtime")
+    except (ContractError, UnsupportedError) as error:
+        return str(error)
+    return ""
 
 
 def kind_of_file(file: PurePath) -> Kind | None:

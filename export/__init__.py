@@ -6,7 +6,9 @@
     network_facts   what is measured about it
     proving         golden members, activations on golden cases, the check before a name
     remeasured      a bundle that is there, with parts that were measured
+    designed_optics  the lens or plate as designed, for the bundle
     energy, card    the card and the preview for people
+    parts           the parts of a bundle, and the usual names of their files
     assemble        everything packed, proved, written
     packing         `camkit.export.bundle` and `camkit export`
 

@@ -82,7 +82,7 @@ PROBE_RECIPE: Final = CaseRecipe(scene_seed=30, exposure=0.9, iso=400.0, field=0
 SIZES: Final = ("S", "M", "L")
 DEFAULT_SIZE: Final = "M"
 
-Found = dict[str, dict[str, Checkpoint]]
+Checkpoints = dict[str, dict[str, Checkpoint]]
 """Role -> size -> checkpoint."""
 Networks = dict[str, dict[str, ExportedNetwork]]
 
@@ -156,7 +156,7 @@ class _Camera:
     kind: TrainingKind[Any, Any]
     recipe: Recipe
     design: Design
-    checkpoints: Found
+    checkpoints: Checkpoints
     optics: FrozenOptics
     freeze: Mapping[str, Any]
     plan: dict[str, Threshold] | None
@@ -206,43 +206,46 @@ def _optics(parts: Parts, recipe: Recipe, design: Design) -> FrozenOptics:
     return optics if parts.haze is None else replace(optics, haze=read_haze(parts.haze))
 
 
-def _by_role(roles: tuple[str, ...], paths: tuple[Path, ...], given: list[Checkpoint]) -> Found:
+def _by_role(
+    roles: tuple[str, ...], paths: tuple[Path, ...], checkpoints: list[Checkpoint]
+) -> Checkpoints:
     """Sort checkpoints by role and size: every role in the same sizes."""
-    found: Found = {role: {} for role in roles}
-    for path, checkpoint in zip(paths, given, strict=True):
+    by_role: Checkpoints = {role: {} for role in roles}
+    for path, checkpoint in zip(paths, checkpoints, strict=True):
         role, size = checkpoint.role, checkpoint.size
-        if role not in found:
+        if role not in by_role:
             have = ", ".join(roles)
             raise ContractError(f"{path} is of the role {role!r}; this kind of camera has {have}")
-        alone = [c.role for c in given].count(role) == 1
+        alone = [c.role for c in checkpoints].count(role) == 1
         if size not in SIZES and not alone:
             raise ContractError(
                 f"{path} is of size {size}; a bundle holds the sizes S, M and L "
                 "(any other network must be alone in its role)"
             )
         size = size if size in SIZES else DEFAULT_SIZE
-        if size in found[role]:
+        if size in by_role[role]:
             raise ContractError(f"two checkpoints of the role {role} are of size {size}: keep one")
-        found[role][size] = checkpoint
-    wanted = {size for sizes in found.values() for size in sizes}
-    for role, sizes in found.items():
-        if missing := sorted(wanted - sizes.keys(), key=SIZES.index):
+        by_role[role][size] = checkpoint
+    all_sizes = {size for sizes in by_role.values() for size in sizes}
+    for role, sizes in by_role.items():
+        if missing := sorted(all_sizes - sizes.keys(), key=SIZES.index):
             raise ContractError(f"there is no checkpoint of the role {role}, size {missing[0]}")
     return {
-        role: dict(sorted(s.items(), key=lambda i: SIZES.index(i[0]))) for role, s in found.items()
+        role: dict(sorted(s.items(), key=lambda i: SIZES.index(i[0])))
+        for role, s in by_role.items()
     }
 
 
-def _each(found: Found, make: Callable[[str, str], ExportedNetwork]) -> Networks:
-    return {role: {size: make(role, size) for size in sizes} for role, sizes in found.items()}
+def _each(checkpoints: Checkpoints, make: Callable[[str, str], ExportedNetwork]) -> Networks:
+    return {role: {size: make(role, size) for size in sizes} for role, sizes in checkpoints.items()}
 
 
 def _models(networks: Networks) -> dict[str, bytes]:
-    made: dict[str, bytes] = {}
+    members: dict[str, bytes] = {}
     for sizes in networks.values():
         for network in sizes.values():
-            made |= network.members
-    return made
+            members |= network.members
+    return members
 
 
 def _windows(bundle: Bundle, cases: Cases) -> dict[tuple[str, str], list[FloatArray]]:
@@ -259,8 +262,8 @@ def _windows(bundle: Bundle, cases: Cases) -> dict[tuple[str, str], list[FloatAr
         for one, arrays in captures:
             work = case_work(bundle, one, arrays, size)
             for role in bundle.manifest.networks:
-                given = np.ascontiguousarray(work.network_input(role))[None]
-                windows.setdefault((role, size), []).append(given)
+                window = np.ascontiguousarray(work.network_input(role))[None]
+                windows.setdefault((role, size), []).append(window)
     return windows
 
 
@@ -278,8 +281,8 @@ def _stress_members(parts: Parts, optics: FrozenOptics) -> dict[str, bytes]:
             have none.
     """
     if parts.stress_haze is None:
-        found = parts.stress_psf
-        return {} if found is None else {STRESS_PSF: psf_to_bytes(read_psf(found))}
+        path = parts.stress_psf
+        return {} if path is None else {STRESS_PSF: psf_to_bytes(read_psf(path))}
     if parts.stress_psf is None or optics.haze is None:
         raise ContractError(
             f"{parts.stress_haze} is the haze of kernels off the design point, for optics with a "
@@ -298,7 +301,7 @@ def _manifest(camera: _Camera, parts: Parts, networks: Networks) -> Manifest:
         for role, sizes in networks.items()
     }
     stages = tuple(_on_frozen_grid(stage, camera.freeze) for stage in design.stages)
-    known = KnownParts(sensor=recipe.sensor, optics=optics, networks=facts)
+    stage_parts = KnownParts(sensor=recipe.sensor, optics=optics, networks=facts)
     data = (c.training_data for sizes in camera.checkpoints.values() for c in sizes.values())
     return Manifest(
         format_version=format_of(camera.optics.psf, (optics, *stages), least=LIGHT_VERSION),  # laws
@@ -310,7 +313,7 @@ def _manifest(camera: _Camera, parts: Parts, networks: Networks) -> Manifest:
         sensor=recipe.sensor,
         optics=optics,
         stages=stages,
-        planes=planes_of(stages, known),
+        planes=planes_of(stages, stage_parts),
         products={IMAGE: stages[-1].gives[0], **design.products},
         networks=facts,
         freeze=dict(camera.freeze),

@@ -85,35 +85,35 @@ def card_text(
     return "\n".join(lines)
 
 
-def laws_text(found: MeasuredLaws) -> str:
+def laws_text(measured: MeasuredLaws) -> str:
     """Return the part of the card that states which laws of a picture its networks keep."""
-    if isinstance(found, str):
-        return f"\nLaws of a picture: {found}.\n"
+    if isinstance(measured, str):
+        return f"\nLaws of a picture: {measured}.\n"
     lines = [f"{_LAWS} (`camkit check --level laws`)", ""]
     lines += ["| size | law | worst | admitted | front end | |", "|---|---|---|---|---|---|"]
-    for size, laws in found.items():
+    for size, laws in measured.items():
         for law in laws:
             front = "" if law.front is None else number_text(law.front, law.unit)
-            kept = "kept" if law.is_kept else f"BROKEN: {law.where}"
+            verdict = "kept" if law.is_kept else f"BROKEN: {law.where}"
             lines.append(
                 f"| {size or ''} | {law.name.replace('_', ' ')} | "
                 f"{number_text(law.worst, law.unit)} | {number_text(law.limit, law.unit)} | "
-                f"{front} | {kept} |"
+                f"{front} | {verdict} |"
             )
     return "\n".join([*lines, ""])
 
 
-def with_laws_text(card: str, manifest: Manifest, found: MeasuredLaws) -> str:
+def with_laws_text(card: str, manifest: Manifest, measured: MeasuredLaws) -> str:
     """Return a card that names another version of its bundle, and other laws.
 
     Args:
         card: Of the bundle as it was.
         manifest: As it is now.
-        found: What was measured.
+        measured: What was measured.
     """
     _, _, rest = card.partition("\n")
-    kept, _, _ = rest.partition(_LAWS)
-    return f"{_title(manifest)}\n{kept}{laws_text(found)}"
+    body, _, _ = rest.partition(_LAWS)
+    return f"{_title(manifest)}\n{body}{laws_text(measured)}"
 
 
 def _title(manifest: Manifest) -> str:
@@ -145,10 +145,10 @@ def preview_png(bundle: Bundle, golden: Mapping[str, GoldenArrays]) -> bytes:
     from matplotlib.figure import Figure
 
     psf = bundle.psf
-    shown = np.unique(np.linspace(0, psf.field_heights_mm.size - 1, 5).round().astype(int))
+    fields = np.unique(np.linspace(0, psf.field_heights_mm.size - 1, 5).round().astype(int))
     figure = Figure(figsize=(10, 7.5), dpi=80, layout="constrained")
     axes = figure.subplots(3, 5)
-    for column, i in enumerate(shown):
+    for column, i in enumerate(fields):
         kernel = psf.kernels[i].mean(axis=0)
         bands = np.arange(kernel.shape[0])
         thirds = np.array_split(bands, 3) if bands.size >= 3 else [bands] * 3
@@ -170,7 +170,7 @@ def preview_png(bundle: Bundle, golden: Mapping[str, GoldenArrays]) -> bytes:
         pair = np.broadcast_to(pair, (3, *pair.shape[1:]))
         axes[2, column].imshow(encode_srgb(pair.astype(np.float32)).transpose(1, 2, 0))
         axes[2, column].set_title(f"{name}: {best} over truth", fontsize=8)
-    for axis in (*axes[0, shown.size :], *axes[1, shown.size :], *axes[2]):
+    for axis in (*axes[0, fields.size :], *axes[1, fields.size :], *axes[2]):
         axis.axis("off")
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", metadata={"Software": None})

@@ -45,8 +45,8 @@ def designed_members(
             the PSF was not frozen from them.
         CamkitError: If a lens is wrong, see `read_lens`.
     """
-    carried = _carried(checkpoints)
-    lens, plate = _lens_of(parts, carried), _plate_of(parts, carried)
+    designed = _designed_of(checkpoints)
+    lens, plate = _lens_of(parts, designed), _plate_of(parts, designed)
     if lens is not None and plate is not None:
         raise ContractError(
             f"a bundle holds a lens or a plate; here are the lens {lens.name} and the plate "
@@ -63,31 +63,31 @@ def designed_members(
     return {}
 
 
-def _carried(checkpoints: Iterable[Checkpoint]) -> Mapping[str, bytes]:
+def _designed_of(checkpoints: Iterable[Checkpoint]) -> Mapping[str, bytes]:
     """Return the optics that checkpoints carry; old checkpoints carry none."""
-    found: list[Mapping[str, bytes]] = []
+    distinct: list[Mapping[str, bytes]] = []
     for checkpoint in checkpoints:
-        if checkpoint.designed and checkpoint.designed not in found:
-            found.append(checkpoint.designed)
-    if len(found) > 1:
+        if checkpoint.designed and checkpoint.designed not in distinct:
+            distinct.append(checkpoint.designed)
+    if len(distinct) > 1:
         raise ContractError(
             "the checkpoints were trained with different optics; train them for one lens or plate"
         )
-    return found[0] if found else {}
+    return distinct[0] if distinct else {}
 
 
-def _lens_of(parts: Parts, carried: Mapping[str, bytes]) -> Lens | None:
+def _lens_of(parts: Parts, designed: Mapping[str, bytes]) -> Lens | None:
     if parts.prescription is not None:
         return read_lens(parts.prescription)
-    return parse_prescription(carried[PRESCRIPTION].decode()) if PRESCRIPTION in carried else None
+    return parse_prescription(designed[PRESCRIPTION].decode()) if PRESCRIPTION in designed else None
 
 
-def _plate_of(parts: Parts, carried: Mapping[str, bytes]) -> Plate | None:
+def _plate_of(parts: Parts, designed: Mapping[str, bytes]) -> Plate | None:
     if parts.plate is not None:
         return read_plate(parts.plate)
-    if PLATE not in carried or parts.without_plate:
+    if PLATE not in designed or parts.without_plate:
         return None
-    return plate_of_members(carried, "the checkpoints")
+    return plate_of_members(designed, "the checkpoints")
 
 
 def _check_plate(plate: Plate, psf: FrozenPsf, path: Path) -> None:
@@ -97,8 +97,8 @@ def _check_plate(plate: Plate, psf: FrozenPsf, path: Path) -> None:
     grid = PixelGrid(side_px=frozen.shape[-1], pitch_um=psf.pixel_pitch_um)
     with torch.no_grad():
         light = plate.psf(float(psf.wavelengths_um[middle]), grid, float(psf.depths_mm[0]))
-    own = light.to(torch.float64).numpy()
-    elsewhere = float(np.abs(own / own.sum() - frozen / frozen.sum()).sum() / 2)
+    computed = light.to(torch.float64).numpy()
+    elsewhere = float(np.abs(computed / computed.sum() - frozen / frozen.sum()).sum() / 2)
     if elsewhere > SAME_PLATE_SHARE:
         raise ContractError(
             f"{path} was not frozen from the plate {plate.name}: {elsewhere:.1%} of the light lies "

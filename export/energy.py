@@ -23,8 +23,8 @@ def energy_diameter_px(kernel: FloatArray, share: float) -> float:
     cy, cx = float((y * kernel).sum()) / total, float((x * kernel).sum()) / total
     radius = np.hypot(y - cy, x - cx).ravel()
     order = np.argsort(radius)
-    held = np.cumsum(kernel.ravel()[order]) / total
-    return float(2 * radius[order][np.searchsorted(held, share)])
+    enclosed = np.cumsum(kernel.ravel()[order]) / total
+    return float(2 * radius[order][np.searchsorted(enclosed, share)])
 
 
 def modulation(kernel: FloatArray, cycles_per_px: float) -> float:

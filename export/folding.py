@@ -34,17 +34,21 @@ process holds twice, and such kernels belong to coarse scales, where little is t
 def fold_nodes(graph: onnx.GraphProto) -> None:
     """Rewrite the nodes of a graph, in place; other patterns stay as they are."""
     weights = {w.name: numpy_helper.to_array(w) for w in graph.initializer}
-    known = set(weights)
+    initial_names = set(weights)
     nodes = list(graph.node)
     for fold in (_constants_into_weights, _one_slope, _coarse_convolutions):
         nodes = fold(nodes, weights, str(graph.output[0].name))
     del graph.node[:]
     graph.node.extend(nodes)
-    used = {name for node in nodes for name in node.input}
-    kept = [w for w in graph.initializer if w.name in used]
-    made = [numpy_helper.from_array(w, n) for n, w in weights.items() if n in used - known]
+    input_names = {name for node in nodes for name in node.input}
+    initializers = [w for w in graph.initializer if w.name in input_names]
+    new_initializers = [
+        numpy_helper.from_array(w, n)
+        for n, w in weights.items()
+        if n in input_names - initial_names
+    ]
     del graph.initializer[:]
-    graph.initializer.extend([*kept, *made])
+    graph.initializer.extend([*initializers, *new_initializers])
 
 
 def _constants_into_weights(nodes: list[Any], weights: Weights, last: str) -> list[Any]:
@@ -52,21 +56,21 @@ def _constants_into_weights(nodes: list[Any], weights: Weights, last: str) -> li
     nodes, place = list(nodes), 0
     while place < len(nodes):
         conv = nodes[place]
-        after = _only_reader(nodes, conv, last) if _has_bias(conv, weights) else None
-        constant = None if after is None else _channel_constant(after, conv, weights)
-        if after is None or constant is None:
+        follower = _only_reader(nodes, conv, last) if _has_bias(conv, weights) else None
+        constant = None if follower is None else _channel_constant(follower, conv, weights)
+        if follower is None or constant is None:
             place += 1
             continue
         weight, bias = (weights[name].astype(np.float64) for name in conv.input[1:3])
-        if after.op_type == "Sub":
+        if follower.op_type == "Sub":
             bias = bias - constant
         else:
             weight, bias = weight * constant[:, None, None, None], bias * constant
-        names = [f"{after.output[0]}_{what}" for what in ("weight", "bias")]
+        names = [f"{follower.output[0]}_{what}" for what in ("weight", "bias")]
         for name, values in zip(names, (weight, bias), strict=True):
             weights[name] = values.astype(np.float32)
-        nodes[place] = _copied(conv, [conv.input[0], *names], after.output[0])
-        nodes.remove(after)
+        nodes[place] = _copied(conv, [conv.input[0], *names], follower.output[0])
+        nodes.remove(follower)
     return nodes
 
 
@@ -106,7 +110,7 @@ def _one_slope(nodes: list[Any], weights: Weights, _last: str) -> list[Any]:
 def _coarse_convolutions(nodes: list[Any], weights: Weights, last: str) -> list[Any]:
     """Convolve before a picture is doubled, not after."""
     dropped: set[str] = set()
-    made: dict[str, list[Any]] = {}
+    replacements: dict[str, list[Any]] = {}
     for resize in nodes:
         conv = _only_reader(nodes, resize, last) if _is_doubling(resize, weights) else None
         if conv is None or not _is_plain_3x3(conv, weights):
@@ -122,12 +126,12 @@ def _coarse_convolutions(nodes: list[Any], weights: Weights, last: str) -> list[
             tail = None
         phases = _phases(resize.input[0], conv, slope, weights)
         if tail is None:
-            made[conv.output[0]] = _interleaved(phases, end.output[0])
+            replacements[conv.output[0]] = _interleaved(phases, end.output[0])
         else:
-            made[conv.output[0]] = _narrowed(phases, tail, weights)
+            replacements[conv.output[0]] = _narrowed(phases, tail, weights)
         dropped |= {node.output[0] for node in (resize, slope, tail) if node is not None}
     there = [node for node in nodes if node.output[0] not in dropped]
-    return [new for node in there for new in made.get(node.output[0], [node])]
+    return [new for node in there for new in replacements.get(node.output[0], [node])]
 
 
 def _phases(
@@ -162,21 +166,21 @@ def _narrowed(
     """Return the nodes that take each pixel of every sample to the few channels, and add up."""
     weight, output, total = weights[tail.input[1]], tail.output[0], ""
     nodes: list[Any] = []
-    for place, made in phases:
+    for place, phase_nodes in phases:
         part = f"{output}_{place[0]}{place[1]}"
-        weights[f"{part}_weight"] = _seen_from(weight, place)
-        inputs = [made[-1].output[0], f"{part}_weight"]
+        weights[f"{part}_weight"] = _phase_weight(weight, place)
+        inputs = [phase_nodes[-1].output[0], f"{part}_weight"]
         if not total and len(tail.input) > 2:
             weights[f"{part}_bias"] = np.tile(weights[tail.input[2]], 4)
             inputs.append(f"{part}_bias")
-        nodes += [*made, _conv_2x2(inputs, part, place)]
+        nodes += [*phase_nodes, _conv_2x2(inputs, part, place)]
         if total:
             nodes.append(helper.make_node("Add", [total, part], [f"{part}_sum"]))
         total = nodes[-1].output[0]
     return [*nodes, _fine(total, output)]
 
 
-def _seen_from(weight: NDArray[Any], place: tuple[int, int]) -> NDArray[Any]:
+def _phase_weight(weight: NDArray[Any], place: tuple[int, int]) -> NDArray[Any]:
     """Return the part of a 3x3 kernel on the fine grid that falls on the pixels of one place.
 
     Args:
@@ -186,17 +190,17 @@ def _seen_from(weight: NDArray[Any], place: tuple[int, int]) -> NDArray[Any]:
     Returns:
         (4 k, c, 2, 2), for the four pixels of a sample in reading order.
     """
-    found = np.zeros((2, 2, *weight.shape[:2], 2, 2), np.float32)
+    phase_weight = np.zeros((2, 2, *weight.shape[:2], 2, 2), np.float32)
     for y, x, i, j in product(range(2), range(2), range(3), range(3)):
         (row, from_y), (column, from_x) = divmod(y + i - 1, 2), divmod(x + j - 1, 2)
         if (from_y, from_x) == place:
-            found[y, x, :, :, row + from_y, column + from_x] = weight[:, :, i, j]
-    return found.reshape(-1, weight.shape[1], 2, 2)
+            phase_weight[y, x, :, :, row + from_y, column + from_x] = weight[:, :, i, j]
+    return phase_weight.reshape(-1, weight.shape[1], 2, 2)
 
 
-def _conv_2x2(inputs: list[str], output: str, before: tuple[int, int]) -> Any:
+def _conv_2x2(inputs: list[str], output: str, leading: tuple[int, int]) -> Any:
     """Return a convolution that keeps the size: so many rows and columns of zeros come before."""
-    pads = [*before, *(1 - count for count in before)]
+    pads = [*leading, *(1 - count for count in leading)]
     return helper.make_node("Conv", inputs, [output], kernel_shape=[2, 2], pads=pads)
 
 
@@ -213,13 +217,13 @@ def _is_doubling(node: Any, weights: Weights) -> bool:
     """Return whether a node gives every sample four times, as a square."""
     if node.op_type != "Resize" or len(node.input) != 3 or node.input[1]:
         return False
-    scales, asked = weights.get(node.input[2]), _attributes(node)
-    wanted = {
+    scales, attributes = weights.get(node.input[2]), _attributes(node)
+    expected = {
         "mode": b"nearest",
         "coordinate_transformation_mode": b"asymmetric",
         "nearest_mode": b"floor",
     }
-    plain = all(asked.get(key) == value for key, value in wanted.items())
+    plain = all(attributes.get(key) == value for key, value in expected.items())
     return plain and scales is not None and tuple(scales) == _SCALES
 
 
@@ -227,8 +231,8 @@ def _is_plain_3x3(node: Any, weights: Weights) -> bool:
     if node.op_type != "Conv" or any(name not in weights for name in node.input[1:]):
         return False
     plain = {"strides": [1, 1], "dilations": [1, 1], "group": 1, "auto_pad": b"NOTSET"}
-    asked = {"pads": [0] * 4, **plain, **_attributes(node)}
-    same = all(asked[key] == value for key, value in {"pads": [1] * 4, **plain}.items())
+    attributes = {"pads": [0] * 4, **plain, **_attributes(node)}
+    same = all(attributes[key] == value for key, value in {"pads": [1] * 4, **plain}.items())
     return same and bool(weights[node.input[1]].shape[2:] == (3, 3))
 
 
@@ -243,6 +247,6 @@ def _only_reader(nodes: list[Any], node: Any, last: str) -> Any:
 
 
 def _copied(node: Any, inputs: list[str], output: str) -> Any:
-    made = helper.make_node(node.op_type, inputs, [output])
-    made.attribute.extend(node.attribute)
-    return made
+    copy = helper.make_node(node.op_type, inputs, [output])
+    copy.attribute.extend(node.attribute)
+    return copy

@@ -53,7 +53,7 @@ def to_onnx(network: nn.Module, *, channels: int = 6, scale: int = 1) -> bytes:
     network.eval()
     try:
         model = _stripped(
-            _traced(network, channels, stride), _given(network, channels, scale), scale
+            _traced(network, channels, stride), _output_planes(network, channels, scale), scale
         )
         check_parity(network, model, _random_windows(channels, stride), scale=scale)
     finally:
@@ -183,7 +183,7 @@ def _traced(network: nn.Module, channels: int, stride: int) -> onnx.ModelProto:
     return program.model_proto
 
 
-def _given(network: nn.Module, channels: int, scale: int) -> int:
+def _output_planes(network: nn.Module, channels: int, scale: int) -> int:
     """Return the output planes of a network.
 
     Raises:
@@ -222,8 +222,8 @@ def _stripped(traced: onnx.ModelProto, outputs: int, scale: int) -> bytes:
         nodes.append(clean)
     channels = graph.input[0].type.tensor_type.shape.dim[1].dim_value
     float32 = onnx.TensorProto.FLOAT
-    own = "" if scale == 1 else f"{scale}_"
-    sides = [f"{own}height", f"{own}width"]
+    prefix = "" if scale == 1 else f"{scale}_"
+    sides = [f"{prefix}height", f"{prefix}width"]
     model = helper.make_model(
         helper.make_graph(
             nodes,

@@ -28,22 +28,24 @@ def golden_members(bundle: Bundle, golden: Mapping[str, GoldenArrays]) -> dict[s
 
 def with_activations(bundle: Bundle, cases: Cases) -> dict[str, dict[str, NetworkFacts]]:
     """Return the facts of its networks, with activations that hold for the golden cases too."""
-    found: dict[str, dict[str, NetworkFacts]] = {}
+    networks: dict[str, dict[str, NetworkFacts]] = {}
     for role, sizes in bundle.manifest.networks.items():
-        found[role] = {}
+        networks[role] = {}
         for size, facts in sizes.items():
             windows = [
                 case_work(bundle, case, arrays, size).network_input(role)[None]
                 for case, arrays in cases.values()
             ]
-            seen = node_activations(bundle.network_bytes(role, size), windows)
-            known = facts.node_activation
-            largest = {name: max(value, known.get(name, 0.0)) for name, value in seen.items()}
+            activations = node_activations(bundle.network_bytes(role, size), windows)
+            earlier = facts.node_activation
+            largest = {
+                name: max(value, earlier.get(name, 0.0)) for name, value in activations.items()
+            }
             top = max(facts.max_activation, *largest.values())
-            found[role][size] = facts.model_copy(
+            networks[role][size] = facts.model_copy(
                 update={"node_activation": largest, "max_activation": top}
             )
-    return found
+    return networks
 
 
 def write_proved(

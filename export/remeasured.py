@@ -127,10 +127,10 @@ def remeasured(
         raise DecodeError(
             f"the haze of {name} belongs to its kernels; leave {option_text('psf')} out"
         )
-    own = {name: bundle.member(name) for name in bundle.names if name not in OWN_NAMES}
+    members = {name: bundle.member(name) for name in bundle.names if name not in OWN_NAMES}
     psf = bundle.psf if hazy or optics.type == "frozen_psf" else None
     haze = bundle.haze if hazy else None
-    draft = _Draft(manifest=bundle.manifest, members=own, psf=psf, haze=haze)
+    draft = _Draft(manifest=bundle.manifest, members=members, psf=psf, haze=haze)
     draft.change(golden=(), envelope=None, plan=None, card=Card())
     if measured.noise is not None:
         _put_noise(draft, measured.noise)
@@ -145,51 +145,51 @@ def remeasured(
     return _proved(draft, out), tuple(draft.notes)
 
 
-def _put_noise(draft: _Draft, found: NoiseFile) -> None:
-    lowest = min(found.iso, key=lambda one: one.iso)
-    if any(not one.read_noise_resolved for one in found.iso):
+def _put_noise(draft: _Draft, noise_file: NoiseFile) -> None:
+    lowest = min(noise_file.iso, key=lambda one: one.iso)
+    if any(not one.read_noise_resolved for one in noise_file.iso):
         draft.notes.append("read noise that was not resolved is taken as large as it may be")
     update = {
-        "noise": found.noise(),
+        "noise": noise_file.noise(),
         "full_well_e": lowest.full_well_e,
         "black_level": lowest.black_level,
         "white_level": lowest.white_level,
     }
     sensor = draft.sensor
-    ends = {one.iso for one in sensor.noise}, {one.iso for one in found.iso}
+    ends = {one.iso for one in sensor.noise}, {one.iso for one in noise_file.iso}
     if min(ends[0]) < min(ends[1]) or max(ends[0]) > max(ends[1]):
-        before, now = (f"{min(isos):g} to {max(isos):g}" for isos in ends)
-        draft.notes.append(f"noise is known at ISO {now} now, at {before} before")
+        earlier, now = (f"{min(isos):g} to {max(isos):g}" for isos in ends)
+        draft.notes.append(f"noise is known at ISO {now} now, at {earlier} before")
     draft.change(sensor=type(sensor).model_validate({**sensor.model_dump(), **update}))
 
 
-def _put_psf(draft: _Draft, found: FrozenPsf, *, keep_networks: bool) -> None:
-    sensor, before = draft.sensor, draft.psf
-    if before is None or draft.manifest.stage(Wiener) is None:
+def _put_psf(draft: _Draft, psf: FrozenPsf, *, keep_networks: bool) -> None:
+    sensor, earlier = draft.sensor, draft.psf
+    if earlier is None or draft.manifest.stage(Wiener) is None:
         raise DecodeError(f"{draft.manifest.name} has no Wiener bank that would use kernels")
     pitch_um = sensor.pixel_pitch_um
-    if abs(found.pixel_pitch_um / pitch_um - 1) > PITCH_TOLERANCE:
+    if abs(psf.pixel_pitch_um / pitch_um - 1) > PITCH_TOLERANCE:
         raise DecodeError(
-            f"the kernels have samples of {found.pixel_pitch_um:g} um, the sensor pixels of "
+            f"the kernels have samples of {psf.pixel_pitch_um:g} um, the sensor pixels of "
             f"{pitch_um:g} um"
         )
     channels = len(sensor.channels)
-    if found.wavelengths_um.size != channels:
+    if psf.wavelengths_um.size != channels:
         raise DecodeError(
-            f"the kernels have {found.wavelengths_um.size} wavelengths, one for each of {channels} "
+            f"the kernels have {psf.wavelengths_um.size} wavelengths, one for each of {channels} "
             "channels is expected, as `camkit calibrate psf` writes them"
         )
-    light = _light_at(found.field_heights_mm, before)
-    if found.symmetry == "uniform":
+    light = _light_at(psf.field_heights_mm, earlier)
+    if psf.symmetry == "uniform":
         draft.notes.append("kernels of one place hold no vignetting: light is not evened")
         _leave_out(draft, {Illumination})
     draft.psf = replace(
-        found,
+        psf,
         pixel_pitch_um=pitch_um,
-        distortion=before.distortion,
+        distortion=earlier.distortion,
         relative_illumination=light,
     )
-    waves = tuple(map(float, found.wavelengths_um))
+    waves = tuple(map(float, psf.wavelengths_um))
     # red sees the longest wavelength: rows of the response in the order of the channels
     rows = tuple(tuple(map(float, row)) for row in np.eye(channels)[::-1])
     response = ChannelResponse(
@@ -208,16 +208,16 @@ def _put_psf(draft: _Draft, found: FrozenPsf, *, keep_networks: bool) -> None:
 
 
 def _light_at(heights_mm: FloatGrid, psf: FrozenPsf) -> FloatGrid:
-    known = psf.radial_illumination
-    if known is None:
+    illumination = psf.radial_illumination
+    if illumination is None:
         return np.ones(heights_mm.size)
-    return np.asarray(np.interp(heights_mm**2, known.heights_mm**2, known.light))
+    return np.asarray(np.interp(heights_mm**2, illumination.heights_mm**2, illumination.light))
 
 
 def _leave_out(draft: _Draft, kinds: set[type]) -> None:
     stages = draft.manifest.stages
-    kept = [stage for stage in stages if type(stage) not in kinds]
-    draft.change(stages=rewired(kept, stages))
+    remaining = [stage for stage in stages if type(stage) not in kinds]
+    draft.change(stages=rewired(remaining, stages))
 
 
 def _leave_out_networks(draft: _Draft) -> None:
@@ -229,8 +229,8 @@ def _leave_out_networks(draft: _Draft) -> None:
     }
     draft.members = {name: data for name, data in draft.members.items() if name not in names}
     stages = draft.manifest.stages
-    kept = [stage for stage in stages if stage.type != "network"]
-    draft.change(stages=rewired(kept, stages), networks={})
+    remaining = [stage for stage in stages if stage.type != "network"]
+    draft.change(stages=rewired(remaining, stages), networks={})
 
 
 def _put_centre(draft: _Draft, measured: Measured) -> None:
@@ -263,19 +263,19 @@ def _farthest_px(extent: Extent) -> float:
     return float(np.hypot(max(x, extent.width_px - 1 - x), max(y, extent.height_px - 1 - y)))
 
 
-def _put_flat(draft: _Draft, found: FlatFile) -> None:
-    pitch_um, entry = draft.sensor.pixel_pitch_um, found.to_entry()
-    if abs(found.pixel_pitch_um / pitch_um - 1) > PITCH_TOLERANCE:
+def _put_flat(draft: _Draft, flat: FlatFile) -> None:
+    pitch_um, entry = draft.sensor.pixel_pitch_um, flat.to_entry()
+    if abs(flat.pixel_pitch_um / pitch_um - 1) > PITCH_TOLERANCE:
         raise DecodeError(
-            f"the flat was measured with pixels of {found.pixel_pitch_um:g} um, the sensor has "
+            f"the flat was measured with pixels of {flat.pixel_pitch_um:g} um, the sensor has "
             f"{pitch_um:g} um"
         )
-    if not found.separated:
+    if not flat.separated:
         draft.notes.append("the flat was not told from the display; what it has of it comes along")
     corner_mm = _farthest_px(draft.sensor.known_extent) * to_mm(pitch_um)
-    if found.heights_mm[-1] < LEAST_REACH * corner_mm:
+    if flat.heights_mm[-1] < LEAST_REACH * corner_mm:
         draft.notes.append(
-            f"the flat is known to {found.heights_mm[-1]:.3g} mm of {corner_mm:.3g} from the "
+            f"the flat is known to {flat.heights_mm[-1]:.3g} mm of {corner_mm:.3g} from the "
             "centre; beyond, light is taken to fall no further"
         )
     optics = draft.manifest.optics
@@ -292,19 +292,19 @@ def _put_flat(draft: _Draft, found: FlatFile) -> None:
     draft.psf = replace(draft.psf, relative_illumination=values)
 
 
-def _put_geometry(draft: _Draft, found: GeometryFile) -> None:
+def _put_geometry(draft: _Draft, geometry: GeometryFile) -> None:
     extent = draft.sensor.known_extent
-    rows = (found.radial.coefficients,) * len(draft.sensor.channels)
-    radius_mm = found.radial.radius_px * to_mm(extent.pixel_pitch_um)
+    rows = (geometry.radial.coefficients,) * len(draft.sensor.channels)
+    radius_mm = geometry.radial.radius_px * to_mm(extent.pixel_pitch_um)
     entry = RadialEntry(coefficients=rows, radius_mm=radius_mm)
     farthest = _farthest_px(extent)
     try:
         check_distortion(entry.to_distortion(), farthest * to_mm(extent.pixel_pitch_um))
     except ContractError as error:
         raise DecodeError(f"the geometry cannot be undone: {error}") from error
-    if found.covered_radius_px * RANGE_MARGIN < farthest:
-        known = f"{found.covered_radius_px:.0f} px of {farthest:.0f}"
-        draft.notes.append(f"the geometry is known to {known} from the centre; the rest is guessed")
+    if geometry.covered_radius_px * RANGE_MARGIN < farthest:
+        reach = f"{geometry.covered_radius_px:.0f} px of {farthest:.0f}"
+        draft.notes.append(f"the geometry is known to {reach} from the centre; the rest is guessed")
     optics = draft.manifest.optics
     if isinstance(optics, LensProfile):
         draft.change(optics=optics.model_copy(update={"distortion": entry}))
@@ -321,9 +321,9 @@ def _finish(draft: _Draft) -> None:
         draft.members[optics.member] = psf_to_bytes(draft.psf)
         focus_mm = optics.object_distance_mm
         frozen = FrozenOptics(psf=draft.psf, haze=draft.haze)
-        made = frozen.entry(np.inf if focus_mm is None else focus_mm)
-        newest = format_of(draft.psf, (made, *manifest.stages), least=manifest.version_pair)
-        draft.change(optics=made, format_version=newest)
+        entry = frozen.entry(np.inf if focus_mm is None else focus_mm)
+        newest = format_of(draft.psf, (entry, *manifest.stages), least=manifest.version_pair)
+        draft.change(optics=entry, format_version=newest)
     parts = Parts(
         sensor=draft.manifest.sensor,
         optics=draft.manifest.optics,
@@ -331,8 +331,8 @@ def _finish(draft: _Draft) -> None:
     )
     stages = draft.manifest.stages
     draft.change(planes=planes_of(stages, parts), laws=None)  # of other parts than before
-    given = draft.manifest.all_planes
-    products = {name: plane for name, plane in manifest.products.items() if plane in given}
+    planes = draft.manifest.all_planes
+    products = {name: plane for name, plane in manifest.products.items() if plane in planes}
     draft.change(products={**products, "image": stages[-1].gives[0]})
 
 
@@ -340,12 +340,12 @@ def _proved(draft: _Draft, out: Path) -> Bundle:
     """Make golden cases, check the bundle, and write it."""
     if draft.manifest.has_kernels:
         with tempfile.TemporaryDirectory() as folder:
-            made = write_bundle(Path(folder) / out.name, draft.manifest, draft.members)
-            cases = photograph_all(made)
-            draft.members |= golden_members(made, add_outputs(made, cases))
+            trial = write_bundle(Path(folder) / out.name, draft.manifest, draft.members)
+            cases = photograph_all(trial)
+            draft.members |= golden_members(trial, add_outputs(trial, cases))
             draft.change(
                 golden=tuple(case for case, _ in cases.values()),
-                networks=with_activations(made, cases),
+                networks=with_activations(trial, cases),
             )
     bundle, _ = write_proved(out, draft.manifest, draft.members)
     return bundle

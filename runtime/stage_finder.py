@@ -6,9 +6,11 @@ It is the one that the stage names as its `runtime`, else that of its type in
 A module defines
 
     prepare(entry, job) -> StageWork     what the stage does to one capture; cheap, before any row
-    seconds(entry, subject, work, speed)    what it will take, for plans that estimate seconds
-    METHODS                              names of its ways, as `--method` takes them; may be empty
+    METHODS                              names of its ways, as `--method` takes them; one that
+                                         restores has at least one, or its result counts as
+                                         developed alone
     OPTIONS                              fields of `Options` that mean something to it
+    seconds(entry, subject, work, speed)    optional: what it will take; a plan counts 0 without
     look(entry, job) -> Job              optional: looks at the capture before anything is planned;
                                          the job returned knows what it found
     IS_NEEDED                            optional: true where no method leaves the stage out
@@ -27,9 +29,11 @@ from typing import Final
 
 from camkit.bundle.manifest import Manifest
 from camkit.bundle.stages import StageEntry, all_stages, find_stage, type_of
-from camkit.entry_points import has_module
-from camkit.errors import UnsupportedError
+from camkit.bundle.stages.register import READY, stages_of_packages
+from camkit.entry_points import has_module, load_part
+from camkit.errors import ContractError, UnsupportedError
 
+REQUIRED_PARTS: Final = ("prepare", "METHODS", "OPTIONS")
 STAGES: Final = "camkit.runtime.stages"
 """Named, not imported: its modules import what imports this one."""
 
@@ -40,7 +44,7 @@ def stage_module(name: str) -> ModuleType:
 
     Raises:
         UnsupportedError: If there is no such stage, or this runtime does not do it.
-        ContractError: If a package brings what is none.
+        ContractError: If a package brings what is none, or its module fails or lacks a part.
     """
     return _module(find_stage(name))
 
@@ -52,12 +56,24 @@ def module_of(stage: StageEntry) -> ModuleType:
 
 @cache
 def _module(entry: type[StageEntry]) -> ModuleType:
-    module = _module_name(entry)
-    if not has_module(module):
-        raise UnsupportedError(
-            f"the stage {type_of(entry)!r} is not walked: there is no module {module}"
-        )
-    return importlib.import_module(module)
+    name, stage = _module_name(entry), f"the stage {type_of(entry)!r}"
+    if not has_module(name):
+        raise UnsupportedError(f"{stage} is not walked: there is no module {name}")
+    module = load_part(name, stage) if entry.runtime else importlib.import_module(name)
+    if missing := [part for part in REQUIRED_PARTS if not hasattr(module, part)]:
+        raise ContractError(f"the module {name} of {stage} does not define {', '.join(missing)}")
+    return module
+
+
+def states_of_packages() -> dict[str, str]:
+    """Return the stages that packages bring by name: `READY`, or why they are refused."""
+    states = stages_of_packages()
+    for name in [name for name, state in states.items() if state == READY]:
+        try:
+            stage_module(name)
+        except (ContractError, UnsupportedError) as error:
+            states[name] = str(error)
+    return states
 
 
 def _module_name(entry: type[StageEntry]) -> str:

@@ -15,6 +15,7 @@ ASK = (
     "import setuptools; from distutils.core import run_setup; "
     "print(*run_setup('setup.py', stop_after='config').packages)"
 )
+MAPPED = r"`?[a-z][a-z0-9_]*/?`?"
 SHIPPED = ("camkit", "runtime", "export", "models_def")
 FOUND_BY_PLACE = (
     "camkit.report.bench.metrics",
@@ -142,6 +143,25 @@ def test_nothing_that_ships_serves_the_tools_alone() -> None:
         package = name.rpartition(".")[0]
         ahead |= ((_named(modules[name]) | {package}) & modules.keys()) - reached
     assert set(modules) - reached <= DATA
+
+
+def _mapped(package: Path) -> set[str]:
+    """Return the names that lines "name, name   what" or "- `name`: what" of a map begin with."""
+    docstring = ast.get_docstring(ast.parse(package.read_text(encoding="utf-8"))) or ""
+    head = rf"^ *(?:.*-> |- )?({MAPPED}(?:, {MAPPED})*)(?: {{2,}}|: )"
+    heads = re.findall(head, docstring.partition("\n")[2], re.M)
+    return {name.strip("`/ ") for head in heads for name in head.split(",")}
+
+
+def test_maps_of_packages_name_what_is_there() -> None:
+    packages = [path for top in (*SHIPPED, "tools") for _, path in _modules(top)]
+    wrong, mapped = {}, 0
+    for package in (path for path in packages if path.name == "__init__.py"):
+        names, there = _mapped(package), {path.stem for path in package.parent.iterdir()}
+        mapped += len(names)
+        wrong[str(package.relative_to(ROOT))] = names - there
+    assert mapped > 600
+    assert not {package: names for package, names in wrong.items() if names}
 
 
 def test_an_editable_install_puts_a_folder_of_one_link_on_the_path(tmp_path: Path) -> None:

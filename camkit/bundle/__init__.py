@@ -5,7 +5,11 @@
     chain                          whether the stages join
     manifest                       what manifest.json may say, and its schema
     upgrade                        manifests of format 1.0
-    psf_file, golden               the safetensors members
+    frozen_optics                  kernels or streaks, as files hold them
+    light_bound                    the bound on the light that a network may move
+    psf_file, streak_file          the safetensors members: optics,
+    haze_file                      the haze of these,
+    golden, haze_golden            cases that prove a bundle
     strict_json                    JSON that every reader understands alike
     local_headers, container       the zip: names, sizes, refusals
     reader                         container + manifest + hashes -> Bundle

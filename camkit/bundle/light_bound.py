@@ -6,7 +6,7 @@
 A network behind a bank adds detail to a picture whose local mean is right already. What its own
 local mean adds beyond what noise and an error of the kernels explain is taken back; beside clipped
 samples nothing is added at all, and what is nearly white is not darkened.
-`camkit/runtime/network/light.py` and `camkit/models_def/networks/light.py` compute it.
+`camkit/runtime/network/light_bound.py` and `camkit/models_def/networks/light.py` compute it.
 """
 
 from typing import Annotated, Final

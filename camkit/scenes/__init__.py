@@ -7,6 +7,7 @@ procedural    `procedural:SEED`, a bit of everything
 clean         edges, stars and discs whose truth is known to the last pixel
 slanted_edge  a sharp edge, to measure an MTF on
 squares       `squares:SEED`, dark squares on white, to measure the focus of a camera body on
+charts        lamps and patches on which the laws of a picture are held
 saturation    the exposure at which a share of a scene saturates
 scene_register  a scene by its name; those that a kind of camera brings too (`night:SEED`)
 """

@@ -59,17 +59,17 @@ def problem_of(recipe: DesignRecipe, lens: Lens) -> Problem:
 
 def refocused(lens: Lens, distance_mm: float) -> Lens:
     """Return the lens with its sensor moved as the paraxial image of an object at a distance is."""
-    placed = replace(lens, object_distance_mm=distance_mm)
+    unfocused = replace(lens, object_distance_mm=distance_mm)
     return with_focus_shift(
-        placed, paraxial_image(placed).distance_mm - paraxial_image(lens).distance_mm
+        unfocused, paraxial_image(unfocused).distance_mm - paraxial_image(lens).distance_mm
     )
 
 
 def field_slopes(optics: OpticsRecipe) -> Tensor:
     """Return the fields (field,) as slopes, spaced as the recipe says."""
-    far = math.tan(to_radians(optics.half_field_deg))
+    edge_slope = math.tan(to_radians(optics.half_field_deg))
     steps = torch.linspace(0, 1, optics.fields, dtype=torch.float64)
-    slopes: Tensor = far * (steps.sqrt() if optics.spacing == "area" else steps)
+    slopes: Tensor = edge_slope * (steps.sqrt() if optics.spacing == "area" else steps)
     return slopes
 
 
@@ -88,12 +88,12 @@ def pixels_of(recipe: DesignRecipe, problem: Problem, begin: Tensor) -> Pixels:
 
 def recorder_of(recipe: DesignRecipe) -> Recorder:
     """Return the pixel model of a recipe; raises ContractError for unknown colour filters."""
-    wanted, known = recipe.pixels.cfa, {str(cfa): cfa for cfa in CFA_PATTERNS}
-    if wanted and wanted not in known:
+    name, patterns = recipe.pixels.cfa, {str(cfa): cfa for cfa in CFA_PATTERNS}
+    if name and name not in patterns:
         raise ContractError(
-            f"pixels.cfa must be one of {', '.join(known)}, or empty; got {wanted!r}"
+            f"pixels.cfa must be one of {', '.join(patterns)}, or empty; got {name!r}"
         )
-    return Recorder(noise=recipe.pixels.noise, cfa=known.get(wanted))
+    return Recorder(noise=recipe.pixels.noise, cfa=patterns.get(name))
 
 
 def network_of(recipe: DesignRecipe) -> nn.Module | None:
@@ -104,11 +104,11 @@ def network_of(recipe: DesignRecipe) -> nn.Module | None:
     torch.manual_seed(recipe.schedule.seed)
     network = build_network(choice.name, **choice.config)
     check_patch(choice.name, network, recipe.schedule.patch_px)
-    wanted = recipe.front.channels
-    if network.in_channels != wanted:
+    planes = recipe.front.channels
+    if network.in_channels != planes:
         raise ContractError(
             f"network {choice.name} takes {network.in_channels} planes, the front "
-            f"{recipe.front.kind!r} gives {wanted}; set network.config.in_channels"
+            f"{recipe.front.kind!r} gives {planes}; set network.config.in_channels"
         )
     return network
 

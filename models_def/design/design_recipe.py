@@ -216,8 +216,8 @@ def with_choices(
     Without `search` the design begins at the prescription itself.
     """
     changes = {"steps": steps, "lens_rate": lens_rate, "seed": seed}
-    chosen = {key: value for key, value in changes.items() if value is not None}
-    schedule = replace(recipe.schedule, **chosen)  # type: ignore[arg-type]
+    overrides = {key: value for key, value in changes.items() if value is not None}
+    schedule = replace(recipe.schedule, **overrides)  # type: ignore[arg-type]
     return replace(
         recipe,
         schedule=schedule,

@@ -37,12 +37,14 @@ class Copy:
 
 def draw_copy(lens: Lens, errors: FabricationErrors, number: int) -> Copy:
     """Draw the errors of a copy, those of `perturb`; the same number gives the same copy."""
-    made = perturb(lens, errors, np.random.default_rng((number, 77)))
-    pairs = list(zip(lens.surfaces, made.surfaces, strict=True))
-    bent = [(s.curvature_per_mm, m.curvature_per_mm) for s, m in pairs]
+    copy_lens = perturb(lens, errors, np.random.default_rng((number, 77)))
+    pairs = list(zip(lens.surfaces, copy_lens.surfaces, strict=True))
+    curvatures = [(s.curvature_per_mm, m.curvature_per_mm) for s, m in pairs]
     moved_mm = np.array([m.thickness_mm - s.thickness_mm for s, m in pairs])
     return Copy(
-        radius=np.array([nominal / own - 1 if own else 0.0 for nominal, own in bent]),
+        radius=np.array(
+            [nominal / actual - 1 if actual else 0.0 for nominal, actual in curvatures]
+        ),
         thickness_mm=np.append(moved_mm[:-1], 0.0),
         index=np.array([m.index_offset - s.index_offset for s, m in pairs]),
         focus_mm=float(moved_mm[-1]),
@@ -60,12 +62,14 @@ def made_with(
         reference: The same lenses at the reference wavelength, by which copies are focused.
         object_distance_mm: That they are focused at.
     """
-    off = _with_errors(reference, copy)
-    shift = image_distance(off, object_distance_mm) - image_distance(reference, object_distance_mm)
-    made = _with_errors(tensors, copy)
-    gaps = made.thickness_mm
+    unfocused = _with_errors(reference, copy)
+    shift = image_distance(unfocused, object_distance_mm) - image_distance(
+        reference, object_distance_mm
+    )
+    fabricated = _with_errors(tensors, copy)
+    gaps = fabricated.thickness_mm
     last = gaps[-1] + shift + copy.focus_mm
-    return replace(made, thickness_mm=torch.cat([gaps[:-1], last[None]]))
+    return replace(fabricated, thickness_mm=torch.cat([gaps[:-1], last[None]]))
 
 
 def _with_errors(tensors: SurfaceTensors, copy: Copy) -> SurfaceTensors:
@@ -73,11 +77,11 @@ def _with_errors(tensors: SurfaceTensors, copy: Copy) -> SurfaceTensors:
         flat = torch.from_numpy(values).to(like.dtype)
         return flat.reshape(-1, *(1,) * (like.ndim - 1))
 
-    behind = np.concatenate([np.zeros(1), copy.index])
+    index = np.concatenate([np.zeros(1), copy.index])
     return replace(
         tensors,
         curvature_per_mm=tensors.curvature_per_mm
         / (1 + shaped(copy.radius, tensors.curvature_per_mm)),
         thickness_mm=tensors.thickness_mm + shaped(copy.thickness_mm, tensors.thickness_mm),
-        index=tensors.index + shaped(behind, tensors.index),
+        index=tensors.index + shaped(index, tensors.index),
     )

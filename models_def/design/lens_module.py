@@ -80,15 +80,15 @@ class LensModule(DesignLens):
             basis = whitening(problem, begin)
         else:
             span = problem.free.high - problem.free.low
-            own = torch.where(span > 0, 1 / span.clamp_min(1e-300), 0.0)
-            basis = torch.diag(torch.ones_like(begin) if units == "range" else own)
+            inverse_span = torch.where(span > 0, 1 / span.clamp_min(1e-300), 0.0)
+            basis = torch.diag(torch.ones_like(begin) if units == "range" else inverse_span)
         self.register_buffer("basis", basis)
         self.moves = nn.Parameter(torch.zeros_like(begin))
 
     def scaled(self) -> Tensor:
         """Return the present lens (variable,), within its bounds."""
-        moved: Tensor = _Bounded.apply(self.begin + self.basis @ self.moves)  # type: ignore[no-untyped-call]
-        return moved
+        bounded: Tensor = _Bounded.apply(self.begin + self.basis @ self.moves)  # type: ignore[no-untyped-call]
+        return bounded
 
     def forward(self) -> tuple[Tensor, Tensor]:
         """Return kernels (depth, field, 3, k, k) and the penalty of the limits (a scalar)."""
@@ -111,7 +111,7 @@ class LensModule(DesignLens):
             return made_with(tensors, copy, reference=reference, object_distance_mm=focused_mm)
 
         traced = (trace_batch(problem, scaled, mm, change) for mm in problem.depths_mm)
-        return torch.stack([splat_batch(found.landings, self.pixels)[0] for found in traced])
+        return torch.stack([splat_batch(batch.landings, self.pixels)[0] for batch in traced])
 
     def lens(self) -> Lens:
         """Return the present lens as a prescription."""
@@ -139,11 +139,11 @@ def fitting_window_px(problem: Problem, scaled: Tensor, pixels: Pixels) -> int:
                 for depth_mm in problem.depths_mm
             ]
         )
-    held = float(kernels.sum((-2, -1)).amin())
-    if held < 1 - _LOST_LIGHT:
+    light_share = float(kernels.sum((-2, -1)).amin())
+    if light_share < 1 - _LOST_LIGHT:
         raise ContractError(
-            f"the lens is too blurred to begin with: {WIDEST_PX} px hold {held:.0%} of the light "
-            "of its worst field; begin from a sharper lens (or [starts]), or set kernel_px"
+            f"the lens is too blurred to begin with: {WIDEST_PX} px hold {light_share:.0%} of the "
+            "light of its worst field; begin from a sharper lens (or [starts]), or set kernel_px"
         )
     least = 2 * round(_SPARE * window_px(kernels, _LOST_LIGHT) / 2) + 1
     return min(max(least, _LEAST_PX), WIDEST_PX)
@@ -158,11 +158,11 @@ def whitening(problem: Problem, scaled: Tensor) -> Tensor:
     """
     rms = replace(problem, merit="rms")
     with torch.no_grad():
-        _, slope = jacobian(lambda given: residuals(rms, given), scaled[None])
+        _, slope = jacobian(lambda variables: residuals(rms, variables), scaled[None])
     normal = slope[0].T @ slope[0] / problem.core_mm**2
     inside = ((scaled > _AT_BOUND) & (scaled < 1 - _AT_BOUND)).to(normal.dtype)
-    apart = 1 - torch.outer(inside, inside)
-    normal = torch.where((apart > 0) & ~torch.eye(len(scaled), dtype=torch.bool), 0.0, normal)
+    at_bound = 1 - torch.outer(inside, inside)
+    normal = torch.where((at_bound > 0) & ~torch.eye(len(scaled), dtype=torch.bool), 0.0, normal)
     values, vectors = torch.linalg.eigh(normal)
     floor = _RIDGE * float(values.max().clamp_min(1e-12))
     basis: Tensor = vectors @ torch.diag((values + floor) ** -0.5) @ vectors.T

@@ -152,10 +152,10 @@ class DesignLoop:
         self._optimizer = torch.optim.Adam(groups)
         self._valid = [self._draw(VALID_SEED + i, 1) for i in range(schedule.valid_patches)]
 
-    def run(self, until: int | None = None) -> Iterator[Progress]:
+    def run(self, last_step: int | None = None) -> Iterator[Progress]:
         """Run up to a step (the last by default), yielding every validated moment."""
         schedule, begin = self.schedule, time.monotonic()
-        end = schedule.steps if until is None else min(until, schedule.steps)
+        end = schedule.steps if last_step is None else min(last_step, schedule.steps)
         while self.step < end:
             loss = self._one_step()
             if self.step % schedule.valid_steps == 0 or self.step == end:
@@ -172,8 +172,10 @@ class DesignLoop:
         with torch.set_grad_enabled(True):
             parts.lens.moves.requires_grad_(moving)
             kernels, penalty = self._kernels(moving=moving)
-            made = self._made(kernels, _step_seed(schedule.seed, self.step), moving=moving)
-            pictures, sharp = self._pictures(batch, kernels, made)
+            capture_kernels = self._capture_kernels(
+                kernels, _step_seed(schedule.seed, self.step), moving=moving
+            )
+            pictures, sharp = self._pictures(batch, kernels, capture_kernels)
             loss = design_loss(parts.loss, pictures, sharp)
             total = loss + schedule.penalty_weight * penalty
         self._optimizer.zero_grad(set_to_none=True)
@@ -196,7 +198,7 @@ class DesignLoop:
             kernels, penalty = self.parts.lens()
         return kernels.float(), penalty
 
-    def _made(self, kernels: Tensor, number: int, *, moving: bool) -> Tensor:
+    def _capture_kernels(self, kernels: Tensor, number: int, *, moving: bool) -> Tensor:
         """Return the kernels of the captures: those of copy `number`, if there are any.
 
         Args:
@@ -211,26 +213,26 @@ class DesignLoop:
             return lens.made_kernels(draw_copy(lens.problem.free.lens, errors, number)).float()
 
     def _pictures(
-        self, batch: Batch, kernels: Tensor, made: Tensor | None = None
+        self, batch: Batch, kernels: Tensor, capture_kernels: Tensor | None = None
     ) -> tuple[Tensor, Tensor]:
         """Return recovered pictures (depth, b, 3, p, p) and the sharp ones in sRGB tone.
 
         Args:
             batch: Patches.
             kernels: That the filter knows.
-            made: That captures are made with; None for the same.
+            capture_kernels: That captures are made with; None for the same.
         """
         parts, schedule = self.parts, self.schedule
-        found = []
-        for depth, of_depth in enumerate(kernels if made is None else made):
-            chosen = of_depth[batch.fields]
-            recorded = capture(batch.sharp, chosen, parts.recorder, batch.normal[depth])
-            told = kernels[depth] if parts.front.depth_known else kernels.mean(0)
-            planes = parts.front.planes(recorded, told[batch.fields])
-            found.append(planes[:, -3:] if parts.network is None else parts.network(planes))
+        recovered = []
+        for depth, of_depth in enumerate(kernels if capture_kernels is None else capture_kernels):
+            patch_kernels = of_depth[batch.fields]
+            recorded = capture(batch.sharp, patch_kernels, parts.recorder, batch.normal[depth])
+            filter_kernels = kernels[depth] if parts.front.depth_known else kernels.mean(0)
+            planes = parts.front.planes(recorded, filter_kernels[batch.fields])
+            recovered.append(planes[:, -3:] if parts.network is None else parts.network(planes))
         edge = (batch.sharp.shape[-1] - schedule.patch_px) // 2
         sharp = batch.sharp[..., edge : edge + schedule.patch_px, edge : edge + schedule.patch_px]
-        return torch.stack(found), encode_srgb(sharp)
+        return torch.stack(recovered), encode_srgb(sharp)
 
     def _draw(self, seed: int, count: int) -> Batch:
         parts, schedule = self.parts, self.schedule
@@ -258,11 +260,11 @@ class DesignLoop:
         with torch.no_grad():
             kernels, penalty = self._kernels(moving=False)
             copies = self._valid_copies(kernels)
-            found = [
+            scores = [
                 self._judged(batch, kernels, copies[i % len(copies)])
                 for i, batch in enumerate(self._valid)
             ]
-        valid_db, valid_loss = (float(np.mean(column)) for column in zip(*found, strict=True))
+        valid_db, valid_loss = (float(np.mean(column)) for column in zip(*scores, strict=True))
         merit = valid_db if self.parts.loss.is_psnr else -valid_loss
         merit -= self.schedule.penalty_weight * float(penalty)
         if merit > self.best_merit:
@@ -279,11 +281,13 @@ class DesignLoop:
     def _valid_copies(self, kernels: Tensor) -> list[Tensor]:
         """Return kernels of the copies that lenses are judged by, drawn apart from all others."""
         count = 1 if self.parts.fabrication is None else VALID_COPIES
-        return [self._made(kernels, VALID_SEED + i, moving=False) for i in range(count)]
+        return [self._capture_kernels(kernels, VALID_SEED + i, moving=False) for i in range(count)]
 
-    def _judged(self, batch: Batch, kernels: Tensor, made: Tensor) -> tuple[float, float]:
+    def _judged(
+        self, batch: Batch, kernels: Tensor, capture_kernels: Tensor
+    ) -> tuple[float, float]:
         """Return mean PSNR and loss of a batch."""
-        pictures, sharp = self._pictures(batch, kernels, made)
+        pictures, sharp = self._pictures(batch, kernels, capture_kernels)
         loss = float(design_loss(self.parts.loss, pictures, sharp))
         return _psnr_db(pictures, sharp), loss
 
@@ -300,8 +304,8 @@ class DesignLoop:
                 at = torch.tensor([field])
                 for number in range(field * patches, (field + 1) * patches):
                     batch = replace(self._draw(SCORE_SEED + number, 1), fields=at)
-                    made = copies[number % len(copies)]
-                    yield field, *self._pictures(batch, kernels, made)
+                    capture_kernels = copies[number % len(copies)]
+                    yield field, *self._pictures(batch, kernels, capture_kernels)
 
     def look(self, count: int = 4) -> tuple[Tensor, tuple[Tensor, Tensor, Tensor]]:
         """Return kernels and, of fixed patches, (count, 3, h, w) captures, recovered, sharp."""
@@ -310,11 +314,11 @@ class DesignLoop:
             rows = []
             for batch in self._valid[:count]:
                 pictures, sharp = self._pictures(batch, kernels)
-                chosen = kernels[0][batch.fields]
-                seen = capture(batch.sharp, chosen, self.parts.recorder, batch.normal[0])
+                patch_kernels = kernels[0][batch.fields]
+                recorded = capture(batch.sharp, patch_kernels, self.parts.recorder, batch.normal[0])
                 edge = self.parts.front.margin_px
-                inner = slice(edge, seen.shape[-1] - edge)
-                rows.append((encode_srgb(seen[..., inner, inner])[0], pictures[0, 0], sharp[0]))
+                inner = slice(edge, recorded.shape[-1] - edge)
+                rows.append((encode_srgb(recorded[..., inner, inner])[0], pictures[0, 0], sharp[0]))
         captures, recovered, sharp_ones = (
             torch.stack(column) for column in zip(*rows, strict=True)
         )

@@ -66,9 +66,9 @@ def design_loss(loss: DesignLoss, pictures: Tensor, sharp: Tensor) -> Tensor:
     weights = _weights(loss, pictures)
     if loss.kind == "edof":
         reference = pictures[loss.reference_depth]
-        apart = (pictures - reference).abs().mean((1, 2, 3, 4))
+        differences = (pictures - reference).abs().mean((1, 2, 3, 4))
         unlike = torch.stack([1 - ssim(p, sharp).mean() for p in pictures])
-        return (weights * apart).sum() + loss.ssim_weight * unlike.sum()
+        return (weights * differences).sum() + loss.ssim_weight * unlike.sum()
     gap = pictures - sharp
     if loss.kind == "l1":
         each = gap.abs().mean((1, 2, 3, 4))

@@ -68,12 +68,12 @@ class DesignRun:
         self.lens_file = stem.with_name(f"{recipe.name}.toml")
         _join_workers()
         # with a window of its own a checkpoint holds all that a search would find again
-        held = self.files.resumes and recipe.pixels.kernel_px > 0
-        given = replace(recipe, starts=Starts()) if held else recipe
-        parts = parts_of(given, folder=options.recipe_folder, pictures=options.pictures)
+        holds_lens = self.files.resumes and recipe.pixels.kernel_px > 0
+        begin_recipe = replace(recipe, starts=Starts()) if holds_lens else recipe
+        parts = parts_of(begin_recipe, folder=options.recipe_folder, pictures=options.pictures)
         _share_lens(parts.lens)
         self.loop = DesignLoop(parts, recipe.schedule)
-        searched = bool(given.starts.count and recipe.schedule.lens_rate)
+        searched = bool(begin_recipe.starts.count and recipe.schedule.lens_rate)
         self.searched_s = self.files.stop() if searched else 0.0
         if self.files.resumes:
             table = self.files.read(recipe_digest(recipe), "steps", "lens_rate")
@@ -85,12 +85,12 @@ class DesignRun:
         """Return whether this process writes the files."""
         return not torch.distributed.is_initialized() or torch.distributed.get_rank() == 0
 
-    def go(self, until: int | None = None) -> Iterator[Progress]:
+    def go(self, last_step: int | None = None) -> Iterator[Progress]:
         """Run, yielding every validated moment after it is on disk."""
         self.files.start()
         if self.loop.step == 0:
             self._record(self.loop.judge())
-        for moment in self.loop.run(until):
+        for moment in self.loop.run(last_step):
             timed = replace(moment, seconds=self.files.stop())
             self._record(timed)
             yield timed
@@ -114,9 +114,9 @@ class DesignRun:
         """Restore the best lens, write it, and return a report on the run."""
         self.loop.take_best()
         lens = self.loop.parts.lens
-        found = finished(lens.problem, lens.scaled().detach())
-        note = f"camkit design, recipe {self.recipe.name}, from {found.name}"
-        write_lens(replace(found, name=self.recipe.name, note=note), self.lens_file)
+        best_lens = finished(lens.problem, lens.scaled().detach())
+        note = f"camkit design, recipe {self.recipe.name}, from {best_lens.name}"
+        write_lens(replace(best_lens, name=self.recipe.name, note=note), self.lens_file)
         return {
             "name": self.recipe.name,
             "steps": self.loop.step,

@@ -63,19 +63,19 @@ class RunFiles:
 
     def start(self) -> None:
         """Count time from now on, beyond what was spent before."""
-        self._watch, self._before = Stopwatch(), (self.spent_s, self.spent_cpu_s)
+        self._watch, self._earlier_s = Stopwatch(), (self.spent_s, self.spent_cpu_s)
 
     def stop(self) -> float:
         """Return the seconds spent so far; the clock goes on."""
-        self.spent_s = self._before[0] + self._watch.wall_s()
-        self.spent_cpu_s = self._before[1] + self._watch.cpu_s()
+        self.spent_s = self._earlier_s[0] + self._watch.wall_s()
+        self.spent_cpu_s = self._earlier_s[1] + self._watch.cpu_s()
         return self.spent_s
 
     def record(self, digest: str, state: Mapping[str, Any], entry: Mapping[str, Any]) -> None:
         """Write a checkpoint, and append an entry to the log."""
         self.checkpoint.parent.mkdir(parents=True, exist_ok=True)
-        spent = {"spent_s": self.spent_s, "spent_cpu_s": self.spent_cpu_s}
-        write_table(self.checkpoint, {"format": self._version, "digest": digest, **spent, **state})
+        times = {"spent_s": self.spent_s, "spent_cpu_s": self.spent_cpu_s}
+        write_table(self.checkpoint, {"format": self._version, "digest": digest, **times, **state})
         clock = {"seconds": round(self.spent_s, 3), "cpu_s": round(self.spent_cpu_s, 3)}
         line = {"step": entry["step"], **clock, **entry}
         with self.log.open("a" if entry["step"] else "w", encoding="utf-8") as file:

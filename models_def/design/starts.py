@@ -84,7 +84,7 @@ def best_starts(problem: Problem, starts: Starts) -> Tensor:
     begin = problem.free.scaled()
     if starts.count == 0:
         return begin[None]
-    found = improve(
+    search = improve(
         replace(
             problem,
             samples=half_disc(_PUPIL_RAYS),
@@ -99,12 +99,12 @@ def best_starts(problem: Problem, starts: Starts) -> Tensor:
         steps=starts.dls_steps,
         seed=starts.seed,
     )
-    if not np.isfinite(found.merit):
+    if not np.isfinite(search.merit):
         raise ContractError(
             f"none of {starts.count} starts near {problem.free.lens.name} forms an image; give "
             "another lens to start from, or tighter bounds"
         )
-    formed = found.ends[np.isfinite(found.merits)]
+    formed = search.ends[np.isfinite(search.merits)]
     return formed[:1] if not starts.judged else torch.cat([formed[: starts.judged], begin[None]])
 
 

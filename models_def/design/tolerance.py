@@ -44,7 +44,7 @@ FIELDS: Final = (
     *((1.0, float(azimuth)) for azimuth in (0, 90, 180, 270)),
 )
 _LARGEST_KERNEL_PX: Final = 127
-_LOST: Final = 0.005
+_LOST_SHARE: Final = 0.005
 _PROBES: Final = 4
 _BATCH: Final = 4
 _SPOT_RAYS: Final = 128
@@ -195,16 +195,16 @@ def run_tolerance(
     total = run.copies + run.limit_copies * len(classes)
     done = 0
 
-    def measure(given: Tolerances, numbers: list[range], *, at_limits: bool) -> Measured:
+    def measure(widths: Tolerances, numbers: list[range], *, at_limits: bool) -> Measured:
         nonlocal done
-        found = []
+        results = []
         for some in numbers:
-            drawn = draw_deviations(lens, given, some, run.seed, at_limits=at_limits)
-            found.append(judge.measure(drawn))
+            deviations = draw_deviations(lens, widths, some, run.seed, at_limits=at_limits)
+            results.append(judge.measure(deviations))
             done += len(some)
             if watch is not None:
                 watch(done, total)
-        return _joined(found)
+        return _joined(results)
 
     nominal = judge.measure(no_deviations(lens))
     copies = measure(tolerances, parts, at_limits=False)
@@ -220,7 +220,7 @@ def run_tolerance(
         kernel_px=judge.kernels.shape[-1],
         nominal=nominal,
         copies=copies,
-        classes=tuple(sorted(losses, key=lambda found: -float(found.loss_db.mean()))),
+        classes=tuple(sorted(losses, key=lambda loss: -float(loss.loss_db.mean()))),
         offenders=_offenders(judge),
     )
 
@@ -242,22 +242,26 @@ class _Judge:
     def measure(self, deviations: Deviations) -> Measured:
         landing = land(self.lens, deviations, self.view, self.tolerances.compensator)
         size = self.kernels.shape[-1]
-        kernels, kept = copy_kernels(landing, self.color_weights, size, self.run.pitch_um)
+        kernels, energy = copy_kernels(landing, self.color_weights, size, self.run.pitch_um)
         psnr = [self._psnr_db(of_copy.float()) for of_copy in kernels]
         return Measured(
             psnr_db=np.stack(psnr),
             spot_rms_mm=spot_rms_mm(landing).numpy(),
             refocus_mm=landing.refocus_mm.numpy(),
-            energy_kept=float(kept.min()),
+            energy_kept=float(energy.min()),
         )
 
     def _psnr_db(self, kernels: Tensor) -> Array:
         """Photograph with kernels (field, 3, k, k), recover with the nominal ones: (field,)."""
         front, count = Front(kind="wiener"), self.run.patches
         with torch.no_grad():
-            own, known = (k.repeat_interleave(count, 0) for k in (kernels, self.kernels))
-            recorded = capture(self.sharp, own, Recorder(noise=self.run.noise), self.normal)
-            recovered = front.planes(recorded, known)[:, -3:]
+            capture_kernels, filter_kernels = (
+                k.repeat_interleave(count, 0) for k in (kernels, self.kernels)
+            )
+            recorded = capture(
+                self.sharp, capture_kernels, Recorder(noise=self.run.noise), self.normal
+            )
+            recovered = front.planes(recorded, filter_kernels)[:, -3:]
             edge = (self.sharp.shape[-1] - self.run.patch_px) // 2
             inner = slice(edge, edge + self.run.patch_px)
             error = recovered.clamp(0, 1) - encode_srgb(self.sharp[..., inner, inner])
@@ -268,12 +272,16 @@ class _Judge:
 
 def _judge(lens: Lens, tolerances: Tolerances, run: ToleranceRun) -> _Judge:
     """Fix fields and patches; the window of the kernels holds the nominal and the first copies."""
-    far = np.tan(max(lens.field_angles_rad, default=0.0))
-    fields = FIELDS if far > 0 else FIELDS[:1]
-    view = _view(lens, fields, far, run.rays)
+    edge_slope = np.tan(max(lens.field_angles_rad, default=0.0))
+    fields = FIELDS if edge_slope > 0 else FIELDS[:1]
+    view = _view(lens, fields, edge_slope, run.rays)
     waves = view.wavelengths_um.numpy()
-    seen = waves.min() > _VISIBLE_UM[0] and waves.max() < _VISIBLE_UM[1]
-    colors = gaussian_response(waves).response if seen else np.full((3, waves.size), 1 / waves.size)
+    is_visible = waves.min() > _VISIBLE_UM[0] and waves.max() < _VISIBLE_UM[1]
+    colors = (
+        gaussian_response(waves).response
+        if is_visible
+        else np.full((3, waves.size), 1 / waves.size)
+    )
     weights = torch.from_numpy(colors)
 
     def kernels(deviations: Deviations, size_px: int) -> Tensor:
@@ -282,8 +290,8 @@ def _judge(lens: Lens, tolerances: Tolerances, run: ToleranceRun) -> _Judge:
 
     probes = draw_deviations(lens, tolerances, range(_PROBES), run.seed)
     none = no_deviations(lens)
-    wide = [kernels(given, _LARGEST_KERNEL_PX) for given in (none, probes)]
-    size = max(9, window_px(torch.cat(wide), _LOST))
+    wide = [kernels(deviations, _LARGEST_KERNEL_PX) for deviations in (none, probes)]
+    size = max(9, window_px(torch.cat(wide), _LOST_SHARE))
     front, rng = Front(kind="wiener"), np.random.default_rng(run.seed)
     inner = run.patch_px + 2 * front.margin_px
     source = open_source(
@@ -294,8 +302,8 @@ def _judge(lens: Lens, tolerances: Tolerances, run: ToleranceRun) -> _Judge:
     )
     count = len(fields) * run.patches
     crops = np.stack([source.draw_crop(rng, inner) for _ in range(count)])
-    around = (size - 1) // 2
-    sharp = np.pad(crops, ((0, 0), (0, 0), (around, around), (around, around)), mode="wrap")
+    margin = (size - 1) // 2
+    sharp = np.pad(crops, ((0, 0), (0, 0), (margin, margin), (margin, margin)), mode="wrap")
     normal = rng.standard_normal((count, 3, inner, inner), dtype=np.float32)
     return _Judge(
         lens=lens,
@@ -310,9 +318,11 @@ def _judge(lens: Lens, tolerances: Tolerances, run: ToleranceRun) -> _Judge:
     )
 
 
-def _view(lens: Lens, fields: tuple[tuple[float, float], ...], far: float, rays: int) -> View:
+def _view(
+    lens: Lens, fields: tuple[tuple[float, float], ...], edge_slope: float, rays: int
+) -> View:
     return View(
-        slopes=torch.tensor([far * share for share, _ in fields], dtype=torch.float64),
+        slopes=torch.tensor([edge_slope * share for share, _ in fields], dtype=torch.float64),
         azimuths_rad=torch.tensor([to_radians(a) for _, a in fields], dtype=torch.float64),
         wavelengths_um=torch.tensor(lens.wavelengths_um, dtype=torch.float64),
         # mirrored: the nominal kernels are as symmetric as the lens
@@ -333,13 +343,15 @@ def _joined(parts: list[Measured]) -> Measured:
 
 
 def _class_loss(
-    tolerances: Tolerances, error_class: ErrorClass, nominal: Measured, found: Measured
+    tolerances: Tolerances, error_class: ErrorClass, nominal: Measured, measured: Measured
 ) -> ClassLoss:
     return ClassLoss(
         error_class=error_class,
         half_width=tolerances.of(error_class).half_width,
-        loss_db=nominal.mean_db[0] - found.mean_db,
-        spot_growth_mm=float((_overall(found.spot_rms_mm) - _overall(nominal.spot_rms_mm)).mean()),
+        loss_db=nominal.mean_db[0] - measured.mean_db,
+        spot_growth_mm=float(
+            (_overall(measured.spot_rms_mm) - _overall(nominal.spot_rms_mm)).mean()
+        ),
     )
 
 
@@ -359,6 +371,6 @@ def _offenders(judge: _Judge) -> tuple[Offender, ...]:
     singles, deviations = single_deviations(judge.lens, judge.tolerances)
     if not singles:
         return ()
-    grown = overall(deviations) - overall(no_deviations(judge.lens))
-    pairs = sorted(zip(grown.tolist(), singles, strict=True), key=lambda pair: -pair[0])
+    growth_mm = overall(deviations) - overall(no_deviations(judge.lens))
+    pairs = sorted(zip(growth_mm.tolist(), singles, strict=True), key=lambda pair: -pair[0])
     return tuple(Offender(single=single, spot_growth_mm=mm) for mm, single in pairs)

@@ -9,6 +9,8 @@
                                catalog        their names, for recipes and checkpoints
     restored and true picture -> discriminator   opponents in training, never exported
                               -> vgg             features of VGG-19, weights from the user
+    any of them              -> near_lights   one that acts beside lights alone
+                             -> light         the bound on the light that it may move
     photons of an array       -> sub_pixel       the CPU-first network, four times as fine
                               -> back_projection, bicubic_first   references; on `bicubic`
 

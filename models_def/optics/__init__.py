@@ -16,13 +16,16 @@ In the order in which data flows:
 - `distortion`: the radial polynomial of eq. (6.10)
 - `psf`: rays splatted into kernels
 - `kernel_bank`: kernels per colour of the nominal lens and of fabricated copies, for training
-- `optics`: what freezing knows of any optics; `lens_optics` and `measured` fulfil it,
-  `optics_file` reads either
+- `freezable_optics`: what freezing knows of any optics
+- `lens_optics`, `measured`, `optics_file`: a lens and a measured PSF as such, either by its file
 - `frozen`: a `FrozenPsf` on a grid of fields, depths and wavelengths
-- `sampling`: what coarse samples and blocks cost, in dB
+- `sampling_loss`: what coarse samples and blocks cost, in dB
 - `freeze`: the least samples within a stated loss
 - `freezer`: any optics frozen, each by the way that suits it
 - `analysis/`: spots, MTF, curves, third order and wavefronts for people
+- `diffraction/`: plates that diffract, before a lens
+- `dots/`: plates of dots, before an array of small pixels
+- `thin/`: a thin plate for a large field
 - `tolerance/`: errors of fabrication, decentres and tilts among them
 - `search/`: how a lens is found and improved: free numbers, merits, damped least squares
 - `render/`: pictures of a textured plane, by rays or by a map of PSFs

@@ -9,6 +9,7 @@ place_undo           filters that nearly undo it, each for its place
 haze                 the coarse band: the scene in cells, and the capture cleared by it
 blocks               the grid of overlapping windowed blocks, and the sum of them
 spectrum             Fourier transforms of blocks
+lights               lights that clip, explained where they are
 wiener               the Wiener filter of one block
 joint_colours        the same for all colours of it together
 richardson_lucy      the Richardson-Lucy rounds of one block

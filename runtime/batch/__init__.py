@@ -4,6 +4,7 @@ sources     files, folders, globs -> captures
 tasks       bundle, name of the picture, clashes: errors before any work
 making      one capture claimed, made, told as a result
 batch_progress    how many are done, and how much of those under way
+cluster/    the same on the workers of a dask cluster
 processing  all of them, `jobs` at once
 
 Pictures and sidecars are claimed, written to part files and renamed. One file's failure never stops

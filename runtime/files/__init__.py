@@ -2,6 +2,7 @@
 
 tiff_tags     tags of TIFF-based files, read within bounds
 exif_tags     what a photograph says of itself, from EXIF anywhere
+exr_attributes  the same as attributes of an OpenEXR file
 raw_metadata  the same of a RAW file, with LibRaw's help
 raw_tags      noise and place of a RAW file from its tags
 in_memory     bytes and open files, stored while they are read

@@ -12,6 +12,8 @@ Map:
     icc: ICC profiles from primaries, white and tone.
     origin: what travels beside the planes.
     exif, directory: the metadata of a photograph as EXIF; directories of TIFF files.
+    preview_file, tone_mapping, pixels: the JPEG beside a picture, made in memory.
+    claim: of several processes, one makes an output.
     part_file: files that appear complete or not at all.
     sidecar: what was done, and proof that it is whole.
 """

@@ -80,7 +80,8 @@ def stage_seconds(
         elif isinstance(stage, Network) and windows is not None:
             seconds.append(network_seconds(stage.role, windows, speed))
         else:
-            seconds.append(module_of(stage).seconds(stage, subject, work, speed))
+            estimate = getattr(module_of(stage), "seconds", None)
+            seconds.append(0.0 if estimate is None else estimate(stage, subject, work, speed))
     return tuple(seconds)
 
 

@@ -2,7 +2,7 @@
 
 noise         noise of a capture that states none; repair of broken samples
 glow          whether a sample that stands out is light
-demosaic      mosaic to three planes; `directional` is its slower, better method
-front_rows    repair, white balance and demosaic joined, as rows
+demosaic      mosaic to three planes
+directional   its slower, better method
 stabilise     k-sigma and square root around the network
 """

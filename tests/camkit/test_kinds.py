@@ -1,5 +1,6 @@
 """Kinds of cameras are found by name: camkit's own, and those of installed packages."""
 
+import importlib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -79,7 +80,7 @@ def test_part_that_is_missing_is_refused_by_name(installed: Path) -> None:
 
 
 def test_part_that_cannot_be_imported_says_why(installed: Path) -> None:
-    with pytest.raises(ModuleNotFoundError, match="nothing_of_this_name"):
+    with pytest.raises(ContractError, match=r"'mine' cannot be loaded .*nothing_of_this_name"):
         find_kind("mine").part("report")
 
 
@@ -102,3 +103,12 @@ def test_nobody_takes_the_name_of_a_kind_of_camkit(installed: Path) -> None:
     points = {kinds.GROUP: {"bayer": f"{PACKAGE}:MINE"}}
     with installed_package.installed(installed.parent, PACKAGE, points):
         assert find_kind("bayer") is BAYER
+
+
+def test_doctor_lists_kinds_of_packages_and_why_one_is_refused(installed: Path) -> None:
+    states = kinds.kinds_of_packages()
+    assert "have no part in runtime" in states["mine"]
+    assert "with a home" in states["homeless"]
+    (installed / "runtime.py").write_text("", encoding="utf-8")
+    importlib.invalidate_caches()
+    assert kinds.kinds_of_packages()["mine"] == "ready"

@@ -61,7 +61,7 @@ WRONG: dict[str, dict[str, Any]] = {
     "two gains": {"white_balance": (2.0, 1.0)},
     "texts for gains": {"white_balance": ("2", "1", "2")},
     "a fraction of a pixel": {"origin_px": (1.5, 2)},
-    "a word for a body": {"unit": "body.toml"},
+    "a number for a body": {"unit": 3},
     "None where nothing is no choice": {"strength": None},
     "what only the inside sets": {"of_kind": ()},
     "a number for a file": {"timing": 3},

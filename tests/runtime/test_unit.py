@@ -8,7 +8,7 @@ import pytest
 
 from camkit.bundle.reader import Bundle, open_bundle
 from camkit.errors import ContractError
-from camkit.runtime.options import Options
+from camkit.runtime.options import Options, with_choices
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.unit import Unit, format_unit, lens_hash, read_unit
 from camkit.scenes.squares import squares_scene
@@ -34,6 +34,12 @@ def test_a_unit_is_what_its_file_says(tmp_path: Path) -> None:
 def test_a_unit_without_a_name_has_that_of_its_file(tmp_path: Path) -> None:
     unit = read_unit(_written(tmp_path, f'bundle_sha256 = "{HASH}"\n'))
     assert (unit.name, dict(unit.facts)) == ("body 17", {})
+
+
+def test_a_pipeline_takes_a_unit_or_its_file(tmp_path: Path) -> None:
+    path = _written(tmp_path, 'name = "mine"\nbundle_sha256 = "' + HASH + '"\n')
+    assert with_choices(Options(), {"unit": path}) == Options(unit=read_unit(path))
+    assert with_choices(Options(), {"unit": str(path)}) == Options(unit=read_unit(path))
 
 
 @pytest.mark.parametrize(

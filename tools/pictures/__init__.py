@@ -1,4 +1,8 @@
-"""Pictures of the demo.
+"""Pictures of README and gallery.
 
-- `captions`: rows of pictures in one PNG, a caption over each
+- `gallery`: all pictures of README and gallery
+- `views`: every built-in camera at work
+- `crops`: crops of a capture, restored and sharp
+- `front`: speed against accuracy, as a small chart
+- `captions`: rows of pictures in one file, a caption over each
 """

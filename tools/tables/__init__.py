@@ -11,6 +11,7 @@ for equal times, keeps a journal and writes a record is one runner:
     table_rows       what is compared, and for how many seeds
     equal_training   the networks of rows, each for the same CPU time
     journal          finished work, by the hash of all that decides it
+    recipe_text      recipes as text, a key with another value
     records          compact JSON and Markdown
     runner           the command line
 """

@@ -5,7 +5,7 @@ does stands in the module of the same name in `camkit.runtime.stages`, or in the
 
 linearise, repair, white_balance, demosaic    the front
 haze, wiener, highlights, deglare, network    the restoration
-raise_clipped, illumination, undistort, color what every picture needs behind it
+raise_clipped, illumination, undistort, color  what every picture needs behind it
 correct, super_resolve, sharpen, lifetime     single photons
 register                                      all of them by type, and those of packages
 """

@@ -4,7 +4,7 @@ import operator
 import re
 from collections.abc import Mapping
 from functools import reduce
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, get_args
 
 from pydantic import Field, GetCoreSchemaHandler, GetPydanticSchema
 from pydantic_core import CoreSchema, core_schema
@@ -104,7 +104,18 @@ def _of_package(name: str) -> type[StageEntry]:
             f"the entry point {point.value!r} must be a camkit PackageStage of the type {name!r} "
             "that names its runtime module"
         )
+    packages = {_plain(name) for name in get_args(entry.model_fields["package"].annotation)}
+    if point.dist is not None and packages and _plain(point.dist.name) not in packages:
+        raise ContractError(
+            f"the stage {name!r} says that {' or '.join(sorted(packages))} brings it; it is "
+            f"{point.dist.name}"
+        )
     return entry
+
+
+def _plain(distribution: str) -> str:
+    """Return the name of a distribution as packaging compares it."""
+    return re.sub(r"[-_.]+", "-", distribution).lower()
 
 
 def all_stages() -> list[type[StageEntry]]:

@@ -1,6 +1,5 @@
 """A display as the photographed object: its targets, and captures of them as pairs for training.
 
-profile    the ICC profile in a picture file: sRGB, Adobe RGB, others by name
 displayed_picture  pictures as light, upright, whatever their profile
 marks      blocks in the corners of a screen that say which target it shows, drawn and found
 screen     where things lie on a screen: marks, picture, board

@@ -4,7 +4,9 @@
     plate     one plate: look at it, design it, etch it
     design    a lens and its network designed together
     freeze    a lens to a frozen PSF
+    fit_bank  the bank that restores colours together
     prepare   whole frames of a camera with a haze, for train and fit-bank
+    freeze_norms  norms of a trained network become constants
     train     a recipe to a checkpoint
     export    checkpoints and PSF to one proved bundle
 

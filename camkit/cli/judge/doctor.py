@@ -55,10 +55,11 @@ def examine() -> dict[str, Any]:
     """Collect the facts that `doctor` prints."""
     from camkit import __version__
     from camkit.bundle.reader import built_in_bundles
-    from camkit.bundle.stages.register import stages_of_packages
+    from camkit.kinds import kinds_of_packages
     from camkit.models_def.face.torch_need import INSTALLED_BY
     from camkit.report.bench.machine import memory_mb, package_version, processor_name
     from camkit.runtime.network.engine import available_threads, providers
+    from camkit.runtime.stage_finder import states_of_packages
 
     return {
         "camkit": __version__,
@@ -74,7 +75,8 @@ def examine() -> dict[str, Any]:
         "raw_decoder": _try_decoder(),
         "design_time": ("ready" if util.find_spec("torch") else f"not installed: {INSTALLED_BY}"),
         "bundles": {name: str(path) for name, path in sorted(built_in_bundles().items())},
-        "stages_of_packages": stages_of_packages(),
+        "kinds_of_packages": kinds_of_packages(),
+        "stages_of_packages": states_of_packages(),
         "packages": {name: package_version(name) or "not installed" for name in PACKAGES},
     }
 

@@ -5,7 +5,7 @@ In the order of the work:
     scene         sharp pictures that no training has seen, and their places on the sensor
     shot, taking  a capture beside the truth, and how scenarios take one
     lamps         lights by their spectra
-    kernel_change kernels enlarged and turned
+    kernel_change  kernels enlarged and turned
     rig           light through a lens, and every method on one capture, by the pipeline itself
     consistency   chi^2 per pixel of a restoration, blurred again, against the capture
     verdict       what a sweep asks of any kind of camera

@@ -80,16 +80,16 @@ class Masks:
     Attributes:
         core: (side, side), 1 inside.
         parts: (part, side, side), 1 inside; they do not overlap.
-        far: (side, side), the streaks beyond a third of their length.
+        outer: (side, side), the streaks beyond a third of their length.
     """
 
     core: Tensor
     parts: Tensor
-    far: Tensor
+    outer: Tensor
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Reached:
+class GoalShares:
     """The shares of the goal that a PSF reaches, by colour.
 
     Attributes:
@@ -121,24 +121,24 @@ def masks_of(goal: Goal, side_px: int) -> Masks:
     place = torch.arange(side_px, dtype=torch.float64) - half
     distance = (place[:, None] ** 2 + place[None, :] ** 2).sqrt()
     lines = []
-    taken = torch.zeros(side_px, side_px, dtype=torch.bool)
+    streaks = torch.zeros(side_px, side_px, dtype=torch.bool)
     for angle_deg in goal.angles_deg:
         angle = math.radians(angle_deg)
-        across = -math.sin(angle) * place[None, :] + math.cos(angle) * place[:, None]
+        offset = -math.sin(angle) * place[None, :] + math.cos(angle) * place[:, None]
         # where lines cross, the first one has the light
-        lines.append((across.abs() <= goal.half_width_px) & ~taken)
-        taken |= lines[-1]
+        lines.append((offset.abs() <= goal.half_width_px) & ~streaks)
+        streaks |= lines[-1]
     edges = torch.linspace(goal.near_px, goal.far_px, goal.lengths + 1, dtype=torch.float64)
     rings = [(distance > near) & (distance <= far) for near, far in itertools.pairwise(edges)]
     if goal.lengths == 1:
-        parts = [taken & rings[0]]
+        parts = [streaks & rings[0]]
     else:
         parts = [line & ring for line in lines for ring in rings]
     third = goal.near_px + (goal.far_px - goal.near_px) / 3
     return Masks(
         core=(distance <= goal.core_px).float(),
         parts=torch.stack(parts).float(),
-        far=(taken & (distance > third) & (distance <= goal.far_px)).float(),
+        outer=(streaks & (distance > third) & (distance <= goal.far_px)).float(),
     )
 
 
@@ -155,14 +155,14 @@ def goal_loss(light: Tensor, bare: Tensor, masks: Masks, goal: Goal) -> Tensor:
     """
     core, bare_core = ((psf * masks.core).sum() for psf in (light, bare))
     parts, bare_parts = (torch.einsum("yx,pyx->p", psf, masks.parts) for psf in (light, bare))
-    wanted = goal.streak_share / len(parts) + goal.core_share * bare_parts
+    targets = goal.streak_share / len(parts) + goal.core_share * bare_parts
     return (
         goal.core_weight * (goal.core_share * bare_core - core).abs()
-        + goal.streak_weight * (wanted - parts).abs().sum()
+        + goal.streak_weight * (targets - parts).abs().sum()
     )
 
 
-def reached(light: Tensor, bare: Tensor, masks: Masks) -> Reached:
+def goal_shares(light: Tensor, bare: Tensor, masks: Masks) -> GoalShares:
     """Return the shares of the goal that PSFs (colour, side, side) reach.
 
     What is written is what lies in the streaks beyond the bare lens's light there, which sinks as
@@ -171,10 +171,10 @@ def reached(light: Tensor, bare: Tensor, masks: Masks) -> Reached:
     core = (light * masks.core).sum((-2, -1)) / (bare * masks.core).sum((-2, -1))
     added = light - core[:, None, None] * bare
     written = (added * masks.parts.sum(0)).sum((-2, -1))
-    far = (added * masks.far).sum((-2, -1)) / written
-    far = torch.where(written > _NOTHING, far, torch.zeros_like(far))
-    return Reached(
+    outer_share = (added * masks.outer).sum((-2, -1)) / written
+    outer_share = torch.where(written > _NOTHING, outer_share, torch.zeros_like(outer_share))
+    return GoalShares(
         core_share=tuple(core.tolist()),
         streak_share=tuple(written.tolist()),
-        far_share=tuple(far.tolist()),
+        far_share=tuple(outer_share.tolist()),
     )

@@ -42,32 +42,32 @@ def begin_map(recipe: PlateRecipe, folder: Path | None = None) -> HeightMap:
     if recipe.map.begin:
         return _map_of_plate(recipe, folder)
     generator = torch.Generator().manual_seed(recipe.schedule.seed)
-    chosen, cells = recipe.map, recipe.cells
-    if chosen.kind == "rank":
+    choice, cells = recipe.map, recipe.cells
+    if choice.kind == "rank":
         return RankMap(
             cells,
-            rank=chosen.rank,
-            most_um=chosen.most_um,
-            offset=chosen.offset,
-            start=chosen.start,
+            rank=choice.rank,
+            most_um=choice.most_um,
+            offset=choice.offset,
+            start=choice.start,
             seed=recipe.schedule.seed,
         )
-    if chosen.kind == "full":
-        return FullMap(chosen.start * torch.randn(cells, cells, generator=generator))
-    if chosen.kind == "gratings":
-        angles_rad = tuple(math.radians(angle) for angle in chosen.angles_deg)
-        profiles = torch.randn(len(angles_rad), chosen.numbers, generator=generator)
-        return GratingMap(cells, angles_rad, chosen.start * profiles)
-    numbers_um = chosen.start * torch.randn(chosen.numbers, generator=generator)
+    if choice.kind == "full":
+        return FullMap(choice.start * torch.randn(cells, cells, generator=generator))
+    if choice.kind == "gratings":
+        angles_rad = tuple(math.radians(angle) for angle in choice.angles_deg)
+        profiles = torch.randn(len(angles_rad), choice.numbers, generator=generator)
+        return GratingMap(cells, angles_rad, choice.start * profiles)
+    numbers_um = choice.start * torch.randn(choice.numbers, generator=generator)
     return (
-        ZernikeMap(cells, numbers_um) if chosen.kind == "zernike" else RadialMap(cells, numbers_um)
+        ZernikeMap(cells, numbers_um) if choice.kind == "zernike" else RadialMap(cells, numbers_um)
     )
 
 
 def _map_of_plate(recipe: PlateRecipe, folder: Path | None) -> HeightMap:
-    given = Path(recipe.map.begin)
-    beside = given if folder is None else folder / given
-    plate = read_plate(beside if beside.is_file() else given)
+    begin = Path(recipe.map.begin)
+    path = begin if folder is None else folder / begin
+    plate = read_plate(path if path.is_file() else begin)
     if plate.height_um.shape[0] != recipe.cells:
         raise ContractError(
             f"{recipe.map.begin} has {plate.height_um.shape[0]} cells along a side, the recipe "
@@ -75,13 +75,13 @@ def _map_of_plate(recipe: PlateRecipe, folder: Path | None) -> HeightMap:
         )
     if recipe.map.kind == "full":
         return FullMap(plate.height_um)
-    found = _own_map(plate)
-    if not isinstance(found, _KINDS[recipe.map.kind]):
+    height_map = _own_map(plate)
+    if not isinstance(height_map, _KINDS[recipe.map.kind]):
         raise ContractError(
             f"{recipe.map.begin} has no map of the kind {recipe.map.kind} to begin at; "
             "kind = full takes any plate"
         )
-    return found
+    return height_map
 
 
 def _own_map(plate: Plate) -> HeightMap | None:

@@ -23,7 +23,7 @@ TRAIN_SEED: Final = NIGHT_SEED
 VALID_SEED: Final = 4_000_000
 """Of held-out scenes; scenes to measure on are night:0 and upwards."""
 
-_HELD: Final = 400
+_CACHED_SCENES: Final = 400
 """Scenes in memory; one of 384 px takes 0.9 MB."""
 
 Generator = np.random.Generator
@@ -95,7 +95,7 @@ class Nights:
         self._scene_px, self._psf_px = scene_px, psf_px
         self._matrix, gains = camera_from_rec709(np.array(camera.sensor.color_matrix))
         self.pixels = Pixels(cfa=camera.sensor.cfa, gains=gains)
-        self._made: dict[int, Night] = {}
+        self._cache: dict[int, Night] = {}
 
     def draw(self, rng: Generator, count: int) -> Patches:
         """Draw patches, mostly about lights, turned and mirrored."""
@@ -103,7 +103,7 @@ class Nights:
         side = data.sample_px + self._psf_px - 1
         crops, noises = [], []
         for _ in range(count):
-            night = self._drawn(int(rng.integers(self._count)))
+            night = self._cached_night(int(rng.integers(self._count)))
             top, left = draw_corner(rng, night, self._camera)
             crop = night.light[:, top : top + side, left : left + side].astype(np.float32)
             crop = np.rot90(crop, int(rng.integers(4)), (1, 2))
@@ -120,10 +120,10 @@ class Nights:
             normal=torch.from_numpy(rng.standard_normal(shape, dtype=np.float32)),
         )
 
-    def _drawn(self, number: int) -> Night:
-        if number not in self._made:
-            self._made[number] = self._night(number)
-        return self._made[number]
+    def _cached_night(self, number: int) -> Night:
+        if number not in self._cache:
+            self._cache[number] = self._night(number)
+        return self._cache[number]
 
     def _night(self, number: int) -> Night:
         seed, data = self._first + number, self._camera.data
@@ -140,7 +140,7 @@ class Nights:
 
 
 # another design in the same process asks for the same scenes again
-@lru_cache(maxsize=_HELD)
+@lru_cache(maxsize=_CACHED_SCENES)
 def _light(
     seed: int,
     side_px: int,

@@ -17,7 +17,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from camkit.models_def.design.plate.goal import Reached, goal_loss, masks_of, reached
+from camkit.models_def.design.plate.goal import GoalShares, goal_loss, goal_shares, masks_of
 from camkit.models_def.design.plate.plate_recipe import PlateRecipe
 from camkit.models_def.design.plate.reader import Picture, PlateReader
 from camkit.models_def.optics.diffraction.map_numbers import HeightMap
@@ -38,7 +38,7 @@ class Moment:
         loss: Mean over colours, of the plate as it is made; with a reader its weighted loss on
             fixed patches is added.
         best_loss: The least so far.
-        reached: What the colours have of the goal.
+        shares: What the colours have of the goal.
         picture: How the reader does; None without one.
     """
 
@@ -46,7 +46,7 @@ class Moment:
     seconds: float
     loss: float
     best_loss: float
-    reached: Reached
+    shares: GoalShares
     picture: Picture | None = None
 
 
@@ -54,19 +54,19 @@ class PlateLoop:
     """Runs a design."""
 
     def __init__(
-        self, recipe: PlateRecipe, made: HeightMap, reader: PlateReader | None = None
+        self, recipe: PlateRecipe, height_map: HeightMap, reader: PlateReader | None = None
     ) -> None:
         """Prepare the loop.
 
         Args:
             recipe: What is wanted.
-            made: The map to begin at; its numbers move.
+            height_map: The map to begin at; its numbers move.
             reader: The network of a joint design.
 
         Raises:
             ContractError: If the window does not hold the streaks, or the cells are too wide.
         """
-        self.recipe, self.made, self.reader = recipe, made.float(), reader
+        self.recipe, self.height_map, self.reader = recipe, height_map.float(), reader
         self.step, self.best_loss = 0, math.inf
         self.best: State = {}
         self.best_network: State = {}
@@ -78,51 +78,51 @@ class PlateLoop:
         self._index = refractive_index(find_glass(recipe.glass), waves).tolist()
         self._masks = masks_of(recipe.goal, pixels.side_px)
         self._bare = self._lights(torch.zeros(recipe.cells, recipe.cells))
-        self._optimizer = torch.optim.Adam(self.made.parameters(), lr=recipe.schedule.rate)
+        self._optimizer = torch.optim.Adam(self.height_map.parameters(), lr=recipe.schedule.rate)
 
-    def run(self, until: int | None = None, seconds: float = math.inf) -> Iterator[Moment]:
+    def run(self, last_step: int | None = None, seconds: float = math.inf) -> Iterator[Moment]:
         """Run up to a step (the last by default) or for a time, yielding every logged moment.
 
         The step that is under way when the time ends is finished, and logged.
         """
         schedule, begin = self.recipe.schedule, time.monotonic()
-        end = schedule.steps if until is None else min(until, schedule.steps)
+        end = schedule.steps if last_step is None else min(last_step, schedule.steps)
         while self.step < end:
             self._one_step()
-            spent = time.monotonic() - begin
-            if self.step % schedule.log_steps == 0 or self.step == end or spent >= seconds:
-                yield self.judge(spent)
-            if spent >= seconds:
+            elapsed_s = time.monotonic() - begin
+            if self.step % schedule.log_steps == 0 or self.step == end or elapsed_s >= seconds:
+                yield self.judge(elapsed_s)
+            if elapsed_s >= seconds:
                 return
 
     def _one_step(self) -> None:
-        heights = self.made()
+        heights = self.height_map()
         leaf = heights.detach().requires_grad_()
-        made = self._etched(leaf, self._errors())
-        slopes = self._read(made.detach())
-        if self.reader is None or self.step >= self.reader.chosen.hold_steps:
-            self._move(heights, self._pushed(leaf, made, slopes))
+        fabricated = self._etched(leaf, self._errors())
+        slopes = self._read(fabricated.detach())
+        if self.reader is None or self.step >= self.reader.recipe.hold_steps:
+            self._move(heights, self._pushed(leaf, fabricated, slopes))
         self.step += 1
 
-    def _read(self, made: Tensor) -> Tensor | None:
+    def _read(self, fabricated: Tensor) -> Tensor | None:
         """Train the network for its steps; return the slopes (colour, side, side) of its loss."""
         if self.reader is None:
             return None
         progress = self.step / self.recipe.schedule.steps
-        slopes, _ = self.reader.follow(self._lights(made), self.step, progress)
-        return self.reader.chosen.weight * slopes
+        slopes, _ = self.reader.follow(self._lights(fabricated), self.step, progress)
+        return self.reader.recipe.weight * slopes
 
-    def _pushed(self, leaf: Tensor, made: Tensor, slopes: Tensor | None) -> Tensor:
+    def _pushed(self, leaf: Tensor, fabricated: Tensor, slopes: Tensor | None) -> Tensor:
         """Return the slope of all losses to the heights."""
         etched, count = self.recipe.schedule.etched, len(self._bare)
         pushed = torch.zeros_like(leaf)
         for colour in range(count):
-            light = self._light(made, colour)
+            light = self._light(fabricated, colour)
             loss = goal_loss(light, self._bare[colour], self._masks, self.recipe.goal) / count
             if slopes is not None:
                 loss = loss + (light * slopes[colour]).sum()
-            (found,) = torch.autograd.grad(loss, leaf, retain_graph=etched)
-            pushed += found
+            (slope,) = torch.autograd.grad(loss, leaf, retain_graph=etched)
+            pushed += slope
         return pushed
 
     def _move(self, heights: Tensor, pushed: Tensor) -> None:
@@ -136,8 +136,8 @@ class PlateLoop:
     def judge(self, seconds: float = 0.0) -> Moment:
         """Evaluate the present map, made without errors; the best are kept."""
         with torch.no_grad():
-            made = self._etched(self.made(), ())
-            light = self._lights(made)
+            fabricated = self._etched(self.height_map(), ())
+            light = self._lights(fabricated)
             losses = [
                 float(goal_loss(one, bare, self._masks, self.recipe.goal))
                 for one, bare in zip(light, self._bare, strict=True)
@@ -145,17 +145,19 @@ class PlateLoop:
         loss, picture = sum(losses) / len(losses), None
         if self.reader is not None:
             picture = self.reader.judge(light)
-            loss += self.reader.chosen.weight * picture.loss
+            loss += self.reader.recipe.weight * picture.loss
         if loss < self.best_loss:
             self.best_loss = loss
-            self.best = {name: value.clone() for name, value in self.made.state_dict().items()}
+            self.best = {
+                name: value.clone() for name, value in self.height_map.state_dict().items()
+            }
             self.best_network = {} if self.reader is None else self.reader.average()
         return Moment(
             step=self.step,
             seconds=seconds,
             loss=loss,
             best_loss=self.best_loss,
-            reached=reached(light, self._bare, self._masks),
+            shares=goal_shares(light, self._bare, self._masks),
             picture=picture,
         )
 
@@ -187,12 +189,12 @@ class PlateLoop:
         if not schedule.depth_error or etching is None:
             return ()
         generator = torch.Generator().manual_seed(schedule.seed * 1_000_003 + self.step)
-        drawn = torch.randn(etching.masks, generator=generator, dtype=torch.float64)
-        return tuple((schedule.depth_error * drawn).tolist())
+        normal = torch.randn(etching.masks, generator=generator, dtype=torch.float64)
+        return tuple((schedule.depth_error * normal).tolist())
 
     def take_best(self) -> None:
         """Restore the best map, and the network that read it then."""
-        self.made.load_state_dict(self.best)
+        self.height_map.load_state_dict(self.best)
         if self.reader is not None:
             self.reader.take_average(self.best_network)
 
@@ -202,7 +204,7 @@ class PlateLoop:
             "step": self.step,
             "best_loss": self.best_loss,
             "best": self.best,
-            "map": self.made.state_dict(),
+            "map": self.height_map.state_dict(),
             "optimizer": self._optimizer.state_dict(),
         }
         if self.reader is not None:
@@ -213,7 +215,7 @@ class PlateLoop:
         """Restore a saved state."""
         self.step, self.best_loss = state["step"], state["best_loss"]
         self.best = state["best"]
-        self.made.load_state_dict(state["map"])
+        self.height_map.load_state_dict(state["map"])
         self._optimizer.load_state_dict(state["optimizer"])
         if self.reader is not None:
             self.best_network = state["weights"]["network"]

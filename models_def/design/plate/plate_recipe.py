@@ -180,8 +180,8 @@ def with_plate_choices(
 ) -> PlateRecipe:
     """Return the recipe with a caller's choices; None keeps the value of the recipe."""
     changes = {"steps": steps, "seed": seed}
-    chosen = {key: value for key, value in changes.items() if value is not None}
-    return replace(recipe, schedule=replace(recipe.schedule, **chosen))  # type: ignore[arg-type]
+    overrides = {key: value for key, value in changes.items() if value is not None}
+    return replace(recipe, schedule=replace(recipe.schedule, **overrides))  # type: ignore[arg-type]
 
 
 def plate_recipe_digest(recipe: PlateRecipe) -> str:

@@ -9,7 +9,7 @@ from typing import Any, Final
 import torch
 
 from camkit.errors import ContractError
-from camkit.models_def.design.plate.goal import Reached
+from camkit.models_def.design.plate.goal import GoalShares
 from camkit.models_def.design.plate.maps import begin_map
 from camkit.models_def.design.plate.plate_loop import Moment, PlateLoop
 from camkit.models_def.design.plate.plate_recipe import PlateRecipe, plate_recipe_digest
@@ -51,8 +51,8 @@ class PlateRun:
         self.recipe, self.options = recipe, options
         self.files = RunFiles(options.out.with_suffix(""), options, FORMAT, options.out)
         self.digest = plate_recipe_digest(recipe)
-        made = begin_map(recipe, options.recipe_folder)
-        self.loop = PlateLoop(recipe, made, self._reader())
+        height_map = begin_map(recipe, options.recipe_folder)
+        self.loop = PlateLoop(recipe, height_map, self._reader())
         if self.files.resumes:
             self.loop.load(self.files.read(self.digest, "steps", "seed"))
 
@@ -88,17 +88,17 @@ class PlateRun:
             "step": moment.step,
             "loss": moment.loss,
             "best_loss": moment.best_loss,
-            **_shares(moment.reached),
-            **_told(moment),
+            **_shares(moment.shares),
+            **_reader_results(moment),
         }
         self.files.record(self.digest, self.loop.state(), entry)
 
     def finish(self) -> dict[str, Any]:
         """Restore the best map, write the plate, and return a report on the run."""
         self.loop.take_best()
-        made = self.loop.made
+        height_map = self.loop.height_map
         with torch.no_grad():
-            height_um = made().detach()
+            height_um = height_map().detach()
         recipe = self.recipe
         write_plate(
             Plate(
@@ -108,7 +108,7 @@ class PlateRun:
                 bench=recipe.bench,
                 height_um=height_um,
                 etching=recipe.etching,
-                numbers=None if isinstance(made, FullMap) else numbers_of(made),
+                numbers=None if isinstance(height_map, FullMap) else numbers_of(height_map),
             ),
             self.options.out,
         )
@@ -121,31 +121,31 @@ class PlateRun:
             "begin_loss": first["loss"],
             "best_loss": self.loop.best_loss,
             "wavelengths_um": list(recipe.pixels.wavelengths_um),
-            **_shares(judged.reached),
+            **_shares(judged.shares),
             "seconds": round(self.files.spent_s, 1),
             "cpu_s": round(self.files.spent_cpu_s, 1),
             "plate": str(self.options.out),
             "checkpoint": str(self.files.checkpoint),
             "log": str(self.files.log),
-            **{f"begin_{key}": first[key] for key in _told(judged)},
-            **_told(judged),
+            **{f"begin_{key}": first[key] for key in _reader_results(judged)},
+            **_reader_results(judged),
         }
 
 
-def _shares(reached: Reached) -> dict[str, list[float]]:
+def _shares(goal_shares: GoalShares) -> dict[str, list[float]]:
     """Return what the colours have of the goal, rounded."""
-    shares = (reached.core_share, reached.streak_share, reached.far_share)
+    shares = (goal_shares.core_share, goal_shares.streak_share, goal_shares.far_share)
     names = ("core_share", "streak_share", "far_share")
     return {n: [round(v, 5) for v in s] for n, s in zip(names, shares, strict=True)}
 
 
-def _told(moment: Moment) -> dict[str, float]:
+def _reader_results(moment: Moment) -> dict[str, float]:
     """Return the reader's results on fixed patches; nothing without one."""
     if moment.picture is None:
         return {}
-    found = moment.picture
+    picture = moment.picture
     return {
-        "picture_loss": round(found.loss, 6),
-        "picture_db": round(found.db, 3),
-        "picture_capture_db": round(found.capture_db, 3),
+        "picture_loss": round(picture.loss, 6),
+        "picture_db": round(picture.db, 3),
+        "picture_capture_db": round(picture.capture_db, 3),
     }

@@ -62,7 +62,7 @@ class PlateReader:
 
     def __init__(
         self,
-        chosen: ReaderRecipe,
+        reader_recipe: ReaderRecipe,
         camera: HdrRecipe,
         *,
         psf_px: int,
@@ -72,8 +72,8 @@ class PlateReader:
         """Prepare network, captures and fitter.
 
         Args:
-            chosen: Of the recipe of the plate.
-            camera: The one that `chosen` names.
+            reader_recipe: Of the recipe of the plate.
+            camera: The one that `reader_recipe` names.
             psf_px: Odd side of the PSFs.
             seed: Of weights and draws.
             first: First weights; None for random ones.
@@ -81,9 +81,11 @@ class PlateReader:
         Raises:
             ContractError: If there is no such network, or it does not take the patches.
         """
-        self.chosen, self._seed = chosen, seed
-        self._entry = _entry(chosen, camera, seed)
-        data = replace(camera.data, sample_px=chosen.patch_px, capture_px=chosen.patch_px)
+        self.recipe, self._seed = reader_recipe, seed
+        self._entry = _entry(reader_recipe, camera, seed)
+        data = replace(
+            camera.data, sample_px=reader_recipe.patch_px, capture_px=reader_recipe.patch_px
+        )
         camera = replace(camera, data=data)
 
         def nights(first_seed: int, count: int) -> Nights:
@@ -91,12 +93,12 @@ class PlateReader:
                 camera,
                 first_seed=first_seed,
                 count=count,
-                scene_px=chosen.scene_px,
+                scene_px=reader_recipe.scene_px,
                 psf_px=psf_px,
             )
 
-        self._nights = nights(TRAIN_SEED, chosen.scenes)
-        self._valid_nights = nights(VALID_SEED, chosen.valid_patches)
+        self._nights = nights(TRAIN_SEED, reader_recipe.scenes)
+        self._valid_nights = nights(VALID_SEED, reader_recipe.valid_patches)
         self._valid: Patches | None = None
         self.fitter = Fitter(self._entry, build_network, "cpu", first)
 
@@ -113,13 +115,13 @@ class PlateReader:
         """
         leaf = light.detach().requires_grad_()
         losses = []
-        for k in range(self.chosen.network_steps):
-            number = step * self.chosen.network_steps + k
+        for k in range(self.recipe.network_steps):
+            number = step * self.recipe.network_steps + k
             patches = self._nights.draw(
-                np.random.default_rng((self._seed, number)), self.chosen.batch
+                np.random.default_rng((self._seed, number)), self.recipe.batch
             )
-            given, truth = self._exposures(leaf, patches)
-            loss = picture_loss(self.fitter.run(given, progress), truth)
+            captures, truth = self._exposures(leaf, patches)
+            loss = picture_loss(self.fitter.run(captures, progress), truth)
             self.fitter.descend(loss, number, progress)
             losses.append(float(loss.detach()))
         return torch.as_tensor(leaf.grad) / len(losses), float(np.mean(losses))
@@ -127,15 +129,15 @@ class PlateReader:
     def judge(self, light: Tensor) -> Picture:
         """Read fixed patches behind PSFs (3, n, n), by the averaged network."""
         if self._valid is None:
-            rng = np.random.default_rng((VALID_SEED, self.chosen.patch_px))
-            self._valid = self._valid_nights.draw(rng, self.chosen.valid_patches)
+            rng = np.random.default_rng((VALID_SEED, self.recipe.patch_px))
+            self._valid = self._valid_nights.draw(rng, self.recipe.valid_patches)
         with torch.no_grad():
-            given, truth = self._exposures(light, self._valid)
-            found = self.fitter.restore(given)
+            captures, truth = self._exposures(light, self._valid)
+            roots = self.fitter.restore(captures)
             return Picture(
-                loss=float(picture_loss(found, truth)),
-                db=_psnr_db(found, truth),
-                capture_db=_psnr_db(given, truth),
+                loss=float(picture_loss(roots, truth)),
+                db=_psnr_db(roots, truth),
+                capture_db=_psnr_db(captures, truth),
             )
 
     def _exposures(self, light: Tensor, patches: Patches) -> tuple[Tensor, Tensor]:
@@ -174,12 +176,12 @@ class PlateReader:
 
 
 def open_reader(
-    chosen: ReaderRecipe, *, psf_px: int, colours: int, seed: int, folder: Path | None = None
+    reader_recipe: ReaderRecipe, *, psf_px: int, colours: int, seed: int, folder: Path | None = None
 ) -> PlateReader:
     """Open the reader of a recipe.
 
     Args:
-        chosen: The table [reader].
+        reader_recipe: The table [reader].
         psf_px: Odd side of the PSFs.
         colours: Of the plate's recipe.
         seed: Of weights and draws.
@@ -188,29 +190,29 @@ def open_reader(
     Raises:
         ContractError: If the camera's recipe or the first weights cannot be read or do not fit.
     """
-    camera = read_recipe(_beside(chosen.recipe, folder))
+    camera = read_recipe(_path_of(reader_recipe.recipe, folder))
     if not isinstance(camera, HdrRecipe):
         raise ContractError(
-            f'reader.recipe must be that of a camera of the kind "hdr"; {chosen.recipe} is of the '
-            f"kind {camera.kind!r}"
+            f'reader.recipe must be that of a camera of the kind "hdr"; '
+            f"{reader_recipe.recipe} is of the kind {camera.kind!r}"
         )
     if colours != COLOURS:
         raise ContractError(
             f"a reader wants pixels.wavelengths_um for R, G and B, {COLOURS} of them; got {colours}"
         )
     first = None
-    if chosen.begin:
-        first = read_first_weights(_beside(chosen.begin, folder), chosen.size, ROLE)
-    return PlateReader(chosen, camera, psf_px=psf_px, seed=seed, first=first)
+    if reader_recipe.begin:
+        first = read_first_weights(_path_of(reader_recipe.begin, folder), reader_recipe.size, ROLE)
+    return PlateReader(reader_recipe, camera, psf_px=psf_px, seed=seed, first=first)
 
 
-def reader_digest(chosen: ReaderRecipe, folder: Path | None) -> str:
+def reader_digest(reader_recipe: ReaderRecipe, folder: Path | None) -> str:
     """Return a hash of the camera's recipe and the first weights, which the table only names."""
-    found = hashlib.sha256()
-    for name in filter(None, (chosen.recipe, chosen.begin)):
-        path = _beside(name, folder)
-        found.update(path.read_bytes() if path.is_file() else name.encode())
-    return found.hexdigest()
+    digest = hashlib.sha256()
+    for name in filter(None, (reader_recipe.recipe, reader_recipe.begin)):
+        path = _path_of(name, folder)
+        digest.update(path.read_bytes() if path.is_file() else name.encode())
+    return digest.hexdigest()
 
 
 def picture_loss(roots: Tensor, light: Tensor) -> Tensor:
@@ -230,21 +232,21 @@ def _psnr_db(roots: Tensor, light: Tensor) -> float:
     return float(db.mean())
 
 
-def _entry(chosen: ReaderRecipe, camera: HdrRecipe, seed: int) -> NetworkRecipe:
-    entry = camera.network(chosen.size, ROLE)
+def _entry(reader_recipe: ReaderRecipe, camera: HdrRecipe, seed: int) -> NetworkRecipe:
+    entry = camera.network(reader_recipe.size, ROLE)
     if entry.network in THESIS_NAMES:
         raise ContractError(
-            f"reader.size {chosen.size}: {entry.network} is trained by losses of its own through "
-            "VGG-19; take a network from the capture to the picture, lean_s say"
+            f"reader.size {reader_recipe.size}: {entry.network} is trained by losses of its own "
+            "through VGG-19; take a network from the capture to the picture, lean_s say"
         )
     # slopes of a plate are small differences
     schedule = replace(entry.schedule, precision="float32", seed=seed)
     network = build_network(entry.network, **entry.config)
-    check_patch(entry.network, network, chosen.patch_px)
+    check_patch(entry.network, network, reader_recipe.patch_px)
     check_layout(entry.network, network, layout_of(camera, ROLE))
     return replace(entry, schedule=schedule)
 
 
-def _beside(name: str, folder: Path | None) -> Path:
-    beside = Path(name) if folder is None else folder / name
-    return beside if beside.is_file() else Path(name)
+def _path_of(name: str, folder: Path | None) -> Path:
+    path = Path(name) if folder is None else folder / name
+    return path if path.is_file() else Path(name)

@@ -2,10 +2,10 @@
 
 - `texture`: a picture on a plane in front of the camera, looked up with gradients
 - `window`: the part of a sensor that is rendered
-- `optics`: the lens as the renderers see it: tensors at any wavelength, stop, object distance
+- `lens_view`: the lens as the renderers see it: tensors at any wavelength, stop, object distance
 - `beam`: which directions pass the stop, and how much light they bring
 - `strata`: stratified numbers for sub-pixel shifts, pupil points and wavelengths
 - `monte_carlo`: (a) rays from pixels to the texture, averaged over passes
-- `alignment`: the texture warped to the render, pixel to pixel
+- `texture_alignment`: the texture warped to the render, pixel to pixel
 - `psf_map`: (b) the aligned texture spread by PSFs over fields, colours and depths
 """

@@ -1,8 +1,8 @@
 """Search and improvement of lenses: free numbers, merits of spots, damped least squares.
 
 - `variables`: which numbers of a lens are free; batches of lenses as tensors
-- `beam`: rays of a batch of lenses, by the paraxial entrance pupil
-- `merit`: residuals of spots, three merits
+- `beam_launch`: rays of a batch of lenses, by the paraxial entrance pupil
+- `spot_residuals`: residuals of spots, three merits
 - `limits`: residuals of what a lens must not be: too thin, too steep, losing rays
 - `penalty`: what keeps a design where rays pass
 - `problem`: merit and limits of a batch of lenses, as one residual function

@@ -2,7 +2,7 @@
 
 In the order in which data flows:
 
-- `recipe`: what is wanted, from a TOML file
+- `thin_recipe`: what is wanted, from a TOML file
 - `ideal`: the phase that one direction would want of the whole aperture (eq. 3.1-3.3)
 - `partition`: one profile for all directions, each in its virtual aperture (eq. 3.4), meridional
 - `skew`: the same as spots of skew rays through both faces of the plate
@@ -12,6 +12,7 @@ In the order in which data flows:
 - `middle`: what the light of a field is gathered about: its peak, or its chief ray
 - `waves`: the same peak as a sum of waves
 - `report`: both of a lens, for people and programs
-- `freezing`: both of a lens over the field, as core kernels and a haze in cells
+- `hazy_freezing`: both of a lens over the field, as core kernels and a haze in cells
+- `distances`: the same at other distances than that of its focus
 - `sag_table`: a profile for the workshop
 """

@@ -7,8 +7,8 @@
     relativistic    RaGAN-LS; eq. (6.13)
     sharp           pictures without captures, for a critic
     opponents       who opposes a generator, and their steps
-    fitter          one step: the opponents, then the generator; eqs. (3.9), (6.14)
-    fitting         the fitter of any kind whose cameras make three colours
+    picture_fitter  one step: the opponents, then the generator; eqs. (3.9), (6.14)
+    picture_fitting  the fitter of any kind whose cameras make three colours
 
 A recipe says `loss = "content"` for the content terms alone, `loss = "adversarial"` for a critic
 beside them; the tables `content` and `critic` of its schedule say how much each term counts.

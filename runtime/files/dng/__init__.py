@@ -7,6 +7,7 @@ masked_areas   black measured where the sensor sees no light
 opcodes        opcode lists: which are there, which are applied
 field_gain     GainMap and FixVignetteRadial as a gain of each pixel
 corrections    black and gain applied to samples
+applied_tags   all of it for decoded samples, and notes
 white_point    gains of AsShotNeutral and AsShotWhiteXY
 predictors     bytes of a decompressed strip or tile as numbers
 jpeg_frames    the size that a JPEG in a strip or tile states of itself

@@ -3,6 +3,7 @@
 jpeg_segments, png_chunks   the parts of a file, walked without decoding
 color_space, icc_profile    what codes mean: curves and primaries, or tables through LittleCMS
 stated_space                the colour space that a file states in any of the ways of its format
+foreign                     formats that are not read, each by its name
 decoded                     what every decoder gives
 opencv_picture              PNG, JPEG, Radiance HDR and others through OpenCV
 radiance                    the header of a Radiance HDR, checked before

@@ -15,6 +15,9 @@ template_cubics   templates between those of a bank
 fit            time, amplitude, background and sigma of every pixel
 least_squares  the same by least squares, as the dissertation does
 two_returns    two surfaces in one pixel, fitted together
+second_return  the second, where the residual of one asks for it
+surroundings   whether a pixel lies inside the surface around it
+scatter        scatter that the correction of pile-up leaves
 evidence       from when on a return is believed
 pooling        photons shared with neighbours where a pixel alone has too few
 hot_pixels     pixels that count without light: found and painted over

@@ -15,15 +15,15 @@ def make_loop(recipe: DesignRecipe) -> DesignLoop:
     return DesignLoop(parts_of(recipe), recipe.schedule)
 
 
-def finish(loop: DesignLoop, until: int | None = None) -> list[float]:
-    return [moment.valid_db for moment in loop.run(until)]
+def finish(loop: DesignLoop, last_step: int | None = None) -> list[float]:
+    return [moment.valid_db for moment in loop.run(last_step)]
 
 
 def test_a_resumed_design_ends_in_the_same_bits(recipe: DesignRecipe) -> None:
     whole = make_loop(recipe)
     finish(whole)
     first = make_loop(recipe)
-    finish(first, until=3)
+    finish(first, last_step=3)
     second = make_loop(recipe)
     second.load(first.state())
     finish(second)
@@ -40,7 +40,7 @@ def test_the_lens_is_held_at_first_and_frozen_at_last(recipe: DesignRecipe) -> N
     loop = make_loop(replace(recipe, schedule=schedule))
     seen = []
     for step in range(1, 7):
-        finish(loop, until=step)
+        finish(loop, last_step=step)
         seen.append(loop.parts.lens.moves.detach().clone())
     assert not seen[1].any()
     assert seen[2].any()
@@ -85,7 +85,7 @@ def test_where_captures_are_judged_the_best_has_the_least_loss(recipe: DesignRec
     loop = make_loop(judged)
     merits = []
     for step in range(5):
-        finish(loop, until=step)
+        finish(loop, last_step=step)
         merits.append(loop.best_merit if step else -math.inf)
         with torch.no_grad():
             kernels, penalty = loop.parts.lens()

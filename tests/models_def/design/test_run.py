@@ -16,9 +16,9 @@ from camkit.models_def.optics.lens_file.lens_file import read_lens
 from camkit.models_def.optics.paraxial import paraxial_data
 
 
-def finish(recipe: DesignRecipe, options: DesignOptions, until: int | None = None) -> DesignRun:
+def finish(recipe: DesignRecipe, options: DesignOptions, last_step: int | None = None) -> DesignRun:
     run = DesignRun(recipe, options)
-    list(run.go(until))
+    list(run.go(last_step))
     return run
 
 
@@ -27,7 +27,7 @@ def test_a_stopped_run_goes_on_and_leaves_lens_log_and_checkpoint(
 ) -> None:
     whole = finish(recipe, DesignOptions(out_dir=tmp_path / "a"))
     options = DesignOptions(out_dir=tmp_path / "b")
-    finish(recipe, options, until=3)
+    finish(recipe, options, last_step=3)
     resumed = finish(recipe, replace(options, resume=True))
     assert torch.equal(resumed.loop.parts.lens.moves, whole.loop.parts.lens.moves)
     report = resumed.finish()
@@ -50,7 +50,7 @@ def test_a_resumed_run_takes_its_start_from_the_checkpoint(
     whole = finish(searching, DesignOptions(out_dir=tmp_path / "a"))
     assert whole.searched_s > 0
     options = DesignOptions(out_dir=tmp_path / "b")
-    finish(searching, options, until=3)
+    finish(searching, options, last_step=3)
     monkeypatch.setattr(starts, "improve", pytest.fail)
     resumed = finish(searching, replace(options, resume=True))
     assert resumed.searched_s == 0
@@ -60,7 +60,7 @@ def test_a_resumed_run_takes_its_start_from_the_checkpoint(
 
 def test_an_earlier_run_is_not_lost_by_mistake(recipe: DesignRecipe, tmp_path: Path) -> None:
     options = DesignOptions(out_dir=tmp_path)
-    finish(recipe, options, until=3)
+    finish(recipe, options, last_step=3)
     with pytest.raises(ContractError, match="resume"):
         DesignRun(recipe, options)
     other = replace(recipe, schedule=replace(recipe.schedule, seed=9))
@@ -72,7 +72,7 @@ def test_an_earlier_run_is_not_lost_by_mistake(recipe: DesignRecipe, tmp_path: P
 
 
 def test_the_view_shows_fixed_patches(recipe: DesignRecipe, tmp_path: Path) -> None:
-    view = finish(recipe, DesignOptions(out_dir=tmp_path), until=3).view()
+    view = finish(recipe, DesignOptions(out_dir=tmp_path), last_step=3).view()
     assert view.kernels.shape == (1, 3, 3, 33, 33)
     assert {tuple(p.shape) for p in view.patches} == {(2, 3, 24, 24)}
 

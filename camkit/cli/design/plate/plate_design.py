@@ -80,9 +80,9 @@ def _line(moment: "Moment") -> str:
     core, streak, outer = (
         "/".join(f"{100 * share:.1f}" for share in shares)
         for shares in (
-            moment.reached.core_share,
-            moment.reached.streak_share,
-            moment.reached.far_share,
+            moment.shares.core_share,
+            moment.shares.streak_share,
+            moment.shares.far_share,
         )
     )
     picture = moment.picture

@@ -1,6 +1,7 @@
 """Lights read back from the streaks that optics write beside them (`camkit.streaks`).
 
     cells        a capture, or a kernel, in cells of 2 x 2 samples, and of 4 x 4
+    cell_rows    pixels from cells, linear between their middles
     kernels      dense kernels as cells see them: what is core, what is veil
     convolution  light spread by a kernel, and back
     regions      clipped cells that throw light on the same samples, in one window

@@ -1,6 +1,7 @@
 """Stages are found by type: those of camkit, and those of packages that are installed."""
 
 import json
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -211,6 +212,41 @@ def test_nobody_takes_the_name_of_a_stage_of_camkit(package: Path) -> None:
     told = examine()["stages_of_packages"]
     assert told["dim"] == "ready"
     assert "brings a stage 'wiener', which camkit has" in told["wiener"]
+
+
+@pytest.mark.parametrize(
+    ("work", "message"),
+    [
+        (None, "the stage 'dim' is not walked: there is no module"),
+        ("import nowhere_at_all", "the stage 'dim' cannot be loaded from .*nowhere_at_all"),
+        ("METHODS = (no_name,)", "the stage 'dim' cannot be loaded from .*no_name"),
+        ("METHODS = ()", "of the stage 'dim' does not define prepare, OPTIONS"),
+    ],
+)
+def test_doctor_says_what_the_module_of_a_stage_lacks(
+    work: str | None, message: str, site: Path
+) -> None:
+    module = site / HOME / "work.py"
+    module.unlink()
+    if work is not None:
+        module.write_text(work, encoding="utf-8")
+    with installed(site, PACKAGE, POINTS):
+        assert re.search(message, examine()["stages_of_packages"]["dim"])
+
+
+def test_a_stage_names_the_distribution_that_brings_it(site: Path) -> None:
+    with installed(site, "another-package", POINTS):
+        state = examine()["stages_of_packages"]["dim"]
+    assert state == f"the stage 'dim' says that {PACKAGE} brings it; it is another-package"
+
+
+def test_a_plan_counts_no_seconds_for_a_stage_that_says_none(site: Path, tmp_path: Path) -> None:
+    module = site / HOME / "work.py"
+    module.write_text(WORK.split("def seconds", maxsplit=1)[0], encoding="utf-8")
+    with installed(site, PACKAGE, POINTS):
+        plan = camkit.load(str(_write(tmp_path))).plan(np.full((64, 96), 543, np.uint16))
+    assert plan["plan"]["stages"]["dim"]["expected_s"] == 0
+    assert plan["estimate"]["seconds"] > 0
 
 
 def test_a_broken_package_hides_no_stage(package: Path) -> None:

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.design.plate.goal import Goal, goal_loss, masks_of, reached
+from camkit.models_def.design.plate.goal import Goal, goal_loss, goal_shares, masks_of
 
 GOAL = Goal(angles_deg=(0.0, 60.0, 120.0), near_px=6.0, far_px=30.0)
 SIDE = 71
@@ -56,7 +56,7 @@ def test_one_mask_does_not_ask_for_length_and_many_do() -> None:
 
 def test_what_is_reached_is_told_by_colour() -> None:
     light = torch.stack([_written(GOAL, 0.06), _written(GOAL, 0.02)])
-    found = reached(light, torch.stack([_bare()] * 2), masks_of(GOAL, SIDE))
+    found = goal_shares(light, torch.stack([_bare()] * 2), masks_of(GOAL, SIDE))
     assert found.core_share == pytest.approx((0.94, 0.98), abs=1e-4)
     assert found.streak_share == pytest.approx((0.06, 0.02), abs=1e-4)
     # of arms from 6 to 30 px, what lies beyond 14: two thirds
@@ -65,7 +65,7 @@ def test_what_is_reached_is_told_by_colour() -> None:
 
 def test_the_length_of_nothing_is_none() -> None:
     bare = _bare()
-    assert reached(bare[None], bare[None], masks_of(GOAL, SIDE)).far_share == (0.0,)
+    assert goal_shares(bare[None], bare[None], masks_of(GOAL, SIDE)).far_share == (0.0,)
 
 
 def test_masks_lie_where_lines_do_and_do_not_overlap() -> None:

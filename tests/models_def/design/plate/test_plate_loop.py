@@ -23,10 +23,10 @@ def test_a_design_comes_near_its_goal() -> None:
     loop = _loop(pixels=pixels, schedule={"steps": 40, "rate": 0.05, "log_steps": 10})
     begin = loop.judge()
     *_, last = loop.run()
-    assert begin.reached.streak_share[0] < 0.02
+    assert begin.shares.streak_share[0] < 0.02
     assert last.best_loss < 0.25 * begin.loss
-    assert last.reached.streak_share[0] == pytest.approx(0.06, abs=0.015)
-    assert last.reached.core_share[0] == pytest.approx(0.94, abs=0.02)
+    assert last.shares.streak_share[0] == pytest.approx(0.06, abs=0.015)
+    assert last.shares.core_share[0] == pytest.approx(0.94, abs=0.02)
     loop.take_best()
     assert loop.judge().loss == last.best_loss
 
@@ -37,21 +37,22 @@ def test_a_resumed_loop_ends_in_the_same_bits(etched: dict[str, Any]) -> None:
     whole, first = (_loop(schedule=schedule, etching=ETCHING) for _ in range(2))
     moments = list(whole.run())
     assert [moment.step for moment in moments] == [2, 4, 6]
-    list(first.run(until=3))
+    list(first.run(last_step=3))
     second = _loop(schedule=schedule, etching=ETCHING)
     second.load(first.state())
     assert [moment.loss for moment in second.run()][-1] == moments[-1].loss
-    assert torch.equal(second.made(), whole.made())
+    assert torch.equal(second.height_map(), whole.height_map())
 
 
 def test_a_loop_through_levels_sees_what_is_etched() -> None:
     plain = _loop(etching={"range_um": 1.2, "levels": 2})
     etched = _loop(etching={"range_um": 1.2, "levels": 2}, schedule={"etched": True})
     assert etched.judge().loss != plain.judge().loss
-    before = [value.clone() for value in etched.made.parameters()]
+    before = [value.clone() for value in etched.height_map.parameters()]
     etched._one_step()
     assert all(
-        not torch.equal(old, new) for old, new in zip(before, etched.made.parameters(), strict=True)
+        not torch.equal(old, new)
+        for old, new in zip(before, etched.height_map.parameters(), strict=True)
     )
 
 

@@ -90,12 +90,12 @@ def test_a_joint_design_goes_on_in_the_same_bits(folder: Path, etched: bool) -> 
     }
     whole, first, second = (_loop(folder, joint(**changes)) for _ in range(3))
     moments = list(whole.run())
-    list(first.run(until=2))
+    list(first.run(last_step=2))
     second.load(copy.deepcopy(first.state()))
     again = list(second.run())
     assert again[-1].picture == moments[-1].picture
     assert again[-1].loss == moments[-1].loss
-    assert torch.equal(second.made(), whole.made())
+    assert torch.equal(second.height_map(), whole.height_map())
     assert moments[-1].picture is not None
     second.take_best()
     best = second.judge()
@@ -104,14 +104,14 @@ def test_a_joint_design_goes_on_in_the_same_bits(folder: Path, etched: bool) -> 
 
 def test_a_plate_that_is_held_stays_while_its_network_learns(folder: Path) -> None:
     loop = _loop(folder, joint({"hold_steps": 2}))
-    begin = loop.made().detach().clone()
+    begin = loop.height_map().detach().clone()
     weights = loop.reader.fitter.weights()  # type: ignore[union-attr]
-    list(loop.run(until=2))
-    assert torch.equal(loop.made(), begin)
+    list(loop.run(last_step=2))
+    assert torch.equal(loop.height_map(), begin)
     now = loop.reader.fitter.weights()  # type: ignore[union-attr]
     assert any(not torch.equal(weights[name], now[name]) for name in weights)
-    list(loop.run(until=3))
-    assert not torch.equal(loop.made(), begin)
+    list(loop.run(last_step=3))
+    assert not torch.equal(loop.height_map(), begin)
 
 
 def test_a_reader_that_has_not_learnt_takes_the_light_out_of_the_streaks(folder: Path) -> None:
@@ -119,11 +119,11 @@ def test_a_reader_that_has_not_learnt_takes_the_light_out_of_the_streaks(folder:
     goal = {"near_px": 4.0, "far_px": 20.0, "core_weight": 0.0, "streak_weight": 0.0}
     schedule = {"steps": 8, "rate": 0.05, "log_steps": 8}
     loop = _loop(folder, joint(goal=goal, schedule=schedule))
-    begin = loop.judge().reached
+    begin = loop.judge().shares
     *_, last = loop.run()
     assert last.loss == last.picture.loss  # type: ignore[union-attr]
-    assert max(last.reached.streak_share) < 0.6 * min(begin.streak_share)
-    assert min(last.reached.core_share) > max(begin.core_share) - 0.02
+    assert max(last.shares.streak_share) < 0.6 * min(begin.streak_share)
+    assert min(last.shares.core_share) > max(begin.core_share) - 0.02
 
 
 def test_without_weight_the_plate_goes_its_own_way(folder: Path) -> None:
@@ -131,8 +131,8 @@ def test_without_weight_the_plate_goes_its_own_way(folder: Path) -> None:
     alone_loop = PlateLoop(alone, begin_map(alone))
     held = _loop(folder, joint({"weight": 0.0}))
     for loop in (alone_loop, held):
-        list(loop.run(until=2))
-    torch.testing.assert_close(held.made(), alone_loop.made(), rtol=0, atol=1e-6)
+        list(loop.run(last_step=2))
+    torch.testing.assert_close(held.height_map(), alone_loop.height_map(), rtol=0, atol=1e-6)
 
 
 def test_a_digest_follows_what_the_table_only_names(folder: Path) -> None:

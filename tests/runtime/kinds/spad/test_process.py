@@ -18,6 +18,7 @@ from camkit.cli.app import run
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.kinds.spad.pulse import GatedPulse
 from camkit.runtime.kinds.spad.time_axis import TimeAxis
+from tests import spad_bundle
 from tests.data_folder import data_path
 from tests.spad_files import WRITERS, small_cube, write_cells5, write_sdt_zip
 
@@ -110,6 +111,21 @@ def test_a_scan_becomes_depth_points_and_preview(
     }
     assert sidecar["spad"]["valid"] == [int(sound.sum())]
     assert set(sidecar["beside_sha256"]) == {".ply", ".png", ".tif"}
+
+
+def test_products_are_not_streamed_but_refused_by_name(scan: Path, timing: Path) -> None:
+    pipeline = camkit.load(None, kind="spad", timing=timing)
+    with pytest.raises(camkit.ContractError, match="whole products, not bands of a picture: use"):
+        pipeline.stream(scan, lambda *_: None)
+
+
+def test_photons_are_those_of_the_capture_on_a_finer_grid_too(tmp_path: Path) -> None:
+    counts = np.random.default_rng(3).poisson(20, (spad_bundle.HEIGHT, spad_bundle.WIDTH))
+    np.savez(tmp_path / "counts.npz", counts=counts.astype(np.uint16))
+    bundle = spad_bundle.write_spad_bundle(tmp_path)
+    result = camkit.load(bundle.path, method="linear").run(tmp_path / "counts.npz")
+    assert result.arrays["intensity"].shape == (4 * counts.shape[0], 4 * counts.shape[1])
+    assert result.sections["spad"]["photons"] == pytest.approx(counts.sum(), rel=0.2)
 
 
 def test_from_python_nothing_is_written(scan: Path, timing: Path, tmp_path: Path) -> None:
