@@ -18,7 +18,6 @@ Finer = Literal["net", "linear"]
 FINER: Final[tuple[Finer, ...]] = get_args(Finer)
 """Ways to a finer grid, with a bundle."""
 Product = Literal["depth", "intensity", "transient", "lifetime"]
-PRODUCTS: Final[tuple[Product, ...]] = get_args(Product)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

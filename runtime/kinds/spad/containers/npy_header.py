@@ -1,7 +1,6 @@
 """The header of an array in numpy's format."""
 
 import io
-import struct
 import tokenize
 import warnings
 from typing import Any, Final
@@ -10,14 +9,12 @@ import numpy as np
 from numpy.lib import format as npy
 
 from camkit.errors import DecodeError
+from camkit.runtime.kinds.spad.containers.broken import BROKEN
 
 Header = tuple[tuple[int, ...], bool, np.dtype[Any]]
 """Shape, whether columns come first, type."""
-BROKEN_HEADER: Final = (
-    *(ValueError, SyntaxError, TypeError, KeyError, IndexError, AttributeError, OverflowError),
-    *(RecursionError, MemoryError, EOFError, struct.error, tokenize.TokenError),
-)
-"""Errors that numpy raises for headers that are damaged; it parses them as Python."""
+BROKEN_HEADER: Final = (*BROKEN, SyntaxError, tokenize.TokenError, MemoryError)
+"""Numpy parses headers as Python; one of many brackets takes more memory than the parser has."""
 
 
 def read_header(start: io.BytesIO, what: str) -> Header:

@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from camkit.errors import CamkitError
-from camkit.runtime.kinds.spad.files.broken import BROKEN
+from camkit.runtime.kinds.spad.containers.broken import BROKEN
 from camkit.runtime.kinds.spad.files.hdf5 import attribute_of
 from camkit.runtime.kinds.spad.files.npz import read_npz
 from camkit.runtime.kinds.spad.timing import read_timing, timing_beside

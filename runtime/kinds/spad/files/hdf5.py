@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from camkit.errors import CamkitError, DecodeError, UnsupportedError
-from camkit.runtime.kinds.spad.files.broken import BROKEN
+from camkit.runtime.kinds.spad.containers.broken import BROKEN
 from camkit.runtime.kinds.spad.files.counts_file import EXTRA, CountsFile, Hints
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from camkit.caller import option_text
 from camkit.errors import CamkitError, ContractError, DecodeError
+from camkit.runtime.kinds.spad.containers.broken import BROKEN
 from camkit.runtime.kinds.spad.containers.hdf5_tree import (
     Tree,
     check_readable,
@@ -25,7 +26,6 @@ from camkit.runtime.kinds.spad.containers.hdf5_tree import (
 )
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
 from camkit.runtime.kinds.spad.files.axes import backwards
-from camkit.runtime.kinds.spad.files.broken import BROKEN
 from camkit.runtime.kinds.spad.files.counts_file import KEYS, CountsFile, Hints
 from camkit.runtime.kinds.spad.files.stamps import StampsFile
 from camkit.runtime.kinds.spad.files.variable import chosen_name, stated_values

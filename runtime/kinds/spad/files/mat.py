@@ -1,9 +1,7 @@
 """MATLAB files: version 5 by scipy, version 7.3 as HDF5."""
 
 import math
-import struct
 import warnings
-import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,6 +12,7 @@ import scipy.io
 
 from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError
+from camkit.runtime.kinds.spad.containers.broken import BROKEN
 from camkit.runtime.kinds.spad.containers.mat_sizes import (
     Listed,
     bytes_of,
@@ -30,11 +29,7 @@ from camkit.runtime.kinds.spad.timing import TABLE_OF
 HDF5_MAGIC: Final = b"\x89HDF\r\n\x1a\n"
 USER_BLOCK: Final = 512
 """Bytes before the HDF5 of version 7.3."""
-BROKEN: Final = (
-    *(ValueError, TypeError, KeyError, IndexError, OverflowError, OSError, EOFError),
-    *(NotImplementedError, UnicodeDecodeError, struct.error, zlib.error),
-    *(AttributeError, UnboundLocalError, RuntimeError, scipy.io.matlab.MatReadError, UserWarning),
-)
+DAMAGED: Final = (*BROKEN, scipy.io.matlab.MatReadError, UserWarning)
 """What scipy raises of files that are damaged."""
 BYTES_OF: Final = {
     "single": 4,
@@ -84,7 +79,7 @@ def open_mat(path: Path, hints: Hints) -> CountsFile:
         with _doubts_raised():
             variables = scipy.io.loadmat(str(path), appendmat=False, variable_names=[name, *small])
         values, stated_times = variables[name], stated_values({n: variables[n] for n in small})
-    except BROKEN as error:
+    except DAMAGED as error:
         raise DecodeError(f"{path.name} is damaged: {error}") from error
     if values.dtype == object:
         if values.ndim != 2:
@@ -106,7 +101,7 @@ def _listed_by_scipy(path: Path) -> list[Listed]:
     try:
         with _doubts_raised():
             return list(scipy.io.whosmat(str(path), appendmat=False))
-    except BROKEN as error:
+    except DAMAGED as error:
         raise DecodeError(f"{path.name} is damaged, or no MATLAB file: {error}") from error
 
 

@@ -1,7 +1,6 @@
 """PTU of PicoQuant, T3: images as histograms of every pixel, other measurements as one pixel."""
 
 import logging
-import struct
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,16 +11,11 @@ from numpy.typing import NDArray
 
 from camkit.caller import option_text
 from camkit.errors import CamkitError, ContractError, DecodeError, UnsupportedError
+from camkit.runtime.kinds.spad.containers.broken import BROKEN
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
 from camkit.runtime.kinds.spad.files.channels import chosen_places
 from camkit.runtime.kinds.spad.files.counts_file import ARRIVALS, EXTRA, CountsFile, Hints
 
-BROKEN: Final = (
-    *(ValueError, TypeError, KeyError, IndexError, OverflowError, OSError, EOFError),
-    *(NotImplementedError, UnicodeDecodeError, UnboundLocalError, ZeroDivisionError),
-    *(AttributeError, RuntimeError, struct.error),
-)
-"""What ptufile raises of files that are damaged, or of other measurements."""
 RECORD_BYTES: Final = 4
 COUNT_BYTES: Final = 4
 TIMES: Final = 2

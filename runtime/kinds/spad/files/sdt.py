@@ -1,10 +1,8 @@
 """SDT of Becker & Hickl: a histogram of every pixel, plain or in a zip."""
 
 import io
-import struct
 import tempfile
 import zipfile
-import zlib
 from pathlib import Path
 from typing import IO, Final
 
@@ -12,17 +10,12 @@ import numpy as np
 
 from camkit.caller import option_text
 from camkit.errors import CamkitError, ContractError, DecodeError, UnsupportedError
+from camkit.runtime.kinds.spad.containers.broken import BROKEN
 from camkit.runtime.kinds.spad.containers.packed import PIECE, member_bytes, opened_zip
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
 from camkit.runtime.kinds.spad.files.channels import chosen_places
 from camkit.runtime.kinds.spad.files.counts_file import ARRIVALS, EXTRA, CountsFile, Hints
 
-BROKEN: Final = (
-    *(ValueError, TypeError, KeyError, IndexError, OverflowError, OSError, EOFError),
-    *(zipfile.BadZipFile, zlib.error, RuntimeError),
-    *(NotImplementedError, AssertionError, UnicodeDecodeError, AttributeError, struct.error),
-)
-"""What sdtfile raises of files that are damaged."""
 PS_PER_S: Final = 1e12
 NEW_BLOCKS: Final = 15
 """Revision from which on blocks may be longer than 4 GB."""

@@ -1,15 +1,12 @@
 """TIFF: a page of counts, or a stack whose pages are time."""
 
 import logging
-import lzma
 import math
-import struct
 import tempfile
-import zlib
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 import tifffile
@@ -17,20 +14,13 @@ from numpy.typing import NDArray
 
 from camkit.errors import CamkitError, DecodeError
 from camkit.runtime.cancel import check_wish
+from camkit.runtime.kinds.spad.containers.broken import BROKEN
 from camkit.runtime.kinds.spad.containers.packed import MOST_UNPACKED
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
 from camkit.runtime.kinds.spad.files.channels import chosen_places
 from camkit.runtime.kinds.spad.files.counts_file import CountsFile, Hints
 from camkit.runtime.kinds.spad.files.tiff_pages import check_pages, check_whole, stack_axes
 
-BROKEN: Final = (
-    *(tifffile.TiffFileError, ValueError, TypeError, KeyError, IndexError, OSError, EOFError),
-    *(RuntimeError, AttributeError, ZeroDivisionError, OverflowError, struct.error),
-    zlib.error,
-    lzma.LZMAError,
-    ImportError,  # a packing that needs a library of its own
-)
-"""What tifffile raises of files that are damaged, or packed in ways that it does not know."""
 logging.getLogger("tifffile").addHandler(logging.NullHandler())
 
 
@@ -41,7 +31,8 @@ def open_tiff(path: Path, hints: Hints) -> CountsFile:
             axes, values = _stack(path, file, hints)
     except CamkitError:
         raise
-    except BROKEN as error:
+    except (*BROKEN, tifffile.TiffFileError, ImportError) as error:
+        # ImportError: a packing that needs a library of its own
         raise DecodeError(f"{path.name} is damaged, or no TIFF of counts: {error}") from error
     return ArrayFile(path, values, replace(hints, axes=axes))
 
