@@ -2,7 +2,8 @@
 
 A file of some kilobytes may hold cells of gigabytes of zeros, packed, and cells in cells without an
 end. So every element of the variable is passed by in small pieces, and what it would unpack to is
-counted; nothing is kept.
+counted; nothing is kept. Elements that do not fit into one another, or are of a type that there is
+not, are refused here: scipy believes them.
 
 References: MathWorks, MAT-File Format, level 5.
 """
@@ -24,6 +25,12 @@ OBJECT: Final = 3
 STRUCTS: Final = frozenset({2, OBJECT})
 NUMBER_BYTES: Final = {6: 8, 7: 4, 8: 1, 9: 1, 10: 2, 11: 2, 12: 4, 13: 4, 14: 8, 15: 8}
 """Class of an array of numbers -> bytes of one."""
+NUMBER_TYPES: Final = frozenset({1, 2, 3, 4, 5, 6, 7, 9, 12, 13, 16, 17, 18})
+"""Types of elements that hold numbers or letters."""
+TEXT: Final = 4
+SPARSE: Final = 5
+PLAIN_CLASSES: Final = frozenset({*NUMBER_BYTES, TEXT, SPARSE})
+"""Classes of arrays of numbers and of text."""
 TEXT_TIMES: Final = 4
 """Of the bytes of anything else: text becomes UTF-32."""
 OBJECT_BYTES: Final = 200
@@ -178,16 +185,35 @@ class _Walk:
         count = 1
         for side in sides:
             count *= max(side, 0)
+        if min(sides, default=0) < 0 or rest < 0:
+            raise EOFError("an array is larger than what holds it, or has no shape")
         if kind == CELL or kind in STRUCTS:
-            return self._inner(kind, count, depth)
+            return self._inner(kind, count, depth, rest)
         memory_bytes = OBJECT_BYTES + max(rest, 0) * TEXT_TIMES
         if kind in NUMBER_BYTES:
             memory_bytes = OBJECT_BYTES + count * NUMBER_BYTES[kind] * (2 if flags & COMPLEX else 1)
         self._counted(memory_bytes)
-        self._skip(max(rest, 0))
+        if kind in PLAIN_CLASSES:
+            rest -= self._numbers(rest, (3 if kind == SPARSE else 1) + bool(flags & COMPLEX))
+        self._skip(rest)
         return memory_bytes
 
-    def _inner(self, kind: int, count: int, depth: int) -> int:
+    def _numbers(self, size: int, elements: int) -> int:
+        """Skip the elements of an array of numbers; return how many of its bytes they took."""
+        bytes_read = 0
+        for _ in range(elements):
+            kind, length = self.tag()
+            is_small = kind >> 16
+            if (kind & 0xFFFF) not in NUMBER_TYPES or is_small > 4:
+                raise EOFError(f"numbers of the unknown type {kind}")
+            padded = 0 if is_small else -(-length // 8) * 8
+            bytes_read += 8 + padded
+            if bytes_read > size:
+                raise EOFError("numbers are more than their array holds")
+            self._skip(padded)
+        return bytes_read
+
+    def _inner(self, kind: int, count: int, depth: int, rest: int) -> int:
         """Skip the arrays in a cell or a structure."""
         total = self._counted(OBJECT_BYTES)
         if kind == OBJECT:
@@ -197,13 +223,14 @@ class _Walk:
             _, fields = self._element()
             (wide,) = struct.unpack(f"{self.end}i", length[:4].ljust(4, b"\0"))
             count *= len(fields) // max(wide, 1)
+        if 8 * count > rest:
+            raise EOFError("cells are fewer than their shape says")
         for _ in range(count):
             kind, size = self.tag()
             total += self._counted(8)
-            if kind == MATRIX:
-                total += self.matrix(size, depth + 1, None)
-            else:
-                self._skip(size)
+            if kind != MATRIX:
+                raise EOFError(f"a cell of the type {kind}, which is no array")
+            total += self.matrix(size, depth + 1, None)
             if self.bytes_left < 0:
                 break
         return total

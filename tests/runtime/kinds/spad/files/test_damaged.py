@@ -2,6 +2,8 @@
 
 import io
 import pickle
+import subprocess
+import sys
 import zipfile
 from pathlib import Path
 
@@ -89,6 +91,48 @@ def test_files_with_other_bytes_are_read_or_refused(
     else:
         assert np.isfinite(found).all()
         assert (found >= 0).all()
+
+
+MUTANTS = """
+import sys
+from pathlib import Path
+import numpy as np
+from camkit.errors import CamkitError
+from camkit.runtime.kinds.spad.files.counts_file import Hints
+from camkit.runtime.kinds.spad.files.open_counts import open_counts
+
+path, draw, read = Path(sys.argv[1]), np.random.default_rng(51), 0
+whole = path.read_bytes()
+for _ in range(int(sys.argv[2])):
+    data = bytearray(whole)
+    for place in draw.integers(128, len(data), draw.integers(1, 4)):
+        data[place] = draw.choice([0, 255, draw.integers(256)])
+    path.write_bytes(data)
+    try:
+        with open_counts(path, Hints()) as file:
+            file.rows(0, file.height, np.arange(41) - 0.5)
+        read += 1
+    except CamkitError as error:
+        assert "\\n" not in str(error)
+print(read)
+"""
+
+
+def test_a_library_that_trusts_sizes_is_not_given_damaged_ones(tmp_path: Path) -> None:
+    """The reader of MATLAB files believes types and sizes: its crash would end a whole batch."""
+    path, mutants = tmp_path / "cells.mat", 1500
+    stamps = np.empty((3, 4), object)
+    for place in np.ndindex(stamps.shape):
+        stamps[place] = np.arange(1.0, 2.0 + sum(place)).reshape(1, -1)
+    scipy.io.savemat(path, {"photons": stamps})
+    done = subprocess.run(
+        [sys.executable, "-c", MUTANTS, str(path), str(mutants)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert mutants / 20 < int(done.stdout) < mutants
 
 
 @pytest.mark.parametrize("name", EVERY)
