@@ -18,6 +18,9 @@ from camkit.runtime.kinds.spad.files.counts_file import ARRIVALS, EXTRA, CountsF
 
 RECORD_BYTES: Final = 4
 COUNT_BYTES: Final = 4
+MARKERS: Final = ("ImgHdr_LineStart", "ImgHdr_LineStop", "ImgHdr_Frame")
+MOST_MARKER: Final = 32
+"""Far above the four that a device has; ptufile takes two to this power, however large it is."""
 TIMES: Final = 2
 """Of max_bytes: such files are read whole."""
 logging.getLogger("ptufile").addHandler(logging.NullHandler())
@@ -56,6 +59,12 @@ def _check_whole(path: Path, file: Any) -> None:
         raise DecodeError(
             f"{path.name} is cut off: {file.number_records} photons and markers are announced, "
             f"{max(room, 0) // RECORD_BYTES} are there"
+        )
+    numbers = {tag: file.tags[tag] for tag in MARKERS if tag in file.tags}
+    if wrong := [tag for tag, number in numbers.items() if not 0 <= number <= MOST_MARKER]:
+        raise DecodeError(
+            f"{path.name} is damaged: {wrong[0]} is the marker {numbers[wrong[0]]}; there are "
+            f"0 to {MOST_MARKER}"
         )
 
 

@@ -135,6 +135,16 @@ def test_a_library_that_trusts_sizes_is_not_given_damaged_ones(tmp_path: Path) -
     assert mutants / 20 < int(done.stdout) < mutants
 
 
+@pytest.mark.parametrize("tag", [b"ImgHdr_LineStart", b"ImgHdr_LineStop", b"ImgHdr_Frame"])
+def test_a_marker_that_no_device_has_is_refused(tag: bytes, whole: Files, tmp_path: Path) -> None:
+    data, path = bytearray(whole["scan.ptu"]), tmp_path / "scan.ptu"
+    value = data.index(tag + b"\0") + 40
+    data[value : value + 8] = (99).to_bytes(8, "little")
+    path.write_bytes(data)
+    with pytest.raises(DecodeError, match=rf"{tag.decode()} is the marker 99; there are 0 to 32"):
+        _read(path)
+
+
 @pytest.mark.parametrize("name", EVERY)
 def test_another_kind_of_file_under_the_name_is_refused(name: str, tmp_path: Path) -> None:
     path = tmp_path / name
