@@ -2,9 +2,10 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from camkit.bundle.facts import Port
 from camkit.errors import ContractError
@@ -51,6 +52,37 @@ class SampleLayout:
     def scale(self) -> int:
         """Samples along a side of the outputs for one of the inputs."""
         return self.outputs[0].scale
+
+    def check(self, name: str, network: nn.Module) -> None:
+        """Refuse a network that does not map these samples to their targets.
+
+        Args:
+            name: Of the network, for the message.
+            network: What it is.
+
+        Raises:
+            ContractError: Naming what it takes and gives.
+        """
+        stride_px: Any = network.stride_px
+        side_px = 4 * stride_px
+        planes = torch.zeros(1, self.input_channels, side_px, side_px)
+        shape = (1, self.output_channels, self.scale * side_px, self.scale * side_px)
+        was_training = network.training
+        network.eval()
+        try:
+            with torch.no_grad():
+                got = tuple(torch.as_tensor(network(planes)).shape)
+        except RuntimeError as error:
+            raise ContractError(
+                f"{name} does not take the {self.input_channels} channels of its role "
+                f"({', '.join(port.name for port in self.inputs)}): {error}"
+            ) from error
+        finally:
+            network.train(was_training)
+        if got != shape:
+            raise ContractError(
+                f"{name} must make {shape} of {tuple(planes.shape)}; it makes {got}"
+            )
 
     def by_name(self, planes: Tensor) -> dict[str, Tensor]:
         """Split (b, channels, h, w) of all inputs, or inputs and masks, by their names."""

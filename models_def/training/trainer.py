@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 import torch
-from torch import nn
 
 from camkit.bundle.stages.network import DEFAULT_ROLE
 from camkit.caller import option_text
@@ -42,7 +41,6 @@ from camkit.models_def.training.log import RunLog
 from camkit.models_def.training.pool import SamplePool, open_pool
 from camkit.models_def.training.recipe import Recipe
 from camkit.models_def.training.refinement import Refinement
-from camkit.models_def.training.sample import SampleLayout
 from camkit.models_def.training.schedule import progress_of
 from camkit.progress import Task, duration, left_text, note, working
 from camkit.stopwatch import Stopwatch
@@ -189,7 +187,7 @@ def train(
     # before anything is traced
     network, layout = build_role(kind, recipe, role, options.size)
     check_patch(entry.network, network, schedule.patch_px)
-    check_layout(entry.network, network, layout)
+    layout.check(entry.network, network)
     first = None if refinement is None else refinement.first
     if options.start is not None:
         if refinement is not None:
@@ -240,32 +238,6 @@ def train(
         )
         run.loop(pool, task)
     return run.result()
-
-
-def check_layout(name: str, network: nn.Module, layout: SampleLayout) -> None:
-    """Refuse a network that does not map the samples of its role to their targets.
-
-    Raises:
-        ContractError: Naming what it takes and gives.
-    """
-    stride_px: Any = network.stride_px
-    side_px = 4 * stride_px
-    planes = torch.zeros(1, layout.input_channels, side_px, side_px)
-    shape = (1, layout.output_channels, layout.scale * side_px, layout.scale * side_px)
-    was_training = network.training
-    network.eval()
-    try:
-        with torch.no_grad():
-            got = tuple(torch.as_tensor(network(planes)).shape)
-    except RuntimeError as error:
-        raise ContractError(
-            f"{name} does not take the {layout.input_channels} channels of its role "
-            f"({', '.join(port.name for port in layout.inputs)}): {error}"
-        ) from error
-    finally:
-        network.train(was_training)
-    if got != shape:
-        raise ContractError(f"{name} must make {shape} of {tuple(planes.shape)}; it makes {got}")
 
 
 def checkpoint_path(recipe: Recipe, options: TrainOptions, refinement: Refinement | None) -> Path:

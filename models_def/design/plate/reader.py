@@ -31,7 +31,6 @@ from camkit.models_def.training.first_weights import FirstWeights, read_first_we
 from camkit.models_def.training.fitter import Fitter
 from camkit.models_def.training.kind import read_recipe
 from camkit.models_def.training.recipe import NetworkRecipe
-from camkit.models_def.training.trainer import check_layout
 from camkit.scenes.saturation import CEILING
 
 ROLE: Final = "whole"
@@ -243,7 +242,7 @@ def _entry(reader_recipe: ReaderRecipe, camera: HdrRecipe, seed: int) -> Network
     schedule = replace(entry.schedule, precision="float32", seed=seed)
     network = build_network(entry.network, **entry.config)
     check_patch(entry.network, network, reader_recipe.patch_px)
-    check_layout(entry.network, network, layout_of(camera, ROLE))
+    layout_of(camera, ROLE).check(entry.network, network)
     return replace(entry, schedule=schedule)
 
 
