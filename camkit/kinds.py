@@ -183,18 +183,11 @@ def kinds_of_packages() -> dict[str, str]:
     states = {}
     for name in sorted(entry_points(GROUP)):
         try:
-            states[name] = _broken_part(find_kind(name)) or "ready"
-        except ContractError as error:
+            find_kind(name).part("runtime")
+            states[name] = "ready"
+        except (ContractError, UnsupportedError) as error:
             states[name] = str(error)
     return states
-
-
-def _broken_part(kind: Kind) -> str:
-    try:
-        kind.part("runtime")
-    except (ContractError, UnsupportedError) as error:
-        return str(error)
-    return ""
 
 
 def kind_of_file(file: PurePath) -> Kind | None:

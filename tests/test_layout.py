@@ -113,6 +113,22 @@ def test_folders_hold_at_most_twenty_modules() -> None:
             assert len(modules) <= 20, folder
 
 
+def test_modules_hold_at_most_400_lines_of_code() -> None:
+    """A docstring counts one line; blank lines and comments count none."""
+    for top in (*SHIPPED, "tools"):
+        for path in (ROOT / top).rglob("*.py"):
+            text = path.read_text(encoding="utf-8")
+            lines = {
+                number
+                for number, line in enumerate(text.splitlines(), 1)
+                if line.strip() and not line.strip().startswith("#")
+            }
+            for node in ast.walk(ast.parse(text)):
+                if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+                    lines -= set(range(node.lineno + 1, (node.end_lineno or 0) + 1))
+            assert len(lines) <= 400, path
+
+
 def test_a_file_of_tools_is_a_command_and_its_folders_hold_commands_or_what_they_use() -> None:
     modules = dict(_modules("tools"))
     used = {name for path in modules.values() for name in _named(path)}
