@@ -44,7 +44,7 @@ def doctor(
         return
     for name, value in report.items():
         if isinstance(value, dict):
-            say(f"{name}:")
+            say(f"{name}:" if value else f"{name}: none")
             for key, item in value.items():
                 say(f"  {key}: {item}")
         else:
