@@ -7,8 +7,9 @@ import sys
 import threading
 from collections.abc import Iterable, Sequence
 from contextlib import nullcontext
+from functools import cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from camkit.arrays import FloatArray
 from camkit.errors import BundleError, ContractError, UnsupportedError
 from camkit.runtime.cancel import Cancel, Cancelled, watched
 from camkit.runtime.machine.memory import mapped_arrays
+from camkit.runtime.network.segment import Segment
 
 _IMPORTED_BEFORE = "onnxruntime" in sys.modules and "ORT_DISABLE_TELEMETRY" not in os.environ
 os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
@@ -40,6 +42,8 @@ PROVIDER_NAMES: Final = {
 """What a caller may ask for, and what onnxruntime calls it."""
 _FALLBACKS: Final = {"tensorrt": ("cuda", "cpu"), "cuda": ("cpu",), "openvino": ("cpu",)}
 _CREATION: Final = threading.Lock()
+Memory = Literal["arena", "block", "shared"]
+"""Of a session: an arena of its own, one block once sizes are known, the arena of all segments."""
 _CGROUP: Final = Path("/sys/fs/cgroup")
 _ORT_ERRORS: Final = (
     ort_errors.EPFail,
@@ -142,9 +146,11 @@ class NetworkEngine:
         self.block_bytes = block_bytes if provider == "cpu" else None
         with _CREATION:
             self._session = _create_session(
-                model, threads, provider, in_block=self.block_bytes is not None
+                model, threads, provider, memory="arena" if self.block_bytes is None else "block"
             )
         self._memory = nullcontext() if self.block_bytes is None else mapped_arrays
+        self._model, self._cutting = model, threading.Lock()
+        self._segments: tuple[SegmentEngine, ...] | None = None
         self.threads = threads
         self.provider = provider
         self.scale = scale
@@ -183,22 +189,22 @@ class NetworkEngine:
         binding = self._session.io_binding()
         binding.bind_cpu_input("input", window)
         binding.bind_output("output", "cpu", 0, np.float32, shape, out.ctypes.data)
-        running = ort.RunOptions()
-
-        def end() -> None:
-            running.terminate = True
-
-        try:
-            with watched(cancel, end), self._memory:
-                self._session.run_with_iobinding(binding, running)
-        except Cancelled:
-            raise
-        except (RuntimeError, *_ORT_ERRORS) as error:
-            raise ContractError(
-                f"the network cannot run on a window of {window.shape}: {error}; "
-                "sides must be multiples of its stride"
-            ) from error
+        with self._memory:
+            _run(self._session, binding, cancel, window.shape)
         return out
+
+    def segments(self) -> tuple["SegmentEngine", ...]:
+        """Return the network in segments with the same bits; none where it cannot be cut."""
+        if self.provider != "cpu":
+            return ()
+        with self._cutting:
+            if self._segments is None:
+                # onnx takes a tenth of a second to import, and small pictures need no segments
+                from camkit.runtime.network.graph_cuts import cut_network
+
+                cut = cut_network(self._model)
+                self._segments = tuple(SegmentEngine(one, threads=self.threads) for one in cut)
+        return self._segments
 
     def _checked(self, window: FloatArray) -> FloatArray:
         if window.ndim != 4 or window.shape[:2] != (1, self.channels) or window.dtype != np.float32:
@@ -207,6 +213,54 @@ class NetworkEngine:
                 f"got {window.dtype} {window.shape}"
             )
         return np.ascontiguousarray(window)
+
+
+class SegmentEngine:
+    """One segment of a network, ready to run on strips of whole rows; float32, on the CPU.
+
+    All segments take their memory from one arena of the process: they run one after another.
+    """
+
+    def __init__(self, segment: Segment, *, threads: int) -> None:
+        """Load a segment.
+
+        Args:
+            segment: Of `cut_network`.
+            threads: Threads per run, from `available_threads`.
+
+        Raises:
+            BundleError: If onnxruntime refuses it.
+        """
+        self.segment = segment
+        with _CREATION:
+            _share_arena()
+            self._session = _create_session(segment.model, threads, memory="shared")
+
+    def run(self, inputs: Sequence[FloatArray]) -> list[FloatArray]:
+        """Run the segment on one strip.
+
+        Args:
+            inputs: (1, c, rows, w) float32, C-contiguous, in the order of its feeds.
+
+        Returns:
+            (1, c, rows, w) of every output.
+
+        Raises:
+            ContractError: If onnxruntime refuses the strip.
+        """
+        first = self.segment.feeds[0]
+        size_px = [side * first.step for side in inputs[0].shape[2:]]
+        binding = self._session.io_binding()
+        for feed, rows in zip(self.segment.feeds, inputs, strict=True):
+            binding.bind_cpu_input(feed.name, rows)
+        outputs = []
+        for port in self.segment.outputs:
+            shape = (1, port.channels, *(port.samples(side) for side in size_px))
+            output = np.empty(shape, np.float32)
+            binding.bind_output(port.name, "cpu", 0, np.float32, shape, output.ctypes.data)
+            outputs.append(output)
+        _run(self._session, binding, None, inputs[0].shape)
+        return outputs
 
 
 def largest_activations(
@@ -240,6 +294,40 @@ def largest_activations(
     return largest
 
 
+def _run(session: Any, binding: Any, cancel: Cancel | None, shape: tuple[int, ...]) -> None:
+    """Run a session until it is done or cancelled.
+
+    Raises:
+        ContractError: If onnxruntime refuses the size.
+        Cancelled: If `cancel` said so.
+    """
+    running = ort.RunOptions()
+
+    def end() -> None:
+        running.terminate = True
+
+    try:
+        with watched(cancel, end):
+            session.run_with_iobinding(binding, running)
+    except Cancelled:
+        raise
+    except (RuntimeError, *_ORT_ERRORS) as error:
+        raise ContractError(
+            f"the network cannot run on a window of {shape}: {error}; "
+            "sides must be multiples of its stride"
+        ) from error
+
+
+@cache
+def _share_arena() -> None:
+    """Register the arena of all segments; once a process."""
+    arena = ort.OrtMemoryInfo(
+        "Cpu", ort.OrtAllocatorType.ORT_ARENA_ALLOCATOR, 0, ort.OrtMemType.DEFAULT
+    )
+    # 1: grow by what is asked for, not by powers of two
+    ort.create_and_register_allocator(arena, ort.OrtArenaCfg({"arena_extend_strategy": 1}))
+
+
 def _check_version(version: str) -> None:
     parts = tuple(int(p) for p in version.split("+", maxsplit=1)[0].split(".")[:3] if p.isdigit())
     if parts < MINIMUM_VERSION:
@@ -250,7 +338,7 @@ def _check_version(version: str) -> None:
 
 
 def _create_session(
-    model: bytes, threads: int, provider: str = "cpu", *, in_block: bool = False
+    model: bytes, threads: int, provider: str = "cpu", *, memory: Memory = "arena"
 ) -> Any:
     candidates = _chosen_providers(provider)
     options = ort.SessionOptions()
@@ -258,8 +346,10 @@ def _create_session(
     options.inter_op_num_threads = 1
     options.execution_mode = ort.ExecutionMode.ORT_SEQUENTIAL
     options.graph_optimization_level = ort.GraphOptimizationLevel.ORT_ENABLE_ALL
-    options.enable_mem_pattern = in_block
-    options.enable_cpu_mem_arena = not in_block
+    options.enable_mem_pattern = memory == "block"
+    options.enable_cpu_mem_arena = memory != "block"
+    if memory == "shared":
+        options.add_session_config_entry("session.use_env_allocators", "1")
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     options.log_severity_level = 4  # errors reach the caller as exceptions, not on stderr
     try:
