@@ -189,6 +189,7 @@ class _NetworkStage:
         tiles = {role: windows.to_json() for role, windows in log.windows.items()}
         one = len(bundle.manifest.networks) == 1
         log.record["tiles"] = tiles[entry.role] if one else tiles
+        log.record["network"] = {"provider": job.options.provider, "dtype": job.options.dtype}
 
     def _trimmed(self, engine: NetworkEngine, cap_bytes: int) -> Run:
         """Return the run of a network that has the memory to itself, as far as it is near the cap.
