@@ -109,11 +109,7 @@ class Options:
                 f"{option_text('max_seconds')} finds the best quality that fits by itself; leave "
                 f"{option_text('quality')} out"
             )
-        if self.dtype == "bf16" and self.provider != "openvino":
-            raise ContractError(
-                f"{option_text('dtype', 'bf16')} is computed by openvino alone; add "
-                f"{option_text('provider', 'openvino')}"
-            )
+        _check_dtype(self.dtype, self.provider)
         _check_depth(self.depth_m)
         if not 0 <= self.strength <= 1:
             raise ContractError(f"strength must lie in 0..1; got {self.strength}")
@@ -252,6 +248,14 @@ def check_kind_options(options: Options, kind: Kind, where: str) -> None:
         raise ContractError(
             f"{option_list(foreign)} does not apply {where}: it is for cameras of the "
             f"kind {makers[0].name}; leave it out"
+        )
+
+
+def _check_dtype(dtype: Dtype, provider: Provider) -> None:
+    if dtype == "bf16" and provider != "openvino":
+        raise ContractError(
+            f"{option_text('dtype', dtype)} is computed by openvino alone; add "
+            f"{option_text('provider', 'openvino')}"
         )
 
 

@@ -19,7 +19,6 @@ from camkit.caller import option_text
 from camkit.errors import BundleError, ContractError, UnsupportedError
 from camkit.runtime.cancel import Cancel, watched
 from camkit.runtime.machine.processor import BFLOAT16_FLAGS, lacks_bfloat16, processor_fact
-from camkit.runtime.network.graph import parse_graph
 
 logger = logging.getLogger(__name__)
 INSTALLED_BY: Final = "pip install 'camkit[openvino]'"
@@ -75,6 +74,8 @@ class OpenvinoSession:
                 f"{option_text('dtype', 'bf16')} needs {missing}; use "
                 f"{option_text('dtype', 'fp32')}"
             )
+        from camkit.runtime.network.graph import parse_graph  # a start on the CPU spares onnx
+
         parse_graph(model)  # openvino would read files that a model names
         self._settings = {
             "INFERENCE_PRECISION_HINT": "bf16" if bfloat16 else "f32",
