@@ -23,8 +23,8 @@ from pathlib import Path
 from camkit.errors import BundleError, ContractError
 from camkit.models_def.training.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
 from camkit.models_def.training.credits import describe_data
-from camkit.models_def.training.fitter import Fitter
 from camkit.models_def.training.first_weights import FirstWeights, read_first_weights
+from camkit.models_def.training.fitter import Fitter
 from camkit.models_def.training.kind import Material, read_recipe, training_kind
 from camkit.models_def.training.pictures import list_pictures
 from camkit.models_def.training.recipe import Recipe
@@ -179,8 +179,9 @@ def go(arguments: argparse.Namespace) -> None:
         _link(out / samples.name, samples)
         before = read_checkpoint(path)
         result = train(job / RECIPE, options)
-        steps, gain = result.steps - before.step, result.valid_db - (before.best_db or 0.0)
-        print(f"{size}: {steps} steps more, {result.valid_db:.3f} dB ({gain:+.3f})", flush=True)
+        start_db = "" if before.best_db is None else f"{before.best_db:.3f} to "
+        steps = result.steps - before.step
+        print(f"{size}: {steps} steps more, {start_db}{result.valid_db:.3f} dB", flush=True)
         shutil.rmtree(samples)
 
 

@@ -18,15 +18,18 @@ ALONE = (
 )
 
 
-@pytest.mark.parametrize("bundle", ["duet", "streak-hdr", "spad-sr"])
+@pytest.mark.parametrize(
+    ("bundle", "width_px", "height_px"),
+    [("duet", 64, 48), ("streak-hdr", 64, 48), ("spad-sr", 16, 8)],
+)
 def test_every_kind_of_network_equals_onnxruntime_where_neither_it_nor_camkit_is(
-    bundle: str, tmp_path: Path
+    bundle: str, width_px: int, height_px: int, tmp_path: Path
 ) -> None:
     gpu_networks.prepare(tmp_path, [bundle])
     out = tmp_path / "report.json"
     words = (
         *("measure", str(tmp_path), "-o", str(out), "--device", "cpu", "--seconds", "0"),
-        *("--width", "96", "--height", "64", "--tile", "32"),
+        *("--width", str(width_px), "--height", str(height_px), "--tile", "32"),
     )
     command = [sys.executable, "-c", ALONE, gpu_networks.__file__, *words]
     subprocess.run(command, check=True, capture_output=True)
