@@ -63,7 +63,9 @@ def prepare(folder: Path, names: list[str]) -> None:
     from camkit.bundle.reader import built_in_bundles, open_bundle
     from camkit.runtime.network.engine import NetworkEngine
 
-    graphs, weights, cases = [], {}, {}
+    graphs = []
+    weights: dict[str, Any] = {}
+    cases: dict[str, Any] = {}
     rng = np.random.default_rng(0)
     for name in names or sorted(built_in_bundles()):
         bundle = open_bundle(built_in_bundles()[name])
@@ -94,8 +96,8 @@ def prepare(folder: Path, names: list[str]) -> None:
                 )
     folder.mkdir(parents=True, exist_ok=True)
     (folder / GRAPHS).write_text(json.dumps(graphs), encoding="utf-8")
-    np.savez(folder / WEIGHTS, **weights)  # type: ignore[arg-type]
-    np.savez(folder / CASES, **cases)  # type: ignore[arg-type]
+    np.savez(folder / WEIGHTS, **weights)
+    np.savez(folder / CASES, **cases)
 
 
 def _node(node: Any, helper: Any) -> dict[str, Any]:
@@ -133,43 +135,43 @@ class TorchNetwork:
         values = {"input": window}
         last_use = {name: i for i, node in enumerate(self.nodes) for name in node["inputs"]}
         for i, node in enumerate(self.nodes):
-            taken = [
+            sources = [
                 values[name] if name in values else self._weights[name] if name else None
                 for name in node["inputs"]
             ]
-            values[node["output"]] = OPERATORS[node["op"]](taken, node["attributes"])
-            del taken  # a whole picture in one window: what nobody needs is given back
+            values[node["output"]] = OPERATORS[node["op"]](sources, node["attributes"])
+            del sources  # a whole picture in one window: what nobody needs is given back
             for name in {name for name in node["inputs"] if last_use[name] == i}:
                 values.pop(name, None)
         return values["output"]
 
 
-def _conv(taken: list[Any], of: dict[str, Any]) -> Tensor:
-    source, weight, *bias = taken
-    top, left, bottom, right = of.get("pads", [0, 0, 0, 0])
+def _conv(sources: list[Any], settings: dict[str, Any]) -> Tensor:
+    source, weight, *bias = sources
+    top, left, bottom, right = settings.get("pads", [0, 0, 0, 0])
     if (top, left) != (bottom, right):
         source, top, left = functional.pad(source, (left, right, top, bottom)), 0, 0
     return functional.conv2d(
         source,
         weight,
         bias[0] if bias else None,
-        stride=of.get("strides", [1, 1]),
+        stride=settings.get("strides", [1, 1]),
         padding=(top, left),
-        dilation=of.get("dilations", [1, 1]),
-        groups=of.get("group", 1),
+        dilation=settings.get("dilations", [1, 1]),
+        groups=settings.get("group", 1),
     )
 
 
-def _shuffle(taken: list[Any], of: dict[str, Any]) -> Tensor:
-    if of.get("mode", "DCR") != "CRD":
+def _shuffle(sources: list[Any], settings: dict[str, Any]) -> Tensor:
+    if settings.get("mode", "DCR") != "CRD":
         raise ValueError("DepthToSpace of mode DCR is not written")
-    return functional.pixel_shuffle(taken[0], of["blocksize"])
+    return functional.pixel_shuffle(sources[0], settings["blocksize"])
 
 
-def _slice(taken: list[Any], _: dict[str, Any]) -> Tensor:
-    source, starts, ends = taken[:3]
-    axes = taken[3].tolist() if len(taken) > 3 else range(len(starts))
-    steps = taken[4].tolist() if len(taken) > 4 else [1] * len(starts)
+def _slice(sources: list[Any], _: dict[str, Any]) -> Tensor:
+    source, starts, ends = sources[:3]
+    axes = sources[3].tolist() if len(sources) > 3 else range(len(starts))
+    steps = sources[4].tolist() if len(sources) > 4 else [1] * len(starts)
     picked = [slice(None)] * source.ndim
     for axis, start, end, step in zip(axes, starts.tolist(), ends.tolist(), steps, strict=True):
         picked[axis] = slice(start, min(end, source.shape[axis]), step)
@@ -177,27 +179,33 @@ def _slice(taken: list[Any], _: dict[str, Any]) -> Tensor:
     return result
 
 
-def _pool(taken: list[Any], of: dict[str, Any]) -> Tensor:
-    top, left, bottom, right = of.get("pads", [0, 0, 0, 0])
-    if (top, left) != (bottom, right) or of.get("ceil_mode", 0):
+def _pool(sources: list[Any], settings: dict[str, Any]) -> Tensor:
+    top, left, bottom, right = settings.get("pads", [0, 0, 0, 0])
+    if (top, left) != (bottom, right) or settings.get("ceil_mode", 0):
         raise ValueError("MaxPool is written for even borders")
     return functional.max_pool2d(
-        taken[0], of["kernel_shape"], of.get("strides", [1, 1]), (top, left), of["dilations"]
+        sources[0],
+        settings["kernel_shape"],
+        settings.get("strides", [1, 1]),
+        (top, left),
+        settings["dilations"],
     )
 
 
-def _largest(taken: list[Any], of: dict[str, Any]) -> Tensor:
-    return torch.amax(taken[0], dim=taken[1].tolist(), keepdim=bool(of.get("keepdims", 1)))
+def _largest(sources: list[Any], settings: dict[str, Any]) -> Tensor:
+    return torch.amax(
+        sources[0], dim=sources[1].tolist(), keepdim=bool(settings.get("keepdims", 1))
+    )
 
 
-def _clip(taken: list[Any], _: dict[str, Any]) -> Tensor:
-    least, most = [*taken[1:], None, None][:2]
-    return torch.clamp(taken[0], least, most)
+def _clip(sources: list[Any], _: dict[str, Any]) -> Tensor:
+    least, most = [*sources[1:], None, None][:2]
+    return torch.clamp(sources[0], least, most)
 
 
 OPERATORS: dict[str, Callable[[list[Any], dict[str, Any]], Tensor]] = {
     "Conv": _conv,
-    "LeakyRelu": lambda x, of: functional.leaky_relu(x[0], of.get("alpha", 0.01)),
+    "LeakyRelu": lambda x, settings: functional.leaky_relu(x[0], settings.get("alpha", 0.01)),
     "Relu": lambda x, _: functional.relu(x[0]),
     "Add": lambda x, _: x[0] + x[1],
     "Sub": lambda x, _: x[0] - x[1],
@@ -205,7 +213,7 @@ OPERATORS: dict[str, Callable[[list[Any], dict[str, Any]], Tensor]] = {
     "Div": lambda x, _: x[0] / x[1],
     "Min": lambda x, _: torch.minimum(*x),
     "Max": lambda x, _: torch.maximum(*x),
-    "Concat": lambda x, of: torch.cat(x, dim=of["axis"]),
+    "Concat": lambda x, settings: torch.cat(x, dim=settings["axis"]),
     "DepthToSpace": _shuffle,
     "Slice": _slice,
     "MaxPool": _pool,
@@ -331,7 +339,7 @@ def _latencies(
     dtype: Any,
     arguments: argparse.Namespace,
 ) -> dict[str, float]:
-    """Return seconds of the network alone, and with the picture brought and taken back."""
+    """Return seconds of the network alone, and with the picture brought and sources back."""
     device = arguments.device
 
     def bring() -> Tensor:

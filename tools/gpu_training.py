@@ -14,7 +14,6 @@ learning rate falls over the minutes of all sessions.
 import argparse
 import os
 import shutil
-import sys
 import tarfile
 import tempfile
 from collections.abc import Sequence
@@ -172,15 +171,15 @@ def go(arguments: argparse.Namespace) -> None:
         )
         path = checkpoint_path(recipe, options, None)
         if not path.exists():
-            for kept in job.glob(f"{path.stem}.*"):
-                shutil.copy(kept, out)
+            for file in job.glob(f"{path.stem}.*"):
+                shutil.copy(file, out)
         samples = job / f"samples_{size}"
         samples.mkdir(exist_ok=True)
         _link(out / samples.name, samples)
-        before = read_checkpoint(path)
+        earlier = read_checkpoint(path)
         result = train(job / RECIPE, options)
-        start_db = "" if before.best_db is None else f"{before.best_db:.3f} to "
-        steps = result.steps - before.step
+        start_db = "" if earlier.best_db is None else f"{earlier.best_db:.3f} to "
+        steps = result.steps - earlier.step
         print(f"{size}: {steps} steps more, {start_db}{result.valid_db:.3f} dB", flush=True)
         shutil.rmtree(samples)
 
@@ -191,4 +190,4 @@ def _link(place: Path, target: Path) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

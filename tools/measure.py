@@ -182,11 +182,11 @@ def _in_turn(
     outputs = [engine.run(window) for engine in engines]
     seconds: list[list[float]] = [[] for _ in engines]
     for _ in range(runs):
-        for spent, engine, output in zip(seconds, engines, outputs, strict=True):
+        for times, engine, output in zip(seconds, engines, outputs, strict=True):
             began = time.process_time()
             engine.run(window, output)
-            spent.append(time.process_time() - began)
-    return [statistics.median(spent) for spent in seconds], outputs
+            times.append(time.process_time() - began)
+    return [statistics.median(times) for times in seconds], outputs
 
 
 def _tiles_error(network: SizedNetwork, tile_px: int) -> float:
