@@ -123,7 +123,6 @@ class TorchNetwork:
         self.stride, self.reach, self.scale = (
             graph[key] for key in ("stride_px", "reach_px", "scale")
         )
-        self.sensor_px = graph["sensor_px"]
         self._weights = {
             name: value.to(device, dtype) if value.is_floating_point() else value
             for name, value in weights.items()
@@ -276,7 +275,8 @@ def _row(
     exact = TorchNetwork(graph, weights, device, torch.float32)
     parity = _distance(exact(window), case["output"].to(device))
     # a picture of the sensor where that is smaller: single photons have 64x32 pixels
-    size = min(arguments.height, exact.sensor_px[1]), min(arguments.width, exact.sensor_px[0])
+    limit_px = graph["sensor_px"] or [sys.maxsize, sys.maxsize]
+    size = min(arguments.height, limit_px[1]), min(arguments.width, limit_px[0])
     picture = _picture(window.shape[1], size, exact.stride)
     # other windows take other kernels: as near as float32 is, and no equal bits
     whole = exact(picture.to(device))
@@ -339,7 +339,7 @@ def _latencies(
     dtype: Any,
     arguments: argparse.Namespace,
 ) -> dict[str, float]:
-    """Return seconds of the network alone, and with the picture brought and sources back."""
+    """Return seconds of the network alone, and with the picture brought there and back."""
     device = arguments.device
 
     def bring() -> Tensor:

@@ -1,7 +1,7 @@
 """The only door to openvino: a session like that of onnxruntime, in float32 or bfloat16.
 
 openvino is an extra. Its telemetry, which reports every import, is kept out. A network is compiled
-for the size of its windows (tens of milliseconds), since kernels for any size take a fifth longer;
+for the size of its windows (tens of milliseconds), since kernels for any size are slower;
 the windows of a picture have one size. Its last compilation is kept: others would hold the
 memory of their activations beside it.
 """
