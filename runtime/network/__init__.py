@@ -3,6 +3,7 @@
 operators, graph_walk   what a tensor depends on, by walking the graph
 graph                   the only door to onnx: refusals and facts
 engine                  the only door to onnxruntime: one session per model, or per segment
+openvino_session        the only door to openvino, an extra: float32 or bfloat16
 tiling, row_buffer      windows over a picture with the bits of the whole
 guard                   every tile finite and bounded, else replaced or refused
 light_bound, light_keeper  light that a network moves, taken back behind every window

@@ -17,6 +17,7 @@ from camkit.arrays import FloatArray
 from camkit.errors import BundleError, ContractError, UnsupportedError
 from camkit.runtime.cancel import Cancel, Cancelled, watched
 from camkit.runtime.machine.memory import mapped_arrays
+from camkit.runtime.network.openvino_session import OpenvinoSession, has_openvino
 from camkit.runtime.network.segment import Segment
 
 _IMPORTED_BEFORE = "onnxruntime" in sys.modules and "ORT_DISABLE_TELEMETRY" not in os.environ
@@ -37,10 +38,10 @@ PROVIDER_NAMES: Final = {
     "cpu": "CPUExecutionProvider",
     "cuda": "CUDAExecutionProvider",
     "tensorrt": "TensorrtExecutionProvider",
-    "openvino": "OpenVINOExecutionProvider",
 }
-"""What a caller may ask for, and what onnxruntime calls it."""
-_FALLBACKS: Final = {"tensorrt": ("cuda", "cpu"), "cuda": ("cpu",), "openvino": ("cpu",)}
+"""What a caller may ask of onnxruntime, and what it calls it."""
+OPENVINO: Final = "openvino"
+_FALLBACKS: Final = {"tensorrt": ("cuda", "cpu"), "cuda": ("cpu",)}
 _CREATION: Final = threading.Lock()
 Memory = Literal["arena", "block", "shared"]
 """Of a session: an arena of its own, one block once sizes are known, the arena of all segments."""
@@ -98,7 +99,11 @@ def providers() -> tuple[str, ...]:
 
 
 def usable_providers() -> tuple[str, ...]:
-    """Return those of `PROVIDER_NAMES` that the installed onnxruntime was built with, cpu first."""
+    """Return those of onnxruntime by the names of `PROVIDER_NAMES`, cpu first, then openvino."""
+    return (*_built_in(), *[OPENVINO][: has_openvino()])
+
+
+def _built_in() -> tuple[str, ...]:
     built = providers()
     return tuple(name for name, full in PROVIDER_NAMES.items() if full in built)
 
@@ -119,35 +124,45 @@ class NetworkEngine:
         provider: str = "cpu",
         scale: int = 1,
         block_bytes: float | None = None,
+        bfloat16: bool = False,
     ) -> None:
         """Load a model.
 
         Args:
             model: Serialised ONNX model with the weights inside; never a path.
             threads: Threads per run, from `available_threads`.
-            provider: Key of `PROVIDER_NAMES`; arrays stay in the memory of the CPU.
+            provider: Key of `PROVIDER_NAMES`, or openvino; arrays stay in the memory of the CPU.
             scale: Samples along a side of the output for one pixel of the input.
             block_bytes: Counted memory of a run per pixel (`block_bytes_per_pixel` of the graph):
                 on the CPU its tensors then lie in one block of about that size, once onnxruntime
                 has seen windows of a size. None for its arena, which takes fresh pages less often
                 and may hold several times that.
+            bfloat16: Multiply in bfloat16; for openvino alone.
 
         Raises:
             ContractError: If `model` is not bytes, threads or scale < 1.
             BundleError: If onnxruntime refuses the model or its inputs and outputs are not those
                 of a network.
-            UnsupportedError: If the installed onnxruntime is too old or lacks the provider.
+            UnsupportedError: If the installed onnxruntime is too old or lacks the provider, or
+                the machine lacks bfloat16.
         """
         if not isinstance(model, bytes):
             raise ContractError(f"the model must be given as bytes; got {type(model).__name__}")
         if threads < 1 or scale < 1:
             raise ContractError(f"threads and scale must be >= 1; got {threads}, {scale}")
-        _check_version(ort.__version__)
         self.block_bytes = block_bytes if provider == "cpu" else None
-        with _CREATION:
-            self._session = _create_session(
-                model, threads, provider, memory="arena" if self.block_bytes is None else "block"
-            )
+        self._session: Any
+        if provider == OPENVINO:
+            self._session = OpenvinoSession(model, threads=threads, bfloat16=bfloat16)
+        else:
+            _check_version(ort.__version__)
+            with _CREATION:
+                self._session = _create_session(
+                    model,
+                    threads,
+                    provider,
+                    memory="arena" if self.block_bytes is None else "block",
+                )
         self._memory = nullcontext() if self.block_bytes is None else mapped_arrays
         self._model, self._cutting = model, threading.Lock()
         self._segments: tuple[SegmentEngine, ...] | None = None
@@ -186,12 +201,19 @@ class NetworkEngine:
             raise ContractError(
                 f"out must be C-contiguous float32 {shape}; got {out.dtype} {out.shape}"
             )
+        if self.provider == OPENVINO:
+            self._session.run_into(window, out, cancel)
+        else:
+            self._run_bound(window, out, cancel)
+        return out
+
+    def _run_bound(self, window: FloatArray, out: FloatArray, cancel: Cancel | None) -> None:
+        """Run the session of onnxruntime, which reads and writes the arrays themselves."""
         binding = self._session.io_binding()
         binding.bind_cpu_input("input", window)
-        binding.bind_output("output", "cpu", 0, np.float32, shape, out.ctypes.data)
+        binding.bind_output("output", "cpu", 0, np.float32, out.shape, out.ctypes.data)
         with self._memory:
             _run(self._session, binding, cancel, window.shape)
-        return out
 
     def segments(self) -> tuple["SegmentEngine", ...]:
         """Return the network in segments with the same bits; none where it cannot be cut."""
@@ -371,7 +393,7 @@ def _chosen_providers(provider: str) -> list[str | tuple[str, dict[str, str]]]:
     Raises:
         UnsupportedError: If the installed onnxruntime lacks the provider.
     """
-    usable = usable_providers()
+    usable = _built_in()
     if provider not in usable:
         raise UnsupportedError(
             f"the installed onnxruntime computes on {', '.join(usable)}; got {provider!r}: "

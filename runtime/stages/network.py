@@ -198,6 +198,7 @@ class _NetworkStage:
         tiles = {role: windows.to_json() for role, windows in log.windows.items()}
         one = len(bundle.manifest.networks) == 1
         log.record["tiles"] = tiles[entry.role] if one else tiles
+        log.record["network"] = {"provider": job.options.provider, "dtype": job.options.dtype}
 
     def _run(self, engine: NetworkEngine, trim: Callable[[], None]) -> Run:
         """Return the run of a network on windows of which it takes the first channels."""
