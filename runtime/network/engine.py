@@ -342,7 +342,7 @@ def _run(session: Any, binding: Any, cancel: Cancel | None, shape: tuple[int, ..
 
 @cache
 def _share_arena() -> None:
-    """Register the arena of all segments; once a process."""
+    """Make the arena of all segments; once a process."""
     arena = ort.OrtMemoryInfo(
         "Cpu", ort.OrtAllocatorType.ORT_ARENA_ALLOCATOR, 0, ort.OrtMemType.DEFAULT
     )

@@ -356,9 +356,9 @@ def partial_model(
     model = _decode(data)
     graph = model.graph
     nodes = [node for node in graph.node if tensors & set(node.output)]
-    used = {name for node in nodes for name in node.input}
-    constants = [n for n in graph.node if n.op_type == "Constant" and used & set(n.output)]
-    weights = [tensor for tensor in graph.initializer if tensor.name in used]
+    read_names = {name for node in nodes for name in node.input}
+    constants = [n for n in graph.node if n.op_type == "Constant" and read_names & set(n.output)]
+    weights = [tensor for tensor in graph.initializer if tensor.name in read_names]
     for part, values in ((graph.node, [*constants, *nodes]), (graph.initializer, weights)):
         copies = [type(value).FromString(value.SerializeToString()) for value in values]
         del part[:]

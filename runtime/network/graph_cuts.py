@@ -182,16 +182,16 @@ class _Cuts:
 
     def _names_in(self, first: int, end: int) -> list[str]:
         """Return the tensors from outside that some nodes take."""
-        used = dict.fromkeys(
+        inputs = dict.fromkeys(
             name
             for node in self._nodes[first:end]
             for name in tensor_names(self._walk.extents, node.inputs)
         )
-        return [name for name in used if self._maker.get(name, -1) < first]
+        return [name for name in inputs if self._maker.get(name, -1) < first]
 
     def _names_out(self, first: int, end: int) -> list[str]:
-        made = (name for node in self._nodes[first:end] for name in node.outputs)
-        return [name for name in made if self._last_use.get(name, -1) >= end]
+        outputs = (name for node in self._nodes[first:end] for name in node.outputs)
+        return [name for name in outputs if self._last_use.get(name, -1) >= end]
 
     def _port(self, name: str) -> Port:
         extent = self._walk.extents[name]

@@ -69,9 +69,9 @@ def plan_strips(segments: Sequence[Segment], size_px: tuple[int, int], strip_px:
     for bottom in [*range(strip_px, height, strip_px), height]:
         ends = [0] * len(segments)
         for k in range(len(segments) - 1, -1, -1):
-            wanted = [ends[i] + segments[i].reach_px for i in readers[k]] or [bottom]
+            bottoms = [ends[i] + segments[i].reach_px for i in readers[k]] or [bottom]
             lattice = segments[k].lattice_px
-            ends[k] = min(-(-max(wanted) // lattice) * lattice, height)
+            ends[k] = min(-(-max(bottoms) // lattice) * lattice, height)
         stops.append(tuple(ends))
     return StripPlan(
         height_px=height,
@@ -102,7 +102,7 @@ def _needed_bytes(
     (height, width), readers, peak = size_px, _readers(segments), 0.0
     for done, ends in pairwise(([0] * len(segments), *stops[:_SEEN_STRIPS])):
         tops = [max(d - s.reach_px, 0) for d, s in zip(done, segments, strict=True)]
-        held = sum(
+        waiting = sum(
             (ends[k] - min((tops[i] for i in readers[k]), default=done[k])) * one.held_bytes
             for k, one in enumerate(segments)
         )
@@ -110,7 +110,7 @@ def _needed_bytes(
             (min(end + one.reach_px, height) - top) * one.strip_bytes
             for end, one, top in zip(ends, segments, tops, strict=True)
         )
-        peak = max(peak, width * (held + strip))
+        peak = max(peak, width * (waiting + strip))
     return int(peak)
 
 
@@ -131,7 +131,7 @@ _SEEN_STRIPS: Final = 64
 
 
 @dataclass(slots=True)
-class _Held:
+class _Tensor:
     """The rows of one tensor that somebody still needs.
 
     Attributes:
@@ -175,7 +175,7 @@ class _Held:
 
 
 def _shuffle(rows: FloatArray, feed: Feed, fine: FloatArray) -> None:
-    """Put the channels of a tensor (c b^2, r, w) to the pixels of blocks, (c, b r, b w)."""
+    """Move the channels of a tensor (c b^2, r, w) to the pixels of blocks, (c, b r, b w)."""
     block, channels = feed.block, feed.channels
     height, width = rows.shape[1:]
     places = fine.reshape(channels, height, block, width, block)
@@ -215,9 +215,9 @@ class NetworkRows:
         self._padded = _Padded(source, plan.height_px, plan.width_px)
         feeds = [feed.port for segment in segments for feed in segment.feeds]
         ports = {p.name: p for p in (*feeds, *(p for s in segments for p in s.outputs))}
-        self._held = {name: _Held(port) for name, port in ports.items()}
-        self._input = self._held[segments[0].feeds[0].port.name]
-        self._result = self._held[segments[-1].outputs[0].name]
+        self._tensors = {name: _Tensor(port) for name, port in ports.items()}
+        self._input = self._tensors[segments[0].feeds[0].port.name]
+        self._result = self._tensors[segments[-1].outputs[0].name]
         self._done = [0] * len(segments)
         self._strips = iter(plan.stops)
         self._top = 0
@@ -263,17 +263,19 @@ class NetworkRows:
         top = max(start - segment.reach_px, 0)
         bottom = min(stop + segment.reach_px, self._plan.height_px)
         inputs = [
-            self._held[feed.port.name].fed(feed, feed.port.samples(top), feed.port.samples(bottom))
+            self._tensors[feed.port.name].fed(
+                feed, feed.port.samples(top), feed.port.samples(bottom)
+            )
             for feed in segment.feeds
         ]
         outputs = self._engines[k].run(inputs)
         for port, output in zip(segment.outputs, outputs, strict=True):
             rows = output[0][:, port.samples(start - top) : port.samples(stop - top)]
-            self._held[port.name].pieces.append((port.samples(start), rows))
+            self._tensors[port.name].pieces.append((port.samples(start), rows))
 
     def _forget(self) -> None:
         """Forget rows that nobody needs any more."""
-        for tensor in self._held.values():
+        for tensor in self._tensors.values():
             tops = [
                 stop - segment.reach_px
                 for segment, stop in zip(self._segments, self._done, strict=True)

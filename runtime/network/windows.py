@@ -1,4 +1,4 @@
-"""The windows of the networks of one capture: laid within the memory cap, then run.
+"""The windows of the networks of one capture: windows within the memory cap, then run.
 
     networks, size, memory [, labels] -> NetworkWindows -> bands
 
@@ -361,11 +361,11 @@ def _lay_strips(
                 tile_px=(FINISH_HEIGHT_PX, size_px[1]),
             ),
         )
-        laid = NetworkWindows(
+        windows = NetworkWindows(
             networks=(network,), tiles=tiles, cells=None, mode=limits.mode, strips=strips
         )
-        if laid.needed_bytes() <= limits.max_bytes:
-            return laid
+        if windows.needed_bytes() <= limits.max_bytes:
+            return windows
     return None
 
 
