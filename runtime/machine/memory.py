@@ -60,7 +60,7 @@ def keep_freed_memory() -> None:
 
 
 def use_one_heap() -> None:
-    """Let the threads to come share one heap, so that what one frees serves the others."""
+    """Make the threads to come share one heap, so that what one frees serves the others."""
     if _LIBC is not None:
         _LIBC.mallopt(_M_ARENA_MAX, 1)
 

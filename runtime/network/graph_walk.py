@@ -143,7 +143,7 @@ class Walk:
         return self.extent(node).output_of(channels, windows)
 
     def mark_global(self, node: Node) -> None:
-        """List a node that sees the whole picture."""
+        """Add a node to those that see the whole picture."""
         self.global_operators.append(f"{node.label} ({node.op})")
 
 
