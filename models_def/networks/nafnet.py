@@ -7,7 +7,7 @@
                '------------------- last three planes -----------------------'
 
     block: x + b conv(share(gate(depthwise(conv(norm(x)))))), then x + g conv(gate(conv(norm(x))))
-    gate: half of the channels times the other half; share: times a 1x1 of their mean over the picture
+    gate: half of the channels times the other half; share: times a 1x1 of their picture's mean
 
 What a pixel becomes depends on the mean of its whole picture: it is trained on patches, judged on
 pictures, and no exact tiles can be cut, so no bundle holds one. The convolution at the end begins

@@ -6,15 +6,16 @@
 
 `train` makes the samples of the recipe once and trains every method from scratch for the same
 CPU-minutes, one after the other; stopped, it goes on where it was. `judge` restores the same
-pictures, through fresh copies of the lens, with every method that is trained by then, the classical
-ones and the networks that the bundle holds; it goes on likewise, and writes record and page. `chart`
-draws the record.
+pictures, through fresh copies of the lens, with every method that is trained by then, the
+classical ones and the networks that the bundle holds; it goes on likewise, and writes record and
+page. `chart` draws the record.
 """
 
 import argparse
 import json
 import sys
 from argparse import ArgumentParser, Namespace
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -29,9 +30,17 @@ from tools.comparison.tuning import tuned_from_json
 from tools.methods.equal_minutes import Budget, train_method
 from tools.methods.front_chart import RECORD, write_front_chart
 from tools.methods.front_page import to_page
-from tools.methods.judging import Protocol, front_rows, judged, timed, to_record
+from tools.methods.judging import (
+    Protocol,
+    front_rows,
+    judged,
+    separate_row,
+    timed,
+    to_record,
+)
 from tools.methods.method_list import METHODS
 from tools.methods.sample_store import open_store
+from tools.methods.separate_peer import SeparatePeer
 from tools.tables.records import to_compact_json
 
 RUNS: Final = Path("out/methods")
@@ -65,6 +74,7 @@ def parse_arguments(words: list[str]) -> Namespace:
     judging.add_argument("--tuned", type=Path, default=Path("docs/results/quality.json"))
     judging.add_argument("--pictures", type=int, help="only the first ones, by name")
     judging.add_argument("--side-px", type=int, default=512, help="middle of a picture")
+    judging.add_argument("--deepinv-python", type=Path, help="interpreter that has deepinv")
     judging.add_argument("--rounds", type=int, default=5, help="of timing")
     for command in (training, judging):
         command.add_argument("--data", type=Path, required=True, help="folder of pictures")
@@ -112,8 +122,12 @@ def judge(arguments: Namespace) -> None:
         most_px=arguments.side_px,
         work_dir=arguments.work_dir,
     )
-    measurements = judged(rows, protocol, tell)
-    seconds = timed(rows, protocol, arguments.rounds, tell)
+    with ExitStack() as stack:
+        if arguments.deepinv_python is not None:
+            peer = stack.enter_context(SeparatePeer(arguments.deepinv_python))
+            rows.append(separate_row(peer))
+        measurements = judged(rows, protocol, tell)
+        seconds = timed(rows, protocol, arguments.rounds, tell)
     record = to_record(rows, measurements, seconds, budget)
     text = to_compact_json(record, DIGITS)
     arguments.record.write_text(text.replace('{"name"', '\n{"name"') + "\n", encoding="utf-8")

@@ -70,6 +70,11 @@ class Budget:
         ending: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         return ending
 
+    def is_spent(self, name: str) -> bool:
+        """Return whether a method was trained to the end, for these minutes."""
+        ending = self.ending(name)
+        return ending is not None and ending["minutes"] == self.minutes
+
 
 def train_method(name: str, store: SampleStore, budget: Budget, tell: Tell) -> dict[str, Any]:
     """Train a method until its minutes are over, or go on where it was stopped; return its end.

@@ -108,12 +108,8 @@ def label_places(rows: Sequence[Mapping[str, Any]]) -> list[tuple[int, int]]:
     return places
 
 
-def _draw_points(
-    panel: Panel, rows: Sequence[Mapping[str, Any]], color: str, label: str
-) -> None:
-    errors = [
-        row["over_s"]["all"].get("error_db", 0.0) if row["over_s"] else 0.0 for row in rows
-    ]
+def _draw_points(panel: Panel, rows: Sequence[Mapping[str, Any]], color: str, label: str) -> None:
+    errors = [row["over_s"]["all"].get("error_db", 0.0) if row["over_s"] else 0.0 for row in rows]
     panel.errorbar(
         [row["cpu_s_per_mp"] for row in rows],
         [row["gain_db"] for row in rows],

@@ -110,5 +110,3 @@ def blurred_blocks(batch: Batch, scale: float) -> Blurred:
         read_variance=read,
         scale=scale,
     )
-
-

@@ -111,8 +111,7 @@ def by_kernels(scale: float, network: nn.Module) -> PlaneMethod:
 
 def _block_network(scale: float, network: nn.Module, capture: LocalCapture) -> BlockFilter:
     shot, read = (
-        torch.tensor(values)[None]
-        for values in (capture.noise.shot, capture.noise.read_variance)
+        torch.tensor(values)[None] for values in (capture.noise.shot, capture.noise.read_variance)
     )
 
     def restore(block: Block) -> FloatArray:

@@ -130,7 +130,9 @@ def open_store(
         "count": count,
     }
     path = folder / FACTS
-    saved = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else facts | {"made": 0}
+    saved: dict[str, Any] = facts | {"made": 0}
+    if path.is_file():
+        saved = json.loads(path.read_text(encoding="utf-8"))
     if {name: saved[name] for name in facts} != facts:
         raise ContractError(f"{folder} holds other samples: remove it, or name another --work-dir")
     store = _mapped(folder, recipe, material, count)
@@ -143,9 +145,7 @@ def open_store(
     return store
 
 
-def _mapped(
-    folder: Path, recipe: BayerRecipe, material: BayerMaterial, count: int
-) -> SampleStore:
+def _mapped(folder: Path, recipe: BayerRecipe, material: BayerMaterial, count: int) -> SampleStore:
     side, layout = recipe.data.sample_px, layout_of(recipe)
     whole = side + 2 * recipe.data.margin_px
     shapes: dict[str, tuple[type, tuple[int, ...]]] = {

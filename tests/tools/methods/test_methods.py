@@ -33,9 +33,7 @@ def tiny(monkeypatch: pytest.MonkeyPatch, material: BayerMaterial) -> None:  # n
     monkeypatch.setattr(
         "camkit.models_def.kinds.bayer.training.trace_material", lambda *_: material
     )
-    monkeypatch.setattr(
-        judging, "fabricated_optics", lambda bundle, *_, **__: bundle.frozen_optics
-    )
+    monkeypatch.setattr(judging, "fabricated_optics", lambda bundle, *_, **__: bundle.frozen_optics)
     for module, name, value in (
         (equal_minutes, "BLOCK_PX", 64),
         (judging, "ISOS", (100.0, 100.0, 100.0)),
@@ -63,11 +61,19 @@ def test_methods_are_trained_for_their_minutes_judged_and_drawn(
         cv2.imwrite(str(pictures / f"{name}.png"), pixels)
     shared = ("--data", pictures, "--work-dir", tmp_path / "work", "--minutes", 0.01)
     train = ("train", *shared, "--recipe", recipe_path, "--samples", 3)
+    ending = tmp_path / "work" / "runs" / "S.json"
+    run(monkeypatch, *train, "--methods", "S", "--minutes", 0.005)
+    steps = json.loads(ending.read_text())["steps"]
+    with pytest.raises(SystemExit, match=r"for 0\.005 CPU-minutes, not 0\.01"):
+        run(monkeypatch, *train)
+    ending.unlink()  # as if it had been stopped
     run(monkeypatch, *train, "--methods", ",".join(NAMES))
-    trained = {name: tmp_path / "work" / "runs" / f"{name}.pt" for name in NAMES}
-    before = trained["S"].read_bytes()
+    resumed = json.loads(ending.read_text())
+    assert resumed["steps"] > steps
+    assert resumed["cpu_s"] < 0.015 * 60 + 1
+    before = ending.with_suffix(".pt").read_bytes()
     run(monkeypatch, *train, "--methods", "S")
-    assert trained["S"].read_bytes() == before
+    assert ending.with_suffix(".pt").read_bytes() == before
     tuned = tmp_path / "tuned.json"
     values = {
         "admm_tv": {"weight": 5, "iterations": 2},
