@@ -68,8 +68,8 @@ class ChannelNorm(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         """Return (b, c, h, w) from (b, c, h, w)."""
-        off = x - x.mean(1, keepdim=True)
-        normed = off / (off.square().mean(1, keepdim=True) + NORM_EPSILON).sqrt()
+        deviation = x - x.mean(1, keepdim=True)
+        normed = deviation / (deviation.square().mean(1, keepdim=True) + NORM_EPSILON).sqrt()
         return normed * self.weight[:, None, None] + self.bias[:, None, None]
 
 
@@ -150,7 +150,7 @@ class Nafnet(nn.Module):
             skips.append(x)
             x = halving(x)
         x = self.middle(x)
-        for up, decoder, skip in zip(self.ups, self.decoders, reversed(skips), strict=True):
-            x = decoder(up(x) + skip)
+        for widening, decoder, skip in zip(self.ups, self.decoders, reversed(skips), strict=True):
+            x = decoder(widening(x) + skip)
         restored: Tensor = planes[:, -3:] + self.ending(x)
         return restored

@@ -51,16 +51,16 @@ def draw(record: Mapping[str, Any]) -> Drawing:
     figure = new_figure(*SIZE_IN)
     panel = figure.subplots()
     for kind, label in KINDS.items():
-        own = [row for row in rows if row["kind"] == kind]
-        if own:
-            _draw_points(panel, own, COLORS[kind], label.format(minutes=record["minutes"]))
+        points = [row for row in rows if row["kind"] == kind]
+        if points:
+            _draw_points(panel, points, COLORS[kind], label.format(minutes=record["minutes"]))
     front = front_of(rows)
     panel.plot(*zip(*front, strict=True), color="0.75", linewidth=1, zorder=0)
-    for row, (right, up) in zip(rows, label_places(rows), strict=True):
+    for row, offset in zip(rows, label_places(rows), strict=True):
         panel.annotate(
             row["title"],
             (row["cpu_s_per_mp"], row["gain_db"]),
-            xytext=(right, up),
+            xytext=offset,
             textcoords="offset points",
             fontsize=7,
             color=COLORS[row["kind"]],

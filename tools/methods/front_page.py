@@ -71,12 +71,12 @@ def to_page(record: Mapping[str, Any]) -> str:
 
 def _cells(row: Mapping[str, Any], record: Mapping[str, Any]) -> list[str]:
     training = row["training"] or {}
-    over = row["over_s"]
-    gains = {} if over is None else over["by_iso"]
+    against_s = row["over_s"]
+    gains = {} if against_s is None else against_s["by_iso"]
     return [
         row["title"],
         f"{row['psnr_db']:.2f}",
-        "" if over is None else _gain(over["all"]),
+        "" if against_s is None else _gain(against_s["all"]),
         f"{row['cpu_s_per_mp']:.2f}",
         row["runs_in"],
         str(training.get("steps", "")),

@@ -293,21 +293,23 @@ def to_record(
 ) -> dict[str, Any]:
     """Return the record of the front, as plain values."""
     gains = paired_gains(measurements, [(row.name, REFERENCE) for row in rows])
-    over = {gain["method"]: {**gain, "aim_db": None} for gain in gains}
+    by_method = {gain["method"]: {**gain, "aim_db": None} for gain in gains}
     entries = []
     for row in rows:
-        own = [m for m in measurements if m.method == row.name]
-        mean_db, error_db = mean_and_error([m.psnr_db for m in own], [m.picture for m in own])
+        results = [m for m in measurements if m.method == row.name]
+        mean_db, error_db = mean_and_error(
+            [m.psnr_db for m in results], [m.picture for m in results]
+        )
         entries.append(
             {
                 "name": row.name,
                 "title": row.title,
                 "kind": row.kind,
                 "runs_in": row.runs_in,
-                "captures": len(own),
+                "captures": len(results),
                 "psnr_db": mean_db,
                 "error_db": error_db,
-                "over_s": over.get(row.name),
+                "over_s": by_method.get(row.name),
                 "cpu_s_per_mp": float(np.median(seconds[row.name])),
                 "cpu_s_spread": [min(seconds[row.name]), max(seconds[row.name])],
                 "training": budget.ending(row.name) if row.kind == "trained" else None,
