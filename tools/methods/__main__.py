@@ -74,7 +74,7 @@ def parse_arguments(words: list[str]) -> Namespace:
     judging.add_argument("--tuned", type=Path, default=Path("docs/results/quality.json"))
     judging.add_argument("--pictures", type=int, help="only the first ones, by name")
     judging.add_argument("--side-px", type=int, default=512, help="middle of a picture")
-    judging.add_argument("--deepinv-python", type=Path, help="interpreter that has deepinv")
+    judging.add_argument("--deepinv-python", type=Path, help="of an environment that has deepinv")
     judging.add_argument("--rounds", type=int, default=5, help="of timing")
     for command in (training, judging):
         command.add_argument("--data", type=Path, required=True, help="folder of pictures")

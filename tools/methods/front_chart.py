@@ -22,6 +22,10 @@ KINDS: Final = {
     "trained": "trained from scratch, {minutes:g} CPU-minutes each",
     "shipped": "camkit's networks as shipped",
 }
+TICKS_S: Final = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
+NEAR_TIMES: Final = 2.5
+NEAR_DB: Final = 0.6
+"""Points whose names might meet: seconds within a factor, decibels within a difference."""
 DEVELOPED: Final = "input"
 """The row whose decibels the others gain; it restores nothing, so it is no point."""
 
@@ -67,10 +71,13 @@ def draw(record: Mapping[str, Any]) -> Drawing:
         )
     panel.set_xscale("log")
     low, high = panel.get_xlim()
+    ticks = [tick for tick in TICKS_S if low < tick < 2 * high]
+    panel.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    panel.set_xticks([], minor=True)
     panel.set_xlim(low, high * 2)
     panel.set_xlabel("CPU-seconds a megapixel, one thread, from developed to restored planes")
     panel.set_ylabel("dB gained over the picture as taken\n(bars: error of the difference to S)")
-    panel.legend(loc="lower right")
+    panel.legend(loc="best")
     return figure
 
 
@@ -94,17 +101,18 @@ def front_of(rows: Sequence[Mapping[str, Any]]) -> list[tuple[float, float]]:
 
 
 def label_places(rows: Sequence[Mapping[str, Any]]) -> list[tuple[int, int]]:
-    """Return (right, up) in points of every name: above its point, below where one lies above."""
+    """Return (right, up) in points of every name: above its point, lower where others lie near."""
     places = []
     for row in rows:
-        near = [
-            other
+        gaps_db = [
+            other["gain_db"] - row["gain_db"]
             for other in rows
             if other is not row
-            and 0.6 < other["cpu_s_per_mp"] / row["cpu_s_per_mp"] < 2.5
-            and 0 <= other["gain_db"] - row["gain_db"] < 0.4
+            and 1 / NEAR_TIMES < other["cpu_s_per_mp"] / row["cpu_s_per_mp"] < NEAR_TIMES
+            and abs(other["gain_db"] - row["gain_db"]) < NEAR_DB
         ]
-        places.append((6, -9 if near else 3))
+        crowded_above, crowded_below = any(g >= 0 for g in gaps_db), any(g < 0 for g in gaps_db)
+        places.append((7, (-3 if crowded_below else -9) if crowded_above else 3))
     return places
 
 
