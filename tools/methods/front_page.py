@@ -6,8 +6,6 @@ from typing import Any, Final
 from tools.tables.records import markdown_table
 
 TITLE: Final = "# The front of methods"
-TITLE: Final = "# The front of methods"
-TITLE: Final = "# The front of methods"
 HOW: Final = (
     (
         "Modern methods beside camkit's: trained from scratch for the same CPU-minutes on the "

@@ -8,7 +8,7 @@ of its place. What they give is stabilised, as of every network of camkit. No bu
 they serve the front of methods alone.
 
 References: Dong, Roth, Schiele 2020, Deep Wiener Deconvolution (features); Geman, Yang 1995
-(half-quadratic splitting); Zhang, Van Gool, Timofte 2020 (unrolled, a network as prior).
+(half-quadratic splitting); Zhang et al. 2020 (unrolled, a network as prior).
 """
 
 from dataclasses import dataclass

@@ -19,8 +19,8 @@ from camkit.runtime.bank.blocks import Block, BlockBank
 from tools.comparison.peers import LocalCapture, part_sides
 
 TV_WEIGHT: Final = 10.0
-"""Of the total variation, in the variance of the noise at the mean of a part. With the step size the
-best of 3 x 3 on one picture of `valid_open` at ISO 100, and 0.02 dB off the best at ISO 1600."""
+"""Of the total variation, in the variance of the noise at the mean of a part. With the step size
+the best of 3 x 3 on one picture of `valid_open` at ISO 100, 0.02 dB off the best at ISO 1600."""
 STEP_SIZE: Final = 300.0
 ROUNDS: Final = 12
 
