@@ -6,6 +6,7 @@ They are not in the wheel. A file here is a command; a folder holds what command
     quality             a bundle beside classical methods, by a fixed protocol
     plan_report         what `--quality adaptive` may skip, calibrated and proved
     evidence            products, plans and seconds of two checkouts compared
+    methods             modern methods beside camkit's: dB against CPU-seconds
     tables              tables of the thesis, their networks trained for equal times
     design_start        a start lens by random search
     stage_profile       where the time of a photograph goes
