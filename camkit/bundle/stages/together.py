@@ -44,6 +44,16 @@ class Spread(Entry):
         return self
 
 
+class Mosaic(Entry):
+    """The places where the bank works from the samples of the mosaic (format 2.10).
+
+    Attributes:
+        within_mm: Field height up to which a block's place is one.
+    """
+
+    within_mm: NonNegative
+
+
 class Together(Entry):
     """The prior of the bank for the colours of a scene, and for their noise.
 
