@@ -12,9 +12,14 @@ variance V_c) and sigma_ps the sign with which plane p sees alias s,
 
 The phase of a plane's place is taken off Y first, so K is the same wherever red lies: one for a
 place and those that mirror it. Sum and difference of the greens (+, -) see two aliases each, which
-leaves a 2x2 system of R and B to solve. k of `joint_colours` is the power of L at the low alias,
-over the whole band. Means are taken off first and put back. The noise is that of the sensor's
-samples, so `noise` and `noise_rise`, which describe what a demosaic does to it, are not used.
+leaves a 2x2 system of R and B to solve. The noise is that of the sensor's samples, so `noise` and
+`noise_rise`, which describe what a demosaic does to it, are not used. Means are taken off first and
+put back.
+
+    s = scale m^2 k^follow min(1, k / smooth_below)^smooth_follow
+
+with k the measured over the expected power of L at the low alias, in the whole of `BAND`: the
+spectrum of a smooth block falls faster than F, and what is high in it is noise.
 
 References: Soulez and Thiebaut 2009 (joint deconvolution and demosaicing); Sun 2021, eq. (2.9), for
 one full plane.
@@ -28,8 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.arrays import FloatArray
-from camkit.bundle.stages import Together
-from camkit.bundle.stages.together import BAND
+from camkit.bundle.stages import Mosaic, Together
 from camkit.runtime.bank.joint_colours import (
     CORNER_FREQUENCY,
     LEAST_MEASURED,
@@ -40,6 +44,9 @@ from camkit.runtime.bank.joint_colours import (
 )
 from camkit.runtime.bank.spectrum import ComplexArray, from_packed, packed_spectrum, transform
 
+BAND: Final = (0.06, 0.25)
+"""Cycles per pixel in which the power of a block is measured: what lies below tells little of what
+lies above."""
 ALIASES: Final = ((0, 0), (0, 1), (1, 0), (1, 1))
 """(rows, columns) by which an alias lies higher, in units of the planes' sampling frequency."""
 GREENS: Final = (1, 2, 2, 1)
@@ -108,7 +115,7 @@ def alias_shapes(model: Together, block_px: int) -> AliasShapes:
     f2 = fy * fy + fx * fx
     fall = float(block_px) ** 2 * (f2 + CORNER_FREQUENCY**2) ** (-model.exponent / 2)
     often = np.where((across == 0) | (2 * across == n), 1.0, 2.0)
-    band = np.where((f2[0] >= BAND[0] ** 2) & (f2[0] <= BAND[1] ** 2), fall[0] ** 2 * often, 0)
+    band = np.where((f2[0] >= BAND[0] ** 2) & (f2[0] < BAND[1] ** 2), fall[0] ** 2 * often, 0)
     return AliasShapes(
         rows=np.array(rows),
         columns=np.array(columns),
@@ -188,6 +195,7 @@ def restore_mosaic(
     level: NDArray[np.float64],
     variance: NDArray[np.float64],
     model: Together,
+    mosaic: Mosaic,
 ) -> FloatArray:
     """Deconvolve a periodic block from the samples of its mosaic.
 
@@ -198,6 +206,7 @@ def restore_mosaic(
         level: (3,) > 0, of the block.
         variance: (3,) of the noise of its samples.
         model: The model.
+        mosaic: How it treats smooth blocks.
 
     Returns:
         (3, b, b) float32.
@@ -208,8 +217,9 @@ def restore_mosaic(
     scale = model.scale * mean * mean
     data, means = _data(samples, red, share)
     noise = (samples.shape[-1] / 2) ** 2 * variance / (share * share * scale)
-    if model.follow:
-        noise /= _measured(data, transfer, shapes, (noise, scale)) ** model.follow
+    measured = _measured(data, transfer, shapes, (noise, scale))
+    noise *= max(1.0, mosaic.smooth_below / measured) ** mosaic.smooth_follow
+    noise /= measured**model.follow
     solved = _solved(data, transfer, _factors(transfer, noise))
     sharp = _spectrum(solved, transfer, shapes, (red, share, model.own))
     packed = packed_spectrum(sharp, samples.shape[-1])

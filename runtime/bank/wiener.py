@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.arrays import FloatArray
-from camkit.bundle.stages import Wiener
+from camkit.bundle.stages import Mosaic, Wiener
 from camkit.noise import NoiseModel
 from camkit.runtime.bank.blocks import Block, BlockFilter, PlaceKnowledge
 from camkit.runtime.bank.joint_colours import Transfer, restore_together, transfer_of
@@ -69,7 +69,9 @@ def wiener_filter(settings: Wiener, noise: NoiseModel, kernel_px: int | None = N
         unknown = spread_clipped(block.unknown)
         lights, unexplained = explain_lights(block, unknown, background, settings, kernel_px)
         residual = block.samples - apply_transfer(lights, block.otf)
-        np.copyto(residual, 0, where=unknown)
+        # samples beside clipped ones were measured: it is their demosaicked planes that suffer
+        by_samples = _mosaic_at(settings, block.height_mm, block.red, block.otf) is not None
+        np.copyto(residual, 0, where=block.unknown if by_samples else unknown)
         variance = np.maximum(variance, unexplained)
         return lights + deconvolved(residual, variance)
 
@@ -87,19 +89,21 @@ def place_knowledge(settings: Wiener, red: tuple[int, int] | None = None) -> Pla
         return None
 
     def know(otf: ComplexArray, height_mm: float) -> Transfer | MosaicTransfer:
-        if _by_samples(settings, height_mm, red, otf.shape[1]):
+        if _mosaic_at(settings, height_mm, red, otf) is not None:
             return mosaic_transfer(otf, height_mm, model)
         return transfer_of(otf, height_mm, model)
 
     return know
 
 
-def _by_samples(
-    settings: Wiener, height_mm: float, red: tuple[int, int] | None, block_px: int
-) -> bool:
-    """Return whether a block is restored from the samples of its mosaic."""
-    within = settings.mosaic is not None and height_mm <= settings.mosaic.within_mm
-    return within and red is not None and block_px % 2 == 0
+def _mosaic_at(
+    settings: Wiener, height_mm: float, red: tuple[int, int] | None, otf: ComplexArray
+) -> Mosaic | None:
+    """Return how a block is restored from the samples of its mosaic; None where it is not."""
+    mosaic = settings.mosaic
+    if mosaic is None or red is None or height_mm > mosaic.within_mm or otf.shape[1] % 2:
+        return None
+    return mosaic
 
 
 def _restored(
@@ -111,12 +115,11 @@ def _restored(
     """Return samples of a block, or what its lights leave of them, with all colours together."""
     model, known = settings.together, block.knowledge
     assert model is not None
-    if block.red is not None and _by_samples(
-        settings, block.height_mm, block.red, samples.shape[-1]
-    ):
+    mosaic = _mosaic_at(settings, block.height_mm, block.red, block.otf)
+    if mosaic is not None and block.red is not None:
         if not isinstance(known, MosaicTransfer):
             known = mosaic_transfer(block.otf, block.height_mm, model)
-        return restore_mosaic(samples, known, red=block.red, model=model, **facts)
+        return restore_mosaic(samples, known, red=block.red, model=model, mosaic=mosaic, **facts)
     if not isinstance(known, Transfer):
         known = transfer_of(block.otf, block.height_mm, model)
     return restore_together(samples, known, model=model, **facts)
