@@ -202,13 +202,15 @@ def make_bank(entry: Wiener, job: Job, planes: Stream) -> BlockBank:
         noise = noise.raised(planes.noise_rise())
     side = cut_block_px(entry.block_px, entry.overlap_px, local.window.size_px)
     cut = entry.model_copy(update={"block_px": max(side, *local.kernels.kernels.shape[-2:])})
-    red = _red_of(job.capture)
+    red = _red_of(job.capture, planes)
     return restoration_bank(local, cut, noise, method=method, threads=job.threads, red=red)
 
 
-def _red_of(capture: Capture) -> tuple[int, int] | None:
-    """Return (row, column) of red in the first cell of a capture; None without a mosaic."""
-    return None if capture.cfa is None else divmod(capture.cfa.index("R"), 2)
+def _red_of(capture: Capture, planes: Stream) -> tuple[int, int] | None:
+    """Return (row, column) of red in the mosaic that planes hold the samples of; None for none."""
+    if capture.cfa is None or planes.shape[1:] != (capture.height, capture.width):
+        return None
+    return divmod(capture.cfa.index("R"), 2)
 
 
 def _kernels(bundle: Bundle, depth_mm: float | None, focus_um: float, scale: float) -> FieldKernels:
