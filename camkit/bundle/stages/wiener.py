@@ -1,7 +1,7 @@
 """The Wiener bank."""
 
 from collections.abc import Sequence
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -76,6 +76,10 @@ class Wiener(StageEntry):
         if self.mosaic is not None and self.together is None:
             raise ValueError("mosaic needs together, whose numbers it takes")
         return self
+
+    def alone(self) -> Self:
+        """Return the bank that restores every colour alone."""
+        return self.model_copy(update={"together": None, "mosaic": None})
 
     def join(self, planes: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Return the plane as taken: deconvolved."""

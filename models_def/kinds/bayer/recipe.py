@@ -374,7 +374,9 @@ class BayerRecipe(Recipe):
             )
 
     def with_together(self, together: Together | None) -> "BayerRecipe":
-        """Return it with another model of colours in its bank."""
+        """Return it with another model of colours in its bank, None for each alone."""
+        if together is None:
+            return replace(self, wiener=self.wiener.alone())
         return replace(self, wiener=self.wiener.model_copy(update={"together": together}))
 
 
