@@ -270,7 +270,7 @@ class _Factors:
 
 
 def _factors(transfer: MosaicTransfer, noise: NDArray[np.float64]) -> _Factors:
-    """Eliminate the greens, and invert what is left of R and B."""
+    """Return the inverse: greens eliminated, what is left of R and B inverted."""
     red, green, blue = noise.astype(np.float32)
     greens = np.reciprocal(transfer.power[1:3] + green)
     left = [
