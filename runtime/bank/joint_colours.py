@@ -118,7 +118,7 @@ def shapes_of(model: Together, block_px: int) -> Shapes:
     fall = (samples * (f2 + CORNER_FREQUENCY**2) ** (-model.exponent / 2)).astype(np.float32)
     lines = zip(model.noise, model.noise_rise, strict=True)
     noise = samples * np.exp(np.stack([n + 4 * rise * f2 for n, rise in lines]))
-    found = lookup_of(model.spread, f2)
+    lookup = lookup_of(model.spread, f2)
     steps = [np.arange(0, side, BAND_STEP) for side in f2.shape]
     rows, columns = np.meshgrid(*steps, indexing="ij")
     in_band = (f2[rows, columns] >= BAND[0] ** 2) & (f2[rows, columns] <= BAND[1] ** 2)
@@ -126,11 +126,11 @@ def shapes_of(model: Together, block_px: int) -> Shapes:
     spread_fall = spread_weights(fall[None], block_px)
     spread_noise = spread_weights(noise.astype(np.float32), block_px)
     # float32 holds the numbers exactly: a block has far fewer frequencies than 2^24
-    spread_number = spread_weights(found.number[None].astype(np.float32), block_px)
+    spread_number = spread_weights(lookup.number[None].astype(np.float32), block_px)
     return Shapes(
         fall=spread_fall[0],
         noise=spread_noise,
-        lookup=replace(found, number=spread_number[0].astype(np.intp)),
+        lookup=replace(lookup, number=spread_number[0].astype(np.intp)),
         band=band,
         band_fall=_at(spread_fall, band[0])[0],
         band_noise=_at(spread_noise, band[0]),

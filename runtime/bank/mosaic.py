@@ -86,7 +86,7 @@ class MosaicTransfer:
         cross: (2, 2, 2, n, h) K of (R, B) with (+, -).
         cross_power: (2, 2, n, h) its squared absolute value.
         red_blue: (2, n, h) K of R with B.
-        through: (2, 2, n, h) K of R with B by way of (+, -), times the power of those.
+        detour: (2, 2, n, h) K of R with B by way of (+, -), times the power of those.
     """
 
     sharp: FloatArray
@@ -95,7 +95,7 @@ class MosaicTransfer:
     cross: FloatArray
     cross_power: FloatArray
     red_blue: FloatArray
-    through: FloatArray
+    detour: FloatArray
 
 
 @lru_cache(maxsize=4)
@@ -139,7 +139,7 @@ def mosaic_transfer(otf: ComplexArray, height_mm: float, model: Together) -> Mos
         model: The model; neither `noise` nor `noise_rise` of it is used.
     """
     shapes = alias_shapes(model, otf.shape[1])
-    h = _seen(otf, shapes)
+    h = _transfer_at(otf, shapes)
     fh = h * shapes.fall
     alone = spread_at(model.spread, height_mm, shapes.lookup, np.float32(model.mistrust / 16))
     alone[1] *= 2  # sum and difference of two greens, each over the root of 2
@@ -159,11 +159,11 @@ def mosaic_transfer(otf: ComplexArray, height_mm: float, model: Together) -> Mos
         cross=cross,
         cross_power=np.square(cross).sum(axis=0),
         red_blue=red_blue,
-        through=_crossed(cross[:, 0], cross[:, 1]),
+        detour=_crossed(cross[:, 0], cross[:, 1]),
     )
 
 
-def _seen(otf: ComplexArray, shapes: AliasShapes) -> FloatArray:
+def _transfer_at(otf: ComplexArray, shapes: AliasShapes) -> FloatArray:
     """Return (2, 3, 4, n, h): a quarter of H at the aliases, with the sign it is seen with."""
     h = np.empty((2, 3, *shapes.fall.shape), np.float32)
     for s, (rows, columns) in enumerate(zip(shapes.rows, shapes.columns, strict=True)):
@@ -266,37 +266,37 @@ class _Factors:
     greens: FloatArray
     red: FloatArray
     blue: FloatArray
-    between: FloatArray
+    red_to_blue: FloatArray
 
 
 def _factors(transfer: MosaicTransfer, noise: NDArray[np.float64]) -> _Factors:
     """Return the inverse: greens eliminated, what is left of R and B inverted."""
     red, green, blue = noise.astype(np.float32)
     greens = np.reciprocal(transfer.power[1:3] + green)
-    left = [
+    remainders = [
         power + more - crossed[0] * greens[0] - crossed[1] * greens[1]
         for power, more, crossed in zip(
             transfer.power[::3], (red, blue), transfer.cross_power, strict=True
         )
     ]
-    between = transfer.red_blue - (transfer.through * greens).sum(axis=1)
-    weight = left[0] * left[1]
-    weight -= between[0] * between[0]
-    weight -= between[1] * between[1]
+    red_to_blue = transfer.red_blue - (transfer.detour * greens).sum(axis=1)
+    weight = remainders[0] * remainders[1]
+    weight -= red_to_blue[0] * red_to_blue[0]
+    weight -= red_to_blue[1] * red_to_blue[1]
     np.reciprocal(weight, out=weight)
-    between *= weight
-    return _Factors(greens, left[1] * weight, left[0] * weight, between)
+    red_to_blue *= weight
+    return _Factors(greens, remainders[1] * weight, remainders[0] * weight, red_to_blue)
 
 
 def _solved(data: FloatArray, transfer: MosaicTransfer, factors: _Factors) -> FloatArray:
     """Return (2, 4, n, h): the inverse times spectra of R, +, -, B."""
-    cross, between = transfer.cross, factors.between
+    cross, red_to_blue = transfer.cross, factors.red_to_blue
     solved = np.empty_like(data)
     greens = data[:, 1:3] * factors.greens
     rest = data[:, ::3] - _product(cross, greens[:, None]).sum(axis=2)
     red, blue = rest[:, 0], rest[:, 1]
-    solved[:, 0] = factors.red * red - _product(between, blue)
-    solved[:, 3] = factors.blue * blue + _crossed(red, between) * np.float32(-1)
+    solved[:, 0] = factors.red * red - _product(red_to_blue, blue)
+    solved[:, 3] = factors.blue * blue + _crossed(red, red_to_blue) * np.float32(-1)
     back = _crossed(solved[:, 0][:, None], cross[:, 0]) + _crossed(
         solved[:, 3][:, None], cross[:, 1]
     )
@@ -348,13 +348,13 @@ def _spectrum(
         shapes: Of the block's size.
         block: Place of red, (3,) share of every colour, own.
     """
-    (y, x), share, own = block
+    (y, x), share, own_power = block
     n = shapes.rows.shape[1]
     spectrum = np.empty((3, 2 * n, n + 1), np.complex64)
     for s, ((dy, dx), rows) in enumerate(zip(ALIASES, shapes.rows, strict=True)):
         terms = _product(transfer.sharp[:, :, s], solved[:, (0, GREENS[s], 3)])
         light = terms.sum(axis=1)
-        terms *= np.float32(own)
+        terms *= np.float32(own_power)
         terms += light[:, None]
         factor = ((-1) ** (y * dy + x * dx) * share).astype(np.float32)[:, None, None]
         terms[0] *= factor

@@ -113,16 +113,18 @@ def _restored(
     facts: dict[str, NDArray[np.float64]],
 ) -> FloatArray:
     """Return samples of a block, or what its lights leave of them, with all colours together."""
-    model, known = settings.together, block.knowledge
+    model, knowledge = settings.together, block.knowledge
     assert model is not None
     mosaic = _mosaic_at(settings, block.height_mm, block.red, block.otf)
     if mosaic is not None and block.red is not None:
-        if not isinstance(known, MosaicTransfer):
-            known = mosaic_transfer(block.otf, block.height_mm, model)
-        return restore_mosaic(samples, known, red=block.red, model=model, mosaic=mosaic, **facts)
-    if not isinstance(known, Transfer):
-        known = transfer_of(block.otf, block.height_mm, model)
-    return restore_together(samples, known, model=model, **facts)
+        if not isinstance(knowledge, MosaicTransfer):
+            knowledge = mosaic_transfer(block.otf, block.height_mm, model)
+        return restore_mosaic(
+            samples, knowledge, red=block.red, model=model, mosaic=mosaic, **facts
+        )
+    if not isinstance(knowledge, Transfer):
+        knowledge = transfer_of(block.otf, block.height_mm, model)
+    return restore_together(samples, knowledge, model=model, **facts)
 
 
 @lru_cache(maxsize=4)
