@@ -41,7 +41,7 @@ ISOS: Final = (100.0, 400.0, 1600.0)
 PLACES: Final = (0, 1, 2, 3)
 """Of `FIELD_SHARES`: from the axis to three quarters."""
 RECIPE: Final = Path("models_def/recipes/duet.toml")
-TODAY, STATED, EVERYWHERE = "together", "mosaic", "everywhere"
+TODAY, NEAR_AXIS, EVERYWHERE = "together", "mosaic", "everywhere"
 RED: Final = (0, 0)
 ROUNDS: Final = 60
 DIGITS: Final = 4
@@ -79,16 +79,16 @@ def main(words: Sequence[str] | None = None) -> None:
     bundle = open_bundle(find_bundle(arguments.bundle))
     ways = ways_of(bundle, arguments.recipe)
     pictures = list_set(arguments.data, arguments.pictures)
-    found = judge(ways, pictures, arguments.work_dir / "psf")
+    captures = judge(ways, pictures, arguments.work_dir / "psf")
     record = {
         "machine": describe_machine(),
         "bundle": bundle.manifest.name,
-        "captures": len(found),
-        "psnr_db": {way: statistics.fmean(one.psnr_db[way] for one in found) for way in ways},
-        "gain_db": gains(found),
+        "captures": len(captures),
+        "psnr_db": {way: statistics.fmean(one.psnr_db[way] for one in captures) for way in ways},
+        "gain_db": gains(captures),
         "by_place": {
             f"{FIELD_SHARES[position]:g}": {
-                f"{iso:g}": gains([x for x in found if (x.position, x.iso) == (position, iso)])
+                f"{iso:g}": gains([x for x in captures if (x.position, x.iso) == (position, iso)])
                 for iso in ISOS
             }
             for position in PLACES
@@ -109,11 +109,11 @@ def ways_of(bundle: Bundle, recipe: Path) -> dict[str, Bundle]:
     if "mosaic" not in table or "together" not in table:
         raise ContractError(f"{recipe.name} has no tables [wiener.together] and [wiener.mosaic]")
     together = Together.model_validate(table["together"])
-    stated = Mosaic.model_validate(table["mosaic"])
-    everywhere = stated.model_copy(update={"within_mm": 1e6})
+    mosaic = Mosaic.model_validate(table["mosaic"])
+    everywhere = mosaic.model_copy(update={"within_mm": 1e6})
     return {
-        way: _with_bank(bundle, {"together": together, "mosaic": mosaic})
-        for way, mosaic in ((TODAY, None), (STATED, stated), (EVERYWHERE, everywhere))
+        way: _with_bank(bundle, {"together": together, "mosaic": samples})
+        for way, samples in ((TODAY, None), (NEAR_AXIS, mosaic), (EVERYWHERE, everywhere))
     }
 
 
@@ -137,7 +137,7 @@ def judge(ways: Mapping[str, Bundle], pictures: Sequence[Path], cache: Path) -> 
     def lens(copy: int) -> FrozenOptics:
         return fabricated_optics(bundle, copy, cache_folder=cache)
 
-    found = []
+    captures = []
     for number, picture in enumerate(pictures):
         for position in PLACES:
             for iso in ISOS:
@@ -149,24 +149,26 @@ def judge(ways: Mapping[str, Bundle], pictures: Sequence[Path], cache: Path) -> 
                     iso=iso,
                     psf="fresh",
                 )
-                taken = photograph(shot, read_picture(picture), bundle, lens(shot.fabrication_seed))
+                capture = photograph(
+                    shot, read_picture(picture), bundle, lens(shot.fabrication_seed)
+                )
                 judged = {
-                    way: psnr(*inner_srgb(restore(taken), taken.sharp))
+                    way: psnr(*inner_srgb(restore(capture), capture.sharp))
                     for way, restore in restorers.items()
                 }
-                found.append(
+                captures.append(
                     Judged(picture=picture.name, position=position, iso=iso, psnr_db=judged)
                 )
-        print(picture.name, json.dumps(gains(found)), flush=True)
-    return found
+        print(picture.name, json.dumps(gains(captures)), flush=True)
+    return captures
 
 
-def gains(found: Sequence[Judged]) -> dict[str, dict[str, float | None]]:
+def gains(captures: Sequence[Judged]) -> dict[str, dict[str, float | None]]:
     """Return mean, error and least gain over demosaicked planes, by way."""
     entries: dict[str, dict[str, float | None]] = {}
-    for way in (STATED, EVERYWHERE):
-        differences = [one.psnr_db[way] - one.psnr_db[TODAY] for one in found]
-        mean, error = mean_and_error(differences, [one.picture for one in found])
+    for way in (NEAR_AXIS, EVERYWHERE):
+        differences = [one.psnr_db[way] - one.psnr_db[TODAY] for one in captures]
+        mean, error = mean_and_error(differences, [one.picture for one in captures])
         entries[way] = {"mean": mean, "se": error, "least": min(differences)}
     return entries
 
@@ -180,10 +182,10 @@ def cpu_ms(ways: Mapping[str, Bundle], rounds: int = ROUNDS) -> dict[str, dict[s
             began = time.process_time()
             call()
             times[key].append(time.process_time() - began)
-    found: dict[str, dict[str, float]] = {way: {} for way in ways}
+    medians: dict[str, dict[str, float]] = {way: {} for way in ways}
     for (way, part), seconds in times.items():
-        found[way][part] = 1e3 * statistics.median(seconds)
-    return found
+        medians[way][part] = 1e3 * statistics.median(seconds)
+    return medians
 
 
 def _work_of(bundle: Bundle) -> dict[str, Callable[[], object]]:
@@ -197,11 +199,11 @@ def _work_of(bundle: Bundle) -> dict[str, Callable[[], object]]:
     side = max(entry.block_px, *kernels.shape[1:])
     planes = np.random.default_rng(0).random((3, side, side), dtype=np.float32)
     otf = to_otf(kernels, side)
-    known = know(otf, 0.0)
+    knowledge = know(otf, 0.0)
 
     def block() -> object:
         tapered = taper_edges(planes, otf, ring)
-        return restore(Block(samples=tapered, otf=otf, knowledge=known, red=RED))
+        return restore(Block(samples=tapered, otf=otf, knowledge=knowledge, red=RED))
 
     return {"block": block, "place": lambda: know(to_otf(kernels, side), 0.0)}
 

@@ -378,8 +378,8 @@ def _red_of(recipe: BayerRecipe, borders: Sides) -> tuple[int, int]:
 def filtered(developed: Developed, recipe: BayerRecipe) -> Tensor:
     """Return (1, 3, S, S) of developed planes behind the recipe's bank, linear."""
     circumstances, mosaic = developed.circumstances, recipe.wiener.mosaic
-    within = mosaic is not None and circumstances.height_mm <= mosaic.within_mm
-    if within and circumstances.red is not None:
+    is_near = mosaic is not None and circumstances.height_mm <= mosaic.within_mm
+    if is_near and circumstances.red is not None:
         return _filtered_by_runtime(developed, recipe.wiener)
     return wiener_restore(
         developed.planes,
