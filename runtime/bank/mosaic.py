@@ -62,14 +62,14 @@ class AliasShapes:
 
     Attributes:
         rows: (4, n) rows of the aliases in a half spectrum of the block.
-        columns: (4, h) their columns.
+        columns: Their columns, h of them each.
         fall: (4, n, h) F, times the samples of a block; float32.
         lookup: Of the frequencies (4, n, h).
         band: (n, h) F squared of the low alias where it is measured, as often as it is there.
     """
 
     rows: NDArray[np.intp]
-    columns: NDArray[np.intp]
+    columns: tuple[slice, ...]
     fall: FloatArray
     lookup: Lookup
     band: FloatArray
@@ -103,22 +103,20 @@ def alias_shapes(model: Together, block_px: int) -> AliasShapes:
     """Return the shapes of a block of even side."""
     n = block_px // 2
     down, across = _signed(n), np.arange(n // 2 + 1)
-    rows, columns = [], []
-    for (
-        dy,
-        dx,
-    ) in ALIASES:  # what lies beyond the half spectrum is the mirror image of what is in it
-        rows.append((1 - 2 * dx) * (down + n * dy) % block_px)
-        columns.append(n - across if dx else across)
-    fy = np.fft.fftfreq(block_px)[np.array(rows)][:, :, None]
-    fx = np.fft.rfftfreq(block_px)[np.array(columns)][:, None, :]
+    # what lies beyond the half spectrum is the mirror image of what is in it
+    rows = np.array([(1 - 2 * dx) * (down + n * dy) % block_px for dy, dx in ALIASES])
+    columns = tuple(
+        slice(n, n - len(across), -1) if dx else slice(len(across)) for _, dx in ALIASES
+    )
+    fy = np.fft.fftfreq(block_px)[rows][:, :, None]
+    fx = np.stack([np.fft.rfftfreq(block_px)[part] for part in columns])[:, None, :]
     f2 = fy * fy + fx * fx
     fall = float(block_px) ** 2 * (f2 + CORNER_FREQUENCY**2) ** (-model.exponent / 2)
     often = np.where((across == 0) | (2 * across == n), 1.0, 2.0)
     band = np.where((f2[0] >= BAND[0] ** 2) & (f2[0] < BAND[1] ** 2), fall[0] ** 2 * often, 0)
     return AliasShapes(
-        rows=np.array(rows),
-        columns=np.array(columns),
+        rows=rows,
+        columns=columns,
         fall=fall.astype(np.float32),
         lookup=lookup_of(model.spread, f2),
         band=band.astype(np.float32),
@@ -167,7 +165,7 @@ def _transfer_at(otf: ComplexArray, shapes: AliasShapes) -> FloatArray:
     """Return (2, 3, 4, n, h): a quarter of H at the aliases, with the sign it is seen with."""
     h = np.empty((2, 3, *shapes.fall.shape), np.float32)
     for s, (rows, columns) in enumerate(zip(shapes.rows, shapes.columns, strict=True)):
-        part = otf[:, rows[:, None], columns]
+        part = otf.take(rows, axis=1)[:, :, columns]
         for c in range(3):
             sign = np.float32(SIGNS[c][s] / 4)
             np.multiply(part[c].real, sign, out=h[0, c, s])
@@ -351,7 +349,7 @@ def _spectrum(
     (y, x), share, own_power = block
     n = shapes.rows.shape[1]
     spectrum = np.empty((3, 2 * n, n + 1), np.complex64)
-    for s, ((dy, dx), rows) in enumerate(zip(ALIASES, shapes.rows, strict=True)):
+    for s, (dy, dx) in enumerate(ALIASES):
         terms = _product(transfer.sharp[:, :, s], solved[:, (0, GREENS[s], 3)])
         light = terms.sum(axis=1)
         terms *= np.float32(own_power)
@@ -359,8 +357,6 @@ def _spectrum(
         factor = ((-1) ** (y * dy + x * dx) * share).astype(np.float32)[:, None, None]
         terms[0] *= factor
         terms[1] *= -factor if dx else factor
-        last = terms.shape[-1]
-        columns = slice(n, n - last, -1) if dx else slice(0, last)
-        spectrum.real[:, rows, columns] = terms[0]
-        spectrum.imag[:, rows, columns] = terms[1]
+        spectrum.real[:, shapes.rows[s], shapes.columns[s]] = terms[0]
+        spectrum.imag[:, shapes.rows[s], shapes.columns[s]] = terms[1]
     return spectrum

@@ -173,11 +173,11 @@ def gains(captures: Sequence[Judged]) -> dict[str, dict[str, float | None]]:
     return entries
 
 
-def cpu_ms(ways: Mapping[str, Bundle], rounds: int = ROUNDS) -> dict[str, dict[str, float]]:
+def cpu_ms(ways: Mapping[str, Bundle]) -> dict[str, dict[str, float]]:
     """Return CPU-milliseconds of a block, tapered and filtered, and of a place on the axis."""
     calls = {(way, part): c for way, one in ways.items() for part, c in _work_of(one).items()}
     times: dict[tuple[str, str], list[float]] = {key: [] for key in calls}
-    for _ in range(rounds):
+    for _ in range(ROUNDS):
         for key, call in calls.items():
             began = time.process_time()
             call()
