@@ -117,6 +117,11 @@ class Capture:
         metadata: What the file says of its photograph, to be carried into pictures.
         sha256: Hash of the file; None for arrays.
         window: Where the samples lie in a larger picture; None if the format knows no such thing.
+        bin_px: Side of the squares of the sensor's mosaic that every sample is a mean of, see
+            `camkit.runtime.signal.binning`; 1 for the sensor's own samples. Place and pitch are
+            those of the mosaic.
+        noise_factors: Variance of such means over that of the sensor's samples, one per colour;
+            None for the sensor's own samples.
         notes: What a person should know of this decode.
         decoder_peak_mb: Peak memory of the process that decoded; 0 where it was this one.
     """
@@ -139,6 +144,8 @@ class Capture:
     metadata: Metadata = field(default_factory=Metadata)
     sha256: str | None = None
     window: PictureWindow | None = None
+    bin_px: int = 1
+    noise_factors: tuple[float, ...] | None = None
     notes: tuple[str, ...] = ()
     decoder_peak_mb: float = field(default=0.0, compare=False)
 
@@ -191,6 +198,11 @@ class Capture:
     def gives_own_rows(self) -> bool:
         """Return whether what `rows` reads is the reader's own: it is a view of the samples."""
         return False
+
+    @property
+    def is_of_mosaic(self) -> bool:
+        """Return whether a mosaic recorded the light: its colours and levels are a sensor's."""
+        return self.cfa is not None or self.bin_px > 1
 
     @property
     def contract(self) -> InputContract:

@@ -22,6 +22,7 @@ OutputColor = Literal["rec709", "acescg", "camera"]
 DemosaicMethod = Literal["fast", "quality"]
 Assumption = Literal["centre", "scale"]
 Quality = Literal["exact", "best", "adaptive", "draft"]
+Scale = Literal["1", "1/2", "1/4"]
 OnUnsafe = Literal["warn", "fallback", "fail"]
 Laws = Literal["stated", "enforce"]
 DEFAULT_MAX_MEM_BYTES: Final = 930_000_000
@@ -36,6 +37,8 @@ class Options:
         size: Network size held by the bundle, such as S, M or L; None for that of the quality.
         quality: exact (M, nothing skipped), best (the largest size, nothing skipped), adaptive
             (no more than the capture needs) or draft; see camkit/runtime/plan.
+        scale: Size of the picture over that of the capture, along each side: its mosaic is averaged
+            over squares first, so that the price falls with the pixels.
         max_seconds: Time that a capture may take on this machine; None for any.
         max_error_db: Loss against `exact` that a capture may have at worst; None for that of the
             quality.
@@ -73,6 +76,7 @@ class Options:
 
     size: str | None = None
     quality: Quality = "exact"
+    scale: Scale = "1"
     max_seconds: float | None = None
     max_error_db: float | None = None
     depth_m: float | None = None

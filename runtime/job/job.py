@@ -101,7 +101,7 @@ class Job:
     def color_matrix(self) -> Matrix | None:
         """Return XYZ (D65) to camera, of the file before that of the bundle; None if not known."""
         sensor = None if self.bundle is None else self.bundle.manifest.sensor
-        if self.capture.color_matrix is not None or self.capture.cfa is None:
+        if self.capture.color_matrix is not None or not self.capture.is_of_mosaic:
             file_matrix: Matrix | None = self.capture.color_matrix
             return file_matrix
         if sensor is None or sensor.type != "bayer":
@@ -144,6 +144,8 @@ class Job:
             source, noise = "file", self.capture.noise
         elif self.capture.iso is not None:
             source, noise = "bundle", manifest.light_sensor.noise_at(self.capture.iso)
+            if self.capture.noise_factors is not None:
+                noise = noise.raised(self.capture.noise_factors)
         else:
             with self.log.clock.stage("noise"):
                 source, noise = "measured", measure_noise(self.capture)

@@ -3,8 +3,9 @@
 checked against the sensor -> placed -> looked at by the stages -> planned
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Final
 
 from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import BayerSensor
@@ -17,12 +18,17 @@ from camkit.runtime.content import Content, light_squares, measure_content
 from camkit.runtime.files.doubts import notes_behind
 from camkit.runtime.geometry.placement import place
 from camkit.runtime.job.job import Job
-from camkit.runtime.options import Options
+from camkit.runtime.options import Options, Scale
 from camkit.runtime.plan.decision import DEVELOP, Subject, Work
 from camkit.runtime.plan.planner import make_plan, needs_content
 from camkit.runtime.plan.rules.lights import needs_lights
 from camkit.runtime.plan.ways import ways_of, without_networks
+from camkit.runtime.signal.binning import binned_capture
 from camkit.runtime.stage_finder import module_of, stage_keys
+
+BINNING: Final = "binning"
+"""Name of the clock of averaging the mosaic."""
+BIN_PX: Final[Mapping[Scale, int]] = {"1": 1, "1/2": 2, "1/4": 4}
 
 
 def know_photograph(job: Job) -> Job:
@@ -35,6 +41,10 @@ def know_photograph(job: Job) -> Job:
     job.log.notes += _first_notes(job)
     extent = None if job.bundle is None else job.bundle.manifest.sensor.extent
     placement = place(job.capture, extent, job.options.assume)
+    if (bin_px := bin_px_of(job)) > 1:
+        with job.log.clock.stage(BINNING):
+            job = replace(job, capture=binned_capture(job.capture, bin_px, threads=job.threads))
+        placement = placement.binned(bin_px)
     ones = (1.0,) * job.capture.channels
     job = looked_at(replace(job, sensor_place=placement, white_balance=ones), job.setup.stages)
     if placement.note and job.bundle is not None:
@@ -46,6 +56,21 @@ def know_photograph(job: Job) -> Job:
         for key, way in zip(stage_keys(job.setup.stages), ways, strict=True)
     }
     return job
+
+
+def bin_px_of(job: Job) -> int:
+    """Return the side of the squares that a mosaic is averaged over; 1 for none.
+
+    Raises:
+        ContractError: If a smaller picture was asked for of what is no mosaic.
+    """
+    bin_px = BIN_PX[job.options.scale]
+    if bin_px > 1 and job.capture.cfa is None:
+        raise ContractError(
+            f"{option_text('scale', job.options.scale)} averages a mosaic, and the capture has "
+            "full colour; leave it out"
+        )
+    return bin_px
 
 
 def looked_at(job: Job, stages: Sequence[StageEntry]) -> Job:

@@ -21,7 +21,7 @@ from camkit.runtime.job.job import Job
 from camkit.runtime.job.kind_capture import KindCapture
 from camkit.runtime.job.log import Log
 from camkit.runtime.job.meter import Meter
-from camkit.runtime.job.photograph import content_of, know_photograph
+from camkit.runtime.job.photograph import BINNING, content_of, know_photograph
 from camkit.runtime.job.setup import Setup
 from camkit.runtime.job.stream import Stream
 from camkit.runtime.job.walker import Walk, probed
@@ -35,7 +35,7 @@ from camkit.runtime.plan.speed import Speed
 from camkit.runtime.rows import Rows, RowSource
 from camkit.runtime.stage_finder import module_of
 
-BEFORE_STAGES: Final = ("noise", "envelope", "scene")
+BEFORE_STAGES: Final = (BINNING, "noise", "envelope", "scene")
 
 
 class Reconstruction:
@@ -84,6 +84,7 @@ class Reconstruction:
                 reserved_bytes=reserved_bytes,
             )
         )
+        self.capture = self.job.capture
         self._walk = Walk(self.job)
 
     @property

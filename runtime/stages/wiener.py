@@ -197,6 +197,8 @@ def make_bank(entry: Wiener, job: Job, planes: Stream) -> BlockBank:
     if entry.together is not None and method == METHODS[0]:
         # its numbers were fitted to noise of this sensor; with less it would trust its kernels more
         least = sensor.noise_at(min(one.iso for one in sensor.noise))
+        if job.capture.noise_factors is not None:
+            least = least.raised(job.capture.noise_factors)
         noise = noise.at_least(least.with_gains(planes.gains))
     if planes.noise_rise is not None:
         noise = noise.raised(planes.noise_rise())
