@@ -21,6 +21,7 @@ from camkit.noise import NoiseModel
 from camkit.picture_window import PictureWindow
 from camkit.runtime.machine.memory import mapping_of
 from camkit.runtime.metadata import Metadata
+from camkit.runtime.signal.binning import Binning
 
 if TYPE_CHECKING:
     from camkit.bundle.plane import Plane
@@ -117,11 +118,8 @@ class Capture:
         metadata: What the file says of its photograph, to be carried into pictures.
         sha256: Hash of the file; None for arrays.
         window: Where the samples lie in a larger picture; None if the format knows no such thing.
-        bin_px: Side of the squares of the sensor's mosaic that every sample is a mean of, see
-            `camkit.runtime.signal.binning`; 1 for the sensor's own samples. Place and pitch are
-            those of the mosaic.
-        noise_factors: Variance of such means over that of the sensor's samples, one per colour;
-            None for the sensor's own samples.
+        binning: Squares of the sensor's mosaic that the samples are means over; None for the
+            sensor's own samples. Place and pitch are those of the mosaic.
         notes: What a person should know of this decode.
         decoder_peak_mb: Peak memory of the process that decoded; 0 where it was this one.
     """
@@ -144,8 +142,7 @@ class Capture:
     metadata: Metadata = field(default_factory=Metadata)
     sha256: str | None = None
     window: PictureWindow | None = None
-    bin_px: int = 1
-    noise_factors: tuple[float, ...] | None = None
+    binning: Binning | None = None
     notes: tuple[str, ...] = ()
     decoder_peak_mb: float = field(default=0.0, compare=False)
 
@@ -202,7 +199,7 @@ class Capture:
     @property
     def is_of_mosaic(self) -> bool:
         """Return whether a mosaic recorded the light: its colours and levels are a sensor's."""
-        return self.cfa is not None or self.bin_px > 1
+        return self.cfa is not None or self.binning is not None
 
     @property
     def contract(self) -> InputContract:

@@ -144,8 +144,8 @@ class Job:
             source, noise = "file", self.capture.noise
         elif self.capture.iso is not None:
             source, noise = "bundle", manifest.light_sensor.noise_at(self.capture.iso)
-            if self.capture.noise_factors is not None:
-                noise = noise.raised(self.capture.noise_factors)
+            if self.capture.binning is not None:
+                noise = noise.raised(self.capture.binning.noise_factors)
         else:
             with self.log.clock.stage("noise"):
                 source, noise = "measured", measure_noise(self.capture)

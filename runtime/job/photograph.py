@@ -23,7 +23,7 @@ from camkit.runtime.plan.decision import DEVELOP, Subject, Work
 from camkit.runtime.plan.planner import make_plan, needs_content
 from camkit.runtime.plan.rules.lights import needs_lights
 from camkit.runtime.plan.ways import ways_of, without_networks
-from camkit.runtime.signal.binning import binned_capture
+from camkit.runtime.signal.binned_capture import binned_capture
 from camkit.runtime.stage_finder import module_of, stage_keys
 
 BINNING: Final = "binning"
