@@ -113,6 +113,7 @@ class Options:
                 f"{option_text('max_seconds')} finds the best quality that fits by itself; leave "
                 f"{option_text('quality')} out"
             )
+        _check_scale(self)
         _check_dtype(self.dtype, self.provider)
         _check_depth(self.depth_m)
         if not 0 <= self.strength <= 1:
@@ -252,6 +253,21 @@ def check_kind_options(options: Options, kind: Kind, where: str) -> None:
         raise ContractError(
             f"{option_list(foreign)} does not apply {where}: it is for cameras of the "
             f"kind {makers[0].name}; leave it out"
+        )
+
+
+def _check_scale(options: Options) -> None:
+    if options.scale == "1":
+        return
+    given = [
+        name
+        for name in ("max_seconds", "max_error_db", "quality")
+        if getattr(options, name) not in (None, "exact")
+    ]
+    if given:
+        raise ContractError(
+            f"{option_text('scale', options.scale)} decides what is done at its price; leave "
+            f"{option_list(given)} out"
         )
 
 

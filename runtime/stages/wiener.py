@@ -25,6 +25,7 @@ from camkit.runtime.bank.blocks import (
     lay_spans,
 )
 from camkit.runtime.bank.distance import CELL_PX, find_nearness, search_blocks
+from camkit.runtime.bank.joint_colours import binned_model
 from camkit.runtime.bank.kernels_by_distance import (
     KEPT_STEPS,
     MEAN,
@@ -208,6 +209,9 @@ def make_bank(entry: Wiener, job: Job, planes: Stream) -> BlockBank:
         noise = noise.raised(planes.noise_rise())
     side = cut_block_px(entry.block_px, entry.overlap_px, local.window.size_px)
     cut = entry.model_copy(update={"block_px": max(side, *local.kernels.kernels.shape[-2:])})
+    if binning is not None and cut.together is not None:
+        together = binned_model(cut.together, binning.side_px)
+        cut = cut.model_copy(update={"together": together, "mosaic": None})
     red = _red_of(job.capture, planes)
     return restoration_bank(local, cut, noise, method=method, threads=job.threads, red=red)
 

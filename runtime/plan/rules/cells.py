@@ -26,7 +26,7 @@ ORDER: Final = 20
 
 def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
     """Divide the cells among the tiers within the loss that may be spent."""
-    if not work.networks or subject.role is None:
+    if not work.networks or subject.role is None or subject.side_px > 1:
         return work, None
     model = read_loss_model(subject.bundle.manifest.plan)
     if subject.content is None:
