@@ -67,7 +67,7 @@ def check_choices(
             f"{option_list(foreign)} does not apply {where}: "
             f"{'nothing' if bundle is None else 'none of its stages'} uses it; leave it out"
         )
-    if options.scale != "1" and (why := no_binning(stages, has_optics=bundle is not None)):
+    if options.scale != "1" and (why := no_binning(stages)):
         raise ContractError(f"{option_text('scale')} does not apply {where}: {why}; leave it out")
     if options.size is not None and bundle is not None:
         sizes = bundle.manifest.sizes

@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import Final
 
 from camkit.bundle.manifest import Manifest
-from camkit.bundle.stages import Network, StageEntry, Wiener
+from camkit.bundle.stages import Network, StageEntry
 from camkit.runtime.options import Options, Scale
 from camkit.runtime.plan.bounded_networks import front_end
 from camkit.runtime.plan.decision import Work
@@ -42,25 +42,18 @@ def binned_work(manifest: Manifest, options: Options, work: Work, side_px: int) 
     return replace(work, strength=NETWORK_SHARE)
 
 
-def no_binning(stages: Sequence[StageEntry], *, has_optics: bool) -> str:
-    """Return why the mosaic of a camera is not averaged; empty where it may be.
-
-    Args:
-        stages: Of the camera.
-        has_optics: Whether it is a camera, and not what is done without a bundle.
-    """
+def no_binning(stages: Sequence[StageEntry]) -> str:
+    """Return why the mosaic of a camera is not averaged; empty where it may be."""
     needing = [s.type for s in stages if getattr(module_of(s), "ON_MOSAIC", False)]
     if needing:
         return f"its stage {needing[0]} works on the mosaic"
     networks = [stage for stage in stages if isinstance(stage, Network)]
     if any(front_end(network, stages) is None for network in networks):
         return "its network stands alone, and was trained on pixels of full size"
-    if has_optics and not any(isinstance(stage, Wiener) for stage in stages):
-        return "it has no filter bank, whose kernels would be those of larger pixels"
     return ""
 
 
 def draft_side_px(options: Options, stages: Sequence[StageEntry]) -> int:
     """Return the side of the squares that a draft averages over; 1 for none."""
     is_draft = options.quality == "draft" and options.method is None
-    return DRAFT_SIDE_PX if is_draft and not no_binning(stages, has_optics=True) else 1
+    return DRAFT_SIDE_PX if is_draft and not no_binning(stages) else 1
