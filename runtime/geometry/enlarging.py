@@ -13,9 +13,7 @@ MARGIN_PX: Final = 1
 """Rows above and below that a pixel is made of."""
 
 
-def enlarged_bands(
-    source: RowSource, times: int, size_px: tuple[int, int]
-) -> Iterator[FloatArray]:
+def enlarged_bands(source: RowSource, times: int, size_px: tuple[int, int]) -> Iterator[FloatArray]:
     """Yield a picture with `times` as many pixels along each axis, from top to bottom.
 
     Linear between pixels: no value leaves the range of the pixels that it is made of, so a flat

@@ -54,7 +54,7 @@ class Job:
         measured_noise: Noise of the raw signal; None where no stage needs it.
         white_balance: Gains in use; ones where the stages balance nothing.
         color: From the colour of the stages to that asked for; None where no stage makes one.
-        enlarged_px: (height, width) that the picture gets back at the end; None where it has the size
+        enlarged_px: (height, width) that the picture gets back at the end; None where it keeps that
             of the capture.
         falls_back: The capture lies outside what the bundle was shown to help with, and the caller
             wants no network then.

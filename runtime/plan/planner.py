@@ -16,13 +16,13 @@ from camkit.bundle.reader import Bundle
 from camkit.errors import ContractError
 from camkit.runtime.options import Options
 from camkit.runtime.plan.binned_work import SIDES_PX, binned_work
+from camkit.runtime.plan.counted import counted_work
 from camkit.runtime.plan.decision import Decision, Subject, Work
-from camkit.runtime.plan.estimate import estimate_seconds, tier_work_of
+from camkit.runtime.plan.estimate import estimate_seconds
 from camkit.runtime.plan.loss import LossModel, read_loss_model
 from camkit.runtime.plan.rule import apply_rules
 from camkit.runtime.plan.rules.size import REFERENCE, SIZE, size_cost_db
 from camkit.runtime.plan.speed import Speed
-from camkit.runtime.plan.tiers import work_shares
 from camkit.runtime.plan.ways import (
     planned,
     stand_ins,
@@ -191,17 +191,7 @@ def _within_error(subject: Subject, work: Work, model: LossModel | None) -> Plan
         for size in _sizes(subject)
         if size == _sizes(subject)[0] or size_cost_db(subject, size) <= spend
     ]
-    return min(plans, key=_nominal_work)
-
-
-def _nominal_work(plan: Plan) -> float:
-    """Return the work of the networks and the bank of a plan, in multiplications per pixel."""
-    tiers = tier_work_of(plan.subject, plan.work)
-    per_px = tiers.per_px()
-    if plan.work.labels is None or plan.subject.content is None:
-        return float(per_px[3])
-    bank, network = work_shares(plan.work.labels, plan.subject.content.cell_px, tiers)
-    return float(bank * per_px[1] + network * (per_px[3] - per_px[1]))
+    return min(plans, key=lambda plan: counted_work(plan.subject, plan.work))
 
 
 def _within_seconds(subject: Subject, work: Work, model: LossModel | None, speed: Speed) -> Plan:

@@ -108,7 +108,8 @@ def _compared(job: Job) -> Job:
 
 def seconds(entry: Network, subject: Subject, work: Work, speed: Speed) -> float:
     """Return the seconds that it will take."""
-    return network_seconds(entry.role, role_window_mp(entry.role, subject, work), speed)
+    window_mp = role_window_mp(entry.role, subject, work)
+    return network_seconds(entry.role, window_mp, speed, subject.megapixels)
 
 
 def given_rows(entry: Network, job: Job, streams: Sequence[Stream]) -> RowSource:
