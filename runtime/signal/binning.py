@@ -8,7 +8,7 @@ the full one shows when it is averaged. What averaging does to a colour is relat
 """
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,14 +81,15 @@ class Binning:
         means = waves(own, frequencies).mean(axis=1)
         moved = waves(np.arange(-1, 2) * self.side_px, frequencies)
         moved = moved @ self.shift_weights(colour)[0]
-        return np.abs(means * moved) / np.abs(waves(places, frequencies).mean(axis=1))
+        share = np.abs(means * moved) / np.abs(waves(places, frequencies).mean(axis=1))
+        return np.asarray(share, np.float64)
 
 
-def waves(places_px: FloatGrid, frequencies: FloatGrid) -> NDArray[np.complex128]:
+def waves(places_px: NDArray[Any], frequencies: FloatGrid) -> NDArray[np.complex128]:
     """Return (frequency, place): the phases at some places."""
-    return np.exp(2j * np.pi * np.outer(frequencies, places_px))
+    return np.asarray(np.exp(2j * np.pi * np.outer(frequencies, places_px)), np.complex128)
 
 
 def _hat(to: float) -> FloatArray:
     """Return (3,): weights of samples -1, 0, 1 for the signal at a place -1..1, linear."""
-    return np.maximum(1 - np.abs(np.arange(-1, 2) - to), 0).astype(np.float32)
+    return np.asarray(np.maximum(1 - np.abs(np.arange(-1, 2) - to), 0), np.float32)
