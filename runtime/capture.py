@@ -21,7 +21,7 @@ from camkit.noise import NoiseModel
 from camkit.picture_window import PictureWindow
 from camkit.runtime.machine.memory import mapping_of
 from camkit.runtime.metadata import Metadata
-from camkit.runtime.signal.binning import Binning
+from camkit.runtime.binning import Binning
 
 if TYPE_CHECKING:
     from camkit.bundle.plane import Plane

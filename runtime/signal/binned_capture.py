@@ -17,7 +17,7 @@ from camkit.errors import ContractError
 from camkit.runtime.capture import Capture
 from camkit.runtime.machine.memory import release_pages
 from camkit.runtime.machine.slices import run_chunks
-from camkit.runtime.signal.binning import COLOURS, Binning
+from camkit.runtime.binning import COLOURS, Binning
 
 BLACK: Final = 4096
 WHITE: Final = 65535

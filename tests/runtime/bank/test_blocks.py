@@ -19,7 +19,7 @@ from camkit.runtime.bank.blocks import (
 from camkit.runtime.bank.psf import FieldKernels, color_kernels
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.rows import ArrayRows, RollingRows
-from camkit.runtime.signal.binning import Binning
+from camkit.runtime.binning import Binning
 from tests.psf_factory import (
     PITCH_UM,
     coma_kernels,

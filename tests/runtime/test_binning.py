@@ -5,7 +5,7 @@ import pytest
 
 from camkit.cfa import CFA_PATTERNS, CfaPattern
 from camkit.errors import ContractError
-from camkit.runtime.signal.binning import COLOURS, Binning
+from camkit.runtime.binning import COLOURS, Binning
 
 
 @pytest.mark.parametrize("cfa", CFA_PATTERNS)
