@@ -10,6 +10,7 @@ from torch import Tensor, nn
 from camkit.cfa import CFA_PATTERNS
 from camkit.errors import ContractError
 from camkit.models_def.design.camera import Camera
+from camkit.models_def.design.descent import Descending, descended
 from camkit.models_def.design.design_recipe import DesignRecipe, OpticsRecipe
 from camkit.models_def.design.lens_module import WIDEST_PX, LensModule, fitting_window_px
 from camkit.models_def.design.loop import DesignLoop, DesignParts
@@ -84,6 +85,7 @@ def pixels_of(recipe: DesignRecipe, problem: Problem, begin: Tensor) -> Pixels:
         pitch_um=recipe.pixels.pitch_um,
         kernel_px=recipe.pixels.kernel_px or WIDEST_PX,
         color_weights=weights / weights.sum(1, keepdim=True),
+        window_follows=recipe.camera is not None,
     )
     if recipe.pixels.kernel_px:
         return pixels
@@ -179,6 +181,15 @@ def parts_of(
         return loop.best_merit
 
     begin = best_judged(lenses, judge)
+    if recipe.descent and recipe.fabrication and camera and recipe.schedule.lens_rate:
+        descending = Descending(
+            descent=recipe.descent,
+            camera=camera,
+            fabrication=recipe.fabrication,
+            make=lambda scaled: LensModule(problem, pixels, scaled),
+            seed=recipe.schedule.seed,
+        )
+        begin = descended(begin, descending)
     return parts_at(begin, network_of(recipe), whiten=recipe.optics.whiten)
 
 

@@ -113,7 +113,7 @@ class Camera:
         matrix = np.array(recipe.sensor.color_matrix)
         to_camera, self.gains = camera_from_rec709(matrix)
         self._to_camera = torch.from_numpy(to_camera).float()
-        self._to_rec709 = torch.from_numpy(rec709_from_camera(matrix)).float()
+        self.to_rec709 = torch.from_numpy(rec709_from_camera(matrix)).float()
 
     def noise_at(self, places: Tensor) -> Noise:
         """Return the noise of patches; `places` (b,) 0..1 lie between the ISOs."""
@@ -126,6 +126,12 @@ class Camera:
             shot=torch.tensor([model.shot for model in models]),
             read=torch.tensor([model.read_variance for model in models]),
         )
+
+    def variance_at(self, iso: float, level: float) -> Tensor:
+        """Return the variance (3,) of the noise of a level after white balance."""
+        model = self.recipe.sensor.noise_at(iso).with_gains(self.gains)
+        read = torch.tensor(model.read_variance, dtype=torch.float64)
+        return read + level * torch.tensor(model.shot, dtype=torch.float64)
 
     def capture(self, sharp: Tensor, kernels: Tensor, noise: Noise, normal: Tensor) -> Tensor:
         """Photograph patches and develop them.
@@ -186,7 +192,7 @@ class Camera:
             bright = BRIGHT**0.5 / (scale * noise.shot.sqrt())
             output = bounded(output, front, None, self.recipe.light, scale=scale, bright=bright)
         linear = unstabilise(output, noise.shot, noise.read, scale=scale)
-        return encode_srgb(_turned(linear, self._to_rec709))
+        return encode_srgb(_turned(linear, self.to_rec709))
 
     def _stable(self, planes: Tensor, noise: Noise) -> Tensor:
         shot = _columns(noise.shot)

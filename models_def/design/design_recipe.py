@@ -7,6 +7,7 @@ from typing import Any, Final, Literal, TypeVar, get_args
 
 from camkit.errors import ContractError
 from camkit.models_def.design.camera import CameraChoice
+from camkit.models_def.design.expected import Descent
 from camkit.models_def.design.front import Front
 from camkit.models_def.design.lens_module import MoveUnits
 from camkit.models_def.design.loop import DesignSchedule
@@ -25,7 +26,7 @@ Spacing = Literal["height", "area"]
 
 _KEYS: Final = {
     *("name", "prescription", "vary", "optics", "limits", "pixels", "front", "network", "loss"),
-    *("schedule", "data", "starts", "fabrication", "camera"),
+    *("schedule", "data", "starts", "fabrication", "camera", "descent"),
 }
 
 
@@ -148,6 +149,7 @@ class DesignRecipe:
         starts: How many lenses near it are tried first.
         fabrication: Errors of the copies that captures are made with; None for the lens itself.
         camera: Whose bank stands in front, where `front` restores colours together.
+        descent: On what that bank is expected to leave, from the best start; None for none.
     """
 
     name: str
@@ -164,6 +166,7 @@ class DesignRecipe:
     starts: Starts
     fabrication: FabricationErrors | None = None
     camera: CameraChoice | None = None
+    descent: Descent | None = None
 
 
 def read_design(path: Path) -> DesignRecipe:
@@ -200,9 +203,12 @@ def to_design(table: Mapping[str, Any]) -> DesignRecipe:
         starts=section("starts", Starts, table.get("starts", {})),
         fabrication=_optional("fabrication", FabricationErrors, table),
         camera=_optional("camera", CameraChoice, table),
+        descent=_optional("descent", Descent, table),
     )
     if (recipe.camera is not None) != (recipe.front.kind == "together"):
         raise ContractError("the front 'together' and a table [camera] belong together")
+    if recipe.descent is not None and (recipe.camera is None or recipe.fabrication is None):
+        raise ContractError("a table [descent] needs [camera] and [fabrication]")
     if recipe.starts.judged and not recipe.pixels.kernel_px:
         raise ContractError("judged starts need one window for all: set pixels.kernel_px")
     if recipe.starts.judged and recipe.loss.needs_network and recipe.front.kind == "none":
@@ -235,6 +241,7 @@ def with_choices(
         schedule=schedule,
         prescription=prescription or recipe.prescription,
         starts=recipe.starts if search else Starts(),
+        descent=recipe.descent if search else None,
     )
 
 
