@@ -59,7 +59,7 @@ def test_a_copy_that_is_the_lens_leaves_no_doubt_and_a_shifted_one_that_of_its_p
         f = of.together.spread.frequencies[n]
         wanted = float(np.mean((2 * np.sin(np.pi * f * np.cos(angle))) ** 2))
         # a mean between the neighbours of a frequency is not the value there
-        assert float(spread[0, 1, 0, n]) == pytest.approx(wanted, rel=0.12)
+        assert float(spread[0, 1, 0, n]) == pytest.approx(wanted, rel=0.2)
 
 
 def test_the_stated_doubt_is_that_of_the_recipe_at_each_height() -> None:
