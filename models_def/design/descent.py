@@ -49,7 +49,7 @@ class Descending:
 
 
 def descended(begin: Tensor, parts: Descending) -> Tensor:
-    """Return the lens (variable,), scaled, at the end of the best descent; no worse than `begin`."""
+    """Return the lens (variable,), scaled, at the end of the best descent, or `begin`."""
     descent, draws = parts.descent, torch.Generator().manual_seed(parts.seed)
     starts = [begin]
     for _ in range(descent.starts - 1):

@@ -262,7 +262,10 @@ class DesignLoop:
             known: What the filter knows.
             capture_kernels: That captures are made with; None for the nominal ones.
         """
-        made, schedule = known.kernels if capture_kernels is None else capture_kernels, self.schedule
+        made, schedule = (
+            known.kernels if capture_kernels is None else capture_kernels,
+            self.schedule,
+        )
         recovered = [
             self._recovered(batch, known, depth, of_depth[batch.fields])
             for depth, of_depth in enumerate(made)

@@ -122,7 +122,9 @@ def test_gradients_to_the_lens_are_those_of_finite_differences(table: dict[str, 
         developed = of.capture(sharp, kernels[0], noise, normal)
         restored = of.restored(developed, kernels[0], spread, noise)
         picture = of.pictures(developed, restored, noise, network)[None]
-        return design_loss(DesignLoss(kind="log_mse"), picture, encode_srgb(sharp[..., 32:56, 32:56]))
+        return design_loss(
+            DesignLoss(kind="log_mse"), picture, encode_srgb(sharp[..., 32:56, 32:56])
+        )
 
     begin = torch.zeros_like(lens.moves)
     (slope,) = torch.autograd.grad(loss(begin), lens.moves)
