@@ -373,15 +373,23 @@ class DesignLoop:
             rows = []
             for batch in self._valid[:count]:
                 pictures, sharp = self._pictures(batch, known)
-                patch_kernels = known.kernels[0][batch.fields]
-                recorded = capture(batch.sharp, patch_kernels, self.parts.recorder, batch.normal[0])
-                edge = self.parts.front.margin_px
-                inner = slice(edge, recorded.shape[-1] - edge)
-                rows.append((encode_srgb(recorded[..., inner, inner])[0], pictures[0, 0], sharp[0]))
+                rows.append((self._seen(batch, known)[0], pictures[0, 0], sharp[0]))
         captures, recovered, sharp_ones = (
             torch.stack(column) for column in zip(*rows, strict=True)
         )
         return known.kernels, (captures, recovered, sharp_ones)
+
+    def _seen(self, batch: Batch, known: Knowledge) -> Tensor:
+        """Return captures of the first depth through the nominal lens, (b, 3, p, p) in sRGB."""
+        parts, patch_kernels = self.parts, known.kernels[0][batch.fields]
+        if parts.camera is not None:
+            noise = parts.camera.noise_at(batch.iso)
+            developed = parts.camera.capture(batch.sharp, patch_kernels, noise, batch.normal[0])
+            return parts.camera.pictures(developed, developed, noise, None)
+        recorded = capture(batch.sharp, patch_kernels, parts.recorder, batch.normal[0])
+        edge = parts.front.margin_px
+        inner = slice(edge, recorded.shape[-1] - edge)
+        return encode_srgb(recorded[..., inner, inner])
 
     def _share_gradients(self) -> None:
         if not (torch.distributed.is_available() and torch.distributed.is_initialized()):
