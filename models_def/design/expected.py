@@ -27,6 +27,10 @@ from camkit.models_def.sensors.wiener import to_otf
 GRID_PX: Final = 96
 """Side of the grid of frequencies; a kernel that is wider wraps, which keeps its transfer there."""
 
+LOST_SHARE: Final = 0.005
+"""Of the light: so much may fall outside the window of a kernel."""
+LOST_WEIGHT: Final = 40.0
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Descent:
@@ -83,8 +87,14 @@ class ExpectedError:
         self._weight = to_rec709.T @ to_rec709
 
     def __call__(self, lens: DesignLens) -> tuple[Tensor, Tensor]:
-        """Return dB (iso, depth, field), and the penalty of the limits (a scalar)."""
+        """Return dB (iso, depth, field), and the penalty of the limits (a scalar).
+
+        Light that falls outside the window is missing from the transfer, so a lens could hide its
+        blur there. Beyond half a percent it counts as a limit.
+        """
         kernels, penalty = lens()
+        lost = (1 - LOST_SHARE - kernels.sum((-2, -1))).clamp(min=0)
+        penalty = penalty + LOST_WEIGHT * lost.square().sum()
         transfer = _transfer(kernels)
         gaps = [(_transfer(lens.made_kernels(c)) - transfer).abs().square() for c in self.copies]
         spread = torch.stack(gaps).mean(0)

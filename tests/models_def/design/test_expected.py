@@ -10,6 +10,7 @@ import torch
 from camkit.models_def.design.assembly import parts_of, problem_of
 from camkit.models_def.design.camera import Camera
 from camkit.models_def.design.descent import Descending, descended
+from camkit.models_def.design.design_recipe import to_design
 from camkit.models_def.design.expected import GRID_PX, Descent, ExpectedError
 from camkit.models_def.design.fabrication import draw_copy
 from camkit.models_def.design.lens import DesignLens
@@ -84,6 +85,20 @@ def test_its_gradient_is_that_of_finite_differences(table: dict[str, Any]) -> No
         step[number] = 1e-4
         found = float((value(begin + step) - value(begin - step)).detach()) / 2e-4
         assert found == pytest.approx(float(slope[number]), rel=1e-2)
+
+
+def test_a_lens_may_not_hide_its_blur_outside_the_window(table: dict[str, Any]) -> None:
+    copies = [draw_copy(lens_of(table).problem.free.lens, ERRORS, 1)]
+    penalties = []
+    for kernel_px in (11, 129):
+        behind_the_bank(table)
+        table["pixels"]["kernel_px"] = kernel_px
+        lens = parts_of(to_design(table), folder=RECIPES).lens
+        with torch.no_grad():
+            error = ExpectedError(camera(), DESCENT, copies)
+            penalties.append(float(error(lens)[1] - lens()[1]))
+    assert penalties[0] > 0.1
+    assert penalties[1] == 0
 
 
 def test_a_descent_improves_a_defocused_lens_and_never_ends_below_its_start(
