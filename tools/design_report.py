@@ -79,18 +79,18 @@ def judged(
     lens = replace(
         recipe.lens, prescription=name, seed=arguments.seed, copies=COPIES, validation_copies=COPIES
     )
-    own = replace(recipe, lens=lens)
-    material = trace_material(own, arguments.recipe.parent, arguments.cache)
-    own = own.with_together(fitted(own, material, arguments.fit_data, fits=arguments.fit))
-    captures = make_validation_captures(own, material.bank, arguments.data)
+    camera = replace(recipe, lens=lens)
+    material = trace_material(camera, arguments.recipe.parent, arguments.cache)
+    camera = camera.with_together(fitted(camera, material, arguments.fit_data, fits=arguments.fit))
+    captures = make_validation_captures(camera, material.bank, arguments.data)
     places = [(c.field_share, c.iso) for c in captures]
     title = Path(name).stem
     ways: list[tuple[str, Restorer]] = [(f"{title}, bank", bank_restorer)]
     for source in weights:
-        restorer = network_restorer(own, arguments.size, source)
+        restorer = network_restorer(camera, arguments.size, source)
         ways.append((f"{title}, {arguments.size} of {Path(source).stem}", restorer))
     return [
-        Row(name=way, every_db=every_db(captures, own, restore), places=places)
+        Row(name=way, every_db=every_db(captures, camera, restore), places=places)
         for way, restore in ways
     ]
 
@@ -113,9 +113,9 @@ def table_of(rows: list[Row], base: Row) -> str:
     return markdown_table(heads, cells)
 
 
-def _mean(values: list[float], chosen: list[bool]) -> float:
-    kept = [value for value, is_chosen in zip(values, chosen, strict=True) if is_chosen]
-    return sum(kept) / len(kept)
+def _mean(values: list[float], are_chosen: list[bool]) -> float:
+    values_there = [value for value, is_chosen in zip(values, are_chosen, strict=True) if is_chosen]
+    return sum(values_there) / len(values_there)
 
 
 def main() -> None:

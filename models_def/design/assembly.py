@@ -9,12 +9,12 @@ from torch import Tensor, nn
 
 from camkit.cfa import CFA_PATTERNS
 from camkit.errors import ContractError
-from camkit.models_def.design.camera import Camera
 from camkit.models_def.design.descent import Descending, descended
 from camkit.models_def.design.design_recipe import DesignRecipe, OpticsRecipe
 from camkit.models_def.design.lens_module import WIDEST_PX, LensModule, fitting_window_px
 from camkit.models_def.design.loop import DesignLoop, DesignParts
 from camkit.models_def.design.sensor import Recorder
+from camkit.models_def.design.shipped_camera import Camera
 from camkit.models_def.design.starts import Starts, best_judged, best_starts
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.networks.catalog import build_network, check_patch

@@ -7,10 +7,10 @@ from typing import Final
 import torch
 from torch import Tensor
 
-from camkit.models_def.design.camera import Camera
 from camkit.models_def.design.expected import Descent, ExpectedError
 from camkit.models_def.design.fabrication import draw_copy
 from camkit.models_def.design.lens import DesignLens
+from camkit.models_def.design.shipped_camera import Camera
 from camkit.models_def.optics.prescription import FabricationErrors
 from camkit.progress import counted
 
@@ -55,11 +55,11 @@ def descended(begin: Tensor, parts: Descending) -> Tensor:
     for _ in range(descent.starts - 1):
         lens = parts.make(begin)
         normal = torch.randn(lens.moves.shape, generator=draws, dtype=lens.moves.dtype)
-        starts.append(_moved(lens, descent.spread * normal))
+        starts.append(_numbers_at(lens, descent.spread * normal))
     ends = [(_merit(begin, parts), begin)]
-    ends += [_down(start, parts) for start in counted(starts, "descending", "lenses")]
+    ends += [_descend(start, parts) for start in counted(starts, "descending", "lenses")]
     for _ in counted(range(descent.rounds - 1), "descending on", "rounds"):
-        ends.append(_down(_best(ends)[1], parts))
+        ends.append(_descend(_best(ends)[1], parts))
     return _best(ends)[1]
 
 
@@ -67,7 +67,7 @@ def _best(ends: list[tuple[float, Tensor]]) -> tuple[float, Tensor]:
     return max(ends, key=lambda end: end[0])
 
 
-def _moved(lens: DesignLens, moves: Tensor) -> Tensor:
+def _numbers_at(lens: DesignLens, moves: Tensor) -> Tensor:
     with torch.no_grad():
         lens.moves.copy_(moves)
         return lens.scaled()
@@ -79,7 +79,7 @@ def _merit(scaled: Tensor, parts: Descending) -> float:
         return -float(_loss(lens, parts.error_of(lens), parts.descent))
 
 
-def _down(begin: Tensor, parts: Descending) -> tuple[float, Tensor]:
+def _descend(begin: Tensor, parts: Descending) -> tuple[float, Tensor]:
     """Return merit and numbers of the best lens on the way down from one."""
     lens, descent = parts.make(begin), parts.descent
     error = parts.error_of(lens)

@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any, Final, Literal, TypeVar, get_args
 
 from camkit.errors import ContractError
-from camkit.models_def.design.camera import CameraChoice
 from camkit.models_def.design.expected import Descent
 from camkit.models_def.design.front import Front
 from camkit.models_def.design.lens_module import MoveUnits
 from camkit.models_def.design.loop import DesignSchedule
 from camkit.models_def.design.loss import DesignLoss
+from camkit.models_def.design.shipped_camera import CameraChoice
 from camkit.models_def.design.starts import Starts
 from camkit.models_def.networks.catalog import NETWORK_NAMES
 from camkit.models_def.optics.prescription import FabricationErrors

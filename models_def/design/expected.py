@@ -18,9 +18,9 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.design.camera import Camera
 from camkit.models_def.design.fabrication import Copy
 from camkit.models_def.design.lens import DesignLens
+from camkit.models_def.design.shipped_camera import Camera
 from camkit.models_def.sensors.together import CORNER_FREQUENCY, frequencies_squared
 from camkit.models_def.sensors.wiener import to_otf
 
@@ -72,7 +72,7 @@ class ExpectedError:
         """Compute what does not depend on the lens."""
         model, level = camera.together, descent.level
         f2 = frequencies_squared((GRID_PX, GRID_PX), torch.zeros((), dtype=torch.float64))
-        self.copies, self._own, self._mistrust = copies, model.own, model.mistrust
+        self.copies, self._own_power, self._mistrust = copies, model.own, model.mistrust
         prior = (f2 + CORNER_FREQUENCY**2) ** (-model.exponent / 2)
         self._prior = model.scale * level**2 * prior
         self._share = torch.full_like(f2, 2.0)  # a half spectrum, its ends apart
@@ -93,8 +93,8 @@ class ExpectedError:
         blur there. Beyond half a percent it counts as a limit.
         """
         kernels, penalty = lens()
-        lost = (1 - LOST_SHARE - kernels.sum((-2, -1))).clamp(min=0)
-        penalty = penalty + LOST_WEIGHT * lost.square().sum()
+        light_lost = (1 - LOST_SHARE - kernels.sum((-2, -1))).clamp(min=0)
+        penalty = penalty + LOST_WEIGHT * light_lost.square().sum()
         transfer = _transfer(kernels)
         gaps = [(_transfer(lens.made_kernels(c)) - transfer).abs().square() for c in self.copies]
         spread = torch.stack(gaps).mean(0)
@@ -104,13 +104,13 @@ class ExpectedError:
 
     def _error(self, power: Tensor, spread: Tensor, noise: Tensor) -> Tensor:
         """Return the squared error (depth, field) of transfers (depth, field, 3, h, w)."""
-        prior, own_prior = self._prior, self._own * self._prior
-        doubt = (self._own * power + self._mistrust * spread) * prior + noise
+        prior, own_prior = self._prior, self._own_power * self._prior
+        doubt = (self._own_power * power + self._mistrust * spread) * prior + noise
         light = prior / (1 + prior * (power / doubt).sum(-3))
         g = 1 - own_prior * power / doubt
         shared = torch.einsum("...ihw,ij,...jhw->...hw", g, self._weight, g)
-        apart = torch.einsum("i,...ihw->...hw", self._weight.diag(), g)
-        return ((light * shared + own_prior * apart) * self._share).sum((-2, -1))
+        of_colours = torch.einsum("i,...ihw->...hw", self._weight.diag(), g)
+        return ((light * shared + own_prior * of_colours) * self._share).sum((-2, -1))
 
 
 def _transfer(kernels: Tensor) -> Tensor:

@@ -20,12 +20,12 @@ import torch
 from torch import Tensor, nn
 
 from camkit.errors import ContractError
-from camkit.models_def.design.camera import Camera, Knowledge
 from camkit.models_def.design.fabrication import draw_copy
 from camkit.models_def.design.front import Front
 from camkit.models_def.design.lens import DesignLens
 from camkit.models_def.design.loss import DesignLoss, design_loss
 from camkit.models_def.design.sensor import Recorder, capture
+from camkit.models_def.design.shipped_camera import Camera, Knowledge
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import FabricationErrors
 from camkit.models_def.sensors.tone import encode_srgb
@@ -191,8 +191,8 @@ class DesignLoop:
             )
             if self.step % self._spread_steps == 0:
                 self._spread = self._measured_spread(kernels)
-            known = Knowledge(kernels=kernels, spread=self._spread)
-            pictures, sharp = self._pictures(batch, known, capture_kernels)
+            knowledge = Knowledge(kernels=kernels, spread=self._spread)
+            pictures, sharp = self._pictures(batch, knowledge, capture_kernels)
             loss = design_loss(parts.loss, pictures, sharp)
             total = loss + schedule.penalty_weight * penalty
         self._optimizer.zero_grad(set_to_none=True)
@@ -253,42 +253,42 @@ class DesignLoop:
         return Knowledge(kernels=kernels, spread=self._measured_spread(kernels)), penalty
 
     def _pictures(
-        self, batch: Batch, known: Knowledge, capture_kernels: Tensor | None = None
+        self, batch: Batch, knowledge: Knowledge, capture_kernels: Tensor | None = None
     ) -> tuple[Tensor, Tensor]:
         """Return recovered pictures (depth, b, 3, p, p) and the sharp ones in sRGB tone.
 
         Args:
             batch: Patches.
-            known: What the filter knows.
+            knowledge: What the filter knows.
             capture_kernels: That captures are made with; None for the nominal ones.
         """
-        made, schedule = (
-            known.kernels if capture_kernels is None else capture_kernels,
+        copy_kernels, schedule = (
+            knowledge.kernels if capture_kernels is None else capture_kernels,
             self.schedule,
         )
         recovered = [
-            self._recovered(batch, known, depth, of_depth[batch.fields])
-            for depth, of_depth in enumerate(made)
+            self._recovered(batch, knowledge, depth, of_depth[batch.fields])
+            for depth, of_depth in enumerate(copy_kernels)
         ]
         edge = (batch.sharp.shape[-1] - schedule.patch_px) // 2
         sharp = batch.sharp[..., edge : edge + schedule.patch_px, edge : edge + schedule.patch_px]
         return torch.stack(recovered), encode_srgb(sharp)
 
     def _recovered(
-        self, batch: Batch, known: Knowledge, depth: int, patch_kernels: Tensor
+        self, batch: Batch, knowledge: Knowledge, depth: int, patch_kernels: Tensor
     ) -> Tensor:
         """Return recovered pictures (b, 3, p, p) of a depth through kernels (b, 3, k, k)."""
         parts = self.parts
-        kernels = known.kernels[depth] if parts.front.depth_known else known.kernels.mean(0)
+        kernels = knowledge.kernels[depth] if parts.front.depth_known else knowledge.kernels.mean(0)
         filter_kernels, normal = kernels[batch.fields], batch.normal[depth]
-        if parts.camera is None or known.spread is None:
+        if parts.camera is None or knowledge.spread is None:
             recorded = capture(batch.sharp, patch_kernels, parts.recorder, normal)
             planes = parts.front.planes(recorded, filter_kernels)
             output: Tensor = planes[:, -3:] if parts.network is None else parts.network(planes)
             return output
         noise = parts.camera.noise_at(batch.iso)
         developed = parts.camera.capture(batch.sharp, patch_kernels, noise, normal)
-        spread = known.spread[depth][batch.fields]
+        spread = knowledge.spread[depth][batch.fields]
         restored = parts.camera.restored(developed, filter_kernels, spread, noise)
         return parts.camera.pictures(developed, restored, noise, parts.network)
 
@@ -317,10 +317,10 @@ class DesignLoop:
         the least loss. What a lens outside its limits pays in the loss counts against it.
         """
         with torch.no_grad():
-            known, penalty = self._knowledge()
-            copies = self._valid_copies(known.kernels)
+            knowledge, penalty = self._knowledge()
+            copies = self._valid_copies(knowledge.kernels)
             scores = [
-                self._judged(batch, known, copies[i % len(copies)])
+                self._judged(batch, knowledge, copies[i % len(copies)])
                 for i, batch in enumerate(self._valid)
             ]
         valid_db, valid_loss = (float(np.mean(column)) for column in zip(*scores, strict=True))
@@ -334,7 +334,7 @@ class DesignLoop:
             loss=loss,
             valid_db=valid_db,
             best_db=self.best_db,
-            lost_light=1 - float(known.kernels.sum((-2, -1)).amin()),
+            lost_light=1 - float(knowledge.kernels.sum((-2, -1)).amin()),
         )
 
     def _valid_copies(self, kernels: Tensor) -> list[Tensor]:
@@ -343,10 +343,10 @@ class DesignLoop:
         return [self._capture_kernels(kernels, VALID_SEED + i, moving=False) for i in range(count)]
 
     def _judged(
-        self, batch: Batch, known: Knowledge, capture_kernels: Tensor
+        self, batch: Batch, knowledge: Knowledge, capture_kernels: Tensor
     ) -> tuple[float, float]:
         """Return mean PSNR and loss of a batch."""
-        pictures, sharp = self._pictures(batch, known, capture_kernels)
+        pictures, sharp = self._pictures(batch, knowledge, capture_kernels)
         loss = float(design_loss(self.parts.loss, pictures, sharp))
         return _psnr_db(pictures, sharp), loss
 
@@ -357,31 +357,31 @@ class DesignLoop:
             Field, recovered (depth, 1, 3, p, p) and sharp (1, 3, p, p), in sRGB tone.
         """
         with torch.no_grad():
-            known, _ = self._knowledge()
-            copies = self._valid_copies(known.kernels)
+            knowledge, _ = self._knowledge()
+            copies = self._valid_copies(knowledge.kernels)
             for field in range(len(self.parts.lens.problem.slopes)):
                 at = torch.tensor([field])
                 for number in range(field * patches, (field + 1) * patches):
                     batch = replace(self._draw(SCORE_SEED + number, 1), fields=at)
                     capture_kernels = copies[number % len(copies)]
-                    yield field, *self._pictures(batch, known, capture_kernels)
+                    yield field, *self._pictures(batch, knowledge, capture_kernels)
 
     def look(self, count: int = 4) -> tuple[Tensor, tuple[Tensor, Tensor, Tensor]]:
         """Return kernels and, of fixed patches, (count, 3, h, w) captures, recovered, sharp."""
         with torch.no_grad():
-            known, _ = self._knowledge()
+            knowledge, _ = self._knowledge()
             rows = []
             for batch in self._valid[:count]:
-                pictures, sharp = self._pictures(batch, known)
-                rows.append((self._seen(batch, known)[0], pictures[0, 0], sharp[0]))
+                pictures, sharp = self._pictures(batch, knowledge)
+                rows.append((self._capture_pictures(batch, knowledge)[0], pictures[0, 0], sharp[0]))
         captures, recovered, sharp_ones = (
             torch.stack(column) for column in zip(*rows, strict=True)
         )
-        return known.kernels, (captures, recovered, sharp_ones)
+        return knowledge.kernels, (captures, recovered, sharp_ones)
 
-    def _seen(self, batch: Batch, known: Knowledge) -> Tensor:
+    def _capture_pictures(self, batch: Batch, knowledge: Knowledge) -> Tensor:
         """Return captures of the first depth through the nominal lens, (b, 3, p, p) in sRGB."""
-        parts, patch_kernels = self.parts, known.kernels[0][batch.fields]
+        parts, patch_kernels = self.parts, knowledge.kernels[0][batch.fields]
         if parts.camera is not None:
             noise = parts.camera.noise_at(batch.iso)
             developed = parts.camera.capture(batch.sharp, patch_kernels, noise, batch.normal[0])

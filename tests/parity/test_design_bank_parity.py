@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from camkit.models_def.design.camera import Camera, CameraChoice, Noise
+from camkit.models_def.design.shipped_camera import Camera, CameraChoice, Noise
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.training.kind import read_recipe
 from camkit.runtime.bank.blocks import Block, taper_edges, to_otf

@@ -8,17 +8,17 @@ import pytest
 import torch
 
 from camkit.models_def.design.assembly import parts_of, problem_of
-from camkit.models_def.design.camera import Camera
 from camkit.models_def.design.descent import Descending, descended
 from camkit.models_def.design.design_recipe import to_design
 from camkit.models_def.design.expected import GRID_PX, Descent, ExpectedError
 from camkit.models_def.design.fabrication import draw_copy
 from camkit.models_def.design.lens import DesignLens
 from camkit.models_def.design.lens_module import LensModule
+from camkit.models_def.design.shipped_camera import Camera
 from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.prescription import FabricationErrors
 from camkit.models_def.sensors.wiener import to_otf
-from tests.models_def.design.test_camera import RECIPES, behind_the_bank, camera
+from tests.models_def.design.test_shipped_camera import RECIPES, behind_the_bank, camera
 
 ERRORS = FabricationErrors()
 DESCENT = Descent(rounds=1, evaluations=6, copies=2, iso=(100.0, 1600.0))

@@ -6,10 +6,10 @@ import pytest
 import torch
 
 from camkit.models_def.design.assembly import parts_of
-from camkit.models_def.design.camera import Knowledge
 from camkit.models_def.design.design_recipe import DesignRecipe, to_design
 from camkit.models_def.design.loop import DesignLoop
 from camkit.models_def.design.loss import design_loss
+from camkit.models_def.design.shipped_camera import Knowledge
 
 
 def make_loop(recipe: DesignRecipe) -> DesignLoop:

@@ -10,10 +10,10 @@ import torch
 
 from camkit.errors import ContractError
 from camkit.models_def.design.assembly import parts_of
-from camkit.models_def.design.camera import Camera, CameraChoice
 from camkit.models_def.design.design_recipe import DesignRecipe, to_design
 from camkit.models_def.design.loop import DesignLoop
 from camkit.models_def.design.loss import DesignLoss, design_loss
+from camkit.models_def.design.shipped_camera import Camera, CameraChoice
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.networks.catalog import build_network
 from camkit.models_def.sensors.together import frequencies_squared, spread_at

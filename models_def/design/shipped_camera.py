@@ -69,7 +69,7 @@ class CameraChoice:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Knowledge:
-    """What a filter knows of a lens.
+    """The knowledge that a filter has of a lens.
 
     Attributes:
         kernels: (depth, field, 3, k, k), nominal.
@@ -169,7 +169,7 @@ class Camera:
             facts.otf,
             facts.level,
             facts.variance,
-            _between(spread.to(planes.dtype), self.together.spread.frequencies, f),
+            _interpolated_lines(spread.to(planes.dtype), self.together.spread.frequencies, f),
             Numbers.of(self.together, planes),
         )
 
@@ -224,7 +224,7 @@ class Camera:
         return torch.from_numpy((1 - part) * table[below] + part * table[above]).float()[None]
 
 
-def _between(lines: Tensor, frequencies: tuple[float, ...], f: Tensor) -> Tensor:
+def _interpolated_lines(lines: Tensor, frequencies: tuple[float, ...], f: Tensor) -> Tensor:
     """Return lines (..., n) at the places f (h, w), linear between frequencies, (..., h, w)."""
     places = torch.tensor(frequencies, dtype=f.dtype)
     at = f.clamp(max=places[-1])
