@@ -7,7 +7,7 @@ from typing import Final
 import torch
 from torch import Tensor
 
-from camkit.models_def.design.expected import Descent, ExpectedError
+from camkit.models_def.design.expected import Descent, ExpectedError, even_mean
 from camkit.models_def.design.fabrication import draw_copy
 from camkit.models_def.design.lens import DesignLens
 from camkit.models_def.design.shipped_camera import Camera
@@ -48,18 +48,35 @@ class Descending:
         return ExpectedError(self.camera, self.descent, copies)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Goal:
+    """The loss of a lens: gains over the lens at the start (iso, depth, field), and limits."""
+
+    error: ExpectedError
+    begin_db: Tensor
+    descent: Descent
+
+    def loss(self, lens: DesignLens) -> Tensor:
+        every_db, penalty = self.error(lens)
+        gain = even_mean(every_db - self.begin_db, self.descent.evenness)
+        return self.descent.penalty_weight * penalty - gain
+
+
 def descended(begin: Tensor, parts: Descending) -> Tensor:
     """Return the lens (variable,), scaled, at the end of the best descent, or `begin`."""
     descent, draws = parts.descent, torch.Generator().manual_seed(parts.seed)
+    lens = parts.make(begin)
+    error = parts.error_of(lens)
+    with torch.no_grad():
+        goal = _Goal(error=error, begin_db=error(lens)[0], descent=descent)
+        ends = [(-float(goal.loss(lens)), begin)]
     starts = [begin]
     for _ in range(descent.starts - 1):
-        lens = parts.make(begin)
         normal = torch.randn(lens.moves.shape, generator=draws, dtype=lens.moves.dtype)
         starts.append(_numbers_at(lens, descent.spread * normal))
-    ends = [(_merit(begin, parts), begin)]
-    ends += [_descend(start, parts) for start in counted(starts, "descending", "lenses")]
+    ends += [_descend(parts.make(start), goal) for start in counted(starts, "descending", "lenses")]
     for _ in counted(range(descent.rounds - 1), "descending on", "rounds"):
-        ends.append(_descend(_best(ends)[1], parts))
+        ends.append(_descend(parts.make(_best(ends)[1]), goal))
     return _best(ends)[1]
 
 
@@ -73,21 +90,14 @@ def _numbers_at(lens: DesignLens, moves: Tensor) -> Tensor:
         return lens.scaled()
 
 
-def _merit(scaled: Tensor, parts: Descending) -> float:
-    lens = parts.make(scaled)
-    with torch.no_grad():
-        return -float(_loss(lens, parts.error_of(lens), parts.descent))
-
-
-def _descend(begin: Tensor, parts: Descending) -> tuple[float, Tensor]:
+def _descend(lens: DesignLens, goal: _Goal) -> tuple[float, Tensor]:
     """Return merit and numbers of the best lens on the way down from one."""
-    lens, descent = parts.make(begin), parts.descent
-    error = parts.error_of(lens)
-    best = (float("-inf"), begin)
+    evaluations = goal.descent.evaluations
+    best = (float("-inf"), lens.scaled().detach())
     optimiser = torch.optim.LBFGS(
         [lens.moves],
-        max_iter=descent.evaluations,
-        max_eval=descent.evaluations,
+        max_iter=evaluations,
+        max_eval=evaluations,
         history_size=_HISTORY,
         line_search_fn="strong_wolfe",
     )
@@ -95,15 +105,10 @@ def _descend(begin: Tensor, parts: Descending) -> tuple[float, Tensor]:
     def closure() -> Tensor:
         nonlocal best
         optimiser.zero_grad()
-        loss = _loss(lens, error, descent)
+        loss = goal.loss(lens)
         loss.backward()  # type: ignore[no-untyped-call]
         best = max(best, (-float(loss.detach()), lens.scaled().detach()), key=lambda end: end[0])
         return loss
 
     optimiser.step(closure)  # type: ignore[no-untyped-call]
     return best
-
-
-def _loss(lens: DesignLens, error: ExpectedError, descent: Descent) -> Tensor:
-    every_db, penalty = error(lens)
-    return -every_db.mean() + descent.penalty_weight * penalty

@@ -11,6 +11,7 @@ Rec.709, in dB, is a merit of a lens with exact gradients, V's included: a desce
 hundredth of the time that pictures take, and goes further. It does not know the network.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -42,8 +43,11 @@ class Descent:
         starts: Lenses that are descended from, the given one among them.
         spread: Standard deviation of the others' moves, of which 1 changes the spots by a pixel.
         copies: Monte-Carlo samples that V is measured with.
-        iso: At which the error is expected; the mean of its dB counts.
+        iso: At which the error is expected.
         level: Of the scene, 1.0 = white.
+        evenness: Per dB. Gains over the lens at the start count by a mean that weighs small gains
+            more: 0 is the plain mean, which takes from the corner for the axis; with much of it
+            only the least gain of a field and ISO counts.
         penalty_weight: Of the limits of the lens.
     """
 
@@ -54,14 +58,15 @@ class Descent:
     copies: int = 6
     iso: tuple[float, ...] = (100.0, 400.0, 1600.0)
     level: float = 0.25
+    evenness: float = 2.0
     penalty_weight: float = 50.0
 
     def __post_init__(self) -> None:
         if min(self.rounds, self.evaluations, self.starts, self.copies) < 1 or not self.iso:
             raise ContractError(f"counts of a descent must be >= 1; got {self}")
-        if not (min(self.iso) > 0 and self.level > 0 and self.spread >= 0):
+        if not (min(self.iso) > 0 and self.level > 0 and min(self.spread, self.evenness) >= 0):
             raise ContractError(
-                f"descent.iso and descent.level must be > 0, spread >= 0; got {self}"
+                f"descent.iso and level must be > 0, spread and evenness >= 0; got {self}"
             )
 
 
@@ -116,3 +121,11 @@ class ExpectedError:
 def _transfer(kernels: Tensor) -> Tensor:
     otf = to_otf(kernels.flatten(0, -4), (GRID_PX, GRID_PX))
     return otf.reshape(*kernels.shape[:-2], *otf.shape[-2:])
+
+
+def even_mean(gains_db: Tensor, evenness: float) -> Tensor:
+    """Return -log(mean exp(-evenness gain)) / evenness; the mean where evenness is 0."""
+    if not evenness:
+        return gains_db.mean()
+    flat = -evenness * gains_db.flatten()
+    return -(torch.logsumexp(flat, 0) - math.log(len(flat))) / evenness
