@@ -198,8 +198,7 @@ def _put_psf(draft: _Draft, psf: FrozenPsf, *, keep_networks: bool) -> None:
     draft.change(sensor=sensor.model_copy(update={"channel_response": response}), freeze={})
     draft.members = {name: data for name, data in draft.members.items() if name not in DESIGN}
     stages = tuple(
-        stage.model_copy(update={"together": None}) if isinstance(stage, Wiener) else stage
-        for stage in draft.manifest.stages
+        stage.alone() if isinstance(stage, Wiener) else stage for stage in draft.manifest.stages
     )
     draft.change(stages=stages)
     if draft.manifest.networks and not keep_networks:

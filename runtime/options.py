@@ -16,7 +16,7 @@ from camkit.runtime.unit import Unit, read_unit
 from camkit.units import MM_PER_M
 
 Mode = Literal["exact", "fast", "whole"]
-Dtype = Literal["fp32", "fp16"]
+Dtype = Literal["fp32", "fp16", "bf16"]
 Provider = Literal["cpu", "cuda", "tensorrt", "openvino"]
 OutputColor = Literal["rec709", "acescg", "camera"]
 DemosaicMethod = Literal["fast", "quality"]
@@ -64,9 +64,10 @@ class Options:
         threads: Threads in all; None for those the process may use.
         tile_px: Output side of the windows, for tests and measurements; None lets the plan choose.
         unit: The camera body, whose facts the stages may use; None for any.
-        dtype: Which graph of the bundle: fp32, or fp16 where it holds one. A CPU computes the
-            latter in fp32 too, with weights rounded to fp16.
-        provider: What onnxruntime computes the network on.
+        dtype: Which graph of the bundle, fp32, or fp16 where it holds one (a CPU computes the
+            latter in fp32 too, with weights rounded to fp16); or bf16, the graph of fp32
+            multiplied in bfloat16, which openvino does where the processor has it.
+        provider: What computes the network: onnxruntime on cpu, cuda or tensorrt, or openvino.
         of_kind: What is chosen for one kind of camera alone: (name, value), see `KindOption`.
     """
 
@@ -108,6 +109,7 @@ class Options:
                 f"{option_text('max_seconds')} finds the best quality that fits by itself; leave "
                 f"{option_text('quality')} out"
             )
+        _check_dtype(self.dtype, self.provider)
         _check_depth(self.depth_m)
         if not 0 <= self.strength <= 1:
             raise ContractError(f"strength must lie in 0..1; got {self.strength}")
@@ -246,6 +248,14 @@ def check_kind_options(options: Options, kind: Kind, where: str) -> None:
         raise ContractError(
             f"{option_list(foreign)} does not apply {where}: it is for cameras of the "
             f"kind {makers[0].name}; leave it out"
+        )
+
+
+def _check_dtype(dtype: Dtype, provider: Provider) -> None:
+    if dtype == "bf16" and provider != "openvino":
+        raise ContractError(
+            f"{option_text('dtype', dtype)} is computed by openvino alone; add "
+            f"{option_text('provider', 'openvino')}"
         )
 
 

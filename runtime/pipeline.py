@@ -516,4 +516,5 @@ def _engine(bundle: Bundle, key: tuple[str, str], options: Options, threads: int
         provider=options.provider,
         scale=sizes[size].output_scale,
         block_bytes=block_bytes,
+        bfloat16=options.dtype == "bf16",
     )

@@ -6,9 +6,12 @@ They are not in the wheel. A file here is a command; a folder holds what command
     quality             a bundle beside classical methods, by a fixed protocol
     plan_report         what `--quality adaptive` may skip, calibrated and proved
     evidence            products, plans and seconds of two checkouts compared
+    methods             modern methods beside camkit's: dB against CPU-seconds
     tables              tables of the thesis, their networks trained for equal times
     design_start        a start lens by random search
     stage_profile       where the time of a photograph goes
+    gpu_networks        networks rebuilt in torch, checked and timed where a GPU is lent
+    gpu_training        a training packed for such a machine, and gone on with there
     measure, memory     time, tiling, RAW files; peak memory against its cap
     build_glass         the glass catalogues, from their sources
     weight              refuses bundles that change under one version, checkpoints, big pictures

@@ -2,6 +2,7 @@
 
 python -m tools.measure speed CAPTURE.dng [--runs 3] [--sizes S,M]
 python -m tools.measure tiling [--bundle duet]
+python -m tools.measure precision [--bundle duet] [--sizes S,M] [--runs 5]
 python -m tools.measure raws FOLDER --out-dir out/raws
 """
 
@@ -12,14 +13,18 @@ import statistics
 import subprocess
 import sys
 import tempfile
+import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.reader import built_in_bundles, find_bundle, open_bundle
 from camkit.cli.judge.doctor import examine
 from camkit.runtime.network.engine import NetworkEngine, available_threads
+from camkit.runtime.network.openvino_session import missing_bfloat16
 from camkit.runtime.network.tiling import TileLimits, infer_bands, lay_windows
 from camkit.runtime.network.windows import SizedNetwork
 from camkit.runtime.rows import ArrayRows
@@ -27,6 +32,9 @@ from camkit.runtime.rows import ArrayRows
 NOKIA = ("--mosaic", "GRBG", "--black-level", "25", "--white-level", "1023")
 RAW_OPTIONS = {"nokia_n900_bayer_grbg10.png": NOKIA}
 TRANSFORMS = ("wiener", "network")
+WAYS = (("cpu", False), ("openvino", False), ("openvino", True))
+"""Provider, and whether it multiplies in bfloat16."""
+TILES_PX = (192, 320, 500)
 
 
 def main() -> None:
@@ -42,6 +50,12 @@ def main() -> None:
     tiling.add_argument("--bundle", default=None)
     tiling.add_argument("--width", type=int, default=6000)
     tiling.add_argument("--height", type=int, default=4000)
+    precision = commands.add_parser("precision")
+    precision.add_argument("--bundle", default="duet")
+    precision.add_argument("--sizes", default="S,M")
+    precision.add_argument("--runs", type=int, default=5)
+    precision.add_argument("--width", type=int, default=6000)
+    precision.add_argument("--height", type=int, default=4000)
     raws = commands.add_parser("raws")
     raws.add_argument("folder", type=Path)
     raws.add_argument("--out-dir", type=Path, default=Path("out/raws"))
@@ -51,6 +65,7 @@ def main() -> None:
     {
         "speed": measure_speed,
         "tiling": measure_tiling,
+        "precision": measure_precision,
         "raws": measure_raws,
     }[arguments.command](arguments)
 
@@ -97,12 +112,16 @@ def measure_tiling(arguments: argparse.Namespace) -> None:
                 print(f"| {name} | {label} | {picture} | {count} | {worst:g} |")
 
 
-def _tiling_error(network: SizedNetwork, height: int, width: int) -> tuple[int, float]:
+def _tiling_error(
+    network: SizedNetwork, height: int, width: int, tile_px: int | None = None
+) -> tuple[int, float]:
     """Return the number of windows, and the largest difference from one window."""
     facts = network.facts
     shape = (facts.input_channels, height, width)
     planes = ArrayRows(np.random.default_rng(0).uniform(0, 3, shape).astype(np.float32))
-    limits = TileLimits(stride_px=facts.stride_px, halo_px=facts.reach_px, cost=network.cost)
+    limits = TileLimits(
+        stride_px=facts.stride_px, halo_px=facts.reach_px, cost=network.cost, tile_px=tile_px
+    )
     layout = lay_windows(height, width, limits)
     whole = TileLimits(stride_px=facts.stride_px, halo_px=0, max_bytes=sys.maxsize, whole=True)
     one_layout, scale = lay_windows(height, width, whole), facts.output_scale
@@ -113,6 +132,66 @@ def _tiling_error(network: SizedNetwork, height: int, width: int) -> tuple[int, 
         difference = np.abs(band - one[:, top : top + band.shape[1]])
         worst, top = max(worst, float(difference.max())), top + band.shape[1]
     return layout.window_count, worst
+
+
+def measure_precision(arguments: argparse.Namespace) -> None:
+    """Compare onnxruntime and openvino in float32 and bfloat16: CPU time, numbers, tiles.
+
+    One thread; windows as planned for a picture, the ways in turn.
+
+    Raises:
+        SystemExit: If openvino or bfloat16 is missing here.
+    """
+    if (missing := missing_bfloat16()) is not None:
+        raise SystemExit(f"bfloat16 needs {missing}")
+    bundle = open_bundle(find_bundle(arguments.bundle))
+    print("| network | | CPU-s of a picture | ratio | RMS from onnxruntime | tiles from whole |")
+    print("|---|---|---|---|---|---|")
+    for role, sizes in bundle.manifest.networks.items():
+        for size in arguments.sizes.split(","):
+            facts, data = sizes[size], bundle.network_bytes(role, size)
+            scale = facts.output_scale
+            engines = [
+                NetworkEngine(data, threads=1, provider=provider, scale=scale, bfloat16=bfloat16)
+                for provider, bfloat16 in WAYS
+            ]
+            network = SizedNetwork(size=size, run=engines[0].run, facts=facts)
+            limits = TileLimits(
+                stride_px=facts.stride_px, halo_px=facts.reach_px, cost=network.cost
+            )
+            layout = lay_windows(arguments.height, arguments.width, limits)
+            shape = (facts.input_channels, layout.window_height_px, layout.window_width_px)
+            window = np.random.default_rng(0).uniform(0, 3, (1, *shape)).astype(np.float32)
+            seconds, outputs = _in_turn(engines, window, arguments.runs)
+            for way, engine, spent_s, output in zip(WAYS, engines, seconds, outputs, strict=True):
+                rms = float(np.sqrt(np.square(output - outputs[0]).mean()))
+                worst = max(
+                    _tiles_error(replace(network, run=engine.run), tile_px) for tile_px in TILES_PX
+                )
+                print(
+                    f"| {size} | {way[0]} {'bf16' if way[1] else 'fp32'} | "
+                    f"{spent_s * layout.window_count:.2f} | {spent_s / seconds[0]:.2f} | "
+                    f"{rms:.2g} | {worst:.2g} |"
+                )
+
+
+def _in_turn(
+    engines: list[NetworkEngine], window: FloatArray, runs: int
+) -> tuple[list[float], list[FloatArray]]:
+    """Return the median CPU seconds of every engine on a window, and what it gives."""
+    outputs = [engine.run(window) for engine in engines]
+    seconds: list[list[float]] = [[] for _ in engines]
+    for _ in range(runs):
+        for times, engine, output in zip(seconds, engines, outputs, strict=True):
+            began = time.process_time()
+            engine.run(window, output)
+            times.append(time.process_time() - began)
+    return [statistics.median(times) for times in seconds], outputs
+
+
+def _tiles_error(network: SizedNetwork, tile_px: int) -> float:
+    """Return the largest difference of tiles from one window, on a picture of some tiles."""
+    return _tiling_error(network, 800, 1104, tile_px)[1]
 
 
 def measure_raws(arguments: argparse.Namespace) -> None:

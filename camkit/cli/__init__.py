@@ -16,6 +16,9 @@ import os
 # after each product, at the cost of everybody else's. It reads this when numpy is imported.
 os.environ.setdefault("OPENBLAS_THREAD_TIMEOUT", "4")
 
+# Pages of 2 MB are cleared whole for arrays that are filled and freed at once.
+os.environ.setdefault("NUMPY_MADVISE_HUGEPAGE", "0")
+
 from camkit.cli.app import main
 
 __all__ = ["main"]

@@ -4,6 +4,7 @@
                             -> trimmed_unet   the thesis's trimmed U-Net, a reference
                             -> full_unet      its generator: the trimmed one with its deep scales
                             -> constant_unet  the single-stage U-Net of Deep Optics, a reference
+                            -> nafnet         blocks without activation functions, a reference
                             -> normed_unet    the generator of the thin plate, a reference
                                instance_norm  its norms, and constants that stand in for them
                                catalog        their names, for recipes and checkpoints

@@ -18,6 +18,7 @@ from camkit.models_def.networks.lean_unet import (
     LeanConfig,
     LeanUnet,
 )
+from camkit.models_def.networks.nafnet import NafConfig, Nafnet
 from camkit.models_def.networks.near_lights import REACH_PX, NearLights
 from camkit.models_def.networks.normed_unet import NormedConfig, NormedUnet
 from camkit.models_def.networks.trimmed_unet import TrimmedConfig, TrimmedUnet
@@ -53,6 +54,7 @@ _BUILDERS: Final[Builders] = {
     "full_unet": configured(FullUnet, FullConfig),
     "constant_unet": configured(ConstantUnet, ConstantConfig),
     "normed_unet": configured(NormedUnet, NormedConfig),
+    "nafnet": configured(Nafnet, NafConfig),
 }
 
 NETWORK_NAMES: Final = tuple(_BUILDERS)

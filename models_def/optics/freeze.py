@@ -218,7 +218,7 @@ def freeze_samples(
     """
     filter_settings = settings or Wiener(prior_scale=PRIOR_SCALE, prior_exponent=PRIOR_EXPONENT)
     # losses of samples by the same filter for every camera, each colour alone
-    alone = filter_settings.model_copy(update={"together": None})
+    alone = filter_settings.alone()
     freeze_grid = grid or FreezeGrid()
     tell(f"tracing {optics.name} and its copies")
     bench = make_bench(optics, sensor, alone, grid=freeze_grid)

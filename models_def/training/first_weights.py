@@ -10,9 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-import onnx
 import torch
-from onnx import numpy_helper
 from torch import Tensor, nn
 
 from camkit.bundle.reader import SUFFIX, Bundle, find_bundle, open_bundle
@@ -144,6 +142,8 @@ def state_of_onnx(model: bytes) -> State:
         ContractError: If the network has PReLUs (the U-Nets of the thesis), or weights lie
             outside the model.
     """
+    import onnx  # a run that is resumed does without
+
     graph = onnx.load_from_string(model).graph
     if any(node.name.endswith(PRELU) or node.op_type == "PRelu" for node in graph.node):
         raise ContractError(
@@ -156,5 +156,5 @@ def state_of_onnx(model: bytes) -> State:
             continue
         if tensor.data_location == onnx.TensorProto.EXTERNAL:
             raise ContractError(f"the weight {tensor.name} lies in another file; refused")
-        state[tensor.name] = torch.from_numpy(numpy_helper.to_array(tensor).copy())
+        state[tensor.name] = torch.from_numpy(onnx.numpy_helper.to_array(tensor).copy())
     return state

@@ -62,16 +62,26 @@ class Objective:
     states: Mapping[str, Stateful] | None = None
 
 
-def patch_objective(finish: Finish | None = None) -> Objective:
+def run_planes(fitter: "Fitter", batch: Batch, progress: float) -> Tensor:
+    """Return what the network makes of the planes of a batch."""
+    return fitter.run(batch.planes, progress)
+
+
+def patch_objective(
+    finish: Finish | None = None,
+    run: Callable[["Fitter", Batch, float], Tensor] = run_planes,
+) -> Objective:
     """Return the loss of a schedule, on the errors of patches in the square-root domain.
 
     Args:
         finish: What is done behind the network before its output is judged; None for nothing.
+        run: The fitter, a batch and the share of the schedule that lies behind -> the output of
+            the network.
     """
 
     def loss(fitter: "Fitter", batch: Batch, step: int, progress: float) -> Tensor:
         del step
-        schedule, output = fitter.schedule, fitter.run(batch.planes, progress)
+        schedule, output = fitter.schedule, run(fitter, batch, progress)
         if finish is not None:
             output = finish(output, batch)
         target, weight = batch.target.to(fitter.device), batch.weight.to(fitter.device)

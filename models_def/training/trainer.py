@@ -66,6 +66,7 @@ class TrainOptions:
         start: Checkpoint or bundle with the same network, of another camera say, whose weights
             are the first ones; None for random weights.
         stop_at_step: Stop there though the schedule goes on, as an interruption would.
+        session_minutes: The same after so much wall time of this call.
         resume: Go on from the checkpoint in `out_dir`.
         overwrite: Start anew over a checkpoint that lies there.
         threads: Threads of torch.
@@ -88,6 +89,7 @@ class TrainOptions:
     max_cpu_minutes: float | None = None
     start: Path | None = None
     stop_at_step: int | None = None
+    session_minutes: float | None = None
     resume: bool = False
     overwrite: bool = False
     threads: int = 1
@@ -100,7 +102,7 @@ class TrainOptions:
     validate_s: float = 180.0
 
     def __post_init__(self) -> None:
-        for name in ("max_minutes", "max_cpu_minutes"):
+        for name in ("max_minutes", "max_cpu_minutes", "session_minutes"):
             minutes = getattr(self, name)
             if minutes is not None and minutes <= 0:
                 raise ContractError(f"{name} must be > 0; got {minutes}")
@@ -394,7 +396,13 @@ class _Run:
         return progress_of(self.step, self.steps, of_steps)
 
     def _is_over(self, progress: float) -> bool:
-        return progress >= 1 or self.step == self.options.stop_at_step
+        return progress >= 1 or self.step == self.options.stop_at_step or self._is_interrupted()
+
+    def _is_interrupted(self) -> bool:
+        """Return whether the session ends, the last validation and checkpoint included."""
+        minutes = self.options.session_minutes
+        closing_s = sum(wall_s for wall_s, _ in self.closing_s.values())
+        return minutes is not None and self.stopwatch.wall_s() + closing_s > 60 * minutes
 
     def _log(self, pool: SamplePool, progress: float, loss: float) -> None:
         self.loss = loss

@@ -12,6 +12,7 @@ spectrum             Fourier transforms of blocks
 lights               lights that clip, explained where they are
 wiener               the Wiener filter of one block
 joint_colours        the same for all colours of it together
+mosaic               the same from the samples of its mosaic
 richardson_lucy      the Richardson-Lucy rounds of one block
 total_variation      least squares with total variation of one block, by ADMM
 cross_channel        the same with edges of all colours in the same places

@@ -44,6 +44,7 @@ def restoration_bank(
     *,
     method: str = "wiener",
     threads: int = 1,
+    red: tuple[int, int] | None = None,
 ) -> BlockBank:
     """Make the bank of a method.
 
@@ -53,6 +54,7 @@ def restoration_bank(
         noise: Noise of the capture after white balance.
         method: wiener, rl (Richardson-Lucy), admm-tv or cross-channel.
         threads: Blocks restored at a time; no influence on the bits.
+        red: (row, column) of red in the first cell of the capture's mosaic; None for none.
 
     Raises:
         UnsupportedError: If the method is unknown.
@@ -63,7 +65,8 @@ def restoration_bank(
         block_px=settings.block_px,
         overlap_px=settings.overlap_px,
         threads=threads,
-        knowledge=place_knowledge(settings) if method == "wiener" else None,
+        knowledge=place_knowledge(settings, red) if method == "wiener" else None,
+        red=red,
     )
 
 

@@ -51,6 +51,8 @@ class Block:
         unknown: (1 or c, b, b), true where the sensor clipped; None if nowhere.
         height_mm: Field height of its place.
         knowledge: What `PlaceKnowledge` gave for that place, where the bank has one.
+        red: (row, column) of red in the first cell of the mosaic that the samples were made of;
+            None for none, or an odd side, whose cells do not repeat.
     """
 
     samples: FloatArray
@@ -58,6 +60,7 @@ class Block:
     unknown: NDArray[np.bool_] | None = None
     height_mm: float = 0.0
     knowledge: object = None
+    red: tuple[int, int] | None = None
 
 
 BlockFilter = Callable[[Block], FloatArray]
@@ -314,6 +317,7 @@ class BlockBank:
         overlap_px: int,
         threads: int = 1,
         knowledge: PlaceKnowledge | None = None,
+        red: tuple[int, int] | None = None,
     ) -> None:
         """Plan the grid.
 
@@ -325,7 +329,10 @@ class BlockBank:
             threads: Blocks restored at a time; no influence on the bits.
             knowledge: Made once for a place and those that mirror it; their blocks are mirrored
                 then, not their OTF.
+            red: (row, column) of red in the first cell of the picture's mosaic; None for none.
         """
+        has_cells = block_px % 2 == 0 and min(psf.window.size_px) > 1
+        self._red = red if has_cells else None
         self._knowledge = knowledge
         self._psf = psf
         self._filter = block_filter
@@ -380,7 +387,7 @@ class BlockBank:
             rows = _select(source.read(top, bottom), index, axis=1)
             mask = None if saturated is None else saturated(top, bottom)
             mask = None if mask is None else _select(mask, index, axis=mask.ndim - 2)
-            strip = _Strip(rows, mask, span, plain)
+            strip = _Strip(rows, mask, span, plain, self._red)
             total = _lengthened(total, span.start + span.inner.stop - first_row)
             self._add_blocks(strip, total[:, span.start + span.inner.start - first_row :], cancel)
             # What is not needed again must not wait here while the network works.
@@ -448,7 +455,7 @@ class BlockBank:
 
     def _filtered(self, cut: "_Cut", place: "_Place", place_mm: tuple[float, float]) -> FloatArray:
         """Filter what was cut for a block, with the OTF of its place or of one that mirrors it."""
-        samples, unknown = cut
+        samples, unknown, red = cut
         across, down = (self._psf.kernels.turns and along_mm < 0 for along_mm in place_mm)
         mirrored = np.s_[..., :: -1 if down else 1, :: -1 if across else 1]
         otf = place.otf
@@ -460,6 +467,7 @@ class BlockBank:
             unknown=None if unknown is None else unknown[mirrored],
             height_mm=float(np.hypot(*place_mm)),
             knowledge=place.knowledge,
+            red=red if red is None or place.knowledge is None else (red[0] ^ down, red[1] ^ across),
         )
         return self._filter(block)[mirrored]
 
@@ -481,30 +489,37 @@ class _Place:
 
 _Numbered = tuple[int, tuple[float, float]]
 """Number of the kernels of a place, and its position in mm."""
-_Cut = tuple[FloatArray, NDArray[np.bool_] | None]
+_Cut = tuple[FloatArray, NDArray[np.bool_] | None, tuple[int, int] | None]
+"""Samples of a block, which of them clipped, and where red lies in its first cell."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Strip:
-    """The rows of one block row, mirrored past the borders, and their clipped samples."""
+    """The rows of one block row, mirrored past the borders, their clipped samples, and red."""
 
     rows: FloatArray
     saturated: NDArray[np.bool_] | None
     span: Span
     plain: PlainBlock | None = None
+    red: tuple[int, int] | None = None
 
     def is_plain(self, column: Span) -> bool:
         """Return whether a block stays as it is."""
         return self.plain is not None and self.plain(self.span, column)
 
     def cut(self, column: Span) -> _Cut:
-        """Return samples and clipped samples of one block."""
+        """Return samples, clipped samples and the place of red of one block."""
         samples = _select(self.rows, column.index, axis=2)
+        # a border mirrored about its outermost samples goes on with the cells of the mosaic
+        starts = self.span.start, column.start
+        red = self.red
+        if red is not None:
+            red = (red[0] - starts[0]) % 2, (red[1] - starts[1]) % 2
         if self.saturated is None:
-            return samples, None
+            return samples, None, red
         mask = self.saturated if self.saturated.ndim == 3 else self.saturated[None]
         unknown = _select(mask, column.index, axis=2)
-        return samples, unknown if unknown.any() else None
+        return samples, unknown if unknown.any() else None, red
 
 
 def _select(planes: NDArray[Any], index: NDArray[np.intp], *, axis: int) -> NDArray[Any]:

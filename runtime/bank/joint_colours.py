@@ -22,7 +22,7 @@ variance of the transfer over fabricated copies at the block's field height: wha
 transfer cannot promise counts as noise that grows with the scene. Frequency 0 stays.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final
 
@@ -54,15 +54,28 @@ Places = NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Lookup:
+    """The frequencies of a grid among those of the spread's table.
+
+    Attributes:
+        number: Which of the distinct frequencies lies where in the grid.
+        low: (f,) number of the table's frequency below each distinct one.
+        part: (f,) how far each lies from there to the next.
+    """
+
+    number: Places
+    low: Places
+    part: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Shapes:
     """The terms that depend on the size of a block alone; float32.
 
     Attributes:
         fall: (b, b) F, times the samples of a block; for packed planes.
         noise: (c, b, b) noise for a variance of one, times those samples; for packed planes.
-        number: (b, b) which of the block's distinct frequencies lies where in a packed plane.
-        low: (f,) number of the table's frequency below each distinct one.
-        part: (f,) how far each lies from there to the next.
+        lookup: Of the frequencies in a packed plane.
         band: Places of the real and imaginary parts of the frequencies that are measured, in packed
             planes.
         band_fall: (n,) F there, times the samples.
@@ -71,9 +84,7 @@ class Shapes:
 
     fall: FloatArray
     noise: FloatArray
-    number: Places
-    low: Places
-    part: FloatArray
+    lookup: Lookup
     band: tuple[Places, Places]
     band_fall: FloatArray
     band_noise: FloatArray
@@ -107,10 +118,7 @@ def shapes_of(model: Together, block_px: int) -> Shapes:
     fall = (samples * (f2 + CORNER_FREQUENCY**2) ** (-model.exponent / 2)).astype(np.float32)
     lines = zip(model.noise, model.noise_rise, strict=True)
     noise = samples * np.exp(np.stack([n + 4 * rise * f2 for n, rise in lines]))
-    places = np.array(model.spread.frequencies)
-    distinct, number = np.unique(f2, return_inverse=True)
-    at = np.minimum(np.sqrt(distinct), places[-1])
-    low = np.clip(np.searchsorted(places, at, side="right") - 1, 0, len(places) - 2)
+    lookup = lookup_of(model.spread, f2)
     steps = [np.arange(0, side, BAND_STEP) for side in f2.shape]
     rows, columns = np.meshgrid(*steps, indexing="ij")
     in_band = (f2[rows, columns] >= BAND[0] ** 2) & (f2[rows, columns] <= BAND[1] ** 2)
@@ -118,17 +126,25 @@ def shapes_of(model: Together, block_px: int) -> Shapes:
     spread_fall = spread_weights(fall[None], block_px)
     spread_noise = spread_weights(noise.astype(np.float32), block_px)
     # float32 holds the numbers exactly: a block has far fewer frequencies than 2^24
-    spread_number = spread_weights(number.reshape(1, *f2.shape).astype(np.float32), block_px)
+    spread_number = spread_weights(lookup.number[None].astype(np.float32), block_px)
     return Shapes(
         fall=spread_fall[0],
         noise=spread_noise,
-        number=spread_number[0].astype(np.intp),
-        low=low,
-        part=((at - places[low]) / (places[low + 1] - places[low])).astype(np.float32),
+        lookup=replace(lookup, number=spread_number[0].astype(np.intp)),
         band=band,
         band_fall=_at(spread_fall, band[0])[0],
         band_noise=_at(spread_noise, band[0]),
     )
+
+
+def lookup_of(spread: Spread, f2: NDArray[np.float64]) -> Lookup:
+    """Return where the squared frequencies of a grid lie in the table of a spread."""
+    places = np.array(spread.frequencies)
+    distinct, number = np.unique(f2, return_inverse=True)
+    at = np.minimum(np.sqrt(distinct), places[-1])
+    low = np.clip(np.searchsorted(places, at, side="right") - 1, 0, len(places) - 2)
+    part = ((at - places[low]) / (places[low + 1] - places[low])).astype(np.float32)
+    return Lookup(number=number.reshape(f2.shape), low=low, part=part)
 
 
 def transfer_of(otf: ComplexArray, height_mm: float, model: Together) -> Transfer:
@@ -143,7 +159,7 @@ def transfer_of(otf: ComplexArray, height_mm: float, model: Together) -> Transfe
     shapes = shapes_of(model, block_px)
     packed = packed_spectrum(otf, block_px)
     power = packed_power(packed)
-    doubt = _spread_at(model.spread, height_mm, shapes, np.float32(model.mistrust))
+    doubt = spread_at(model.spread, height_mm, shapes.lookup, np.float32(model.mistrust))
     doubt += np.float32(model.own) * power
     doubt *= shapes.fall
     power *= shapes.fall
@@ -156,21 +172,19 @@ def transfer_of(otf: ComplexArray, height_mm: float, model: Together) -> Transfe
     )
 
 
-def _spread_at(
-    spread: Spread, height_mm: float, shapes: Shapes, mistrust: np.float32
-) -> FloatArray:
-    """Return mistrust V of a field height, (c, b, b) packed; linear between the table's places."""
+def spread_at(spread: Spread, height_mm: float, lookup: Lookup, mistrust: np.float32) -> FloatArray:
+    """Return mistrust V of a field height, (c, *grid); linear between the table's places."""
     table, heights = _table(spread)
     place = float(np.interp(height_mm, heights, np.arange(len(heights))))
     below = min(int(place), max(len(heights) - 2, 0))
     above = min(below + 1, len(heights) - 1)
     lines = (table[below] + (place - below) * (table[above] - table[below])).astype(np.float32)
     steps = np.diff(lines, axis=1)
-    doubt: FloatArray = steps.take(shapes.low, axis=1)
-    doubt *= shapes.part
-    doubt += lines.take(shapes.low, axis=1)
+    doubt: FloatArray = steps.take(lookup.low, axis=1)
+    doubt *= lookup.part
+    doubt += lines.take(lookup.low, axis=1)
     doubt *= mistrust
-    return doubt.take(shapes.number, axis=1)
+    return doubt.take(lookup.number, axis=1)
 
 
 @lru_cache(maxsize=4)

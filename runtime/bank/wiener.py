@@ -2,7 +2,8 @@
 
     X = Y conj(H) / (|H|^2 + N / S),  S(f) = prior_scale * level^2 * (f^2 + f0^2)^(-exponent / 2)
 
-or, where the bundle says so, all colours of a block with one model (`together`).
+or, where the bundle says so, all colours of a block with one model (`together`), near the axis from
+the samples of the mosaic (`mosaic`).
 
 Where the sensor clipped, a linear filter would turn the missing light into rings over the whole
 block. There a few rounds of Richardson-Lucy, which take clipped samples as "at least this bright",
@@ -17,11 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.arrays import FloatArray
-from camkit.bundle.stages import Together, Wiener
+from camkit.bundle.stages import Mosaic, Wiener
 from camkit.noise import NoiseModel
 from camkit.runtime.bank.blocks import Block, BlockFilter, PlaceKnowledge
 from camkit.runtime.bank.joint_colours import Transfer, restore_together, transfer_of
 from camkit.runtime.bank.lights import explain_lights
+from camkit.runtime.bank.mosaic import MosaicTransfer, mosaic_transfer, restore_mosaic
 from camkit.runtime.bank.richardson_lucy import background_of, spread_clipped
 from camkit.runtime.bank.spectrum import ComplexArray, apply_transfer
 
@@ -56,13 +58,8 @@ def wiener_filter(settings: Wiener, noise: NoiseModel, kernel_px: int | None = N
 
         def deconvolved(samples: FloatArray, variance: NDArray[np.float64]) -> FloatArray:
             if settings.together is not None:
-                return restore_together(
-                    samples,
-                    _transfer(block, settings.together),
-                    level=np.sqrt(power),
-                    variance=variance,
-                    model=settings.together,
-                )
+                facts = {"level": np.sqrt(power), "variance": variance}
+                return _restored(block, samples, settings, facts)
             rise = _prior_rise(samples.shape[-1], settings.prior_exponent)
             gain = _gain(block.otf, rise, variance / (settings.prior_scale * power))
             return apply_transfer(samples, gain)
@@ -72,24 +69,62 @@ def wiener_filter(settings: Wiener, noise: NoiseModel, kernel_px: int | None = N
         unknown = spread_clipped(block.unknown)
         lights, unexplained = explain_lights(block, unknown, background, settings, kernel_px)
         residual = block.samples - apply_transfer(lights, block.otf)
-        np.copyto(residual, 0, where=unknown)
+        # samples beside clipped ones were measured: it is their demosaicked planes that suffer
+        by_samples = _mosaic_at(settings, block.height_mm, block.red, block.otf) is not None
+        np.copyto(residual, 0, where=block.unknown if by_samples else unknown)
         variance = np.maximum(variance, unexplained)
         return lights + deconvolved(residual, variance)
 
     return restore
 
 
-def place_knowledge(settings: Wiener) -> PlaceKnowledge | None:
-    """Return the terms of the filter for all blocks of a place; None if there are none."""
+def place_knowledge(settings: Wiener, red: tuple[int, int] | None = None) -> PlaceKnowledge | None:
+    """Return the terms of the filter for all blocks of a place; None if there are none.
+
+    Args:
+        settings: Of the bank.
+        red: Place of red in the capture's mosaic; None for none.
+    """
     if (model := settings.together) is None:
         return None
-    return lambda otf, height_mm: transfer_of(otf, height_mm, model)
+
+    def know(otf: ComplexArray, height_mm: float) -> Transfer | MosaicTransfer:
+        if _mosaic_at(settings, height_mm, red, otf) is not None:
+            return mosaic_transfer(otf, height_mm, model)
+        return transfer_of(otf, height_mm, model)
+
+    return know
 
 
-def _transfer(block: Block, model: Together) -> Transfer:
-    if isinstance(block.knowledge, Transfer):
-        return block.knowledge
-    return transfer_of(block.otf, block.height_mm, model)
+def _mosaic_at(
+    settings: Wiener, height_mm: float, red: tuple[int, int] | None, otf: ComplexArray
+) -> Mosaic | None:
+    """Return how a block is restored from the samples of its mosaic; None where it is not."""
+    mosaic = settings.mosaic
+    if mosaic is None or red is None or height_mm > mosaic.within_mm or otf.shape[1] % 2:
+        return None
+    return mosaic
+
+
+def _restored(
+    block: Block,
+    samples: FloatArray,
+    settings: Wiener,
+    facts: dict[str, NDArray[np.float64]],
+) -> FloatArray:
+    """Return samples of a block, or what its lights leave of them, with all colours together."""
+    model, knowledge = settings.together, block.knowledge
+    assert model is not None
+    mosaic = _mosaic_at(settings, block.height_mm, block.red, block.otf)
+    if mosaic is not None and block.red is not None:
+        if not isinstance(knowledge, MosaicTransfer):
+            knowledge = mosaic_transfer(block.otf, block.height_mm, model)
+        return restore_mosaic(
+            samples, knowledge, red=block.red, model=model, mosaic=mosaic, **facts
+        )
+    if not isinstance(knowledge, Transfer):
+        knowledge = transfer_of(block.otf, block.height_mm, model)
+    return restore_together(samples, knowledge, model=model, **facts)
 
 
 @lru_cache(maxsize=4)

@@ -2,9 +2,10 @@
 
 import ctypes
 import mmap
-import os
 import sys
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
@@ -46,16 +47,34 @@ def trim_heap(limit_bytes: int) -> None:
 
 
 def keep_freed_memory() -> None:
-    """Undo a small MALLOC_TRIM_THRESHOLD_ of the environment, as dask gives its workers.
+    """Keep what is freed for the arrays that follow, for as long as this process lives.
 
-    With it every array that is freed goes back to the system and every new one comes in page by
-    page: block filters take twice as long. The thresholds set here are those that glibc would come
-    to by itself; what it keeps is given back by `trim_heap`.
+    Otherwise arrays that are freed go back to the system and new ones come in page by page, each
+    cleared first: a sixth of the time of a large photograph, and with the small
+    MALLOC_TRIM_THRESHOLD_ that dask gives its workers twice that of block filters. What is kept is
+    given back by `trim_heap`.
     """
-    threshold = os.environ.get("MALLOC_TRIM_THRESHOLD_", "")
-    if _LIBC is not None and threshold.isdecimal() and int(threshold) < _KEPT_BYTES:
+    if _LIBC is not None:
         _LIBC.mallopt(_M_MMAP_THRESHOLD, _KEPT_BYTES // 2)
-        _LIBC.mallopt(_M_TRIM_THRESHOLD, _KEPT_BYTES)
+        _LIBC.mallopt(_M_TRIM_THRESHOLD, _MOST_KEPT_BYTES)
+
+
+def use_one_heap() -> None:
+    """Make the threads to come share one heap, so that what one frees serves the others."""
+    if _LIBC is not None:
+        _LIBC.mallopt(_M_ARENA_MAX, 1)
+
+
+@contextmanager
+def kept_memory() -> Iterator[None]:
+    """Keep what is freed inside the block; give it back behind it."""
+    keep_freed_memory()
+    try:
+        yield
+    finally:
+        if _LIBC is not None:
+            _LIBC.mallopt(_M_TRIM_THRESHOLD, _KEPT_BYTES)
+        trim_heap(0)
 
 
 class _MappedArrays:
@@ -104,8 +123,10 @@ def _glibc() -> ctypes.CDLL | None:
 _LIBC: Final = _glibc()
 _M_TRIM_THRESHOLD: Final = -1
 _M_MMAP_THRESHOLD: Final = -3
+_M_ARENA_MAX: Final = -8
 _KEPT_BYTES: Final = 64 * 2**20
 """glibc's own threshold grows up to here (mallopt(3))."""
+_MOST_KEPT_BYTES: Final = 2**30
 _MAPPED_BYTES: Final = 256 * 2**10
 mapped_arrays: Final = _MappedArrays()
 """Context in which arrays go back to the system as soon as they are freed.

@@ -7,8 +7,9 @@ import sys
 import threading
 from collections.abc import Iterable, Sequence
 from contextlib import nullcontext
+from functools import cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 
@@ -16,6 +17,8 @@ from camkit.arrays import FloatArray
 from camkit.errors import BundleError, ContractError, UnsupportedError
 from camkit.runtime.cancel import Cancel, Cancelled, watched
 from camkit.runtime.machine.memory import mapped_arrays
+from camkit.runtime.network.openvino_session import OpenvinoSession, has_openvino
+from camkit.runtime.network.segment import Segment
 
 _IMPORTED_BEFORE = "onnxruntime" in sys.modules and "ORT_DISABLE_TELEMETRY" not in os.environ
 os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
@@ -35,11 +38,13 @@ PROVIDER_NAMES: Final = {
     "cpu": "CPUExecutionProvider",
     "cuda": "CUDAExecutionProvider",
     "tensorrt": "TensorrtExecutionProvider",
-    "openvino": "OpenVINOExecutionProvider",
 }
-"""What a caller may ask for, and what onnxruntime calls it."""
-_FALLBACKS: Final = {"tensorrt": ("cuda", "cpu"), "cuda": ("cpu",), "openvino": ("cpu",)}
+"""What a caller may ask of onnxruntime, and what it calls it."""
+OPENVINO: Final = "openvino"
+_FALLBACKS: Final = {"tensorrt": ("cuda", "cpu"), "cuda": ("cpu",)}
 _CREATION: Final = threading.Lock()
+Memory = Literal["arena", "block", "shared"]
+"""Of a session: an arena of its own, one block once sizes are known, the arena of all segments."""
 _CGROUP: Final = Path("/sys/fs/cgroup")
 _ORT_ERRORS: Final = (
     ort_errors.EPFail,
@@ -94,7 +99,11 @@ def providers() -> tuple[str, ...]:
 
 
 def usable_providers() -> tuple[str, ...]:
-    """Return those of `PROVIDER_NAMES` that the installed onnxruntime was built with, cpu first."""
+    """Return those of onnxruntime by the names of `PROVIDER_NAMES`, cpu first, then openvino."""
+    return (*_built_in(), *[OPENVINO][: has_openvino()])
+
+
+def _built_in() -> tuple[str, ...]:
     built = providers()
     return tuple(name for name, full in PROVIDER_NAMES.items() if full in built)
 
@@ -115,36 +124,48 @@ class NetworkEngine:
         provider: str = "cpu",
         scale: int = 1,
         block_bytes: float | None = None,
+        bfloat16: bool = False,
     ) -> None:
         """Load a model.
 
         Args:
             model: Serialised ONNX model with the weights inside; never a path.
             threads: Threads per run, from `available_threads`.
-            provider: Key of `PROVIDER_NAMES`; arrays stay in the memory of the CPU.
+            provider: Key of `PROVIDER_NAMES`, or openvino; arrays stay in the memory of the CPU.
             scale: Samples along a side of the output for one pixel of the input.
             block_bytes: Counted memory of a run per pixel (`block_bytes_per_pixel` of the graph):
                 on the CPU its tensors then lie in one block of about that size, once onnxruntime
                 has seen windows of a size. None for its arena, which takes fresh pages less often
                 and may hold several times that.
+            bfloat16: Multiply in bfloat16; for openvino alone.
 
         Raises:
             ContractError: If `model` is not bytes, threads or scale < 1.
             BundleError: If onnxruntime refuses the model or its inputs and outputs are not those
                 of a network.
-            UnsupportedError: If the installed onnxruntime is too old or lacks the provider.
+            UnsupportedError: If the installed onnxruntime is too old or lacks the provider, or
+                the machine lacks bfloat16.
         """
         if not isinstance(model, bytes):
             raise ContractError(f"the model must be given as bytes; got {type(model).__name__}")
         if threads < 1 or scale < 1:
             raise ContractError(f"threads and scale must be >= 1; got {threads}, {scale}")
-        _check_version(ort.__version__)
         self.block_bytes = block_bytes if provider == "cpu" else None
-        with _CREATION:
-            self._session = _create_session(
-                model, threads, provider, in_block=self.block_bytes is not None
-            )
+        self._session: Any
+        if provider == OPENVINO:
+            self._session = OpenvinoSession(model, threads=threads, bfloat16=bfloat16)
+        else:
+            _check_version(ort.__version__)
+            with _CREATION:
+                self._session = _create_session(
+                    model,
+                    threads,
+                    provider,
+                    memory="arena" if self.block_bytes is None else "block",
+                )
         self._memory = nullcontext() if self.block_bytes is None else mapped_arrays
+        self._model, self._cutting = model, threading.Lock()
+        self._segments: tuple[SegmentEngine, ...] | None = None
         self.threads = threads
         self.provider = provider
         self.scale = scale
@@ -180,25 +201,32 @@ class NetworkEngine:
             raise ContractError(
                 f"out must be C-contiguous float32 {shape}; got {out.dtype} {out.shape}"
             )
+        if self.provider == OPENVINO:
+            self._session.run_into(window, out, cancel)
+        else:
+            self._run_bound(window, out, cancel)
+        return out
+
+    def _run_bound(self, window: FloatArray, out: FloatArray, cancel: Cancel | None) -> None:
+        """Run the session of onnxruntime, which reads and writes the arrays themselves."""
         binding = self._session.io_binding()
         binding.bind_cpu_input("input", window)
-        binding.bind_output("output", "cpu", 0, np.float32, shape, out.ctypes.data)
-        running = ort.RunOptions()
+        binding.bind_output("output", "cpu", 0, np.float32, out.shape, out.ctypes.data)
+        with self._memory:
+            _run(self._session, binding, cancel, window.shape)
 
-        def end() -> None:
-            running.terminate = True
+    def segments(self) -> tuple["SegmentEngine", ...]:
+        """Return the network in segments with the same bits; none where it cannot be cut."""
+        if self.provider != "cpu":
+            return ()
+        with self._cutting:
+            if self._segments is None:
+                # onnx takes a tenth of a second to import, and small pictures need no segments
+                from camkit.runtime.network.graph_cuts import cut_network
 
-        try:
-            with watched(cancel, end), self._memory:
-                self._session.run_with_iobinding(binding, running)
-        except Cancelled:
-            raise
-        except (RuntimeError, *_ORT_ERRORS) as error:
-            raise ContractError(
-                f"the network cannot run on a window of {window.shape}: {error}; "
-                "sides must be multiples of its stride"
-            ) from error
-        return out
+                cut = cut_network(self._model)
+                self._segments = tuple(SegmentEngine(one, threads=self.threads) for one in cut)
+        return self._segments
 
     def _checked(self, window: FloatArray) -> FloatArray:
         if window.ndim != 4 or window.shape[:2] != (1, self.channels) or window.dtype != np.float32:
@@ -207,6 +235,54 @@ class NetworkEngine:
                 f"got {window.dtype} {window.shape}"
             )
         return np.ascontiguousarray(window)
+
+
+class SegmentEngine:
+    """One segment of a network, ready to run on strips of whole rows; float32, on the CPU.
+
+    All segments take their memory from one arena of the process: they run one after another.
+    """
+
+    def __init__(self, segment: Segment, *, threads: int) -> None:
+        """Load a segment.
+
+        Args:
+            segment: Of `cut_network`.
+            threads: Threads per run, from `available_threads`.
+
+        Raises:
+            BundleError: If onnxruntime refuses it.
+        """
+        self.segment = segment
+        with _CREATION:
+            _share_arena()
+            self._session = _create_session(segment.model, threads, memory="shared")
+
+    def run(self, inputs: Sequence[FloatArray]) -> list[FloatArray]:
+        """Run the segment on one strip.
+
+        Args:
+            inputs: (1, c, rows, w) float32, C-contiguous, in the order of its feeds.
+
+        Returns:
+            (1, c, rows, w) of every output.
+
+        Raises:
+            ContractError: If onnxruntime refuses the strip.
+        """
+        first = self.segment.feeds[0]
+        size_px = [side * first.step for side in inputs[0].shape[2:]]
+        binding = self._session.io_binding()
+        for feed, rows in zip(self.segment.feeds, inputs, strict=True):
+            binding.bind_cpu_input(feed.name, rows)
+        outputs = []
+        for port in self.segment.outputs:
+            shape = (1, port.channels, *(port.samples(side) for side in size_px))
+            output = np.empty(shape, np.float32)
+            binding.bind_output(port.name, "cpu", 0, np.float32, shape, output.ctypes.data)
+            outputs.append(output)
+        _run(self._session, binding, None, inputs[0].shape)
+        return outputs
 
 
 def largest_activations(
@@ -240,6 +316,40 @@ def largest_activations(
     return largest
 
 
+def _run(session: Any, binding: Any, cancel: Cancel | None, shape: tuple[int, ...]) -> None:
+    """Run a session until it is done or cancelled.
+
+    Raises:
+        ContractError: If onnxruntime refuses the size.
+        Cancelled: If `cancel` said so.
+    """
+    running = ort.RunOptions()
+
+    def end() -> None:
+        running.terminate = True
+
+    try:
+        with watched(cancel, end):
+            session.run_with_iobinding(binding, running)
+    except Cancelled:
+        raise
+    except (RuntimeError, *_ORT_ERRORS) as error:
+        raise ContractError(
+            f"the network cannot run on a window of {shape}: {error}; "
+            "sides must be multiples of its stride"
+        ) from error
+
+
+@cache
+def _share_arena() -> None:
+    """Make the arena of all segments; once a process."""
+    arena = ort.OrtMemoryInfo(
+        "Cpu", ort.OrtAllocatorType.ORT_ARENA_ALLOCATOR, 0, ort.OrtMemType.DEFAULT
+    )
+    # 1: grow by what is asked for, not by powers of two
+    ort.create_and_register_allocator(arena, ort.OrtArenaCfg({"arena_extend_strategy": 1}))
+
+
 def _check_version(version: str) -> None:
     parts = tuple(int(p) for p in version.split("+", maxsplit=1)[0].split(".")[:3] if p.isdigit())
     if parts < MINIMUM_VERSION:
@@ -250,7 +360,7 @@ def _check_version(version: str) -> None:
 
 
 def _create_session(
-    model: bytes, threads: int, provider: str = "cpu", *, in_block: bool = False
+    model: bytes, threads: int, provider: str = "cpu", *, memory: Memory = "arena"
 ) -> Any:
     candidates = _chosen_providers(provider)
     options = ort.SessionOptions()
@@ -258,8 +368,10 @@ def _create_session(
     options.inter_op_num_threads = 1
     options.execution_mode = ort.ExecutionMode.ORT_SEQUENTIAL
     options.graph_optimization_level = ort.GraphOptimizationLevel.ORT_ENABLE_ALL
-    options.enable_mem_pattern = in_block
-    options.enable_cpu_mem_arena = not in_block
+    options.enable_mem_pattern = memory == "block"
+    options.enable_cpu_mem_arena = memory != "block"
+    if memory == "shared":
+        options.add_session_config_entry("session.use_env_allocators", "1")
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     options.log_severity_level = 4  # errors reach the caller as exceptions, not on stderr
     try:
@@ -281,7 +393,7 @@ def _chosen_providers(provider: str) -> list[str | tuple[str, dict[str, str]]]:
     Raises:
         UnsupportedError: If the installed onnxruntime lacks the provider.
     """
-    usable = usable_providers()
+    usable = _built_in()
     if provider not in usable:
         raise UnsupportedError(
             f"the installed onnxruntime computes on {', '.join(usable)}; got {provider!r}: "

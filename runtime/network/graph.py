@@ -9,7 +9,7 @@ Transpose (tiles have another shape than pictures), no Loop, If or Scan, no MatM
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -337,3 +337,39 @@ def with_node_outputs(data: bytes) -> tuple[bytes, tuple[str, ...]]:
         onnx.helper.make_tensor_value_info(name, onnx.TensorProto.FLOAT, None) for name in names
     )
     return model.SerializeToString(), names
+
+
+def partial_model(
+    data: bytes,
+    tensors: Set[str],
+    inputs: Sequence[tuple[str, int]],
+    outputs: Sequence[tuple[str, int]],
+) -> bytes:
+    """Return some nodes of a model as a model of its own.
+
+    Args:
+        data: The model, admissible.
+        tensors: What the nodes compute.
+        inputs: Name and channels of what they take.
+        outputs: Name and channels of what is asked of them.
+    """
+    model = _decode(data)
+    graph = model.graph
+    nodes = [node for node in graph.node if tensors & set(node.output)]
+    read_names = {name for node in nodes for name in node.input}
+    constants = [n for n in graph.node if n.op_type == "Constant" and read_names & set(n.output)]
+    weights = [tensor for tensor in graph.initializer if tensor.name in read_names]
+    for part, values in ((graph.node, [*constants, *nodes]), (graph.initializer, weights)):
+        copies = [type(value).FromString(value.SerializeToString()) for value in values]
+        del part[:]
+        part.extend(copies)
+    for part, ports in ((graph.input, inputs), (graph.output, outputs)):
+        del part[:]
+        part.extend(
+            onnx.helper.make_tensor_value_info(
+                name, onnx.TensorProto.FLOAT, [1, channels, None, None]
+            )
+            for name, channels in ports
+        )
+    del graph.value_info[:]
+    return bytes(model.SerializeToString())

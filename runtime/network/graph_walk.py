@@ -90,7 +90,21 @@ class GraphFacts:
 
 
 @dataclass(slots=True, kw_only=True)
-class _Walk:
+class Walk:
+    """The tensors of a graph, and what was found on the way through it.
+
+    Attributes:
+        constants: By name.
+        extents: Tensor -> channels and grid.
+        windows: Output of a node -> the samples that it reads, rows and columns.
+        global_operators: "name (type)" of nodes that see the whole picture.
+        unblocked: Convolutions off onnxruntime's blocked path.
+        blocked: Outputs of those on it.
+        workspace: Output of a node -> values per pixel that it needs besides.
+        mac_per_pixel: Multiply-accumulates.
+        slow_per_pixel: Those of pooling, of groups and off the blocked path.
+    """
+
     constants: Constants
     extents: dict[str, Extent]
     windows: dict[str, Windows] = field(default_factory=dict)
@@ -102,18 +116,21 @@ class _Walk:
     slow_per_pixel: float = 0.0
 
     def extent(self, node: Node, index: int = 0) -> Extent:
+        """Return the extent of an input of a node."""
         name = node.inputs[index] if index < len(node.inputs) else ""
         if name not in self.extents:
             raise BundleError(f"{node.label}: input {name!r} is not computed before it is used")
         return self.extents[name]
 
     def constant_shape(self, node: Node, index: int) -> tuple[int, ...]:
+        """Return the shape of an input that must be a constant."""
         name = node.inputs[index] if index < len(node.inputs) else ""
         if name not in self.constants:
             raise BundleError(f"{node.label}: input {index} must be a constant")
         return self.constants[name].shape
 
     def integers(self, node: Node, index: int) -> list[int]:
+        """Return an input that must be constant integers."""
         self.constant_shape(node, index)
         values = self.constants[node.inputs[index]]
         if values.dtype.kind not in "iu":
@@ -126,6 +143,7 @@ class _Walk:
         return self.extent(node).output_of(channels, windows)
 
     def mark_global(self, node: Node) -> None:
+        """Add a node to those that see the whole picture."""
         self.global_operators.append(f"{node.label} ({node.op})")
 
 
@@ -148,12 +166,7 @@ def walk_graph(
         BundleError: If a node cannot be followed, or the output is not a whole number of samples
             per pixel of the input with the declared channels.
     """
-    start = Extent(channels=source[1], axes=(Axis(), Axis()))
-    walk = _Walk(constants=constants, extents={source[0]: start})
-    for node in nodes:
-        extents = _node_extents(walk, node)
-        _check_extents(node, extents)
-        walk.extents.update(zip(node.outputs, extents, strict=False))
+    walk = walk_nodes(nodes, constants, source)
     final, scale = _final(walk.extents, target)
     steps = [axis.step for e in walk.extents.values() if e.axes is not None for axis in e.axes]
     stride = math.lcm(*(step.numerator for step in steps))
@@ -187,6 +200,26 @@ def walk_graph(
         parameters=sum(a.size for a in constants.values() if a.dtype.kind == "f"),
         values_per_pixel=values,
     )
+
+
+def walk_nodes(nodes: Sequence[Node], constants: Constants, source: tuple[str, int]) -> Walk:
+    """Walk the nodes forwards.
+
+    Args:
+        nodes: In the order of computation.
+        constants: By name.
+        source: Name and channels of the input.
+
+    Raises:
+        BundleError: If a node cannot be followed.
+    """
+    start = Extent(channels=source[1], axes=(Axis(), Axis()))
+    walk = Walk(constants=constants, extents={source[0]: start})
+    for node in nodes:
+        extents = _node_extents(walk, node)
+        _check_extents(node, extents)
+        walk.extents.update(zip(node.outputs, extents, strict=False))
+    return walk
 
 
 def _check_extents(node: Node, extents: Sequence[Extent]) -> None:
@@ -224,7 +257,7 @@ def _final(extents: Mapping[str, Extent], target: tuple[str, int | None]) -> tup
 
 
 def _reach(
-    nodes: Sequence[Node], walk: _Walk, *, ends: tuple[str, str], samples: tuple[int, int]
+    nodes: Sequence[Node], walk: Walk, *, ends: tuple[str, str], samples: tuple[int, int]
 ) -> int:
     """Trace the runs that the kept pixels 0 .. n - 1 read from the output back to the input.
 
@@ -258,7 +291,7 @@ def _reach(
     return reach
 
 
-def _interleavings(nodes: Sequence[Node], walk: _Walk, target: str) -> dict[str, tuple[str, int]]:
+def _interleavings(nodes: Sequence[Node], walk: Walk, target: str) -> dict[str, tuple[str, int]]:
     """Find pictures of a tensor each, put together as the pixels of blocks.
 
     A pixel of the fine picture reads one of them, not all: DepthToSpace reads places of a block
@@ -280,7 +313,7 @@ def _interleavings(nodes: Sequence[Node], walk: _Walk, target: str) -> dict[str,
     return woven
 
 
-def _check_inputs(walk: _Walk, node: Node) -> None:
+def _check_inputs(walk: Walk, node: Node) -> None:
     """Refuse tensors where constants belong, and numbers of other types than float."""
     if node.op not in _FREE:
         for index, name in enumerate(node.inputs[1:], start=1):
@@ -290,7 +323,7 @@ def _check_inputs(walk: _Walk, node: Node) -> None:
         raise BundleError(f"{node.label}: casts to float32 and float16 alone are admitted")
 
 
-def _node_extents(walk: _Walk, node: Node) -> list[Extent]:
+def _node_extents(walk: Walk, node: Node) -> list[Extent]:
     _check_inputs(walk, node)
     if node.op in ("Conv", "ConvTranspose"):
         return [_convolve(walk, node)]
@@ -310,7 +343,7 @@ def _node_extents(walk: _Walk, node: Node) -> list[Extent]:
     return [_global(walk, node)]
 
 
-def _convolve(walk: _Walk, node: Node) -> Extent:
+def _convolve(walk: Walk, node: Node) -> Extent:
     shape = walk.constant_shape(node, 1)
     groups = node.integer("group", 1)
     extent = walk.extent(node)
@@ -348,7 +381,7 @@ def _convolve(walk: _Walk, node: Node) -> Extent:
     return result
 
 
-def _pool(walk: _Walk, node: Node) -> Extent:
+def _pool(walk: Walk, node: Node) -> Extent:
     if len(node.outputs) > 1:
         raise BundleError(f"{node.label}: pooling with indices is refused")
     kernel = node.integers("kernel_shape", [])
@@ -369,7 +402,7 @@ def _is_blocked(node: Node, channels_in: int, channels_out: int, groups: int) ->
     return all(channels % _LARGE_BLOCK == 0 for channels in per_group)
 
 
-def _elementwise(walk: _Walk, node: Node) -> Extent:
+def _elementwise(walk: Walk, node: Node) -> Extent:
     operands = [name for name in node.inputs if name and name not in walk.constants]
     extents = [walk.extent(node, node.inputs.index(name)) for name in operands]
     if not extents:
@@ -405,7 +438,7 @@ def _common_extent(node: Node, extents: Sequence[Extent], channels: int) -> Exte
     return Extent(channels=channels, axes=next(iter(axes), None))
 
 
-def _shuffle(walk: _Walk, node: Node) -> Extent:
+def _shuffle(walk: Walk, node: Node) -> Extent:
     extent, block = walk.extent(node), node.integer("blocksize", 0)
     if not 1 <= block <= 64:
         raise BundleError(f"{node.label}: blocksize {block} is refused")
@@ -418,7 +451,7 @@ def _shuffle(walk: _Walk, node: Node) -> Extent:
     return walk.pass_through(node, extent.channels // (block * block), (window, window))
 
 
-def _regroup(walk: _Walk, node: Node) -> list[Extent]:
+def _regroup(walk: Walk, node: Node) -> list[Extent]:
     """Follow Concat, Split and Slice along the channels; along space they are refused."""
     if node.op == "Slice":
         return [_slice(walk, node)]
@@ -438,7 +471,7 @@ def _regroup(walk: _Walk, node: Node) -> list[Extent]:
     return [extent.output_of(size) for size in sizes]
 
 
-def _slice(walk: _Walk, node: Node) -> Extent:
+def _slice(walk: Walk, node: Node) -> Extent:
     extent = walk.extent(node)
     starts, ends = walk.integers(node, 1), walk.integers(node, 2)
     has = [index < len(node.inputs) and bool(node.inputs[index]) for index in range(5)]
@@ -454,7 +487,7 @@ def _slice(walk: _Walk, node: Node) -> Extent:
     return extent.output_of(channels)
 
 
-def _global(walk: _Walk, node: Node) -> Extent:
+def _global(walk: Walk, node: Node) -> Extent:
     """Follow the operators that may see the whole picture."""
     extent = walk.extent(node)
     if node.op in NORMALIZATIONS:

@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 
@@ -44,6 +44,14 @@ the one before, of which the next stage still needs some pieces."""
 Run = Callable[[FloatArray], FloatArray]
 Progress = Callable[[int, int], None]
 """Called with (work done, work in all)."""
+
+
+class WindowRows(Protocol):
+    """The padded rows around the windows in work."""
+
+    def move_to(self, top: int) -> FloatArray:
+        """Return the rows from `top` on, (c, rows, padded w); never above an earlier `top`."""
+        ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -190,7 +198,7 @@ class TileLimits:
         halo_px: Its reach, or less in fast mode; rounded up to the stride.
         cost: What the network holds per pixel.
         max_bytes: Cap on one window with its arena, the row buffer and one output band together.
-        tile_px: Force output tiles of this size (tests); None leaves it free.
+        tile_px: Force output tiles of this side, or (height, width); None leaves it free.
         whole: One window whatever the size.
     """
 
@@ -198,7 +206,7 @@ class TileLimits:
     halo_px: int
     cost: PixelCost = PixelCost()
     max_bytes: int = DEFAULT_MAX_BYTES
-    tile_px: int | None = None
+    tile_px: int | tuple[int, int] | None = None
     whole: bool = False
 
     def __post_init__(self) -> None:
@@ -207,8 +215,15 @@ class TileLimits:
                 "stride must be >= 1, halo >= 0 and bytes per pixel > 0; got "
                 f"{self.stride_px}, {self.halo_px}, {self.cost.arena_bytes}"
             )
-        if self.tile_px is not None and self.tile_px < 1:
+        if self.tile_px is not None and min(self.tile_sides_px) < 1:
             raise ContractError(f"tile_px must be >= 1; got {self.tile_px}")
+
+    @property
+    def tile_sides_px(self) -> tuple[int, int]:
+        """Return height and width of the tiles that are forced; 0 where none are."""
+        if isinstance(self.tile_px, tuple):
+            return self.tile_px
+        return self.tile_px or 0, self.tile_px or 0
 
 
 def lay_windows(height_px: int, width_px: int, limits: TileLimits) -> TileLayout:
@@ -230,8 +245,8 @@ def lay_windows(height_px: int, width_px: int, limits: TileLimits) -> TileLayout
     stride, halo = limits.stride_px, _ceil_to(limits.halo_px, limits.stride_px)
     size = _ceil_to(height_px, stride), _ceil_to(width_px, stride)
     if limits.tile_px is not None:
-        tile = _ceil_to(limits.tile_px, stride) + 2 * halo
-        window = min(size[0], tile), min(size[1], tile)
+        height, width = (_ceil_to(side, stride) + 2 * halo for side in limits.tile_sides_px)
+        window = min(size[0], height), min(size[1], width)
     else:
         window = _least_work(size, halo, limits)
     return TileLayout(
@@ -282,7 +297,7 @@ def _equal_windows(size: int, halo: int, stride: int) -> set[int]:
     return {w for w in windows if w == size or w > 2 * halo}
 
 
-def infer_bands(
+def infer_bands(  # noqa: PLR0913
     run: Run,
     source: RowSource,
     layout: TileLayout,
@@ -292,6 +307,7 @@ def infer_bands(
     guard: TileGuard | None = None,
     scale: int = 1,
     finish: WindowFinish | None = None,
+    rows: WindowRows | None = None,
 ) -> Iterator[FloatArray]:
     """Run a network over a picture and yield its rows from top to bottom.
 
@@ -304,6 +320,7 @@ def infer_bands(
         guard: Looks at every tile; None refuses NaN and inf only.
         scale: s, samples along a side of the output for one pixel of the input.
         finish: Changes the output of a window in place; it also sees all channels of the source.
+        rows: Returns the padded rows of windows, where `run` reads the source by itself.
 
     Yields:
         (k, rows, s w) float32 pieces of bands, consecutive, together the whole picture.
@@ -320,14 +337,14 @@ def infer_bands(
     shape = (1, channels, layout.window_height_px, layout.window_width_px)
     window = np.empty(shape, np.float32) if len(layout.columns) > 1 else None
     padded = layout.padded_height_px, layout.padded_width_px
-    buffer = RowBuffer(source, layout.window_height_px, padded)
+    buffer = rows or RowBuffer(source, layout.window_height_px, padded)
     count = 0
     for i, row in enumerate(layout.rows):
-        rows = buffer.move_to(row.origin_px)
+        band = buffer.move_to(row.origin_px)
         pieces: list[FloatArray] = []
         for j, column in enumerate(layout.columns):
             check_cancelled(cancel)
-            filled = _filled(window, rows, column.origin_px)
+            filled = _filled(window, band, column.origin_px)
             output = run(filled)
             if finish is not None:
                 finish(output[0], filled[0], _box(row, column, (height, width)))

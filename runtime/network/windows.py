@@ -1,14 +1,15 @@
-"""The windows of the networks of one capture: laid within the memory cap, then run.
+"""The windows of the networks of one capture: windows within the memory cap, then run.
 
     networks, size, memory [, labels] -> NetworkWindows -> bands
 
-Without labels one network runs everywhere (`tiling`), with labels on some lattice cells only
-(`cell_windows`).
+Without labels one network runs everywhere: a large picture in strips of whole rows, segment by
+segment (`row_network`), otherwise in windows (`tiling`). With labels it runs on some lattice cells
+only (`cell_windows`).
 """
 
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -25,8 +26,15 @@ from camkit.runtime.network.cell_windows import (
     infer_cells,
     lay_cells,
 )
+from camkit.runtime.network.engine import SegmentEngine
 from camkit.runtime.network.guard import TileGuard
 from camkit.runtime.network.light_keeper import WindowFinish
+from camkit.runtime.network.row_network import (
+    NetworkRows,
+    StripPlan,
+    StripWindows,
+    plan_strips,
+)
 from camkit.runtime.network.tiling import (
     PixelCost,
     Progress,
@@ -40,6 +48,12 @@ from camkit.runtime.options import Mode
 from camkit.runtime.rows import RowSource
 
 FAST_LEAST_DB: Final = 80.0
+STRIPS_FROM_PX: Final = 1_500_000
+"""Pixels of a picture above which a network runs in strips: below, one window takes no longer."""
+STRIP_HEIGHTS_PX: Final = (96, 48, 1)
+"""Rows of a strip, if the memory allows."""
+FINISH_HEIGHT_PX: Final = 256
+"""Rows of the windows of the step behind strips."""
 STEP_BYTES: Final = 16.0
 """For a pixel of a window, of the step behind a network: its cells, and rows on their way."""
 
@@ -56,6 +70,8 @@ class SizedNetwork:
         masks: Channels that its windows hold besides its inputs, for the step behind it.
         extra_reach_px: Pixels that the step behind it looks beyond its reach.
         lattice_px: Windows keep to multiples of it besides, for the step behind it.
+        segments: Returns the network in segments, none if it cannot be cut; None for windows only.
+        trim: Called before every strip.
     """
 
     size: str
@@ -65,6 +81,8 @@ class SizedNetwork:
     masks: int = 0
     extra_reach_px: int = 0
     lattice_px: int = 1
+    segments: Callable[[], Sequence[SegmentEngine]] | None = None
+    trim: Callable[[], None] = lambda: None
 
     @property
     def stride_px(self) -> int:
@@ -130,12 +148,15 @@ class NetworkWindows:
         tiles: One network everywhere; None with cells.
         cells: Networks on their cells; None with tiles.
         mode: Of the windows.
+        strips: The network in strips, whose windows are those of the step behind it; None for
+            windows that the network is run on.
     """
 
     networks: tuple[SizedNetwork, ...]
     tiles: TileLayout | None
     cells: CellLayout | None
     mode: Mode
+    strips: StripPlan | None = None
 
     def bands(
         self,
@@ -164,11 +185,18 @@ class NetworkWindows:
             )
         if self.tiles is None:
             raise ContractError("a network needs tiles or cells")
-        network = self.networks[0]
+        network, run, rows = self.networks[0], self.networks[0].run, None
+        if self.strips is not None and network.segments is not None:
+            strips = NetworkRows(network.segments(), source, self.strips, cancel, network.trim)
+            facts = network.facts
+            ends = source.shape[0], facts.output_channels, facts.output_scale
+            rows = StripWindows(strips, self.tiles, ends)
+            run = rows.result
         return infer_bands(
-            network.run,
+            run,
             source,
             self.tiles,
+            rows=rows,
             progress=progress,
             cancel=cancel,
             guard=guard,
@@ -194,6 +222,8 @@ class NetworkWindows:
 
     def window_mp(self) -> dict[str, float]:
         """Return size -> megapixels computed, halos included."""
+        if self.strips is not None:
+            return {self.networks[0].size: self.strips.work_ratio * self.strips.area_px / 1e6}
         if self.tiles is not None:
             layout = self.tiles
             area = layout.window_count * layout.window_height_px * layout.window_width_px
@@ -205,13 +235,22 @@ class NetworkWindows:
     def needed_bytes(self) -> int:
         """Estimate the memory: windows with their arenas, rows held, one output band."""
         if self.tiles is not None:
-            return self.tiles.needed_bytes(self.networks[0].cost)
+            strip_bytes = 0 if self.strips is None else self.strips.needed_bytes
+            return strip_bytes + self.tiles.needed_bytes(_cost(self.networks[0], self.strips))
         if self.cells is None:
             return 0
         return self.cells.needed_bytes([network.cost for network in self.networks])
 
     def to_json(self) -> dict[str, Any]:
         """Return the windows in a few numbers, for the sidecar."""
+        if self.strips is not None:
+            return {
+                "mode": self.mode,
+                "halo_px": 0,
+                "windows": 1,
+                "strips": len(self.strips.stops),
+                "work_ratio": round(self.strips.work_ratio, 3),
+            }
         if self.tiles is not None:
             operators = list(self.networks[0].facts.global_operators)
             return {
@@ -290,10 +329,51 @@ def _lay_windows(
         tile_px=limits.tile_px,
         whole=one_window,
     )
+    if (strips := _lay_strips(size_px, network, limits)) is not None:
+        return strips
     if network.is_global and limits.mode == "exact":
         _check_one_window(size_px, network, limits, tile_limits)
     tiles = lay_windows(*size_px, tile_limits)
     return NetworkWindows(networks=tuple(networks), tiles=tiles, cells=None, mode=limits.mode)
+
+
+def _lay_strips(
+    size_px: tuple[int, int], network: SizedNetwork, limits: WindowLimits
+) -> NetworkWindows | None:
+    """Return strips of a large picture, as high as the memory allows; None for windows."""
+    is_large = size_px[0] * size_px[1] > STRIPS_FROM_PX
+    if network.segments is None or not is_large or limits.mode == "whole" or limits.tile_px:
+        return None
+    segments = [engine.segment for engine in network.segments()]
+    if not segments:
+        return None
+    stride = network.stride_px
+    padded = tuple(-(-side // stride) * stride for side in size_px)
+    heights = dict.fromkeys(-(-height // stride) * stride for height in STRIP_HEIGHTS_PX)
+    for height in heights:
+        strips = plan_strips(segments, (padded[0], padded[1]), height)
+        tiles = lay_windows(
+            *size_px,
+            TileLimits(
+                stride_px=stride,
+                halo_px=network.extra_reach_px,
+                cost=_cost(network, strips),
+                tile_px=(FINISH_HEIGHT_PX, size_px[1]),
+            ),
+        )
+        windows = NetworkWindows(
+            networks=(network,), tiles=tiles, cells=None, mode=limits.mode, strips=strips
+        )
+        if windows.needed_bytes() <= limits.max_bytes:
+            return windows
+    return None
+
+
+def _cost(network: SizedNetwork, strips: StripPlan | None) -> PixelCost:
+    """Return the memory of windows: of the step behind a network only, where it runs in strips."""
+    if strips is None:
+        return network.cost
+    return replace(network.cost, arena_bytes=STEP_BYTES)
 
 
 def _check_one_window(

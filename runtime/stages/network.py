@@ -1,7 +1,8 @@
 """A network in windows: its planes taken to equal noise, tiled exactly, guarded, taken back."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -50,6 +51,8 @@ from camkit.runtime.signal.stabilise import (
 METHODS: Final = ("net",)
 TRIM_SHARE: Final = 0.7
 """Of the cap; above it freed memory is given back before every window."""
+STRIP_TRIM_SHARE: Final = 0.92
+"""Likewise before every strip, which takes less."""
 WEIGHT_BYTES: Final = 8.8
 """Memory of a session for each weight: the number, and its place in a block (measured)."""
 OPTIONS: Final = (
@@ -166,16 +169,22 @@ class _NetworkStage:
             cell_px=CELL_PX,
             tile_px=job.options.tile_px,
         )
+        # its activations are the peak: what other stages have freed must not lie beside them
+        trim, trim_late = (
+            partial(trim_heap, int(share * max_bytes)) for share in (TRIM_SHARE, STRIP_TRIM_SHARE)
+        )
         engines = [job.setup.networks(entry.role, size) for size in work.sizes()]
         networks = [
             SizedNetwork(
                 size=size,
-                run=self._trimmed(engine, max_bytes),
+                run=self._run(engine, trim),
                 facts=one,
                 block_bytes=engine.block_bytes or 0.0,
                 masks=self._masks,
                 extra_reach_px=entry.extra_reach_px,
                 lattice_px=1 if entry.light is None else LIGHT_CELL_PX,
+                segments=engine.segments,
+                trim=trim_late,
             )
             for size, one, engine in zip(work.sizes(), facts, engines, strict=True)
         ]
@@ -189,17 +198,15 @@ class _NetworkStage:
         tiles = {role: windows.to_json() for role, windows in log.windows.items()}
         one = len(bundle.manifest.networks) == 1
         log.record["tiles"] = tiles[entry.role] if one else tiles
+        log.record["network"] = {"provider": job.options.provider, "dtype": job.options.dtype}
 
-    def _trimmed(self, engine: NetworkEngine, cap_bytes: int) -> Run:
-        """Return the run of a network that has the memory to itself, as far as it is near the cap.
-
-        Its activations are the peak: what other stages have freed must not lie beside them.
-        """
+    def _run(self, engine: NetworkEngine, trim: Callable[[], None]) -> Run:
+        """Return the run of a network on windows of which it takes the first channels."""
         cancel = self._job.cancel  # not by the job, which holds the windows
         inputs = engine.channels
 
         def run(window: FloatArray) -> FloatArray:
-            trim_heap(int(TRIM_SHARE * cap_bytes))
+            trim()
             return engine.run(window[:, :inputs], cancel=cancel)
 
         return run

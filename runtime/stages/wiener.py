@@ -33,6 +33,7 @@ from camkit.runtime.bank.kernels_by_distance import (
 )
 from camkit.runtime.bank.lights import fitted_px, light_share
 from camkit.runtime.bank.psf import FieldKernels, color_kernels
+from camkit.runtime.capture import Capture
 from camkit.runtime.content import LIGHT_PX
 from camkit.runtime.job.coarse_cells import cells_of
 from camkit.runtime.job.job import Job
@@ -201,7 +202,15 @@ def make_bank(entry: Wiener, job: Job, planes: Stream) -> BlockBank:
         noise = noise.raised(planes.noise_rise())
     side = cut_block_px(entry.block_px, entry.overlap_px, local.window.size_px)
     cut = entry.model_copy(update={"block_px": max(side, *local.kernels.kernels.shape[-2:])})
-    return restoration_bank(local, cut, noise, method=method, threads=job.threads)
+    red = _red_of(job.capture, planes)
+    return restoration_bank(local, cut, noise, method=method, threads=job.threads, red=red)
+
+
+def _red_of(capture: Capture, planes: Stream) -> tuple[int, int] | None:
+    """Return (row, column) of red in the mosaic that planes hold the samples of; None for none."""
+    if capture.cfa is None or planes.shape[1:] != (capture.height, capture.width):
+        return None
+    return divmod(capture.cfa.index("R"), 2)
 
 
 def _kernels(bundle: Bundle, depth_mm: float | None, focus_um: float, scale: float) -> FieldKernels:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from camkit.runtime.network.openvino_session import missing_bfloat16
 from tests.bundle_factory import write_tiny_bundle
 from tests.capture_factory import write_tiny_captures
 from tests.tiny_design import run_tool
@@ -56,3 +57,19 @@ def test_every_raw_file_is_developed_or_refused_with_its_reason(
     assert (tmp_path / "out" / "a.png").is_file()
     assert broken[:2] == ["broken.dng", "refused"]
     assert broken[-1]
+
+
+def test_precision_gives_a_row_for_every_way_or_says_what_is_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bundle = write_tiny_bundle(tmp_path)
+    words = ("precision", "--bundle", str(bundle), "--sizes", "M", "--runs", "1")
+    words = (*words, "--width", "96", "--height", "64")
+    if (missing := missing_bfloat16()) is not None:
+        with pytest.raises(SystemExit, match="bfloat16 needs"):
+            run_tool(monkeypatch, "measure", *words)
+        pytest.skip(f"bfloat16 needs {missing}")
+    run_tool(monkeypatch, "measure", *words)
+    _, _, *ways = rows(capsys.readouterr().out)
+    assert [way[1] for way in ways] == ["cpu fp32", "openvino fp32", "openvino bf16"]
+    assert [float(way[3]) > 0 for way in ways] == [True] * 3

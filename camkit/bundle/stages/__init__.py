@@ -26,7 +26,7 @@ from camkit.bundle.stages.register import Stage, all_stages, find_stage, type_of
 from camkit.bundle.stages.repair import Repair
 from camkit.bundle.stages.sharpen import Sharpen
 from camkit.bundle.stages.super_resolve import SuperResolve
-from camkit.bundle.stages.together import Together
+from camkit.bundle.stages.together import Mosaic, Together
 from camkit.bundle.stages.undistort import Undistort
 from camkit.bundle.stages.white_balance import WhiteBalance
 from camkit.bundle.stages.wiener import Wiener
@@ -42,6 +42,7 @@ __all__ = [
     "JoinError",
     "Lifetime",
     "Linearise",
+    "Mosaic",
     "Network",
     "PackageStage",
     "Parts",

@@ -44,6 +44,21 @@ class Spread(Entry):
         return self
 
 
+class Mosaic(Entry):
+    """The places where the bank works from the samples of the mosaic (format 2.10).
+
+    Attributes:
+        within_mm: Field height up to which a block's place is one.
+        smooth_below: A block that shows less light than so many times the expected is smooth.
+        smooth_follow: Exponent with which the power of the light follows what smooth blocks lack,
+            besides `follow`; 0 for not at all.
+    """
+
+    within_mm: NonNegative
+    smooth_below: Annotated[float, Field(gt=0, le=1e6)] = 1.0
+    smooth_follow: Annotated[float, Field(ge=0, le=4)] = 0.0
+
+
 class Together(Entry):
     """The prior of the bank for the colours of a scene, and for their noise.
 

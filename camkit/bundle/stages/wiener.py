@@ -1,12 +1,13 @@
 """The Wiener bank."""
 
 from collections.abc import Sequence
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
 from camkit.bundle.entry import NonNegative, Positive, Since, Word
 from camkit.bundle.plane import Plane
+from camkit.bundle.sensor import RGB
 from camkit.bundle.stages.entry import (
     JoinError,
     Parts,
@@ -17,7 +18,7 @@ from camkit.bundle.stages.entry import (
     need_masks,
     need_rows,
 )
-from camkit.bundle.stages.together import Together
+from camkit.bundle.stages.together import Mosaic, Together
 
 _PITCH_RTOL: Final = 1e-6
 
@@ -39,6 +40,8 @@ class Wiener(StageEntry):
             hold half of a kernel's side, or the whole of it (format 2.8; bundles of formats before
             2.4 have the latter, later ones the former).
         together: How the colours are restored together (format 2.4); None for each alone.
+        mosaic: Where the colours are restored from the samples of the mosaic, with the numbers of
+            `together`, and not from demosaicked planes (format 2.10); None for nowhere.
         depth: Whose kernels are taken where nobody says how far the scene is: the mean over the
             depths of the PSF, or those of the distance that every part of the capture shows
             (format 2.8).
@@ -56,6 +59,9 @@ class Wiener(StageEntry):
     clip_power: Annotated[float, Field(ge=1.0, lt=3.0)] = 1.0
     clip_windows: Literal["half_kernel", "whole_kernel"] = "half_kernel"
     together: Together | None = None
+    mosaic: Annotated[
+        Mosaic | None, Since((2, 10), "a bank works from the samples of the mosaic")
+    ] = None
     depth: Annotated[
         Literal["mean", "estimated"], Since((2, 8), "a bank finds the distance of the scene")
     ] = "mean"
@@ -67,7 +73,13 @@ class Wiener(StageEntry):
                 f"overlap_px may be half of block_px at most; got {self.overlap_px} of "
                 f"{self.block_px}"
             )
+        if self.mosaic is not None and self.together is None:
+            raise ValueError("mosaic needs together, whose numbers it takes")
         return self
+
+    def alone(self) -> Self:
+        """Return the bank that restores every colour alone."""
+        return self.model_copy(update={"together": None, "mosaic": None})
 
     def join(self, planes: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Return the plane as taken: deconvolved."""
@@ -85,6 +97,8 @@ class Wiener(StageEntry):
                 f"it restores {len(self.together.noise)} colours together and takes "
                 f"{len(plane.channels)}"
             )
+        if self.mosaic is not None and plane.channels != RGB:
+            raise JoinError("it works from the samples of a mosaic, and takes no planes of R, G, B")
         if not plane.grid.warped:
             raise JoinError("it works in the geometry of the sensor, before any undistortion")
         if parts.sensor.extent is not None:

@@ -58,7 +58,9 @@ def bench(
     ] = None,
     dtypes: Annotated[
         str | None,
-        typer.Option(help="Precisions of fp32,fp16; default: both for size M, else fp32."),
+        typer.Option(
+            help="Precisions of fp32,fp16,bf16; default: the first two for size M, else fp32."
+        ),
     ] = None,
     providers: Annotated[
         str | None,

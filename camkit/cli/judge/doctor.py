@@ -18,6 +18,7 @@ PACKAGES = [
     "scipy",
     "onnxruntime",
     "onnx",
+    "openvino",
     "rawpy",
     "opencv-contrib-python-headless",
     "OpenEXR",
@@ -59,6 +60,7 @@ def examine() -> dict[str, Any]:
     from camkit.models_def.face.torch_need import INSTALLED_BY
     from camkit.report.bench.machine import memory_mb, package_version, processor_name
     from camkit.runtime.network.engine import available_threads, providers
+    from camkit.runtime.network.openvino_session import missing_bfloat16
     from camkit.runtime.stage_finder import states_of_packages
 
     return {
@@ -69,6 +71,7 @@ def examine() -> dict[str, Any]:
         "threads": available_threads(None),
         "memory_mb": memory_mb(),
         "providers": ", ".join(providers()),
+        "openvino": _openvino_state(missing_bfloat16()),
         "onnxruntime_telemetry": (
             "off" if os.environ.get("ORT_DISABLE_TELEMETRY") == "1" else "not switched off"
         ),
@@ -79,6 +82,11 @@ def examine() -> dict[str, Any]:
         "stages_of_packages": states_of_packages(),
         "packages": {name: package_version(name) or "not installed" for name in PACKAGES},
     }
+
+
+def _openvino_state(missing: str | None) -> str:
+    """Return in which numbers openvino computes networks here."""
+    return "fp32, bf16" if missing is None else f"no bf16, which needs {missing}"
 
 
 def _try_decoder() -> str:

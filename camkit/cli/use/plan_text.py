@@ -92,6 +92,9 @@ def plan_lines(facts: dict[str, Any]) -> list[str]:
     lines.append(f"  status: planned, bundle {facts['bundle']}")
     if "depth" in facts.get("plan", {}):
         lines.append(f"  kernels: {facts['plan']['depth']}")
+    if "network" in facts.get("plan", {}):
+        network = facts["plan"]["network"]
+        lines.append(f"  network: {network['dtype']} on {network['provider']}")
     for decision in facts["decisions"]:
         saving = decision["saving_s"] or 0.0
         lines.append(f"  {decision['what']}: {decision['choice']} ({decision['reason']})")

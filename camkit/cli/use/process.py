@@ -135,6 +135,12 @@ def process(
     strength: Annotated[
         float, typer.Option(help="Share of the network's correction that is kept, 0 to 1.")
     ] = 1.0,
+    provider: Annotated[
+        str, typer.Option(help="What computes the network: cpu, cuda, tensorrt or openvino.")
+    ] = "cpu",
+    dtype: Annotated[
+        str, typer.Option(help="Precision of the network: fp32, fp16 or bf16 (openvino alone).")
+    ] = "fp32",
     max_mem: Annotated[
         str | None, typer.Option(help="Memory limit, such as 2G or 900M; default: 930M.")
     ] = None,
@@ -169,10 +175,12 @@ def process(
     from camkit.cli.use.cluster import cluster_client
     from camkit.cli.use.results import print_result
     from camkit.runtime.batch import process as run
+    from camkit.runtime.machine.memory import use_one_heap
     from camkit.runtime.options import Options, parse_memory, with_choices
     from camkit.runtime.unit import read_unit
     from camkit.runtime.write_options import WriteOptions
 
+    use_one_heap()
     plain = Options(
         size=size,
         quality=quality,  # type: ignore[arg-type]
@@ -196,6 +204,8 @@ def process(
         max_mem_bytes=None if max_mem is None else parse_memory(max_mem),
         threads=threads,
         unit=None if unit is None else read_unit(unit),
+        dtype=dtype,  # type: ignore[arg-type]
+        provider=provider,  # type: ignore[arg-type]
     )
     options = with_choices(plain, of_kind)
     write = WriteOptions(

@@ -25,6 +25,8 @@ from camkit.report.bench.trial import (
     spread_out,
 )
 from camkit.runtime.kind import part_of
+from camkit.runtime.network.engine import OPENVINO
+from camkit.runtime.network.openvino_session import missing_bfloat16
 from camkit.runtime.plan.decision import DEVELOP, Work
 from camkit.runtime.plan.ways import offered_methods, planned
 from camkit.runtime.stage_finder import all_methods, stage_module
@@ -147,8 +149,17 @@ def _obstacle(trial: Trial, facts: Sequence[NetworkFacts], ground: Ground) -> st
     if trial.threads > ground.threads:
         return f"this process may use {ground.threads} threads"
     if trial.provider not in ground.providers:
-        return f"onnxruntime here computes on {', '.join(ground.providers)}"
+        return f"networks here are computed on {', '.join(ground.providers)}"
+    if trial.dtype == "bf16":
+        return _bfloat16_obstacle(trial)
     return None
+
+
+def _bfloat16_obstacle(trial: Trial) -> str | None:
+    if trial.provider != OPENVINO:
+        return f"bf16 is computed by {OPENVINO} alone"
+    missing = missing_bfloat16()
+    return None if missing is None else f"bf16 needs {missing}"
 
 
 def _with_memory(trial: Trial, ground: Ground) -> Trial:

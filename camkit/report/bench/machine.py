@@ -7,11 +7,12 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, Final
 
+from camkit.runtime.machine.processor import processor_fact
 from camkit.runtime.network.engine import available_threads, usable_providers
 
 PACKAGES: Final = (
     *("numpy", "scipy", "onnxruntime", "opencv-contrib-python-headless", "rawpy", "OpenEXR"),
-    *("tifffile", "scikit-image", "torch"),
+    *("tifffile", "scikit-image", "torch", "openvino"),
 )
 _TELLING: Final = ("sse4_2", "avx", "fma", "f16c", "amx", "neon", "asimd", "sve", "bf16", "i8mm")
 
@@ -27,7 +28,7 @@ def describe_machine() -> dict[str, Any]:
         "camkit": __version__,
         "processor": processor_name(),
         "architecture": platform.machine(),
-        "cpu_flags": telling_flags(_cpuinfo("flags") or _cpuinfo("Features") or ""),
+        "cpu_flags": telling_flags(processor_fact("flags") or processor_fact("Features") or ""),
         "cores": os.cpu_count(),
         "threads": available_threads(None),
         "memory_mb": memory_mb(),
@@ -40,7 +41,7 @@ def describe_machine() -> dict[str, Any]:
 
 def processor_name() -> str:
     """Return what the processor calls itself, or else its architecture."""
-    return _cpuinfo("model name") or platform.processor() or platform.machine()
+    return processor_fact("model name") or platform.processor() or platform.machine()
 
 
 def memory_mb() -> int | None:
@@ -67,19 +68,6 @@ def free_memory_bytes() -> int | None:
 def telling_flags(flags: str) -> list[str]:
     """Return those of a processor's flags that name its vector and matrix instructions."""
     return sorted(flag for flag in set(flags.split()) if flag.startswith(_TELLING))
-
-
-def _cpuinfo(key: str) -> str | None:
-    """Return the first value of a key in /proc/cpuinfo; None where there is none."""
-    try:
-        with Path("/proc/cpuinfo").open(encoding="utf-8") as lines:
-            for line in lines:
-                name, _, value = line.partition(":")
-                if name.strip() == key:
-                    return value.strip()
-    except OSError:
-        return None
-    return None
 
 
 def _meminfo(key: str) -> int | None:

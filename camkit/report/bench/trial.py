@@ -26,8 +26,8 @@ class Trial:
         method: As `camkit process --method` takes it, or develop.
         size: Such as S, M or L; None without a network.
         mode: exact, fast or whole; None without a network.
-        dtype: fp32 or fp16; None without a network.
-        provider: What onnxruntime computes on; None without a network.
+        dtype: fp32, fp16 or bf16; None without a network.
+        provider: What computes the network; None without a network.
         threads: Threads in all.
         tile_px: Forced side of the tiles; None for the planned one.
         max_mem_bytes: Memory cap; None for the default.
@@ -108,7 +108,7 @@ class Axes:
         methods: None for all that are registered.
         best: Where no methods are given, this many of every bundle, the best first; None for all.
         modes: exact, fast, whole.
-        dtypes: fp32, fp16.
+        dtypes: fp32, fp16, bf16.
         providers: cpu, cuda, tensorrt, openvino.
         threads: Numbers of threads.
         tiles_px: Sides of tiles.
@@ -141,7 +141,7 @@ class Axes:
 
 AXIS_VALUES: Final[dict[str, tuple[str, ...]]] = {
     "modes": ("exact", "fast", "whole"),
-    "dtypes": ("fp32", "fp16"),
+    "dtypes": ("fp32", "fp16", "bf16"),
     "providers": ("cpu", "cuda", "tensorrt", "openvino"),
 }
 
@@ -152,7 +152,7 @@ class Ground:
 
     Attributes:
         threads: Threads that may be used.
-        providers: What onnxruntime computes on, cpu first.
+        providers: What networks are computed on here, cpu first.
         free_bytes: Memory that is free now; None where the system does not tell.
     """
 

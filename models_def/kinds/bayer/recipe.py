@@ -316,6 +316,11 @@ class BayerRecipe(Recipe):
     frames: FramesRecipe = field(default_factory=FramesRecipe)
 
     def __post_init__(self) -> None:
+        if self.haze is not None and self.wiener.mosaic is not None:
+            raise ContractError(
+                "the tiles of a lens with a haze do not tell where their mosaic begins; leave "
+                "wiener.mosaic out"
+            )
         if self.haze is not None and self.lens.depths_mm:
             self._check_hazy_depths()
         shares, depths = len(self.data.depth_shares), len(self.lens.depths_mm)
@@ -369,7 +374,9 @@ class BayerRecipe(Recipe):
             )
 
     def with_together(self, together: Together | None) -> "BayerRecipe":
-        """Return it with another model of colours in its bank."""
+        """Return it with another model of colours in its bank, None for each alone."""
+        if together is None:
+            return replace(self, wiener=self.wiener.alone())
         return replace(self, wiener=self.wiener.model_copy(update={"together": together}))
 
 

@@ -19,6 +19,7 @@ from torch import Tensor
 from camkit.arrays import FloatArray
 from camkit.bundle.facts import Port
 from camkit.bundle.light_bound import BRIGHT
+from camkit.bundle.stages import Wiener
 from camkit.colorimetry import camera_from_rec709
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.psf_bank import PsfBank
@@ -30,6 +31,9 @@ from camkit.models_def.sensors.stabilise import stabilise
 from camkit.models_def.sensors.wiener import to_otf, wiener_restore
 from camkit.models_def.training.sample import Batch, Finish, Sample, SampleLayout
 from camkit.noise import NoiseModel
+from camkit.runtime.bank.blocks import Block, taper_edges
+from camkit.runtime.bank.blocks import to_otf as to_runtime_otf
+from camkit.runtime.bank.wiener import wiener_filter
 from camkit.units import MM_PER_M
 
 CLIPPED_REACH_PX: Final = 4
@@ -115,6 +119,8 @@ class Circumstances:
         illumination: Relative illumination of the place.
         height_mm: Field height of the block.
         noise_rise: What was done before the bank multiplied the variance of every colour by.
+        red: (row, column) of red in the first cell of the mosaic that the planes were made of; None
+            where that is not known: no filter then works on the mosaic.
     """
 
     noise: NoiseModel
@@ -123,12 +129,17 @@ class Circumstances:
     illumination: float
     height_mm: float = 0.0
     noise_rise: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    red: tuple[int, int] | None = None
+
+    @property
+    def met_noise(self) -> NoiseModel:
+        """Return the noise that the bank meets."""
+        return self.noise.raised(self.noise_rise)
 
     @property
     def met(self) -> tuple[Tensor, Tensor]:
-        """Return the noise that the bank meets: shot and read variance of the colours."""
-        noise = self.noise.raised(self.noise_rise)
-        return torch.tensor(noise.shot), torch.tensor(noise.read_variance)
+        """Return shot and read variance of that noise."""
+        return torch.tensor(self.met_noise.shot), torch.tensor(self.met_noise.read_variance)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -352,13 +363,24 @@ def photograph(
             frozen=frozen,
             illumination=illumination,
             height_mm=float(np.hypot(exposure.block_x_mm, exposure.block_y_mm)),
+            red=_red_of(recipe, exposure.borders),
         ),
     )
 
 
+def _red_of(recipe: BayerRecipe, borders: Sides) -> tuple[int, int]:
+    """Return (row, column) of red in the first cell of planes that borders may be mirrored in."""
+    row, column = divmod(recipe.sensor.cfa.index("R"), 2)
+    beyond_px = [recipe.data.margin_px if borders[side] else 0 for side in (0, 2)]
+    return (row + beyond_px[0]) % 2, (column + beyond_px[1]) % 2
+
+
 def filtered(developed: Developed, recipe: BayerRecipe) -> Tensor:
     """Return (1, 3, S, S) of developed planes behind the recipe's bank, linear."""
-    circumstances = developed.circumstances
+    circumstances, mosaic = developed.circumstances, recipe.wiener.mosaic
+    is_near = mosaic is not None and circumstances.height_mm <= mosaic.within_mm
+    if is_near and circumstances.red is not None:
+        return _filtered_by_runtime(developed, recipe.wiener)
     return wiener_restore(
         developed.planes,
         circumstances.frozen,
@@ -367,6 +389,21 @@ def filtered(developed: Developed, recipe: BayerRecipe) -> Tensor:
         developed.unknown,
         height_mm=circumstances.height_mm,
     )
+
+
+def _filtered_by_runtime(developed: Developed, settings: Wiener) -> Tensor:
+    """Filter planes as the runtime does: no gradient goes through the way on the mosaic."""
+    circumstances = developed.circumstances
+    planes, unknown = developed.planes[0].numpy(), developed.unknown[0].numpy()
+    otf = to_runtime_otf(circumstances.frozen[0].numpy(), planes.shape[-1])
+    block = Block(
+        samples=taper_edges(planes, otf, settings.overlap_px // 4),
+        otf=otf,
+        unknown=unknown if unknown.any() else None,
+        height_mm=circumstances.height_mm,
+        red=circumstances.red,
+    )
+    return torch.from_numpy(wiener_filter(settings, circumstances.met_noise)(block))[None]
 
 
 def finish_shot(developed: Developed, recipe: BayerRecipe, restored: Tensor | None = None) -> Shot:

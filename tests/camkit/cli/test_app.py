@@ -16,7 +16,8 @@ OPTIONS = {
     "process": "--bundle --size --quality --max-seconds --max-error-db --out-dir --format --color "
     "--wb --exposure --demosaic --linear "
     "--no-vignetting --no-undistort --mosaic --black-level --white-level --method --mode "
-    "--origin-px --assume --max-mem --threads --jobs --resume --overwrite --json --dry-run --debug",
+    "--provider --dtype --origin-px --assume "
+    "--max-mem --threads --jobs --resume --overwrite --json --dry-run --debug",
     "plan": "--bundle --size --quality --max-seconds --max-error-db --out-dir --method --mode "
     "--assume --max-mem --threads --json --debug",
     "info": "--schema --json --debug",

@@ -62,6 +62,14 @@ def test_a_budget_of_time_ends_a_run_with_its_decay(tmp_path, recipe_path, mater
     assert train(recipe_path, given, material=material).steps < 60
 
 
+def test_a_session_ends_by_its_own_clock_and_the_schedule_goes_on(tmp_path, recipe_path, material):
+    session = options(tmp_path, size="M", session_minutes=1e-4)
+    assert train(recipe_path, session, material=material).steps < 60
+    assert (
+        train(recipe_path, options(tmp_path, size="M", resume=True), material=material).steps == 60
+    )
+
+
 def test_the_cpu_time_of_an_earlier_run_counts(tmp_path, recipe_path, material):
     first = train(recipe_path, options(tmp_path, size="M", stop_at_step=5), material=material)
     spent = first.cpu_s / 60

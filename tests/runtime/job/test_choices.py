@@ -195,7 +195,7 @@ def test_flags_are_those_of_the_command() -> None:
     parameters = inspect.signature(process).parameters
     typed = {"--" + name.rstrip("_").replace("_", "-") for name in parameters}
     typed |= {flag.replace("--", "--no-", 1) for flag in typed}
-    for_programs = {"tile_px", "dtype", "provider"}
+    for_programs = {"tile_px"}
     with speaking("command"):
         assert {name for name in CHANGED if option_text(name) not in typed} <= for_programs
 

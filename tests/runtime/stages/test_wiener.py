@@ -11,8 +11,9 @@ from camkit.arrays import FloatArray
 from camkit.bundle.facts import Port
 from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import Extent, PlanesSensor
-from camkit.bundle.stages import Linearise, Network, Together, Wiener
+from camkit.bundle.stages import Linearise, Mosaic, Network, Together, Wiener
 from camkit.bundle.writer import write_bundle
+from camkit.cfa import CfaPattern
 from camkit.errors import BundleError
 from camkit.noise import NoiseModel
 from camkit.psf import FrozenPsf
@@ -65,6 +66,31 @@ def test_bands_are_those_of_the_bank_with_the_noise_behind_the_gains(
     np.testing.assert_array_equal(
         read_all(sharp.rows(), 10), bank.restore_array(light, light > 0.7)
     )
+
+
+@pytest.mark.parametrize(("cfa", "red"), [("RGGB", (0, 0)), ("GBRG", (1, 0)), (None, None)])
+def test_the_bank_is_told_where_the_mosaic_of_the_capture_begins(
+    bundle: Bundle, cfa: CfaPattern | None, red: tuple[int, int] | None
+) -> None:
+    entry = bundle.manifest.stage(Wiener)
+    assert entry is not None
+    near = {"together": TOGETHER, "mosaic": Mosaic(within_mm=9.0)}
+    entry, light = entry.model_copy(update=near), texture(64, 96)
+    capture = made_mosaic()
+    if cfa is None:
+        planes = np.zeros((3, *capture.samples.shape), np.uint16)
+        capture = replace(capture, cfa=None, samples=planes, black_level=np.zeros(3, np.float32))
+    else:
+        capture = replace(capture, cfa=cfa)
+    job = replace(start(bundle, made_mosaic()).job, capture=capture)
+    taken = stream_of(light, gains=OWN_BALANCE), stream_of(light > 2, "mask")
+    (sharp,) = run_stage(entry, job, *taken)
+    local = LocalPsf(
+        kernels=color_kernels(bundle.psf, *bundle.manifest.light_sensor.response_arrays()),
+        window=job.placement.window,
+    )
+    bank = restoration_bank(local, entry, job.noise.with_gains(OWN_BALANCE), red=red)
+    np.testing.assert_array_equal(read_all(sharp.rows(), 10), bank.restore_array(light))
 
 
 @pytest.mark.parametrize("together", [TOGETHER, None], ids=["together", "alone"])

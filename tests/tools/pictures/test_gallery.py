@@ -107,7 +107,12 @@ def test_the_command_writes_a_view_a_small_one_and_the_chart(
     rows = {"A scene": {"as taken: 1.0 dB": picture, "restored: 2.0 dB": picture, "truth": picture}}
     made = views.View(title="toy 1.0", rows=rows)
     monkeypatch.setattr(gallery, "VIEWS", {"toy": lambda _: made})
+    record = tmp_path / "methods.json"
+    monkeypatch.setattr(gallery, "RECORD", record)
     monkeypatch.setattr(gallery, "write_front", lambda path: path.write_bytes(b"chart"))
+    monkeypatch.setattr(
+        gallery, "write_front_chart", lambda path, _: path.write_bytes(b"front of methods")
+    )
     monkeypatch.setattr(sys, "argv", ["gallery", "-o", str(tmp_path), "toy"])
     gallery.main()
     small = cv2.imread(str(tmp_path / "toy-small.jpg"))
@@ -115,4 +120,7 @@ def test_the_command_writes_a_view_a_small_one_and_the_chart(
     assert small.shape == (gallery.SMALL_PX[0], 2 * gallery.SMALL_PX[1] + gallery.GAP_PX, 3)
     assert cv2.imread(str(tmp_path / "toy.jpg")) is not None
     assert (tmp_path / "front.png").read_bytes() == b"chart"
+    record.touch()
+    gallery.main()
+    assert (tmp_path / "front.png").read_bytes() == b"front of methods"
     assert "kB in all" in capsys.readouterr().out

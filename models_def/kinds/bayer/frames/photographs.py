@@ -46,7 +46,6 @@ from camkit.psf import depth_name
 from camkit.runtime.bank.haze import hazy_kernels
 from camkit.runtime.geometry.illumination import illumination_band
 from camkit.runtime.options import Options
-from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.twin.exposure import Setting, expose
 from camkit.runtime.twin.light import Light, LightOptions, lens_of, light_of, scene_window
 from camkit.units import to_mm
@@ -191,6 +190,8 @@ class _Studio:
     def __init__(
         self, recipe: BayerRecipe, sources: FrameSources, part: str, bundle: Bundle, tiles: int
     ) -> None:
+        from camkit.runtime.pipeline import Pipeline  # training does without onnxruntime
+
         data = recipe.data
         self._recipe, self._sources, self._tiles = recipe, sources, tiles
         self._choosing = part == PARTS[1]

@@ -14,6 +14,7 @@ def test_doctor_tells_versions_and_tries_the_decoder(camkit_command) -> None:
     assert facts["memory_mb"] > 100
     assert "CPUExecutionProvider" in facts["providers"]
     assert facts["packages"]["numpy"][0].isdigit()
+    assert "bf16" in facts["openvino"]
 
 
 def test_doctor_says_when_the_decoder_fails(camkit_command, monkeypatch) -> None:

@@ -12,6 +12,7 @@ from camkit.report.bench.line_up import make_trials
 from camkit.report.bench.metric import registered_metrics
 from camkit.report.bench.metrics import picture
 from camkit.report.bench.trial import Axes, Entrant, Ground
+from camkit.runtime.network import openvino_session
 from tests.wide_bundle import write_wide_bundle
 
 GROUND = Ground(threads=2, providers=("cpu",), free_bytes=10**10)
@@ -47,7 +48,26 @@ def test_fp16_providers_and_sizes_that_are_not_there_are_said_not_made(bundle: B
     assert made == ["M", "M whole", "M 1 thread"]
     assert "tiny L: the bundle holds M" in skips
     assert "tiny M fp16: the bundle holds no fp16 graph of this size" in skips
-    assert "tiny M cuda: onnxruntime here computes on cpu" in skips
+    assert "tiny M cuda: networks here are computed on cpu" in skips
+
+
+def test_bfloat16_without_openvino_makes_no_row_and_says_what_is_missing(
+    bundle: Bundle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(openvino_session, "has_openvino", lambda: False)
+    axes = Axes(
+        methods=("net",),
+        modes=("exact",),
+        dtypes=("fp32", "bf16"),
+        providers=("cpu", "openvino"),
+        vary=False,
+    )
+    made, skips = labels(bundle, axes, replace(GROUND, providers=("cpu", "openvino")))
+    assert made == ["M", "M openvino"]
+    assert skips == [
+        "tiny M bf16: bf16 is computed by openvino alone",
+        "tiny M bf16 openvino: bf16 needs the package openvino (pip install 'camkit[openvino]')",
+    ]
 
 
 def test_more_threads_than_there_are_make_no_row(bundle: Bundle) -> None:

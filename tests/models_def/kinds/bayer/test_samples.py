@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 
+from camkit.bundle.stages import Dehaze, Mosaic
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.psf_bank import PsfBank
 from camkit.models_def.kinds.bayer.samples import (
@@ -11,11 +12,16 @@ from camkit.models_def.kinds.bayer.samples import (
     Exposure,
     corner_height_mm,
     draw_exposure,
+    filtered,
     make_shot,
+    photograph,
     scene_side_px,
 )
 from camkit.models_def.sensors.stabilise import unstabilise
+from camkit.runtime.bank.blocks import Block, taper_edges, to_otf
+from camkit.runtime.bank.wiener import wiener_filter
 from camkit.scenes import procedural_scene
+from tests.together_factory import TOGETHER
 
 CENTRE = Exposure(x_mm=0.0, y_mm=0.0, block_x_mm=0.0, block_y_mm=0.0, copy=0, iso=100.0)
 
@@ -118,6 +124,34 @@ def test_picture_borders_show_mirrored_content_and_leave_the_middle_alone(recipe
     assert torch.equal(edge.sample.target, inside.sample.target)
     change = (edge.sample.inputs["wiener"] - inside.sample.inputs["wiener"]).abs().mean((0, 2))
     assert float(change[:8].mean()) > 4 * float(change[-16:].mean())
+
+
+@pytest.mark.parametrize("borders", [(False,) * 4, (True, False, True, False)])
+def test_the_bank_of_samples_near_the_axis_works_on_their_mosaic(recipe, bank, borders):
+    near = recipe.wiener.model_copy(update={"together": TOGETHER, "mosaic": Mosaic(within_mm=1.0)})
+    recipe, crop = replace(recipe, wiener=near), grey(recipe, bank, 0.0)
+    crop[:] = np.clip(procedural_scene(8, *crop.shape[1:]), 0, 0.9)
+    exposure = replace(CENTRE, borders=borders)
+    shot = photograph(crop, exposure, recipe, bank, np.random.default_rng(0))
+    given, planes = shot.circumstances, shot.planes[0].numpy()
+    assert given.red == (0, 0)
+    otf = to_otf(given.frozen[0].numpy(), planes.shape[-1])
+    tapered = taper_edges(planes, otf, near.overlap_px // 4)
+    block = Block(samples=tapered, otf=otf, red=given.red)
+    expected = wiener_filter(near, given.noise)(block)
+    np.testing.assert_array_equal(filtered(shot, recipe)[0].numpy(), expected)
+    apart = replace(shot, circumstances=replace(given, height_mm=1.5))
+    by_planes = filtered(replace(apart, circumstances=replace(given, red=None)), recipe)
+    assert not torch.equal(filtered(apart, recipe), filtered(shot, recipe))
+    torch.testing.assert_close(
+        by_planes, filtered(shot, replace(recipe, wiener=near.model_copy(update={"mosaic": None})))
+    )
+
+
+def test_tiles_of_a_lens_with_a_haze_have_no_mosaic(recipe):
+    near = recipe.wiener.model_copy(update={"together": TOGETHER, "mosaic": Mosaic(within_mm=1.0)})
+    with pytest.raises(ContractError, match=r"leave wiener\.mosaic out"):
+        replace(recipe, wiener=near, haze=Dehaze())
 
 
 def test_samples_depend_on_nothing_but_their_generator(recipe, bank):
