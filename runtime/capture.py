@@ -19,9 +19,9 @@ from camkit.errors import ContractError
 from camkit.field_types import check_fields
 from camkit.noise import NoiseModel
 from camkit.picture_window import PictureWindow
+from camkit.runtime.binning import Binning
 from camkit.runtime.machine.memory import mapping_of
 from camkit.runtime.metadata import Metadata
-from camkit.runtime.binning import Binning
 
 if TYPE_CHECKING:
     from camkit.bundle.plane import Plane

@@ -25,10 +25,10 @@ from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.bank.psf import FieldKernels
 from camkit.runtime.bank.spectrum import ComplexArray, apply_transfer, transform
+from camkit.runtime.binning import Binning, waves
 from camkit.runtime.cancel import Cancel, check_cancelled
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.rows import ArrayRows, RowSource
-from camkit.runtime.binning import Binning, waves
 
 MaskRows = Callable[[int, int], NDArray[np.bool_]]
 

@@ -20,8 +20,7 @@ from camkit.runtime.plan.decision import PLAIN, Subject, Work
 from camkit.runtime.plan.tiers import BANK_MAC, NETWORK_EVERYWHERE_MAC, network_work
 
 STRIP_RATIO: Final = 1.2
-"""Computed over kept pixels of strips (measured with duet: S 1.21, M 1.17 of 3 megapixels and 1.35
-of 24, whose strips are lower)."""
+"""Computed over kept pixels of strips (measured with duet at 24 megapixels: S 1.21, M 1.17)."""
 USUAL_BYTES: Final = 500_000_000
 """Memory that windows of cells get of the usual cap."""
 

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from camkit.arrays import FloatArray
 from camkit.errors import ContractError
+from camkit.runtime.binning import COLOURS, Binning
 from camkit.runtime.capture import Capture
 from camkit.runtime.machine.memory import release_pages
 from camkit.runtime.machine.slices import run_chunks
-from camkit.runtime.binning import COLOURS, Binning
 
 BLACK: Final = 4096
 WHITE: Final = 65535

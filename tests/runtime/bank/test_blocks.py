@@ -17,9 +17,9 @@ from camkit.runtime.bank.blocks import (
     to_otf,
 )
 from camkit.runtime.bank.psf import FieldKernels, color_kernels
+from camkit.runtime.binning import Binning
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.rows import ArrayRows, RollingRows
-from camkit.runtime.binning import Binning
 from tests.psf_factory import (
     PITCH_UM,
     coma_kernels,
