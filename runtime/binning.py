@@ -54,7 +54,7 @@ class Binning:
 
         They are linear: what lies between two samples is nowhere outside their range.
         """
-        down, across = (_hat(to / self.side_px) for to in self.shift_px(colour))
+        down, across = (_hat(shift / self.side_px) for shift in self.shift_px(colour))
         return down, across
 
     @property
@@ -77,11 +77,11 @@ class Binning:
             frequencies: (n,) in cycles per pixel before averaging.
         """
         places = np.arange(self.side_px) - (self.side_px - 1) / 2
-        own = places[sorted({row for row, _ in self.sites(colour)})]
-        means = waves(own, frequencies).mean(axis=1)
-        moved = waves(np.arange(-1, 2) * self.side_px, frequencies)
-        moved = moved @ self.shift_weights(colour)[0]
-        share = np.abs(means * moved) / np.abs(waves(places, frequencies).mean(axis=1))
+        colour_places = places[sorted({row for row, _ in self.sites(colour)})]
+        means = waves(colour_places, frequencies).mean(axis=1)
+        shifted_mean = waves(np.arange(-1, 2) * self.side_px, frequencies)
+        shifted_mean = shifted_mean @ self.shift_weights(colour)[0]
+        share = np.abs(means * shifted_mean) / np.abs(waves(places, frequencies).mean(axis=1))
         return np.asarray(share, np.float64)
 
 
@@ -90,6 +90,6 @@ def waves(places_px: NDArray[Any], frequencies: FloatGrid) -> NDArray[np.complex
     return np.asarray(np.exp(2j * np.pi * np.outer(frequencies, places_px)), np.complex128)
 
 
-def _hat(to: float) -> FloatArray:
+def _hat(place: float) -> FloatArray:
     """Return (3,): weights of samples -1, 0, 1 for the signal at a place -1..1, linear."""
-    return np.asarray(np.maximum(1 - np.abs(np.arange(-1, 2) - to), 0), np.float32)
+    return np.asarray(np.maximum(1 - np.abs(np.arange(-1, 2) - place), 0), np.float32)

@@ -259,15 +259,15 @@ def check_kind_options(options: Options, kind: Kind, where: str) -> None:
 def _check_scale(options: Options) -> None:
     if options.scale == "1":
         return
-    given = [
+    foreign = [
         name
         for name in ("max_seconds", "max_error_db", "quality")
         if getattr(options, name) not in (None, "exact")
     ]
-    if given:
+    if foreign:
         raise ContractError(
             f"{option_text('scale', options.scale)} decides what is done at its price; leave "
-            f"{option_list(given)} out"
+            f"{option_list(foreign)} out"
         )
 
 

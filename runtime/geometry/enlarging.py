@@ -29,7 +29,7 @@ def enlarged_bands(source: RowSource, times: int, size_px: tuple[int, int]) -> I
         (c, rows, width) float32.
     """
     channels, height, width = source.shape
-    beyond = size_px[1] - width * times
+    more_columns = size_px[1] - width * times
     for top in range(0, height, BAND_ROWS):
         bottom = min(top + BAND_ROWS, height)
         above, below = max(top - MARGIN_PX, 0), min(bottom + MARGIN_PX, height)
@@ -40,6 +40,6 @@ def enlarged_bands(source: RowSource, times: int, size_px: tuple[int, int]) -> I
         for plane, small in zip(out, rows, strict=True):
             large = cv2.resize(small, None, fx=times, fy=times, interpolation=cv2.INTER_LINEAR)
             missing = end - bottom * times
-            plane[...] = np.pad(large[inside], ((0, missing), (0, beyond)), mode="edge")
+            plane[...] = np.pad(large[inside], ((0, missing), (0, more_columns)), mode="edge")
         yield out
         del out, rows

@@ -142,8 +142,8 @@ def _spend(
     while True:
         energy = costs + _pull(labels, borders)
         saving = np.take_along_axis(energy, labels[None], axis=0) - energy
-        own = np.take_along_axis(losses, labels[None], axis=0)
-        fits = losses - own <= allowed - own.sum()
+        current = np.take_along_axis(losses, labels[None], axis=0)
+        fits = losses - current <= allowed - current.sum()
         saving = np.where(fits, saving, 0)
         tier, row, column = np.unravel_index(saving.argmax(), saving.shape)
         if saving[tier, row, column] <= 0:

@@ -267,8 +267,8 @@ def _nearness(entry: Wiener, job: Job, planes: Stream) -> NearnessMap:
             threads=job.threads,
         )
     job.log.sections["distance"] = nearness.to_json()
-    found: NearnessMap = nearness
-    return found
+    result: NearnessMap = nearness
+    return result
 
 
 def _nearness_key(entry: Wiener) -> tuple[str, tuple[str, ...]]:

@@ -97,10 +97,10 @@ def _saving(capture: CaptureCells, bundle: Bundle, labels: Labels | None, small:
         saved = 1 - counted_work(subject, replace(done, networks=bool(done.sizes()))) / everything
     if labels is None or saved < LEAST_SAVING:
         labels, saved = np.full(capture.pixels.shape, FULL, np.int8), 0.0
-    left = np.take_along_axis(_measured(capture, small), labels[None].astype(np.intp), axis=0)
+    errors = np.take_along_axis(_measured(capture, small), labels[None].astype(np.intp), axis=0)
     return Saving(
         name=capture.name,
-        loss_db=float(10 * np.log10(left.sum() / capture.errors[EXACT].sum())),
+        loss_db=float(10 * np.log10(errors.sum() / capture.errors[EXACT].sum())),
         saved=saved,
         tiers=tuple(float(np.mean(labels == tier)) for tier in range(FULL + 1)),
     )

@@ -16,13 +16,13 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
     """Report that the mosaic is averaged over squares first, and what becomes of networks."""
     if subject.side_px == 1:
         return work, None
-    asked = option_text("quality", "draft") if subject.enlarged else option_text("scale")
+    option = option_text("quality", "draft") if subject.enlarged else option_text("scale")
     network = "no network: it was trained on pixels of full size"
     if work.networks:
         network = f"{work.strength:.0%} of what the network adds are kept"
     return work, Decision(
         what=SCALE,
         choice=f"1/{subject.side_px}" + (", enlarged" if subject.enlarged else ""),
-        reason=f"set by {asked}; {network}",
+        reason=f"set by {option}; {network}",
         cost_db=DRAFT_COST_DB if subject.enlarged else 0.0,
     )
