@@ -29,7 +29,7 @@ NETWORK_FIXED_MAC: Final = 3_300.0
 NETWORK_EVERYWHERE_MAC: Final = 7_600.0
 """What a network costs per pixel of the picture, in whatever cells it runs: the way to equal noise
 and back, and the bound of its light. No plan saves it."""
-LEAST_SAVING: Final = 0.05
+LEAST_SAVING: Final = 0.1
 """Below this share of the work nothing is skipped."""
 _BANK_REACH_PX: Final = 256
 _WEIGHTS: Final = 48
