@@ -31,7 +31,7 @@ from camkit.runtime.kinds.hdr.streaks.rims import MARGIN_PX as RIM_MARGIN_PX
 from camkit.runtime.kinds.hdr.streaks.rims import near_clipped, no_brighter
 from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
-from camkit.runtime.rows import RollingRows, Rows
+from camkit.runtime.rows import RollingRows, Rows, read_bands
 from camkit.runtime.signal.demosaic import DemosaicMethod
 from camkit.runtime.stages.demosaic import ColorRows
 
@@ -160,13 +160,16 @@ def _from_samples(
     cfa, capture = job.capture.cfa, job.capture
     assert cfa is not None  # it is a mosaic
     cleared = RollingRows(mosaic.shape, _cleared(mosaic, painter, capture)).reader()
-    source = ColorRows(cleared, cfa, method, threads=job.threads)
-    captured, gains, height = picture.rows(), mosaic.gains, capture.height
+    colours = ColorRows(cleared, cfa, method, threads=job.threads)
+    # in high bands: what a demosaic looks at above and below is computed for each
+    source = RollingRows(colours.shape, read_bands(colours)).reader()
+    captured, gains, height = picture.pieced(), mosaic.gains, capture.height
     del picture, mosaic
     for top in range(0, height, LIT_ROWS):
         bottom = min(top + LIT_ROWS, height)
         above, below = max(top - RIM_MARGIN_PX, 0), min(bottom + RIM_MARGIN_PX, height)
-        planes, clipped = source.read(above, below), capture.saturated_rows(above, below)
+        planes = np.concatenate(source.pieces(above, below), axis=1)
+        clipped = capture.saturated_rows(above, below)
         painter.light_up(planes, clipped, above, gains)
         inside = np.s_[..., top - above : bottom - above, :]
         lit, near = planes[inside], near_clipped(clipped)[inside]
