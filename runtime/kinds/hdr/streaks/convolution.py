@@ -158,7 +158,10 @@ def _wrapped(kernel: FloatArray, half: int, size: tuple[int, ...]) -> FloatArray
     for down, rows in ((-half, before), (0, after)):
         for right, columns in ((-half, before), (0, after)):
             part = kernel[rows, columns]
-            at = (slice(shift % side, shift % side + many) for shift, side, many in zip((down, right), size, part.shape, strict=True))
+            at = (
+                slice(shift % side, shift % side + many)
+                for shift, side, many in zip((down, right), size, part.shape, strict=True)
+            )
             wrapped[tuple(at)] += part
     return wrapped
 
