@@ -51,7 +51,7 @@ class Cells:
     @property
     def unclipped(self) -> FloatArray:
         """Return the light of what did not clip, spread over its cell."""
-        return self.light * (1 - self.clipped)
+        return self.light * (1 - self.clipped) if self.clipped.any() else self.light
 
 
 def sample_sites(cfa: CfaPattern | None) -> tuple[Sites, ...]:
@@ -113,7 +113,7 @@ def coarser(cells: Cells) -> Cells:
     if min(cells.light.shape[1:]) < 2:
         raise ContractError(f"cells need two on each side; got {cells.light.shape[1:]}")
     light = pooled(cells.light)
-    share = np.zeros_like(light)
+    share = np.zeros(light.shape, np.float32)  # takes no memory until it is written to
     for top in range(0, light.shape[1], TILE_CELLS):
         for left in range(0, light.shape[2], TILE_CELLS):
             there = np.s_[:, top : top + TILE_CELLS, left : left + TILE_CELLS]
