@@ -64,6 +64,35 @@ def test_a_threshold_that_gives_every_array_back_is_undone() -> None:
     assert faults[1] < 0.2 * faults[0]
 
 
+@pytest.mark.skipif(memory._LIBC is None, reason="no glibc")
+def test_memory_is_kept_inside_the_block_and_given_back_behind_it() -> None:
+    """Arrays of threads that follow one another take the pages of those before them."""
+    done = subprocess.run([sys.executable, "-c", KEPT], capture_output=True, text=True, check=True)
+    apart, shared, held, given_back = map(int, done.stdout.split())
+    assert shared < 0.5 * apart  # the first touch of 96 MB among them
+    assert given_back < held - 50e6
+
+
+KEPT = """
+import resource
+from concurrent.futures import ThreadPoolExecutor
+import numpy as np
+from camkit.runtime.machine import memory
+
+def faults():
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+    for _ in range(20):
+        with ThreadPoolExecutor(1) as pool:
+            list(pool.map(lambda _: [np.ones(2_000_000) for _ in range(6)], range(1)))
+    return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before
+
+apart = faults()
+memory.use_one_heap()
+with memory.kept_memory():
+    shared = faults()
+    held = memory._resident_bytes()
+print(apart, shared, held, memory._resident_bytes())
+"""
 PAGES = """
 import resource, sys
 import numpy as np
