@@ -261,7 +261,7 @@ def _check_bundle(container: Container, path: Path) -> Bundle:
     manifest = read_container_manifest(container)
     for need in manifest.needs():
         _need_version(manifest, need.version, need.what)
-    optics_name = getattr(manifest.optics, "member", None)
+    optics_name: str = getattr(manifest.optics, "member", "")
 
     def checked(name: str) -> bytes | None:
         data = _checked_member(container, name, manifest.members[name])

@@ -56,7 +56,7 @@ def find_hot(
     dark, expected = dark[hot], _usual(background, hot) * bins
     excess = dark - expected > SIGMAS * np.sqrt(np.maximum(expected, 1.0))
     hot[hot] = excess & (dark > TIMES * expected)
-    return hot
+    return np.asarray(hot)
 
 
 def _usual(background: NDArray[np.float64], at: NDArray[np.bool_]) -> NDArray[np.float64]:
