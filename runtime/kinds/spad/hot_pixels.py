@@ -65,8 +65,8 @@ def _usual(background: NDArray[np.float64], at: NDArray[np.bool_]) -> NDArray[np
         whole = median_filter(background, size=NEIGHBOURHOOD_PX, mode="mirror")
         return np.asarray(whole[at])
     wide = np.pad(background, NEIGHBOURHOOD_PX // 2, mode="reflect")
-    around = sliding_window_view(wide, (NEIGHBOURHOOD_PX, NEIGHBOURHOOD_PX))[at]
-    return np.asarray(np.median(around.reshape(-1, NEIGHBOURHOOD_PX**2), axis=1))
+    neighbours = sliding_window_view(wide, (NEIGHBOURHOOD_PX, NEIGHBOURHOOD_PX))[at]
+    return np.asarray(np.median(neighbours.reshape(-1, NEIGHBOURHOOD_PX**2), axis=1))
 
 
 def check_map(hot: NDArray[np.bool_]) -> None:

@@ -234,10 +234,10 @@ def _cells(job: Job, light_plane: str, mask_plane: str) -> Cells:
     pixels = np.zeros((samples.shape[0], *shape[1:]), np.uint8)
     for top in range(0, height, BAND_ROWS):
         bottom = min(top + BAND_ROWS, height)
-        seen, hidden = samples.read(top, bottom), mask.read(top, bottom)
+        band, mask_band = samples.read(top, bottom), mask.read(top, bottom)
         for left in range(0, 2 * shape[2], TILE_COLUMNS):
             columns = slice(left, min(left + TILE_COLUMNS, 2 * shape[2]))
-            part = cells_of(seen[..., columns], hidden[..., columns], sites)
+            part = cells_of(band[..., columns], mask_band[..., columns], sites)
             at = np.s_[:, top // 2 : bottom // 2, columns.start // 2 : columns.stop // 2]
             light[at] = part.light
             if part.pixels.any():

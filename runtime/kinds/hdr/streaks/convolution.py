@@ -90,9 +90,9 @@ class FewLights:
             # a sum over rows of fixed order: products of matrices hang on threads and processors
             whole = np.einsum("ji,j->i", self._kernels, light[self._at])
             return np.asarray(whole, np.float32).reshape(self._shape)
-        once, thrown = np.zeros(self._shape, np.float32), np.empty(self._shape, np.float32)
+        once, product = np.zeros(self._shape, np.float32), np.empty(self._shape, np.float32)
         for y, x in zip(*self._at, strict=True):
-            once += np.multiply(self._kernel_at(y, x), light[y, x], out=thrown)
+            once += np.multiply(self._kernel_at(y, x), light[y, x], out=product)
         return once
 
     def gathered(self, image: FloatArray) -> FloatArray:

@@ -82,11 +82,11 @@ def _shrunk(
     """Yield samples nearer to the mean of their surroundings, weighted by doubt."""
     doubts = [np.square(np.float32(DOUBT) * plane) for plane in brightest]
     weight, mean, square = _local_moments(rest, clipped, doubts)
-    around: dict[tuple[int, ...], tuple[FloatArray, FloatArray]] = {}
+    moments: dict[tuple[int, ...], tuple[FloatArray, FloatArray]] = {}
     for plane, streak, mask, doubt in zip(rest, streaks, clipped, doubts, strict=True):
-        if plane.shape not in around:
-            around[plane.shape] = _mean_and_spread(weight, mean, square, plane.shape)
-        middle, spread = around[plane.shape]
+        if plane.shape not in moments:
+            moments[plane.shape] = _mean_and_spread(weight, mean, square, plane.shape)
+        middle, spread = moments[plane.shape]
         samples = plane - middle
         samples *= spread / (spread + doubt)
         samples += middle
