@@ -13,7 +13,7 @@ SPREAD := -q -n auto --dist loadfile
 # else every process that a test starts compiles the product anew
 export PYTHONDONTWRITEBYTECODE =
 
-.PHONY: demo pictures test test-slow fuzz check format docs clean
+.PHONY: demo pictures test test-slow fuzz check types tidy format docs clean
 
 demo: $(RUNTIME_STAMP)  ## main job on the demo capture, runtime only (no torch)
 	@echo "1 of 2: a night scene with streak-hdr, on the way to out/night.png (about ten seconds)"
@@ -39,12 +39,17 @@ fuzz: $(DEV_STAMP)  ## search for bundles that camkit does not stand (Linux); FU
 	$(DEV)/bin/python -m pip install -q --disable-pip-version-check -c constraints.txt -e ".[fuzz]"
 	OMP_NUM_THREADS=1 FUZZ_SECONDS=$(FUZZ_SECONDS) $(DEV)/bin/python -m tests.hostile.fuzz
 
-check: $(DEV_STAMP)  ## weight, format, lint, types, layers, spelling
+check: $(DEV_STAMP)  ## weight, format, lint, types, layers, spelling; types beside the rest
 	@echo "Checking weight, format, lint, types, layers and spelling: about a minute"
+	$(MAKE) --no-print-directory -j2 types tidy
+
+types: $(DEV_STAMP)
+	$(DEV)/bin/mypy
+
+tidy: $(DEV_STAMP)
 	$(DEV)/bin/python -m tools.weight
 	$(DEV)/bin/ruff format --check $(SOURCES)
 	$(DEV)/bin/ruff check $(SOURCES)
-	$(DEV)/bin/mypy
 	$(DEV)/bin/lint-imports
 	$(DEV)/bin/codespell $(SOURCES) docs README.md CHANGELOG.md CONTRIBUTING.md
 
