@@ -22,7 +22,6 @@ from camkit.runtime.unit import Unit
 from camkit.runtime.write_options import WriteOptions
 from tests.bundle_factory import write_tiny_bundle
 from tests.capture_factory import write_tiny_captures
-from tests.decoded_here import decoded_here  # noqa: F401
 from tests.glare_bundle import write_glare_bundle
 from tests.hdr_bundle import write_hdr_bundle
 from tests.planes_bundle import planes_sensor, write_planes_bundle
