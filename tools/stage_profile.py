@@ -27,7 +27,7 @@ from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.report.bench.gemm import gemm_peak_gmac_per_s
 from camkit.runtime.clock import StageClock
 from camkit.runtime.job.reconstruction import Reconstruction
-from camkit.runtime.machine.memory import peak_rss_mb
+from camkit.runtime.machine.memory import keep_memory_for_good, peak_rss_mb
 from camkit.runtime.network.engine import available_threads
 from camkit.runtime.output.band_queue import BandQueue
 from camkit.runtime.output.part_file import atomic_output
@@ -108,7 +108,10 @@ def run_again(arguments: argparse.Namespace) -> str:
     script += [] if arguments.size is None else ["--size", arguments.size]
     script += [] if arguments.method is None else ["--method", arguments.method]
     script += [] if arguments.threads is None else ["--threads", str(arguments.threads)]
-    return subprocess.run(script, capture_output=True, text=True, check=True).stdout
+    environment = {**os.environ, "NUMPY_MADVISE_HUGEPAGE": "0"}  # as the command has it
+    return subprocess.run(
+        script, capture_output=True, text=True, check=True, env=environment
+    ).stdout
 
 
 def profile_stages(arguments: argparse.Namespace) -> None:
@@ -135,6 +138,7 @@ def profile_stages(arguments: argparse.Namespace) -> None:
 
 
 def _profile_once(arguments: argparse.Namespace) -> dict[str, Any]:
+    keep_memory_for_good()  # as the command does
     began = time.perf_counter()
     choices = {"size": arguments.size, "method": arguments.method}
     pipeline = load(arguments.bundle, **choices, threads=arguments.threads)
@@ -159,6 +163,7 @@ def _profile_once(arguments: argparse.Namespace) -> dict[str, Any]:
         "rss_mb": threads.rss_mb,
         "threads": threads.by_thread(),
         "total": total,
+        "size_px": work.shape[:0:-1],
     }
 
 

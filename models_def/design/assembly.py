@@ -9,11 +9,14 @@ from torch import Tensor, nn
 
 from camkit.cfa import CFA_PATTERNS
 from camkit.errors import ContractError
+from camkit.models_def.design.descent import Descending, descended
 from camkit.models_def.design.design_recipe import DesignRecipe, OpticsRecipe
 from camkit.models_def.design.lens_module import WIDEST_PX, LensModule, fitting_window_px
 from camkit.models_def.design.loop import DesignLoop, DesignParts
 from camkit.models_def.design.sensor import Recorder
+from camkit.models_def.design.shipped_camera import Camera
 from camkit.models_def.design.starts import Starts, best_judged, best_starts
+from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.networks.catalog import build_network, check_patch
 from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.paraxial import paraxial_image
@@ -22,6 +25,8 @@ from camkit.models_def.optics.pupil import half_disc
 from camkit.models_def.optics.search.problem import Problem
 from camkit.models_def.optics.search.splat import Pixels
 from camkit.models_def.optics.search.variables import FreeLens
+from camkit.models_def.training.first_weights import read_first_weights, take_first_weights
+from camkit.models_def.training.kind import read_recipe
 from camkit.models_def.training.pictures import SceneSource, open_scenes
 from camkit.units import to_radians
 
@@ -80,6 +85,7 @@ def pixels_of(recipe: DesignRecipe, problem: Problem, begin: Tensor) -> Pixels:
         pitch_um=recipe.pixels.pitch_um,
         kernel_px=recipe.pixels.kernel_px or WIDEST_PX,
         color_weights=weights / weights.sum(1, keepdim=True),
+        window_follows=recipe.camera is not None,
     )
     if recipe.pixels.kernel_px:
         return pixels
@@ -110,7 +116,31 @@ def network_of(recipe: DesignRecipe) -> nn.Module | None:
             f"network {choice.name} takes {network.in_channels} planes, the front "
             f"{recipe.front.kind!r} gives {planes}; set network.config.in_channels"
         )
+    if choice.start:
+        take_first_weights(network, read_first_weights(Path(choice.start), choice.start_size))
     return network
+
+
+def camera_of(recipe: DesignRecipe, folder: Path | None) -> Camera | None:
+    """Return the camera whose bank stands in front; None where it is another front.
+
+    Raises:
+        ContractError: If its recipe is missing or of another kind, or its pixels are not those of
+            the design.
+    """
+    choice = recipe.camera
+    if choice is None:
+        return None
+    training = read_recipe((folder or Path()) / choice.recipe)
+    if not isinstance(training, BayerRecipe):
+        raise ContractError(f"camera.recipe must be of a camera behind a mosaic: {choice.recipe}")
+    pitch_um = training.sensor.pixel_pitch_um
+    if pitch_um != recipe.pixels.pitch_um:
+        raise ContractError(
+            f"pixels.pitch_um must be that of {choice.recipe}, {pitch_um}; got "
+            f"{recipe.pixels.pitch_um}"
+        )
+    return Camera(training, choice, recipe.front.margin_px)
 
 
 def parts_of(
@@ -131,7 +161,7 @@ def parts_of(
     problem = problem_of(recipe, find_lens(recipe.prescription, folder))
     lenses = best_starts(problem, recipe.starts if recipe.schedule.lens_rate else Starts())
     pixels = pixels_of(recipe, problem, lenses[0])
-    source = source or source_of(recipe, pictures)
+    source, camera = source or source_of(recipe, pictures), camera_of(recipe, folder)
 
     def parts_at(begin: Tensor, network: nn.Module | None, *, whiten: bool) -> DesignParts:
         return DesignParts(
@@ -142,6 +172,7 @@ def parts_of(
             fabrication=recipe.fabrication,
             loss=recipe.loss,
             source=source,
+            camera=camera,
         )
 
     def judge(scaled: Tensor) -> float:
@@ -150,6 +181,15 @@ def parts_of(
         return loop.best_merit
 
     begin = best_judged(lenses, judge)
+    if recipe.descent and recipe.fabrication and camera and recipe.schedule.lens_rate:
+        descending = Descending(
+            descent=recipe.descent,
+            camera=camera,
+            fabrication=recipe.fabrication,
+            make=lambda scaled: LensModule(problem, pixels, scaled),
+            seed=recipe.schedule.seed,
+        )
+        begin = descended(begin, descending)
     return parts_at(begin, network_of(recipe), whiten=recipe.optics.whiten)
 
 

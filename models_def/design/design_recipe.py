@@ -3,13 +3,15 @@
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Final, Literal, get_args
+from typing import Any, Final, Literal, TypeVar, get_args
 
 from camkit.errors import ContractError
+from camkit.models_def.design.expected import Descent
 from camkit.models_def.design.front import Front
 from camkit.models_def.design.lens_module import MoveUnits
 from camkit.models_def.design.loop import DesignSchedule
 from camkit.models_def.design.loss import DesignLoss
+from camkit.models_def.design.shipped_camera import CameraChoice
 from camkit.models_def.design.starts import Starts
 from camkit.models_def.networks.catalog import NETWORK_NAMES
 from camkit.models_def.optics.prescription import FabricationErrors
@@ -19,11 +21,12 @@ from camkit.models_def.toml_table import check_keys, section, table_digest, type
 from camkit.models_def.training.recipe import SceneRecipe
 from camkit.side_file import read_side_toml
 
+T = TypeVar("T")
 Spacing = Literal["height", "area"]
 
 _KEYS: Final = {
     *("name", "prescription", "vary", "optics", "limits", "pixels", "front", "network", "loss"),
-    *("schedule", "data", "starts", "fabrication"),
+    *("schedule", "data", "starts", "fabrication", "camera", "descent"),
 }
 
 
@@ -118,10 +121,15 @@ class NetworkChoice:
     Attributes:
         name: In the catalogue.
         config: What of its config differs from the defaults.
+        start: First weights: a bundle, the name of a built-in one, or a checkpoint; empty for
+            weights drawn by chance.
+        start_size: The network of a bundle with several.
     """
 
     name: str = ""
     config: dict[str, Any]
+    start: str = ""
+    start_size: str = "S"
 
     def __post_init__(self) -> None:
         if self.name and self.name not in NETWORK_NAMES:
@@ -140,6 +148,8 @@ class DesignRecipe:
         variables: What of the lens is free.
         starts: How many lenses near it are tried first.
         fabrication: Errors of the copies that captures are made with; None for the lens itself.
+        camera: Whose bank stands in front, where `front` restores colours together.
+        descent: On what that bank is expected to leave, from the best start; None for none.
     """
 
     name: str
@@ -155,6 +165,8 @@ class DesignRecipe:
     data: SceneRecipe
     starts: Starts
     fabrication: FabricationErrors | None = None
+    camera: CameraChoice | None = None
+    descent: Descent | None = None
 
 
 def read_design(path: Path) -> DesignRecipe:
@@ -189,17 +201,23 @@ def to_design(table: Mapping[str, Any]) -> DesignRecipe:
         schedule=section("schedule", DesignSchedule, table.get("schedule", {})),
         data=section("data", SceneRecipe, table.get("data", {})),
         starts=section("starts", Starts, table.get("starts", {})),
-        fabrication=(
-            section("fabrication", FabricationErrors, table["fabrication"])
-            if "fabrication" in table
-            else None
-        ),
+        fabrication=_optional("fabrication", FabricationErrors, table),
+        camera=_optional("camera", CameraChoice, table),
+        descent=_optional("descent", Descent, table),
     )
+    if (recipe.camera is not None) != (recipe.front.kind == "together"):
+        raise ContractError("the front 'together' and a table [camera] belong together")
+    if recipe.descent is not None and (recipe.camera is None or recipe.fabrication is None):
+        raise ContractError("a table [descent] needs [camera] and [fabrication]")
     if recipe.starts.judged and not recipe.pixels.kernel_px:
         raise ContractError("judged starts need one window for all: set pixels.kernel_px")
     if recipe.starts.judged and recipe.loss.needs_network and recipe.front.kind == "none":
         raise ContractError("judged starts need a front that recovers: set front.kind")
     return recipe
+
+
+def _optional(name: str, kind: type[T], table: Mapping[str, Any]) -> T | None:
+    return section(name, kind, table[name]) if name in table else None
 
 
 def with_choices(
@@ -223,10 +241,14 @@ def with_choices(
         schedule=schedule,
         prescription=prescription or recipe.prescription,
         starts=recipe.starts if search else Starts(),
+        descent=recipe.descent if search else None,
     )
 
 
 def recipe_digest(recipe: DesignRecipe) -> str:
     """Return a hash of all that decides a run."""
     table = {name: value for name, value in asdict(recipe).items() if value is not None}
+    if not recipe.network.start:  # designs from before there were first weights can go on
+        for key in ("start", "start_size"):
+            del table["network"][key]
     return table_digest(table)

@@ -1,7 +1,11 @@
-"""The front end between sensor and network: none, or the Wiener filter of the present kernels."""
+"""The front end between sensor and network.
+
+None, the Wiener filter of every colour alone with the present kernels, or the bank of a camera
+that ships, which restores the colours together (`camera`).
+"""
 
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final, Literal, get_args
 
 import torch
 from torch import Tensor
@@ -10,7 +14,7 @@ from camkit.errors import ContractError
 from camkit.models_def.sensors.tone import encode_srgb
 from camkit.models_def.sensors.wiener import to_otf
 
-FrontName = Literal["none", "wiener"]
+FrontName = Literal["none", "wiener", "together"]
 _CORNER: Final = 1 / 512
 
 
@@ -19,7 +23,9 @@ class Front:
     """The planes that a network sees, in sRGB tone.
 
     Attributes:
-        kind: none: the capture (3 planes); wiener: the capture and its Wiener result (6).
+        kind: none: the capture (3 planes); wiener: the capture and its Wiener result (6);
+            together: the developed capture and what the bank of a camera makes of it (6,
+            stabilised).
         signal_to_noise: Power of the signal at one cycle per pixel over that of the noise.
         exponent: Of the fall of the signal's power.
         filter_margin_px: Pixels recorded around a patch for the filter and cut off again.
@@ -34,8 +40,10 @@ class Front:
     depth_known: bool = True
 
     def __post_init__(self) -> None:
-        if self.kind not in ("none", "wiener"):
-            raise ContractError(f"a front is none or wiener; got {self.kind!r}")
+        if self.kind not in get_args(FrontName):
+            raise ContractError(
+                f"a front is one of {', '.join(get_args(FrontName))}; got {self.kind!r}"
+            )
         if self.filter_margin_px < 1:
             raise ContractError(f"filter_margin_px must be >= 1; got {self.filter_margin_px}")
         if not self.signal_to_noise > 0:

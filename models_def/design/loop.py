@@ -25,6 +25,8 @@ from camkit.models_def.design.front import Front
 from camkit.models_def.design.lens import DesignLens
 from camkit.models_def.design.loss import DesignLoss, design_loss
 from camkit.models_def.design.sensor import Recorder, capture
+from camkit.models_def.design.shipped_camera import Camera, Knowledge
+from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import FabricationErrors
 from camkit.models_def.sensors.tone import encode_srgb
 from camkit.models_def.training.pictures import SceneSource
@@ -32,6 +34,7 @@ from camkit.models_def.training.pictures import SceneSource
 VALID_SEED: Final = 900_000
 SCORE_SEED: Final = 950_000
 VALID_COPIES: Final = 8
+SPREAD_SEED: Final = 980_000
 _CLIP: Final = 1.0
 
 State = dict[str, Any]
@@ -95,6 +98,7 @@ class DesignParts:
         source: Of sharp patches.
         fabrication: Errors of the copies that captures are made with; the filter knows the
             nominal lens. None makes them with the lens itself.
+        camera: In the place of `recorder` and `front`, where colours are restored together.
     """
 
     lens: DesignLens
@@ -104,15 +108,24 @@ class DesignParts:
     loss: DesignLoss
     source: SceneSource
     fabrication: FabricationErrors | None = None
+    camera: Camera | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Batch:
-    """Patches of a step: sharp (b, 3, s, s) linear, fields (b,), normal (depth, b, 3, c, c)."""
+    """Patches of a step.
+
+    Attributes:
+        sharp: (b, 3, s, s) linear.
+        fields: (b,).
+        normal: (depth, b, 3, c, c).
+        iso: (b,) 0..1, places between the ISOs of a camera; empty without one.
+    """
 
     sharp: Tensor
     fields: Tensor
     normal: Tensor
+    iso: Tensor
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -145,6 +158,7 @@ class DesignLoop:
         self.best_db = -math.inf
         self.best_merit = -math.inf
         self.best: State = {}
+        self._spread: Tensor | None = None
         groups = [{"params": [parts.lens.moves], "lr": schedule.lens_rate}]
         if parts.network is not None:
             groups.append({"params": [*parts.network.parameters()], "lr": schedule.network_rate})
@@ -175,7 +189,10 @@ class DesignLoop:
             capture_kernels = self._capture_kernels(
                 kernels, _step_seed(schedule.seed, self.step), moving=moving
             )
-            pictures, sharp = self._pictures(batch, kernels, capture_kernels)
+            if self.step % self._spread_steps == 0:
+                self._spread = self._measured_spread(kernels)
+            knowledge = Knowledge(kernels=kernels, spread=self._spread)
+            pictures, sharp = self._pictures(batch, knowledge, capture_kernels)
             loss = design_loss(parts.loss, pictures, sharp)
             total = loss + schedule.penalty_weight * penalty
         self._optimizer.zero_grad(set_to_none=True)
@@ -212,27 +229,68 @@ class DesignLoop:
         with torch.set_grad_enabled(moving):
             return lens.made_kernels(draw_copy(lens.problem.free.lens, errors, number)).float()
 
+    @property
+    def _spread_steps(self) -> int:
+        camera = self.parts.camera
+        return self.schedule.steps if camera is None else camera.choice.spread_steps
+
+    def _measured_spread(self, kernels: Tensor) -> Tensor | None:
+        """Return V of the present lens (depth, field, 3, n), if the filter asks for it."""
+        camera, problem = self.parts.camera, self.parts.lens.problem
+        if camera is None:
+            return None
+        if not camera.choice.copies or self.parts.fabrication is None:
+            heights_mm = problem.slopes * paraxial_data(problem.free.lens).efl_mm
+            return camera.stated_spread(heights_mm).expand(len(kernels), -1, -1, -1)
+        numbers = range(SPREAD_SEED, SPREAD_SEED + camera.choice.copies)
+        copies = [self._capture_kernels(kernels, number, moving=False) for number in numbers]
+        frozen = kernels if self.parts.front.depth_known else kernels.mean(0, keepdim=True)
+        return camera.measured_spread(frozen.detach(), copies)
+
+    def _knowledge(self) -> tuple[Knowledge, Tensor]:
+        """Return what the filter knows of the present lens, without gradients, and the penalty."""
+        kernels, penalty = self._kernels(moving=False)
+        return Knowledge(kernels=kernels, spread=self._measured_spread(kernels)), penalty
+
     def _pictures(
-        self, batch: Batch, kernels: Tensor, capture_kernels: Tensor | None = None
+        self, batch: Batch, knowledge: Knowledge, capture_kernels: Tensor | None = None
     ) -> tuple[Tensor, Tensor]:
         """Return recovered pictures (depth, b, 3, p, p) and the sharp ones in sRGB tone.
 
         Args:
             batch: Patches.
-            kernels: That the filter knows.
-            capture_kernels: That captures are made with; None for the same.
+            knowledge: What the filter knows.
+            capture_kernels: That captures are made with; None for the nominal ones.
         """
-        parts, schedule = self.parts, self.schedule
-        recovered = []
-        for depth, of_depth in enumerate(kernels if capture_kernels is None else capture_kernels):
-            patch_kernels = of_depth[batch.fields]
-            recorded = capture(batch.sharp, patch_kernels, parts.recorder, batch.normal[depth])
-            filter_kernels = kernels[depth] if parts.front.depth_known else kernels.mean(0)
-            planes = parts.front.planes(recorded, filter_kernels[batch.fields])
-            recovered.append(planes[:, -3:] if parts.network is None else parts.network(planes))
+        copy_kernels, schedule = (
+            knowledge.kernels if capture_kernels is None else capture_kernels,
+            self.schedule,
+        )
+        recovered = [
+            self._recovered(batch, knowledge, depth, of_depth[batch.fields])
+            for depth, of_depth in enumerate(copy_kernels)
+        ]
         edge = (batch.sharp.shape[-1] - schedule.patch_px) // 2
         sharp = batch.sharp[..., edge : edge + schedule.patch_px, edge : edge + schedule.patch_px]
         return torch.stack(recovered), encode_srgb(sharp)
+
+    def _recovered(
+        self, batch: Batch, knowledge: Knowledge, depth: int, patch_kernels: Tensor
+    ) -> Tensor:
+        """Return recovered pictures (b, 3, p, p) of a depth through kernels (b, 3, k, k)."""
+        parts = self.parts
+        kernels = knowledge.kernels[depth] if parts.front.depth_known else knowledge.kernels.mean(0)
+        filter_kernels, normal = kernels[batch.fields], batch.normal[depth]
+        if parts.camera is None or knowledge.spread is None:
+            recorded = capture(batch.sharp, patch_kernels, parts.recorder, normal)
+            planes = parts.front.planes(recorded, filter_kernels)
+            output: Tensor = planes[:, -3:] if parts.network is None else parts.network(planes)
+            return output
+        noise = parts.camera.noise_at(batch.iso)
+        developed = parts.camera.capture(batch.sharp, patch_kernels, noise, normal)
+        spread = knowledge.spread[depth][batch.fields]
+        restored = parts.camera.restored(developed, filter_kernels, spread, noise)
+        return parts.camera.pictures(developed, restored, noise, parts.network)
 
     def _draw(self, seed: int, count: int) -> Batch:
         parts, schedule = self.parts, self.schedule
@@ -243,12 +301,13 @@ class DesignLoop:
         crops = np.stack([parts.source.draw_crop(rng, side) for _ in range(count)])
         depths = len(parts.lens.problem.object_distances_mm) or 1
         normal = rng.standard_normal((depths, count, 3, inner, inner), dtype=np.float32)
+        numbers = rng.permutation(np.arange(count) + rng.integers(fields)) % fields
+        iso = rng.random(count if parts.camera is not None else 0)
         return Batch(
             sharp=torch.from_numpy(crops.clip(0, 1)),
-            fields=torch.from_numpy(
-                rng.permutation(np.arange(count) + rng.integers(fields)) % fields
-            ),
+            fields=torch.from_numpy(numbers),
             normal=torch.from_numpy(normal),
+            iso=torch.from_numpy(iso),
         )
 
     def judge(self, loss: float = math.nan, seconds: float = 0.0) -> Progress:
@@ -258,10 +317,10 @@ class DesignLoop:
         the least loss. What a lens outside its limits pays in the loss counts against it.
         """
         with torch.no_grad():
-            kernels, penalty = self._kernels(moving=False)
-            copies = self._valid_copies(kernels)
+            knowledge, penalty = self._knowledge()
+            copies = self._valid_copies(knowledge.kernels)
             scores = [
-                self._judged(batch, kernels, copies[i % len(copies)])
+                self._judged(batch, knowledge, copies[i % len(copies)])
                 for i, batch in enumerate(self._valid)
             ]
         valid_db, valid_loss = (float(np.mean(column)) for column in zip(*scores, strict=True))
@@ -275,7 +334,7 @@ class DesignLoop:
             loss=loss,
             valid_db=valid_db,
             best_db=self.best_db,
-            lost_light=1 - float(kernels.sum((-2, -1)).amin()),
+            lost_light=1 - float(knowledge.kernels.sum((-2, -1)).amin()),
         )
 
     def _valid_copies(self, kernels: Tensor) -> list[Tensor]:
@@ -284,10 +343,10 @@ class DesignLoop:
         return [self._capture_kernels(kernels, VALID_SEED + i, moving=False) for i in range(count)]
 
     def _judged(
-        self, batch: Batch, kernels: Tensor, capture_kernels: Tensor
+        self, batch: Batch, knowledge: Knowledge, capture_kernels: Tensor
     ) -> tuple[float, float]:
         """Return mean PSNR and loss of a batch."""
-        pictures, sharp = self._pictures(batch, kernels, capture_kernels)
+        pictures, sharp = self._pictures(batch, knowledge, capture_kernels)
         loss = float(design_loss(self.parts.loss, pictures, sharp))
         return _psnr_db(pictures, sharp), loss
 
@@ -298,31 +357,39 @@ class DesignLoop:
             Field, recovered (depth, 1, 3, p, p) and sharp (1, 3, p, p), in sRGB tone.
         """
         with torch.no_grad():
-            kernels, _ = self._kernels(moving=False)
-            copies = self._valid_copies(kernels)
+            knowledge, _ = self._knowledge()
+            copies = self._valid_copies(knowledge.kernels)
             for field in range(len(self.parts.lens.problem.slopes)):
                 at = torch.tensor([field])
                 for number in range(field * patches, (field + 1) * patches):
                     batch = replace(self._draw(SCORE_SEED + number, 1), fields=at)
                     capture_kernels = copies[number % len(copies)]
-                    yield field, *self._pictures(batch, kernels, capture_kernels)
+                    yield field, *self._pictures(batch, knowledge, capture_kernels)
 
     def look(self, count: int = 4) -> tuple[Tensor, tuple[Tensor, Tensor, Tensor]]:
         """Return kernels and, of fixed patches, (count, 3, h, w) captures, recovered, sharp."""
         with torch.no_grad():
-            kernels, _ = self._kernels(moving=False)
+            knowledge, _ = self._knowledge()
             rows = []
             for batch in self._valid[:count]:
-                pictures, sharp = self._pictures(batch, kernels)
-                patch_kernels = kernels[0][batch.fields]
-                recorded = capture(batch.sharp, patch_kernels, self.parts.recorder, batch.normal[0])
-                edge = self.parts.front.margin_px
-                inner = slice(edge, recorded.shape[-1] - edge)
-                rows.append((encode_srgb(recorded[..., inner, inner])[0], pictures[0, 0], sharp[0]))
+                pictures, sharp = self._pictures(batch, knowledge)
+                rows.append((self._capture_pictures(batch, knowledge)[0], pictures[0, 0], sharp[0]))
         captures, recovered, sharp_ones = (
             torch.stack(column) for column in zip(*rows, strict=True)
         )
-        return kernels, (captures, recovered, sharp_ones)
+        return knowledge.kernels, (captures, recovered, sharp_ones)
+
+    def _capture_pictures(self, batch: Batch, knowledge: Knowledge) -> Tensor:
+        """Return captures of the first depth through the nominal lens, (b, 3, p, p) in sRGB."""
+        parts, patch_kernels = self.parts, knowledge.kernels[0][batch.fields]
+        if parts.camera is not None:
+            noise = parts.camera.noise_at(batch.iso)
+            developed = parts.camera.capture(batch.sharp, patch_kernels, noise, batch.normal[0])
+            return parts.camera.pictures(developed, developed, noise, None)
+        recorded = capture(batch.sharp, patch_kernels, parts.recorder, batch.normal[0])
+        edge = parts.front.margin_px
+        inner = slice(edge, recorded.shape[-1] - edge)
+        return encode_srgb(recorded[..., inner, inner])
 
     def _share_gradients(self) -> None:
         if not (torch.distributed.is_available() and torch.distributed.is_initialized()):
@@ -345,7 +412,9 @@ class DesignLoop:
 
     def state(self) -> State:
         """Return all that a resumed run needs: tensors and plain numbers."""
+        spread = {} if self._spread is None else {"spread": self._spread}
         return {
+            **spread,
             "step": self.step,
             "best_db": self.best_db,
             "best_merit": self.best_merit,
@@ -358,6 +427,7 @@ class DesignLoop:
         """Restore a saved state."""
         self.step, self.best = state["step"], state["best"]
         self.best_db, self.best_merit = state["best_db"], state["best_merit"]
+        self._spread = state.get("spread")
         self._set(state["weights"])
         self._optimizer.load_state_dict(state["optimizer"])
 

@@ -69,11 +69,12 @@ class DesignRun:
         _join_workers()
         # with a window of its own a checkpoint holds all that a search would find again
         holds_lens = self.files.resumes and recipe.pixels.kernel_px > 0
-        begin_recipe = replace(recipe, starts=Starts()) if holds_lens else recipe
+        begin_recipe = replace(recipe, starts=Starts(), descent=None) if holds_lens else recipe
         parts = parts_of(begin_recipe, folder=options.recipe_folder, pictures=options.pictures)
         _share_lens(parts.lens)
         self.loop = DesignLoop(parts, recipe.schedule)
-        searched = bool(begin_recipe.starts.count and recipe.schedule.lens_rate)
+        looked = begin_recipe.starts.count or begin_recipe.descent
+        searched = bool(looked and recipe.schedule.lens_rate)
         self.searched_s = self.files.stop() if searched else 0.0
         if self.files.resumes:
             table = self.files.read(recipe_digest(recipe), "steps", "lens_rate")

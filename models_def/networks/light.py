@@ -63,7 +63,8 @@ def bounded(
     change = weighted / weight.clamp(min=_TINY)
     excess = change
     if not bound.admits_detail_alone:
-        limit = _limit(_means(front), bound, scale)
+        # a design has gradients in the front too; even areas have no contrast, whose root has none
+        limit = _limit(_means(front.detach()), bound, scale)
         excess = change - torch.maximum(torch.minimum(change, limit), -limit)
     surplus = functional.interpolate(
         excess, scale_factor=CELL_PX, mode="bilinear", align_corners=False

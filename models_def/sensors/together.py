@@ -20,6 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from camkit.bundle.stages import Together
@@ -28,6 +29,8 @@ from camkit.bundle.stages.together import BAND, BAND_STEP, Spread
 CORNER_FREQUENCY = 1 / 512
 LEAST_SHARE = 1e-3
 LEAST_MEASURED = 1e-6
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,6 +89,22 @@ def spread_at(spread: Spread, height_mm: float, f2: Tensor) -> Tensor:
     return torch.from_numpy(np.stack([np.interp(at, places, line) for line in lines])).to(f2)
 
 
+def line_means(values: Array, frequencies: tuple[float, ...]) -> Array:
+    """Return means (..., n) of a half spectrum (..., h, w // 2 + 1) around every frequency.
+
+    Weighted by the hats between neighbours; 0 at frequency 0, where a transfer is 1.
+    """
+    places = np.hypot(
+        np.fft.fftfreq(values.shape[-2])[:, None],
+        np.fft.rfftfreq(values.shape[-2])[None],
+    )
+    hats = np.stack([np.interp(places, frequencies, unit) for unit in np.eye(len(frequencies))])
+    hats[0] = 0
+    weights = hats / np.maximum(hats.sum((1, 2), keepdims=True), 1e-12)
+    means: Array = np.tensordot(values, weights, axes=([-2, -1], [-2, -1]))
+    return means
+
+
 def restore_together(
     planes: Tensor,
     otf: Tensor,
@@ -95,7 +114,7 @@ def restore_together(
     together: Together,
     numbers: Numbers | None = None,
 ) -> Tensor:
-    """Deconvolve periodic patches.
+    """Deconvolve periodic patches of one field height.
 
     Args:
         planes: (b, c, h, w).
@@ -109,10 +128,36 @@ def restore_together(
     Returns:
         (b, c, h, w).
     """
-    size = (planes.shape[-2], planes.shape[-1])
-    numbers = numbers or Numbers.of(together, planes)
-    f2 = frequencies_squared(size, planes)
+    f2 = frequencies_squared((planes.shape[-2], planes.shape[-1]), planes)
     spread = spread_at(together.spread, height_mm, f2)
+    return restore_doubting(
+        planes, otf, level, variance, spread, numbers or Numbers.of(together, planes)
+    )
+
+
+def restore_doubting(
+    planes: Tensor,
+    otf: Tensor,
+    level: Tensor,
+    variance: Tensor,
+    spread: Tensor,
+    numbers: Numbers,
+) -> Tensor:
+    """Deconvolve periodic patches whose variance of the transfer is known.
+
+    Args:
+        planes: (b, c, h, w).
+        otf: (b, c, h, w // 2 + 1).
+        level: (b, c) > 0.
+        variance: (b, c) of the noise.
+        spread: V, (b, c, h, w // 2 + 1), or (c, h, w // 2 + 1) of all patches.
+        numbers: Of the model.
+
+    Returns:
+        (b, c, h, w).
+    """
+    size = (planes.shape[-2], planes.shape[-1])
+    f2 = frequencies_squared(size, planes)
     mean = level.mean(dim=1, keepdim=True)
     a = (level / mean).clamp(min=LEAST_SHARE)[..., None, None]
     spectrum = torch.fft.rfft2(planes)

@@ -23,7 +23,6 @@ from camkit.runtime.development import FileResult
 from camkit.runtime.face.keywords import ProcessKeywords
 from camkit.runtime.files.in_memory import FilePath, list_paths
 from camkit.runtime.kind import kind_without_bundle
-from camkit.runtime.machine.memory import kept_memory
 from camkit.runtime.options import (
     LEAST_MAX_MEM_BYTES,
     Options,
@@ -117,8 +116,7 @@ def process(  # noqa: PLR0913 - each says one thing to its caller
         count = PictureCount(task, progress, on_result)
         if client is None:
             common = replace(common, progress=count.progress)
-            with kept_memory():
-                return _process_here(tasks, pipelines, common, count.result)
+            return _process_here(tasks, pipelines, common, count.result)
         from camkit.runtime.batch.cluster.run import Wishes, process_on_cluster
 
         # only results are counted: shares of pictures would cost messages

@@ -2,10 +2,9 @@
 
 import ctypes
 import mmap
+import os
 import sys
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
@@ -47,34 +46,29 @@ def trim_heap(limit_bytes: int) -> None:
 
 
 def keep_freed_memory() -> None:
-    """Keep what is freed for the arrays that follow, for as long as this process lives.
+    """Undo a small MALLOC_TRIM_THRESHOLD_ of the environment, as dask gives its workers.
 
-    Otherwise arrays that are freed go back to the system and new ones come in page by page, each
-    cleared first: a sixth of the time of a large photograph, and with the small
-    MALLOC_TRIM_THRESHOLD_ that dask gives its workers twice that of block filters. What is kept is
-    given back by `trim_heap`.
+    With it every array that is freed goes back to the system and every new one comes in page by
+    page: block filters take twice as long. The thresholds set here are those that glibc would come
+    to by itself; what it keeps is given back by `trim_heap`.
+    """
+    threshold = os.environ.get("MALLOC_TRIM_THRESHOLD_", "")
+    if _LIBC is not None and threshold.isdecimal() and int(threshold) < _KEPT_BYTES:
+        _LIBC.mallopt(_M_MMAP_THRESHOLD, _KEPT_BYTES // 2)
+        _LIBC.mallopt(_M_TRIM_THRESHOLD, _KEPT_BYTES)
+
+
+def keep_memory_for_good() -> None:
+    """Keep all memory for the arrays to come, in a process that does nothing else and then ends.
+
+    All threads share one heap, and what is freed stays in it. Otherwise freed arrays go back to the
+    system and new ones come in page by page, each cleared first: a fifth of the time of a large
+    photograph. To be called before threads are started; `trim_heap` still gives back.
     """
     if _LIBC is not None:
+        _LIBC.mallopt(_M_ARENA_MAX, 1)
         _LIBC.mallopt(_M_MMAP_THRESHOLD, _KEPT_BYTES // 2)
         _LIBC.mallopt(_M_TRIM_THRESHOLD, _MOST_KEPT_BYTES)
-
-
-def use_one_heap() -> None:
-    """Make the threads to come share one heap, so that what one frees serves the others."""
-    if _LIBC is not None:
-        _LIBC.mallopt(_M_ARENA_MAX, 1)
-
-
-@contextmanager
-def kept_memory() -> Iterator[None]:
-    """Keep what is freed inside the block; give it back behind it."""
-    keep_freed_memory()
-    try:
-        yield
-    finally:
-        if _LIBC is not None:
-            _LIBC.mallopt(_M_TRIM_THRESHOLD, _KEPT_BYTES)
-        trim_heap(0)
 
 
 class _MappedArrays:

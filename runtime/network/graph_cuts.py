@@ -58,7 +58,8 @@ def cut_network(data: bytes) -> tuple[Segment, ...]:
     graph = parse_graph(data)
     graph = replace(graph, nodes=_sliced_late(graph.nodes))
     walk = walk_nodes(graph.nodes, graph.constants, (graph.input_name, graph.input_channels))
-    if walk.global_operators or any(e.axes is None for e in walk.extents.values()):
+    axes = [extent.axes for extent in walk.extents.values()]
+    if walk.global_operators or any(one is None or one[0].step != one[1].step for one in axes):
         return ()
     cuts = _Cuts(graph, walk)
     places = cuts.best()
@@ -226,28 +227,34 @@ class _Cuts:
 
     def _reach(self, first: int, end: int) -> tuple[int, int]:
         """Return lattice and reach of a segment in pixels."""
-        nodes, extents = self._nodes[first:end], self._walk.extents
+        nodes = self._nodes[first:end]
         names = [*self._names_in(first, end), *(name for node in nodes for name in node.outputs)]
         lattice = math.lcm(*(self._port(name).step.numerator for name in names))
+        reach = max(self._reach_along(axis, first, end, lattice) for axis in range(2))
+        return lattice, -(-math.ceil(reach) // lattice) * lattice
+
+    def _reach_along(self, axis: int, first: int, end: int, lattice_px: int) -> Fraction:
+        """Return how far a segment looks beyond a cell of its lattice along rows or columns."""
         runs = {
-            name: (0, self._port(name).samples(lattice) - 1) for name in self._names_out(first, end)
+            name: (0, self._port(name).samples(lattice_px) - 1)
+            for name in self._names_out(first, end)
         }
-        for node in reversed(nodes):
+        for node in reversed(self._nodes[first:end]):
             for output in node.outputs:
                 if output not in runs:
                     continue
                 run = runs[output]
                 if output in self._walk.windows:
-                    run = self._walk.windows[output][0].reads(*run)
-                for name in tensor_names(extents, node.inputs):
+                    run = self._walk.windows[output][axis].reads(*run)
+                for name in tensor_names(self._walk.extents, node.inputs):
                     old = runs.get(name, run)
                     runs[name] = min(old[0], run[0]), max(old[1], run[1])
         reach = Fraction(0)
         for name in self._names_in(first, end):
             step = self._port(name).step
             low, high = runs.get(name, (0, -1))
-            reach = max(reach, -low * step, (high + 1) * step - lattice)
-        return lattice, -(-math.ceil(reach) // lattice) * lattice
+            reach = max(reach, -low * step, (high + 1) * step - lattice_px)
+        return reach
 
     def _strip_bytes(self, first: int, end: int, fed: set[str]) -> float:
         walk = self._walk

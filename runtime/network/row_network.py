@@ -11,6 +11,7 @@ and end on the lattice of a segment and zeros lie beyond the picture's border on
 those of a run on the whole picture.
 """
 
+import math
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -38,7 +39,8 @@ class StripPlan:
         width_px: Columns of the padded picture.
         strip_px: Rows of the result at a time, a multiple of the network's stride.
         stops: (strip, segment) rows that a segment has given when a strip is done.
-        needed_bytes: Memory of a run: rows held between segments, and the largest strip.
+        columns: Width of the parts that each segment's strips are run in.
+        needed_bytes: Memory of a run: rows held between segments, and the largest part.
         work_ratio: Computed over necessary multiplications.
     """
 
@@ -46,6 +48,7 @@ class StripPlan:
     width_px: int
     strip_px: int
     stops: tuple[tuple[int, ...], ...]
+    columns: tuple[int, ...]
     needed_bytes: int
     work_ratio: float
 
@@ -55,16 +58,29 @@ class StripPlan:
         return self.height_px * self.width_px
 
 
-def plan_strips(segments: Sequence[Segment], size_px: tuple[int, int], strip_px: int) -> StripPlan:
+def plan_strips(
+    segments: Sequence[Segment],
+    size_px: tuple[int, int],
+    strip_px: int,
+    channels: int | None = None,
+) -> StripPlan:
     """Plan the strips of a picture.
 
     Args:
         segments: Of the network.
         size_px: (height, width) after padding to the network's stride.
         strip_px: Rows at a time.
+        channels: Of the picture, those that the network does not take included; None for its own.
     """
     height, width = size_px
-    readers = _readers(segments)
+    readers = [
+        [
+            i
+            for i, other in enumerate(segments)
+            if {feed.port.name for feed in other.feeds} & {port.name for port in one.outputs}
+        ]
+        for one in segments
+    ]
     stops = []
     for bottom in [*range(strip_px, height, strip_px), height]:
         ends = [0] * len(segments)
@@ -73,45 +89,57 @@ def plan_strips(segments: Sequence[Segment], size_px: tuple[int, int], strip_px:
             lattice = segments[k].lattice_px
             ends[k] = min(-(-max(bottoms) // lattice) * lattice, height)
         stops.append(tuple(ends))
+    columns = tuple(_columns(one, strip_px, width) for one in segments)
+    waiting = _waiting_samples(segments, stops, channels or segments[0].feeds[0].port.channels)
+    part = max(
+        one.strip_bytes * (strip_px + 2 * one.reach_px) * min(part + 2 * one.reach_px, width)
+        for part, one in zip(columns, segments, strict=True)
+    )
     return StripPlan(
         height_px=height,
         width_px=width,
         strip_px=strip_px,
         stops=tuple(stops),
-        needed_bytes=_needed_bytes(segments, stops, size_px),
+        columns=columns,
+        needed_bytes=int(_FLOAT_BYTES * width * waiting + part),
         work_ratio=_work_ratio(segments, stops, height),
     )
 
 
-def _readers(segments: Sequence[Segment]) -> list[list[int]]:
-    """Return the segments that read the outputs of each."""
-    return [
-        [
-            i
-            for i, other in enumerate(segments)
-            if {feed.port.name for feed in other.feeds} & {port.name for port in one.outputs}
-        ]
-        for one in segments
-    ]
+def _columns(segment: Segment, strip_px: int, width_px: int) -> int:
+    """Return the width of the parts in which a segment's strips are run."""
+    height = strip_px + 2 * segment.reach_px
+    parts = math.ceil(segment.strip_bytes * height * width_px / PART_BYTES)
+    lattice = segment.lattice_px
+    return max(-(-width_px // (parts * lattice)) * lattice, 4 * segment.reach_px, lattice)
 
 
-def _needed_bytes(
-    segments: Sequence[Segment], stops: Sequence[Sequence[int]], size_px: tuple[int, int]
-) -> int:
-    """Return the peak of what is held and of the largest strip; after a while all are alike."""
-    (height, width), readers, peak = size_px, _readers(segments), 0.0
+def _waiting_samples(
+    segments: Sequence[Segment], stops: Sequence[Sequence[int]], channels: int
+) -> float:
+    """Return the most samples that wait for their readers, per pixel of width.
+
+    From some strip on all need the same.
+    """
+    tensors = {port.name: port for one in segments for port in one.outputs}
+    source = segments[0].feeds[0].port
+    readers = {
+        name: [k for k, s in enumerate(segments) if any(f.port.name == name for f in s.feeds)]
+        for name in (*tensors, source.name)
+    }
+    makers = {port.name: k for k, one in enumerate(segments) for port in one.outputs}
+    most = 0.0
     for done, ends in pairwise(([0] * len(segments), *stops[:_SEEN_STRIPS])):
         tops = [max(d - s.reach_px, 0) for d, s in zip(done, segments, strict=True)]
-        waiting = sum(
-            (ends[k] - min((tops[i] for i in readers[k]), default=done[k])) * one.held_bytes
-            for k, one in enumerate(segments)
+        bottom = max(ends[k] + segments[k].reach_px for k in readers[source.name])
+        samples: float = channels * (
+            bottom - min([tops[k] for k in readers[source.name]] + [done[-1]])
         )
-        strip = max(
-            (min(end + one.reach_px, height) - top) * one.strip_bytes
-            for end, one, top in zip(ends, segments, tops, strict=True)
-        )
-        peak = max(peak, width * (waiting + strip))
-    return int(peak)
+        for name, port in tensors.items():
+            top = min((tops[k] for k in readers[name]), default=done[makers[name]])
+            samples += (ends[makers[name]] - top) * port.channels / float(port.step) ** 2
+        most = max(most, samples)
+    return most
 
 
 def _work_ratio(
@@ -127,7 +155,41 @@ def _work_ratio(
     return work / max(height_px * sum(one.mac_per_pixel for one in segments), 1)
 
 
+_FLOAT_BYTES: Final = 4
 _SEEN_STRIPS: Final = 64
+PART_BYTES: Final = 64e6
+"""Memory of a part of a strip: as little as lets few pixels be computed twice."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Reach:
+    """The pixels that a segment gives along one axis, and those that it looks at.
+
+    Attributes:
+        start: First pixel that it gives.
+        stop: One past the last.
+        reach_px: Beyond these.
+        size_px: Of the picture.
+    """
+
+    start: int
+    stop: int
+    reach_px: int
+    size_px: int
+
+    @property
+    def low(self) -> int:
+        """Return the first pixel that it looks at."""
+        return max(self.start - self.reach_px, 0)
+
+    @property
+    def high(self) -> int:
+        """Return one past the last."""
+        return min(self.stop + self.reach_px, self.size_px)
+
+    def inner(self, port: Port) -> slice:
+        """Return where the samples that it gives lie in its output."""
+        return slice(port.samples(self.start - self.low), port.samples(self.stop - self.low))
 
 
 @dataclass(slots=True)
@@ -147,20 +209,23 @@ class _Tensor:
         parts = self._parts(top, top + rows.shape[1])
         np.concatenate([part for _, part in parts], axis=1, out=rows)
 
-    def fed(self, feed: Feed, top: int, bottom: int) -> FloatArray:
-        """Return rows as a segment takes them, (1, c, b rows, b w), contiguous."""
-        parts = list(self._parts(top, bottom))
-        if feed.block > 1:
-            width, block = parts[0][1].shape[2], feed.block
-            fine = np.empty((1, feed.channels, block * (bottom - top), block * width), np.float32)
-            for first, rows in parts:
-                at = slice(block * (first - top), block * (first - top + rows.shape[1]))
-                _shuffle(rows, feed, fine[0][:, at])
+    def fed(self, feed: Feed, rows: "_Reach", columns: "_Reach") -> FloatArray:
+        """Return a part as a segment takes it, (1, c, b rows, b columns), contiguous."""
+        port, block = self.port, feed.block
+        top, bottom = port.samples(rows.low), port.samples(rows.high)
+        left, right = port.samples(columns.low), port.samples(columns.high)
+        parts = [(first, piece[:, :, left:right]) for first, piece in self._parts(top, bottom)]
+        if block > 1:
+            size = block * (bottom - top), block * (right - left)
+            fine = np.empty((1, feed.channels, *size), np.float32)
+            for first, piece in parts:
+                at = slice(block * (first - top), block * (first - top + piece.shape[1]))
+                _shuffle(piece, feed, fine[0][:, at])
             return fine
-        channels = self.port.channels  # what lies below them in the picture is no input
+        channels = port.channels  # what lies below them in the picture is no input
         if len(parts) == 1 and parts[0][1].flags.c_contiguous:
             return parts[0][1][None, :channels]
-        return np.concatenate([rows[:channels] for _, rows in parts], axis=1)[None]
+        return np.concatenate([piece[:channels] for _, piece in parts], axis=1)[None]
 
     def forget(self, top: int) -> None:
         """Forget what lies above a row."""
@@ -259,19 +324,31 @@ class NetworkRows:
 
     def _run(self, k: int, start: int, stop: int) -> None:
         check_cancelled(self._cancel)
-        segment = self._segments[k]
-        top = max(start - segment.reach_px, 0)
-        bottom = min(stop + segment.reach_px, self._plan.height_px)
-        inputs = [
-            self._tensors[feed.port.name].fed(
-                feed, feed.port.samples(top), feed.port.samples(bottom)
-            )
-            for feed in segment.feeds
+        segment, width, part_px = self._segments[k], self._plan.width_px, self._plan.columns[k]
+        rows = _Reach(start, stop, segment.reach_px, self._plan.height_px)
+        parts = [
+            _Reach(left, min(left + part_px, width), segment.reach_px, width)
+            for left in range(0, width, part_px)
         ]
-        outputs = self._engines[k].run(inputs)
-        for port, output in zip(segment.outputs, outputs, strict=True):
-            rows = output[0][:, port.samples(start - top) : port.samples(stop - top)]
-            self._tensors[port.name].pieces.append((port.samples(start), rows))
+        whole = [
+            np.empty((port.channels, port.samples(stop - start), port.samples(width)), np.float32)
+            for port in segment.outputs
+            if len(parts) > 1
+        ]
+        for columns in parts:
+            inputs = [
+                self._tensors[feed.port.name].fed(feed, rows, columns) for feed in segment.feeds
+            ]
+            outputs = self._engines[k].run(inputs)
+            crops = [
+                output[0][:, rows.inner(port), columns.inner(port)]
+                for port, output in zip(segment.outputs, outputs, strict=True)
+            ]
+            del inputs, outputs
+            for port, part, all_columns in zip(segment.outputs, crops, whole, strict=False):
+                all_columns[:, :, port.samples(columns.start) : port.samples(columns.stop)] = part
+        for port, piece in zip(segment.outputs, whole or crops, strict=True):
+            self._tensors[port.name].pieces.append((port.samples(start), piece))
 
     def _forget(self) -> None:
         """Forget rows that nobody needs any more."""

@@ -33,7 +33,7 @@ from camkit.runtime.network.row_buffer import RowBuffer
 from camkit.runtime.rows import RowSource
 
 DEFAULT_MAX_BYTES: Final = 640 * 2**20
-_FLOAT_BYTES: Final = 4
+FLOAT_BYTES: Final = 4
 _MOST_COUNTS: Final = 64
 PIECE_ROWS: Final = 64
 """A band is given away in pieces of about so many rows, each of which may be forgotten alone."""
@@ -150,8 +150,8 @@ def _needed_bytes(
     window: tuple[int, int], rows: tuple[Span, ...], width_px: int, cost: PixelCost
 ) -> int:
     band = max(span.stop_px - span.start_px for span in rows)
-    row_bytes = _FLOAT_BYTES * width_px
-    ends = _FLOAT_BYTES * (cost.channels + cost.out_values)
+    row_bytes = FLOAT_BYTES * width_px
+    ends = FLOAT_BYTES * (cost.channels + cost.out_values)
     arena = int(window[0] * window[1] * (cost.arena_bytes + ends))
     return arena + row_bytes * (cost.channels * window[0] + cost.out_values * BANDS_HELD * band)
 

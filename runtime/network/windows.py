@@ -36,6 +36,8 @@ from camkit.runtime.network.row_network import (
     plan_strips,
 )
 from camkit.runtime.network.tiling import (
+    BANDS_HELD,
+    FLOAT_BYTES,
     PixelCost,
     Progress,
     Run,
@@ -50,10 +52,8 @@ from camkit.runtime.rows import RowSource
 FAST_LEAST_DB: Final = 80.0
 STRIPS_FROM_PX: Final = 1_500_000
 """Pixels of a picture above which a network runs in strips: below, one window takes no longer."""
-STRIP_HEIGHTS_PX: Final = (96, 48, 1)
-"""Rows of a strip, if the memory allows."""
-FINISH_HEIGHT_PX: Final = 256
-"""Rows of the windows of the step behind strips."""
+STRIP_HEIGHTS_PX: Final = ((96, 128), (48, 96), (1, 64))
+"""Rows of a strip, and of the windows of the step behind it, the first that the memory allows."""
 STEP_BYTES: Final = 16.0
 """For a pixel of a window, of the step behind a network: its cells, and rows on their way."""
 
@@ -235,8 +235,9 @@ class NetworkWindows:
     def needed_bytes(self) -> int:
         """Estimate the memory: windows with their arenas, rows held, one output band."""
         if self.tiles is not None:
-            strip_bytes = 0 if self.strips is None else self.strips.needed_bytes
-            return strip_bytes + self.tiles.needed_bytes(_cost(self.networks[0], self.strips))
+            if self.strips is not None:
+                return self.strips.needed_bytes + _finish_bytes(self.tiles, self.networks[0].cost)
+            return self.tiles.needed_bytes(self.networks[0].cost)
         if self.cells is None:
             return 0
         return self.cells.needed_bytes([network.cost for network in self.networks])
@@ -349,31 +350,39 @@ def _lay_strips(
         return None
     stride = network.stride_px
     padded = tuple(-(-side // stride) * stride for side in size_px)
-    heights = dict.fromkeys(-(-height // stride) * stride for height in STRIP_HEIGHTS_PX)
-    for height in heights:
-        strips = plan_strips(segments, (padded[0], padded[1]), height)
-        tiles = lay_windows(
-            *size_px,
-            TileLimits(
-                stride_px=stride,
-                halo_px=network.extra_reach_px,
-                cost=_cost(network, strips),
-                tile_px=(FINISH_HEIGHT_PX, size_px[1]),
-            ),
+    for height, finish_height in STRIP_HEIGHTS_PX:
+        strips = plan_strips(
+            segments,
+            (padded[0], padded[1]),
+            -(-height // stride) * stride,
+            network.cost.channels,
+        )
+        tile_limits = TileLimits(
+            stride_px=stride,
+            halo_px=network.extra_reach_px,
+            cost=network.cost,
+            tile_px=(finish_height, size_px[1]),
         )
         windows = NetworkWindows(
-            networks=(network,), tiles=tiles, cells=None, mode=limits.mode, strips=strips
+            networks=(network,),
+            tiles=lay_windows(*size_px, tile_limits),
+            cells=None,
+            mode=limits.mode,
+            strips=strips,
         )
         if windows.needed_bytes() <= limits.max_bytes:
             return windows
     return None
 
 
-def _cost(network: SizedNetwork, strips: StripPlan | None) -> PixelCost:
-    """Return the memory of windows: of the step behind a network only, where it runs in strips."""
-    if strips is None:
-        return network.cost
-    return replace(network.cost, arena_bytes=STEP_BYTES)
+def _finish_bytes(layout: TileLayout, cost: PixelCost) -> int:
+    """Return the memory of the step behind strips: two buffers, cells, pieces on the way."""
+    ends = FLOAT_BYTES * (cost.channels + cost.out_values)
+    rows = layout.window_height_px * (ends + STEP_BYTES)
+    band_px = max(span.stop_px - span.start_px for span in layout.rows)
+    return int(
+        layout.window_width_px * (rows + BANDS_HELD * band_px * FLOAT_BYTES * cost.out_values)
+    )
 
 
 def _check_one_window(

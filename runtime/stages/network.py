@@ -51,7 +51,7 @@ from camkit.runtime.signal.stabilise import (
 METHODS: Final = ("net",)
 TRIM_SHARE: Final = 0.7
 """Of the cap; above it freed memory is given back before every window."""
-STRIP_TRIM_SHARE: Final = 0.92
+STRIP_TRIM_SHARE: Final = 0.8
 """Likewise before every strip, which takes less."""
 WEIGHT_BYTES: Final = 8.8
 """Memory of a session for each weight: the number, and its place in a block (measured)."""

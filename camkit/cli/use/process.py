@@ -175,12 +175,12 @@ def process(
     from camkit.cli.use.cluster import cluster_client
     from camkit.cli.use.results import print_result
     from camkit.runtime.batch import process as run
-    from camkit.runtime.machine.memory import use_one_heap
+    from camkit.runtime.machine.memory import keep_memory_for_good
     from camkit.runtime.options import Options, parse_memory, with_choices
     from camkit.runtime.unit import read_unit
     from camkit.runtime.write_options import WriteOptions
 
-    use_one_heap()
+    keep_memory_for_good()
     plain = Options(
         size=size,
         quality=quality,  # type: ignore[arg-type]

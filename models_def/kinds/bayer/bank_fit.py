@@ -15,7 +15,6 @@ from typing import Final
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from pydantic import ValidationError
 from torch import Tensor
 
@@ -39,7 +38,7 @@ from camkit.models_def.kinds.bayer.samples import (
     told_depth,
 )
 from camkit.models_def.sensors.stabilise import stabilise
-from camkit.models_def.sensors.together import Numbers, restore_together
+from camkit.models_def.sensors.together import Numbers, line_means, restore_together
 from camkit.models_def.sensors.wiener import block_facts, to_otf, wiener_restore
 from camkit.models_def.training.bank_fitting import BankFit, BankFitOptions
 from camkit.models_def.training.pictures import open_scenes
@@ -99,7 +98,6 @@ def spread_of(bank: PsfBank, recipe: BayerRecipe) -> Spread:
     errors = (-recipe.data.depth_error, recipe.data.depth_error)
     count = len(bank.copy_heights_mm)
     indices = np.unique(np.linspace(0, count - 1, min(HEIGHTS, count)).round().astype(int))
-    places = np.hypot(np.fft.fftfreq(GRID_PX)[:, None], np.fft.rfftfreq(GRID_PX)[None])
     variance = []
     for index in indices:
         height = float(bank.copy_heights_mm[index])
@@ -111,7 +109,8 @@ def spread_of(bank: PsfBank, recipe: BayerRecipe) -> Spread:
             for error in (errors if recipe.estimates_depth else (0.0,))
         ]
         mean = torch.stack(gaps).square().mean(dim=0)[0].numpy().astype(np.float64)
-        variance.append(tuple(_line(of_colour, places) for of_colour in mean))
+        lines = line_means(mean, FREQUENCIES).round(SPREAD_DIGITS)
+        variance.append(tuple(tuple(line) for line in lines.tolist()))
     return Spread(
         heights_mm=tuple(float(h) for h in bank.copy_heights_mm[indices]),
         frequencies=FREQUENCIES,
@@ -148,13 +147,6 @@ def transfer_errors(bank: PsfBank, recipe: BayerRecipe) -> tuple[float, ...]:
             powers[copy] += float(transfer.abs().square().sum())
     wrong, whole = (sums.reshape(-1, bank.depths).sum(axis=1) for sums in (squares, powers))
     return tuple(float(error) for error in np.sqrt(wrong / whole))
-
-
-def _line(values: NDArray[np.float64], places: NDArray[np.float64]) -> tuple[float, ...]:
-    """Return the mean around every frequency of the table, by the hats between its neighbours."""
-    hats = [np.interp(places, FREQUENCIES, unit) for unit in np.eye(len(FREQUENCIES))]
-    means = [float((hat * values).sum() / hat.sum()) for hat in hats]
-    return tuple(round(mean, SPREAD_DIGITS) for mean in (0.0, *means[1:]))
 
 
 def fit_bank(

@@ -150,10 +150,7 @@ def score(captures: Sequence[ValidationCapture], recipe: BayerRecipe, restore: R
         Mean PSNR on sRGB values; by ISO, by field height as a share of the corner's, and by copy
         of the lens where there are several.
     """
-    with torch.no_grad():
-        values = [
-            _psnr(capture, recipe, _restored(capture, recipe, restore)) for capture in captures
-        ]
+    values = every_db(captures, recipe, restore)
     labels = {
         "by_iso": [f"{capture.iso:g}" for capture in captures],
         "by_field": [f"{capture.field_share:g}" for capture in captures],
@@ -162,6 +159,14 @@ def score(captures: Sequence[ValidationCapture], recipe: BayerRecipe, restore: R
     if len(set(copies)) > 1:
         labels["by_copy"] = copies
     return mean_score(values, **labels)
+
+
+def every_db(
+    captures: Sequence[ValidationCapture], recipe: BayerRecipe, restore: Restorer
+) -> list[float]:
+    """Return the PSNR of each capture on sRGB values; arguments as of `score`."""
+    with torch.no_grad():
+        return [_psnr(c, recipe, _restored(c, recipe, restore)) for c in captures]
 
 
 def _restored(capture: ValidationCapture, recipe: BayerRecipe, restore: Restorer) -> Tensor:

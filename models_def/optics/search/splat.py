@@ -20,11 +20,14 @@ class Pixels:
         pitch_um: Of the pixels.
         color_weights: (3, wave), each row sums to 1: how much of each wavelength a colour sees.
         kernel_px: Window of a PSF, odd; light outside counts as lost.
+        window_follows: Whether gradients know that the window follows the centroid. Without it a
+            gradient counts a shift of the whole PSF, which never comes to pass.
     """
 
     pitch_um: float
     color_weights: Tensor
     kernel_px: int = 65
+    window_follows: bool = False
 
     def __post_init__(self) -> None:
         if self.kernel_px < 9 or self.kernel_px % 2 == 0:
@@ -42,8 +45,9 @@ def splat_batch(landings: Rays, pixels: Pixels) -> Tensor:
     alive = landings.valid[..., LEAD:].to(landings.x.dtype)
     x, y = landings.x[..., LEAD:] * scale, landings.y[..., LEAD:] * scale
     total = alive.sum((-2, -1), keepdim=True).clamp_min(1)
-    # where the window lies is not a matter of the lens: no gradient through it
-    middle = ((y * alive).sum((-2, -1), keepdim=True) / total).detach()
+    middle = (y * alive).sum((-2, -1), keepdim=True) / total
+    if not pixels.window_follows:
+        middle = middle.detach()
     row, column = y - middle + (size - 1) / 2, x + (size - 1) / 2
     half = spread_tents(row, column, alive / alive.shape[-1] / 2, size)
     both = half + half.flip(-1)

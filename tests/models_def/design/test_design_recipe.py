@@ -23,7 +23,9 @@ from camkit.models_def.optics.paraxial import paraxial_data
 RECIPES = Path(__file__).resolve().parents[3] / "models_def" / "recipes"
 
 
-@pytest.mark.parametrize("name", ["duet_joint_lens", "lfov", "lfov_joint", "edof", "edof_joint"])
+@pytest.mark.parametrize(
+    "name", ["duet_joint_lens", "duet_bank_lens", "lfov", "lfov_joint", "edof", "edof_joint"]
+)
 def test_recipes_that_are_shipped_take_steps(name: str) -> None:
     recipe = read_design(RECIPES / f"{name}.toml")
     small = replace(

@@ -9,6 +9,7 @@ from camkit.models_def.design.assembly import parts_of
 from camkit.models_def.design.design_recipe import DesignRecipe, to_design
 from camkit.models_def.design.loop import DesignLoop
 from camkit.models_def.design.loss import design_loss
+from camkit.models_def.design.shipped_camera import Knowledge
 
 
 def make_loop(recipe: DesignRecipe) -> DesignLoop:
@@ -89,9 +90,9 @@ def test_where_captures_are_judged_the_best_has_the_least_loss(recipe: DesignRec
         merits.append(loop.best_merit if step else -math.inf)
         with torch.no_grad():
             kernels, penalty = loop.parts.lens()
-            kernels = kernels.float()
+            known = Knowledge(kernels=kernels.float())
             losses = [
-                float(design_loss(judged.loss, *loop._pictures(batch, kernels)))
+                float(design_loss(judged.loss, *loop._pictures(batch, known)))
                 for batch in loop._valid
             ]
         here = -sum(losses) / len(losses) - judged.schedule.penalty_weight * float(penalty)
@@ -112,7 +113,7 @@ def test_a_front_that_is_told_no_depth_filters_with_the_mean_kernel(recipe: Desi
     assert known.judge().valid_db > mean.judge().valid_db
     with torch.no_grad():
         kernels = mean.parts.lens()[0].float()
-        same = kernels.mean(0, keepdim=True).expand_as(kernels)
+        same = Knowledge(kernels=kernels.mean(0, keepdim=True).expand_as(kernels))
         # where all depths have one kernel there is nothing to be told
         batch = mean._valid[0]
         one, other = (loop._pictures(batch, same)[0] for loop in (known, mean))

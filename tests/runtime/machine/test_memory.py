@@ -64,6 +64,34 @@ def test_a_threshold_that_gives_every_array_back_is_undone() -> None:
     assert faults[1] < 0.2 * faults[0]
 
 
+@pytest.mark.skipif(memory._LIBC is None, reason="no glibc")
+def test_a_process_of_camkit_s_own_keeps_what_its_threads_free() -> None:
+    """Arrays of threads that follow one another take the pages of those before them."""
+    apart, shared = (
+        int(
+            subprocess.run(
+                [sys.executable, "-c", THREADS, keep], capture_output=True, text=True, check=True
+            ).stdout
+        )
+        for keep in ("", "keep")
+    )
+    assert shared < 0.5 * apart  # the first touch of 96 MB among them
+
+
+THREADS = """
+import resource, sys
+from concurrent.futures import ThreadPoolExecutor
+import numpy as np
+from camkit.runtime.machine import memory
+
+if sys.argv[1]:
+    memory.keep_memory_for_good()
+before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+for _ in range(20):
+    with ThreadPoolExecutor(1) as pool:
+        list(pool.map(lambda _: [np.ones(2_000_000) for _ in range(6)], range(1)))
+print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
+"""
 PAGES = """
 import resource, sys
 import numpy as np

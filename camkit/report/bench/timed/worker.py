@@ -1,4 +1,4 @@
-"""The process whose time and memory are measured: files to pictures, as any user's program.
+"""The process whose time and memory are measured: files to pictures, as `camkit process`.
 
     python -m camkit.report.bench.timed.worker JOB     JOB is the JSON of a `process_run.Job`
 
@@ -17,8 +17,11 @@ if TYPE_CHECKING:
 
 def main(text: str) -> None:
     """Run a job."""
+    os.environ.setdefault("NUMPY_MADVISE_HUGEPAGE", "0")  # as the command line does
     import camkit
+    from camkit.runtime.machine.memory import keep_memory_for_good
 
+    keep_memory_for_good()
     job: dict[str, Any] = json.loads(text)
 
     def tell(result: "FileResult") -> None:
