@@ -2,6 +2,7 @@
 
     capture, raw, raw_worker, files/   a file becomes linear samples with metadata
     array_capture, metadata            so does an array; what a photograph says of itself
+    binning                            squares of a mosaic that are averaged: weights, noise, detail
     signal/                            repair, white balance, demosaic; the stabilising transform
     bank/                              frozen PSF, blocks, Wiener filter, classical methods
     network/                           graphs read, run and tiled exactly

@@ -19,6 +19,7 @@ from camkit.errors import ContractError
 from camkit.field_types import check_fields
 from camkit.noise import NoiseModel
 from camkit.picture_window import PictureWindow
+from camkit.runtime.binning import Binning
 from camkit.runtime.machine.memory import mapping_of
 from camkit.runtime.metadata import Metadata
 
@@ -117,6 +118,8 @@ class Capture:
         metadata: What the file says of its photograph, to be carried into pictures.
         sha256: Hash of the file; None for arrays.
         window: Where the samples lie in a larger picture; None if the format knows no such thing.
+        binning: Squares of the sensor's mosaic that the samples are means over; None for the
+            sensor's own samples. Place and pitch are those of the mosaic.
         notes: What a person should know of this decode.
         decoder_peak_mb: Peak memory of the process that decoded; 0 where it was this one.
     """
@@ -139,6 +142,7 @@ class Capture:
     metadata: Metadata = field(default_factory=Metadata)
     sha256: str | None = None
     window: PictureWindow | None = None
+    binning: Binning | None = None
     notes: tuple[str, ...] = ()
     decoder_peak_mb: float = field(default=0.0, compare=False)
 
@@ -191,6 +195,11 @@ class Capture:
     def gives_own_rows(self) -> bool:
         """Return whether what `rows` reads is the reader's own: it is a view of the samples."""
         return False
+
+    @property
+    def is_of_mosaic(self) -> bool:
+        """Return whether a mosaic recorded the light: its colours and levels are a sensor's."""
+        return self.cfa is not None or self.binning is not None
 
     @property
     def contract(self) -> InputContract:

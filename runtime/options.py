@@ -22,6 +22,7 @@ OutputColor = Literal["rec709", "acescg", "camera"]
 DemosaicMethod = Literal["fast", "quality"]
 Assumption = Literal["centre", "scale"]
 Quality = Literal["exact", "best", "adaptive", "draft"]
+Scale = Literal["1", "1/2", "1/4"]
 OnUnsafe = Literal["warn", "fallback", "fail"]
 Laws = Literal["stated", "enforce"]
 DEFAULT_MAX_MEM_BYTES: Final = 930_000_000
@@ -36,6 +37,8 @@ class Options:
         size: Network size held by the bundle, such as S, M or L; None for that of the quality.
         quality: exact (M, nothing skipped), best (the largest size, nothing skipped), adaptive
             (no more than the capture needs) or draft; see camkit/runtime/plan.
+        scale: Size of the picture over that of the capture, along each side: its mosaic is averaged
+            over squares first, so that the price falls with the pixels.
         max_seconds: Time that a capture may take on this machine; None for any.
         max_error_db: Loss against `exact` that a capture may have at worst; None for that of the
             quality.
@@ -73,6 +76,7 @@ class Options:
 
     size: str | None = None
     quality: Quality = "exact"
+    scale: Scale = "1"
     max_seconds: float | None = None
     max_error_db: float | None = None
     depth_m: float | None = None
@@ -109,6 +113,7 @@ class Options:
                 f"{option_text('max_seconds')} finds the best quality that fits by itself; leave "
                 f"{option_text('quality')} out"
             )
+        _check_scale(self)
         _check_dtype(self.dtype, self.provider)
         _check_depth(self.depth_m)
         if not 0 <= self.strength <= 1:
@@ -248,6 +253,21 @@ def check_kind_options(options: Options, kind: Kind, where: str) -> None:
         raise ContractError(
             f"{option_list(foreign)} does not apply {where}: it is for cameras of the "
             f"kind {makers[0].name}; leave it out"
+        )
+
+
+def _check_scale(options: Options) -> None:
+    if options.scale == "1":
+        return
+    given = [
+        name
+        for name in ("max_seconds", "max_error_db", "quality")
+        if getattr(options, name) not in (None, "exact")
+    ]
+    if given:
+        raise ContractError(
+            f"{option_text('scale', options.scale)} decides what is done at its price; leave "
+            f"{option_list(given)} out"
         )
 
 

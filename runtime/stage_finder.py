@@ -14,6 +14,8 @@ A module defines
     look(entry, job) -> Job              optional: looks at the capture before anything is planned;
                                          the job returned knows what it found
     IS_NEEDED                            optional: true where no method leaves the stage out
+    ON_MOSAIC                            optional: true where it needs the mosaic itself, so that
+                                         none of its samples are averaged (`--scale`)
     is_left_out(options)                 optional: whether the caller wants it left out
     check(entry, manifest, max_bytes)    optional: refuses, when a bundle is loaded, what asks too
                                          much of a machine

@@ -3,11 +3,13 @@
     python -m tools.plan_report calibrate --bundle duet --data DATA/train_open --out plan.json
     python -m tools.plan_report calibrate ... --write camkit/bundles/duet.camkit
     python -m tools.plan_report report --bundle duet --data DATA --out-dir out/plan
+    python -m tools.plan_report oracle --bundle duet --data DATA
 
 `calibrate` simulates captures of pictures and procedural scenes, measures per lattice cell what
 less than the exact result loses, fits the loss model and writes it as the manifest's `plan`:
 into a JSON file, which `camkit export --plan` takes, and with --write into a bundle.
-`report` measures saving and loss on the scenes of tools/plan/scenes.py.
+`report` measures saving and loss on the scenes of tools/plan/scenes.py; `oracle` computes on the
+same scenes what could be saved if the loss of every cell were known beforehand.
 """
 
 import argparse
@@ -26,13 +28,15 @@ from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.bundle.writer import write_bundle
 from camkit.errors import ContractError
 from camkit.report.quality import list_set, read_picture
-from camkit.runtime.plan.loss import EXACT, plan_entries
+from camkit.runtime.plan.loss import EXACT, plan_entries, read_loss_model
 from camkit.runtime.plan.rules.size import REFERENCE
 from camkit.runtime.plan.tiers import TierWork
 from tools.plan.cells import CaptureCells, measure_cells, photograph, pipelines
 from tools.plan.fit import Calibration, fit_model
+from tools.plan.oracle import oracle_saving, plan_saving, summary_line
+from tools.plan.proof import ISOS as PROOF_ISOS
 from tools.plan.proof import prove, write_report
-from tools.plan.scenes import GENERATORS, proof_scenes
+from tools.plan.scenes import GENERATORS, ProofScene, proof_scenes
 
 ISOS = (100.0, 400.0, 1600.0)
 SIDE_PX = 1280
@@ -54,19 +58,26 @@ def main() -> int:
     calibrate.add_argument("--out", type=Path, help="JSON file for `camkit export --plan`")
     calibrate.add_argument("--write", type=Path, help="bundle to store the plan in")
     report = commands.add_parser("report", help="saving and loss on unseen scenes")
-    report.add_argument("--bundle", default="duet", help="name or path")
-    report.add_argument(
-        "--data", type=Path, help="folder with valid_open and hdr; none: procedural"
-    )
+    oracle = commands.add_parser("oracle", help="what could be saved, and what the plan saves")
+    for command in (report, oracle):
+        _add_scenes(command)
     report.add_argument("--out-dir", type=Path, default=Path("out/plan"))
     report.add_argument("--quality", default="adaptive", choices=("adaptive", "draft"))
-    report.add_argument("--width", type=int, default=2048, help="of procedural scenes")
-    report.add_argument("--height", type=int, default=1536, help="of procedural scenes")
-    report.add_argument("--limit", type=int, default=0, help="only so many scenes")
-    report.add_argument("--kinds", default="", help="only these kinds, with commas")
     report.add_argument("--runs", type=int, default=1, help="timed runs per capture and quality")
     options = parser.parse_args()
-    return _calibrate(options) if options.command == "calibrate" else _report(options)
+    run = {"calibrate": _calibrate, "report": _report, "oracle": _oracle}
+    return run[options.command](options)
+
+
+def _add_scenes(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--bundle", default="duet", help="name or path")
+    command.add_argument(
+        "--data", type=Path, help="folder with valid_open and hdr; none: procedural"
+    )
+    command.add_argument("--width", type=int, default=2048, help="of procedural scenes")
+    command.add_argument("--height", type=int, default=1536, help="of procedural scenes")
+    command.add_argument("--limit", type=int, default=0, help="only so many scenes")
+    command.add_argument("--kinds", default="", help="only these kinds, with commas")
 
 
 def _calibrate(options: argparse.Namespace) -> int:
@@ -165,16 +176,36 @@ def _print_calibration(calibration: Calibration, captures: list[CaptureCells]) -
 
 def _report(options: argparse.Namespace) -> int:
     bundle = open_bundle(find_bundle(options.bundle))
-    subjects = tuple(name for name in options.kinds.split(",") if name)
     rows = []
-    scenes = proof_scenes(options.height, options.width, options.data, subjects)
-    if options.limit:
-        scenes = itertools.islice(scenes, options.limit)
-    for row in prove(bundle, scenes, quality=options.quality, runs=options.runs):
+    for row in prove(bundle, _proof_scenes(options), quality=options.quality, runs=options.runs):
         rows.append(row)
         print(row.line(), flush=True)
     for line in write_report(rows, bundle, options.out_dir):
         print(line)
+    return 0
+
+
+def _proof_scenes(options: argparse.Namespace) -> Iterator[ProofScene]:
+    subjects = tuple(name for name in options.kinds.split(",") if name)
+    scenes = proof_scenes(options.height, options.width, options.data, subjects)
+    return itertools.islice(scenes, options.limit) if options.limit else scenes
+
+
+def _oracle(options: argparse.Namespace) -> int:
+    bundle = open_bundle(find_bundle(options.bundle))
+    model = read_loss_model(bundle.manifest.plan)
+    work, small = _work(bundle)
+    if model is None or small is None:
+        raise ContractError(f"{bundle.manifest.name} has no calibrated plan, or one size alone")
+    targets, oracles, plans = pipelines(bundle), [], []
+    for number, scene in enumerate(_proof_scenes(options)):
+        iso = PROOF_ISOS[number % len(PROOF_ISOS)]
+        simulation = photograph(bundle, scene.make(), number=number, iso=iso)
+        cells = measure_cells(bundle, targets, scene.name, simulation)
+        oracles.append(oracle_saving(cells, bundle, work, small))
+        plans.append(plan_saving(cells, bundle, work, small, model))
+        print(summary_line("oracle", oracles), flush=True)
+        print(summary_line("plan", plans), flush=True)
     return 0
 
 

@@ -25,6 +25,7 @@ from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.bank.psf import FieldKernels
 from camkit.runtime.bank.spectrum import ComplexArray, apply_transfer, transform
+from camkit.runtime.binning import Binning, waves
 from camkit.runtime.cancel import Cancel, check_cancelled
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.rows import ArrayRows, RowSource
@@ -87,11 +88,14 @@ class LocalPsf:
         window: Place of the capture on the sensor.
         choice: Kernels that differ from place to place, of fields and sides as `kernels`; None for
             `kernels` everywhere.
+        binning: Squares that the pixels of the window are means over; kernels are those of the
+            pixels before. None for none.
     """
 
     kernels: FieldKernels
     window: SensorWindow
     choice: KernelChoice | None = None
+    binning: Binning | None = None
 
     @property
     def channels(self) -> int:
@@ -110,6 +114,13 @@ class LocalPsf:
     def kernels_of(self, number: int) -> FieldKernels:
         """Return the kernels of a number."""
         return self.kernels if self.choice is None else self.choice.kernels_of(number)
+
+    def otf_of(self, number: int, place_mm: tuple[float, float], block_px: int) -> ComplexArray:
+        """Return the OTF of the kernels of a number, at a place, on a periodic block."""
+        kernel = self.kernels_of(number).at(*place_mm)
+        if self.binning is None:
+            return to_otf(kernel, block_px)
+        return binned_otf(kernel, block_px, self.binning)
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,6 +230,33 @@ def to_otf(kernel: FloatArray, block_px: int) -> ComplexArray:
         for cols, kernel_cols in _halves(kw, across):
             block[:, rows, cols] = kernel[:, kernel_rows, kernel_cols]
     return transform(block)
+
+
+def binned_otf(kernel: FloatArray, block_px: int, binning: Binning) -> ComplexArray:
+    """Transform a (c, kh, kw) kernel to the OTF between means over squares.
+
+    It leads from the picture averaged over squares to what is recorded of it in each colour; what
+    lies beyond the finest detail of such a picture is left out.
+
+    Args:
+        kernel: In pixels before they are averaged.
+        block_px: Side of the block, in squares.
+        binning: The squares.
+
+    Returns:
+        (c, b, b // 2 + 1) complex64.
+    """
+    side = binning.side_px
+    down, across = np.fft.fftfreq(block_px) / side, np.fft.rfftfreq(block_px) / side
+    height, width = kernel.shape[-2:]
+    rows = waves(np.arange(height) - height // 2, -down).astype(np.complex64)
+    columns = waves(np.arange(width) - width // 2, -across).T.astype(np.complex64)
+    otf = np.empty((kernel.shape[0], block_px, across.size), np.complex64)
+    for channel, plane in enumerate(kernel):
+        otf[channel] = rows @ plane.astype(np.complex64) @ columns
+        otf[channel] *= binning.transfer(channel, down)[:, None].astype(np.float32)
+        otf[channel] *= binning.transfer(channel, across).astype(np.float32)
+    return otf
 
 
 def _halves(length: int, middle: int) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
@@ -447,7 +485,7 @@ class BlockBank:
     def _place(self, place: "_Numbered") -> "_Place":
         """Return the OTF of a place, and what the filter knows of it."""
         number, place_mm = place
-        otf = to_otf(self._psf.kernels_of(number).at(*place_mm), self._block_px)
+        otf = self._psf.otf_of(number, place_mm, self._block_px)
         # Kernels of one field are those of many heights.
         if self._knowledge is None or self._psf.kernels.field_heights_mm.size == 1:
             return _Place(otf=otf)

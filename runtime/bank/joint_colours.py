@@ -49,6 +49,9 @@ CORNER_FREQUENCY: Final = 1 / 512
 LEAST_SHARE: Final = 1e-3
 """Of the mean level: a colour darker than that is taken to be as bright."""
 LEAST_MEASURED: Final = 1e-6
+BINNED_NOISE: Final = 0.7
+"""Logarithm of the noise of means over squares of a mosaic: detail that they fold back counts as
+noise (judged on valid_open, docs/results/plan.md); it is white, no demosaicking has shaped it."""
 
 Places = NDArray[np.intp]
 
@@ -107,6 +110,23 @@ class Transfer:
     doubt: FloatArray
     band_power: FloatArray
     band_doubt: FloatArray
+
+
+def binned_model(model: Together, side_px: int) -> Together:
+    """Return the model for means over squares, from that for demosaicked pixels.
+
+    Args:
+        model: Fitted to pixels.
+        side_px: Side of a square in pixels.
+    """
+    frequencies = tuple(frequency * side_px for frequency in model.spread.frequencies)
+    return model.model_copy(
+        update={
+            "spread": model.spread.model_copy(update={"frequencies": frequencies}),
+            "noise": (BINNED_NOISE,) * len(model.noise),
+            "noise_rise": (0.0,) * len(model.noise_rise),
+        }
+    )
 
 
 @lru_cache(maxsize=4)

@@ -18,6 +18,7 @@ from camkit.runtime.options import (
     OutputColor,
     Provider,
     Quality,
+    Scale,
 )
 from camkit.runtime.output.writer import FileFormat
 from camkit.runtime.unit import Unit
@@ -37,6 +38,7 @@ class LoadKeywords(KindKeywords, total=False):
 
     size: str | None
     quality: Quality
+    scale: Scale
     max_seconds: float | None
     max_error_db: float | None
     depth_m: float | None

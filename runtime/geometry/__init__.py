@@ -3,6 +3,7 @@
 sensor_window   pixels of a capture to millimetres from the axis
 placement       where a capture lies on a bundle's sensor
 shrink          planes made smaller by whole numbers
+enlarging       pictures made larger by whole numbers, band by band
 field_blur         spatially varying blur, for the digital twin
 illumination    vignetting, and its division
 distortion      the radial model, its inverse and its fit

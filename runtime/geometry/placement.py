@@ -6,7 +6,7 @@ centre on the axis) or `assume="scale"` (the picture spans the sensor, kernels s
 ratio).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from camkit.bundle.sensor import Extent
@@ -25,13 +25,23 @@ class Placement:
 
     Attributes:
         window: The capture as a window on the sensor.
-        kernel_scale: Width ratio by which kernels must be scaled; 1 unless `assume="scale"`.
+        kernel_scale: Width ratio by which kernels must be scaled; 1 unless `assume="scale"`, or
+            the capture is binned.
         note: What was assumed, for the sidecar; empty when nothing was.
     """
 
     window: SensorWindow
     kernel_scale: float = 1.0
     note: str = ""
+
+    def binned(self, bin_px: int) -> "Placement":
+        """Return the place of a capture that was binned over squares of some pixels."""
+        width, height = (side // bin_px for side in self.window.size_px)
+        return replace(
+            self,
+            window=self.window.resampled(bin_px, (width, height)),
+            kernel_scale=self.kernel_scale / bin_px,
+        )
 
 
 def place(capture: Capture, extent: Extent | None, assume: Assumption | None) -> Placement:

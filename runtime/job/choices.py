@@ -14,6 +14,7 @@ from camkit.kinds import BAYER, Kind
 from camkit.psf import depth_weights
 from camkit.runtime.job.setup import DEVELOPMENT
 from camkit.runtime.options import Options, check_kind_options, given_options
+from camkit.runtime.plan.binned_work import no_binning
 from camkit.runtime.plan.decision import DEVELOP, Work
 from camkit.runtime.plan.ways import LEFT_OUT, offered_methods, ways_of
 from camkit.runtime.stage_finder import methods_of, module_of
@@ -66,6 +67,8 @@ def check_choices(
             f"{option_list(foreign)} does not apply {where}: "
             f"{'nothing' if bundle is None else 'none of its stages'} uses it; leave it out"
         )
+    if options.scale != "1" and (why := no_binning(stages)):
+        raise ContractError(f"{option_text('scale')} does not apply {where}: {why}; leave it out")
     if options.size is not None and bundle is not None:
         sizes = bundle.manifest.sizes
         if options.size not in sizes:

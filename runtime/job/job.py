@@ -54,6 +54,8 @@ class Job:
         measured_noise: Noise of the raw signal; None where no stage needs it.
         white_balance: Gains in use; ones where the stages balance nothing.
         color: From the colour of the stages to that asked for; None where no stage makes one.
+        enlarged_px: (height, width) that the picture gets back at the end; None where it keeps that
+            of the capture.
         falls_back: The capture lies outside what the bundle was shown to help with, and the caller
             wants no network then.
         work: What is to be done.
@@ -73,6 +75,7 @@ class Job:
     measured_noise: NoiseModel | None = None
     white_balance: Gains = ()
     color: ColorStage | None = None
+    enlarged_px: tuple[int, int] | None = None
     falls_back: bool = False
     work: Work = field(default_factory=Work)
     plan: Plan | None = None
@@ -101,7 +104,7 @@ class Job:
     def color_matrix(self) -> Matrix | None:
         """Return XYZ (D65) to camera, of the file before that of the bundle; None if not known."""
         sensor = None if self.bundle is None else self.bundle.manifest.sensor
-        if self.capture.color_matrix is not None or self.capture.cfa is None:
+        if self.capture.color_matrix is not None or not self.capture.is_of_mosaic:
             file_matrix: Matrix | None = self.capture.color_matrix
             return file_matrix
         if sensor is None or sensor.type != "bayer":
@@ -144,6 +147,8 @@ class Job:
             source, noise = "file", self.capture.noise
         elif self.capture.iso is not None:
             source, noise = "bundle", manifest.light_sensor.noise_at(self.capture.iso)
+            if self.capture.binning is not None:
+                noise = noise.raised(self.capture.binning.noise_factors)
         else:
             with self.log.clock.stage("noise"):
                 source, noise = "measured", measure_noise(self.capture)

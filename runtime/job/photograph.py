@@ -5,6 +5,7 @@ checked against the sensor -> placed -> looked at by the stages -> planned
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Final
 
 from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import BayerSensor
@@ -18,11 +19,16 @@ from camkit.runtime.files.doubts import notes_behind
 from camkit.runtime.geometry.placement import place
 from camkit.runtime.job.job import Job
 from camkit.runtime.options import Options
+from camkit.runtime.plan.binned_work import SIDES_PX, draft_side_px
 from camkit.runtime.plan.decision import DEVELOP, Subject, Work
 from camkit.runtime.plan.planner import make_plan, needs_content
 from camkit.runtime.plan.rules.lights import needs_lights
 from camkit.runtime.plan.ways import ways_of, without_networks
+from camkit.runtime.signal.binned_capture import binned_capture
 from camkit.runtime.stage_finder import module_of, stage_keys
+
+BINNING: Final = "binning"
+"""Name of the clock of averaging the mosaic."""
 
 
 def know_photograph(job: Job) -> Job:
@@ -35,8 +41,9 @@ def know_photograph(job: Job) -> Job:
     job.log.notes += _first_notes(job)
     extent = None if job.bundle is None else job.bundle.manifest.sensor.extent
     placement = place(job.capture, extent, job.options.assume)
+    job = _binned(replace(job, sensor_place=placement))
     ones = (1.0,) * job.capture.channels
-    job = looked_at(replace(job, sensor_place=placement, white_balance=ones), job.setup.stages)
+    job = looked_at(replace(job, white_balance=ones), job.setup.stages)
     if placement.note and job.bundle is not None:
         job.log.notes.append(placement.note)
     job = _planned(job)
@@ -46,6 +53,37 @@ def know_photograph(job: Job) -> Job:
         for key, way in zip(stage_keys(job.setup.stages), ways, strict=True)
     }
     return job
+
+
+def _binned(job: Job) -> Job:
+    """Return the job whose mosaic is averaged over squares, if the caller wants less of it.
+
+    Raises:
+        ContractError: If a smaller picture was asked for of what is no mosaic.
+    """
+    options, capture = job.options, job.capture
+    side_px = SIDES_PX[options.scale]
+    if side_px > 1 and capture.cfa is None:
+        raise ContractError(
+            f"{option_text('scale', options.scale)} averages a mosaic, and the capture has full "
+            "colour; leave it out"
+        )
+    enlarged_px = None
+    if side_px == 1 and job.bundle is not None and capture.cfa is not None:
+        side_px = draft_side_px(options, job.setup.stages)
+        enlarged_px = (capture.height, capture.width) if side_px > 1 else None
+    if side_px == 1:
+        return job
+    with job.log.clock.stage(BINNING):
+        small = binned_capture(capture, side_px, threads=job.threads)
+    if enlarged_px is not None:
+        small = replace(small, window=capture.window)
+    return replace(
+        job,
+        capture=small,
+        sensor_place=job.placement.binned(side_px),
+        enlarged_px=enlarged_px,
+    )
 
 
 def looked_at(job: Job, stages: Sequence[StageEntry]) -> Job:
@@ -75,7 +113,8 @@ def _planned(job: Job) -> Job:
     if job.falls_back:
         options = replace(options, method=_method_below(bundle))
     content = None
-    if needs_content(options):
+    binning = job.capture.binning
+    if needs_content(options) and binning is None:
         job = job.with_noise()
         content = content_of(job)
     lights = None
@@ -89,6 +128,8 @@ def _planned(job: Job) -> Job:
         placement=job.placement,
         content=content,
         lights=lights,
+        side_px=1 if binning is None else binning.side_px,
+        enlarged=job.enlarged_px is not None,
     )
     plan = make_plan(subject, lambda: job.setup.speed(bundle.manifest.sizes))
     if plan.note:

@@ -17,11 +17,12 @@ from camkit.errors import ContractError
 from camkit.runtime.cancel import Cancel, cancellable
 from camkit.runtime.clock import StageClock
 from camkit.runtime.color import ColorStage
+from camkit.runtime.geometry.enlarging import enlarged_bands
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.kind_capture import KindCapture
 from camkit.runtime.job.log import Log
 from camkit.runtime.job.meter import Meter
-from camkit.runtime.job.photograph import content_of, know_photograph
+from camkit.runtime.job.photograph import BINNING, content_of, know_photograph
 from camkit.runtime.job.setup import Setup
 from camkit.runtime.job.stream import Stream
 from camkit.runtime.job.walker import Walk, probed
@@ -35,7 +36,9 @@ from camkit.runtime.plan.speed import Speed
 from camkit.runtime.rows import Rows, RowSource
 from camkit.runtime.stage_finder import module_of
 
-BEFORE_STAGES: Final = ("noise", "envelope", "scene")
+BEFORE_STAGES: Final = (BINNING, "noise", "envelope", "scene")
+ENLARGING: Final = "enlarging"
+"""Name of the clock behind the stages."""
 
 
 class Reconstruction:
@@ -84,6 +87,7 @@ class Reconstruction:
                 reserved_bytes=reserved_bytes,
             )
         )
+        self.capture = self.job.capture
         self._walk = Walk(self.job)
 
     @property
@@ -117,8 +121,10 @@ class Reconstruction:
         if (
             listed_plane is None or "t" in listed_plane.axes
         ):  # its samples of time are the capture's
-            return self._walk.stream(plane).shape
-        return len(listed_plane.channels), *self.job.grid_px(listed_plane)
+            shape = self._walk.stream(plane).shape
+        else:
+            shape = len(listed_plane.channels), *self.job.grid_px(listed_plane)
+        return shape if self.job.enlarged_px is None else (shape[0], *self.job.enlarged_px)
 
     def _plane_of(self, product: str) -> str:
         if product not in self.products:
@@ -198,7 +204,7 @@ class Reconstruction:
     def seconds(self) -> dict[str, float]:
         """Return the seconds per stage so far, in the order of the data."""
         clock_seconds = self.clock.seconds
-        order = (*BEFORE_STAGES, *self._walk.keys)
+        order = (*BEFORE_STAGES, *self._walk.keys, ENLARGING)
         return {name: clock_seconds[name] for name in sorted(clock_seconds, key=order.index)}
 
     @property
@@ -230,7 +236,13 @@ class Reconstruction:
         Raises:
             ContractError: If there is no such product.
         """
-        return self._walk.stream(self._plane_of(product))
+        stream, size_px = self._walk.stream(self._plane_of(product)), self.job.enlarged_px
+        binning = self.capture.binning if size_px is not None else None
+        if size_px is None or binning is None:
+            return stream
+        bands = enlarged_bands(stream.rows(), binning.side_px, size_px)
+        larger = replace(stream.with_bands(bands), shape=(stream.shape[0], *size_px))
+        return larger.timed(self.clock, ENLARGING)
 
     def metered(self, bands: Iterator[Rows]) -> Iterator[Rows]:
         """Yield bands of a product; what makes them hears of the caller's wish to stop."""

@@ -43,6 +43,9 @@ class Subject:
         lights: (row, column) of squares of `LIGHT_PX`, true where any sample is clipped; None where
             no rule asks.
         loss_db: Predicted loss that the rules may spend, in dB against `exact`.
+        side_px: Side of the squares of the mosaic that the pixels of the capture are means over; 1
+            for its own pixels.
+        enlarged: Whether the picture gets the size of the mosaic back.
     """
 
     bundle: Bundle
@@ -53,6 +56,8 @@ class Subject:
     content: Content | None = None
     lights: NDArray[np.bool_] | None = None
     loss_db: float = 0.0
+    side_px: int = 1
+    enlarged: bool = False
 
     @property
     def role(self) -> str | None:
@@ -95,6 +100,7 @@ class Work:
         mode: Tiling.
         labels: (row, column) tier of every lattice cell; None for FULL everywhere.
         left_out: Types of stages that are left out beside what the method leaves out.
+        strength: Share of what the networks add that is kept, of that which the caller wants.
     """
 
     method: str | None = None
@@ -104,6 +110,7 @@ class Work:
     mode: Mode = "exact"
     labels: Labels | None = None
     left_out: frozenset[str] = frozenset()
+    strength: float = 1.0
 
     def __post_init__(self) -> None:
         if self.labels is None:

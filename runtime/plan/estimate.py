@@ -5,14 +5,16 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from camkit.bundle.stages import Network
-from camkit.runtime.plan.decision import FULL, SMALL, Subject, Work
+from camkit.runtime.plan.counted import STRIP_RATIO, counted_window_mp
+from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
-from camkit.runtime.plan.tiers import TierWork, work_shares
+from camkit.runtime.plan.tiers import TierWork
 from camkit.runtime.plan.ways import LEFT_OUT, ways_of
 from camkit.runtime.stage_finder import module_of
 
-WINDOW_OVERLAP: Final = 1.15
-"""Computed over kept pixels of a usual plan, where no windows are planned yet."""
+NETWORK_REST: Final = 0.8
+"""Of a network outside its windows, in everything but bank and network (measured: 0.11 CPU-seconds
+per megapixel, docs/results/plan.md)."""
 FILE_SHARE: Final = 0.15
 """Share of reading and writing files in everything but bank and network."""
 
@@ -78,49 +80,37 @@ def stage_seconds(
         if way == LEFT_OUT:
             seconds.append(0.0)
         elif isinstance(stage, Network) and windows is not None:
-            seconds.append(network_seconds(stage.role, windows, speed))
+            seconds.append(network_seconds(stage.role, windows, speed, subject.megapixels))
         else:
             estimate = getattr(module_of(stage), "seconds", None)
             seconds.append(0.0 if estimate is None else estimate(stage, subject, work, speed))
     return tuple(seconds)
 
 
-def network_seconds(role: str, window_mp: Mapping[str, float], speed: Speed) -> float:
-    """Return the seconds of the windows of a role."""
-    return sum(speed.network_s_per_mp[role, size] * mp for size, mp in window_mp.items())
+def network_seconds(
+    role: str, window_mp: Mapping[str, float], speed: Speed, megapixels: float
+) -> float:
+    """Return the seconds of the windows of a role, and of what is done around them everywhere.
 
-
-def nominal_window_mp(subject: Subject, work: Work) -> dict[str, float]:
-    """Return size -> megapixels computed by the one network of a camera, from the lattice alone."""
-    computed = subject.megapixels * WINDOW_OVERLAP
-    if not work.networks:
-        return {}
-    if work.labels is None or subject.content is None:
-        return {work.size: computed}
-    areas = subject.content.cell_px
-    tier_work = tier_work_of(subject, work)
-    window_mp = {}
-    for tier, size in ((FULL, work.size), (SMALL, work.small)):
-        if size is None or not (work.labels == tier).any():
-            continue
-        only = work.labels.copy()
-        only[work.labels != tier] = 1
-        _, share = work_shares(only, areas, tier_work)
-        full = tier_work.per_px()
-        ratio = (full[FULL] - full[1]) / (full[tier] - full[1])
-        window_mp[size] = min(share * ratio, 1.0) * computed
-    return window_mp
+    Args:
+        role: Of the network.
+        window_mp: Size -> megapixels that its windows compute.
+        speed: How fast the machine is.
+        megapixels: Of the picture.
+    """
+    windows_s = sum(speed.network_s_per_mp[role, size] * mp for size, mp in window_mp.items())
+    return NETWORK_REST * speed.rest_s_per_mp * megapixels + windows_s
 
 
 def role_window_mp(role: str, subject: Subject, work: Work) -> dict[str, float]:
     """Return size -> megapixels computed by the network of a role, on the grid of what it takes."""
     if subject.role is not None:
-        return nominal_window_mp(subject, work)
+        return counted_window_mp(subject, work)
     manifest = subject.bundle.manifest
     stage = next(s for s in manifest.stages_of(Network) if s.role == role)
     plane = manifest.planes.get(stage.takes[0])
     finer = 1.0 if plane is None else plane.grid.pitch_ratio**-2
-    return {work.size: subject.megapixels * WINDOW_OVERLAP * finer}
+    return {work.size: subject.megapixels * STRIP_RATIO * finer}
 
 
 def tier_work_of(subject: Subject, work: Work) -> TierWork:

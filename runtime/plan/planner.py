@@ -1,7 +1,9 @@
 """Quality and budgets -> rules -> work and decisions.
 
 exact      M, nothing skipped            best     the largest size, nothing skipped
-adaptive   M, within adaptive.loss_db    draft    the smallest size, within draft.loss_db
+adaptive   M, within adaptive.loss_db    draft    the smallest size at half scale, enlarged; of what
+                                                  is no mosaic, within draft.loss_db
+--scale          a smaller picture: the smallest size at 1/2, the bank alone at 1/4
 --max-error-db   the cheapest of all sizes whose predicted worst loss stays below
 --max-seconds    the best of a ladder from exact to the bank alone that fits
 """
@@ -13,13 +15,14 @@ from typing import Final
 from camkit.bundle.reader import Bundle
 from camkit.errors import ContractError
 from camkit.runtime.options import Options
+from camkit.runtime.plan.binned_work import SIDES_PX, binned_work
+from camkit.runtime.plan.counted import counted_work
 from camkit.runtime.plan.decision import Decision, Subject, Work
-from camkit.runtime.plan.estimate import estimate_seconds, tier_work_of
+from camkit.runtime.plan.estimate import estimate_seconds
 from camkit.runtime.plan.loss import LossModel, read_loss_model
 from camkit.runtime.plan.rule import apply_rules
 from camkit.runtime.plan.rules.size import REFERENCE, SIZE, size_cost_db
 from camkit.runtime.plan.speed import Speed
-from camkit.runtime.plan.tiers import work_shares
 from camkit.runtime.plan.ways import (
     planned,
     stand_ins,
@@ -100,7 +103,7 @@ def default_size(bundle: Bundle, options: Options) -> str:
         return REFERENCE
     if options.quality == "best":
         return sizes[-1]
-    if options.quality == "draft":
+    if options.quality == "draft" or options.scale != "1":
         return sizes[0]
     return REFERENCE if REFERENCE in sizes or len(sizes) > 1 else sizes[0]
 
@@ -120,8 +123,8 @@ def make_plan(subject: Subject, speed: Callable[[], Speed]) -> Plan:
     """
     options = subject.options
     model = read_loss_model(subject.bundle.manifest.plan)
-    work = asked_work(subject.bundle, options)
-    if not work.networks:
+    work = asked_work(subject.bundle, options, subject.side_px)
+    if not work.networks or subject.side_px > 1:
         return _ruled(subject, work)
     if options.max_seconds is not None:
         return _within_seconds(subject, work, model, speed())
@@ -135,8 +138,13 @@ def make_plan(subject: Subject, speed: Callable[[], Speed]) -> Plan:
     return _ruled(replace(subject, loss_db=spend), work)
 
 
-def asked_work(bundle: Bundle, options: Options) -> Work:
-    """Return the work that a caller asked for, before any capture is known.
+def asked_work(bundle: Bundle, options: Options, side_px: int | None = None) -> Work:
+    """Return the work that a caller asked for.
+
+    Args:
+        bundle: The camera.
+        options: What was chosen.
+        side_px: Of the squares that a capture is averaged over; None before any is known.
 
     Raises:
         ContractError: If no stage has the method, or what it leaves out cannot be.
@@ -154,7 +162,8 @@ def asked_work(bundle: Bundle, options: Options) -> Work:
         left_out=frozenset(unwanted),
     )
     stand_ins(stages, ways_of(stages, work), bundle.manifest.all_planes)
-    return planned(stages, work)
+    side = SIDES_PX[options.scale] if side_px is None else side_px
+    return binned_work(bundle.manifest, options, planned(stages, work), side)
 
 
 def _ruled(subject: Subject, work: Work, note: str = "") -> Plan:
@@ -182,17 +191,7 @@ def _within_error(subject: Subject, work: Work, model: LossModel | None) -> Plan
         for size in _sizes(subject)
         if size == _sizes(subject)[0] or size_cost_db(subject, size) <= spend
     ]
-    return min(plans, key=_nominal_work)
-
-
-def _nominal_work(plan: Plan) -> float:
-    """Return the work of the networks and the bank of a plan, in multiplications per pixel."""
-    tiers = tier_work_of(plan.subject, plan.work)
-    per_px = tiers.per_px()
-    if plan.work.labels is None or plan.subject.content is None:
-        return float(per_px[3])
-    bank, network = work_shares(plan.work.labels, plan.subject.content.cell_px, tiers)
-    return float(bank * per_px[1] + network * (per_px[3] - per_px[1]))
+    return min(plans, key=lambda plan: counted_work(plan.subject, plan.work))
 
 
 def _within_seconds(subject: Subject, work: Work, model: LossModel | None, speed: Speed) -> Plan:

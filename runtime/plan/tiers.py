@@ -4,7 +4,8 @@
 
 Where a network's cells end, its windows reach a halo further; a lone cell of 256 px with a halo of
 96 costs three cells. The least of work + weight * loss is sought cell by cell in a checkerboard
-(iterated conditional modes), for a row of weights; the cheapest result within the loss is taken.
+(iterated conditional modes), for a row of weights; the cheapest result within the loss is taken,
+and what it leaves of the loss is spent cell by cell.
 Everything is in multiplications, none of it depends on the machine.
 
 References: Besag 1986 (iterated conditional modes).
@@ -18,14 +19,16 @@ from numpy.typing import NDArray
 
 from camkit.errors import ContractError
 from camkit.runtime.content import CELL_PX, CellArray
-from camkit.runtime.plan.decision import FULL, PLAIN, SMALL, WIENER, Labels
+from camkit.runtime.plan.decision import FULL, PLAIN, SMALL, Labels
 
-BANK_MAC: Final = 17_000.0
-"""Work of the bank per pixel, in multiplications of a network that take as long
-(measured: `tools/plan/work.py` at 2a55aa66).
-"""
-NETWORK_FIXED_MAC: Final = 4_500.0
-"""What a network costs per pixel besides its multiplications, in the same unit (measured)."""
+BANK_MAC: Final = 8_000.0
+"""Work of the bank per pixel, in multiplications of a network that take as long (measured:
+docs/results/plan.md)."""
+NETWORK_FIXED_MAC: Final = 3_300.0
+"""What a network costs per pixel of its windows besides its multiplications, in the same unit."""
+NETWORK_EVERYWHERE_MAC: Final = 7_600.0
+"""What a network costs per pixel of the picture, in whatever cells it runs: the way to equal noise
+and back, and the bound of its light. No plan saves it."""
 LEAST_SAVING: Final = 0.05
 """Below this share of the work nothing is skipped."""
 _BANK_REACH_PX: Final = 256
@@ -53,15 +56,15 @@ class TierWork:
 
     def per_px(self) -> FloatGrid:
         """Return the work per pixel of every tier, the bank included."""
-        small = np.inf if self.small_mac is None else BANK_MAC + self._network(self.small_mac)
-        return np.array([0.0, BANK_MAC, small, BANK_MAC + self._network(self.full_mac)])
+        small = np.inf if self.small_mac is None else BANK_MAC + network_work(self.small_mac)
+        return np.array([0.0, BANK_MAC, small, BANK_MAC + network_work(self.full_mac)])
 
     def borders(self) -> FloatGrid:
         """Return (tier, tier): work per border of one cell's side between two tiers."""
         ring = np.zeros(4)
-        ring[FULL] = self._network(self.full_mac) * self.full_halo_px * CELL_PX
+        ring[FULL] = network_work(self.full_mac) * self.full_halo_px * CELL_PX
         if self.small_mac is not None:
-            ring[SMALL] = self._network(self.small_mac) * self.small_halo_px * CELL_PX
+            ring[SMALL] = network_work(self.small_mac) * self.small_halo_px * CELL_PX
         table = ring[:, None] + ring
         bank = BANK_MAC * _BANK_REACH_PX * CELL_PX
         table[PLAIN, 1:] += bank
@@ -69,9 +72,10 @@ class TierWork:
         np.fill_diagonal(table, 0.0)
         return np.asarray(table)
 
-    @staticmethod
-    def _network(mac: float) -> float:
-        return NETWORK_FIXED_MAC + mac
+
+def network_work(mac: float) -> float:
+    """Return the work per pixel of the windows of a network of so many multiplications."""
+    return NETWORK_FIXED_MAC + mac
 
 
 def choose_tiers(
@@ -109,7 +113,9 @@ def choose_tiers(
         amount = total_work(labels, costs, borders)
         if loss <= allowed and amount <= least:
             best, least = labels, amount
-    return None if best is None else best.astype(np.int8)
+    if best is None:
+        return None
+    return _spend(best, costs, np.where(usable, losses, np.inf), allowed, borders).astype(np.int8)
 
 
 def total_work(labels: NDArray[np.integer], costs: FloatGrid, borders: FloatGrid) -> float:
@@ -120,20 +126,29 @@ def total_work(labels: NDArray[np.integer], costs: FloatGrid, borders: FloatGrid
     return float(cells + across + down)
 
 
-def work_shares(labels: Labels, area_px: CellArray, work: TierWork) -> tuple[float, float]:
-    """Return the work of (bank, networks) as shares of doing everything; borders included."""
-    per_px = work.per_px()
-    per_px[~np.isfinite(per_px)] = 0
-    network = per_px - np.where(np.arange(4) >= WIENER, BANK_MAC, 0)
-    borders = work.borders()
-    bank_border = np.zeros((4, 4))
-    bank_border[PLAIN, 1:] = bank_border[1:, PLAIN] = BANK_MAC * _BANK_REACH_PX * CELL_PX
-    bank = np.where(np.arange(4) >= WIENER, BANK_MAC, 0.0)
-    shares = []
-    for cells, edges in ((bank, bank_border), (network, borders - bank_border)):
-        costs = cells[:, None, None] * area_px
-        shares.append(min(total_work(labels, costs, edges) / costs[FULL].sum(), 1.0))
-    return shares[0], shares[1]
+def _spend(
+    labels: NDArray[np.intp],
+    costs: FloatGrid,
+    losses: FloatGrid,
+    allowed: float,
+    borders: FloatGrid,
+) -> NDArray[np.intp]:
+    """Return labels with single cells changed, as long as that saves work within the loss.
+
+    A weighted sum finds only labellings on the convex hull; what they leave of the loss is spent
+    on the cells that save most.
+    """
+    labels = labels.copy()
+    while True:
+        energy = costs + _pull(labels, borders)
+        saving = np.take_along_axis(energy, labels[None], axis=0) - energy
+        own = np.take_along_axis(losses, labels[None], axis=0)
+        fits = losses - own <= allowed - own.sum()
+        saving = np.where(fits, saving, 0)
+        tier, row, column = np.unravel_index(saving.argmax(), saving.shape)
+        if saving[tier, row, column] <= 0:
+            return labels
+        labels[row, column] = tier
 
 
 def _settle(unary: FloatGrid, borders: FloatGrid) -> NDArray[np.intp]:

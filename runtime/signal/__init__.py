@@ -1,5 +1,6 @@
 """The signal before and behind the restoration, in the order of one photograph.
 
+binned_capture    a mosaic as smaller planes, averaged over squares
 noise         noise of a capture that states none; repair of broken samples
 glow          whether a sample that stands out is light
 demosaic      mosaic to three planes

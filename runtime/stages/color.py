@@ -27,7 +27,7 @@ REST_SHARE: Final = 0.06
 def look(_entry: Color, job: Job) -> Job:
     """Choose the colour matrix."""
     options, matrix = job.options, job.color_matrix
-    if matrix is None and job.capture.cfa is not None:
+    if matrix is None and job.capture.is_of_mosaic:
         job.log.notes.append(
             "no colour matrix: camera RGB is used as Rec.709, colours are approximate"
         )

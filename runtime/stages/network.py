@@ -108,7 +108,8 @@ def _compared(job: Job) -> Job:
 
 def seconds(entry: Network, subject: Subject, work: Work, speed: Speed) -> float:
     """Return the seconds that it will take."""
-    return network_seconds(entry.role, role_window_mp(entry.role, subject, work), speed)
+    window_mp = role_window_mp(entry.role, subject, work)
+    return network_seconds(entry.role, window_mp, speed, subject.megapixels)
 
 
 def given_rows(entry: Network, job: Job, streams: Sequence[Stream]) -> RowSource:
@@ -288,9 +289,9 @@ class _NetworkStage:
         Raises:
             ContractError: If its output cannot be mixed with what it improves on.
         """
-        entry, options = self._entry, self._job.options
+        entry, strength = self._entry, self._job.options.strength * self._job.work.strength
         if stand_in is None:
-            if options.strength != 1:
+            if strength != 1:
                 raise ContractError(
                     f"strength mixes what a network makes with the picture in front of it, and the "
                     f"one of the role {entry.role} makes something else; leave it out"
@@ -303,14 +304,14 @@ class _NetworkStage:
             white = white_keeper(noise, entry.scale, rec709_of_planes(self._job.color_matrix))
         if noise is not None and entry.light is not None and entry.light.keeps_bright:
             bright = stabilised_level(BRIGHT, noise, scale=entry.scale)[:, 0, 0]
-        if not measured and options.strength == 1 and white is None:
+        if not measured and strength == 1 and white is None:
             return None
         return LightKeeper(
             front=stand_in,
             kept_channel=self._facts().input_channels if masked else None,
             bound=entry.light,
             measured=measured,
-            strength=options.strength,
+            strength=strength,
             scale=entry.scale,
             bright=bright,
             white=white,

@@ -23,7 +23,7 @@ def prepare(_entry: RaiseClipped, job: Job) -> StageWork:
 
     def run(streams: Sequence[Stream]) -> tuple[Stream, ...]:
         (light,) = streams
-        if job.capture.cfa is None:
+        if not job.capture.is_of_mosaic:
             return (light,)
         red, green, blue = light.gains
 

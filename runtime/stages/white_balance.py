@@ -51,7 +51,7 @@ def _choose(job: Job) -> Gains:
     gains = job.options.white_balance or job.capture.white_balance
     if gains is not None:
         return gains
-    if job.capture.cfa is None:
+    if not job.capture.is_of_mosaic:
         return (1.0, 1.0, 1.0)
     sensor = None if job.bundle is None else job.bundle.manifest.sensor
     if sensor is None or sensor.type != "bayer":

@@ -25,11 +25,12 @@ from camkit.runtime.bank.blocks import (
     lay_spans,
 )
 from camkit.runtime.bank.distance import CELL_PX, find_nearness, search_blocks
+from camkit.runtime.bank.joint_colours import binned_model
 from camkit.runtime.bank.kernels_by_distance import (
     KEPT_STEPS,
     MEAN,
     KernelsByDistance,
-    KernelsOfScene,
+    NearnessMap,
 )
 from camkit.runtime.bank.lights import fitted_px, light_share
 from camkit.runtime.bank.psf import FieldKernels, color_kernels
@@ -184,24 +185,33 @@ def make_bank(entry: Wiener, job: Job, planes: Stream) -> BlockBank:
     """
     bundle = job.known_bundle
     sensor = bundle.manifest.light_sensor
-    camera = bundle, job.options.focus_um, job.placement.kernel_scale
-    window = job.window_of(planes.plane)
+    window, binning = job.window_of(planes.plane), job.capture.binning
+    scale = job.placement.kernel_scale * (1 if binning is None else binning.side_px)
+    camera = bundle, job.options.focus_um, scale
+    choice = None
     if _finds_distance(entry, bundle, job.options):
+        nearness = _nearness(entry, job, planes)
         by_distance = _kernels_by_distance(*camera)
-        scene = _scene_kernels(entry, job, planes, by_distance)
-        local = LocalPsf(kernels=by_distance.at_step(MEAN), window=window, choice=scene)
+        choice = by_distance.of_scene(nearness)
+        kernels = by_distance.at_step(MEAN)
     else:
-        local = LocalPsf(kernels=_kernels(bundle, job.options.depth_mm, *camera[1:]), window=window)
+        kernels = _kernels(bundle, job.options.depth_mm, *camera[1:])
+    local = LocalPsf(kernels=kernels, window=window, choice=choice, binning=binning)
     method = job.work.method if job.work.method in METHODS else METHODS[0]
     noise = job.noise.with_gains(planes.gains)
     if entry.together is not None and method == METHODS[0]:
         # its numbers were fitted to noise of this sensor; with less it would trust its kernels more
         least = sensor.noise_at(min(one.iso for one in sensor.noise))
+        if binning is not None:
+            least = least.raised(binning.noise_factors)
         noise = noise.at_least(least.with_gains(planes.gains))
     if planes.noise_rise is not None:
         noise = noise.raised(planes.noise_rise())
     side = cut_block_px(entry.block_px, entry.overlap_px, local.window.size_px)
     cut = entry.model_copy(update={"block_px": max(side, *local.kernels.kernels.shape[-2:])})
+    if binning is not None and cut.together is not None:
+        together = binned_model(cut.together, binning.side_px)
+        cut = cut.model_copy(update={"together": together, "mosaic": None})
     red = _red_of(job.capture, planes)
     return restoration_bank(local, cut, noise, method=method, threads=job.threads, red=red)
 
@@ -239,12 +249,13 @@ def _finds_distance(entry: Wiener, bundle: Bundle, options: Options) -> bool:
     return entry.depth == ESTIMATED and options.depth_mm is None and several
 
 
-def _scene_kernels(
-    entry: Wiener, job: Job, planes: Stream, kernels: KernelsByDistance
-) -> KernelsOfScene:
-    """Compute the distance of every part of the capture, and return the kernels of it."""
+def _nearness(entry: Wiener, job: Job, planes: Stream) -> NearnessMap:
+    """Return the distance of every part of the capture."""
     key = _nearness_key(entry)
     if (nearness := job.cache.get(key)) is None:
+        kernels = _kernels_by_distance(
+            job.known_bundle, job.options.focus_um, job.placement.kernel_scale
+        )
         cells = cells_of(job, entry.takes, CELL_PX)
         nearness = job.cache[key] = find_nearness(
             cells.means,
@@ -256,7 +267,8 @@ def _scene_kernels(
             threads=job.threads,
         )
     job.log.sections["distance"] = nearness.to_json()
-    return kernels.of_scene(nearness)
+    found: NearnessMap = nearness
+    return found
 
 
 def _nearness_key(entry: Wiener) -> tuple[str, tuple[str, ...]]:

@@ -143,23 +143,22 @@ def true_loss_db(
 ) -> float:
     """Return what a capture really loses when the model may spend `loss_db`."""
     losses = model.predict(capture.content)
-    grid = _grid(losses, small)
+    grid = predicted_grid(losses, small)
     labels = choose_tiers(capture.content.cell_px, grid, losses.allowed(loss_db), work)
     if labels is None:
         return 0.0
-    measured = np.stack(
-        [
-            capture.errors["plain"],
-            capture.errors["wiener"],
-            capture.errors[EXACT if small is None else small],
-            capture.errors[EXACT],
-        ]
-    )
+    measured = np.stack([capture.errors[target] for target in tier_targets(small)])
     got = np.take_along_axis(measured, labels[None].astype(np.intp), axis=0).sum()
     return float(10 * np.log10(got / capture.errors[EXACT].sum()))
 
 
-def _grid(losses: CellLosses, small: str | None) -> np.ndarray:
+def tier_targets(small: str | None) -> tuple[str, ...]:
+    """Return the target whose error every tier has; `small` is that of tier SMALL."""
+    return "plain", "wiener", EXACT if small is None else small, EXACT
+
+
+def predicted_grid(losses: CellLosses, small: str | None) -> np.ndarray:
+    """Return (tier, row, column): what each tier adds to the error, as predicted."""
     grid = np.full((4, *losses.exact.shape), np.inf)
     grid[FULL] = 0.0
     for tier, target in ((PLAIN, "plain"), (WIENER, "wiener"), (SMALL, small)):

@@ -131,8 +131,10 @@ def _row(
 def _counted_seconds(bundle: Bundle, work: Reconstruction, speed: Speed) -> float:
     """Return the seconds of blocks and windows as planned, at the speed of this machine."""
     stage = bundle.manifest.stage(Wiener)
+    megapixels = work.capture.height * work.capture.width / 1e6
     seconds = sum(
-        network_seconds(role, windows.window_mp(), speed) for role, windows in work.windows.items()
+        network_seconds(role, windows.window_mp(), speed, megapixels)
+        for role, windows in work.windows.items()
     )
     if stage is not None:
         rows, columns = (

@@ -33,6 +33,10 @@ def process(
         typer.Option(help="Network size, such as S, M or L; default: the size of --quality."),
     ] = None,
     quality: Quality = "exact",
+    scale: Annotated[
+        str,
+        typer.Option(help="Size of the picture over the capture's: 1, 1/2 or 1/4, at its price."),
+    ] = "1",
     max_seconds: MaxSeconds = None,
     max_error_db: MaxErrorDb = None,
     out_dir: Annotated[Path, typer.Option(help="Folder for pictures and sidecars.")] = Path(),
@@ -184,6 +188,7 @@ def process(
     plain = Options(
         size=size,
         quality=quality,  # type: ignore[arg-type]
+        scale=scale,  # type: ignore[arg-type]
         max_seconds=max_seconds,
         max_error_db=max_error_db,
         depth_m=depth_m,

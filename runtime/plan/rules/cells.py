@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 
 from camkit.bundle.stages import Network
+from camkit.runtime.plan.counted import counted_work
 from camkit.runtime.plan.decision import (
     FULL,
     PLAIN,
@@ -13,20 +14,24 @@ from camkit.runtime.plan.decision import (
     TIER_NAMES,
     WIENER,
     Decision,
+    Labels,
     Subject,
     Work,
 )
 from camkit.runtime.plan.estimate import tier_work_of
 from camkit.runtime.plan.loss import CellLosses, read_loss_model
-from camkit.runtime.plan.tiers import FloatGrid, choose_tiers
+from camkit.runtime.plan.tiers import LEAST_SAVING, FloatGrid, choose_tiers
 from camkit.runtime.plan.ways import known_stand_in
 
 ORDER: Final = 20
 
 
 def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
-    """Divide the cells among the tiers within the loss that may be spent."""
-    if not work.networks or subject.role is None:
+    """Divide the cells among the tiers within the loss that may be spent.
+
+    What is chosen must save work against the whole picture in strips, its windows counted.
+    """
+    if not work.networks or subject.role is None or subject.side_px > 1:
         return work, None
     model = read_loss_model(subject.bundle.manifest.plan)
     if subject.content is None:
@@ -56,17 +61,28 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
         labels = choose_tiers(
             subject.content.cell_px, grid, allowed, tier_work_of(subject, with_small)
         )
-    if labels is None:
+    skipping = with_small if labels is None else _skipping(subject, with_small, labels)
+    limit = (1 - LEAST_SAVING) * counted_work(subject, work)
+    if labels is None or counted_work(subject, skipping) > limit:
         reason = f"nothing can be skipped within {subject.loss_db:.3f} dB"
         return work, Decision(what="cells", choice="all full", reason=reason)
     added = float(np.take_along_axis(grid, labels[None].astype(np.intp), axis=0).sum())
     counts = [f"{int((labels == t).sum())} {TIER_NAMES[t]}" for t in (FULL, SMALL, WIENER, PLAIN)]
-    return replace(with_small, labels=labels), Decision(
+    return skipping, Decision(
         what="cells",
         choice=", ".join(c for c in counts if not c.startswith("0 ")),
         reason=f"flat, dark or out of focus; predicted within {subject.loss_db:.3f} dB",
         cost_db=losses.loss_db(base_loss + added) - losses.loss_db(base_loss),
     )
+
+
+def _skipping(subject: Subject, work: Work, labels: Labels) -> Work:
+    """Return the work with tiers; without the stages of networks where no cell has one."""
+    labelled = replace(work, labels=labels)
+    if labelled.sizes():
+        return labelled
+    unwanted = {stage.type for stage in subject.bundle.manifest.stages_of(Network)}
+    return replace(labelled, networks=False, left_out=work.left_out | unwanted)
 
 
 def _smaller(subject: Subject, work: Work, losses: CellLosses) -> str | None:

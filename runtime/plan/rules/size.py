@@ -20,6 +20,8 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
     options = subject.options
     if options.size is not None:
         reason = f"set by {option_text('size')}"
+    elif options.scale != "1":
+        reason = f"set by {option_text('scale', options.scale)}"
     elif options.max_seconds is not None or options.max_error_db is not None:
         reason = "the best within the stated limits"
     else:
@@ -32,7 +34,7 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
 def size_cost_db(subject: Subject, size: str) -> float:
     """Return the predicted loss of a size on this capture; 0 where nothing was calibrated."""
     model = read_loss_model(subject.bundle.manifest.plan)
-    if model is None or subject.content is None or size == REFERENCE:
+    if model is None or subject.content is None or size == REFERENCE or subject.side_px > 1:
         return 0.0
     losses = model.predict(subject.content)
     extra = losses.extra.get(size)

@@ -9,6 +9,7 @@ from camkit.errors import ContractError
 from camkit.runtime.bank.blocks import (
     BlockBank,
     LocalPsf,
+    binned_otf,
     cut_block_px,
     lay_spans,
     mirror_otf,
@@ -16,6 +17,7 @@ from camkit.runtime.bank.blocks import (
     to_otf,
 )
 from camkit.runtime.bank.psf import FieldKernels, color_kernels
+from camkit.runtime.binning import Binning
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.rows import ArrayRows, RollingRows
 from tests.psf_factory import (
@@ -342,3 +344,18 @@ def test_a_cut_block_covers_the_picture_and_its_borders():
     assert 1500 + 2 * 56 <= side < 1700
     assert side % 4 == 0
     assert len(lay_spans(1500, side, 128)) == 1
+
+
+def test_the_otf_between_means_is_that_of_the_fine_kernel_at_the_same_frequencies() -> None:
+    kernel = np.random.default_rng(2).random((3, 9, 7)).astype(np.float32)
+    kernel /= kernel.sum(axis=(1, 2), keepdims=True)
+    binning, block_px = Binning(side_px=2, cfa="RGGB"), 16
+    otf = binned_otf(kernel, block_px, binning)
+    fine = to_otf(kernel, 2 * block_px)
+    low = np.concatenate([fine[:, : block_px // 2], fine[:, -block_px // 2 :]], axis=1)
+    expected = low[:, :, : block_px // 2 + 1]
+    np.testing.assert_allclose(otf[1], expected[1], atol=1e-5)
+    rows, columns = np.fft.fftfreq(block_px) / 2, np.fft.rfftfreq(block_px) / 2
+    red = binning.transfer(0, rows)[:, None] * binning.transfer(0, columns)
+    np.testing.assert_allclose(otf[0], red * expected[0], atol=1e-5)
+    assert otf[:, 0, 0] == pytest.approx(1.0, abs=1e-5)

@@ -11,7 +11,13 @@ from camkit.bundle.stages import Together, Wiener
 from camkit.bundle.stages.together import BAND, BAND_STEP, Spread
 from camkit.runtime.bank.baselines import restoration_bank
 from camkit.runtime.bank.blocks import Block, BlockBank, to_otf
-from camkit.runtime.bank.joint_colours import CORNER_FREQUENCY, restore_together, transfer_of
+from camkit.runtime.bank.joint_colours import (
+    BINNED_NOISE,
+    CORNER_FREQUENCY,
+    binned_model,
+    restore_together,
+    transfer_of,
+)
 from camkit.runtime.bank.wiener import wiener_filter
 from tests.psf_factory import (
     ISO_100,
@@ -173,3 +179,12 @@ def test_tables_that_make_no_sense_are_refused(changed: dict[str, Any], told: st
 def test_every_colour_needs_its_noise() -> None:
     with pytest.raises(ValidationError, match="one number for each of 3"):
         Together(**(TOGETHER.model_dump() | {"noise": (0.1, 0.2)}))
+
+
+def test_means_over_squares_have_the_doubts_of_their_frequencies_and_white_noise() -> None:
+    model = binned_model(TOGETHER, 2)
+    frequencies = np.array(TOGETHER.spread.frequencies)
+    np.testing.assert_allclose(model.spread.frequencies, 2 * frequencies)
+    assert model.spread.variance == TOGETHER.spread.variance
+    assert set(model.noise_rise) == {0.0}
+    assert set(model.noise) == {BINNED_NOISE}

@@ -118,3 +118,12 @@ def test_a_sensor_without_extent_takes_a_picture_of_any_size(pitch_um: float | N
     assert (window.origin_px, window.axis_px) == ((0.0, 0.0), None)
     assert window.pitch_um == (pitch_um or 1.0)
     assert (placement.kernel_scale, placement.note) == (1.0, "")
+
+
+def test_a_binned_capture_has_larger_pixels_at_the_same_place() -> None:
+    placement = place(_capture(100, 80), _beside(), "scale")
+    small = placement.binned(2)
+    assert small.window.size_px == (50, 40)
+    assert small.window.pitch_um == 2 * placement.window.pitch_um
+    assert small.kernel_scale == placement.kernel_scale / 2
+    assert small.window.to_mm(0, 0) == pytest.approx(placement.window.to_mm(0.5, 0.5))

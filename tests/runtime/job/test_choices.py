@@ -22,6 +22,7 @@ from tests.planes_bundle import planes_sensor, write_planes_bundle
 CHANGED: dict[str, Any] = {
     "size": "M",
     "quality": "draft",
+    "scale": "1/2",
     "max_seconds": 1.0,
     "max_error_db": 0.1,
     "depth_m": float("inf"),
@@ -54,7 +55,7 @@ OF_STAGE = {
         *("dtype", "provider", "laws", "strength"),
     },
     "wiener": {"depth_m"},
-    "demosaic": {"demosaic"},
+    "demosaic": {"demosaic", "scale"},
     "white_balance": {"white_balance"},
     "color": {"color", "exposure_ev"},
     "illumination": {"vignetting"},
@@ -104,7 +105,7 @@ def test_each_option_that_means_nothing_is_refused_by_name(bare: Bundle, name: s
 
 @pytest.mark.parametrize("name", sorted(set(CHANGED) - {"unit"}))
 def test_each_option_that_means_nothing_without_a_bundle_is_refused_by_name(name: str) -> None:
-    if name in FREE | {"color", "exposure_ev", "white_balance", "demosaic"}:
+    if name in FREE | {"color", "exposure_ev", "white_balance", "demosaic", "scale"}:
         check_choices(None, Options(**{name: CHANGED[name]}))
         return
     said = _refused(None, **{name: CHANGED[name]})

@@ -11,10 +11,11 @@ from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Color, Linearise, Network, Wiener
 from camkit.runtime.bank.blocks import lay_spans
 from camkit.runtime.content import LIGHT_PX
+from camkit.runtime.plan.counted import STRIP_RATIO
 from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.estimate import (
     FILE_SHARE,
-    WINDOW_OVERLAP,
+    NETWORK_REST,
     Estimate,
     estimate_seconds,
     network_seconds,
@@ -52,7 +53,8 @@ def test_seconds_are_those_of_the_stages_and_of_the_files(subject: Subject) -> N
     assert min(taken) > 0
     files = FILE_SHARE * SPEED.rest_s_per_mp * subject.megapixels
     assert estimate_seconds(subject, Work(), SPEED) == pytest.approx(sum(taken) + files)
-    assert taken[5] == pytest.approx(3.0 * WINDOW_OVERLAP * subject.megapixels)
+    around = NETWORK_REST * SPEED.rest_s_per_mp
+    assert taken[5] == pytest.approx((3.0 + around) * subject.megapixels)
 
 
 def test_what_is_left_out_takes_no_time(subject: Subject) -> None:
@@ -90,7 +92,9 @@ def test_windows_that_are_planned_count_as_they_are(subject: Subject) -> None:
         stage_seconds(subject, Work(), SPEED),
         stage_seconds(subject, Work(), SPEED, planned),
     )
-    assert exact[5] == network_seconds("restore", {"M": 0.5}, SPEED) == 1.5
+    around = NETWORK_REST * SPEED.rest_s_per_mp * subject.megapixels
+    whole = network_seconds("restore", {"M": 0.5}, SPEED, subject.megapixels)
+    assert exact[5] == whole == pytest.approx(1.5 + around)
     assert exact[:5] + exact[6:] == usual[:5] + usual[6:]
 
 
@@ -118,10 +122,11 @@ def test_networks_of_several_roles_count_on_the_grid_of_what_they_take(tmp_path:
     subject, work = made.plan.subject, made.plan.work
     assert subject.role is None
     coarse = role_window_mp("enlarge", subject, work)["M"]
-    assert coarse == pytest.approx(64 * 96 / 1e6 * WINDOW_OVERLAP)
+    assert coarse == pytest.approx(64 * 96 / 1e6 * STRIP_RATIO)
     assert role_window_mp("clean", subject, work)["M"] == pytest.approx(4 * coarse)
     taken = stage_seconds(subject, work, SPEED)
-    assert taken[1:3] == pytest.approx((7.0 * coarse, 5.0 * 4 * coarse))
+    around = NETWORK_REST * SPEED.rest_s_per_mp * subject.megapixels
+    assert taken[1:3] == pytest.approx((7.0 * coarse + around, 5.0 * 4 * coarse + around))
     estimate = made.explain()
     assert estimate is not None
     assert set(made.record["stages"]) == {"linearise", "network enlarge", "network clean", "color"}

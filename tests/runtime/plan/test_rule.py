@@ -29,7 +29,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_a_new_file_is_a_new_rule(folder: Path) -> None:
     text = "ORDER = 15\ndef decide(case, work):\n    return work, None\n"
     (folder / "gating.py").write_text(text, encoding="utf-8")
-    assert [rule.name for rule in find_rules()][:2] == ["size", "gating"]
+    assert [rule.name for rule in find_rules()][:3] == ["scale", "size", "gating"]
 
 
 def test_a_file_that_is_no_rule_is_named(folder: Path) -> None:

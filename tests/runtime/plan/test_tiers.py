@@ -9,7 +9,7 @@ import pytest
 from camkit.errors import ContractError
 from camkit.runtime.content import CELL_PX
 from camkit.runtime.plan.decision import FULL, PLAIN, SMALL, WIENER
-from camkit.runtime.plan.tiers import TierWork, choose_tiers, total_work, work_shares
+from camkit.runtime.plan.tiers import TierWork, choose_tiers, total_work
 
 WORK = TierWork(full_mac=16_000, full_halo_px=96, small_mac=4_000, small_halo_px=64)
 NO_HALO = replace(WORK, full_halo_px=0, small_halo_px=0)
@@ -79,13 +79,6 @@ def test_without_a_smaller_network_its_tier_is_never_taken() -> None:
     labels = choose_tiers(_area(4, 4), _losses(np.full((4, 4), 1e-6)), 1.0, work)
     assert labels is not None
     assert not (labels == SMALL).any()
-
-
-def test_shares_of_all_and_nothing() -> None:
-    area = _area(3, 3)
-    assert work_shares(np.full((3, 3), FULL, np.int8), area, WORK) == (1.0, 1.0)
-    assert work_shares(np.full((3, 3), PLAIN, np.int8), area, WORK) == (0.0, 0.0)
-    assert work_shares(np.full((3, 3), WIENER, np.int8), area, WORK) == (1.0, 0.0)
 
 
 def test_losses_of_another_shape_are_refused() -> None:

@@ -36,6 +36,7 @@ from camkit.runtime.signal.demosaic import DemosaicMethod
 from camkit.runtime.stages.demosaic import ColorRows
 
 METHODS: Final = ("physics",)
+ON_MOSAIC: Final = True
 OPTIONS: Final = ("depth_m", "demosaic")
 BYTES_PER_PX: Final = 22
 """Cells, veil, lights and streaks of a picture that is one window (measured)."""
