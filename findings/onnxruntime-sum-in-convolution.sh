@@ -2,14 +2,14 @@
 # A network cut in two gives other bits where a sum crosses the cut, the same bits elsewhere.
 #
 # Versions: onnxruntime 1.31.1, onnx 1.23.2, numpy 2.4.6, CPython 3.11 or later, x86-64.
-# Valid input: convolution, leaky ReLU, two more convolutions, and the sum of the last with what the ReLU
-#   gave (a residual block); 32 channels, 64x64, made here. The same nodes are run as one model and
-#   as two, whose second takes what the first gives.
-# Behaviour: convolutions, activations and what lies between them may be parted anywhere. A sum of
-#   two tensors in the blocked layout is taken inside the convolution that makes one of them, unless
-#   the other comes in from outside: then it is a node of its own and rounds differently, by about
-#   one unit in the last place (seen from two blocks of channels on). Who cuts networks for memory or for accelerators and compares bits
-#   must not part a sum from either of its sides.
+# Valid input: convolution, leaky ReLU, two more convolutions, and the sum of the last with what the
+#   first leaky ReLU gave (a residual block); 32 channels, 64x64, made here. The same nodes are run as
+#   one model and as two, whose second takes what the first gives.
+# Behaviour: convolutions, activations and what lies between them may be parted anywhere. A sum of two
+#   tensors in the blocked layout is taken inside the convolution that makes one of them, unless the
+#   other comes in from outside: then it is a node of its own and rounds differently, by about one
+#   unit in the last place (seen from two blocks of channels on). Who cuts networks for memory or for
+#   accelerators and compares bits must not part a sum from either of its sides.
 # Output seen:
 #   cut before the block: equal False, at most 2e-07 of the largest
 #   cut behind the block: equal True, at most 0 of the largest

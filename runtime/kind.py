@@ -29,7 +29,6 @@ from camkit.runtime.kind_parts.photograph_facts import describe_photograph
 from camkit.runtime.kind_parts.picture_files import PICTURES
 from camkit.runtime.options import Options
 from camkit.runtime.raw import named_bundle
-from camkit.runtime.twin.simulate import SimulationOptions, photograph
 
 OF_PHOTOGRAPHS: Final = OF_CAPTURE | {"mosaic"}
 """What may be said of how a photograph was taken."""
@@ -57,6 +56,13 @@ def _no_files(*_: object) -> NoReturn:
     raise UnsupportedError("captures of this kind are not read from files, or written")
 
 
+def _photograph(scene: Any, bundle: Bundle, options: Any) -> Any:
+    # imported late: processing needs no twin
+    from camkit.runtime.twin.simulate import photograph
+
+    return photograph(scene, bundle, options)
+
+
 def _itself(path: Path) -> tuple[Path, ...]:
     return (path,)
 
@@ -79,7 +85,7 @@ class RuntimePart:
             values.
         simulate: (scene, bundle, its `simulation`) -> what the camera records; a scene is (3, h, w)
             linear Rec.709, or for some kinds the file of one.
-        simulation: Type of the options of `simulate`.
+        simulation: Type of the options of `simulate`; None for `SimulationOptions`.
         write: (file, what was recorded, bundle): writes a capture that `read` reads.
         suffixes: Of the files that `write` writes, with their dots; the usual one first.
         files: A capture's file -> all files that `write` writes for it, the capture first.
@@ -97,8 +103,8 @@ class RuntimePart:
     of_capture: frozenset[str] = OF_PHOTOGRAPHS
     bundle_of: Callable[[Path], str | None] = named_bundle
     describe: Callable[[Path, MosaicOptions | None], Mapping[str, Any]] = describe_photograph
-    simulate: Callable[[Any, Bundle, Any], Any] = photograph
-    simulation: type = SimulationOptions
+    simulate: Callable[[Any, Bundle, Any], Any] = _photograph
+    simulation: type | None = None
     write: Callable[[Path, Any, Bundle], None] = _no_files
     suffixes: tuple[str, ...] = ()
     files: Callable[[Path], tuple[Path, ...]] = _itself

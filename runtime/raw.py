@@ -28,6 +28,7 @@ from camkit.regular_file import check_regular
 from camkit.runtime.cancel import current_wish, watched
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.files import raw_checks
+from camkit.runtime.files.capture_header import capture_of
 from camkit.runtime.files.decoder import decoder_of
 from camkit.runtime.files.formats import foreign
 from camkit.runtime.files.in_memory import Source, stored
@@ -114,6 +115,7 @@ def _read(
         options = mosaic or MosaicOptions()
         if limits is not None:
             return _read_isolated(file, limits, options)
+        # imported late: what decodes is otherwise the child's
         from camkit.runtime.raw_worker import decode_raw
 
         return replace(decode_raw(file, options), sha256=file_sha256(file))
@@ -241,8 +243,6 @@ def _receive(child: subprocess.Popen[bytes]) -> Capture | None:
     line = pipe.readline(MAX_HEADER_BYTES)
     if not line.endswith(b"\n"):
         return None
-    from camkit.runtime.raw_worker import capture_of
-
     try:
         header = json.loads(line)
         if "error" in header:

@@ -17,17 +17,16 @@ import signal
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, fields, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, BinaryIO, Final
+from typing import BinaryIO, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from camkit.errors import ContractError, DecodeError
-from camkit.noise import NoiseModel
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.files import raw_checks
+from camkit.runtime.files.capture_header import header_of, is_repeated
 from camkit.runtime.files.dng.jpeg_frames import frame_doubt
 from camkit.runtime.files.dng.picture_tags import sensor_picture
 from camkit.runtime.files.dng.readable import check_readable, is_plain
@@ -36,7 +35,6 @@ from camkit.runtime.files.plain_dng import plain_decode
 from camkit.runtime.files.raw_decode import noted, to_capture
 from camkit.runtime.files.tiff_tags import read_tiff_tags
 from camkit.runtime.machine.memory import peak_rss_mb
-from camkit.runtime.metadata import Metadata
 
 WRITE_ROWS: Final = 256
 PR_SET_PDEATHSIG: Final = 1
@@ -59,7 +57,7 @@ def decode_raw(path: Path, options: MosaicOptions = NOTHING_SAID) -> Capture:
     """
     with _decoded(path, options) as capture:
         samples = capture.samples
-        if _is_repeated(samples):
+        if is_repeated(samples):
             return replace(capture, samples=np.broadcast_to(samples[0].copy(), samples.shape))
         return replace(capture, samples=np.array(samples, order="C"))
 
@@ -104,52 +102,12 @@ def _named_in_utf8(path: Path) -> Iterator[str]:
         yield str(path)
 
 
-def header_of(capture: Capture) -> dict[str, Any]:
-    """Return everything but the samples as plain JSON values."""
-    header: dict[str, Any] = {
-        f.name: getattr(capture, f.name) for f in fields(capture) if f.name != "samples"
-    }
-    header["black_level"] = capture.black_level.tolist()
-    if capture.color_matrix is not None:
-        header["color_matrix"] = capture.color_matrix.tolist()
-    if capture.noise is not None:
-        header["noise"] = [capture.noise.shot, capture.noise.read_variance]
-    header["metadata"] = asdict(capture.metadata)
-    header["dtype"] = capture.samples.dtype.name
-    header["shape"] = capture.samples.shape
-    header["planes_sent"] = 1 if _is_repeated(capture.samples) else None
-    return header
-
-
-def capture_of(header: dict[str, Any], samples: NDArray[Any]) -> Capture:
-    """Rebuild a capture from `header_of` and its samples.
-
-    Raises:
-        ContractError, KeyError, TypeError, ValueError: If the header is not of `header_of`.
-    """
-    values = {f.name: header[f.name] for f in fields(Capture) if f.name != "samples"}
-    values["black_level"] = np.array(values["black_level"], dtype=np.float32)
-    for name in ("white_balance", "origin_px", "sensor_size_px", "notes"):
-        values[name] = None if values[name] is None else tuple(values[name])
-    if values["color_matrix"] is not None:
-        values["color_matrix"] = np.array(values["color_matrix"], dtype=np.float64)
-    if values["noise"] is not None:
-        shot, read_variance = (tuple(part) for part in values["noise"])
-        values["noise"] = NoiseModel(shot=shot, read_variance=read_variance)
-    values["metadata"] = Metadata(**values["metadata"])
-    return Capture(samples=samples, **values)
-
-
-def _is_repeated(samples: NDArray[Any]) -> bool:
-    return samples.ndim == 3 and samples.strides[0] == 0
-
-
 def _send(capture: Capture, out: BinaryIO) -> None:
     header = header_of(capture) | {"decoder_peak_mb": peak_rss_mb()}
     out.write(json.dumps(header).encode() + b"\n")
     samples = capture.samples
     planes = (
-        [samples] if samples.ndim == 2 else list(samples[: 1 if _is_repeated(samples) else None])
+        [samples] if samples.ndim == 2 else list(samples[: 1 if is_repeated(samples) else None])
     )
     for plane in planes:
         for top in range(0, plane.shape[0], WRITE_ROWS):

@@ -43,7 +43,12 @@ class Entry(BaseModel):
             Fields that came later are annotated with theirs.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(
+        extra="forbid",
+        frozen=True,
+        allow_inf_nan=False,
+        defer_build=True,  # a part is compiled where it is checked: most are within the manifest
+    )
     since: ClassVar[Since | None] = None
 
     def needs(self) -> list[Since]:

@@ -13,7 +13,7 @@ import numpy as np
 from camkit.bundle.haze_file import haze_to_bytes
 from camkit.bundle.optics import HAZE, PSF, STREAKS, FrozenPsfOptics, HazyPsfOptics, StreakEntry
 from camkit.bundle.psf_file import (
-    psf_from_bytes,
+    psf_from_tensors,
     psf_to_bytes,
     read_optics_bytes,
     read_tensors,
@@ -105,7 +105,7 @@ def optics_from_bytes(data: bytes, *, what: str, channels: int) -> FrozenOptics:
     if PROFILES in tensors:
         streaks = streaks_from_tensors(tensors, what=what)
         return FrozenOptics(psf=psf_of_streaks(streaks, channels), streaks=streaks)
-    return FrozenOptics(psf=psf_from_bytes(data, what=what))
+    return FrozenOptics(psf=psf_from_tensors(tensors, what=what))
 
 
 def read_optics_file(path: Path, *, channels: int) -> FrozenOptics:

@@ -118,7 +118,11 @@ def psf_from_bytes(data: bytes, *, what: str = "psf.safetensors") -> FrozenPsf:
         BundleError: If the file is damaged, a tensor is missing or has the wrong type or shape,
             or the PSF is not one: NaN, negative or unnormalised kernels, axes out of order.
     """
-    tensors = read_tensors(data, what=what)
+    return psf_from_tensors(read_tensors(data, what=what), what=what)
+
+
+def psf_from_tensors(tensors: Mapping[str, NDArray[Any]], *, what: str) -> FrozenPsf:
+    """Check the tensors of a file and return the frozen PSF; see `psf_from_bytes`."""
     symmetry = _read_symmetry(tensors, what)
     _check_tensors(tensors, symmetry, what)
     try:

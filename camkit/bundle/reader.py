@@ -29,6 +29,7 @@ from camkit.bundle.manifest import (
     FOCUS_VERSION,
     PROFILE_VERSION,
     Manifest,
+    Member,
     read_manifest,
 )
 from camkit.bundle.optics import (
@@ -260,21 +261,24 @@ def _check_bundle(container: Container, path: Path) -> Bundle:
     manifest = read_container_manifest(container)
     for need in manifest.needs():
         _need_version(manifest, need.version, need.what)
+    optics_name: str = getattr(manifest.optics, "member", "")
+
+    def checked(name: str) -> bytes | None:
+        data = _checked_member(container, name, manifest.members[name])
+        return data if name == optics_name else None  # unpacked once, the others are let go
+
     # Unpacking and hashing leave Python's lock to others.
     with ThreadPoolExecutor(CHECKED_AT_ONCE) as pool:
-        checks = [
-            pool.submit(_check_member, container, name, member.size, member.sha256)
-            for name, member in manifest.members.items()
-        ]
-    for check in checks:
-        check.result()
-    return Bundle(
-        path=path, manifest=manifest, _container=container, _optics=_optics_of(container, manifest)
-    )
+        checks = {name: pool.submit(checked, name) for name in manifest.members}
+    members = {name: check.result() for name, check in checks.items()}
+    optics = _optics_of(container, manifest, members.get(optics_name))
+    return Bundle(path=path, manifest=manifest, _container=container, _optics=optics)
 
 
-def _optics_of(container: Container, manifest: Manifest) -> FrozenOptics | None:
-    """Read the optics; those of a bundle without any are refused."""
+def _optics_of(
+    container: Container, manifest: Manifest, member: bytes | None
+) -> FrozenOptics | None:
+    """Read the optics, whose member is unpacked; those of a bundle without any are refused."""
     entry = manifest.optics
     optics_members = {getattr(entry, "member", None), getattr(entry, "haze_member", None)}
     if isinstance(entry, HazyPsfOptics):
@@ -293,7 +297,7 @@ def _optics_of(container: Container, manifest: Manifest) -> FrozenOptics | None:
                 f"the lens profile has the distortion of {rows} channel(s), the sensor {channels}"
             )
         return None
-    data = container.read(entry.member)
+    data = container.read(entry.member) if member is None else member
     optics = optics_from_bytes(data, what=entry.member, channels=channels)
     if optics.member_name != entry.member:
         raise BundleError(f"{entry.member} holds optics of another type than the manifest states")
@@ -379,18 +383,20 @@ def _check_references(manifest: Manifest) -> None:
             raise BundleError(f"{user} needs the member {name}, which the bundle does not have")
 
 
-def _check_member(container: Container, name: str, size: int, sha256: str) -> None:
+def _checked_member(container: Container, name: str, member: Member) -> bytes:
     data = container.read(name)
-    if len(data) != size:
+    if len(data) != member.size:
         raise BundleError(
-            f"member {name} has {len(data)} bytes, the manifest says {size}; fetch the bundle again"
-        )
-    got = hashlib.sha256(data).hexdigest()
-    if got != sha256:
-        raise BundleError(
-            f"member {name} has the hash {got[:16]}..., the manifest says {sha256[:16]}...; "
+            f"member {name} has {len(data)} bytes, the manifest says {member.size}; "
             "fetch the bundle again"
         )
+    got = hashlib.sha256(data).hexdigest()
+    if got != member.sha256:
+        raise BundleError(
+            f"member {name} has the hash {got[:16]}..., the manifest says "
+            f"{member.sha256[:16]}...; fetch the bundle again"
+        )
+    return data
 
 
 def _check_psf(

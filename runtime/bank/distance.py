@@ -30,7 +30,6 @@ from functools import lru_cache
 from typing import Final
 
 import numpy as np
-import scipy.ndimage
 from numpy.typing import NDArray
 
 from camkit.arrays import FloatArray
@@ -137,6 +136,8 @@ def _means(likely: FloatGrid, nearness: FloatGrid) -> FloatGrid:
         likely: (rows, columns, step) logarithms of probabilities, of every block alone.
         nearness: (step,).
     """
+    import scipy.ndimage  # late: cameras of one distance need none of it
+
     everywhere = EVERYWHERE * likely.mean(axis=(0, 1))
     for axis in (0, 1):
         likely = scipy.ndimage.convolve1d(likely, NEIGHBOURS, axis=axis, mode="constant")

@@ -12,7 +12,6 @@ from functools import lru_cache
 from typing import Final
 
 import numpy as np
-import scipy.ndimage
 
 from camkit.caller import option_text
 from camkit.runtime.bank.psf import FieldKernels, FloatGrid
@@ -47,6 +46,8 @@ class NearnessMap:
 
         NaN where most of what lies around tells nothing.
         """
+        import scipy.ndimage  # late: cameras of one distance need none of it
+
         places = zip((y_px, x_px), self.first_px, self.step_px, strict=True)
         where = [[(at - first) / step] for at, first, step in places]
         finite = np.isfinite(self.values)

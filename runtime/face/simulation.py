@@ -122,7 +122,7 @@ def simulate(
     opened = open_bundle(find_bundle(str(bundle)))
     part, sensor = part_of(opened.manifest), opened.manifest.sensor
     _check_suffix(file, part)
-    if part.simulation is not SimulationOptions:
+    if part.simulation is not None:
         photograph_options = {
             "iso": iso,
             "origin_px": origin_px,

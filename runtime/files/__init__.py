@@ -6,6 +6,7 @@ exr_attributes  the same as attributes of an OpenEXR file
 raw_metadata  the same of a RAW file, with LibRaw's help
 raw_tags      noise and place of a RAW file from its tags
 in_memory     bytes and open files, stored while they are read
+capture_header  a capture without samples as JSON, as the decoding child sends it
 decoder       the child that decodes RAW files, also started ahead
 libraw        a RAW file as LibRaw decodes it
 dng/          what a DNG asks for that LibRaw leaves out

@@ -12,18 +12,20 @@ may be odd. Every limit lies beyond what the sound RAW files at hand and simulat
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from camkit.caller import option_text
 from camkit.cfa import CfaPattern
-from camkit.haze import Haze
 from camkit.runtime.capture import Capture
 from camkit.runtime.files.order.row_order import order_doubt
 from camkit.runtime.files.order.tile_edges import TileGrid, tile_doubt
 from camkit.runtime.files.raw_checks import Levels, Samples
+
+if TYPE_CHECKING:
+    from camkit.haze import Haze
 
 ABOVE_WHITE: Final = 1.02
 ABOVE_WHITE_SHARE: Final = 2e-5
@@ -93,7 +95,7 @@ def find_doubts(
     return [doubt for doubt in doubts if doubt]
 
 
-def notes_behind(capture: Capture, haze: Haze) -> list[str]:
+def notes_behind(capture: Capture, haze: "Haze") -> list[str]:
     """Return the notes of a capture without the doubt about its black that a haze explains.
 
     Haze takes light from bright parts into dark ones: no sample need be darker than the share of

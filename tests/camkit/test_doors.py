@@ -23,6 +23,7 @@ from tests.bundle_factory import tiny_psf, write_tiny_bundle
 from tests.camkit.calibration.lensfun.test_entry import GEOMETRY
 from tests.camkit.calibration.point_factory import Point, write_pictures
 from tests.camkit.calibration.sensor_factory import Sensor
+from tests.decoded_here import decoded_here  # noqa: F401
 from tests.lensfun_factory import ZOOM, write_database, write_shot
 from tests.spad_bundle import write_spad_bundle
 

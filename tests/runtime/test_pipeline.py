@@ -27,6 +27,7 @@ from camkit.runtime.twin.simulate import Simulation, SimulationOptions, simulate
 from tests.bundle_factory import tiny_manifest, tiny_members, write_tiny_bundle
 from tests.capture_factory import write_tiny_captures
 from tests.data_folder import data_path
+from tests.decoded_here import decoded_here  # noqa: F401
 from tests.deep_bundle import write_deep_bundle
 from tests.psf_factory import psnr_db, texture
 

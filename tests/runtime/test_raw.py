@@ -16,6 +16,7 @@ from camkit.cfa import CFA_PATTERNS
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime import raw, raw_worker
 from camkit.runtime.capture import Capture
+from camkit.runtime.files.capture_header import header_of
 from camkit.runtime.files.tiff_tags import EXIF_POINTER, read_tiff_tags
 from camkit.runtime.metadata import MAX_TEXT, Metadata
 from camkit.runtime.raw import MosaicOptions, file_sha256, is_picture, named_bundle, read_capture
@@ -57,9 +58,9 @@ def test_isolated_and_in_process_decodes_agree(scene):
     isolated, inside = read_capture(path), read_capture(path, isolate=False)
     assert np.array_equal(isolated.samples, mosaic)
     assert np.array_equal(inside.samples, mosaic)
-    told = raw_worker.header_of(isolated)
+    told = header_of(isolated)
     assert told.pop("decoder_peak_mb") > 10
-    assert told == {k: v for k, v in raw_worker.header_of(inside).items() if k in told}
+    assert told == {k: v for k, v in header_of(inside).items() if k in told}
 
 
 def test_everything_written_into_a_camkit_dng_comes_back(scene):

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from camkit.cli.app import run
+from tests.decoded_here import decoded_here  # noqa: F401
 
 
 @pytest.fixture

@@ -1,7 +1,7 @@
 """Colour photographs behind a mosaic."""
 
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from camkit.bundle.manifest import Manifest
 from camkit.bundle.reader import Bundle
@@ -9,7 +9,9 @@ from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.kind import RuntimePart
 from camkit.runtime.options import Options
 from camkit.runtime.raw import read_capture
-from camkit.runtime.twin.simulate import Simulation, write_capture
+
+if TYPE_CHECKING:
+    from camkit.runtime.twin.simulate import Simulation
 
 
 def read(
@@ -19,8 +21,11 @@ def read(
     return read_capture(file, mosaic=mosaic)
 
 
-def write(path: Path, simulation: Simulation, bundle: Bundle) -> None:
+def write(path: Path, simulation: "Simulation", bundle: Bundle) -> None:
     """Write a DNG that names its bundle."""
+    # imported late: reading needs no twin
+    from camkit.runtime.twin.simulate import write_capture
+
     write_capture(path, simulation, bundle.manifest.sensor, bundle.manifest.name)
 
 

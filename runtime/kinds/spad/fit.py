@@ -13,6 +13,7 @@ from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Final
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -239,9 +240,12 @@ def joined(parts: Sequence[Fit]) -> Fit:
 
 def summed_from_left(counts: FloatArray) -> NDArray[np.float64]:
     """Return the counts before each bin, and all: (p, bins + 1)."""
-    sums = np.zeros((len(counts), counts.shape[1] + 1))
-    np.cumsum(counts, axis=1, out=sums[:, 1:])
-    return sums
+    sums = np.empty((counts.shape[1] + 1, len(counts)))
+    sums[0] = 0
+    # bin by bin for all pixels at once: along a pixel every sum would wait for the last one
+    for before, after, bin_counts in zip(sums, sums[1:], cv2.transpose(counts), strict=False):
+        np.add(before, bin_counts, out=after)
+    return sums.T
 
 
 def _log_ratio(

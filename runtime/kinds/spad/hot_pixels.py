@@ -9,6 +9,7 @@ return takes for background, counts at its own time alone.
 from typing import Any, Final
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
@@ -28,29 +29,44 @@ FEW: Final = 2
 """Spans that may count less than the others: in more, a pixel sees surfaces; two of them fill four
 spans at most."""
 MOST_DEAD: Final = 0.5
+MOST_ONE_BY_ONE: Final = 0.2
+"""Of the pixels: the neighbours of more are sorted for all at once (measured)."""
 
 
-def find_hot(background: NDArray[np.float64], cube: FloatArray) -> NDArray[np.bool_]:
+def find_hot(
+    background: NDArray[np.float64], cube: FloatArray, photons: NDArray[np.float64]
+) -> NDArray[np.bool_]:
     """Find hot pixels.
 
     Args:
         background: (h, w) counts of a bin.
         cube: (h, w, bins) counts.
+        photons: (h, w) their sums.
 
     Returns:
         (h, w).
     """
     bins = cube.shape[2]
-    photons = cube.sum(axis=2, dtype=np.float64)
-    check_wish()
-    usual = median_filter(background, size=NEIGHBOURHOOD_PX, mode="mirror")
     cuts = np.linspace(0, bins, SPANS, endpoint=False).astype(int)
     spans = np.add.reduceat(cube, cuts, axis=2)
     check_wish()
     at_all_times = np.partition(spans, FEW, axis=2)[..., FEW] * SPANS
-    dark, expected = np.minimum(background * bins, at_all_times), usual * bins
+    dark = np.minimum(background * bins, at_all_times)
+    hot = (dark > SHARE * photons) & (dark > SIGMAS)
+    dark, expected = dark[hot], _usual(background, hot) * bins
     excess = dark - expected > SIGMAS * np.sqrt(np.maximum(expected, 1.0))
-    return np.asarray(excess & (dark > TIMES * expected) & (dark > SHARE * photons))
+    hot[hot] = excess & (dark > TIMES * expected)
+    return np.asarray(hot)
+
+
+def _usual(background: NDArray[np.float64], at: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Return the median (n,) around some of the pixels (h, w)."""
+    if at.mean() > MOST_ONE_BY_ONE:
+        whole = median_filter(background, size=NEIGHBOURHOOD_PX, mode="mirror")
+        return np.asarray(whole[at])
+    wide = np.pad(background, NEIGHBOURHOOD_PX // 2, mode="reflect")
+    neighbours = sliding_window_view(wide, (NEIGHBOURHOOD_PX, NEIGHBOURHOOD_PX))[at]
+    return np.asarray(np.median(neighbours.reshape(-1, NEIGHBOURHOOD_PX**2), axis=1))
 
 
 def check_map(hot: NDArray[np.bool_]) -> None:

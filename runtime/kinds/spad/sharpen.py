@@ -156,7 +156,7 @@ class Sharpener:
         photons = cube.sum(axis=2, dtype=np.float64)
         is_hot = np.zeros(shape, dtype=bool)
         if self.way.seek_hot:
-            is_hot = find_hot(alone.background.reshape(shape), cube)
+            is_hot = find_hot(alone.background.reshape(shape), cube, photons)
         if hot is not None:
             is_hot |= hot
         if core is None:

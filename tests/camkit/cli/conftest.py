@@ -8,6 +8,7 @@ import pytest
 
 from camkit.cli.app import run
 from tests.capture_factory import write_tiny_captures
+from tests.decoded_here import decoded_here  # noqa: F401
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -23,6 +23,8 @@ from camkit.runtime.kinds.hdr.streaks.shapes import pooled
 COLOURS: Final = 3
 PITCH_PX: Final = 2
 """Of the cells of a capture."""
+TILE_CELLS: Final = 64
+"""Coarser cells on a side of the squares in which is looked for what clipped."""
 Sites = tuple[tuple[int, int], ...]
 """(y, x) of a colour's samples in a cell of 2 x 2."""
 
@@ -49,7 +51,7 @@ class Cells:
     @property
     def unclipped(self) -> FloatArray:
         """Return the light of what did not clip, spread over its cell."""
-        return self.light * (1 - self.clipped)
+        return self.light * (1 - self.clipped) if self.clipped.any() else self.light
 
 
 def sample_sites(cfa: CfaPattern | None) -> tuple[Sites, ...]:
@@ -110,12 +112,18 @@ def coarser(cells: Cells) -> Cells:
     """
     if min(cells.light.shape[1:]) < 2:
         raise ContractError(f"cells need two on each side; got {cells.light.shape[1:]}")
-    if cells.clipped.any():
-        share = pooled(cells.clipped)
-        light = _unclipped_mean(pooled(cells.unclipped), share)
-    else:
-        light = pooled(cells.light)
-        share = np.zeros_like(light)
+    light = pooled(cells.light)
+    share = np.zeros(light.shape, np.float32)  # takes no memory until it is written to
+    for top in range(0, light.shape[1], TILE_CELLS):
+        for left in range(0, light.shape[2], TILE_CELLS):
+            there = np.s_[:, top : top + TILE_CELLS, left : left + TILE_CELLS]
+            fine = np.s_[:, 2 * top : 2 * (top + TILE_CELLS), 2 * left : 2 * (left + TILE_CELLS)]
+            clipped = cells.clipped[fine]
+            if clipped.any():
+                share[there] = pooled(clipped)
+                light[there] = _unclipped_mean(
+                    pooled(cells.light[fine] * (1 - clipped)), share[there]
+                )
     half = cells.pitch_px / 2
     return Cells(
         light=light,

@@ -90,9 +90,9 @@ class FewLights:
             # a sum over rows of fixed order: products of matrices hang on threads and processors
             whole = np.einsum("ji,j->i", self._kernels, light[self._at])
             return np.asarray(whole, np.float32).reshape(self._shape)
-        once = np.zeros(self._shape, np.float32)
+        once, product = np.zeros(self._shape, np.float32), np.empty(self._shape, np.float32)
         for y, x in zip(*self._at, strict=True):
-            once += light[y, x] * self._kernel_at(y, x)
+            once += np.multiply(self._kernel_at(y, x), light[y, x], out=product)
         return once
 
     def gathered(self, image: FloatArray) -> FloatArray:
@@ -119,17 +119,8 @@ class Convolution:
         self._shape = shape
         # farther than a window is wide nothing in it is lit
         half = min(kernel.shape[0] // 2, max(shape) - 1)
-        middle = kernel.shape[0] // 2
-        inside = slice(middle - half, middle + half + 1)
         self._size = tuple(scipy.fft.next_fast_len(side + half, real=True) for side in shape)
-        place = np.arange(-half, half + 1)
-        wrapped = np.zeros(self._size, np.float32)
-        # where a window is shorter than the kernel, both ends meet in the padding
-        np.add.at(
-            wrapped,
-            (place[:, None] % self._size[0], place[None, :] % self._size[1]),
-            kernel[inside, inside],
-        )
+        wrapped = _wrapped(kernel, half, self._size)
         self._transform = scipy.fft.rfft2(wrapped)
 
     def spread(self, light: FloatArray) -> FloatArray:
@@ -154,6 +145,25 @@ class Convolution:
         there = scipy.fft.ifft(whole, axis=0, norm="forward", overwrite_x=True)[:height]
         filtered = scipy.fft.irfft(there, columns, axis=1, norm="forward")
         return np.asarray(filtered[:, :width] * np.float32(1 / (rows * columns)), np.float32)
+
+
+def _wrapped(kernel: FloatArray, half: int, size: tuple[int, ...]) -> FloatArray:
+    """Return a kernel's middle (2 half + 1 a side) about the first place of a periodic picture.
+
+    Where the picture is smaller, both ends meet and are added.
+    """
+    middle = kernel.shape[0] // 2
+    wrapped = np.zeros(size, np.float32)
+    before, after = slice(middle - half, middle), slice(middle, middle + half + 1)
+    for down, rows in ((-half, before), (0, after)):
+        for right, columns in ((-half, before), (0, after)):
+            part = kernel[rows, columns]
+            at = (
+                slice(shift % side, shift % side + many)
+                for shift, side, many in zip((down, right), size, part.shape, strict=True)
+            )
+            wrapped[tuple(at)] += part
+    return wrapped
 
 
 def _check_kernel(kernel: FloatArray) -> None:

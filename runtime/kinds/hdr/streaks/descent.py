@@ -212,8 +212,8 @@ def gradient(image: FloatArray) -> tuple[FloatArray, FloatArray]:
 def _divergence(y: FloatArray, x: FloatArray) -> FloatArray:
     """Return the transpose of the gradient."""
     out = np.empty((x.shape[0], y.shape[1]), np.float32)
-    out[0], out[1:] = 0, y
-    out[:-1] -= y
+    np.subtract(y[:-1], y[1:], out=out[1:-1])
+    out[0], out[-1] = (0 - y[0], y[-1]) if len(y) else (0, 0)
     out[:, 1:] += x
     out[:, :-1] -= x
     return out

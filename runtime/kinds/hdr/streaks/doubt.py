@@ -82,23 +82,32 @@ def _shrunk(
     """Yield samples nearer to the mean of their surroundings, weighted by doubt."""
     doubts = [np.square(np.float32(DOUBT) * plane) for plane in brightest]
     weight, mean, square = _local_moments(rest, clipped, doubts)
+    moments: dict[tuple[int, ...], tuple[FloatArray, FloatArray]] = {}
     for plane, streak, mask, doubt in zip(rest, streaks, clipped, doubts, strict=True):
-        whole = np.maximum(_interpolated(weight, plane.shape), _TINY)
-        middle = _interpolated(mean, plane.shape)
-        middle /= whole
-        spread = _interpolated(square, plane.shape)
-        spread /= whole
-        spread -= middle * middle
-        np.maximum(spread, _LEAST, out=spread)
-        spread /= spread + doubt
+        if plane.shape not in moments:
+            moments[plane.shape] = _mean_and_spread(weight, mean, square, plane.shape)
+        middle, spread = moments[plane.shape]
         samples = plane - middle
-        samples *= spread
+        samples *= spread / (spread + doubt)
         samples += middle
         # no streak takes light away, none leaves less than nothing
         light = plane + streak
         np.clip(samples, np.minimum(light, 0), light, out=samples)
         np.copyto(samples, plane, where=mask | (doubt <= SURE**2))
         yield samples
+
+
+def _mean_and_spread(
+    weight: FloatArray, mean: FloatArray, square: FloatArray, shape: tuple[int, ...]
+) -> tuple[FloatArray, FloatArray]:
+    """Return the mean of what lies around each sample (h, w) of `shape`, and its variance."""
+    whole = np.maximum(_interpolated(weight, shape), _TINY)
+    middle = _interpolated(mean, shape)
+    middle /= whole
+    spread = _interpolated(square, shape)
+    spread /= whole
+    spread -= middle * middle
+    return middle, np.maximum(spread, _LEAST, out=spread)
 
 
 def _local_moments(

@@ -67,7 +67,7 @@ def no_brighter(lit: FloatArray, captured: FloatArray, near: Mask) -> None:
         captured: As captured.
         near: (h, w) of `near_clipped`.
     """
-    far = ~near
+    far: Mask | bool = ~near if near.any() else True
     for plane, original in zip(lit, captured, strict=True):
         most = np.maximum(original, 0)
         most *= np.float32(MOST_OVER)

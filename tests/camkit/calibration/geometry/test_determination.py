@@ -130,11 +130,12 @@ def _parallel(scatter_px: float, tilt_deg: float = 0.0) -> FloatGrid:
 @pytest.mark.parametrize("scatter_px", [0.0, 0.05, pytest.param(0.3, marks=pytest.mark.slow)])
 def test_exactly_parallel_views_need_the_nominal_focal_length(scatter_px: float) -> None:
     corners = _parallel(scatter_px)
+    judged, _ = judge_all(corners, POINTS, SIZE)
     with pytest.raises(DecodeError, match=r"do not tell the focal length.* or give focal_px$"):
-        _measured(corners)
-    found = _measured(corners, LENS.focal_px)
+        determine(judged, corners, POINTS, SIZE)
+    found = determine(judged, corners, POINTS, SIZE, LENS.focal_px)
     assert "focal_px" in found.undetermined
-    assert found.camera.focal_px == LENS.focal_px
+    assert found.best.fit.camera.focal_px == LENS.focal_px
     assert found.best.rms_px < 1.2 * scatter_px + 0.05
 
 

@@ -11,6 +11,11 @@ from camkit.runtime.files import decoder
 NEEDLESS = {"scipy", "onnx", "google", "matplotlib", "rawpy", "tifffile"}
 
 
+@pytest.fixture(autouse=True)
+def decoded_here() -> None:
+    """Children decode here, as they do for users."""
+
+
 @pytest.fixture
 def started(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
     """Give the arguments of every child that is started."""

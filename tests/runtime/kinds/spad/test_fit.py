@@ -11,7 +11,7 @@ from camkit.runtime.kinds.spad.evidence import (
     search_length,
     threshold_for,
 )
-from camkit.runtime.kinds.spad.fit import Fitter
+from camkit.runtime.kinds.spad.fit import Fitter, summed_from_left
 from camkit.runtime.kinds.spad.pulse import GatedPulse, GaussianPulse
 from camkit.runtime.kinds.spad.time_axis import TimeAxis
 
@@ -136,3 +136,10 @@ def test_banks_that_nobody_can_hold_are_refused() -> None:
     axis = TimeAxis.regular("gate", bins=1_000_000, time_bin_ps=100)
     with pytest.raises(ContractError, match="templates; at most"):
         make_bank(axis, GatedPulse(width_ps=1000, rc_ps=60, sigma_ps=1))
+
+
+def test_counts_before_each_bin_are_summed_one_by_one_in_double_precision() -> None:
+    counts = np.random.default_rng(5).random((7, 30)).astype(np.float32) * 1e4
+    sums = summed_from_left(counts)
+    assert (sums[:, 0] == 0).all()
+    assert np.array_equal(sums[:, 1:], np.cumsum(counts, axis=1, dtype=np.float64))

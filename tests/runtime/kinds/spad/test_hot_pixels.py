@@ -2,11 +2,17 @@
 
 import numpy as np
 import pytest
+from scipy.ndimage import median_filter
 
 from camkit.errors import ContractError
 from camkit.runtime.kinds.spad.bank import make_bank
 from camkit.runtime.kinds.spad.fit import Fitter
-from camkit.runtime.kinds.spad.hot_pixels import find_hot, painted_over
+from camkit.runtime.kinds.spad.hot_pixels import (
+    NEIGHBOURHOOD_PX,
+    _usual,
+    find_hot,
+    painted_over,
+)
 from camkit.runtime.kinds.spad.pulse import GatedPulse
 from camkit.runtime.kinds.spad.time_axis import TimeAxis
 
@@ -22,7 +28,8 @@ def test_hot_pixels_are_found_beside_bright_ones(  # type: ignore[no-untyped-def
     counts[hot] += np.random.default_rng(1).poisson(4.0, (3, axis.bins))
     fit = Fitter(make_bank(axis, pulse)).fit(counts)
     shape = (SIDE, SIDE)
-    found = find_hot(fit.background.reshape(shape), counts.reshape(*shape, axis.bins))
+    cube = counts.reshape(*shape, axis.bins)
+    found = find_hot(fit.background.reshape(shape), cube, cube.sum(axis=2, dtype=float))
     assert np.flatnonzero(found).tolist() == sorted(hot)
 
 
@@ -35,12 +42,14 @@ def test_a_pixel_with_two_surfaces_is_not_hot(  # type: ignore[no-untyped-def]
     fit = Fitter(make_bank(axis, pulse)).fit(counts)
     assert fit.background[edge] > 5 * np.median(fit.background)
     shape = (SIDE, SIDE)
-    assert not find_hot(fit.background.reshape(shape), counts.reshape(*shape, axis.bins)).any()
+    cube = counts.reshape(*shape, axis.bins)
+    assert not find_hot(fit.background.reshape(shape), cube, cube.sum(axis=2, dtype=float)).any()
 
 
 def test_a_few_counts_in_the_dark_are_no_hot_pixel() -> None:
     cube = np.random.default_rng(0).poisson(0.5 / 16, (200, 200, 16)).astype(np.float32)
-    assert find_hot(cube.mean(axis=2, dtype=float), cube).sum() == 0
+    photons = cube.sum(axis=2, dtype=float)
+    assert find_hot(photons / 16, cube, photons).sum() == 0
 
 
 def test_what_is_painted_is_the_mean_of_sound_neighbours() -> None:
@@ -69,3 +78,11 @@ def test_maps_that_cannot_be_are_refused() -> None:
         painted_over(cube, np.zeros((4, 3), bool))
     with pytest.raises(ContractError, match="every pixel is hot"):
         painted_over(cube, np.ones((4, 4), bool))
+
+
+@pytest.mark.parametrize("share", [0.0, 0.05, 0.9])
+def test_the_median_around_some_pixels_is_that_of_the_whole_picture(share: float) -> None:
+    rng = np.random.default_rng(3)
+    background, at = rng.random((30, 40)), rng.random((30, 40)) < share
+    whole = median_filter(background, size=NEIGHBOURHOOD_PX, mode="mirror")
+    assert np.array_equal(_usual(background, at), whole[at])

@@ -98,6 +98,20 @@ def test_coarser_cells_hold_the_light_of_four_and_leave_an_odd_rest_out(
         )
 
 
+def test_coarser_cells_of_large_pictures_are_those_of_their_parts() -> None:
+    samples = np.random.default_rng(2).uniform(0, 1, (1, 600, 820)).astype(np.float32)
+    clipped = np.zeros(samples.shape, bool)
+    clipped[:, 250:270, 500:530] = True
+    cells = cells_of(samples, clipped, sample_sites("RGGB"))
+    whole, part = coarser(cells), np.s_[:, 40:101, 100:170]
+    few = coarser(
+        cells_of(samples[:, 160:404, 400:680], clipped[:, 160:404, 400:680], sample_sites("RGGB"))
+    )
+    assert np.array_equal(whole.light[part], few.light)
+    assert np.array_equal(whole.clipped[part], few.clipped)
+    assert (few.clipped > 0).any()
+
+
 def test_a_cell_of_which_all_clipped_holds_no_known_light() -> None:
     samples = np.ones((3, 4, 4), np.float32)
     cells = coarser(cells_of(samples, samples >= 1, sample_sites(None)))

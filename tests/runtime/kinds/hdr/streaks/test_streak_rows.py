@@ -14,10 +14,12 @@ from camkit.runtime.kinds.hdr.streaks.recovery import Recovery, recover
 from camkit.runtime.kinds.hdr.streaks.regions import Window
 from camkit.runtime.kinds.hdr.streaks.spots import lit_pixels
 from camkit.runtime.kinds.hdr.streaks.streak_rows import (
+    BRIGHTEST,
     FAINT,
     CellStreaks,
     PixelStreaks,
     Streaks,
+    _half,
     streaks_of,
 )
 from tests.streak_factory import (
@@ -143,3 +145,13 @@ def test_streaks_of_cells_end_with_their_window() -> None:
     inside[2 * 6 - 1 : 2 * 13 + 1, 2 * 7 - 1 : 2 * 16 + 1] = True
     assert (got[:, ~inside] == 0).all()
     assert (got[:, 14:17, 16:19] == 0.125).all()
+
+
+def test_halves_are_those_of_numpy_subnormal_ones_and_zeros_too() -> None:
+    rng = np.random.default_rng(0)
+    sizes = np.float32(10) ** rng.uniform(-10, 6, 20_000).astype(np.float32)
+    ties = np.float32([0.5, 1.5, 2.5, 1023.5, 1024, 1024.5]) * np.float32(2.0**-24)
+    plane = np.concatenate([sizes, ties, np.float32([0])])
+    plane = np.stack([plane, -plane])
+    expected = np.clip(plane, -BRIGHTEST, BRIGHTEST).astype(np.float16)
+    assert np.array_equal(_half(plane).view(np.uint16), expected.view(np.uint16))

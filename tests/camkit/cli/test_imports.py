@@ -1,0 +1,55 @@
+"""A command imports what it needs: no library that it does not use, in a fresh process."""
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Final
+
+import pytest
+
+DESIGN: Final = {"torch", "onnxscript", "safetensors.torch", "matplotlib"}
+COMPUTING: Final = {
+    *("numpy", "scipy", "cv2", "onnx", "onnxruntime", "OpenEXR", "PIL", "rawpy", "tifffile"),
+}
+DEVELOPING: Final = {
+    *("scipy", "PIL", "rawpy", "numpy.random", "camkit.report"),
+    "camkit.runtime.raw_worker",
+    "camkit.runtime.twin.simulate",
+}
+"""What no photograph needs that its decoding child does not do."""
+ABSENT: Final = {
+    "--version": COMPUTING,
+    "--help": COMPUTING,
+    "process": COMPUTING,
+    "process a.dng --nonsense": COMPUTING,
+    "info duet": COMPUTING - {"numpy"} | {"rich", "camkit.runtime.pipeline"},
+    "info a.dng": COMPUTING - {"numpy", "cv2", "onnxruntime"} | {"rich"},
+    "process none.dng --bundle duet": DEVELOPING | {"OpenEXR", "onnx"},
+    "process a.dng --bundle none": DEVELOPING | {"onnx"},
+    "process a.dng --bundle duet --force-bundle": DEVELOPING | {"onnx"},
+    # the graph of a network that did not come with camkit is checked
+    "process a.dng --bundle tiny.camkit": DEVELOPING,
+}
+"""Command line -> what it runs without; the folder holds a.dng and tiny.camkit."""
+
+
+def _modules_of(code: str) -> set[str]:
+    """Return the modules that a fresh process holds once it ran this code."""
+    code += "\nprint('LOADED', *sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", f"import sys\n{code}"], capture_output=True, text=True, check=True
+    )
+    return set(done.stdout.rpartition("LOADED")[2].split())
+
+
+@pytest.mark.parametrize("line", ABSENT)
+def test_a_command_imports_no_library_that_it_does_not_use(line: str, captures: Path) -> None:
+    loaded = _modules_of(f"from camkit.cli.app import run\nrun({line.split()!r})")
+    assert "camkit.cli.app" in loaded
+    assert sorted(loaded & (ABSENT[line] | DESIGN)) == []
+
+
+def test_the_decoding_child_imports_no_module_that_only_its_parent_uses() -> None:
+    loaded = _modules_of("import camkit.runtime.raw_worker, rawpy")
+    assert not loaded & (DESIGN | {*COMPUTING} - {"numpy", "rawpy"})
+    assert not loaded & {"typer", "pydantic", "rich", "camkit.psf", "camkit.haze", "camkit.bundle"}
