@@ -56,7 +56,8 @@ def _no_files(*_: object) -> NoReturn:
     raise UnsupportedError("captures of this kind are not read from files, or written")
 
 
-def _photograph(scene: Any, bundle: Bundle, options: Any) -> Any:
+def photograph_by_twin(scene: Any, bundle: Bundle, options: Any) -> Any:
+    """Return what a camera for photographs records of a scene, by camkit's own twin."""
     # imported late: processing needs no twin
     from camkit.runtime.twin.simulate import photograph
 
@@ -103,7 +104,7 @@ class RuntimePart:
     of_capture: frozenset[str] = OF_PHOTOGRAPHS
     bundle_of: Callable[[Path], str | None] = named_bundle
     describe: Callable[[Path, MosaicOptions | None], Mapping[str, Any]] = describe_photograph
-    simulate: Callable[[Any, Bundle, Any], Any] = _photograph
+    simulate: Callable[[Any, Bundle, Any], Any] = photograph_by_twin
     simulation: type | None = None
     write: Callable[[Path, Any, Bundle], None] = _no_files
     suffixes: tuple[str, ...] = ()

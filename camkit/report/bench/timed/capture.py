@@ -12,9 +12,9 @@ from camkit.bundle.sensor import Sensor
 from camkit.errors import ContractError
 from camkit.report.kind_finder import check_photographs
 from camkit.runtime.files.picture import read_light
-from camkit.runtime.kind import part_of
+from camkit.runtime.kind import part_of, photograph_by_twin
 from camkit.runtime.network.engine import available_threads
-from camkit.runtime.twin.simulate import SimulationOptions, photograph
+from camkit.runtime.twin.simulate import SimulationOptions
 from camkit.scenes import procedural_scene
 
 SCENE_SEED: Final = 7
@@ -52,7 +52,7 @@ def timed_capture(
         UnsupportedError: If the camera cannot be simulated.
     """
     manifest, part = bundle.manifest, part_of(bundle.manifest)
-    if part.simulate is photograph:
+    if part.simulate is photograph_by_twin:
         check_photographs(manifest, "give a capture to time with --capture FILE")
     width, height = _sides(manifest.sensor, width_px, height_px, bundle.path.name)
     optics = manifest.optics
