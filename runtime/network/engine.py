@@ -39,7 +39,7 @@ PROVIDER_NAMES: Final = {
     "cuda": "CUDAExecutionProvider",
     "tensorrt": "TensorrtExecutionProvider",
 }
-"""What a caller may ask of onnxruntime, and what it calls it."""
+"""Names that a caller may ask of onnxruntime, and its own for them."""
 OPENVINO: Final = "openvino"
 _FALLBACKS: Final = {"tensorrt": ("cuda", "cpu"), "cuda": ("cpu",)}
 _CREATION: Final = threading.Lock()

@@ -25,9 +25,9 @@ BANK_MAC: Final = 8_000.0
 """Work of the bank per pixel, in multiplications of a network that take as long (measured:
 docs/results/plan.md)."""
 NETWORK_FIXED_MAC: Final = 3_300.0
-"""What a network costs per pixel of its windows besides its multiplications, in the same unit."""
+"""Costs of a network per pixel of its windows besides its multiplications, in the same unit."""
 NETWORK_EVERYWHERE_MAC: Final = 7_600.0
-"""What a network costs per pixel of the picture, in whatever cells it runs: the way to equal noise
+"""Costs of a network per pixel of the picture, in whatever cells it runs: the way to equal noise
 and back, and the bound of its light. No plan saves it."""
 LEAST_SAVING: Final = 0.1
 """Below this share of the work nothing is skipped."""

@@ -48,7 +48,7 @@ HOW: Final = (
     ),
     ("- An error is that of a mean over pictures."),
 )
-"""What stands above the table."""
+"""Text above the table."""
 SHARES: Final = ("0", "0.25", "0.5", "0.75", "1")
 
 

@@ -7,7 +7,7 @@ from camkit.runtime.plan.decision import Decision, Subject, Work
 
 ORDER: Final = 5
 SCALE: Final = "scale"
-"""What this rule decides."""
+"""Name of what this rule decides."""
 DRAFT_COST_DB: Final = 1.3
 """Of a draft against size M, on average (docs/results/plan.md)."""
 

@@ -16,7 +16,7 @@ DEVELOPING: Final = {
     "camkit.runtime.raw_worker",
     "camkit.runtime.twin.simulate",
 }
-"""What no photograph needs that its decoding child does not do."""
+"""Modules for which no photograph has a use that its decoding child does not do."""
 ABSENT: Final = {
     "--version": COMPUTING,
     "--help": COMPUTING,

@@ -29,7 +29,7 @@ from tests.together_factory import SPREAD, TOGETHER
 
 REDS = ((0, 0), (0, 1), (1, 0), (1, 1))
 PATTERNS: tuple[CfaPattern, ...] = ("RGGB", "GRBG", "GBRG", "BGGR")
-"""Where red lies in `REDS`."""
+"""Names of the places of red in `REDS`."""
 COLOURS = np.array([0, 1, 1, 2])
 LEVEL = np.array([0.2, 0.3, 0.12])
 VARIANCE = np.array([2e-5, 1e-5, 3e-5])
@@ -46,7 +46,7 @@ BANK = Wiener(
 
 
 def _kernels() -> FloatArray:
-    """Give kernels of three colours, lopsided, the last by far the sharpest."""
+    """Return kernels of three colours, lopsided, the last by far the sharpest."""
     kernels = np.zeros((3, 7, 7), np.float32)
     y, x = np.mgrid[-3:4, -3:4]
     for kernel, sigma in zip(kernels, (1.8, 1.2, 0.6), strict=True):
@@ -65,7 +65,7 @@ def _whole(otf: np.ndarray) -> np.ndarray:
 
 
 def _prior(side: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Give f^2, F times the samples, and V of a field height."""
+    """Return f^2, F times the samples, and V of a field height."""
     f = np.fft.fftfreq(side)
     f2 = f[:, None] ** 2 + f[None] ** 2
     fall = side**2 * (f2 + CORNER_FREQUENCY**2) ** (-TOGETHER.exponent / 2)
@@ -76,7 +76,7 @@ def _prior(side: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _by_solving(samples: FloatArray, otf: np.ndarray, red: tuple[int, int]) -> FloatArray:
-    """Give the estimate of one dense 4x4 system at every frequency."""
+    """Return the estimate of one dense 4x4 system at every frequency."""
     side = samples.shape[-1]
     n, (f2, fall, spread), h, places = side // 2, _prior(side), _whole(otf), _places(red)
     a, same = (LEVEL / LEVEL.mean())[COLOURS], COLOURS[:, None] == COLOURS
@@ -199,7 +199,7 @@ def test_a_shifted_block_is_restored_to_the_shifted_picture(red: tuple[int, int]
 def _captured(
     scene: FloatArray, kernels: FloatArray, pattern: CfaPattern, seed: int = 0
 ) -> FloatArray:
-    """Give the demosaicked planes of a mosaic that a scene was photographed with."""
+    """Return the demosaicked planes of a mosaic that a scene was photographed with."""
     planes = with_noise(blur_periodic(scene, kernels), ISO_100, np.random.default_rng(seed))
     return demosaic(_mosaic(planes, pattern), pattern)
 

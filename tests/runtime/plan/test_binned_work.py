@@ -1,4 +1,4 @@
-"""What is done to a capture that is averaged over squares first."""
+"""Work on a capture that is averaged over squares first."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What a plan is weighed by is what its windows compute, against the whole picture in strips."""
+"""Plans are weighed by what their windows compute, against the whole picture in strips."""
 
 from dataclasses import replace
 from pathlib import Path

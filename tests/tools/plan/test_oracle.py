@@ -21,7 +21,7 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
 
 
 def _cells(extra: np.ndarray) -> CaptureCells:
-    """Give a capture that loses `extra` per cell by the bank, a tenth by S, thrice developed."""
+    """Return a capture that loses `extra` per cell by the bank, a tenth by S, thrice developed."""
     exact = np.ones_like(extra)
     return CaptureCells(
         name="made",

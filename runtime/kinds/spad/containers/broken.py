@@ -12,4 +12,4 @@ BROKEN: Final = (
     AssertionError,  # sdtfile, of a setup without its end, and tifffile
     UnboundLocalError,  # ptufile, where the first tag is damaged
 )
-"""What any of them raises; readers add the errors that their own library brings."""
+"""Errors that any of them raises; readers add the errors that their own library brings."""
