@@ -119,7 +119,7 @@ class _Training:
             NetworkRecipe(network=name, schedule=schedule),
             lambda _: self._method.build(),
             "cpu",
-            objective=objective_of(self._method, store),
+            objective=objective_of(self._method, store, budget),
         )
         self._step, self._spent_s = 0, 0.0
         path = budget.checkpoint(name)
@@ -187,13 +187,41 @@ class _Training:
             torch.save(saved, part)
 
 
-def objective_of(method: Method, store: SampleStore) -> Objective:
-    """Return the loss of the recipe; behind the bank it is that of what the light bound leaves."""
+def objective_of(method: Method, store: SampleStore, budget: Budget) -> Objective:
+    """Return the loss of the recipe; behind the bank it is that of what the light bound leaves.
+
+    Raises:
+        ContractError: If the method has a teacher that is not trained.
+    """
     if method.feeding == "kernels":
         return patch_objective(run=partial(run_blurred, scale=store.recipe.scale))
     if method.feeding == "capture":
         return patch_objective(run=_run_capture)
-    return patch_objective(finish_of(store.recipe))
+    finish = finish_of(store.recipe)
+    objective = patch_objective(finish)
+    if method.teacher is None:
+        return objective
+    if not budget.is_spent(method.teacher):
+        raise ContractError(f"{method.title}: train {method.teacher} before it")
+    teacher = trained_network(method.teacher, budget)
+
+    def teach(batch: Batch) -> Tensor:
+        output: Tensor = teacher(batch.planes)
+        return output if finish is None else finish(output, batch)
+
+    return taught(objective, teach)
+
+
+def taught(objective: Objective, teach: Callable[[Batch], Tensor]) -> Objective:
+    """Return the mean of a loss against the truth and against what a teacher makes of a batch."""
+
+    def loss(fitter: Fitter, batch: Batch, step: int, progress: float) -> Tensor:
+        with torch.no_grad():
+            lesson = replace(batch, target=teach(batch))
+        truth, taken = (objective.loss(fitter, one, step, progress) for one in (batch, lesson))
+        return (truth + taken) / 2
+
+    return Objective(loss=loss)
 
 
 def _run_capture(fitter: Fitter, batch: Batch, progress: float) -> Tensor:

@@ -2,6 +2,7 @@
 
     blurred block, transfer --> convolutions per colour --> Wiener --> small U-Net     FeatureWiener
                             --> closed form, small U-Net, closed form, ...             UnrolledHqs
+                            --> closed form, S at half size, closed form, S            TwoStages
 
 They see a block as the bank does: linear, white balanced, tapered to be periodic, with the kernels
 of its place. What they give is stabilised, as of every network of camkit. No bundle holds one, so
@@ -11,13 +12,13 @@ References: Dong, Roth, Schiele 2020, Deep Wiener Deconvolution (features); Gema
 (half-quadratic splitting); Zhang et al. 2020 (unrolled, a network as prior).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import torch
 from torch import Tensor, nn
 
-from camkit.models_def.networks.lean_unet import LEAN_S, LeanConfig, LeanUnet
+from camkit.models_def.networks.lean_unet import LEAN_S, LeanUnet
 from camkit.models_def.sensors.stabilise import unstabilise
 from camkit.models_def.sensors.wiener import LEAST_POWER
 
@@ -29,14 +30,8 @@ FEATURES: Final = 8
 STEPS: Final = 3
 FIRST_TRUST: Final = 3.0
 """Logarithm of the first weight of a prior, in the ratio of noise to signal; falls by 1 a step."""
-PRIOR: Final = LeanConfig(
-    widths=LEAN_S.widths,
-    encoder_blocks=LEAN_S.encoder_blocks,
-    decoder_blocks=LEAN_S.decoder_blocks,
-    middle_blocks=LEAN_S.middle_blocks,
-    in_channels=3,
-    bias=True,
-)
+STAGE: Final = replace(LEAN_S, bias=True)
+PRIOR: Final = replace(STAGE, in_channels=3)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -74,6 +69,11 @@ class Blurred:
         """Return (b, 3, 1, 1) of the noise at the mean of a block."""
         mean = self.planes.mean((-2, -1)).clamp(min=0)
         return (self.shot * mean + self.read_variance)[..., None, None]
+
+    @property
+    def noise_ratio(self) -> Tensor:
+        """Return (b, 3, 1, 1): the variance of the noise over the square of the level."""
+        return self.variance / self.level.square()
 
     def stabilised(self, planes: Tensor) -> Tensor:
         """Return planes taken to equal noise; with a slope where there is no light."""
@@ -115,7 +115,7 @@ class UnrolledHqs(nn.Module):
 
     def forward(self, blurred: Blurred) -> Tensor:
         """Return (b, 3, h, w), stabilised."""
-        ratio = blurred.variance / blurred.level.square()
+        ratio = blurred.noise_ratio
         spectrum, linear = torch.fft.rfft2(blurred.planes), blurred.planes
         stable = linear
         for number, prior in enumerate(self.priors):
@@ -124,6 +124,33 @@ class UnrolledHqs(nn.Module):
             stable = prior(blurred.stabilised(sharp)).float()
             linear = blurred.linear(stable)
         return stable
+
+
+class TwoStages(nn.Module):
+    """S at half size, a closed-form step that takes its picture for what to expect, and S again."""
+
+    stride_px = 2 * LeanUnet(STAGE).stride_px
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.trust = nn.Parameter(
+            torch.tensor([FIRST_TRUST, FIRST_TRUST - 1])[:, None].repeat(1, 3)
+        )
+        self.first, self.second = LeanUnet(STAGE), LeanUnet(STAGE)
+
+    def forward(self, blurred: Blurred) -> Tensor:
+        """Return (b, 3, h, w), stabilised."""
+        spectrum = torch.fft.rfft2(blurred.planes)
+        weight = self.trust.exp()[..., None, None] * blurred.noise_ratio[:, None]
+        capture = blurred.stabilised(blurred.planes)
+        sharp = closed_form(spectrum, blurred.otf, blurred.planes, weight[:, 0])
+        halves = torch.cat([capture, blurred.stabilised(sharp)], dim=1)
+        coarse = self.first(nn.functional.avg_pool2d(halves, 2)).float()
+        whole = nn.functional.interpolate(coarse, scale_factor=2, mode="bilinear")
+        sharp = closed_form(spectrum, blurred.otf, blurred.linear(whole), weight[:, 1])
+        planes = torch.cat([capture, blurred.stabilised(sharp)], dim=1)
+        restored: Tensor = self.second(planes).float()
+        return restored
 
 
 class FeatureWiener(nn.Module):
@@ -144,7 +171,7 @@ class FeatureWiener(nn.Module):
         """Return (b, 3, h, w), stabilised."""
         features, noise_gain = self._features(blurred.planes / blurred.level)
         batch, height, width = len(features), *blurred.size
-        noise = (blurred.variance / blurred.level.square()).repeat_interleave(self.features, 1)
+        noise = blurred.noise_ratio.repeat_interleave(self.features, 1)
         noise = noise * noise_gain[:, None, None]
         power = features.var((-2, -1), keepdim=True).clamp(min=LEAST_POWER)
         otf = blurred.otf.repeat_interleave(self.features, 1)

@@ -7,10 +7,11 @@ from typing import Final, Literal
 from torch import Tensor, nn
 
 from camkit.models_def.networks.catalog import build_network
+from camkit.models_def.networks.lean_unet import LeanConfig, LeanUnet
 from camkit.models_def.sensors.wiener import taper_edges, to_otf
 from camkit.models_def.training.fitter import Fitter
 from camkit.models_def.training.sample import Batch
-from tools.methods.kernel_networks import Blurred, FeatureWiener, UnrolledHqs
+from tools.methods.kernel_networks import Blurred, FeatureWiener, TwoStages, UnrolledHqs
 from tools.methods.sample_store import KERNELS, NOISE
 
 Feeding = Literal["bank", "capture", "kernels"]
@@ -26,12 +27,20 @@ class Method:
         build: Makes the untrained network.
         feeding: What it is given.
         learning_rate: At its peak.
+        teacher: The method whose output it is fitted to as well, trained before it.
     """
 
     title: str
     build: Callable[[], nn.Module]
     feeding: Feeding
     learning_rate: float
+    teacher: str | None = None
+
+
+LEAN_XS: Final = LeanConfig(
+    widths=(16, 16, 32), encoder_blocks=(0, 0), decoder_blocks=(0, 0), middle_blocks=3, bias=True
+)
+"""Half of S: 2.4 kMAC/px. No bundle holds it."""
 
 
 def _of_catalog(name: str, **config: object) -> Callable[[], nn.Module]:
@@ -44,6 +53,14 @@ METHODS: Final[Mapping[str, Method]] = {
     ),
     "M": Method(
         title="M", build=_of_catalog("lean_m", bias=True), feeding="bank", learning_rate=2e-3
+    ),
+    "XS": Method(title="XS", build=lambda: LeanUnet(LEAN_XS), feeding="bank", learning_rate=2e-3),
+    "XS_taught": Method(
+        title="XS, taught by M",
+        build=lambda: LeanUnet(LEAN_XS),
+        feeding="bank",
+        learning_rate=2e-3,
+        teacher="M",
     ),
     "naf_bank": Method(
         title="NAFNet-16 behind the bank",
@@ -72,6 +89,12 @@ METHODS: Final[Mapping[str, Method]] = {
     "hqs": Method(
         title="HQS unrolled, 3 steps",
         build=UnrolledHqs,
+        feeding="kernels",
+        learning_rate=1e-3,
+    ),
+    "two_stages": Method(
+        title="two stages of S, a closed form between",
+        build=TwoStages,
         feeding="kernels",
         learning_rate=1e-3,
     ),

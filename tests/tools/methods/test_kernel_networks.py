@@ -7,7 +7,13 @@ from torch import Tensor
 
 from camkit.models_def.sensors.stabilise import stabilise
 from camkit.models_def.sensors.wiener import to_otf
-from tools.methods.kernel_networks import Blurred, FeatureWiener, UnrolledHqs, closed_form
+from tools.methods.kernel_networks import (
+    Blurred,
+    FeatureWiener,
+    TwoStages,
+    UnrolledHqs,
+    closed_form,
+)
 
 SIDE = 16
 
@@ -49,7 +55,7 @@ def test_the_stabilising_transform_is_that_of_camkit_and_undone() -> None:
     assert torch.allclose(one.linear(stable), planes, atol=1e-5)
 
 
-@pytest.mark.parametrize("network", [UnrolledHqs, FeatureWiener])
+@pytest.mark.parametrize("network", [UnrolledHqs, FeatureWiener, TwoStages])
 def test_gradients_reach_all_that_is_learned_and_the_shape_stays(network: type) -> None:
     torch.manual_seed(3)
     one = network()

@@ -3,22 +3,31 @@
 import json
 import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import cv2
 import numpy as np
 import pytest
 import torch
 
+from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.material import BayerMaterial
 from camkit.models_def.networks.lean_unet import LeanConfig, LeanUnet
+from camkit.models_def.training.fitter import Fitter, Objective
+from camkit.models_def.training.kind import read_recipe
+from camkit.models_def.training.sample import Batch
 from tests.bayer_recipe import bank, material, recipe, recipe_path  # noqa: F401
 from tests.psf_factory import texture
 from tests.wide_bundle import write_wide_bundle
 from tools.methods import __main__ as command
 from tools.methods import equal_minutes, judging
+from tools.methods.equal_minutes import Budget, objective_of, taught
 from tools.methods.method_list import METHODS, Method
+from tools.methods.sample_store import SampleStore
 
 TINY = LeanConfig(widths=(16, 16), encoder_blocks=(0,), decoder_blocks=(0,), bias=True)
+RECIPE = Path("models_def/recipes/duet.toml")
 NAMES = ("S", "unet_capture", "hqs")
 
 
@@ -111,3 +120,20 @@ def test_torch_runs_on_one_thread(monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
     with pytest.raises(SystemExit):
         run(monkeypatch, "train", "--data", tmp_path, "--methods", "L")
     assert torch.get_num_threads() == 1
+
+
+def test_a_lesson_counts_as_much_as_the_truth() -> None:
+    plain = Objective(loss=lambda *given: given[1].target.mean())
+    batch = Batch(
+        inputs={"capture": torch.zeros(1, 3, 8, 8)},
+        target=torch.full((1, 3, 8, 8), 4.0),
+        weight=torch.ones(1, 3),
+    )
+    both = taught(plain, lambda one: torch.full_like(one.target, 1.0))
+    assert float(both.loss(cast("Fitter", None), batch, 0, 0.0)) == 2.5
+
+
+def test_a_teacher_is_trained_before_its_pupil(tmp_path: Path) -> None:
+    store = cast("SampleStore", SimpleNamespace(recipe=read_recipe(RECIPE)))
+    with pytest.raises(ContractError, match="XS, taught by M: train M before it"):
+        objective_of(METHODS["XS_taught"], store, Budget(minutes=1, folder=tmp_path))
