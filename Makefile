@@ -6,14 +6,10 @@ RUNTIME_STAMP := $(VENV)/.runtime-installed
 DEV_STAMP := $(DEV)/.dev-installed
 FUZZ_SECONDS ?= 600
 SOURCES := camkit runtime export models_def tests tools setup.py
-# the tests that the coverage gate counts, of runtime, core and tools: watching costs a third more
-COUNTED := tests/runtime tests/camkit/bundle tests/camkit/cli tests/camkit/scenes tests/tools
-COUNTED += $(wildcard tests/camkit/test_*.py)
-SPREAD := -q -n auto --dist loadfile
 # else every process that a test starts compiles the product anew
 export PYTHONDONTWRITEBYTECODE =
 
-.PHONY: demo pictures test test-slow fuzz check types tidy format docs clean
+.PHONY: demo pictures test watched test-slow fuzz check types tidy format docs clean
 
 demo: $(RUNTIME_STAMP)  ## main job on the demo capture, runtime only (no torch)
 	@echo "1 of 2: a night scene with streak-hdr, on the way to out/night.png (about ten seconds)"
@@ -24,13 +20,15 @@ demo: $(RUNTIME_STAMP)  ## main job on the demo capture, runtime only (no torch)
 pictures: $(RUNTIME_STAMP)  ## the pictures of the README and of docs/gallery.md
 	$(VENV)/bin/python -m tools.pictures.gallery --out-dir docs/images
 
-test: check  ## set-up with everything, gate, tests with branch coverage
+test: tidy  ## set-up with everything, gate, tests with branch coverage; types beside the tests
 	@echo "Running all tests: about twelve minutes on two cores"
+	$(MAKE) --no-print-directory -j2 types watched
+
+watched: $(DEV_STAMP)  # tests/conftest.py names the tests that the coverage gate counts
 	$(DEV)/bin/python -m coverage erase
-	OMP_NUM_THREADS=1 $(DEV)/bin/python -m coverage run -m pytest $(SPREAD) $(COUNTED)
+	OMP_NUM_THREADS=1 $(DEV)/bin/python -m coverage run -m pytest -q -n auto --dist loadfile
 	$(DEV)/bin/python -m coverage combine -q
 	$(DEV)/bin/python -m tools.coverage_gate
-	OMP_NUM_THREADS=1 $(DEV)/bin/python -m pytest $(SPREAD) $(COUNTED:%=--ignore=%)
 
 test-slow: $(DEV_STAMP)  ## also the tests that take minutes
 	$(DEV)/bin/python -m pytest -q -m slow --timeout=3600
