@@ -10,6 +10,7 @@ from PIL import Image
 import camkit
 from camkit.bundle.reader import built_in_bundles, open_bundle
 from camkit.errors import ContractError
+from camkit.runtime.capture import Capture
 from camkit.runtime.development import begin
 from camkit.runtime.options import Options
 from camkit.runtime.output.sidecar import sidecar_path
@@ -18,6 +19,7 @@ from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.raw import read_capture
 from camkit.runtime.write_options import WriteOptions
 from tests.capture_factory import write_tiny_captures
+from tests.decoded_here import decoded_here  # noqa: F401
 from tests.dng_factory import write_scene
 
 
@@ -97,19 +99,28 @@ def test_a_restored_picture_names_its_camera_too(tmp_path: Path) -> None:
     assert read_capture(result.output).metadata.model == "tiny"
 
 
-@pytest.mark.parametrize("format_", ["exr", "jpeg"])
-@pytest.mark.parametrize("orientation", [1, 6])
-def test_whole_frames_of_built_in_cameras_fit_the_default_memory(
-    format_: FileFormat, orientation: int
-) -> None:
-    begun = []
+@pytest.fixture(scope="module")
+def whole_frames() -> list[tuple[Pipeline, Capture]]:
+    """Give a whole frame of every built-in camera that photographs."""
+    frames = []
     for path in built_in_bundles().values():
-        sensor = open_bundle(path).manifest.sensor
+        bundle = open_bundle(path)
+        sensor = bundle.manifest.sensor
         if sensor.type == "spad" or sensor.extent is None:
             continue
         samples = np.full((sensor.extent.height_px, sensor.extent.width_px), 900, np.uint16)
-        pipeline = Pipeline(open_bundle(path), Options(threads=1))
+        pipeline = Pipeline(bundle, Options(threads=1))
         capture = pipeline.capture_of(samples, iso=100, white_balance=None, origin_px=None)
+        frames.append((pipeline, capture))
+    return frames
+
+
+@pytest.mark.parametrize("format_", ["exr", "jpeg"])
+@pytest.mark.parametrize("orientation", [1, 6])
+def test_whole_frames_of_built_in_cameras_fit_the_default_memory(
+    whole_frames: list[tuple[Pipeline, Capture]], format_: FileFormat, orientation: int
+) -> None:
+    assert len(whole_frames) >= 5
+    for pipeline, capture in whole_frames:
         turned = replace(capture, orientation=orientation)
-        begun.append(begin(pipeline, turned, WriteOptions(format=format_)))
-    assert len(begun) >= 5
+        assert begin(pipeline, turned, WriteOptions(format=format_))
