@@ -61,11 +61,10 @@ def test_other_distances_are_frozen_beside_it(
 def test_nothing_is_written_where_no_other_distance_is_known(
     camkit_command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for made, few in (
-        (hazy_freezing.freeze_hazy, {"fields": 3, "wavelengths": 2, "rays": 1000}),
-        (distances.freeze_distances, {"distances_mm": (), "wavelengths": 2, "rays": 500}),
-    ):
-        monkeypatch.setattr(made, "__kwdefaults__", dict(made.__kwdefaults__) | few)
+    monkeypatch.setattr(hazy_freezing.freeze_hazy, "__defaults__", (FEW,))
+    usual = dict(distances.freeze_distances.__kwdefaults__)
+    nowhere = usual | {"distances_mm": (), "grid": replace(FEW, rays=500)}
+    monkeypatch.setattr(distances.freeze_distances, "__kwdefaults__", nowhere)
     files = [tmp_path / name for name in ("p.st", "h.st", "sp.st", "sh.st")]
     options = ("-o", "--haze", "--stress-out", "--stress-haze")
     pairs = [word for pair in zip(options, files, strict=True) for word in pair]
