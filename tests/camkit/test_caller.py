@@ -54,6 +54,7 @@ NAMES_OF_FILES = {
 
 
 @cache
+@cache
 def _modules() -> list[tuple[Path, ast.Module]]:
     files = (sorted(s.rglob("*.py")) if s.is_dir() else [s] for s in SOURCES)
     return [(p, ast.parse(p.read_text(encoding="utf-8"))) for inside in files for p in inside]

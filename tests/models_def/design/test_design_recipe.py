@@ -37,6 +37,7 @@ def test_recipes_that_are_shipped_take_steps(name: str) -> None:
         ),
         data=replace(recipe.data, procedural_scenes=1, scene_px=192),
         starts=Starts(),
+        descent=recipe.descent and replace(recipe.descent, evaluations=4, copies=2),
     )
     parts = parts_of(small, folder=RECIPES)
     # a coarse start may bend the picture more than its limits allow

@@ -38,14 +38,14 @@ def test_a_narrow_hole_shows_the_disc_of_airy() -> None:
 
 
 def test_a_wide_hole_shows_its_shadow() -> None:
-    hole = Pinhole(diameter_mm=0.8, distance_mm=5.0)
+    hole = Pinhole(diameter_mm=0.74, distance_mm=5.0)
     light = _light(hole, 0.45, 201)
-    shadow_px = 0.8 / 6e-3
+    shadow_px = 0.74 / 6e-3
     offset = np.arange(201) - 100
     inside = np.hypot(offset[:, None], offset) < shadow_px / 2
     assert light[inside].sum() > 0.97
     # the mean square of a disc's radius is half the square of its radius
-    square = (light * (offset[:, None] ** 2 + offset**2))[np.hypot(offset[:, None], offset) < 90]
+    square = (light * (offset[:, None] ** 2 + offset**2))[np.hypot(offset[:, None], offset) < 85]
     assert np.sqrt(2 * square.sum()) == pytest.approx(shadow_px / 2, rel=0.02)
 
 
