@@ -1,5 +1,6 @@
 """A small bundle of single photons without training: 24x16 pixels, a network of a few layers."""
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -33,10 +34,17 @@ def leaning_kernel() -> np.ndarray:
     return np.asarray(kernel / kernel.sum(), np.float32)
 
 
+@cache
+def _model() -> bytes:
+    """Return the graph, traced once in a process."""
+    torch.manual_seed(1)
+    network = build_spad_network("sub_pixel_s", width=16, blocks=1)
+    return to_onnx(network, channels=2, scale=SCALE)
+
+
 def write_spad_bundle(folder: Path, **changes: Any) -> Bundle:
     """Write the bundle; its network is bicubic interpolation until it is trained."""
-    torch.manual_seed(1)
-    model = to_onnx(build_spad_network("sub_pixel_s", width=16, blocks=1), channels=2, scale=SCALE)
+    model = _model()
     found = inspect_graph(model)
     facts = NetworkFacts(
         member="upscale_s.onnx",

@@ -28,6 +28,7 @@ from camkit.runtime.proof.golden_run import case_work
 from tests.deep_bundle import deep_psf
 from tests.haze_factory import CELL_PX, tiny_haze
 from tests.plan_factory import MODEL
+from tests.traced_once import traced_once  # noqa: F401
 
 _MEASURED: dict[str, ExportedNetwork] = {}
 ENTRIES = plan_entries(MODEL, adaptive_cost_db=0.05, draft_cost_db=0.3)

@@ -10,6 +10,7 @@ import pytest
 import torch
 
 from camkit.bundle.psf_file import read_psf
+from camkit.cli.app import run
 from camkit.errors import ContractError, UnsupportedError
 from camkit.kinds import find_kind
 from camkit.models_def.training.checkpoint import load_network, read_checkpoint, recipe_of
@@ -102,13 +103,12 @@ def test_in_a_minute_its_loss_falls_and_falls(role, recipe_path, tmp_path):
     assert result.valid_db > result.baselines["input"] + 1.0
 
 
-def test_a_role_must_be_named_where_there_are_several(recipe_path, tmp_path):
-    done = camkit("train", recipe_path, "--size", "S", "--out-dir", tmp_path)
-    assert done.returncode == 2
-    assert "roles denoise, upscale; choose one" in done.stderr
-    done = camkit("train", recipe_path, "--role", "upscale", "--fine-tune", "x.pt")
-    assert done.returncode != 0
-    assert "'toy' are not fine-tuned" in done.stderr
+def test_a_role_must_be_named_where_there_are_several(recipe_path, tmp_path, capsys):
+    words = ["train", str(recipe_path)]
+    assert run([*words, "--size", "S", "--out-dir", str(tmp_path)]) == 2
+    assert "roles denoise, upscale; choose one" in capsys.readouterr().err
+    assert run([*words, "--role", "upscale", "--fine-tune", "x.pt"]) != 0
+    assert "'toy' are not fine-tuned" in capsys.readouterr().err
 
 
 def test_targets_are_twice_as_large_and_never_turned(recipe_path, tmp_path):

@@ -1,6 +1,7 @@
 """The CPU-first network that makes pictures finer: start, cost, linearity, export."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -40,12 +41,17 @@ def test_a_new_network_is_bicubic_away_from_the_border(config: SubPixelConfig, p
     assert torch.allclose(found[inner], Bicubic(4, phase)(planes[:, :1])[inner], atol=1e-6)
 
 
+@cache
+def _exported(config: SubPixelConfig) -> tuple[SubPixel, bytes]:
+    network = _awake(config)
+    return network, to_onnx(network, channels=2, scale=4)
+
+
 @pytest.mark.parametrize("config", CONFIGS.values(), ids=CONFIGS.keys())
 def test_the_exported_graph_is_admitted_and_gives_what_torch_gives(
     config: SubPixelConfig,
 ) -> None:
-    network = _awake(config)
-    model = to_onnx(network, channels=2, scale=4)
+    network, model = _exported(config)
     facts = inspect_graph(model)
     assert facts.parameters == sum(p.numel() for p in network.parameters())
     # two 3x3 at the ends, two in every block; the skip reaches 3
@@ -61,7 +67,7 @@ def test_the_exported_graph_is_admitted_and_gives_what_torch_gives(
 
 @pytest.mark.parametrize(("name", "kmac"), [("s", 5.0), ("m", 16.0)])
 def test_a_sub_pixel_costs_what_is_stated(name: str, kmac: float) -> None:
-    facts = inspect_graph(to_onnx(SubPixel(CONFIGS[name]), channels=2, scale=4))
+    facts = inspect_graph(_exported(CONFIGS[name])[1])
     assert facts.mac_per_pixel / 16 / 1000 == pytest.approx(kmac, rel=0.05)
 
 
