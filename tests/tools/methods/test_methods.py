@@ -19,6 +19,7 @@ from camkit.models_def.training.kind import read_recipe
 from camkit.models_def.training.sample import Batch
 from tests.bayer_recipe import bank, material, recipe, recipe_path  # noqa: F401
 from tests.psf_factory import texture
+from tests.traced_once import traced_once  # noqa: F401
 from tests.wide_bundle import write_wide_bundle
 from tools.methods import __main__ as command
 from tools.methods import equal_minutes, judging

@@ -22,6 +22,7 @@ from camkit.models_def.training.checkpoint import read_checkpoint, write_checkpo
 from camkit.models_def.training.trainer import TrainOptions, train
 from tests.toy_camera.install import toy_installed  # noqa: F401
 from tests.toy_camera.recipe import ROLES, STREAKS, write_toy
+from tests.traced_once import traced_once  # noqa: F401
 
 pytestmark = pytest.mark.usefixtures("toy_installed")
 PSF_NAME = "psf.safetensors"
