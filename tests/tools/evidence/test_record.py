@@ -1,11 +1,15 @@
 """A record is the same twice, a changed sample is reported, and two checkouts are timed."""
 
 import copy
+from contextlib import chdir, redirect_stdout
+from io import StringIO
 from pathlib import Path
+from subprocess import CompletedProcess
 from typing import Any
 
 import pytest
 
+from camkit.cli.app import run
 from tools.evidence import __main__ as command
 from tools.evidence import captures, checkout, record
 from tools.evidence.captures import Capture
@@ -28,13 +32,21 @@ def _small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tools.evidence.commands._usual", some_commands)
 
 
+def _here(self: checkout.Checkout, words: list[str]) -> tuple[CompletedProcess[str], float]:
+    """Run `camkit` in this process."""
+    with chdir(self.work), redirect_stdout(StringIO()) as said:
+        code = int(run(words))
+    return CompletedProcess(words, code, stdout=said.getvalue(), stderr=""), 0.1
+
+
 @pytest.mark.usefixtures("_small")
 def test_a_record_is_the_same_twice_and_a_changed_sample_is_reported(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     paths = [tmp_path / "before.json", tmp_path / "after.json"]
     for path in paths:
         assert command.main(["record", str(path), "--bundle", "streak-rank1"]) == 0
+        monkeypatch.setattr(checkout.Checkout, "command", _here)  # which saves three starts
     assert command.main(["compare", *map(str, paths)]) == 0
     assert "12 entries equal, 0 changed" in capsys.readouterr().out
     before = command.read_record(paths[0])
