@@ -3,6 +3,7 @@
 from tests.bayer_recipe import (  # noqa: F401
     bank,
     material,
+    one_picture_to_validate_on,
     recipe,
     recipe_path,
 )
