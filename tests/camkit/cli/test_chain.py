@@ -10,7 +10,7 @@ from camkit.models_def.optics.lens_file.lens_file import write_lens
 from camkit.models_def.optics.lens_optics import LensOptics
 from camkit.models_def.optics.prescription import read_prescription
 from camkit.models_def.training.kind import read_recipe
-from tests.bayer_recipe import RECIPE
+from tests.bayer_recipe import RECIPE, one_picture_to_validate_on  # noqa: F401
 from tests.one_thread import one_thread  # noqa: F401
 
 PRESCRIPTION = Path(__file__).resolve().parents[3] / "models_def" / "prescriptions" / "duet.toml"
