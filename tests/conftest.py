@@ -1,4 +1,4 @@
-"""The tree of commands is built once in a process of tests; coverage watches what its gate counts."""
+"""Commands are built once in a process of tests; coverage watches what its gate counts."""
 
 import os
 import sys

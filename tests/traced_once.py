@@ -1,7 +1,7 @@
 """Networks of one structure traced once in a process, with the weights of each; to import.
 
-Tracing takes more than a second, of whatever size a network is. What the product does next stays: it
-holds every graph against its network. `tests/export/test_onnx_graph.py` traces as users do.
+Tracing takes more than a second, of whatever size a network is. What the product does next stays:
+it holds every graph against its network. `tests/export/test_onnx_graph.py` traces as users do.
 """
 
 from collections.abc import Iterator
