@@ -98,14 +98,23 @@ class Captures:
         repeats = (-(-height // CELL_PX[0]), -(-width // CELL_PX[1]))
         samples = np.tile(small.samples, repeats)[:height, :width]
         window = replace(small.window, origin_px=(0, 0))
-        one = folder / "one"
-        one.mkdir()
+        self.photo.parent.mkdir()
         write_capture(
-            one / "photo.dng",
+            self.photo,
             replace(small, samples=np.ascontiguousarray(samples), window=window),
             large.manifest.sensor,
             large.manifest.name,
         )
+
+    @property
+    def photo(self) -> Path:
+        """Return the capture."""
+        return self._folder / "one" / "photo.dng"
+
+    @property
+    def bundle(self) -> str | Path:
+        """Return name or path of the camera that it is of."""
+        return self._bundle
 
     @property
     def sizes(self) -> tuple[str, ...]:
@@ -122,7 +131,7 @@ class Captures:
             names = []
             for number in range(files):
                 names.append(Path(work) / f"photo{number}.dng")
-                names[-1].symlink_to(self._folder / "one" / "photo.dng")
+                names[-1].symlink_to(self.photo)
             command = [sys.executable, "-m", "camkit", "process", *map(str, names), *words]
             command += ["--bundle", str(self._bundle), "--out-dir", f"{work}/out"]
             with subprocess.Popen(

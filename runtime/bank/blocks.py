@@ -12,7 +12,7 @@ from left to right, whatever thread restored them, so the bits depend on nothing
 """
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final, Protocol
@@ -343,6 +343,10 @@ def taper_weights(size_px: int, ring_px: int) -> FloatArray:
     return weights
 
 
+_Millimetres = tuple[float, float]
+"""Position (x, y) on the sensor."""
+
+
 class BlockBank:
     """Restores pictures block by block with the PSF of each block's place; immutable."""
 
@@ -454,33 +458,58 @@ class BlockBank:
         self, strip: "_Strip", pool: ThreadPoolExecutor, cancel: Cancel | None
     ) -> Iterator[FloatArray]:
         """Yield the windowed blocks of one block row, from left to right."""
-        psf, y_px = self._psf, strip.span.centre
-        places = [
-            (psf.number_at(c.centre, y_px), psf.position_mm(c.centre, y_px)) for c in self._columns
-        ]
-        filtered = [p for c, p in zip(self._columns, places, strict=True) if not strip.is_plain(c)]
-        # Only a round PSF has quadrants that mirror each other.
-        turns = psf.kernels.turns
+        groups = self._groups(strip)
+        blocks: dict[int, Future[FloatArray]] = {}
 
-        def key_of(place: _Numbered) -> _Numbered:
-            number, (x_mm, y_mm) = place
-            if psf.kernels.field_heights_mm.size == 1:
-                return number, (0.0, 0.0)
-            return number, (abs(x_mm), abs(y_mm)) if turns else (x_mm, y_mm)
-
-        keys = sorted({key_of(place) for place in filtered})
-        # The pool takes tasks in order: no block waits for a place that nobody is making.
-        futures = {key: pool.submit(self._place, key) for key in keys}
-
-        def restore(column: Span, place: _Numbered) -> FloatArray:
+        def restore(number: int, place_mm: _Millimetres, made: Future[_Place] | None) -> FloatArray:
             check_cancelled(cancel)
+            column = self._columns[number]
             window = strip.span.weights[:, None] * column.weights
-            if strip.is_plain(column):
+            if made is None:
                 return strip.cut(column)[0][:, strip.span.inner, column.inner] * window
-            sharp = self._filtered(strip.cut(column), futures[key_of(place)].result(), place[1])
+            sharp = self._filtered(strip.cut(column), made.result(), place_mm)
             return sharp[:, strip.span.inner, column.inner] * window
 
-        return pool.map(restore, self._columns, places)
+        # The pool takes tasks in order: a place is made one group ahead, so that no block waits
+        # for one that nobody is making, and forgotten with its last block.
+        keys = iter(groups)
+        following = self._begin(next(keys), pool)
+        for group in groups.values():
+            made, following = following, self._begin(next(keys, None), pool)
+            for number, place_mm in group:
+                blocks[number] = pool.submit(restore, number, place_mm, made)
+        del made, following
+        try:
+            for number in range(len(self._columns)):
+                yield blocks.pop(number).result()
+        finally:
+            for block in blocks.values():
+                block.cancel()
+
+    def _groups(self, strip: "_Strip") -> dict["_Numbered | None", list[tuple[int, _Millimetres]]]:
+        """Return the blocks of a row by what they share: a place, or none where they stay as is."""
+        psf, y_px = self._psf, strip.span.centre
+        groups: dict[_Numbered | None, list[tuple[int, _Millimetres]]] = {}
+        for number, column in enumerate(self._columns):
+            place_mm = psf.position_mm(column.centre, y_px)
+            key = None
+            if not strip.is_plain(column):
+                key = psf.number_at(column.centre, y_px), self._shared(place_mm)
+            groups.setdefault(key, []).append((number, place_mm))
+        return groups
+
+    def _shared(self, place_mm: _Millimetres) -> _Millimetres:
+        """Return the place whose kernels serve a place."""
+        kernels = self._psf.kernels
+        if kernels.field_heights_mm.size == 1:
+            return 0.0, 0.0
+        # Only a round PSF has quadrants that mirror each other.
+        return (abs(place_mm[0]), abs(place_mm[1])) if kernels.turns else place_mm
+
+    def _begin(
+        self, place: "_Numbered | None", pool: ThreadPoolExecutor
+    ) -> "Future[_Place] | None":
+        return None if place is None else pool.submit(self._place, place)
 
     def _place(self, place: "_Numbered") -> "_Place":
         """Return the OTF of a place, and what the filter knows of it."""
@@ -491,7 +520,7 @@ class BlockBank:
             return _Place(otf=otf)
         return _Place(otf=otf, knowledge=self._knowledge(otf, float(np.hypot(*place_mm))))
 
-    def _filtered(self, cut: "_Cut", place: "_Place", place_mm: tuple[float, float]) -> FloatArray:
+    def _filtered(self, cut: "_Cut", place: "_Place", place_mm: _Millimetres) -> FloatArray:
         """Filter what was cut for a block, with the OTF of its place or of one that mirrors it."""
         samples, unknown, red = cut
         across, down = (self._psf.kernels.turns and along_mm < 0 for along_mm in place_mm)
@@ -525,8 +554,8 @@ class _Place:
     knowledge: object = None
 
 
-_Numbered = tuple[int, tuple[float, float]]
-"""Number of the kernels of a place, and its position in mm."""
+_Numbered = tuple[int, _Millimetres]
+"""Number of the kernels of a place, and its position."""
 _Cut = tuple[FloatArray, NDArray[np.bool_] | None, tuple[int, int] | None]
 """Samples of a block, which of them clipped, and where red lies in its first cell."""
 

@@ -57,6 +57,9 @@ FOLLOWS: Final = "noise and level of every block, hence the ISO"
 ESTIMATED: Final = "estimated"
 KERNEL_BLOCKS: Final = 3.2
 """A kernel of another place with its transform, in blocks that are only filtered (measured)."""
+MOSAIC_BLOCKS: Final = 1.3
+"""A block that is restored from the samples of the mosaic, in blocks of planes: 1.37 for filtering,
+1.25 for its place (measured: docs/results/mosaic.json)."""
 KEPT_CAMERAS: Final = 1
 """Cameras whose kernels of all distances are kept, since its next capture needs them too."""
 CELLS_SHARE: Final = 0.6
@@ -293,6 +296,11 @@ def seconds(entry: Wiener, subject: Subject, work: Work, speed: Speed) -> float:
     finds = _finds_distance(entry, subject.bundle, subject.options)
     set_up = 1 + KERNEL_BLOCKS * (1.0 if finds else _kernel_share(subject, columns))
     blocks = np.full((len(rows), len(columns)), set_up * speed.block_s)
+    if entry.mosaic is not None and subject.side_px == 1:
+        window = subject.placement.window
+        across, down = ([span.centre for span in spans] for spans in (columns, rows))
+        heights_mm = np.hypot(*window.to_mm(np.array(across), np.array(down)[:, None]))
+        blocks[heights_mm <= entry.mosaic.within_mm] *= MOSAIC_BLOCKS
     if subject.content is not None and entry.clip_iterations:
         kernel_px = fitted_px(entry, max(subject.bundle.psf.kernels.shape[-2:]))
         work_share = _light_work(entry, subject.content.lights, (rows, columns), kernel_px)

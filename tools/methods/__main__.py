@@ -27,6 +27,7 @@ from camkit.errors import CamkitError, ContractError
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.training.kind import read_recipe, training_kind
 from tools.comparison.tuning import tuned_from_json
+from tools.methods.developers import time_developers
 from tools.methods.equal_minutes import Budget, train_method
 from tools.methods.front_chart import RECORD, write_front_chart
 from tools.methods.front_page import to_page
@@ -128,7 +129,8 @@ def judge(arguments: Namespace) -> None:
             rows.append(separate_row(peer))
         measurements = judged(rows, protocol, tell)
         seconds = timed(rows, protocol, arguments.rounds, tell)
-    record = to_record(rows, measurements, seconds, budget)
+    developers = time_developers(arguments.bundle, arguments.rounds, tell)
+    record = to_record(rows, measurements, seconds, developers, budget)
     text = to_compact_json(record, DIGITS)
     arguments.record.write_text(text.replace('{"name"', '\n{"name"') + "\n", encoding="utf-8")
     arguments.record.with_suffix(".md").write_text(to_page(record), encoding="utf-8")

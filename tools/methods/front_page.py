@@ -1,6 +1,6 @@
 """The page of the front of methods, written from its record."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from tools.tables.records import markdown_table
@@ -51,6 +51,12 @@ HOW: Final = (
     ("- An error is that of a mean over pictures."),
 )
 """Text above the table."""
+DEVELOPED: Final = (
+    "Programs that develop alone, whole commands on one thread, a DNG of the camera to a 16-bit "
+    "TIFF, medians of rounds in turn. Two sizes tell the CPU-seconds of a megapixel from those of "
+    "starting. Tone and colours are each program's own, so no decibels are compared."
+)
+"""Text above the table of developers."""
 SHARES: Final = ("0", "0.25", "0.5", "0.75", "1")
 
 
@@ -68,7 +74,16 @@ def to_page(record: Mapping[str, Any]) -> str:
     table = markdown_table(heads, [_cells(row, record) for row in rows])
     left_out = [f"- {name}: {reason}" for name, reason in record["left_out"].items()]
     machine = f"Timed and trained on {record['machine']}."
-    return "\n".join([TITLE, "", intro, "", *how, "", machine, "", table, "", *left_out, ""])
+    text = [TITLE, "", intro, "", *how, "", machine, "", table, "", DEVELOPED, ""]
+    return "\n".join([*text, _developers(record["developers"]), "", *left_out, ""])
+
+
+def _developers(developers: Sequence[Mapping[str, Any]]) -> str:
+    rows = [
+        [one["title"], one["version"], f"{one['cpu_s_per_mp']:.3f}", f"{one['start_s']:.2f}"]
+        for one in developers
+    ]
+    return markdown_table(["program", "version", "CPU-s/MP", "CPU-s to start"], rows)
 
 
 def _cells(row: Mapping[str, Any], record: Mapping[str, Any]) -> list[str]:

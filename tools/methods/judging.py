@@ -5,10 +5,9 @@ one capture -> every row in turn, rounds of them -> medians of CPU-seconds a meg
 """
 
 import hashlib
-import shutil
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
@@ -38,6 +37,7 @@ from tools.comparison.paired import mean_and_error, paired_gains
 from tools.comparison.peers import PEERS, LocalCapture, Setting
 from tools.comparison.photograph import Photograph, Restorer, finish_planes, photograph
 from tools.comparison.tuning import Tuned
+from tools.methods.developers import DEVELOPERS, DevelopingTime
 from tools.methods.equal_minutes import Budget, trained_network
 from tools.methods.method_list import METHODS
 from tools.methods.plane_methods import (
@@ -57,8 +57,6 @@ REFERENCE: Final = "S"
 JUDGED: Final = 1
 """Counts how rows are judged; what was judged before is judged again."""
 SHIPPED: Final = " shipped"
-SEPARATE: Final = {"RawTherapee": "rawtherapee-cli", "darktable": "darktable-cli"}
-"""Programs of the system that develop alone."""
 
 Tell = Callable[[str], None]
 
@@ -289,6 +287,7 @@ def to_record(
     rows: Sequence[FrontRow],
     measurements: Sequence[Measurement],
     seconds: Mapping[str, Sequence[float]],
+    developers: Sequence[DevelopingTime],
     budget: Budget,
 ) -> dict[str, Any]:
     """Return the record of the front, as plain values."""
@@ -322,11 +321,12 @@ def to_record(
         "isos": list(ISOS),
         "positions": list(POSITIONS),
         "rows": entries,
-        "left_out": left_out(rows),
+        "developers": [asdict(developer) for developer in developers],
+        "left_out": left_out(rows, developers),
     }
 
 
-def left_out(rows: Sequence[FrontRow]) -> dict[str, str]:
+def left_out(rows: Sequence[FrontRow], developers: Sequence[DevelopingTime]) -> dict[str, str]:
     """Return what is not measured here -> why."""
     measured = {row.name for row in rows}
     reasons = {
@@ -336,9 +336,5 @@ def left_out(rows: Sequence[FrontRow]) -> dict[str, str]:
     }
     if "deepinv" not in measured:
         reasons["deepinv"] = "no environment of it was named (--deepinv-python)"
-    return reasons | {
-        title: "not measured: it develops, but knows no blur"
-        if shutil.which(command)
-        else "not installed here"
-        for title, command in SEPARATE.items()
-    }
+    present = {developer.title for developer in developers}
+    return reasons | {title: "not installed here" for title in DEVELOPERS if title not in present}

@@ -217,6 +217,24 @@ def test_the_plan_counts_the_search_and_the_kernels_of_all_distances(finding: Bu
     assert second > least
 
 
+def test_the_plan_counts_blocks_near_the_axis_as_those_of_the_mosaic(bundle: Bundle) -> None:
+    speed = Speed(block_s=0.01, clipped_block_s=0.1, rest_s_per_mp=0.1, threads=1)
+    subject = start(bundle, made_mosaic(), method="wiener").job.subject
+    entry = bundle.manifest.stage(Wiener)
+    assert subject is not None
+    assert entry is not None
+
+    def seconds(within_mm: float, side_px: int = 1) -> float:
+        near = {"together": TOGETHER, "mosaic": Mosaic(within_mm=within_mm)}
+        seen = replace(subject, side_px=side_px)
+        return wiener.seconds(entry.model_copy(update=near), seen, Work(), speed)
+
+    plain = wiener.seconds(entry, subject, Work(), speed)
+    assert seconds(1e3) == pytest.approx(wiener.MOSAIC_BLOCKS * plain)
+    assert seconds(1e-6) == plain
+    assert seconds(1e3, side_px=2) == plain
+
+
 def test_a_bank_that_finds_the_distance_needs_format_2_8(finding: Bundle, tmp_path: Path) -> None:
     older = finding.manifest.model_copy(update={"format_version": "2.7"})
     members = {name: finding.member(name) for name in finding.names}

@@ -23,6 +23,7 @@ from tests.traced_once import traced_once  # noqa: F401
 from tests.wide_bundle import write_wide_bundle
 from tools.methods import __main__ as command
 from tools.methods import equal_minutes, judging
+from tools.methods.developers import DevelopingTime
 from tools.methods.equal_minutes import Budget, objective_of, taught
 from tools.methods.method_list import METHODS, Method
 from tools.methods.sample_store import SampleStore
@@ -44,6 +45,8 @@ def tiny(monkeypatch: pytest.MonkeyPatch, material: BayerMaterial) -> None:  # n
         "camkit.models_def.kinds.bayer.training.trace_material", lambda *_: material
     )
     monkeypatch.setattr(judging, "fabricated_optics", lambda bundle, *_, **__: bundle.frozen_optics)
+    timed = DevelopingTime(title="one", version="1.0", cpu_s_per_mp=0.25, start_s=1.5)
+    monkeypatch.setattr(command, "time_developers", lambda *_: [timed])
     for module, name, value in (
         (equal_minutes, "BLOCK_PX", 64),
         (judging, "ISOS", (100.0, 100.0, 100.0)),
@@ -103,7 +106,10 @@ def test_methods_are_trained_for_their_minutes_judged_and_drawn(
     assert rows["hqs"]["training"]["samples"] == 3
     assert rows["S"]["over_s"]["all"]["db"] == 0
     assert all(row["cpu_s_per_mp"] >= 0 for row in rows.values())
-    assert "| S | " in record.with_suffix(".md").read_text()
+    page = record.with_suffix(".md").read_text()
+    assert "| S | " in page
+    assert "| one | 1.0 | 0.250 | 1.50 |" in page
+    assert "- darktable: not installed here" in page
     for name in ("front.png", "front.svg"):
         run(monkeypatch, "chart", "--record", record, "-o", tmp_path / name)
     assert cv2.imread(str(tmp_path / "front.png")).min() < 100
