@@ -218,8 +218,8 @@ def taught(objective: Objective, teach: Callable[[Batch], Tensor]) -> Objective:
     def loss(fitter: Fitter, batch: Batch, step: int, progress: float) -> Tensor:
         with torch.no_grad():
             lesson = replace(batch, target=teach(batch))
-        truth, taken = (objective.loss(fitter, one, step, progress) for one in (batch, lesson))
-        return (truth + taken) / 2
+        truth, learned = (objective.loss(fitter, one, step, progress) for one in (batch, lesson))
+        return (truth + learned) / 2
 
     return Objective(loss=loss)
 
