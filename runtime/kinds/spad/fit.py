@@ -99,7 +99,7 @@ class Fitter:
 
     @cached_property
     def _parts(self) -> "_Parts":
-        """What of each template lies in its near bins and away from them."""
+        """Shares of each template in its near bins and away from them."""
         bank, rows = self.bank, np.arange(len(self.bank.shares))
         first, end = bank.near.T
         padded = np.pad(np.cumsum(bank.shares, axis=1), ((0, 0), (1, 0)))

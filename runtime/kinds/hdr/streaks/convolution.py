@@ -79,7 +79,7 @@ class FewLights:
         """Kernels about every light: (lights, h w)."""
         half, (y, x), size = self._wide.shape[0] // 2, self._at, np.prod(self._shape)
         kernels = np.lib.stride_tricks.sliding_window_view(self._wide, self._shape)
-        return kernels[half - y, half - x].reshape(len(y), size)
+        return np.asarray(kernels[half - y, half - x].reshape(len(y), size), np.float32)
 
     def _kernel_at(self, y: int, x: int) -> FloatArray:
         """Return the kernel about a place (h, w)."""

@@ -127,7 +127,7 @@ def _region_pixels(region: Region, cells: Cells) -> LitPixels:
 def _without_dark(region: Region, cells: Cells) -> Region:
     """Return the part of a window in which pixels may be lit."""
     window = region.window
-    clipped = (cells.clipped[(slice(None), *window.at)] > 0).any(axis=0)
+    clipped = np.asarray((cells.clipped[(slice(None), *window.at)] > 0).any(axis=0))
     if not clipped.any():
         return region
     rows, columns = box_about(clipped, DARK_CELLS)
