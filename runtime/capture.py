@@ -310,9 +310,11 @@ class Capture:
         limit = black + SATURATION_SHARE * (np.float32(self.white_level) - black)
         if self.cfa is None:
             return np.asarray(rows >= np.ceil(limit))
-        clipped = np.empty(rows.shape, dtype=bool)
         if np.issubdtype(rows.dtype, np.integer):
             limit = np.ceil(limit).astype(np.int64)  # compared in the type of the samples
+        if (limit == limit[0, 0]).all():
+            return np.asarray(rows >= limit[0, 0].item())
+        clipped = np.empty(rows.shape, dtype=bool)
         for dy in (0, 1):
             for dx in (0, 1):
                 clipped[dy::2, dx::2] = rows[dy::2, dx::2] >= limit[dy, dx].item()

@@ -29,14 +29,14 @@ def search_length(bank: Bank) -> float:
     bins, s = bank.axis.bins, bank.shares
     mean = s.sum(axis=1) / bins
     norm = np.sqrt(np.maximum((s * s).sum(axis=1) - bins * mean * mean, 1e-300))
-    total = 0.0
-    for m in range(len(s) - 1):
-        offset = bank.bins[m + 1, 0] - bank.bins[m, 0]
-        width = s.shape[1] - offset
-        product = s[m, offset:] @ s[m + 1, :width] if width > 0 else 0.0
-        cosine = (product - bins * mean[m] * mean[m + 1]) / (norm[m] * norm[m + 1])
-        total += float(np.arccos(np.clip(cosine, -1.0, 1.0)))
-    return total
+    width = s.shape[1]
+    offsets = np.diff(bank.bins[:, 0]).tolist()
+    products = [
+        before[offset:] @ after[: width - offset] if offset < width else 0.0
+        for before, after, offset in zip(s, s[1:], offsets, strict=False)
+    ]
+    cosine = (products - bins * mean[:-1] * mean[1:]) / (norm[:-1] * norm[1:])
+    return float(sum(np.arccos(np.clip(cosine, -1.0, 1.0)).tolist()))
 
 
 def false_alarm_rate(threshold: float, length: float) -> float:

@@ -59,6 +59,23 @@ class Fit:
     template: NDArray[np.int64]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Parts:
+    """Near bins of the templates, (m,) each.
+
+    Attributes:
+        share_in: Of a template, within them.
+        share_out: Elsewhere.
+        det: Of the two equations for signal and background.
+        has_outside: Whether there are other bins.
+    """
+
+    share_in: NDArray[np.float64]
+    share_out: NDArray[np.float64]
+    det: NDArray[np.float64]
+    has_outside: NDArray[np.bool_]
+
+
 class Fitter:
     """A bank with what passes over counts need of it, made when first needed."""
 
@@ -81,10 +98,24 @@ class Fitter:
         return np.stack([information(self.bank, ratio) for ratio in RATIOS])
 
     @cached_property
-    def _summed_shares(self) -> NDArray[np.float64]:
-        """Shares (m, b + 1) of each template before each bin of its band."""
-        shares = self.bank.shares
-        return np.concatenate([np.zeros((len(shares), 1)), np.cumsum(shares, axis=1)], axis=1)
+    def _parts(self) -> "_Parts":
+        """Shares of each template in its near bins and away from them."""
+        bank, rows = self.bank, np.arange(len(self.bank.shares))
+        first, end = bank.near.T
+        padded = np.pad(np.cumsum(bank.shares, axis=1), ((0, 0), (1, 0)))
+        from_left, to_right = (
+            np.clip(place - bank.bins[:, 0], 0, bank.bins.shape[1]) for place in (first, end)
+        )
+        share_in = padded[rows, to_right] - padded[rows, from_left]
+        share_out = bank.totals - share_in
+        bins_in = end - first
+        bins_out = bank.axis.bins - bins_in
+        return _Parts(
+            share_in=share_in,
+            share_out=share_out,
+            det=bins_out * share_in - bins_in * share_out,
+            has_outside=bins_out > 0,
+        )
 
     def _scorer(self, index: int) -> Scorer:
         if index not in self._scorers:
@@ -148,24 +179,17 @@ class Fitter:
         Returns:
             Signal photons and counts of a bin, (p,) each.
         """
-        bank, rows = self.bank, np.arange(len(sums))
-        first, end = bank.near[template].T
-        inside = sums[rows, end] - sums[rows, first]
+        bank, rows, parts = self.bank, np.arange(len(sums)), self._parts
+        first, end = bank.near.T
+        inside = sums[rows, end.take(template)] - sums[rows, first.take(template)]
         whole = sums[:, -1]
-        bins_in = end - first
-        bins_out = bank.axis.bins - bins_in
-        padded = self._summed_shares
-        from_left = np.clip(first - bank.bins[template, 0], 0, bank.bins.shape[1])
-        to_right = np.clip(end - bank.bins[template, 0], 0, bank.bins.shape[1])
-        share_in = padded[template, to_right] - padded[template, from_left]
-        share_out = bank.totals[template] - share_in
-        det = bins_out * share_in - bins_in * share_out
-        is_solvable = (bins_out > 0) & (det > 0)
-        solved = ((whole - inside) * share_in - inside * share_out) / np.where(
-            is_solvable, det, 1.0
-        )
-        background = np.where(is_solvable, np.maximum(solved, 0.0), 0.0)
-        signal = (whole - background * bank.axis.bins) / np.maximum(bank.totals[template], 1e-6)
+        solved = (whole - inside) * parts.share_in.take(template)
+        solved -= inside * parts.share_out.take(template)
+        is_solvable = parts.has_outside & (parts.det > 0)
+        solved /= np.where(is_solvable, parts.det, 1.0).take(template)
+        background = np.where(is_solvable.take(template), np.maximum(solved, 0.0), 0.0)
+        signal = whole - background * bank.axis.bins
+        signal /= np.maximum(bank.totals, 1e-6).take(template)
         return np.maximum(signal, 0.0), background
 
     def _sigma(

@@ -10,20 +10,24 @@ import pytest
 DESIGN: Final = {"torch", "onnxscript", "safetensors.torch", "matplotlib"}
 COMPUTING: Final = {
     *("numpy", "scipy", "cv2", "onnx", "onnxruntime", "OpenEXR", "PIL", "rawpy", "tifffile"),
+    *("openvino", "safetensors", "camkit.report", "asyncio", "multiprocessing", "unittest"),
 }
 DEVELOPING: Final = {
-    *("scipy", "PIL", "rawpy", "numpy.random", "camkit.report"),
+    *("scipy", "PIL", "rawpy", "numpy.random", "camkit.report", "rich"),
+    *("openvino", "asyncio", "multiprocessing", "unittest"),
     "camkit.runtime.raw_worker",
     "camkit.runtime.twin.simulate",
 }
 """Modules for which no photograph has a use that its decoding child does not do."""
+WORDS: Final = COMPUTING | {"camkit.bundle", "camkit.runtime", "camkit.arrays", "tomllib"}
+"""Modules for which words alone have no use."""
 ABSENT: Final = {
-    "--version": COMPUTING,
-    "--help": COMPUTING,
-    "process": COMPUTING,
-    "process a.dng --nonsense": COMPUTING,
-    "info duet": COMPUTING - {"numpy"} | {"rich", "camkit.runtime.pipeline"},
-    "info a.dng": COMPUTING - {"numpy", "cv2", "onnxruntime"} | {"rich"},
+    "--version": WORDS | {"rich"},
+    "--help": WORDS | {"pydantic"},
+    "process": WORDS,
+    "process a.dng --nonsense": WORDS,
+    "info duet": COMPUTING - {"numpy", "safetensors"} | {"rich", "camkit.runtime.pipeline"},
+    "info a.dng": COMPUTING - {"numpy", "cv2", "onnxruntime", "safetensors"} | {"rich"},
     "process none.dng --bundle duet": DEVELOPING | {"OpenEXR", "onnx"},
     "process a.dng --bundle none": DEVELOPING | {"onnx"},
     "process a.dng --bundle duet --force-bundle": DEVELOPING | {"onnx"},

@@ -47,7 +47,7 @@ KEPT_BYTES_PER_PX: Final = 17
 BAND_ROWS: Final = 256
 TILE_COLUMNS: Final = 256
 """Of a band at once: what clipped takes three times the time, so it is sought in small tiles."""
-CLEARED_ROWS: Final = 32 * BLOCK_PX
+CLEARED_ROWS: Final = 64 * BLOCK_PX
 """Of a mosaic at once: neighbours to the number of `DOUBT_MARGIN_PX` are computed again."""
 LIT_ROWS: Final = 64
 """Of a picture at once, in the cache."""
@@ -171,8 +171,10 @@ def _from_samples(
     for top in range(0, height, LIT_ROWS):
         bottom = min(top + LIT_ROWS, height)
         above, below = max(top - RIM_MARGIN_PX, 0), min(bottom + RIM_MARGIN_PX, height)
-        planes = np.concatenate(source.pieces(above, below), axis=1)
         clipped = capture.saturated_rows(above, below)
+        if not clipped.any():  # nothing beside these rows is looked at
+            above, below, clipped = top, bottom, clipped[top - above : bottom - above]
+        planes = np.concatenate(source.pieces(above, below), axis=1)
         painter.light_up(planes, clipped, above, gains)
         inside = np.s_[..., top - above : bottom - above, :]
         lit, near = planes[inside], near_clipped(clipped)[inside]

@@ -33,28 +33,30 @@ class Spread(Protocol):
         ...
 
 
-def spreading(kernel: FloatArray, lit: Mask) -> Spread:
+def spreading(kernel: FloatArray, lit: Mask, *, often: bool = False) -> Spread:
     """Return the cheaper way to spread light that lies on some cells of a window alone.
 
     Args:
         kernel: (n, n) float32, n odd.
         lit: (h, w): where light may be; elsewhere `gathered` need not be right.
+        often: Whether it is spread more than once or twice.
     """
-    count = int(lit.sum())
+    count = int(np.count_nonzero(lit))
     if count <= MOST_LIGHTS and count * lit.size <= MOST_VALUES:
-        return FewLights(kernel, lit)
+        return FewLights(kernel, lit, often=often)
     return Convolution(kernel, lit.shape)
 
 
 class FewLights:
     """A kernel laid about each of a few lights; what leaves the window is lost."""
 
-    def __init__(self, kernel: FloatArray, lit: Mask) -> None:
+    def __init__(self, kernel: FloatArray, lit: Mask, *, often: bool = False) -> None:
         """Prepare the kernel about every light.
 
         Args:
             kernel: (n, n) float32, n odd.
             lit: (h, w): where light may be.
+            often: Whether kernels are laid out at once, as `gathered` does.
 
         Raises:
             ContractError: If the kernel has no middle.
@@ -69,15 +71,15 @@ class FewLights:
         self._wide[half - reach : half + reach + 1, half - reach : half + reach + 1] = kernel[
             middle - reach : middle + reach + 1, middle - reach : middle + reach + 1
         ]
+        if often:
+            _ = self._kernels
 
     @cached_property
     def _kernels(self) -> FloatArray:
         """Kernels about every light: (lights, h w)."""
-        height, width = self._shape
-        kernels = np.empty((len(self._at[0]), height * width), np.float32)
-        for row, y, x in zip(kernels, *self._at, strict=True):
-            row[:] = self._kernel_at(y, x).ravel()
-        return kernels
+        half, (y, x), size = self._wide.shape[0] // 2, self._at, np.prod(self._shape)
+        kernels = np.lib.stride_tricks.sliding_window_view(self._wide, self._shape)
+        return np.asarray(kernels[half - y, half - x].reshape(len(y), size), np.float32)
 
     def _kernel_at(self, y: int, x: int) -> FloatArray:
         """Return the kernel about a place (h, w)."""

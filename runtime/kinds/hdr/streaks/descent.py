@@ -43,6 +43,7 @@ MOST_BEYOND: Final = 0.2
 _DIMMEST_START: Final = 2.0**-20
 _HALVINGS: Final = 12
 _TINY: Final = 1e-30
+_NONE: Final = np.float32(0)
 Mask = NDArray[np.bool_]
 
 
@@ -98,17 +99,17 @@ def seek_lights(
         blurred = spread.spread(light)
         rest_y, rest_x = gradient(measured - blurred)
         weights = _Weights(
-            y=np.where(down, _weight(rest_y, scale), 0).astype(np.float32),
-            x=np.where(across, _weight(rest_x, scale), 0).astype(np.float32),
-            excess=np.where(usable & (blurred > measured), EXCESS / scale**2, 0).astype(np.float32),
+            y=np.where(down, _weight(rest_y, scale), _NONE),
+            x=np.where(across, _weight(rest_x, scale), _NONE),
+            excess=np.where(usable & (blurred > measured), np.float32(EXCESS / scale**2), _NONE),
         )
-        unit = np.where(clipped, light**steps.root, 0).astype(np.float32)
-        price = (_price(light, steps) * unit**2 / np.maximum(light, DIMMEST)).astype(np.float32)
+        unit = np.power(light, steps.root, out=np.zeros_like(light), where=clipped)
+        price = _price(light, steps) * unit**2 / np.maximum(light, DIMMEST)
         system = _System(spread=spread, weights=weights, unit=unit, price=price)
         start = np.divide(light, unit, out=np.zeros_like(light), where=unit > 0)
         rest = unit * system.gathered(rest_y, rest_x, measured - blurred) - price * start
         solution = unit * _conjugate_gradients(system, rest, start, steps.rounds)
-        light = np.where(clipped, np.clip(solution, FAINTEST, BRIGHTEST), 0).astype(np.float32)
+        light = np.where(clipped, np.clip(solution, FAINTEST, BRIGHTEST), _NONE)
     return light
 
 
@@ -172,25 +173,29 @@ class _System:
     def applied(self, light: FloatArray) -> FloatArray:
         """Return the matrix times lights in their units."""
         blurred = self.spread.spread(self.unit * light)
-        return self.unit * self.gathered(*gradient(blurred), blurred) + self.price * light
+        image = self.gathered(*gradient(blurred), blurred)
+        image *= self.unit
+        image += self.price * light
+        return image
 
 
 def _conjugate_gradients(
     system: _System, rest: FloatArray, start: FloatArray, rounds: int
 ) -> FloatArray:
-    """Solve from a start with this residual."""
-    solution = start
-    way = rest.copy()
+    """Solve from a start with this residual; both are changed in place."""
+    solution, way = start, rest.copy()
     size = float(np.vdot(rest, rest))
     for _ in range(rounds):
         if size < _TINY:
             break
         image = system.applied(way)
         step = np.float32(size / max(float(np.vdot(way, image)), _TINY))
-        solution = solution + step * way
-        rest = rest - step * image
+        solution += step * way
+        image *= step
+        rest -= image
         last, size = size, float(np.vdot(rest, rest))
-        way = rest + np.float32(size / last) * way
+        way *= np.float32(size / last)
+        way += rest
     return solution
 
 

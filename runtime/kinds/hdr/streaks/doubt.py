@@ -80,19 +80,23 @@ def _shrunk(
     rest: Lattices, streaks: Lattices, clipped: Sequence[Mask], brightest: Lattices
 ) -> Iterator[FloatArray]:
     """Yield samples nearer to the mean of their surroundings, weighted by doubt."""
-    doubts = [np.square(np.float32(DOUBT) * plane) for plane in brightest]
+    doubts = [np.float32(DOUBT) * plane for plane in brightest]
+    doubts = [np.square(plane, out=plane) for plane in doubts]
     weight, mean, square = _local_moments(rest, clipped, doubts)
     moments: dict[tuple[int, ...], tuple[FloatArray, FloatArray]] = {}
     for plane, streak, mask, doubt in zip(rest, streaks, clipped, doubts, strict=True):
         if plane.shape not in moments:
             moments[plane.shape] = _mean_and_spread(weight, mean, square, plane.shape)
         middle, spread = moments[plane.shape]
+        share = spread + doubt
+        np.divide(spread, share, out=share)
         samples = plane - middle
-        samples *= spread / (spread + doubt)
+        samples *= share
         samples += middle
         # no streak takes light away, none leaves less than nothing
         light = plane + streak
-        np.clip(samples, np.minimum(light, 0), light, out=samples)
+        np.maximum(samples, np.minimum(light, 0, out=share), out=samples)
+        np.minimum(samples, light, out=samples)
         np.copyto(samples, plane, where=mask | (doubt <= SURE**2))
         yield samples
 
@@ -117,8 +121,9 @@ def _local_moments(
     height, width = (max(plane.shape[axis] for plane in rest) for axis in (0, 1))
     sums = np.zeros((3, -(-height // BLOCK), -(-width // BLOCK)), np.float32)
     for samples, mask, doubt in zip(rest, clipped, doubts, strict=True):
-        weight = np.float32(NOISE**2) / (np.float32(NOISE**2) + doubt)
-        weight[mask] = 0
+        weight = np.float32(NOISE**2) + doubt
+        np.divide(np.float32(NOISE**2), weight, out=weight)
+        np.copyto(weight, 0, where=mask)
         for number, part in enumerate(_moments(weight, samples)):
             sums[number] += _in_squares(part, sums.shape[1:])
     for axis in (1, 2):

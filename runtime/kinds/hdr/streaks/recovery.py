@@ -251,7 +251,7 @@ def _lights_of_colour(
     guess = np.where(clipped, 1 + GUESS * rim_px**2, 0).astype(np.float32)
     measured, hidden = coarse.light[at] - veil[at], coarse.clipped[at] > 0
     kernel = kernels.coarse.whole[colour]
-    spread = spreading(kernel, hidden)
+    spread = spreading(kernel, hidden, often=True)
     first = not_outshining(pooled(guess), measured, hidden, spread)
     light = seek_lights(measured, hidden, spread, first, COARSE_STEPS)
     blurred = spread.spread(light)

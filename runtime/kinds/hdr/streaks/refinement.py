@@ -107,7 +107,7 @@ def refined(
         light[near.at] += seek_lights(
             measured - upsampled(other_light, near.shape),
             clipped_cells,
-            spreading(kernels.fine.whole[colour], clipped_cells),
+            spreading(kernels.fine.whole[colour], clipped_cells, often=True),
             with_means(np.where(clipped_cells, dome(lights.rim_px[near.at]), 0), coarse),
             FINE_STEPS,
             hidden=clipped[near.at],

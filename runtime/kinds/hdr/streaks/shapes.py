@@ -31,9 +31,17 @@ def rim_distance_px(mask: NDArray[np.bool_], pitch_px: float) -> FloatArray:
         start = max(top - FARTHEST_CELLS, 0)
         strip = mask[start : top + STRIP_ROWS + FARTHEST_CELLS]
         if strip.any():
-            strip_distance = scipy.ndimage.distance_transform_edt(strip)
+            box, strip_distance = box_about(strip, 1), np.zeros(strip.shape)
+            strip_distance[box] = scipy.ndimage.distance_transform_edt(strip[box])
             distance[top : top + STRIP_ROWS] = strip_distance[top - start :][:STRIP_ROWS]
     return np.minimum(distance, FARTHEST_CELLS) * np.float32(pitch_px)
+
+
+def box_about(mask: NDArray[np.bool_], margin: int) -> tuple[slice, slice]:
+    """Return the rows and columns of what is set in a mask (h, w), and so many about it."""
+    ends = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
+    rows, columns = (slice(max(int(e[0]) - margin, 0), int(e[-1]) + 1 + margin) for e in ends)
+    return rows, columns
 
 
 def dome(distance_px: FloatArray) -> FloatArray:

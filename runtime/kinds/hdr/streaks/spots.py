@@ -12,7 +12,7 @@ References: Sun 2021, chapter 5, gives pixels their light by a network; this sta
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -22,6 +22,8 @@ from numpy.typing import NDArray
 from camkit.arrays import FloatArray
 from camkit.runtime.kinds.hdr.streaks.cells import COLOURS, PITCH_PX, Cells
 from camkit.runtime.kinds.hdr.streaks.recovery import Recovery, Region
+from camkit.runtime.kinds.hdr.streaks.regions import Window
+from camkit.runtime.kinds.hdr.streaks.shapes import box_about
 
 FULL_LEVEL: Final = 0.98
 """Of where samples clip: a pixel between samples that is darker did not, it was seen."""
@@ -32,6 +34,9 @@ ALIKE: Final = 0.7
 """Share of a light whose shape is that of all colours together."""
 COLOUR_SPAN: Final = 2.0
 """How many times as bright a colour may be beside one that was seen, against its whole place."""
+DARK_CELLS: Final = 4
+"""About what clipped, of which light is made: smoothing reaches 2, lit pixels lie beside, and are
+linear between cells."""
 STRIP_CELLS: Final = 2**18
 """Cells about lights that are looked at at once."""
 _EIGHT: Final = np.ones((3, 3), np.int8)
@@ -105,6 +110,7 @@ class _Shaped:
 
 
 def _region_pixels(region: Region, cells: Cells) -> LitPixels:
+    region = _without_dark(region, cells)
     clipped = cells.clipped[(slice(None), *region.window.at)]
     places = _places(clipped, region.light)
     lit = _lit(places.numbers, cells, region)
@@ -115,6 +121,24 @@ def _region_pixels(region: Region, cells: Cells) -> LitPixels:
         columns=shaped.columns + np.int32(PITCH_PX * region.window.left),
         light=light,
         excess=_excess(light, shaped.numbers),
+    )
+
+
+def _without_dark(region: Region, cells: Cells) -> Region:
+    """Return the part of a window in which pixels may be lit."""
+    window = region.window
+    clipped = np.asarray((cells.clipped[(slice(None), *window.at)] > 0).any(axis=0))
+    if not clipped.any():
+        return region
+    rows, columns = box_about(clipped, DARK_CELLS)
+    height, width = region.light[:, rows, columns].shape[1:]
+    left, top = columns.start, rows.start
+    place = Window(top=top, bottom=top + height, left=left, right=left + width)
+    return replace(
+        region,
+        window=place.shifted(window.top, window.left),
+        light=region.light[:, rows, columns],
+        streaks=region.streaks[:, rows, columns],
     )
 
 

@@ -101,3 +101,13 @@ def test_a_lone_light_becomes_the_kernel_as_it_lies() -> None:
 def test_a_kernel_without_a_middle_is_refused(shape: tuple[int, ...]) -> None:
     with pytest.raises(ContractError, match="square with an odd side"):
         Convolution(np.ones(shape, np.float32), (8, 8))
+
+
+def test_kernels_laid_out_at_once_spread_light_as_those_laid_out_one_by_one() -> None:
+    rng = np.random.default_rng(7)
+    kernel = rng.uniform(0, 1, (9, 9)).astype(np.float32)
+    lit = rng.uniform(0, 1, (12, 17)) > 0.9
+    light = np.where(lit, rng.uniform(1, 9, lit.shape), 0).astype(np.float32)
+    once, often = FewLights(kernel, lit), FewLights(kernel, lit, often=True)
+    np.testing.assert_allclose(often.spread(light), once.spread(light), rtol=1e-5)
+    np.testing.assert_array_equal(often.gathered(light), once.gathered(light))

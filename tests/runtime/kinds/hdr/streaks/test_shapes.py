@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from camkit.runtime.kinds.hdr.streaks.shapes import (
     DOME_PX,
+    box_about,
     dome,
     pooled,
     rim_distance_px,
@@ -33,6 +34,15 @@ def test_the_distance_from_the_rim_is_that_to_the_next_cell_outside() -> None:
     got = rim_distance_px(mask, 2.0)
     np.testing.assert_allclose(got.ravel(), 2 * np.array(wanted), atol=FLOAT32)
     assert (rim_distance_px(np.zeros((3, 4), bool), 2.0) == np.zeros((3, 4))).all()
+
+
+def test_a_box_holds_all_that_is_set_and_a_margin_within_the_mask() -> None:
+    mask = _discs(13, 17, (5, 6, 2), (7, 9, 1))
+    rows, columns = box_about(mask, 2)
+    assert (rows.start, columns.start) == (1, 2)
+    assert mask[rows, columns].shape == (10, 11)
+    assert mask[rows, columns].sum() == mask.sum()
+    assert box_about(np.ones((3, 4), bool), 5)[0].start == 0
 
 
 def test_a_dome_rises_with_the_squared_distance_and_is_flat_where_that_is_large() -> None:
