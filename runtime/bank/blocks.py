@@ -461,13 +461,15 @@ class BlockBank:
         groups = self._groups(strip)
         blocks: dict[int, Future[FloatArray]] = {}
 
-        def restore(number: int, place_mm: _Millimetres, made: Future[_Place] | None) -> FloatArray:
+        def restore(
+            number: int, place_mm: _Millimetres, future_place: Future[_Place] | None
+        ) -> FloatArray:
             check_cancelled(cancel)
             column = self._columns[number]
             window = strip.span.weights[:, None] * column.weights
-            if made is None:
+            if future_place is None:
                 return strip.cut(column)[0][:, strip.span.inner, column.inner] * window
-            sharp = self._filtered(strip.cut(column), made.result(), place_mm)
+            sharp = self._filtered(strip.cut(column), future_place.result(), place_mm)
             return sharp[:, strip.span.inner, column.inner] * window
 
         # The pool takes tasks in order: a place is made one group ahead, so that no block waits
@@ -475,10 +477,10 @@ class BlockBank:
         keys = iter(groups)
         following = self._begin(next(keys), pool)
         for group in groups.values():
-            made, following = following, self._begin(next(keys, None), pool)
+            present, following = following, self._begin(next(keys, None), pool)
             for number, place_mm in group:
-                blocks[number] = pool.submit(restore, number, place_mm, made)
-        del made, following
+                blocks[number] = pool.submit(restore, number, place_mm, present)
+        del present, following
         try:
             for number in range(len(self._columns)):
                 yield blocks.pop(number).result()

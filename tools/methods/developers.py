@@ -24,7 +24,7 @@ from tools.memory import Captures
 
 MEGAPIXELS: Final = (1.5, 24.0)
 NUMBER: Final = re.compile(r"\d+(\.\d+)+")
-OWN: Final = "camkit, developed only"
+CAMKIT: Final = "camkit, developed only"
 
 Words = Callable[[Captures, Path], list[str]]
 """A capture and the folder to write to -> the command."""
@@ -62,7 +62,7 @@ def _darktable(captures: Captures, folder: Path) -> list[str]:
 
 
 DEVELOPERS: Final[Mapping[str, Developer]] = {
-    OWN: Developer(program=sys.executable, version=("-m", "camkit", "--version"), words=_camkit),
+    CAMKIT: Developer(program=sys.executable, version=("-m", "camkit", "--version"), words=_camkit),
     "RawTherapee": Developer(program="rawtherapee-cli", version=("-v",), words=_rawtherapee),
     "darktable": Developer(program="darktable-cli", version=("--version",), words=_darktable),
 }
@@ -70,7 +70,7 @@ DEVELOPERS: Final[Mapping[str, Developer]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DevelopingTime:
-    """What a program takes.
+    """CPU time of a program.
 
     Attributes:
         title: Of the program.
@@ -86,7 +86,7 @@ class DevelopingTime:
 
 
 def time_developers(bundle: str, rounds: int, tell: Callable[[str], None]) -> list[DevelopingTime]:
-    """Time the programs that are installed, in turn; medians.
+    """Measure the programs that are installed, in turn; medians.
 
     Args:
         bundle: Name or path of the camera whose captures are developed.
@@ -120,11 +120,11 @@ def time_developers(bundle: str, rounds: int, tell: Callable[[str], None]) -> li
 def _time_of(title: str, developer: Developer, seconds: Sequence[float]) -> DevelopingTime:
     (small, large), (few_s, many_s) = MEGAPIXELS, seconds
     each_s = (many_s - few_s) / (large - small)
-    asked = [developer.program, *developer.version]
-    printed = subprocess.run(asked, capture_output=True, text=True, check=False).stdout
+    question = [developer.program, *developer.version]
+    printed = subprocess.run(question, capture_output=True, text=True, check=False).stdout
     return DevelopingTime(
         title=title,
-        version=found[0] if (found := NUMBER.search(printed)) else "",
+        version=number[0] if (number := NUMBER.search(printed)) else "",
         cpu_s_per_mp=each_s,
         start_s=few_s - each_s * small,
     )

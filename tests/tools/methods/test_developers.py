@@ -9,7 +9,7 @@ import pytest
 from camkit.errors import ContractError
 from tools.memory import Captures
 from tools.methods import developers
-from tools.methods.developers import OWN, Developer, time_developers
+from tools.methods.developers import CAMKIT, Developer, time_developers
 
 START_S, EACH_S = 0.2, 0.1
 BURN = "import sys, time\nwhile time.process_time() < float(sys.argv[1]): pass"
@@ -52,6 +52,6 @@ def test_a_program_that_fails_is_named_with_what_it_said() -> None:
 
 
 def test_camkit_develops_by_the_command_that_is_timed(tmp_path: Path) -> None:
-    words = developers.DEVELOPERS[OWN].words(Captures(tmp_path, "duet", 0.5), tmp_path / "out")
+    words = developers.DEVELOPERS[CAMKIT].words(Captures(tmp_path, "duet", 0.5), tmp_path / "out")
     assert developers._cpu_s(words) > 0
     assert (tmp_path / "out" / "photo.tif").is_file()
