@@ -10,7 +10,7 @@ import tools.evidence
 from tools.evidence.checkout import HERE
 from tools.evidence.comparison import compare
 from tools.evidence.record import make_record
-from tools.evidence.seconds import compare_seconds
+from tools.evidence.seconds import compare_seconds, compare_whole
 
 
 def main(words: list[str] | None = None) -> int:
@@ -27,7 +27,12 @@ def main(words: list[str] | None = None) -> int:
         arguments.out.write_text(text + "\n", encoding="utf-8")
         return 0
     if arguments.command == "seconds":
-        compare_seconds((arguments.a, arguments.b), arguments.bundle, arguments.rounds)
+        roots = arguments.a, arguments.b
+        if arguments.whole:
+            size = {"megapixels": arguments.megapixels, "threads": arguments.threads}
+            compare_whole(roots, arguments.whole, arguments.rounds, **size)
+        else:
+            compare_seconds(roots, arguments.bundle, arguments.rounds)
         return 0
     comparison = compare(read_record(arguments.before), read_record(arguments.after))
     print(*comparison.lines(), sep="\n")
@@ -58,6 +63,11 @@ def _parser() -> argparse.ArgumentParser:
     seconds.add_argument("a", type=Path)
     seconds.add_argument("b", type=Path)
     seconds.add_argument("--rounds", type=int, default=5)
+    seconds.add_argument(
+        "--whole", nargs="+", metavar="BUNDLE:SIZE", help="a large photograph by each of these"
+    )
+    seconds.add_argument("--megapixels", type=float, default=24.0, help="of it")
+    seconds.add_argument("--threads", type=int, default=2, help="for it")
     for command in (record, seconds):
         command.add_argument("--bundle", nargs="+", help="names of built-in bundles; default: all")
     return parser

@@ -74,6 +74,16 @@ def test_two_checkouts_are_timed_in_turn(capsys: pytest.CaptureFixture[str]) -> 
     assert 0.05 < float(last.rpartition(" ")[2]) < 20
 
 
+def test_large_photographs_are_timed_and_compared(capsys: pytest.CaptureFixture[str]) -> None:
+    root = str(checkout.HERE)
+    words = ["--whole", "duet:S", "--rounds", "1", "--megapixels", "0.2", "--threads", "1"]
+    assert command.main(["seconds", root, root, *words]) == 0
+    *_, cpu, clock, peak, agreed = capsys.readouterr().out.splitlines()
+    assert [line.split()[1] for line in (cpu, clock, peak)] == ["cpu_s", "clock_s", "peak_mb"]
+    assert all(0.02 < float(line.split()[-1]) < 50 for line in (cpu, clock, peak))
+    assert agreed == "duet:S same sum"
+
+
 def test_a_worker_that_dies_is_replaced_and_its_entry_says_so(tmp_path: Path) -> None:
     here = checkout.Checkout(root=checkout.HERE, work=tmp_path)
     with checkout.Worker(here) as worker:
