@@ -71,6 +71,7 @@ def main(words: Sequence[str] | None = None) -> None:
     )
     parser.add_argument("--recipe", type=Path, default=RECIPE, help="with [wiener.mosaic]")
     parser.add_argument("--bundle", default="duet", help="NAME or PATH")
+    parser.add_argument("--size", help="judge behind this network, as it ships; without, the bank")
     parser.add_argument("--data", type=Path, required=True, help="folder of sharp pictures")
     parser.add_argument("--pictures", type=int, help="the first of them by name")
     parser.add_argument("--work-dir", type=Path, default=Path("runs/quality"), help="traced PSFs")
@@ -79,10 +80,17 @@ def main(words: Sequence[str] | None = None) -> None:
     bundle = open_bundle(find_bundle(arguments.bundle))
     ways = ways_of(bundle, arguments.recipe)
     pictures = list_set(arguments.data, arguments.pictures)
-    captures = judge(ways, pictures, arguments.work_dir / "psf")
+    choice = {"size": arguments.size} if arguments.size else {"method": "wiener"}
+    captures = judge(
+        {way: bundle_restorer(camera, **choice) for way, camera in ways.items()},
+        bundle,
+        pictures,
+        arguments.work_dir / "psf",
+    )
     record = {
         "machine": describe_machine(),
         "bundle": bundle.manifest.name,
+        "behind": arguments.size,
         "captures": len(captures),
         "psnr_db": {way: statistics.fmean(one.psnr_db[way] for one in captures) for way in ways},
         "gain_db": gains(captures),
@@ -126,12 +134,10 @@ def _with_bank(bundle: Bundle, changed: Mapping[str, Any]) -> Bundle:
     return replace(bundle, manifest=bundle.manifest.model_copy(update={"stages": stages}))
 
 
-def judge(ways: Mapping[str, Bundle], pictures: Sequence[Path], cache: Path) -> list[Judged]:
-    """Photograph pictures and judge what every bank makes of them."""
-    bundle = ways[TODAY]
-    restorers: dict[str, Restorer] = {
-        way: bundle_restorer(camera, method="wiener") for way, camera in ways.items()
-    }
+def judge(
+    restorers: Mapping[str, Restorer], bundle: Bundle, pictures: Sequence[Path], cache: Path
+) -> list[Judged]:
+    """Photograph pictures and judge what every way makes of them."""
 
     @lru_cache
     def lens(copy: int) -> FrozenOptics:

@@ -15,8 +15,9 @@ from tests.wide_bundle import write_wide_bundle
 from tools.comparison import mosaic_gain
 
 
+@pytest.mark.parametrize("size", [None, "S"])
 def test_gains_are_told_by_place_and_iso_beside_the_cost(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    size: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     bundle = write_wide_bundle(tmp_path)
     monkeypatch.setattr(
@@ -33,8 +34,10 @@ def test_gains_are_told_by_place_and_iso_beside_the_cost(
     recipe.write_text(f"[wiener]\n\n{bank_table(TOGETHER)}\n{near}", encoding="utf-8")
     out = tmp_path / "found" / "mosaic.json"
     words = ["--recipe", str(recipe), "--bundle", str(bundle.path), "--data", str(tmp_path / "in")]
-    mosaic_gain.main([*words, "-o", str(out)])
+    behind = [] if size is None else ["--size", size]
+    mosaic_gain.main([*words, *behind, "-o", str(out)])
     found = json.loads(out.read_text(encoding="utf-8"))
+    assert found["behind"] == size
     assert found["captures"] == 2 * 2
     assert set(found["by_place"]) == {"0", "0.75"}
     far = found["by_place"]["0.75"]["100"]
