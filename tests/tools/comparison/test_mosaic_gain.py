@@ -15,7 +15,7 @@ from tests.wide_bundle import write_wide_bundle
 from tools.comparison import mosaic_gain
 
 
-@pytest.mark.parametrize("size", [None, "S"])
+@pytest.mark.parametrize("size", [None, "M"])
 def test_gains_are_told_by_place_and_iso_beside_the_cost(
     size: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
