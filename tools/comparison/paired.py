@@ -20,7 +20,7 @@ AIMS_DB: Final = {
     ("bank", CLASSIC): 0.5,
     ("S", "M" + EARLIER): 0.0,
     ("M", "M" + EARLIER): 0.2,
-    ("M", CLASSIC): 2.4,
+    ("M", CLASSIC): 2.5,
 }
 
 

@@ -82,7 +82,7 @@ def test_captures_that_lack_a_method_are_left_out_of_the_comparison() -> None:
 
 def test_the_page_holds_every_number_and_says_which_aims_were_reached() -> None:
     page = to_markdown(report(run() + run("bundle")))
-    assert "| network M over ADMM-TV | +2.50 +- 0.00 | +2.4: reached |" in page
+    assert "| network M over ADMM-TV | +2.50 +- 0.00 | +2.5: reached |" in page
     assert "| our Wiener bank over ADMM-TV | +0.50 +- 0.00 | +0.5: reached |" in page
     assert "| network M over U-Net | +0.50 +- 0.00 |  |" in page
     assert "2001, off by 0.07" in page
