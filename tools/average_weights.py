@@ -37,12 +37,12 @@ def main(words: Sequence[str] | None = None) -> None:
     try:
         end = read_checkpoint(arguments.checkpoint)
         start = read_first_weights(arguments.start, end.size, end.role).state
-        write_checkpoint(arguments.output, between(start, end, arguments.share))
+        write_checkpoint(arguments.output, part_of_the_way(start, end, arguments.share))
     except CamkitError as error:
         raise SystemExit(f"error: {error}") from error
 
 
-def between(start: State, end: Checkpoint, share: float) -> Checkpoint:
+def part_of_the_way(start: State, end: Checkpoint, share: float) -> Checkpoint:
     """Return a checkpoint whose exported weights are share * end + (1 - share) * start.
 
     Raises:

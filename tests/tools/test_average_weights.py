@@ -48,8 +48,8 @@ def test_the_file_lies_between_both_ends(end: Checkpoint, tmp_path: Path) -> Non
 
 def test_another_network_and_another_share_are_refused(end: Checkpoint) -> None:
     with pytest.raises(ContractError, match="another network: a, b differ"):
-        average_weights.between({}, end, 0.5)
+        average_weights.part_of_the_way({}, end, 0.5)
     with pytest.raises(ContractError, match="another network: b differ"):
-        average_weights.between(end.best | {"b": torch.zeros(3)}, end, 0.5)
+        average_weights.part_of_the_way(end.best | {"b": torch.zeros(3)}, end, 0.5)
     with pytest.raises(ContractError, match=r"0 to 1; got 1\.5"):
-        average_weights.between(end.best, end, 1.5)
+        average_weights.part_of_the_way(end.best, end, 1.5)
