@@ -101,7 +101,7 @@ def test_a_restored_picture_names_its_camera_too(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def whole_frames() -> list[tuple[Pipeline, Capture]]:
-    """Give a whole frame of every built-in camera that photographs."""
+    """Return a whole frame of every built-in camera that photographs."""
     frames = []
     for path in built_in_bundles().values():
         bundle = open_bundle(path)

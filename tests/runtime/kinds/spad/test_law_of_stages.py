@@ -101,7 +101,7 @@ def _made(bundle: Bundle, capture: Path, **choices: Any) -> Result:
 
 @pytest.fixture(scope="module")
 def made_usually(real: Bundle, folder: Path) -> Callable[..., Result]:
-    """What the bundle itself makes of a capture, once for all tests that compare with it."""
+    """Return the picture that the bundle itself makes of a capture, once for all tests that compare with it."""
 
     @cache
     def made(name: str, **choices: Any) -> Result:
