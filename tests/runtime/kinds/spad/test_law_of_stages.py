@@ -101,7 +101,7 @@ def _made(bundle: Bundle, capture: Path, **choices: Any) -> Result:
 
 @pytest.fixture(scope="module")
 def made_usually(real: Bundle, folder: Path) -> Callable[..., Result]:
-    """Return the picture that the bundle itself makes of a capture, once for all tests that compare with it."""
+    """Return what makes the bundle's own picture of a capture, once for all tests."""
 
     @cache
     def made(name: str, **choices: Any) -> Result:
