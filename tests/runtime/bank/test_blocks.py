@@ -1,12 +1,15 @@
 import threading
+import weakref
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from camkit.arrays import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.bank.blocks import (
+    Block,
     BlockBank,
     LocalPsf,
     binned_otf,
@@ -319,6 +322,35 @@ def test_a_failing_filter_ends_the_run_with_its_own_error():
 
 def test_psnr_of_the_tests_is_the_usual_one():
     assert psnr_db(np.zeros((3, 8, 8)), np.full((3, 8, 8), 0.1)) == pytest.approx(20, abs=1e-6)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_few_places_are_held_and_each_is_made_once_a_row(threads: int) -> None:
+    class Known:
+        pass
+
+    made: list[float] = []
+    living: weakref.WeakSet[Known] = weakref.WeakSet()
+
+    def know(_: object, height_mm: float) -> Known:
+        made.append(height_mm)
+        known = Known()
+        living.add(known)
+        return known
+
+    held: list[int] = []
+
+    def note(block: Block) -> FloatArray:
+        held.append(len(living))
+        return block.samples
+
+    psf = local_psf(*coma_kernels(radius_px=4, tail_px=3), (600, 20))
+    layout = {"block_px": 32, "overlap_px": 8, "threads": threads}
+    BlockBank(psf, note, knowledge=know, **layout).restore_array(np.zeros((3, 20, 600), np.float32))
+    places = (len(held) + 1) // 2
+    assert len(made) == places > 10, "two mirrored blocks share a place"
+    # that of a block, the next, and one whose last block just ended, of every thread
+    assert max(held) <= 2 + threads
 
 
 def test_a_bank_that_waits_between_bands_owns_no_threads() -> None:
