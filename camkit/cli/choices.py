@@ -35,7 +35,11 @@ DepthM = Annotated[
 ]
 GlassFiles = Annotated[
     list[Path] | None,
-    typer.Option("--glass", help="Your own glass catalogue (.agf); may be repeated."),
+    typer.Option(
+        "--glass",
+        help="Your own glass catalogue (.agf), and 'names' or 'numbers': what holds where a .zmx "
+        "file has both (default: the name, if its index fits the number); may be repeated.",
+    ),
 ]
 
 

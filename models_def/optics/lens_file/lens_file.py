@@ -5,8 +5,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+from camkit.caller import option_text
 from camkit.errors import ContractError, UnsupportedError
-from camkit.models_def.optics.glass.catalogue import GlassCatalogue
+from camkit.models_def.optics.glass.agf import read_agf
+from camkit.models_def.optics.lens_file.zmx_glass import GLASS_RULES
 from camkit.models_def.optics.lens_file.zmx_reader import read_zmx
 from camkit.models_def.optics.lens_file.zmx_writer import write_zmx
 from camkit.models_def.optics.prescription import Lens, read_prescription, write_prescription
@@ -17,32 +19,39 @@ PRESCRIPTIONS: Final = Path(__file__).resolve().parents[2] / "prescriptions"
 _log = logging.getLogger(__name__)
 
 
-def read_lens(path: Path, catalogues: Sequence[GlassCatalogue] = ()) -> Lens:
+def read_lens(path: Path) -> Lens:
     """Read a lens; what of a .zmx file is left out is logged as a warning.
 
     Args:
         path: .toml or .zmx, in small or capital letters, or the name of a built-in lens.
-        catalogues: Of the user (`read_agf`), beside those that come with camkit.
 
     Raises:
         UnsupportedError: If the suffix is another, or a .zmx file holds what camkit lacks.
         ContractError: If the lens is wrong or a glass unknown.
         DecodeError: If a file is damaged.
     """
-    lens, notes = read_noted_lens(path, catalogues)
+    lens, notes = read_noted_lens(path)
     for note in notes:
         _log.warning("%s: %s", path.name, note)
     return lens
 
 
-def read_noted_lens(
-    path: Path, catalogues: Sequence[GlassCatalogue] = ()
-) -> tuple[Lens, tuple[str, ...]]:
-    """Read a lens and what of its file it does not carry, one line each; see `read_lens`."""
+def read_noted_lens(path: Path, glass: Sequence[Path | str] = ()) -> tuple[Lens, tuple[str, ...]]:
+    """Read a lens and what of its file it does not carry, one line each; see `read_lens`.
+
+    Args:
+        path: As of `read_lens`.
+        glass: Catalogues (.agf) of the user, and at most one of `names` and `numbers`: what holds
+            where a line of a .zmx file has both (`GlassRule`).
+    """
     path = _built_in(path)
+    rules = [rule for rule in GLASS_RULES if rule in map(str, glass)]
+    if len(rules) > 1:
+        raise ContractError(f"{option_text('glass')} takes one of {' and '.join(rules)}")
+    catalogues = [read_agf(Path(file)) for file in glass if str(file) not in GLASS_RULES]
     if _suffix(path) == ".toml":
         return read_prescription(path, catalogues), ()
-    prescription = read_zmx(path, catalogues)
+    prescription = read_zmx(path, catalogues, *rules)
     return prescription.lens, prescription.notes
 
 

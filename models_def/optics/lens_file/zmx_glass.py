@@ -1,5 +1,10 @@
 """Glasses named as .zmx files name them: trade names in capitals, in the order of the GCAT line.
 
+Beside its name a GLAS line may state n_d and V_d, and a file made from a patent names a glass that
+is only near to them. A rule decides between the two: where their indices differ by more than 1e-3,
+or the name stands in no catalogue, the numbers hold. Programs that know none write 1.5 and 40, or
+zeros: those state nothing.
+
 A glass that no catalogue file can name (a plastic of the literature, a model glass) is written as
 a model glass with its strict name as the comment of the surface, from which it is read back.
 """
@@ -7,7 +12,7 @@ a model glass with its strict name as the comment of the surface, from which it 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal, get_args
 
 import torch
 
@@ -27,9 +32,17 @@ from camkit.models_def.optics.glass.dispersion import (
 )
 from camkit.models_def.optics.glass.material import Glass
 from camkit.models_def.optics.glass.model_glass import MODEL_PREFIX, model_glass
+from camkit.models_def.optics.lens_file.zmx_records import Record
 
 MODEL_NAME: Final = "___BLANK"
 COMMENT: Final = "glass "
+GlassRule = Literal["nearest", "names", "numbers"]
+GLASS_RULES: Final[tuple[GlassRule, ...]] = get_args(GlassRule)
+MOST_DIFFERENCE: Final = 1e-3
+"""In n_d or n_F - n_C, up to which a name holds against the numbers beside it."""
+LEAST_DIFFERENCE: Final = 1e-4
+"""From which the two are said to disagree: makers print five digits."""
+_FILLED_IN: Final = (1.5, 40.0)
 _SAME: Final = 1e-9
 """Other programs write 13 digits or more."""
 _ALIASES: Final = {"nikon": "hikari", "nikon_hikari": "hikari", "nikon-hikari": "hikari"}
@@ -46,18 +59,53 @@ class GlassOrder:
         user_catalogues: The user's catalogues; asked first.
         listed: Those of camkit that the GCAT line names, in its order; the first that has a name
             decides. A name that none of them has must stand in exactly one of the others.
+        rule: What holds where a line has a name and numbers; `nearest`: the name as long as its
+            index is that of the numbers within `MOST_DIFFERENCE`.
     """
 
     user_catalogues: tuple[GlassCatalogue, ...] = ()
     listed: tuple[GlassCatalogue, ...] = ()
+    rule: GlassRule = "nearest"
 
 
-def glass_order(names: Sequence[str], user_catalogues: Sequence[GlassCatalogue]) -> GlassOrder:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StatedNumbers:
+    """What a GLAS line states beside the name.
+
+    Attributes:
+        index_d: n_d.
+        abbe_number: V_d; 0 for no dispersion.
+        deviation: Of P_gF from the normal line.
+    """
+
+    index_d: float
+    abbe_number: float
+    deviation: float = 0.0
+
+    def difference(self, glass: Glass) -> float:
+        """Return the larger of the differences in n_d and n_F - n_C; 0 where a glass has none."""
+        index_d, abbe = index_and_abbe(glass)
+        if not index_d:
+            return 0.0
+        stated, known = (
+            (n - 1) / v if v else 0.0
+            for n, v in ((self.index_d, self.abbe_number), (index_d, abbe))
+        )
+        return max(abs(self.index_d - index_d), abs(stated - known))
+
+
+def glass_order(
+    names: Sequence[str],
+    user_catalogues: Sequence[GlassCatalogue],
+    rule: GlassRule = "nearest",
+) -> GlassOrder:
     """Return the order for a GCAT line; catalogues that camkit does not have are passed over."""
     catalogues = [c for c in builtin_catalogues() if not c.literature]
     catalogue_names = [_ALIASES.get(name.casefold(), name.casefold()) for name in names]
     listed = (c for name in catalogue_names for c in catalogues if gcat_name(c) == name.upper())
-    return GlassOrder(user_catalogues=tuple(user_catalogues), listed=tuple(dict.fromkeys(listed)))
+    return GlassOrder(
+        user_catalogues=tuple(user_catalogues), listed=tuple(dict.fromkeys(listed)), rule=rule
+    )
 
 
 def gcat_name(catalogue: GlassCatalogue) -> str:
@@ -66,8 +114,59 @@ def gcat_name(catalogue: GlassCatalogue) -> str:
     return _OLDER.get(name, name).upper()
 
 
+def stated_numbers(glass: Record) -> StatedNumbers | None:
+    """Return what a GLAS line with a name states besides; None where it states nothing."""
+    try:
+        index_d, abbe, *rest = map(float, glass.words[3:6])
+    except ValueError:
+        return None
+    if index_d <= 1 or abbe <= 0 or (index_d, abbe) == _FILLED_IN:
+        return None
+    return StatedNumbers(index_d=index_d, abbe_number=abbe, deviation=rest[0] if rest else 0.0)
+
+
+def read_glass(record: Record, order: GlassOrder) -> Glass:
+    """Return the glass of a GLAS line with a name, by the rule of the order.
+
+    Raises:
+        ContractError: If no catalogue has the name, or several do that GCAT does not name, and no
+            numbers stand beside it or the rule forbids them.
+    """
+    numbers = stated_numbers(record)
+    if numbers is None or order.rule == "names":
+        return find_zmx_glass(record.words[0], order)
+    model = model_glass(numbers.index_d, numbers.abbe_number, numbers.deviation)
+    if order.rule == "numbers":
+        return model
+    try:
+        glass = find_zmx_glass(record.words[0], order)
+    except ContractError:
+        return model
+    return glass if numbers.difference(glass) <= MOST_DIFFERENCE else model
+
+
+def glass_note(record: Record, order: GlassOrder, glass: Glass) -> str | None:
+    """Return how a glass was read, where name and numbers of its line disagree; else None."""
+    name, numbers = record.words[0], stated_numbers(record)
+    if name == MODEL_NAME or numbers is None:
+        return None
+    stated = f"n_d {numbers.index_d:.6g} and V_d {numbers.abbe_number:.4g}"
+    try:
+        known = find_zmx_glass(name, order)
+    except ContractError:
+        return f"{name} is no glass of one catalogue: read by its numbers, {stated}"
+    if numbers.difference(known) < LEAST_DIFFERENCE:
+        return None
+    index_d, abbe = index_and_abbe(known)
+    way = "name" if glass == known else "numbers"
+    return (
+        f"{name} states {stated}, {known.name} has {index_d:.6g} and {abbe:.4g}: read by its {way} "
+        f"({option_text('glass')} decides)"
+    )
+
+
 def find_zmx_glass(name: str, order: GlassOrder) -> Glass:
-    """Return the glass of a GLAS line.
+    """Return the glass that a GLAS line names.
 
     Raises:
         ContractError: If no catalogue has it, or several do that GCAT does not name.

@@ -7,10 +7,16 @@ from pathlib import Path
 from typing import Final
 
 from camkit.errors import DecodeError, UnsupportedError
-from camkit.models_def.optics.glass.catalogue import GlassCatalogue
+from camkit.models_def.optics.glass.catalogue import AIR, GlassCatalogue
 from camkit.models_def.optics.glass.encoding import read_text
 from camkit.models_def.optics.lens_file.zmx_field import with_fields
-from camkit.models_def.optics.lens_file.zmx_glass import OLD_SCHOTT, GlassOrder, glass_order
+from camkit.models_def.optics.lens_file.zmx_glass import (
+    OLD_SCHOTT,
+    GlassOrder,
+    GlassRule,
+    glass_note,
+    glass_order,
+)
 from camkit.models_def.optics.lens_file.zmx_records import (
     Record,
     Records,
@@ -46,23 +52,30 @@ class ZmxLens:
     notes: tuple[str, ...]
 
 
-def read_zmx(path: Path, catalogues: Sequence[GlassCatalogue] = ()) -> ZmxLens:
+def read_zmx(
+    path: Path, catalogues: Sequence[GlassCatalogue] = (), rule: GlassRule = "nearest"
+) -> ZmxLens:
     """Read a lens from a .zmx file.
 
     Args:
         path: UTF-16, UTF-8 or latin-1.
         catalogues: Of the user; asked for glasses before those of the GCAT line.
+        rule: For glasses whose line states numbers beside the name.
 
     Raises:
         DecodeError: If the file is damaged; the message gives the line.
         UnsupportedError: If it holds what camkit does not trace; the message names it.
         ContractError: If a glass is unknown or the lens makes no sense.
     """
-    return parse_zmx(read_text(path), catalogues, name=path.stem)
+    return parse_zmx(read_text(path), catalogues, rule, name=path.stem)
 
 
 def parse_zmx(
-    text: str, catalogues: Sequence[GlassCatalogue] = (), *, name: str = "lens"
+    text: str,
+    catalogues: Sequence[GlassCatalogue] = (),
+    rule: GlassRule = "nearest",
+    *,
+    name: str = "lens",
 ) -> ZmxLens:
     """Read a lens from the text of a .zmx file; see `read_zmx`."""
     records = parse_records(text)
@@ -74,7 +87,7 @@ def parse_zmx(
     object_mm = _object_distance_mm(records, scale)
     _check_image(records)
     gcat = last(system, "GCAT")
-    order = glass_order(gcat.words if gcat else (), catalogues)
+    order = glass_order(gcat.words if gcat else (), catalogues, rule)
     surfaces = tuple(
         read_surface(block, SurfaceContext(number=i, mm_per_unit=scale, order=order))
         for i, block in enumerate(records.surfaces[1:-1], start=1)
@@ -244,14 +257,21 @@ def _notes(records: ZmxRecords, surfaces: tuple[Surface, ...]) -> tuple[str, ...
 def _glass_notes(
     records: ZmxRecords, surfaces: tuple[Surface, ...], order: GlassOrder
 ) -> tuple[str, ...]:
-    """Return notes on glasses that are not of a catalogue that GCAT names: once for each."""
+    """Return notes on glasses: once for each.
+
+    Said are those whose name and numbers disagree, and those of a catalogue that GCAT leaves out.
+    """
     catalogues = {c.name for c in (*order.user_catalogues, *order.listed)} - {OLD_SCHOTT}
     notes: dict[str, str] = {}
     for block, surface in zip(records.surfaces[1:-1], surfaces, strict=True):
         glass = last(block, "GLAS")
-        if glass is None or ":" in surface.glass or "-" not in surface.glass:
+        if glass is None or not glass.words or surface.glass == AIR.name:
             continue
+        note = glass_note(glass, order, surface.medium)
         name, _, catalogue = surface.glass.rpartition("-")
-        if catalogue not in catalogues and glass.words[0].upper() == name.upper():
-            notes.setdefault(name, f"line {glass.line}: {name} is read as {surface.glass}")
+        is_strange = ":" not in surface.glass and name and catalogue not in catalogues
+        if note is None and is_strange and glass.words[0].upper() == name.upper():
+            note = f"{name} is read as {surface.glass}"
+        if note is not None:
+            notes.setdefault(note, f"line {glass.line}: {note}")
     return tuple(notes.values())

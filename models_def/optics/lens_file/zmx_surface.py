@@ -10,7 +10,7 @@ from camkit.models_def.optics.glass.material import Glass
 from camkit.models_def.optics.lens_file.zmx_glass import (
     MODEL_NAME,
     GlassOrder,
-    find_zmx_glass,
+    read_glass,
     read_model_glass,
 )
 from camkit.models_def.optics.lens_file.zmx_records import Record, Records, last
@@ -20,7 +20,6 @@ EVEN_TERMS: Final = 8
 _TYPES: Final = ("STANDARD", "EVENASPH")
 _FIXED: Final = (1, 2)
 """Stated, and picked up from another surface; 0 and 3 follow the rays."""
-_FILLED_IN: Final = (1.5, 40.0)
 _OBSTACLES: Final = ("SQAP", "SQOB", "ELAP", "ELOB", "USAP", "USOB", "OBSC", "SPID")
 
 
@@ -121,23 +120,10 @@ def _glass(records: Records, context: SurfaceContext) -> Glass:
             comment = last(records, "COMM")
             numbers = [record.number(3), record.number(4), record.number(5, 0.0)]
             return read_model_glass(numbers, comment.text.strip() if comment else "", context.order)
-        return find_zmx_glass(name, context.order)
+        return read_glass(record, context.order)
     except ContractError as error:
         where = f"line {record.line}: surface {context.number}"
-        raise ContractError(f"{where}: {error}{_model_hint(record)}") from error
-
-
-def _model_hint(glass: Record) -> str:
-    """Return the glass model of the line; programs write 1.5 and 40 if they know none."""
-    words = glass.words[3:5]
-    try:
-        index_d, number = map(float, words)
-    except ValueError:
-        return ""
-    if index_d <= 1 or number <= 0 or (index_d, number) == _FILLED_IN:
-        return ""
-    model = f"GLAS {MODEL_NAME} 1 0 {words[0]} {words[1]}"
-    return f"; or write {model}, the n_d and V_d of the line, for a model of it"
+        raise ContractError(f"{where}: {error}") from error
 
 
 def _semi_diameter(records: Records, number: int) -> float:

@@ -35,7 +35,6 @@ def convert(
 
     require_torch("camkit lens convert")
     refuse_existing([out], overwrite=overwrite)
-    from camkit.models_def.optics.glass.agf import read_agf
     from camkit.models_def.optics.lens_file.lens_file import (
         read_noted_lens,
         ready_for_lens,
@@ -44,8 +43,7 @@ def convert(
     from camkit.models_def.optics.scaling import scale_to_efl, with_f_number
 
     ready_for_lens(out)
-    catalogues = [read_agf(path) for path in glass or ()]
-    lens, notes = read_noted_lens(source, catalogues)
+    lens, notes = read_noted_lens(source, glass or ())
     if efl_mm is not None:
         lens = scale_to_efl(lens, efl_mm)
     if f_number is not None:

@@ -60,7 +60,6 @@ def optimize(
 
     require_torch("camkit lens optimize")
     refuse_existing([out], overwrite=overwrite)
-    from camkit.models_def.optics.glass.agf import read_agf
     from camkit.models_def.optics.lens_file.lens_file import (
         read_noted_lens,
         ready_for_lens,
@@ -70,7 +69,7 @@ def optimize(
     from camkit.models_def.optics.search.own_frame import in_own_frame, too_small_rims
 
     ready_for_lens(out)
-    lens, read_notes = read_noted_lens(source, [read_agf(path) for path in glass or ()])
+    lens, read_notes = read_noted_lens(source, glass or ())
     problem = _problem(lens, vary, merit=merit, core_mm=core_um / 1000, rays=rays)
     begin = problem.free.scaled()
     problem = in_own_frame(problem, begin)

@@ -49,11 +49,10 @@ def peak(
     import torch
 
     torch.set_num_threads(1)
-    from camkit.models_def.optics.glass.agf import read_agf
     from camkit.models_def.optics.lens_file.lens_file import read_noted_lens
     from camkit.models_def.optics.thin.report import to_text, with_tool
 
-    lens, notes = read_noted_lens(file, [read_agf(path) for path in glass or ()])
+    lens, notes = read_noted_lens(file, glass or ())
     if tool_radius_um is not None:
         lens = with_tool(lens, tool_radius_um)
     record = measured(lens, lens.field_angles_rad, pitch_um, waves=waves)

@@ -35,11 +35,10 @@ def sag(
     require_torch("camkit lens sag")
     refuse_existing([out], overwrite=overwrite)
     from camkit.errors import ContractError
-    from camkit.models_def.optics.glass.agf import read_agf
     from camkit.models_def.optics.lens_file.lens_file import read_noted_lens
     from camkit.models_def.optics.thin.sag_table import sag_table, write_sag_table
 
-    lens, notes = read_noted_lens(file, [read_agf(path) for path in glass or ()])
+    lens, notes = read_noted_lens(file, glass or ())
     if surface is None:
         cut = (n for n, face in enumerate(lens.surfaces) if face.grooves is not None)
         surface = next(cut, 0)

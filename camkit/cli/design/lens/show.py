@@ -40,7 +40,6 @@ def show(
 
     require_torch("camkit lens show")
     from camkit.models_def.optics.analysis.sampling import Pupil
-    from camkit.models_def.optics.glass.agf import read_agf
     from camkit.models_def.optics.lens_file.lens_file import read_noted_lens
     from camkit.report.pages.lens.lens_facts import analyse, to_json
     from camkit.report.pages.lens.lens_page import write_lens_page
@@ -50,7 +49,7 @@ def show(
     folder = out_dir if out_dir is not None or json_ else Path()
     if folder is not None:
         refuse_existing([page_path(folder, file.stem)], overwrite=overwrite)
-    lens, notes = read_noted_lens(file, [read_agf(path) for path in glass or ()])
+    lens, notes = read_noted_lens(file, glass or ())
     with working(f"measuring {lens.name}"):
         facts = analyse(lens, rays, notes)
     with working("drawing the page"):

@@ -56,14 +56,13 @@ def tolerance(
     # the arrays are small: more threads mostly wait for each other
     torch.set_num_threads(1)
     from camkit.models_def.design.tolerance import ToleranceRun, run_tolerance
-    from camkit.models_def.optics.glass.agf import read_agf
     from camkit.models_def.optics.lens_file.lens_file import read_noted_lens
     from camkit.report.pages.lens.yield_chart import chart_paths, to_json, to_text, write_tolerance
 
     folder = out_dir if out_dir is not None or json_ else Path()
     if folder is not None:
         refuse_existing(chart_paths(folder, file.stem), overwrite=overwrite)
-    lens, notes = read_noted_lens(file, [read_agf(path) for path in glass or ()])
+    lens, notes = read_noted_lens(file, glass or ())
     for note in notes:
         say(f"{file.name}: {note}", err=True)
     run = ToleranceRun(

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from camkit.errors import CamkitError, ContractError, DecodeError, UnsupportedError
 from camkit.models_def.optics.glass.agf import parse_agf
+from camkit.models_def.optics.lens_file.zmx_glass import GlassRule
 from camkit.models_def.optics.lens_file.zmx_reader import parse_zmx, read_zmx
 from camkit.models_def.optics.paraxial import focal_lengths, paraxial_data
 from camkit.models_def.optics.spot import chief_heights
@@ -248,10 +249,6 @@ def test_glass_is_found_in_the_order_of_gcat(glas: str, gcat: str, name: str) ->
             r"line 32: surface 1: glass must .*'XN-BK7'.*N-BK7-Schott.*a file in .agf, with glass",
         ),
         ("F2", "may be F2-Schott or F2-Hikari"),
-        (
-            "XN-BK7 0 0 1.6 50.3",
-            "a file in .agf, with glass; or write GLAS ___BLANK 1 0 1.6 50.3, the n_d",
-        ),
         ("XN-BK7 0 0 1.5 4.0E+1", "a file in .agf, with glass$"),
         ("___BLANK 1 0 0.5 60", "a model glass needs"),
     ],
@@ -260,6 +257,75 @@ def test_unknown_glass_is_refused_with_its_line(glas: str, message: str) -> None
     text = _changed(("GLAS N-BK7 0 0 0 0 0 0 0 0 0 0", f"GLAS {glas}"), ("GCAT SCHOTT", "GCAT"))
     with pytest.raises(ContractError, match=message):
         parse_zmx(text)
+
+
+@pytest.mark.parametrize(
+    ("glas", "rule", "name", "note"),
+    [
+        # a patent's glass is near to one with a name: 7.7e-3 apart
+        (
+            "K5G20 0 0 1.5311 55.9",
+            "nearest",
+            "model:1.5311,55.9",
+            "K5G20 states n_d 1.5311 and V_d 55.9, K5G20-Schott has 1.52344 and 56.76: "
+            "read by its numbers (glass decides)",
+        ),
+        (
+            "K5G20 0 0 1.5311 55.9",
+            "names",
+            "K5G20-Schott",
+            "K5G20 states n_d 1.5311 and V_d 55.9, K5G20-Schott has 1.52344 and 56.76: "
+            "read by its name (glass decides)",
+        ),
+        # 2e-4 apart: another melt
+        (
+            "N-LASF41 0 0 1.83481 42.7",
+            "nearest",
+            "N-LASF41-Schott",
+            "N-LASF41 states n_d 1.83481 and V_d 42.7, N-LASF41-Schott has 1.83501 and 43.13: "
+            "read by its name (glass decides)",
+        ),
+        # the same n_d, but 2e-3 more dispersion
+        (
+            "N-BK7 0 0 1.5168 55",
+            "nearest",
+            "model:1.5168,55.0",
+            "N-BK7 states n_d 1.5168 and V_d 55, N-BK7-Schott has 1.5168 and 64.17: "
+            "read by its numbers (glass decides)",
+        ),
+        ("N-BK7 0 0 1.5168 64.17", "nearest", "N-BK7-Schott", None),
+        ("N-BK7 0 0 1.5168 64.17", "numbers", "model:1.5168,64.17", None),
+        # programs that know no numbers write these
+        ("N-BK7 0 0 1.5 4.0E+1 0 0 0 0 0 0", "numbers", "N-BK7-Schott", None),
+        ("N-BK7 0 0 0 0 0 0 0 0 0 0", "numbers", "N-BK7-Schott", None),
+        (
+            "XN-BK7 0 0 1.6 50.3 0.01",
+            "nearest",
+            "model:1.6,50.3,0.01",
+            "XN-BK7 is no glass of one catalogue: read by its numbers, n_d 1.6 and V_d 50.3",
+        ),
+        (
+            "F2 0 0 1.62 36.37",
+            "nearest",
+            "model:1.62,36.37",
+            "F2 is no glass of one catalogue: read by its numbers, n_d 1.62 and V_d 36.37",
+        ),
+    ],
+)
+def test_numbers_beside_a_name_decide_where_they_differ(
+    glas: str, rule: GlassRule, name: str, note: str | None
+) -> None:
+    text = _changed(("GLAS N-BK7 0 0 0 0 0 0 0 0 0 0", f"GLAS {glas}"), ("GCAT SCHOTT", "GCAT"))
+    text = text.replace("GCAT INFRARED", "GCAT SCHOTT") if name != "model:1.62,36.37" else text
+    zmx = parse_zmx(text, rule=rule)
+    assert zmx.lens.surfaces[0].glass == name
+    assert zmx.notes == (() if note is None else (f"line 32: {note}",))
+
+
+def test_a_name_without_numbers_is_refused_where_names_hold() -> None:
+    text = _changed(("GLAS N-BK7 0 0 0 0 0 0 0 0 0 0", "GLAS XN-BK7 0 0 1.6 50.3"))
+    with pytest.raises(ContractError, match="'XN-BK7'"):
+        parse_zmx(text, rule="names")
 
 
 @pytest.mark.parametrize(

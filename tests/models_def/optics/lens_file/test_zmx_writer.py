@@ -113,7 +113,9 @@ def test_glass_of_a_users_catalogue_needs_that_catalogue() -> None:
     text = format_zmx(lens)
     assert parse_zmx(text, [MINE]).lens == lens
     with pytest.raises(ContractError, match=r"FOO.*glass"):
-        parse_zmx(text)
+        parse_zmx(text, rule="names")
+    (note,) = parse_zmx(text).notes
+    assert "FOO is no glass of one catalogue: read by its numbers" in note
 
 
 def test_what_the_format_cannot_hold_is_refused() -> None:
