@@ -1,16 +1,52 @@
-"""TOML tables turned into dataclasses; unknown, missing and wrong keys are errors naming them."""
+"""TOML tables turned into dataclasses; unknown, missing and wrong keys are errors naming them.
 
+All faults of a table are named at once.
+"""
+
+import difflib
 import hashlib
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, fields
+from itertools import chain
 from types import NoneType, UnionType
-from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, Final, Literal, ParamSpec, TypeVar, get_args, get_origin, get_type_hints
 
 from camkit.errors import ContractError
 
+MOST_LISTED: Final = 6
+"""Keys that a message lists: the nearest ones where there are more."""
+
 T = TypeVar("T")
+P = ParamSpec("P")
+
+
+class Faults:
+    """Faults of a file, gathered part by part and raised together."""
+
+    def __init__(self) -> None:
+        self._texts: list[str] = []
+
+    def read(self, reader: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """Return what a reader returns; a part that it refuses counts, and gives None.
+
+        What is read after a fault is only used to find further ones: call `refuse` before it is.
+        """
+        try:
+            return reader(*args, **kwargs)
+        except ContractError as error:
+            self._texts.append(str(error))
+            return None  # type: ignore[return-value]
+
+    def refuse(self) -> None:
+        """Refuse the file if there was a fault.
+
+        Raises:
+            ContractError: Naming all of them.
+        """
+        if self._texts:
+            raise ContractError("; ".join(dict.fromkeys(self._texts)))
 
 
 def section(where: str, kind: type[T], table: Any) -> T:
@@ -22,25 +58,47 @@ def section(where: str, kind: type[T], table: Any) -> T:
     if not isinstance(table, Mapping):
         raise ContractError(f"{where} must be a table; got {table!r}")
     hints = get_type_hints(kind)
-    check_keys(where, table, set(hints))
+    faults = Faults()
+    faults.read(check_keys, where, table, set(hints))
     required = {f.name for f in fields(kind) if _is_required(f)}  # type: ignore[arg-type]
-    missing = required - set(table)
-    if missing:
-        raise ContractError(f"{where} lacks {', '.join(sorted(missing))}")
-    return kind(**{k: typed(f"{where}.{k}", v, hints[k]) for k, v in table.items()})
+    faults.read(_check_missing, where, required - set(table))
+    values = {
+        key: faults.read(typed, f"{where}.{key}", value, hints[key])
+        for key, value in table.items()
+        if key in hints
+    }
+    faults.refuse()
+    return kind(**values)
 
 
 def check_keys(where: str, table: Mapping[str, Any], keys: set[str]) -> None:
     """Refuse keys that are not known."""
     unknown = sorted(set(table) - keys)
     if unknown:
+        names = ", ".join(map(repr, unknown))
+        known = sorted(keys)
+        if len(known) > MOST_LISTED:
+            near = (difflib.get_close_matches(name, known, MOST_LISTED, 0.0) for name in unknown)
+            known = list(dict.fromkeys(chain.from_iterable(zip(*near, strict=True))))[:MOST_LISTED]
         raise ContractError(
-            f"{where}: unknown key {unknown[0]!r}; known are {', '.join(sorted(keys))}"
+            f"{where}: unknown key{'s' * (len(unknown) > 1)} {names}; known are "
+            f"{', '.join(known)}{' and others' * (len(known) < len(keys))}"
         )
 
 
+def _check_missing(where: str, missing: set[str]) -> None:
+    if missing:
+        raise ContractError(f"{where} lacks {', '.join(sorted(missing))}")
+
+
 def typed(where: str, value: Any, kind: Any) -> Any:
-    """Return a value as the type of its field; whole numbers pass as float, lists as tuples."""
+    """Return a value as the type of its field; whole numbers pass as float, lists as tuples.
+
+    Raises:
+        ContractError: If it is of another type, or None: TOML has none, so the key is missing.
+    """
+    if value is None:
+        raise ContractError(f"{where} is missing")
     if get_origin(kind) is UnionType:  # TOML has no None: a key that is there has a value
         (kind,) = (one for one in get_args(kind) if one is not NoneType)
     if get_origin(kind) is tuple:

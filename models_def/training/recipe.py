@@ -16,7 +16,7 @@ from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from camkit.bundle.sensor import BayerSensor, Sensor, nested_sensor
 from camkit.errors import ContractError
-from camkit.models_def.toml_table import check_keys, section, typed
+from camkit.models_def.toml_table import Faults, check_keys, section, typed
 
 PICTURE_LOSSES = ("content", "adversarial")
 """Of what is seen on a display; by a fitter that a kind brings."""
@@ -302,16 +302,20 @@ def common_tables(
         main: The role of [networks.SIZE]; None for the only one.
 
     Raises:
-        ContractError: If a key is unknown, missing or wrong.
+        ContractError: If keys are unknown, missing or wrong: naming all of them.
     """
-    check_keys("recipe", table, {*COMMON, *kind_keys})
-    schedule = own_schedule("schedule", table.get("schedule", {}), ScheduleRecipe())
-    return CommonTables(
-        name=typed("name", table.get("name"), str),
-        kind=typed("kind", table.get("kind", DEFAULT_KIND), str),
-        sensor=_sensor(table.get("sensor", {})),
-        networks=_networks(table.get("networks"), schedule, roles, main),
+    faults = Faults()
+    faults.read(check_keys, "recipe", table, {*COMMON, *kind_keys})
+    base = ScheduleRecipe()
+    schedule = faults.read(own_schedule, "schedule", table.get("schedule", {}), base) or base
+    common = CommonTables(
+        name=faults.read(typed, "name", table.get("name"), str),
+        kind=faults.read(typed, "kind", table.get("kind", DEFAULT_KIND), str),
+        sensor=faults.read(_sensor, table.get("sensor", {})),
+        networks=faults.read(_networks, table.get("networks"), schedule, roles, main),
     )
+    faults.refuse()
+    return common
 
 
 def mosaic_sensor(sensor: Sensor) -> BayerSensor:
@@ -392,9 +396,12 @@ def _sensor(table: Any) -> Sensor:
 
 
 def _refusal(where: str, error: ValidationError) -> ContractError:
-    first = error.errors()[0]
-    parts = (str(part) for part in first["loc"] if part not in _FLAT)
-    return ContractError(f"{'.'.join([where, *parts])}: {first['msg']}")
+    texts = []
+    for fault in error.errors():
+        key = ".".join([where, *(str(part) for part in fault["loc"] if part not in _FLAT)])
+        is_missing = fault["type"] == "missing"
+        texts.append(f"{key} is missing" if is_missing else f"{key}: {fault['msg']}")
+    return ContractError("; ".join(texts))
 
 
 def _networks(

@@ -15,7 +15,7 @@ from camkit.bundle.stages import Dehaze, Together, Wiener
 from camkit.bundle.stages.network import DEFAULT_ROLE
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.scene_light import DisplayRecipe, WildRecipe
-from camkit.models_def.toml_table import section, table_digest, typed
+from camkit.models_def.toml_table import Faults, section, table_digest, typed
 from camkit.models_def.training.pictures import DrawnShares
 from camkit.models_def.training.recipe import (
     DataRecipe,
@@ -384,28 +384,38 @@ def to_bayer_recipe(table: Mapping[str, Any]) -> BayerRecipe:
     """Convert a parsed TOML table to a recipe.
 
     Raises:
-        ContractError: If a key is unknown, missing or wrong, the sensor has no mosaic, or there are
-            frames without a haze.
+        ContractError: If keys are unknown, missing or wrong, all of which are named, the sensor has
+            no mosaic, or there are frames without a haze.
     """
     table = with_new_names(table, _OLDER)
-    common = common_tables(table, kind_keys=OWN_KEYS, roles=ROLES)
-    if "frames" in table and "haze" not in table:
-        raise ContractError("[frames] is for a lens with a haze; there is no table [haze]")
+    faults = Faults()
+    common = faults.read(common_tables, table, kind_keys=OWN_KEYS, roles=ROLES)
+    faults.read(_check_frames, table)
+    distance_mm = faults.read(typed, "object_distance_mm", table.get("object_distance_mm"), float)
+    parts = {
+        "scale": faults.read(typed, "scale", table.get("scale", 64.0), float),
+        "wiener": faults.read(model, "wiener", Wiener, table),
+        "lens": faults.read(section, "lens", LensRecipe, table.get("lens", {})),
+        "data": faults.read(_data, table.get("data", {})),
+        "fine_tuning": faults.read(_fine_tuning, table.get("fine_tuning", {})),
+        "light": faults.read(model, "light", LightBound, table) if "light" in table else None,
+        "haze": faults.read(model, "haze", Dehaze, table) if "haze" in table else None,
+        "frames": faults.read(section, "frames", FramesRecipe, table.get("frames", {})),
+    }
+    faults.refuse()
     return BayerRecipe(
         name=common.name,
         kind=common.kind,
         sensor=mosaic_sensor(common.sensor),
         networks=common.networks,
-        object_distance_mm=typed("object_distance_mm", table.get("object_distance_mm"), float),
-        scale=typed("scale", table.get("scale", 64.0), float),
-        wiener=model("wiener", Wiener, table),
-        lens=section("lens", LensRecipe, table.get("lens", {})),
-        data=_data(table.get("data", {})),
-        fine_tuning=_fine_tuning(table.get("fine_tuning", {})),
-        light=model("light", LightBound, table) if "light" in table else None,
-        haze=model("haze", Dehaze, table) if "haze" in table else None,
-        frames=section("frames", FramesRecipe, table.get("frames", {})),
+        object_distance_mm=distance_mm,
+        **parts,
     )
+
+
+def _check_frames(table: Mapping[str, Any]) -> None:
+    if "frames" in table and "haze" not in table:
+        raise ContractError("[frames] is for a lens with a haze; there is no table [haze]")
 
 
 def _data(table: Any) -> BayerDataRecipe:

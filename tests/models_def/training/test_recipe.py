@@ -69,7 +69,7 @@ def test_a_kind_of_one_role_needs_not_name_it():
         ({"S": {"network": "a"}}, r"networks\.S is of no role; write \[networks\.ROLE\.S\]"),
         ({"third": {"S": {"network": "a"}}}, r"networks\.third is of no role"),
         ({"first": {"S": 3}}, r"networks\.first\.S must be a table"),
-        ({"first": {"S": {}}}, r"networks\.first\.S\.network must be of type str"),
+        ({"first": {"S": {}}}, r"networks\.first\.S\.network is missing"),
         ({"first": {"S": {"network": "a", "schedule": 3}}}, r"schedule must be a table"),
         ({"first": 3}, r"networks\.first must be a table"),
         ([], "at least one table"),

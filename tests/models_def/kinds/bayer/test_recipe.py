@@ -60,7 +60,7 @@ def test_network_schedule_overrides_the_common_one(recipe):
         ("sensor__shape", 3, "sensor.shape"),
         ("wiener__prior_scale", None, "wiener.prior_scale"),
         ("networks__S__netwrok", "x", "networks.S: unknown key"),
-        ("networks__S__network", None, "networks.S.network must be of type str"),
+        ("networks__S__network", None, "networks.S.network is missing"),
         ("networks__S", 3, "networks.S must be a table"),
         ("schedule", 3, "schedule must be a table"),
         ("sensor", 3, "sensor must be a table"),
@@ -71,7 +71,7 @@ def test_network_schedule_overrides_the_common_one(recipe):
         ("frames", {"count": 2}, "there is no table .haze."),
         ("kind", 3, "kind must be of type str"),
         ("networks", {}, "at least one table"),
-        ("name", None, "name must be of type str"),
+        ("name", None, "name is missing"),
     ],
 )
 def test_wrong_recipes_are_refused_by_naming_the_key(recipe_path, change, value, named):
@@ -172,3 +172,30 @@ def test_only_several_depths_can_be_known(recipe_path):
 def test_shares_of_depths_must_fit_the_depths(recipe_path, shares, message):
     with pytest.raises(ContractError, match=message):
         to_recipe(table(recipe_path, lens__depths_mm=[500.0, 900.0], data__depth_shares=shares))
+
+
+def test_all_faults_are_named_at_once() -> None:
+    table = {
+        "nam": "x",
+        "sensor": {"cfa": "RGGB", "width_px": -1},
+        "wiener": {"block": 3},
+        "lens": {"copies": "many"},
+        "data": {"foo": 1, "iso_max": "x"},
+    }
+    with pytest.raises(ContractError) as refusal:
+        to_recipe(table)
+    for fault in (
+        "unknown key 'nam'",
+        "name is missing",
+        "sensor.width_px: ",
+        "sensor.noise is missing",
+        "at least one table [networks.SIZE]",
+        "object_distance_mm is missing",
+        "wiener.prior_scale is missing",
+        "wiener.block: ",
+        "lens lacks prescription",
+        "lens.copies must be of type int; got 'many'",
+        "data: unknown key 'foo'; known are ",
+        "data.iso_max must be of type float; got 'x'",
+    ):
+        assert fault in str(refusal.value)

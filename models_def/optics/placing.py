@@ -1,0 +1,148 @@
+"""A lens stopped, focused and told where its objects lie, as people state it.
+
+    stop -> focus on a distance (the whole lens moves) -> distances of objects from the first vertex
+
+Lens scales count from the sensor, programs from the first vertex, theory from the entrance pupil;
+camkit counts from the first vertex. From the sensor, a distance and where the sensor stands depend
+on each other, and are found together.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final, Literal, get_args
+
+from camkit.caller import option_text
+from camkit.errors import ContractError
+from camkit.models_def.optics.focus import FocusMerit, with_focus
+from camkit.models_def.optics.paraxial import paraxial_data
+from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.scaling import with_f_number
+
+DistanceOrigin = Literal["vertex", "sensor", "pupil"]
+DISTANCE_ORIGINS: Final[tuple[DistanceOrigin, ...]] = get_args(DistanceOrigin)
+_ROUNDS: Final = 60
+_SETTLED_MM: Final = 1e-9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Placement:
+    """How a lens is used.
+
+    Attributes:
+        f_number: EFL / entrance pupil diameter to stop to; None for that of the file.
+        stop_radius_mm: Of the stop, in place of an F-number.
+        focus_mm: Distance that the lens is focused on; None leaves the sensor where the file has
+            it.
+        objects_mm: Distances of the scene, in any order; none for where the lens is focused.
+        origin: What `focus_mm` and `objects_mm` count from.
+        merit: What is best in focus.
+    """
+
+    f_number: float | None = None
+    stop_radius_mm: float | None = None
+    focus_mm: float | None = None
+    objects_mm: Sequence[float] = ()
+    origin: DistanceOrigin = "vertex"
+    merit: FocusMerit = "spot"
+
+    def __post_init__(self) -> None:
+        if self.f_number is not None and self.stop_radius_mm is not None:
+            raise ContractError(
+                f"give {option_text('f_number')} or {option_text('stop_radius_mm')}, not both"
+            )
+        if self.origin not in DISTANCE_ORIGINS:
+            raise ContractError(
+                f"{option_text('distance_from')} takes one of {', '.join(DISTANCE_ORIGINS)}; "
+                f"got {self.origin!r}"
+            )
+        lengths = {"focus_mm": self.focus_mm, "stop_radius_mm": self.stop_radius_mm}
+        lengths |= {f"object_mm {i + 1}": value for i, value in enumerate(self.objects_mm)}
+        wrong = [f"{k} {v}" for k, v in lengths.items() if v is not None and not v > 0]
+        if wrong:
+            raise ContractError(f"lengths must be > 0; got {', '.join(wrong)}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlacedLens:
+    """A lens as it is used.
+
+    Attributes:
+        lens: Stopped and focused; its object distance is the one it is focused on.
+        objects_mm: Distances of the scene from the first vertex, increasing.
+    """
+
+    lens: Lens
+    objects_mm: tuple[float, ...]
+
+
+def placed_lens(lens: Lens, placement: Placement) -> PlacedLens:
+    """Return a lens as it is used.
+
+    Raises:
+        ContractError: If an object would lie within the lens, or the lens cannot be focused.
+    """
+    stopped = _stopped(lens, placement)
+    focused = _focused(stopped, placement)
+    objects = [_from_vertex(focused, value, placement.origin) for value in placement.objects_mm]
+    return PlacedLens(
+        lens=focused, objects_mm=tuple(sorted(set(objects))) or (focused.object_distance_mm,)
+    )
+
+
+def track_mm(lens: Lens) -> float:
+    """Return the way from the first vertex to the sensor."""
+    return sum(surface.thickness_mm for surface in lens.surfaces)
+
+
+def _stopped(lens: Lens, placement: Placement) -> Lens:
+    if placement.f_number is not None:
+        return with_f_number(lens, placement.f_number)
+    if placement.stop_radius_mm is None:
+        return lens
+    surfaces = list(lens.surfaces)
+    stop = surfaces[lens.stop]
+    rim_mm = max(stop.semi_diameter_mm, placement.stop_radius_mm)
+    surfaces[lens.stop] = replace(stop, semi_diameter_mm=rim_mm)
+    return replace(
+        lens,
+        surfaces=tuple(surfaces),
+        aperture_kind="stop_semi_diameter_mm",
+        aperture_value=placement.stop_radius_mm,
+    )
+
+
+def _focused(lens: Lens, placement: Placement) -> Lens:
+    """Return the lens focused on its distance; from the sensor, by repeated placing."""
+    if placement.focus_mm is None:
+        return lens
+    focused = lens
+    for _ in range(_ROUNDS):
+        distance_mm = _from_vertex(focused, placement.focus_mm, placement.origin)
+        placed = with_focus(replace(focused, object_distance_mm=distance_mm), placement.merit)
+        moved_mm = abs(track_mm(placed) - track_mm(focused))
+        focused = placed
+        if placement.origin != "sensor" or math.isinf(distance_mm) or moved_mm < _SETTLED_MM:
+            return focused
+    raise ContractError(
+        f"{lens.name} cannot be focused on {placement.focus_mm:g} mm from the sensor: nearer than "
+        "its image reaches"
+    )
+
+
+def _from_vertex(lens: Lens, distance_mm: float, origin: DistanceOrigin) -> float:
+    """Return a distance from the first vertex.
+
+    Raises:
+        ContractError: If it lies behind the vertex.
+    """
+    behind_mm = {"vertex": 0.0, "sensor": track_mm(lens)}.get(origin)
+    if behind_mm is None:
+        behind_mm = paraxial_data(lens).entrance_pupil_mm
+    vertex_mm = distance_mm - behind_mm
+    if not vertex_mm > 0:
+        raise ContractError(
+            f"an object {distance_mm:g} mm from the {origin} of {lens.name} lies within the lens, "
+            f"whose first vertex is {behind_mm:.4g} mm away from that"
+        )
+    return vertex_mm
