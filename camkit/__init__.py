@@ -6,6 +6,7 @@ The public face, free of torch and loaded only when touched:
     camkit.process(files, ...)     captures in, pictures and sidecars out
     camkit.simulate(scene, ...)    a sharp scene to a capture of a camera
     camkit.calibrate               measurements of a camera: calibrate.noise(...), ...
+    camkit.recipe(lens, ...)       a lens and a sensor to a training recipe (needs torch)
     camkit.freeze(optics, ...)     optics to a frozen PSF (needs torch)
     camkit.train(recipe, ...)      a recipe to a checkpoint (needs torch)
     camkit.export.bundle(...)      checkpoints and PSF to a bundle (needs torch)
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     )
     from camkit.models_def.face.network_training import train
     from camkit.models_def.face.optics_freezing import freeze
+    from camkit.models_def.face.recipe_writing import CameraWords, recipe
     from camkit.runtime.batch import process
     from camkit.runtime.cancel import Cancelled
     from camkit.runtime.capture import MosaicOptions
@@ -42,6 +44,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BundleError",
+    "CameraWords",
     "CamkitError",
     "Cancelled",
     "ContractError",
@@ -57,6 +60,7 @@ __all__ = [
     "freeze",
     "load",
     "process",
+    "recipe",
     "simulate",
     "train",
 ]
@@ -72,6 +76,8 @@ _HOMES = {
     "MosaicOptions": "camkit.runtime.capture",
     "simulate": "camkit.runtime.face.simulation",
     "freeze": "camkit.models_def.face.optics_freezing",
+    "recipe": "camkit.models_def.face.recipe_writing",
+    "CameraWords": "camkit.models_def.face.recipe_writing",
     "train": "camkit.models_def.face.network_training",
 }
 _PACKAGES = {"calibrate": "camkit.calibrate", "export": "camkit.export"}

@@ -28,6 +28,7 @@ FLAGS: Final = {
     "times_s": "--times",
     "darks": "--dark",
     "flats": "--flat",
+    "photo": "--from",
 }
 """Options whose flag is not their name."""
 PARAMETERS: Final = {

@@ -18,6 +18,7 @@ from camkit.cli.design.freeze_norms import freeze_norms
 from camkit.cli.design.lens.lens_app import lens_app
 from camkit.cli.design.plate.plate_app import plate_app
 from camkit.cli.design.prepare import prepare
+from camkit.cli.design.recipe import recipe
 from camkit.cli.design.train import train
 from camkit.cli.exit_code import ExitCode, exit_code_of
 from camkit.cli.groups import JUDGE, MAKE, MEASURE, USE, add_application, add_command
@@ -60,6 +61,7 @@ add_command(app, doctor, JUDGE, "Examine this computer's camkit installation.")
 add_application(app, lens_app, MAKE, "Draw, improve or convert lenses.")
 add_application(app, plate_app, MAKE, "Design diffractive plates and masks.")
 add_command(app, design, MAKE, "Design lens and network together.")
+add_command(app, recipe, MAKE, "Write the recipe of a camera.")
 add_command(app, freeze, MAKE, "Compute the PSF of optics.")
 add_command(app, prepare, MAKE, "Prepare training with veiling glare.")
 add_command(app, train, MAKE, "Train a camera's restoration network.")

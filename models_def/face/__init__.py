@@ -1,6 +1,7 @@
 """Design time for programs and the command line; nothing here imports torch before it is needed.
 
 torch_need        the check that torch is there
+recipe_writing    `camkit.recipe`: a lens and a sensor to a recipe
 optics_freezing   `camkit.freeze`: optics to a frozen PSF
 network_training  `camkit.train`: a recipe to a checkpoint
 """

@@ -127,6 +127,23 @@ def paraxial_data(lens: Lens, wavelength_um: float | None = None) -> Paraxial:
     )
 
 
+def widest_stop_mm(lens: Lens) -> float:
+    """Return the semi-diameter of the stop whose beam on the axis just passes the other rims.
+
+    inf where no surface has a rim.
+    """
+    tensors = surface_tensors(lens, torch.tensor(lens.reference_wavelength_um, dtype=torch.float64))
+    one, far_mm = torch.ones((), dtype=torch.float64), lens.object_distance_mm
+    heights = [
+        abs(float(trace_paraxial(tensors, one, one / far_mm, range(i + 1))[0]))
+        for i in range(len(lens.surfaces))
+    ]
+    rims = [surface.semi_diameter_mm for i, surface in enumerate(lens.surfaces) if i != lens.stop]
+    others = [height for i, height in enumerate(heights) if i != lens.stop]
+    room = min((rim / height for rim, height in zip(rims, others, strict=True)), default=math.inf)
+    return room * heights[lens.stop]
+
+
 def _stop_semi_diameter(lens: Lens, efl_mm: float, pupil_scale: float) -> float:
     if lens.aperture_kind == "stop_semi_diameter_mm":
         return lens.aperture_value

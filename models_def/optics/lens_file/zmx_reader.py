@@ -29,7 +29,7 @@ from camkit.models_def.optics.lens_file.zmx_surface import (
     read_surface,
     refuse_unsupported,
 )
-from camkit.models_def.optics.paraxial import paraxial_data
+from camkit.models_def.optics.paraxial import paraxial_data, widest_stop_mm
 from camkit.models_def.optics.prescription import ApertureKind, Lens, Surface
 
 _MM_PER_UNIT: Final = {"MM": 1.0, "CM": 10.0, "IN": 25.4, "METER": 1000.0, "M": 1000.0}
@@ -108,7 +108,8 @@ def parse_zmx(
         reference_wavelength_um=reference,
     )
     lens = _with_object_aperture(lens, system)
-    notes = (*_notes(records, surfaces), *_glass_notes(records, surfaces, order))
+    lens, aperture_notes = _with_rim_aperture(lens, records, scale)
+    notes = (*aperture_notes, *_notes(records, surfaces), *_glass_notes(records, surfaces, order))
     return ZmxLens(lens=with_fields(lens, system, scale), notes=notes)
 
 
@@ -170,10 +171,8 @@ def _aperture(records: ZmxRecords, stop: int, scale: float) -> tuple[ApertureKin
         raise DecodeError(f"the aperture must be one of {', '.join(_APERTURES)}; got {keys}")
     record = apertures[0]
     if record.key == "FLOA":
-        size = last(records.surfaces[stop + 1], "DIAM")
-        if size is None or not size.number(0) > 0:
-            raise DecodeError(f"line {record.line}: FLOA needs the stop's DIAM; got none")
-        return "stop_semi_diameter_mm", size.number(0) * scale
+        size_mm = _stop_size_mm(records, stop, scale)
+        return "stop_semi_diameter_mm", 1.0 if size_mm is None else size_mm
     if not record.number(0) > 0:
         raise DecodeError(f"line {record.line}: {record.key} must be > 0; got {record.text}")
     if record.key == "ENPD":
@@ -186,6 +185,30 @@ def _aperture(records: ZmxRecords, stop: int, scale: float) -> tuple[ApertureKin
             f"line {record.line}: a working f-number of a near object; give the entrance pupil"
         )
     return "f_number", record.number(0)
+
+
+def _stop_size_mm(records: ZmxRecords, stop: int, scale: float) -> float | None:
+    """Return what the file states of the stop's semi-diameter."""
+    size = last(records.surfaces[stop + 1], "DIAM")
+    return size.number(0) * scale if size is not None and size.number(0) > 0 else None
+
+
+def _with_rim_aperture(lens: Lens, records: ZmxRecords, scale: float) -> tuple[Lens, list[str]]:
+    """Return a lens whose file leaves the size of the stop to the rims, and a note of it."""
+    record = last(records.system, "FLOA")
+    if record is None or _stop_size_mm(records, lens.stop, scale) is not None:
+        return lens, []
+    semi_mm = widest_stop_mm(lens)
+    if math.isinf(semi_mm):
+        raise DecodeError(
+            f"line {record.line}: FLOA needs the stop's DIAM, or fixed rims of other surfaces; "
+            "got neither"
+        )
+    note = (
+        f"line {record.line}: FLOA, and the stop has no DIAM: {semi_mm:.4g} mm, the widest that "
+        "the other rims let the axis see"
+    )
+    return replace(lens, aperture_value=semi_mm), [note]
 
 
 def _with_object_aperture(lens: Lens, system: Records) -> Lens:

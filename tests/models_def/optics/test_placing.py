@@ -82,7 +82,7 @@ def test_a_wrong_placement_is_refused(placement: dict[str, object], message: str
 
 
 def test_what_lies_within_the_lens_is_refused() -> None:
-    with pytest.raises(ContractError, match="20 mm from the sensor .* lies within the lens"):
+    with pytest.raises(ContractError, match=r"20 mm from the sensor .* lies within the lens"):
         placed_lens(LENS, Placement(objects_mm=(20.0,), origin="sensor"))
     # nearer than four focal lengths no plane and its image are
     with pytest.raises(ContractError, match=r"cannot be focused|lies within"):

@@ -137,6 +137,20 @@ def test_aperture_kinds_are_kept(line: str, kind: str, value: float) -> None:
     assert (lens.aperture_kind, lens.aperture_value) == (kind, value)
 
 
+def test_a_stop_without_size_is_as_wide_as_the_other_rims_let_the_axis_see() -> None:
+    """A plane in front of the lens is the stop: the beam is parallel there."""
+    stop = "SURF 1\n  STOP\n  TYPE STANDARD\n  CURV 0\n  DISZ 5\n"
+    text = _changed(("ENPD 2.286E+1", "FLOA"), ("  STOP\n", ""))
+    start = text.index("SURF 1")
+    rest = text[start:].replace("SURF 3", "SURF 4").replace("SURF 2", "SURF 3")
+    lens = parse_zmx(text[:start] + stop + rest.replace("SURF 1", "SURF 2"))
+    assert lens.lens.aperture_value == 12.7
+    assert lens.notes == (
+        "line 7: FLOA, and the stop has no DIAM: 12.7 mm, the widest that the other rims let the "
+        "axis see",
+    )
+
+
 def test_object_space_aperture_becomes_an_entrance_pupil() -> None:
     text = _changed(("ENPD 2.286E+1", "OBNA 0.1 0"), ("DISZ INFINITY", "DISZ 200"))
     lens = parse_zmx(text).lens

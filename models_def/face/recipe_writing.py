@@ -1,0 +1,178 @@
+"""A lens and a sensor to a recipe: `camkit.recipe` and `camkit recipe`."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from camkit.caller import command_text, option_text
+from camkit.errors import ContractError
+from camkit.field_types import check_fields, checked
+from camkit.models_def.face.torch_need import require_torch
+from camkit.runtime.files.in_memory import FilePath
+from camkit.runtime.output.part_file import atomic_output, refuse_existing
+from camkit.units import MM_PER_M
+
+if TYPE_CHECKING:
+    from camkit.models_def.kinds.bayer.recipe_draft import RecipeDraft
+    from camkit.models_def.optics.prescription import Lens
+
+LENS_SUFFIX: Final = "-lens.toml"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraWords:
+    """A camera as people describe it.
+
+    Attributes:
+        sensor: WIDTHxHEIGHT@PITCHum or a name; None where a photograph shows it.
+        photo: A RAW file of the camera, whose sensor is taken.
+        pitch_um: Pixel pitch, where the photograph does not state it.
+        f_number: EFL / entrance pupil diameter; None for that of the lens file.
+        stop_radius_mm: Of the stop, in place of an F-number.
+        focus_m: Distance that the lens is focused on, inf for infinity, in metres; None leaves the
+            sensor where the file has it.
+        object_m: Distances of the scene; empty for the focus.
+        distance_from: What distances count from: vertex (the first surface), sensor or pupil.
+        glass: Catalogues (.agf), and `names` or `numbers`; see `read_noted_lens`.
+    """
+
+    sensor: str | None = None
+    photo: FilePath | None = None
+    pitch_um: float | None = None
+    f_number: float | None = None
+    stop_radius_mm: float | None = None
+    focus_m: float | None = None
+    object_m: Sequence[float] = ()
+    distance_from: str = "vertex"
+    glass: Sequence[FilePath] = ()
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if (self.sensor is None) == (self.photo is None):
+            raise ContractError(
+                f"give {option_text('sensor')}, such as 6000x4000@3.9um, or a photograph by "
+                f"{option_text('photo')}"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DescribedCamera:
+    """A camera whose lens was read, stopped and focused.
+
+    Attributes:
+        lens: As it is used.
+        draft: What its recipe is made of.
+        notes: For people: how glasses were read, what of a file was left out.
+    """
+
+    lens: "Lens"
+    draft: "RecipeDraft"
+    notes: tuple[str, ...]
+
+    def facts(self) -> dict[str, Any]:
+        """Return what is known of the camera, plain JSON values."""
+        from camkit.models_def.optics.paraxial import paraxial_data
+
+        data, sensor = paraxial_data(self.lens), self.draft.sensor
+        return {
+            "name": self.draft.name,
+            "efl_mm": round(data.efl_mm, 4),
+            "f_number": round(abs(data.f_number), 3),
+            "focus_mm": self.draft.focus_mm,
+            "objects_mm": list(self.draft.objects_mm),
+            "sensor": {k: sensor.table[k] for k in ("width_px", "height_px", "pixel_pitch_um")},
+            "defaults": [k for k, source in sensor.sources.items() if source.startswith("default")],
+            "notes": list(self.notes),
+        }
+
+
+@checked
+def recipe(
+    lens: FilePath,
+    out: FilePath,
+    *,
+    camera: CameraWords,
+    name: str | None = None,
+    overwrite: bool = False,
+) -> dict[str, Any]:
+    """Write the training recipe of a lens before a sensor, every key with its default.
+
+    The lens as it is used, stopped and focused, is written beside it: NAME-lens.toml.
+
+    Args:
+        lens: Lens file (.toml, .zmx), or the name of a built-in one.
+        out: Recipe to write (.toml).
+        camera: Its sensor and how the lens is used.
+        name: Of the camera; None for that of the recipe's file.
+        overwrite: Whether files that exist are replaced.
+
+    Returns:
+        The files, and what the camera is.
+
+    Raises:
+        ContractError: If the lens or a word is wrong, or a file exists.
+        UnsupportedError: If torch is not installed, or the lens holds what camkit does not trace.
+    """
+    path = Path(out)
+    lens_path = path.with_name(path.stem + LENS_SUFFIX)
+    refuse_existing((path, lens_path), overwrite=overwrite)
+    require_torch(command_text("recipe"))
+    described = describe_camera(Path(lens), camera, name or path.stem, lens_path.name)
+    write_camera(described, path, lens_path)
+    return {"recipe": str(path), "lens": str(lens_path), **described.facts()}
+
+
+def describe_camera(
+    lens: Path, camera: CameraWords, name: str, prescription: str
+) -> DescribedCamera:
+    """Read a lens, stop and focus it, and find its sensor.
+
+    Args:
+        lens: File or name.
+        camera: Sensor and use.
+        name: Of the camera.
+        prescription: Path that the recipe will have for the lens.
+    """
+    from camkit.models_def.kinds.bayer.recipe_draft import RecipeDraft
+    from camkit.models_def.optics.lens_file.lens_file import read_noted_lens
+    from camkit.models_def.optics.placing import Placement, placed_lens
+    from camkit.models_def.sensors.sensor_choice import choose_sensor, sensor_of
+
+    if camera.sensor is not None:
+        sensor = choose_sensor(camera.sensor)
+    else:
+        from camkit.runtime.raw import read_capture
+
+        sensor = sensor_of(read_capture(camera.photo), camera.pitch_um)
+    placement = Placement(
+        f_number=camera.f_number,
+        stop_radius_mm=camera.stop_radius_mm,
+        focus_mm=None if camera.focus_m is None else camera.focus_m * MM_PER_M,
+        objects_mm=tuple(value * MM_PER_M for value in camera.object_m),
+        origin=camera.distance_from,  # type: ignore[arg-type]
+    )
+    design, notes = read_noted_lens(lens, tuple(map(str, camera.glass)))
+    placed = placed_lens(design, placement)
+    draft = RecipeDraft(
+        name=name,
+        sensor=sensor,
+        prescription=prescription,
+        focus_mm=placed.lens.object_distance_mm,
+        objects_mm=placed.objects_mm,
+    )
+    return DescribedCamera(lens=placed.lens, draft=draft, notes=notes)
+
+
+def write_camera(camera: DescribedCamera, recipe_path: Path, lens_path: Path) -> None:
+    """Write the recipe of a camera and its lens."""
+    from camkit.models_def.kinds.bayer.recipe_draft import recipe_text
+    from camkit.models_def.optics.prescription import format_prescription
+
+    recipe_path.parent.mkdir(parents=True, exist_ok=True)
+    for path, text in (
+        (lens_path, format_prescription(camera.lens)),
+        (recipe_path, recipe_text(camera.draft)),
+    ):
+        with atomic_output(path) as part:
+            part.write_text(text, encoding="utf-8")

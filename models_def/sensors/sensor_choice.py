@@ -1,0 +1,195 @@
+"""The sensor of a camera by few words: a size and a pitch, a name, or a photograph of it.
+
+    "6000x4000@3.9um", "6000x4000@3.9um:BGGR"    what is not said are stated defaults
+    "IMX264", "IMX264:BGGR"                      facts of `named_sensors.toml`, with their source
+    shot.dng                                     what the file says of its sensor
+
+The result is the table `[sensor]` of a recipe, and for every key where its value comes from.
+"""
+
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from typing import Any, Final
+
+import numpy as np
+
+from camkit.caller import option_text
+from camkit.cfa import CFA_PATTERNS, shifted_cfa
+from camkit.errors import ContractError
+from camkit.runtime.capture import Capture
+
+DATA: Final = "named_sensors.toml"
+DEFAULT: Final = "default"
+STATED: Final = "stated"
+BLACK_LEVEL: Final = 256.0
+WHITE_LEVEL: Final = 4095.0
+WELL_E_PER_UM2: Final = 2000.0
+"""Between 900 (machine vision, global shutter) and 3700 (photography)."""
+READ_NOISE_E: Final = 3.0
+ISOS: Final = (100, 200, 400, 800, 1600, 3200, 6400)
+COLOR_MATRIX: Final = (
+    (0.6640, -0.1847, -0.0503),
+    (-0.5238, 1.3010, 0.2474),
+    (-0.0993, 0.1673, 0.6527),
+)
+MATRIX_SOURCE: Final = "default: a Sony ILCE-7RM3, as LibRaw's table of cameras states it"
+PEAKS_UM: Final = (0.600, 0.540, 0.460)
+WIDTH_UM: Final = 0.090
+"""Full width at half maximum."""
+WAVELENGTHS_UM: Final = tuple(round(0.42 + 0.02 * i, 2) for i in range(14))
+RESPONSE_SOURCE: Final = (
+    "model: Gaussians at 0.600, 0.540 and 0.460 um with a full width of 0.090 um at half maximum"
+)
+_STATED: Final = re.compile(
+    r"(?P<width>\d+)x(?P<height>\d+)@(?P<pitch>\d+(?:\.\d+)?|\.\d+)um(?::(?P<cfa>[A-Za-z]+))?"
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensorChoice:
+    """The sensor of a recipe.
+
+    Attributes:
+        table: `[sensor]` without its response.
+        response: `[sensor.channel_response]`.
+        sources: Key -> where its value comes from.
+    """
+
+    table: Mapping[str, Any]
+    response: Mapping[str, Any]
+    sources: Mapping[str, str]
+
+
+def choose_sensor(text: str) -> SensorChoice:
+    """Return the sensor that a text names or describes.
+
+    Raises:
+        ContractError: If it does neither.
+    """
+    stated = _STATED.fullmatch(text.strip())
+    if stated is not None:
+        pattern = (stated["cfa"] or "RGGB").upper()
+        facts: dict[str, Any] = {
+            "width_px": int(stated["width"]),
+            "height_px": int(stated["height"]),
+            "pixel_pitch_um": float(stated["pitch"]),
+            "cfa": pattern,
+        }
+        sources = dict.fromkeys(facts, STATED)
+        if stated["cfa"] is None:
+            sources["cfa"] = DEFAULT
+        return _completed(facts, sources)
+    named = named_sensors()
+    name, _, pattern = text.strip().partition(":")
+    facts = dict(named.get(name.casefold(), {}))
+    if not facts:
+        names = ", ".join(entry["name"] for entry in named.values())
+        raise ContractError(
+            f"{option_text('sensor')} takes WIDTHxHEIGHT@PITCHum, such as 6000x4000@3.9um (with "
+            f"or without :BGGR for another pattern), or one of {names}; got {text!r}"
+        )
+    source = f"{facts.pop('name')}: {facts.pop('source')}"
+    sources = dict.fromkeys(facts, source)
+    if pattern or "cfa" not in facts:
+        facts["cfa"], sources["cfa"] = pattern.upper() or "RGGB", STATED if pattern else DEFAULT
+    return _completed(facts, sources)
+
+
+def sensor_of(capture: Capture, pitch_um: float | None = None) -> SensorChoice:
+    """Return the sensor that a photograph was taken with.
+
+    Args:
+        capture: Of a mosaic.
+        pitch_um: Of the pixels; None for what the file states.
+
+    Raises:
+        ContractError: If it has no mosaic, or nobody states the pitch.
+    """
+    if capture.cfa is None:
+        raise ContractError(
+            f"the sensor is read from a RAW file with a mosaic; describe it by "
+            f"{option_text('sensor')}"
+        )
+    pitch = capture.pixel_pitch_um if pitch_um is None else pitch_um
+    if pitch is None:
+        raise ContractError(
+            f"the file states no pixel pitch; state it by {option_text('pitch_um')}"
+        )
+    height, width = capture.samples.shape
+    width, height = capture.sensor_size_px or (width, height)
+    facts: dict[str, Any] = {
+        "width_px": width,
+        "height_px": height,
+        "pixel_pitch_um": float(pitch),
+        "cfa": shifted_cfa(capture.cfa, capture.origin_px or (0, 0)),
+        "black_level": round(float(np.mean(capture.black_level)), 4),
+        "white_level": float(capture.white_level),
+    }
+    if capture.color_matrix is not None:
+        facts["color_matrix"] = tuple(map(tuple, np.round(capture.color_matrix, 5).tolist()))
+    if capture.noise is not None and capture.iso is not None:
+        shot = float(np.mean(capture.noise.shot))
+        facts["full_well_e"] = capture.iso / (100 * shot)
+        facts["read_noise_e"] = float(np.sqrt(np.mean(capture.noise.read_variance))) / shot
+    sources = dict.fromkeys(facts, capture.camera or "the photograph")
+    if pitch_um is not None:
+        sources["pixel_pitch_um"] = STATED
+    return _completed(facts, sources)
+
+
+@cache
+def named_sensors() -> Mapping[str, Mapping[str, Any]]:
+    """Return the facts of the sensors that camkit knows, by their names in small letters."""
+    text = (resources.files("camkit.models_def.sensors") / DATA).read_text(encoding="utf-8")
+    return {entry["name"].casefold(): entry for entry in tomllib.loads(text)["sensor"]}
+
+
+def _completed(facts: dict[str, Any], sources: dict[str, str]) -> SensorChoice:
+    """Return a sensor with defaults where nothing is known."""
+    if facts["cfa"] not in CFA_PATTERNS:
+        raise ContractError(
+            f"the pattern of a sensor is one of {', '.join(CFA_PATTERNS)}; got {facts['cfa']!r}"
+        )
+    pitch = facts["pixel_pitch_um"]
+    usual = {
+        "black_level": (BLACK_LEVEL, DEFAULT),
+        "white_level": (WHITE_LEVEL, DEFAULT),
+        "full_well_e": (WELL_E_PER_UM2 * pitch**2, f"default: {WELL_E_PER_UM2:g} a square um"),
+        "read_noise_e": (READ_NOISE_E, DEFAULT),
+        "color_matrix": (COLOR_MATRIX, MATRIX_SOURCE),
+    }
+    for key, (value, source) in usual.items():
+        if key not in facts:
+            facts[key], sources[key] = value, source
+    read_e = facts.pop("read_noise_e")
+    sources["noise"] = (
+        f"full well over white less black at ISO 100, half of it at twice the ISO; read noise "
+        f"{sources.pop('read_noise_e')}"
+    )
+    span = facts["white_level"] - facts["black_level"]
+    facts["full_well_e"] = float(f"{facts['full_well_e']:.6g}")
+    facts["illuminant"] = "D65"
+    facts["noise"] = [
+        {
+            "iso": float(iso),
+            "gain_e_per_dn": float(f"{facts['full_well_e'] / span * 100 / iso:.7g}"),
+            "read_noise_e": float(f"{read_e:.4g}"),
+        }
+        for iso in ISOS
+    ]
+    sharpness = 4 * np.log(2) / WIDTH_UM**2
+    waves = np.array(WAVELENGTHS_UM)
+    response = np.exp(-sharpness * np.square(waves - np.array(PEAKS_UM)[:, None]))
+    return SensorChoice(
+        table=facts,
+        response={
+            "wavelengths_um": WAVELENGTHS_UM,
+            "response": tuple(map(tuple, np.round(response, 4).tolist())),
+            "source": RESPONSE_SOURCE,
+        },
+        sources=sources,
+    )
