@@ -68,7 +68,6 @@ def recipe(
     if facts["defaults"]:
         say(f"defaults of the sensor, not facts: {', '.join(facts['defaults'])}", err=True)
     size = "{width_px}x{height_px} of {pixel_pitch_um:g} um".format(**facts["sensor"])
-    say(
-        f"{facts['recipe']}, {facts['lens']}: {facts['efl_mm']:.4g} mm F/{facts['f_number']:.3g} on "
-        f"{size}, focused on {facts['focus_mm'] / MM_PER_M:.4g} m"
-    )
+    optics = f"{facts['efl_mm']:.4g} mm F/{facts['f_number']:.3g}"
+    focus = f"{facts['focus_mm'] / MM_PER_M:.4g} m"
+    say(f"{facts['recipe']}, {facts['lens']}: {optics} on {size}, focused on {focus}")

@@ -42,7 +42,7 @@ def test_a_recipe_and_its_lens_are_written_and_read_back(tmp_path: Path) -> None
 
 
 def test_a_sensor_or_a_photograph_is_needed() -> None:
-    with pytest.raises(ContractError, match="give sensor, such as .* or a photograph by photo"):
+    with pytest.raises(ContractError, match=r"give sensor, such as .* or a photograph by photo"):
         camkit.CameraWords()
     with pytest.raises(ContractError, match="give sensor"):
         camkit.CameraWords(sensor="IMX264", photo="a.dng")
