@@ -40,6 +40,7 @@ def freeze(
     stress_out: FilePath | None = None,
     stress_haze: FilePath | None = None,
     report: FilePath | None = None,
+    quick: bool = False,
     overwrite: bool = False,
 ) -> dict[str, Any]:
     """Compute the PSF of a lens or a plate with as few samples as the loss allows (needs torch).
@@ -60,6 +61,8 @@ def freeze(
         stress_out: Also write kernels off the design point to this file (.safetensors).
         stress_haze: With `haze` and `stress_out`: write the veiling glare of those kernels.
         report: Also write the facts to this file (.json), for `camkit.export.bundle`.
+        quick: Whether fields, wavelengths and blocks are taken as they usually suit, without a
+            search that measures what they cost.
         overwrite: Whether files that exist are replaced.
 
     Returns:
@@ -93,6 +96,7 @@ def freeze(
         focus_um=focus_range_um(source, focus_um),
         haze=haze is not None,
         stress=stress_out is not None,
+        quick=quick,
     )
     freezing = freeze_optics(source, request)
     write_optics_files(freezing.optics, Path(out), haze_path)

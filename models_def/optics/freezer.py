@@ -16,7 +16,13 @@ from camkit.errors import ContractError, UnsupportedError
 from camkit.models_def.optics.diffraction.freezing import WINDOW, freeze_plate
 from camkit.models_def.optics.diffraction.plate_optics import PlateOptics
 from camkit.models_def.optics.freezable_optics import Optics
-from camkit.models_def.optics.freeze import LOSS_LIMIT_DB, Facts, Tell, freeze_samples
+from camkit.models_def.optics.freeze import (
+    LOSS_LIMIT_DB,
+    Facts,
+    Tell,
+    freeze_quickly,
+    freeze_samples,
+)
 from camkit.models_def.optics.frozen import FreezeGrid, freeze_stress
 from camkit.models_def.optics.lens_optics import LensOptics
 from camkit.models_def.optics.thin.distances import freeze_distances
@@ -42,6 +48,7 @@ class FreezeRequest:
         haze: Whether only sharp peaks are kernels, with the haze beside them. A lens alone; the
             rest is chosen then, but for the sensor.
         stress: Whether kernels off the design point are frozen too.
+        quick: Whether nothing is searched: see `freeze_quickly`. A plate is frozen as ever.
     """
 
     sensor: ColorSensor
@@ -53,12 +60,17 @@ class FreezeRequest:
     focus_um: float = 0.0
     haze: bool = False
     stress: bool = False
+    quick: bool = False
 
     def __post_init__(self) -> None:
         names = ("depths_mm", "limit_db", "energy", "max_side_px", "focus_um")
         options = [option_text(name) for name in names if getattr(self, name)]
         if self.haze and options:
             raise ContractError(f"{option_text('haze')} conflicts with {', '.join(options)}")
+        searched = ("limit_db", "focus_um", "haze")
+        options = [option_text(name) for name in searched if getattr(self, name)]
+        if self.quick and options:
+            raise ContractError(f"{option_text('quick')} conflicts with {', '.join(options)}")
 
     def grid(self, base: FreezeGrid) -> FreezeGrid:
         """Return a grid with what is asked for."""
@@ -110,6 +122,9 @@ def freeze_optics(optics: Optics, request: FreezeRequest, *, tell: Tell = note) 
         if isinstance(optics, PlateOptics):
             grid = request.grid(WINDOW)
             frozen, facts = freeze_plate(optics, sensor=request.sensor, grid=grid, tell=tell)
+        elif request.quick:
+            grid = request.grid(FreezeGrid())
+            frozen, facts = freeze_quickly(optics, sensor=request.sensor, grid=grid, tell=tell)
         else:
             grid = request.grid(FreezeGrid())
             frozen, facts = freeze_samples(

@@ -93,6 +93,12 @@ def freeze(
     report: Annotated[
         Path | None, typer.Option(help="Also write the report for `export` to this file (.json).")
     ] = None,
+    quick: Annotated[
+        bool,
+        typer.Option(
+            "--quick", help="Take 7 fields and 5 wavelengths without a search: a preview."
+        ),
+    ] = False,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
@@ -113,6 +119,7 @@ def freeze(
             "--stress-out": stress_out,
             "--stress-haze": stress_haze,
             "--report": report,
+            "--quick": quick or None,
             "--limit-db": None if limit_db == LIMIT_DB else limit_db,
             "--energy": energy,
             "--max-side-px": max_side_px,
@@ -145,6 +152,7 @@ def freeze(
         stress_out=stress_out,
         stress_haze=stress_haze,
         report=report,
+        quick=quick,
         overwrite=overwrite,
     )
     print_report(facts, json_)

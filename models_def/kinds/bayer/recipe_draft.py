@@ -28,8 +28,6 @@ DATA: Final[Mapping[str, Any]] = {
     "first_samples": 400,
     "pool_samples": 1600,
     "steps_per_sample": 4,
-    "margin_px": 48,
-    "block_jitter_px": 80.0,
     "iso_max": 12800.0,
     "exposure_min_ev": -4.0,
     "exposure_max_ev": 1.5,
@@ -96,7 +94,7 @@ def recipe_text(draft: RecipeDraft) -> str:
         *table_lines("wiener", Wiener, bank, without=_STAGE_KEYS),
         *table_lines("light", LightBound, {"spread": 0.2, "keeps_bright": True}),
         *table_lines("lens", LensRecipe, lens),
-        *table_lines("data", BayerDataRecipe, DATA),
+        *table_lines("data", BayerDataRecipe, {**DATA, **_of_blocks(block_px, overlap_px)}),
         *table_lines("schedule", ScheduleRecipe, SCHEDULE),
     ]
     for size, (network, overshoot) in NETWORKS.items():
@@ -108,6 +106,11 @@ def recipe_text(draft: RecipeDraft) -> str:
             "",
         ]
     return "\n".join(lines)
+
+
+def _of_blocks(block_px: int, overlap_px: int) -> dict[str, Any]:
+    """Return what samples take from the bank: half its overlap, half the way between blocks."""
+    return {"margin_px": overlap_px // 2, "block_jitter_px": (block_px - overlap_px) / 2}
 
 
 def _sensor_lines(sensor: SensorChoice) -> list[str]:

@@ -260,3 +260,26 @@ def test_blocks_are_judged_by_the_bank_of_the_recipe(bench: Bench) -> None:
             _shrink(patch)
             losses.append(block_loss(bench.nominal, bench, grid).mean_db)
     assert losses[0] != losses[1]
+
+
+def test_freezing_quickly_has_the_kernels_of_its_grid_and_measures_no_loss(
+    sensor: BayerSensor,
+) -> None:
+    told: list[str] = []
+    grid = FreezeGrid(depths_mm=(2e4, math.inf))
+    frozen, facts = freeze_module.freeze_quickly(duet(), sensor=sensor, grid=grid, tell=told.append)
+    same = freeze(duet(), sensor, replace(grid, fields=7, wavelengths=5)).psf
+    assert np.array_equal(frozen.psf.kernels, same.kernels)
+    assert (facts["fields"], facts["wavelengths"], facts["quick"]) == (7, 5, "no search")
+    assert (facts["block_px"], facts["depths_mm"]) == (240, "20000, inf")
+    assert not [name for name in facts if "loss" in name]
+    assert len(told) == 1
+
+
+@pytest.mark.parametrize(
+    ("side_px", "blocks"), [(9, (240, 80)), (147, (256, 96)), (401, (512, 192))]
+)
+def test_usual_blocks_overlap_as_far_as_kernels_reach(
+    side_px: int, blocks: tuple[int, int]
+) -> None:
+    assert freeze_module.usual_blocks(side_px) == blocks

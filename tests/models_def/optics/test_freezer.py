@@ -31,3 +31,8 @@ def test_who_says_how_much_light_is_wanted_gets_no_less() -> None:
     assert FreezeRequest(sensor=SENSOR).grid(base) == base
     asked = FreezeRequest(sensor=SENSOR, energy=0.95, max_side_px=101).grid(base)
     assert (asked.energy, asked.max_side_px, asked.least_energy) == (0.95, 101, None)
+
+
+def test_what_is_not_searched_has_no_limit() -> None:
+    with pytest.raises(ContractError, match="quick conflicts with limit_db, focus_um"):
+        FreezeRequest(sensor=SENSOR, quick=True, limit_db=0.1, focus_um=3.0)
