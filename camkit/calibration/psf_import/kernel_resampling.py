@@ -1,0 +1,45 @@
+"""Kernels at another pitch: light spread by the area that samples share."""
+
+from typing import Final
+
+import numpy as np
+
+from camkit.calibration.psf_import.kernel_stack import FloatGrid
+
+SAME_PITCH: Final = 1e-6
+
+
+def resampled_kernels(kernels: FloatGrid, ratio: float) -> FloatGrid:
+    """Return (..., h, w) kernels at another pitch; light stays.
+
+    Args:
+        kernels: Odd sides; the middle sample stays in the middle.
+        ratio: Pitch of the kernels over the pitch wanted.
+    """
+    if abs(ratio - 1) < SAME_PITCH:
+        return kernels
+    rows, columns = (_shares(side, ratio) for side in kernels.shape[-2:])
+    return np.asarray(rows @ kernels @ columns.T)
+
+
+def window(kernels: FloatGrid, side_px: int) -> FloatGrid:
+    """Cut or fill (..., h, w) up to the middle (..., side_px, side_px)."""
+    for axis in (-2, -1):
+        missing = (side_px - kernels.shape[axis]) // 2
+        if missing < 0:
+            kernels = np.moveaxis(np.moveaxis(kernels, axis, 0)[-missing:missing], 0, axis)
+        elif missing:
+            around = [(0, 0)] * kernels.ndim
+            around[axis] = (missing, missing)
+            kernels = np.pad(kernels, around)
+    return kernels
+
+
+def _shares(side: int, ratio: float) -> FloatGrid:
+    """Return (target, source): the share of each sample that falls into each one made."""
+    half = int(np.ceil(side * ratio / 2 - 0.5))
+    target_px = np.arange(-half, half + 1, dtype=np.float64)[:, None]
+    source_px = (np.arange(side, dtype=np.float64)[None] - side // 2) * ratio
+    low = np.maximum(target_px - 0.5, source_px - ratio / 2)
+    high = np.minimum(target_px + 0.5, source_px + ratio / 2)
+    return np.clip(high - low, 0, None) / ratio
