@@ -34,18 +34,21 @@ more from each other, and by 0.008 at most from what was computed of them."""
 
 
 def designed_members(
-    parts: Parts, checkpoints: Iterable[Checkpoint], psf: FrozenPsf
+    parts: Parts, designed: Mapping[str, bytes], psf: FrozenPsf
 ) -> dict[str, bytes]:
     """Return the lens or the plate of a camera as members of its bundle: name -> content.
 
     None where the camera has neither, or a checkpoint does not carry it.
 
+    Args:
+        parts: What the caller names.
+        designed: The optics of the checkpoints, or of the recipe; see `designed_of`.
+        psf: Frozen.
+
     Raises:
-        ContractError: If the checkpoints are of different optics, there are a lens and a plate, or
-            the PSF was not frozen from them.
+        ContractError: If there are a lens and a plate, or the PSF was not frozen from them.
         CamkitError: If a lens is wrong, see `read_lens`.
     """
-    designed = _designed_of(checkpoints)
     lens, plate = _lens_of(parts, designed), _plate_of(parts, designed)
     if lens is not None and plate is not None:
         raise ContractError(
@@ -63,8 +66,12 @@ def designed_members(
     return {}
 
 
-def _designed_of(checkpoints: Iterable[Checkpoint]) -> Mapping[str, bytes]:
-    """Return the optics that checkpoints carry; old checkpoints carry none."""
+def designed_of(checkpoints: Iterable[Checkpoint]) -> Mapping[str, bytes]:
+    """Return the optics that checkpoints carry; old checkpoints carry none.
+
+    Raises:
+        ContractError: If they are of different optics.
+    """
     distinct: list[Mapping[str, bytes]] = []
     for checkpoint in checkpoints:
         if checkpoint.designed and checkpoint.designed not in distinct:

@@ -1,10 +1,13 @@
 """Kernels at another pitch: light spread by the area that samples share."""
 
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.calibration.psf_import.kernel_stack import FloatGrid
+from camkit.psf import FrozenPsf
 
 SAME_PITCH: Final = 1e-6
 
@@ -20,6 +23,38 @@ def resampled_kernels(kernels: FloatGrid, ratio: float) -> FloatGrid:
         return kernels
     rows, columns = (_shares(side, ratio) for side in kernels.shape[-2:])
     return np.asarray(rows @ kernels @ columns.T)
+
+
+def with_pitch(psf: FrozenPsf, pitch_um: float) -> FrozenPsf:
+    """Return a PSF with samples of another pitch; the same one if that is its own."""
+    ratio = psf.pixel_pitch_um / pitch_um
+    if abs(ratio - 1) < SAME_PITCH:
+        return psf
+    return replace(
+        psf,
+        kernels=_at_ratio(psf.kernels, ratio),
+        focus_kernels=None if psf.focus_kernels is None else _at_ratio(psf.focus_kernels, ratio),
+        pixel_pitch_um=pitch_um,
+    )
+
+
+def for_sensor(psf: FrozenPsf, pitch_um: float, channels: int) -> FrozenPsf:
+    """Return a measured PSF with the samples of a sensor, its distortion for every channel."""
+    psf, bent = with_pitch(psf, pitch_um), psf.distortion
+    if len(bent.coefficients) != 1 or channels == 1:
+        return psf
+    even = bent.even_coefficients
+    rows = replace(
+        bent,
+        coefficients=np.tile(bent.coefficients, (channels, 1)),
+        even_coefficients=None if even is None else np.tile(even, (channels, 1)),
+    )
+    return replace(psf, distortion=rows)
+
+
+def _at_ratio(kernels: FloatArray, ratio: float) -> FloatArray:
+    at_pitch = resampled_kernels(kernels.astype(np.float64), ratio)
+    return (at_pitch / at_pitch.sum((-2, -1), keepdims=True)).astype(np.float32)
 
 
 def window(kernels: FloatGrid, side_px: int) -> FloatGrid:
