@@ -76,8 +76,7 @@ def card_text(
     for name, arrays in _pictures(golden).items():
         images, white = arrays.outputs[IMAGE], np.float32((whites or {}).get(name, 1.0))
         values = (
-            f"{_psnr_db(images[size] / white, arrays.reference / white):.2f}"
-            for size in sizes
+            f"{_psnr_db(images[size] / white, arrays.reference / white):.2f}" for size in sizes
         )
         lines.append(f"| {name} | " + " | ".join(values) + " |")
     lines += [
@@ -170,13 +169,14 @@ def preview_png(bundle: Bundle, golden: Mapping[str, GoldenArrays]) -> bytes:
         axes[1, column].set_xlabel("cycles/px", fontsize=8)
     axes[1, 0].set_ylabel("MTF")
     best = (bundle.manifest.sizes or (NO_SIZE,))[-1]
+    best_name = best if bundle.manifest.sizes else FILTER
     for column, (name, arrays) in enumerate(_pictures(golden).items()):
         image = arrays.outputs[IMAGE][best]
         gain = 1 / max(float(np.quantile(arrays.reference, 0.99)), 1e-3)
         pair = np.concatenate([image, arrays.reference], axis=1) * gain
         pair = np.broadcast_to(pair, (3, *pair.shape[1:]))
         axes[2, column].imshow(encode_srgb(pair.astype(np.float32)).transpose(1, 2, 0))
-        axes[2, column].set_title(f"{name}: {best if bundle.manifest.sizes else FILTER} over truth", fontsize=8)
+        axes[2, column].set_title(f"{name}: {best_name} over truth", fontsize=8)
     for axis in (*axes[0, fields.size :], *axes[1, fields.size :], *axes[2]):
         axis.axis("off")
     buffer = io.BytesIO()

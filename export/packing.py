@@ -106,12 +106,12 @@ def _check_first(paths: tuple[Path, ...], *, network: bool) -> None:
     if network and any(are_recipes):
         raise ContractError(
             f"{paths[are_recipes.index(True)]} is a recipe; export takes checkpoints of "
-            f"`camkit train`, or a recipe with {option_text('network', False)}"
+            f"`camkit train`, or a recipe with {option_text('network', value=False)}"
         )
     if not network and (len(paths) != 1 or not are_recipes[0]):
         raise ContractError(
-            f"{option_text('network', False)} takes one recipe ({RECIPE}) in place of checkpoints; "
-            f"got {', '.join(path.name for path in paths)}"
+            f"{option_text('network', value=False)} takes one recipe ({RECIPE}) in place of "
+            f"checkpoints; got {', '.join(path.name for path in paths)}"
         )
 
 

@@ -8,7 +8,6 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.calibration.measured import WAVELENGTHS_UM
 from camkit.calibration.psf_import.kernel_places import Places, places_of
 from camkit.calibration.psf_import.kernel_resampling import (
     SAME_PITCH,
@@ -328,16 +327,3 @@ def _notes(normalised: Normalised, shape: Sequence[int], options: ImportOptions)
     if normalised.cut_share > LEAST_CUT:
         notes.append(f"{normalised.cut_share:.2%} of the light lies beyond the side and was cut")
     return notes
-
-
-def measured_response(wavelengths_um: FloatGrid, channels: int) -> FloatGrid | None:
-    """Return (channel, wavelength) of a sensor whose own colours the kernels are.
-
-    Returns:
-        Red first, 1 at its own kernel and 0 at the others; 1 for a kernel of all colours; None if
-        the kernels are of other wavelengths.
-    """
-    if wavelengths_um.size == 1:
-        return np.ones((channels, 1))
-    is_own = channels == wavelengths_um.size and np.allclose(wavelengths_um, WAVELENGTHS_UM)
-    return np.eye(channels)[::-1].copy() if is_own else None

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from camkit.calibration.psf_import.clean_kernels import measured_response
 from camkit.calibration.psf_import.kernel_resampling import with_pitch
+from camkit.calibration.psf_import.own_colours import is_of_own_colours
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.psf_bank import PsfBank
 from camkit.models_def.kinds.bayer.recipe import MEASURED_COLOURS, BayerRecipe
@@ -58,16 +58,15 @@ def _colour_kernels(
 
 def _check_colours(recipe: BayerRecipe, psf: FrozenPsf) -> None:
     """Refuse kernels of the sensor's own colours with another response, and the other way round."""
-    _, response = recipe.sensor.response_arrays()
-    measured = measured_response(psf.wavelengths_um, len(response))
     assert recipe.sensor.channel_response is not None
     is_filled_in = recipe.sensor.channel_response.source == MEASURED_COLOURS
-    if measured is None and is_filled_in:
+    is_own = is_of_own_colours(psf.wavelengths_um)
+    if is_filled_in and not is_own and psf.wavelengths_um.size > 1:
         raise ContractError(
             f"lens.psf has kernels of the wavelengths {psf.wavelengths_um.tolist()} um; state "
             "sensor.channel_response, which weights them"
         )
-    if measured is not None and measured.shape == (3, 3) and not is_filled_in:
+    if is_own and not is_filled_in:
         raise ContractError(
             "lens.psf has one kernel for each colour of the sensor; leave sensor.channel_response "
             "out, which would mix them"

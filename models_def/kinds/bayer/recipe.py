@@ -14,6 +14,7 @@ from camkit.bundle.sensor import BayerSensor
 from camkit.bundle.stages import Dehaze, Together, Wiener
 from camkit.bundle.stages.network import DEFAULT_ROLE
 from camkit.calibration.measured import WAVELENGTHS_UM
+from camkit.calibration.psf_import.own_colours import narrow_response
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.scene_light import DisplayRecipe, WildRecipe
 from camkit.models_def.toml_table import section, table_digest, typed
@@ -438,11 +439,8 @@ def _with_measured_response(table: Mapping[str, Any]) -> Mapping[str, Any]:
         return table
     if "channel_response" in sensor:
         return table
-    response = {
-        "wavelengths_um": list(WAVELENGTHS_UM),
-        "response": np.eye(3)[::-1].tolist(),
-        "source": MEASURED_COLOURS,
-    }
+    waves, rows = (array.tolist() for array in narrow_response(np.array(WAVELENGTHS_UM)))
+    response = {"wavelengths_um": waves, "response": rows, "source": MEASURED_COLOURS}
     return {**table, "sensor": {**sensor, "channel_response": response}}
 
 
