@@ -62,7 +62,8 @@ def import_psf(
         x_mm: Position of every column, right of the axis.
         y_mm: Position of every row, down from the axis.
         heights_mm: Distance from the axis of every kernel of a lens of revolution.
-        flip: Axes that run the other way in the files: "x", "y" or "xy".
+        flip: Axes that run the other way in the files, "x", "y" or "xy"; "kernels" turns every
+            kernel by 180 degrees where it is.
         centre: Sample that is the middle of a kernel.
         background: "border" subtracts the level along the border of every kernel.
         side_px: Odd side of the kernels; None for as far as they reach.

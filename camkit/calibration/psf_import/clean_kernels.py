@@ -277,6 +277,8 @@ def _flipped(
 ) -> tuple[FloatGrid, NDArray[np.int_]]:
     """Reverse kernels, and the rows or columns that they lie in, of axes that run the other way."""
     middles = middles.copy()
+    if flip == "kernels":
+        flip, turns_places = "xy", False
     for name, axis in (("y", 0), ("x", 1)):
         if name not in flip:
             continue

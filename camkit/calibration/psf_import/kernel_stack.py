@@ -16,6 +16,7 @@ FloatGrid = NDArray[np.float64]
 Middle = Literal["middle", "peak", "centroid"]
 Background = Literal["keep", "border"]
 
+FLIPS: Final = ("", "x", "y", "xy", "kernels")
 GREY: Final = "Y"
 WAVELENGTH_OF: Final = dict(zip("BGR", WAVELENGTHS_UM, strict=True)) | {GREY: WAVELENGTHS_UM[1]}
 """Wavelengths that stand for the colours of a sensor."""
@@ -38,7 +39,8 @@ class ImportOptions:
         x_mm: Position of every column, to the right of the axis.
         y_mm: Position of every row, down from the axis.
         heights_mm: Distance from the axis of every kernel of a lens of revolution.
-        flip: Axes along which the file runs the other way: "x", "y" or "xy".
+        flip: Axes along which the file runs the other way, "x", "y" or "xy"; "kernels" turns every
+            kernel by 180 degrees where it is.
         centre: Which sample is the middle of a kernel.
         background: Whether the level along the border of a kernel is taken off.
         side_px: Odd side of the kernels; None for as far as they reach.
@@ -110,8 +112,8 @@ class ImportOptions:
                 f"{option_text('colours')} takes an order of R, G and B, like RGB, or {GREY} for "
                 f"one kernel for all colours; got {self.colours}"
             )
-        if self.flip not in ("", "x", "y", "xy"):
-            faults.append(f"{option_text('flip')} takes x, y or xy; got {self.flip}")
+        if self.flip not in FLIPS:
+            faults.append(f"{option_text('flip')} takes {', '.join(FLIPS[1:])}; got {self.flip}")
         return faults
 
 

@@ -66,7 +66,7 @@ def psf_import(
         typer.Option(help="Distances from the axis in mm, of a lens of revolution, 0,A,B."),
     ] = None,
     flip: Annotated[
-        str, typer.Option(help="Axes that run the other way in the files: x, y or xy.")
+        str, typer.Option(help="Axes that run the other way: x, y or xy; kernels turns each.")
     ] = "",
     centre: Annotated[
         str, typer.Option(help="Middle of a kernel: middle, peak or centroid.")

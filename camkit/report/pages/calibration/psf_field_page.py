@@ -21,7 +21,7 @@ _MAP: Final = (
 _IMPULSE: Final = (
     "A point of light up left of the axis, as the camera will photograph it: the cross is where "
     "the point is, right and down are those of the picture. If tails point another way than in a "
-    "photograph of a point there, the files run the other way: import them with flip x, y or xy."
+    "photograph of a point there, the files run the other way: import them with another flip."
 )
 _PLACE: Final = 0.7
 

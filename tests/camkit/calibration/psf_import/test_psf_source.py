@@ -50,6 +50,16 @@ def test_a_file_that_runs_the_other_way_is_flipped_with_its_places(tmp_path, fli
     assert np.array_equal(right.kernels, other.kernels)
 
 
+def test_kernels_of_a_correlation_are_turned_where_they_are(tmp_path):
+    np.save(tmp_path / "right.npy", counts())
+    np.save(tmp_path / "turned.npy", counts()[..., ::-1, ::-1])
+    right, turned = (
+        import_psf(tmp_path / f"{name}.npy", pitch_um=2.0, span_mm=SPAN, flip=flip).psf.kernels
+        for name, flip in (("right", ""), ("turned", "kernels"))
+    )
+    assert np.array_equal(right, turned)
+
+
 @pytest.mark.parametrize(
     ("axes", "order"),
     [("h,w,c,col,row", (3, 4, 2, 1, 0)), ("c,row,col,h,w", (2, 0, 1, 3, 4))],
@@ -182,7 +192,7 @@ def test_one_message_names_every_fault(tmp_path):
         ({"span_mm": SPAN, "frame_mm": SPAN}, "use one of"),
         ({"x_mm": "1,2,3,4"}, "y_mm is missing"),
         ({"side_px": 4}, "odd"),
-        ({"flip": "z"}, "x, y or xy"),
+        ({"flip": "z"}, "x, y, xy, kernels"),
         ({"uncertainty": "1,2"}, "NOISE,SHIFT_PX,WIDTH"),
         ({"colours": "RGB", "wavelengths_um": "0.4,0.5,0.6"}, "colours or of wavelengths"),
     ],
