@@ -259,7 +259,7 @@ def focus_weights(shifts_um: NDArray[np.float64] | None, focus_um: float) -> NDA
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PsfUncertainty:
-    """How far measured kernels may be off, as standard deviations.
+    """The uncertainty of measured kernels, as standard deviations.
 
     Attributes:
         noise: Of a sample at the peak, relative to the peak; of others by the root of their light.

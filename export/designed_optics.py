@@ -13,7 +13,7 @@ import torch
 from camkit.bundle.reader import PLATE, PRESCRIPTION
 from camkit.caller import option_text
 from camkit.errors import ContractError
-from camkit.export.parts import Parts
+from camkit.export.parts import PSF_NAME, Parts
 from camkit.models_def.optics.diffraction.plate import (
     Plate,
     plate_members,
@@ -55,13 +55,14 @@ def designed_members(
             f"a bundle holds a lens or a plate; here are the lens {lens.name} and the plate "
             f"{plate.name}"
         )
+    psf_file = parts.psf or Path(PSF_NAME)
     # written afresh: the bundle carries the user's glasses and is TOML, whatever came in
     if lens is not None:
         check = check_distortion if parts.haze is None else check_peaks
-        check(lens, psf, parts.psf)
+        check(lens, psf, psf_file)
         return {PRESCRIPTION: format_prescription(lens).encode()}
     if plate is not None:
-        _check_plate(plate, psf, parts.psf)
+        _check_plate(plate, psf, psf_file)
         return plate_members(plate)
     return {}
 

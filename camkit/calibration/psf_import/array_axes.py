@@ -31,9 +31,8 @@ def ordered(array: NDArray[Any], options: ImportOptions, what: str) -> FloatGrid
     if np.iscomplexobj(array):
         raise ContractError(f"{what} is complex: a PSF is the squared magnitude of an amplitude")
     names = _names(array, options, what)
-    values = array.astype(np.float64)
-    for axis in [at for at, name in enumerate(names) if name == NONE][::-1]:
-        values = values.take(0, axis=axis)
+    single = tuple(axis for axis, name in enumerate(names) if name == NONE)
+    values = np.squeeze(array, axis=single).astype(np.float64)
     names = [name for name in names if name != NONE]
     if options.grid is not None:
         values, names = _unrolled(values, names, options.grid, what)
@@ -55,9 +54,9 @@ def _names(array: NDArray[Any], options: ImportOptions, what: str) -> list[str]:
         )
     names = [name.strip().lower() for name in text.split(",")]
     sides = [name for name in names if name != NONE]
-    known = set(sides) <= {*ORDER, RUNNING} and {"h", "w"} <= set(sides)
+    are_known = set(sides) <= {*ORDER, RUNNING} and {"h", "w"} <= set(sides)
     if (
-        not known
+        not are_known
         or len(set(sides)) != len(sides)
         or (RUNNING in sides and {"row", "col"} & {*sides})
     ):

@@ -39,7 +39,7 @@ def read_array(path: Path, variable: str | None) -> NDArray[Any]:
     if suffix == ".npy":
         array: NDArray[Any] = _loaded(path)
         return array
-    return _chosen(_matlab(path) if suffix == ".mat" else _zipped(path), variable, path)
+    return _selected_array(_matlab(path) if suffix == ".mat" else _zipped(path), variable, path)
 
 
 def _loaded(path: Path) -> Any:
@@ -90,7 +90,9 @@ def _matlab_hdf5(path: Path) -> Mapping[str, NDArray[Any]]:
         raise DecodeError(f"{path.name} is no sound MATLAB file: {error}") from error
 
 
-def _chosen(arrays: Mapping[str, NDArray[Any]], variable: str | None, path: Path) -> NDArray[Any]:
+def _selected_array(
+    arrays: Mapping[str, NDArray[Any]], variable: str | None, path: Path
+) -> NDArray[Any]:
     names = ", ".join(f"{name} {array.shape}" for name, array in arrays.items()) or "nothing"
     if variable is not None:
         if variable not in arrays:

@@ -38,7 +38,7 @@ MOST_PLACES: Final = 4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Normalised:
-    """What was changed of the kernels, and what is odd of them; shares are of the light.
+    """Changes that were made to the kernels, and their oddities; shares are of the light.
 
     Attributes:
         sums: Least and largest sum before.
@@ -185,9 +185,9 @@ def _wavelengths(stack: KernelStack, options: ImportOptions) -> tuple[tuple[floa
             f"axis c has {count} entries; name them by {option_text('colours')} (RGB) or "
             f"{option_text('wavelengths_um')}"
         ]
-    named = option_text("colours" if options.wavelengths_um is None else "wavelengths_um")
+    option_name = option_text("colours" if options.wavelengths_um is None else "wavelengths_um")
     if len(waves) != count:
-        return (), [f"{named} names {len(waves)} colours, the files have {count}"]
+        return (), [f"{option_name} names {len(waves)} colours, the files have {count}"]
     if len(set(waves)) != count or min(waves) <= 0:
         return (), [f"the wavelengths {list(waves)} of axis c must differ and be > 0"]
     return tuple(map(float, waves)), []
@@ -195,7 +195,7 @@ def _wavelengths(stack: KernelStack, options: ImportOptions) -> tuple[tuple[floa
 
 def _value_faults(values: FloatGrid) -> list[str]:
     """Return what is wrong with the values of kernels, with their places."""
-    bad = ~np.isfinite(values).all(axis=(-2, -1))
+    bad = np.logical_not(np.isfinite(values).all(axis=(-2, -1)))
     dark = ~bad & ~(np.where(bad[..., None, None], 1, values).sum((-2, -1)) > 0)
     texts = {"NaN or infinite values": bad, "no light": dark}
     return [f"{what} in {_where(mask)}" for what, mask in texts.items() if mask.any()]
@@ -275,7 +275,7 @@ def _middles(values: FloatGrid, stated_px: tuple[int, int] | None, centre: str) 
 def _flipped(
     values: FloatGrid, middles: NDArray[np.int_], flip: str, *, turns_places: bool
 ) -> tuple[FloatGrid, NDArray[np.int_]]:
-    """Reverse kernels, and the rows or columns that they lie in, of axes that run the other way."""
+    """Mirror kernels, and the rows or columns that they lie in, of axes that run the other way."""
     middles = middles.copy()
     if flip == "kernels":
         flip, turns_places = "xy", False
@@ -292,8 +292,8 @@ def _flipped(
 def _centred(values: FloatGrid, middles: NDArray[np.int_]) -> FloatGrid:
     """Fill kernels up to odd squares whose middles are the middles of all."""
     h, w = values.shape[-2:]
-    after = np.array([h - 1, w - 1]) - middles
-    half = int(max(middles.max(), after.max()))
+    to_end = np.array([h - 1, w - 1]) - middles
+    half = int(max(middles.max(), to_end.max()))
     side = 2 * half + 1
     squares = np.zeros((*values.shape[:-2], side, side))
     for row, column in np.ndindex(*middles.shape[:2]):

@@ -33,15 +33,15 @@ class Places:
 def places_of(stack: KernelStack, options: ImportOptions) -> tuple[Places | None, list[str]]:
     """Return the places of a stack, and every fault of what is stated of them."""
     rows, columns = stack.values.shape[:2]
-    stated = _stated(options)
+    place_options = _place_options(options)
     if rows == columns == 1:
-        if stated:
-            return None, [f"one kernel is the same all over the picture; leave {stated} out"]
+        if place_options:
+            return None, [f"one kernel is the same all over the picture; leave {place_options} out"]
         return Places(symmetry="uniform", heights_mm=np.zeros(1)), []
     heights = options.heights_mm if options.heights_mm is not None else stack.heights_mm
     if heights is not None:
         return _radial(np.array(heights, dtype=np.float64), rows * columns)
-    if not stated:
+    if not place_options:
         return None, [
             f"{rows} x {columns} kernels need places: {option_text('span_mm')} WIDTHxHEIGHT from "
             f"the first to the last, {option_text('frame_mm')} WIDTHxHEIGHT of the whole picture, "
@@ -50,7 +50,7 @@ def places_of(stack: KernelStack, options: ImportOptions) -> tuple[Places | None
     return _grid(options, rows, columns)
 
 
-def _stated(options: ImportOptions) -> str:
+def _place_options(options: ImportOptions) -> str:
     names = ("span_mm", "frame_mm", "x_mm", "y_mm", "heights_mm")
     return ", ".join(option_text(name) for name in names if getattr(options, name) is not None)
 

@@ -54,7 +54,8 @@ def for_sensor(psf: FrozenPsf, pitch_um: float, channels: int) -> FrozenPsf:
 
 def _at_ratio(kernels: FloatArray, ratio: float) -> FloatArray:
     at_pitch = resampled_kernels(kernels.astype(np.float64), ratio)
-    return (at_pitch / at_pitch.sum((-2, -1), keepdims=True)).astype(np.float32)
+    at_pitch /= at_pitch.sum((-2, -1), keepdims=True)
+    return np.asarray(at_pitch, dtype=np.float32)
 
 
 def window(kernels: FloatGrid, side_px: int) -> FloatGrid:
@@ -64,9 +65,9 @@ def window(kernels: FloatGrid, side_px: int) -> FloatGrid:
         if missing < 0:
             kernels = np.moveaxis(np.moveaxis(kernels, axis, 0)[-missing:missing], 0, axis)
         elif missing:
-            around = [(0, 0)] * kernels.ndim
-            around[axis] = (missing, missing)
-            kernels = np.pad(kernels, around)
+            widths = [(0, 0)] * kernels.ndim
+            widths[axis] = (missing, missing)
+            kernels = np.pad(kernels, widths)
     return kernels
 
 
@@ -77,4 +78,4 @@ def _shares(side: int, ratio: float) -> FloatGrid:
     source_px = (np.arange(side, dtype=np.float64)[None] - side // 2) * ratio
     low = np.maximum(target_px - 0.5, source_px - ratio / 2)
     high = np.minimum(target_px + 0.5, source_px + ratio / 2)
-    return np.clip(high - low, 0, None) / ratio
+    return np.asarray(np.clip(high - low, 0, None) / ratio, dtype=np.float64)

@@ -1,4 +1,4 @@
-"""How far measured kernels may be off, estimated, and kernels drawn within it.
+"""The uncertainty of measured kernels, estimated, and kernels drawn within it.
 
 What does not vary smoothly over the field is taken for an error of the measurement: of the places
 of colours against each other, and of the widths of kernels. Noise is the scatter along the border.

@@ -28,10 +28,11 @@ def narrow_response(wavelengths_um: FloatGrid) -> tuple[FloatGrid, FloatGrid]:
         return wavelengths_um, np.ones((1, 1))
     knots = wavelengths_um[:, None] + np.array([-HALF_WIDTH_UM, 0.0, HALF_WIDTH_UM])
     peaks = np.kron(np.eye(wavelengths_um.size), [0.0, 1.0, 0.0])
-    return knots.ravel(), peaks[::-1].copy()
+    return knots.ravel(), np.array(peaks[::-1], dtype=np.float64)
 
 
 def is_of_own_colours(wavelengths_um: FloatGrid) -> bool:
     """Return whether wavelengths stand for the colours of the sensor that measured the kernels."""
-    own = np.array(WAVELENGTHS_UM)
-    return wavelengths_um.shape == own.shape and np.allclose(wavelengths_um, own)
+    standing_um = np.array(WAVELENGTHS_UM)
+    same_shape = wavelengths_um.shape == standing_um.shape
+    return same_shape and np.allclose(wavelengths_um, standing_um)

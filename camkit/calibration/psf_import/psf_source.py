@@ -131,7 +131,8 @@ def _place(match: re.Match[str]) -> _Place:
 
 def _of_places(files: Mapping[_Place, Path], options: ImportOptions) -> KernelStack:
     """Join the kernels of files; every place must be there, and all alike."""
-    rows, columns, colours = (sorted({place[axis] for place in files}) for axis in range(3))
+    rows, columns = (sorted({int(place[axis]) for place in files}) for axis in range(2))
+    colours = sorted({place[2] for place in files})
     missing = [
         f"row {row} column {column} {colour}".rstrip()
         for row in rows

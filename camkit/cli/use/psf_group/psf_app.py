@@ -11,4 +11,4 @@ add_command(psf_app, psf_import, MEASURE, "Import kernels of other programs.", n
 
 @psf_app.callback()
 def psf() -> None:
-    """Bring in a PSF that was measured or computed elsewhere."""
+    """Import a PSF that was measured or computed elsewhere."""

@@ -4,6 +4,7 @@ from typing import Final
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.calibration.psf_import.clean_kernels import ImportedPsf
 from camkit.calibration.psf_import.kernel_stack import FloatGrid
 from camkit.psf import FrozenPsf
@@ -113,7 +114,7 @@ def _step(positions_mm: FloatGrid) -> float:
     return float(steps.min()) if steps.size else float("inf") if positions_mm.size > 1 else 1.0
 
 
-def _colour_picture(kernels: FloatGrid) -> FloatGrid:
+def _colour_picture(kernels: FloatArray) -> FloatGrid:
     """Return (h, w, 3) red, green, blue of (wavelength, h, w), on a logarithmic scale."""
     ends = (-1, len(kernels) // 2, 0)  # the longest wavelength is shown red
     picture = np.stack([kernels[end] for end in ends], axis=-1).astype(np.float64)

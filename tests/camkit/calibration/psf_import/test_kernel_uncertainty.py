@@ -1,4 +1,4 @@
-"""Copies of a measured PSF scatter as its uncertainty says, and the estimate finds what scatters."""
+"""Copies of a PSF scatter as its uncertainty says, and the estimate finds what scatters."""
 
 import numpy as np
 import pytest
@@ -72,7 +72,7 @@ def test_noise_is_relative_at_the_peak_and_falls_with_the_root_of_the_light():
 
 
 def test_copies_are_kernels_and_the_same_seed_draws_the_same():
-    psf, drawn = copies(PsfUncertainty(noise=0.1, shift_px=0.3, width=0.1), 3)
+    _, drawn = copies(PsfUncertainty(noise=0.1, shift_px=0.3, width=0.1), 3)
     again = copies(PsfUncertainty(noise=0.1, shift_px=0.3, width=0.1), 3)[1]
     assert all(np.array_equal(a.kernels, b.kernels) for a, b in zip(drawn, again, strict=True))
     assert not np.array_equal(drawn[0].kernels, drawn[1].kernels)

@@ -118,7 +118,7 @@ def test_matlab_7_3_is_read_with_its_axes_in_reverse(tmp_path):
 
 def test_matlab_7_3_without_h5py_is_refused_by_its_name(tmp_path, monkeypatch):
     (tmp_path / "psf.mat").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(600))
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
     with pytest.raises(CamkitError, match=r"version 7\.3.*h5py.*-v7"):
         import_psf(tmp_path / "psf.mat", pitch_um=1.0)
 

@@ -13,8 +13,8 @@ from camkit.bundle.writer import write_bundle
 from camkit.calibration.record import to_toml
 from camkit.cli.exit_code import ExitCode
 from camkit.psf import FrozenPsf
-from camkit.runtime.bank.psf import color_kernels
 from camkit.radial import RadialDistortion
+from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work
 from tests.bundle_factory import write_tiny_bundle
