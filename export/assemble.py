@@ -46,6 +46,7 @@ from camkit.bundle.reader import (
 from camkit.bundle.stages import Dehaze, Network, Stage, Wiener
 from camkit.bundle.stages import Parts as KnownParts
 from camkit.bundle.writer import write_bundle
+from camkit.calibration.psf_import.kernel_places import reach_note
 from camkit.calibration.psf_import.kernel_resampling import for_sensor
 from camkit.caller import option_text
 from camkit.errors import ContractError
@@ -81,6 +82,7 @@ from camkit.runtime.plan.loss import read_loss_model
 from camkit.runtime.proof.golden_run import case_work
 from camkit.runtime.proof.laws.proof import measure_laws, with_laws
 from camkit.side_file import read_side_text
+from camkit.units import to_mm
 
 PACKAGES: Final = ("camkit", "numpy", "scipy", "onnx", "onnxruntime", "torch", "onnxscript")
 LICENCE: Final = "CC-BY-4.0"
@@ -154,8 +156,20 @@ def export_bundle(parts: Parts, out: Path) -> dict[str, Any]:
         "bytes": out.stat().st_size,
         "sha256": bundle.sha256,
         "sizes": ", ".join(bundle.manifest.sizes) or "none",
+        **_notes(camera),
         **{f"check {i}": line for i, line in enumerate(report.lines())},
     }
+
+
+def _notes(camera: "_Camera") -> dict[str, str]:
+    """Return what is odd of the places of a measured PSF."""
+    extent = camera.recipe.sensor.extent
+    if PSF not in camera.designed or extent is None:
+        return {}
+    pitch_um = extent.pixel_pitch_um
+    sides_mm = (to_mm(side * pitch_um) for side in (extent.width_px, extent.height_px))
+    note = reach_note(camera.optics.psf, *sides_mm)
+    return {} if note is None else {"note": note}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

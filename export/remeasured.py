@@ -36,6 +36,7 @@ from camkit.bundle.sensor import BayerSensor, ChannelResponse, Extent, PlanesSen
 from camkit.bundle.stages import Illumination, Parts, Wiener
 from camkit.bundle.writer import write_bundle
 from camkit.calibration.measured_files import FlatFile, GeometryFile, NoiseFile
+from camkit.calibration.psf_import.kernel_places import reach_note
 from camkit.calibration.psf_import.kernel_resampling import with_pitch
 from camkit.calibration.psf_import.own_colours import narrow_response
 from camkit.caller import option_text
@@ -176,6 +177,9 @@ def _put_psf(draft: _Draft, psf: FrozenPsf, *, keep_networks: bool) -> None:
             f"the kernels had samples of {stated_um:g} um and were resampled to {pitch_um:g} um, "
             "the pixels of the sensor"
         )
+    extent = sensor.known_extent
+    sides_mm = (to_mm(side * pitch_um) for side in (extent.width_px, extent.height_px))
+    draft.notes += filter(None, [reach_note(psf, *sides_mm)])
     channels = len(sensor.channels)
     if psf.wavelengths_um.size not in (1, channels):
         raise DecodeError(

@@ -10,7 +10,7 @@ from camkit.calibration.psf_import.kernel_stack import (
     KernelStack,
 )
 from camkit.caller import option_text
-from camkit.psf import Symmetry, grid_heights_mm
+from camkit.psf import FrozenPsf, Symmetry, grid_heights_mm
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -48,6 +48,36 @@ def places_of(stack: KernelStack, options: ImportOptions) -> tuple[Places | None
             f"or {option_text('x_mm')} and {option_text('y_mm')}"
         ]
     return _grid(options, rows, columns)
+
+
+def reach_note(psf: FrozenPsf, width_mm: float, height_mm: float) -> str | None:
+    """Return a note on kernels whose places do not fit a sensor; None if they do.
+
+    Args:
+        psf: Any; only those of a grid and of several heights have places.
+        width_mm: Of the sensor.
+        height_mm: Likewise.
+    """
+    if psf.grid_x_mm is None or psf.grid_y_mm is None:
+        axes = [(psf.field_heights_mm, float(np.hypot(width_mm, height_mm)) / 2)]
+    else:
+        axes = [(psf.grid_x_mm, width_mm / 2), (psf.grid_y_mm, height_mm / 2)]
+    for places_mm, half_mm in axes:
+        if places_mm.size < 2:
+            continue
+        farthest = float(np.abs(places_mm).max())
+        step = float(np.diff(places_mm).max())
+        if farthest - step > half_mm:
+            return (
+                f"kernels lie up to {farthest:.4g} mm from the axis, the sensor ends at "
+                f"{half_mm:.4g} mm: are their places in mm?"
+            )
+        if farthest + step < half_mm:
+            return (
+                f"kernels are known to {farthest:.4g} mm from the axis, the sensor ends at "
+                f"{half_mm:.4g} mm; the outermost ones hold beyond"
+            )
+    return None
 
 
 def _place_options(options: ImportOptions) -> str:
