@@ -255,3 +255,26 @@ def focus_weights(shifts_um: NDArray[np.float64] | None, focus_um: float) -> NDA
     knots = np.insert(shifts, nominal, 0.0)
     hats = np.array([np.interp(focus_um, knots, unit) for unit in np.eye(knots.size)])
     return np.concatenate([hats[nominal : nominal + 1], np.delete(hats, nominal)])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PsfUncertainty:
+    """The uncertainty of measured kernels, as standard deviations.
+
+    Attributes:
+        noise: Of a sample at the peak, relative to the peak; of others by the root of their light.
+        shift_px: Of a colour against the mean of all colours, in samples.
+        width: Relative, of the size of all kernels together.
+    """
+
+    noise: float = 0.01
+    shift_px: float = 0.05
+    width: float = 0.02
+
+    def __post_init__(self) -> None:
+        numbers = (self.noise, self.shift_px, self.width)
+        if not all(0 <= number < 1 for number in numbers):
+            raise ContractError(
+                f"{option_text('uncertainty')} takes NOISE,SHIFT_PX,WIDTH, each in [0, 1); got "
+                f"{numbers}"
+            )

@@ -22,6 +22,7 @@ from typing import Any, Final
 import numpy as np
 
 from camkit.arrays import FloatArray
+from camkit.bundle.chain import rewired
 from camkit.bundle.facts import NetworkFacts
 from camkit.bundle.frozen_optics import FrozenOptics, read_optics_file
 from camkit.bundle.golden import IMAGE, GoldenArrays
@@ -33,7 +34,8 @@ from camkit.bundle.manifest import (
     format_of,
     planes_of,
 )
-from camkit.bundle.psf_file import psf_to_bytes, read_psf
+from camkit.bundle.optics import PSF
+from camkit.bundle.psf_file import psf_from_bytes, psf_to_bytes, read_psf
 from camkit.bundle.reader import (
     CARD,
     PREVIEW,
@@ -41,13 +43,15 @@ from camkit.bundle.reader import (
     STRESS_PSF,
     Bundle,
 )
-from camkit.bundle.stages import Dehaze, Stage, Wiener
+from camkit.bundle.stages import Dehaze, Network, Stage, Wiener
 from camkit.bundle.stages import Parts as KnownParts
 from camkit.bundle.writer import write_bundle
+from camkit.calibration.psf_import.kernel_places import reach_note
+from camkit.calibration.psf_import.kernel_resampling import for_sensor
 from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.export.card import card_text, laws_text, preview_png
-from camkit.export.designed_optics import designed_members
+from camkit.export.designed_optics import designed_members, designed_of
 from camkit.export.golden_cases import (
     CaseRecipe,
     Cases,
@@ -56,7 +60,7 @@ from camkit.export.golden_cases import (
     photograph_all,
 )
 from camkit.export.network_facts import ExportedNetwork, draft_network, measure_network
-from camkit.export.parts import Parts
+from camkit.export.parts import PSF_NAME, Parts
 from camkit.export.proving import golden_members, write_proved
 from camkit.models_def.training.checkpoint import (
     Checkpoint,
@@ -65,13 +69,20 @@ from camkit.models_def.training.checkpoint import (
     recipe_of,
 )
 from camkit.models_def.training.credits import joined_credits
-from camkit.models_def.training.kind import Design, TrainingKind, training_kind
+from camkit.models_def.training.kind import (
+    Design,
+    TrainingKind,
+    read_recipe,
+    special_part,
+    training_kind,
+)
 from camkit.models_def.training.recipe import Recipe, differing_part
 from camkit.runtime.kind import part_of
 from camkit.runtime.plan.loss import read_loss_model
 from camkit.runtime.proof.golden_run import case_work
 from camkit.runtime.proof.laws.proof import measure_laws, with_laws
 from camkit.side_file import read_side_text
+from camkit.units import to_mm
 
 PACKAGES: Final = ("camkit", "numpy", "scipy", "onnx", "onnxruntime", "torch", "onnxscript")
 LICENCE: Final = "CC-BY-4.0"
@@ -144,25 +155,62 @@ def export_bundle(parts: Parts, out: Path) -> dict[str, Any]:
         "bundle": str(out),
         "bytes": out.stat().st_size,
         "sha256": bundle.sha256,
-        "sizes": ", ".join(bundle.manifest.sizes),
+        "sizes": ", ".join(bundle.manifest.sizes) or "none",
+        **_notes(camera),
         **{f"check {i}": line for i, line in enumerate(report.lines())},
     }
 
 
+def _notes(camera: "_Camera") -> dict[str, str]:
+    """Return what is odd of the places of a measured PSF."""
+    extent = camera.recipe.sensor.extent
+    if PSF not in camera.designed or extent is None:
+        return {}
+    pitch_um = extent.pixel_pitch_um
+    sides_mm = (to_mm(side * pitch_um) for side in (extent.width_px, extent.height_px))
+    note = reach_note(camera.optics.psf, *sides_mm)
+    return {} if note is None else {"note": note}
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Camera:
-    """The exported camera, with every size of every role."""
+    """The exported camera, with every size of every role, and its optics as designed."""
 
     kind: TrainingKind[Any, Any]
     recipe: Recipe
     design: Design
     checkpoints: Checkpoints
+    designed: Mapping[str, bytes]
     optics: FrozenOptics
     freeze: Mapping[str, Any]
     plan: dict[str, Threshold] | None
 
 
 def _camera(parts: Parts) -> _Camera:
+    if parts.recipe is None:
+        recipe, by_role, designed = _trained(parts)
+    else:
+        recipe, by_role = read_recipe(parts.recipe), {}
+        find_designed = special_part(recipe.kind, "DESIGNED")
+        designed = {} if find_designed is None else find_designed(recipe, parts.recipe.parent)
+    kind = training_kind(recipe.kind)
+    design = kind.design(recipe)
+    if not by_role:
+        design = replace(design, stages=_without_networks(design.stages, recipe.kind))
+    return _Camera(
+        kind=kind,
+        recipe=recipe,
+        design=design,
+        checkpoints=by_role,
+        designed=designed,
+        optics=_optics(parts, recipe, design, designed),
+        freeze=_freeze_facts(parts),
+        plan=_plan_entries(parts),
+    )
+
+
+def _trained(parts: Parts) -> tuple[Recipe, Checkpoints, Mapping[str, bytes]]:
+    """Return recipe, networks and optics of checkpoints, which must be of one camera."""
     if not parts.checkpoints:
         raise ContractError("export needs at least one checkpoint")
     checkpoints = [read_checkpoint(path) for path in parts.checkpoints]
@@ -175,25 +223,46 @@ def _camera(parts: Parts) -> _Camera:
                 f"the checkpoints are of different cameras: the recipe of {path} has another "
                 f"{what} than that of {parts.checkpoints[0]}; train them for one"
             )
-    design = kind.design(recipe)
-    return _Camera(
-        kind=kind,
-        recipe=recipe,
-        design=design,
-        checkpoints=_by_role(kind.roles, parts.checkpoints, checkpoints),
-        optics=_optics(parts, recipe, design),
-        freeze=_freeze_facts(parts),
-        plan=_plan_entries(parts),
-    )
+    by_role = _by_role(kind.roles, parts.checkpoints, checkpoints)
+    return recipe, by_role, designed_of(checkpoints)
 
 
-def _optics(parts: Parts, recipe: Recipe, design: Design) -> FrozenOptics:
+def _without_networks(stages: tuple[Stage, ...], kind: str) -> tuple[Stage, ...]:
+    """Return the stages that restore without a network.
+
+    Raises:
+        ContractError: If none of them does.
+    """
+    if not any(isinstance(stage, Wiener) for stage in stages):
+        raise ContractError(
+            f"a camera of the kind {kind} has no filter that restores without its network; train "
+            "one"
+        )
+    return rewired([stage for stage in stages if not isinstance(stage, Network)], stages)
+
+
+def _optics(
+    parts: Parts, recipe: Recipe, design: Design, designed: Mapping[str, bytes]
+) -> FrozenOptics:
     """Read the optics, with their haze where a stage removes one.
 
     Raises:
-        ContractError: If there is a haze and no such stage, or the other way round.
+        ContractError: If there are none, or a haze and no such stage, or the other way round.
     """
-    optics = read_optics_file(parts.psf, channels=len(recipe.sensor.channels))
+    channels = len(recipe.sensor.channels)
+    if parts.psf is not None:
+        optics = read_optics_file(parts.psf, channels=channels)
+        if PSF in designed:  # the file may be the one that was imported
+            psf = for_sensor(optics.psf, recipe.sensor.known_extent.pixel_pitch_um, channels)
+            optics = replace(optics, psf=psf)
+    elif PSF in designed:
+        optics = FrozenOptics(psf=psf_from_bytes(designed[PSF], what="the measured PSF"))
+    else:
+        folder = (parts.recipe or parts.checkpoints[0]).parent
+        raise ContractError(
+            f"there is no {folder / PSF_NAME}; make it with `camkit freeze`, or add "
+            f"{option_text('psf')}"
+        )
     undone = any(isinstance(stage, Dehaze) for stage in design.stages)
     if undone == (parts.haze is None):
         raise ContractError(
@@ -269,8 +338,7 @@ def _windows(bundle: Bundle, cases: Cases) -> dict[tuple[str, str], list[FloatAr
 
 def _members(parts: Parts, camera: _Camera) -> dict[str, bytes]:
     members = camera.optics.members | _stress_members(parts, camera.optics)
-    checkpoints = [c for sizes in camera.checkpoints.values() for c in sizes.values()]
-    return members | designed_members(parts, checkpoints, camera.optics.psf)
+    return members | designed_members(parts, camera.designed, camera.optics.psf)
 
 
 def _stress_members(parts: Parts, optics: FrozenOptics) -> dict[str, bytes]:

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from camkit.arrays import FloatArray
-from camkit.bundle.golden import IMAGE, GoldenArrays
+from camkit.bundle.golden import IMAGE, NO_SIZE, GoldenArrays
 from camkit.bundle.manifest import Manifest
 from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import Sensor
@@ -18,6 +18,8 @@ from camkit.runtime.proof.laws.law import number_text
 from camkit.runtime.proof.laws.proof import MeasuredLaws
 
 BORDER_PX: Final = 16
+FILTER: Final = "filter"
+"""Heads the results of a bundle without networks."""
 _LAWS: Final = "\n## Laws of a picture"
 _PLACES: Final = {"radial": "field heights", "uniform": "place", "grid": "places"}
 
@@ -48,7 +50,9 @@ def card_text(
         f"{psf.wavelengths_um.size} wavelengths, {psf.kernels.shape[-1]} px a side, "
         f"for objects at {depths}.",
         "",
-        f"Licence of the weights: {manifest.licence}. Trained on: {manifest.training_data}.",
+        f"Licence of the weights: {manifest.licence}. Trained on: {manifest.training_data}."
+        if manifest.networks
+        else "No network: the filter restores alone.",
         "",
         *_response(sensor),
         "## PSF over the field" + (", mean of the depths" if psf.depths_mm.size > 1 else ""),
@@ -62,17 +66,17 @@ def card_text(
             f"| {height:.2f} | {energy_diameter_px(kernel, 0.95):.0f} | "
             f"{modulation(kernel, 0.1):.2f} | {psf.relative_illumination[i]:.3f} |"
         )
+    sizes = manifest.sizes or (NO_SIZE,)
     lines += ["", "## Networks", "", *_networks(bundle), ""]
     lines += ["## Golden cases (same PSF, PSNR in dB on sRGB values)", ""]
     lines += [
-        "| case | " + " | ".join(manifest.sizes) + " |",
-        "|---|" + "---|" * len(manifest.sizes),
+        "| case | " + " | ".join(manifest.sizes or (FILTER,)) + " |",
+        "|---|" + "---|" * len(sizes),
     ]
     for name, arrays in _pictures(golden).items():
         images, white = arrays.outputs[IMAGE], np.float32((whites or {}).get(name, 1.0))
         values = (
-            f"{_psnr_db(images[size] / white, arrays.reference / white):.2f}"
-            for size in manifest.sizes
+            f"{_psnr_db(images[size] / white, arrays.reference / white):.2f}" for size in sizes
         )
         lines.append(f"| {name} | " + " | ".join(values) + " |")
     lines += [
@@ -129,6 +133,8 @@ def _response(sensor: Sensor) -> list[str]:
 def _networks(bundle: Bundle) -> list[str]:
     """Return a table of every network; with roles where there are several."""
     networks = bundle.manifest.networks
+    if not networks:
+        return ["None."]
     rows = ["| network | kMAC/px | parameters | reach (px) |", "|---|---|---|---|"]
     for role, sizes in networks.items():
         for size, facts in sizes.items():
@@ -162,14 +168,15 @@ def preview_png(bundle: Bundle, golden: Mapping[str, GoldenArrays]) -> bytes:
         axes[1, column].set_ylim(0, 1)
         axes[1, column].set_xlabel("cycles/px", fontsize=8)
     axes[1, 0].set_ylabel("MTF")
-    best = bundle.manifest.sizes[-1]
+    best = (bundle.manifest.sizes or (NO_SIZE,))[-1]
+    best_name = best if bundle.manifest.sizes else FILTER
     for column, (name, arrays) in enumerate(_pictures(golden).items()):
         image = arrays.outputs[IMAGE][best]
         gain = 1 / max(float(np.quantile(arrays.reference, 0.99)), 1e-3)
         pair = np.concatenate([image, arrays.reference], axis=1) * gain
         pair = np.broadcast_to(pair, (3, *pair.shape[1:]))
         axes[2, column].imshow(encode_srgb(pair.astype(np.float32)).transpose(1, 2, 0))
-        axes[2, column].set_title(f"{name}: {best} over truth", fontsize=8)
+        axes[2, column].set_title(f"{name}: {best_name} over truth", fontsize=8)
     for axis in (*axes[0, fields.size :], *axes[1, fields.size :], *axes[2]):
         axis.axis("off")
     buffer = io.BytesIO()

@@ -13,7 +13,7 @@ import torch
 from camkit.bundle.reader import PLATE, PRESCRIPTION
 from camkit.caller import option_text
 from camkit.errors import ContractError
-from camkit.export.parts import Parts
+from camkit.export.parts import PSF_NAME, Parts
 from camkit.models_def.optics.diffraction.plate import (
     Plate,
     plate_members,
@@ -34,37 +34,45 @@ more from each other, and by 0.008 at most from what was computed of them."""
 
 
 def designed_members(
-    parts: Parts, checkpoints: Iterable[Checkpoint], psf: FrozenPsf
+    parts: Parts, designed: Mapping[str, bytes], psf: FrozenPsf
 ) -> dict[str, bytes]:
     """Return the lens or the plate of a camera as members of its bundle: name -> content.
 
     None where the camera has neither, or a checkpoint does not carry it.
 
+    Args:
+        parts: What the caller names.
+        designed: The optics of the checkpoints, or of the recipe; see `designed_of`.
+        psf: Frozen.
+
     Raises:
-        ContractError: If the checkpoints are of different optics, there are a lens and a plate, or
-            the PSF was not frozen from them.
+        ContractError: If there are a lens and a plate, or the PSF was not frozen from them.
         CamkitError: If a lens is wrong, see `read_lens`.
     """
-    designed = _designed_of(checkpoints)
     lens, plate = _lens_of(parts, designed), _plate_of(parts, designed)
     if lens is not None and plate is not None:
         raise ContractError(
             f"a bundle holds a lens or a plate; here are the lens {lens.name} and the plate "
             f"{plate.name}"
         )
+    psf_file = parts.psf or Path(PSF_NAME)
     # written afresh: the bundle carries the user's glasses and is TOML, whatever came in
     if lens is not None:
         check = check_distortion if parts.haze is None else check_peaks
-        check(lens, psf, parts.psf)
+        check(lens, psf, psf_file)
         return {PRESCRIPTION: format_prescription(lens).encode()}
     if plate is not None:
-        _check_plate(plate, psf, parts.psf)
+        _check_plate(plate, psf, psf_file)
         return plate_members(plate)
     return {}
 
 
-def _designed_of(checkpoints: Iterable[Checkpoint]) -> Mapping[str, bytes]:
-    """Return the optics that checkpoints carry; old checkpoints carry none."""
+def designed_of(checkpoints: Iterable[Checkpoint]) -> Mapping[str, bytes]:
+    """Return the optics that checkpoints carry; old checkpoints carry none.
+
+    Raises:
+        ContractError: If they are of different optics.
+    """
     distinct: list[Mapping[str, bytes]] = []
     for checkpoint in checkpoints:
         if checkpoint.designed and checkpoint.designed not in distinct:

@@ -22,6 +22,7 @@ from camkit.runtime.files.in_memory import FilePath
 from camkit.runtime.output.part_file import refuse_existing
 
 NO_PLATE: Final = "none"
+RECIPE: Final = ".toml"
 
 
 @checked
@@ -38,14 +39,16 @@ def bundle(
     prescription: FilePath | None = None,
     plate: FilePath | None = None,
     version: str = "0.1.0",
+    network: bool = True,
     overwrite: bool = False,
 ) -> dict[str, Any]:
     """Pack checkpoints, PSF, lens or plate into a bundle and verify it (needs torch).
 
     Args:
-        checkpoints: One per network size and role, of one camera.
+        checkpoints: One per network size and role, of one camera; without a network, its recipe.
         out: Bundle to write (.camkit).
-        psf: PSF of `camkit.freeze`; None for psf.safetensors beside the first checkpoint.
+        psf: PSF of `camkit.freeze`; None for psf.safetensors beside the first checkpoint, else
+            the measured PSF that the recipe names.
         haze: Veiling glare of the optics; None for haze.safetensors beside the PSF, if any.
         stress_psf: Kernels off the design point; None for stress_psf.safetensors beside the
             checkpoint, if any.
@@ -56,6 +59,7 @@ def bundle(
         prescription: Lens (.toml, .zmx); None for the checkpoint's.
         plate: Plate (.toml or name), "none" for no plate; None for the checkpoint's.
         version: Semantic version of the bundle.
+        network: False packs a recipe without any network: its filter restores alone.
         overwrite: Whether a file that exists is replaced.
 
     Returns:
@@ -73,20 +77,17 @@ def bundle(
     paths = tuple(map(Path, several))
     if not paths:
         raise ContractError("export needs at least one checkpoint")
+    _check_first(paths, network=network)
     folder = paths[0].parent
     optics = _usual_file(psf, folder, PSF_NAME)
-    if optics is None:
-        raise ContractError(
-            f"there is no {folder / PSF_NAME}; make it with `camkit freeze`, or add "
-            f"{option_text('psf')}"
-        )
     stress = _usual_file(stress_psf, folder, STRESS_NAME)
     from camkit.export import assemble
 
     parts = Parts(
-        checkpoints=paths,
+        checkpoints=paths if network else (),
+        recipe=None if network else paths[0],
         psf=optics,
-        haze=_usual_file(haze, optics.parent, HAZE_NAME),
+        haze=_usual_file(haze, optics and optics.parent, HAZE_NAME),
         stress_psf=stress,
         stress_haze=_usual_file(stress_haze, stress and stress.parent, STRESS_HAZE_NAME),
         prescription=None if prescription is None else Path(prescription),
@@ -97,6 +98,21 @@ def bundle(
         version=version,
     )
     return assemble.export_bundle(parts, Path(out))
+
+
+def _check_first(paths: tuple[Path, ...], *, network: bool) -> None:
+    """Refuse a recipe in place of checkpoints, and the other way round."""
+    are_recipes = [path.suffix.lower() == RECIPE for path in paths]
+    if network and any(are_recipes):
+        raise ContractError(
+            f"{paths[are_recipes.index(True)]} is a recipe; export takes checkpoints of "
+            f"`camkit train`, or a recipe with {option_text('network', value=False)}"
+        )
+    if not network and (len(paths) != 1 or not are_recipes[0]):
+        raise ContractError(
+            f"{option_text('network', value=False)} takes one recipe ({RECIPE}) in place of "
+            f"checkpoints; got {', '.join(path.name for path in paths)}"
+        )
 
 
 def _usual_file(path: FilePath | None, folder: Path | None, name: str) -> Path | None:

@@ -17,8 +17,9 @@ class Parts:
     """The parts of a bundle.
 
     Attributes:
-        checkpoints: One per role and size, of one camera.
-        psf: Frozen PSF of `camkit freeze`.
+        checkpoints: One per role and size, of one camera; none for a camera without networks.
+        recipe: Of a camera without networks; None where the checkpoints have it.
+        psf: Frozen PSF of `camkit freeze`; None for the measured PSF of checkpoints or recipe.
         haze: What `camkit freeze --haze` wrote beside it; None for optics without.
         stress_psf: Kernels off the design point.
         stress_haze: The haze beside them; None for optics without.
@@ -32,7 +33,8 @@ class Parts:
     """
 
     checkpoints: tuple[Path, ...]
-    psf: Path
+    psf: Path | None = None
+    recipe: Path | None = None
     haze: Path | None = None
     stress_psf: Path | None = None
     stress_haze: Path | None = None

@@ -36,6 +36,9 @@ from camkit.bundle.sensor import BayerSensor, ChannelResponse, Extent, PlanesSen
 from camkit.bundle.stages import Illumination, Parts, Wiener
 from camkit.bundle.writer import write_bundle
 from camkit.calibration.measured_files import FlatFile, GeometryFile, NoiseFile
+from camkit.calibration.psf_import.kernel_places import reach_note
+from camkit.calibration.psf_import.kernel_resampling import with_pitch
+from camkit.calibration.psf_import.own_colours import narrow_response
 from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError
 from camkit.export.golden_cases import add_outputs, photograph_all
@@ -62,7 +65,7 @@ class Measured:
         geometry: Distortion and optical centre.
         flat: Relative illumination; its centre counts where no geometry states one.
         noise: Of the sensor.
-        psf: Kernels of one place.
+        psf: Kernels of one place or many, at any pitch.
     """
 
     geometry: GeometryFile | None = None
@@ -167,17 +170,21 @@ def _put_psf(draft: _Draft, psf: FrozenPsf, *, keep_networks: bool) -> None:
     sensor, earlier = draft.sensor, draft.psf
     if earlier is None or draft.manifest.stage(Wiener) is None:
         raise DecodeError(f"{draft.manifest.name} has no Wiener bank that would use kernels")
-    pitch_um = sensor.pixel_pitch_um
-    if abs(psf.pixel_pitch_um / pitch_um - 1) > PITCH_TOLERANCE:
-        raise DecodeError(
-            f"the kernels have samples of {psf.pixel_pitch_um:g} um, the sensor pixels of "
-            f"{pitch_um:g} um"
+    pitch_um, stated_um = sensor.pixel_pitch_um, psf.pixel_pitch_um
+    if abs(stated_um / pitch_um - 1) > PITCH_TOLERANCE:
+        psf = with_pitch(psf, pitch_um)
+        draft.notes.append(
+            f"the kernels had samples of {stated_um:g} um and were resampled to {pitch_um:g} um, "
+            "the pixels of the sensor"
         )
+    extent = sensor.known_extent
+    sides_mm = (to_mm(side * pitch_um) for side in (extent.width_px, extent.height_px))
+    draft.notes += filter(None, [reach_note(psf, *sides_mm)])
     channels = len(sensor.channels)
-    if psf.wavelengths_um.size != channels:
+    if psf.wavelengths_um.size not in (1, channels):
         raise DecodeError(
             f"the kernels have {psf.wavelengths_um.size} wavelengths, one for each of {channels} "
-            "channels is expected, as `camkit calibrate psf` writes them"
+            "channels, or one for all, is expected, as `camkit calibrate psf` writes them"
         )
     light = _light_at(psf.field_heights_mm, earlier)
     if psf.symmetry == "uniform":
@@ -189,11 +196,13 @@ def _put_psf(draft: _Draft, psf: FrozenPsf, *, keep_networks: bool) -> None:
         distortion=earlier.distortion,
         relative_illumination=light,
     )
-    waves = tuple(map(float, psf.wavelengths_um))
-    # red sees the longest wavelength: rows of the response in the order of the channels
-    rows = tuple(tuple(map(float, row)) for row in np.eye(channels)[::-1])
+    waves, rows = narrow_response(psf.wavelengths_um)
+    if len(rows) < channels:
+        rows = np.repeat(rows, channels, axis=0)
     response = ChannelResponse(
-        wavelengths_um=waves, response=rows, source="one measured kernel for each colour"
+        wavelengths_um=tuple(waves.tolist()),
+        response=tuple(map(tuple, rows.tolist())),
+        source="one measured kernel for each colour",
     )
     draft.change(sensor=sensor.model_copy(update={"channel_response": response}), freeze={})
     draft.members = {name: data for name, data in draft.members.items() if name not in DESIGN}

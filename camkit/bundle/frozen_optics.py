@@ -13,9 +13,11 @@ import numpy as np
 from camkit.bundle.haze_file import haze_to_bytes
 from camkit.bundle.optics import HAZE, PSF, STREAKS, FrozenPsfOptics, HazyPsfOptics, StreakEntry
 from camkit.bundle.psf_file import (
+    UNCERTAINTY,
     psf_from_tensors,
     psf_to_bytes,
     read_optics_bytes,
+    read_psf,
     read_tensors,
 )
 from camkit.bundle.streak_file import streaks_from_tensors, streaks_to_bytes
@@ -115,6 +117,8 @@ def read_optics_file(path: Path, *, channels: int) -> FrozenOptics:
         BundleError: If it is missing, damaged, or neither.
     """
     data = read_optics_bytes(path, what="PSF")
+    if UNCERTAINTY in read_tensors(data, what=str(path)):  # of a measured PSF; bundles hold none
+        return FrozenOptics(psf=read_psf(path))
     return optics_from_bytes(data, what=str(path), channels=channels)
 
 

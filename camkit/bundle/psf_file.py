@@ -6,7 +6,8 @@ The file holds seven tensors and no metadata, so that the same PSF always gives 
 `relative_illumination`. A PSF that is not radial adds `symmetry`, its name in ASCII (uint8), and a
 grid its positions, `grid_x_mm` and `grid_y_mm`. Kernels of a moved sensor (format 2.5) add
 `focus_kernels` (float32) and `focus_um`; even powers of the distortion (format 2.6) add
-`distortion_even_coefficients` (channel, 3).
+`distortion_even_coefficients` (channel, 3). A file of `camkit psf import` adds `uncertainty` (3,):
+noise, shift in pixels and width of `camkit.psf.PsfUncertainty`; bundles hold none.
 """
 
 from collections.abc import Mapping
@@ -20,7 +21,7 @@ from safetensors.numpy import load, save
 
 from camkit.bundle.strict_json import read_json
 from camkit.errors import BundleError, ContractError
-from camkit.psf import FrozenPsf, Symmetry
+from camkit.psf import FrozenPsf, PsfUncertainty, Symmetry
 from camkit.radial import RadialDistortion
 from camkit.side_file import MOST_BYTES, read_side_bytes
 
@@ -35,6 +36,8 @@ _ADDED: Final = {"radial": (), "uniform": (_SYMMETRY,), "grid": (_SYMMETRY, *_GR
 """What a PSF of each symmetry holds besides."""
 _EVEN: Final = "distortion_even_coefficients"
 _FOCUS: Final = ("focus_um", "focus_kernels")
+UNCERTAINTY: Final = "uncertainty"
+"""The tensor that files of measured PSFs alone have."""
 _SIDES: Final = ("field", "depth", "wavelength", "h", "w")
 _KERNELS: Final = {"kernels": _SIDES, "focus_kernels": ("shift", *_SIDES)}
 
@@ -75,8 +78,13 @@ def _check_header(data: bytes, what: str) -> None:
     read_json(data[_LENGTH_BYTES : _LENGTH_BYTES + length], what=f"the header of {what}")
 
 
-def psf_to_bytes(psf: FrozenPsf) -> bytes:
-    """Encode a frozen PSF as safetensors; the same PSF always gives the same bytes."""
+def psf_to_bytes(psf: FrozenPsf, uncertainty: PsfUncertainty | None = None) -> bytes:
+    """Encode a frozen PSF as safetensors; the same PSF always gives the same bytes.
+
+    Args:
+        psf: The PSF.
+        uncertainty: Of a measured one, for training; a bundle holds none.
+    """
     tensors: dict[str, NDArray[Any]] = {
         "kernels": np.ascontiguousarray(psf.kernels),
         "field_heights_mm": np.asarray(psf.field_heights_mm, dtype=np.float64),
@@ -101,6 +109,9 @@ def psf_to_bytes(psf: FrozenPsf) -> bytes:
     if psf.focus_um is not None and psf.focus_kernels is not None:
         tensors[_FOCUS[0]] = np.asarray(psf.focus_um, dtype=np.float64)
         tensors[_FOCUS[1]] = psf.focus_kernels
+    if uncertainty is not None:
+        numbers = (uncertainty.noise, uncertainty.shift_px, uncertainty.width)
+        tensors[UNCERTAINTY] = np.array(numbers, dtype=np.float64)
     return save({name: np.ascontiguousarray(array) for name, array in tensors.items()})
 
 
@@ -195,9 +206,9 @@ def _check_tensors(tensors: Mapping[str, NDArray[Any]], symmetry: Symmetry, what
             )
 
 
-def write_psf(path: Path, psf: FrozenPsf) -> None:
-    """Write a frozen PSF to a safetensors file, replacing one that is there."""
-    Path(path).write_bytes(psf_to_bytes(psf))
+def write_psf(path: Path, psf: FrozenPsf, uncertainty: PsfUncertainty | None = None) -> None:
+    """Write a frozen PSF to a safetensors file, replacing one that is there; see `psf_to_bytes`."""
+    Path(path).write_bytes(psf_to_bytes(psf, uncertainty))
 
 
 def read_psf(path: Path) -> FrozenPsf:
@@ -206,7 +217,27 @@ def read_psf(path: Path) -> FrozenPsf:
     Raises:
         BundleError: If the file is missing, damaged or not a PSF.
     """
-    return psf_from_bytes(read_optics_bytes(path, what="PSF"), what=str(path))
+    return read_measurement(path)[0]
+
+
+def read_measurement(path: Path) -> tuple[FrozenPsf, PsfUncertainty | None]:
+    """Read a frozen PSF from a safetensors file, and how far it may be off if that is stated.
+
+    Raises:
+        BundleError: If the file is missing, damaged or not a PSF.
+    """
+    tensors = dict(read_tensors(read_optics_bytes(path, what="PSF"), what=str(path)))
+    numbers = tensors.pop(UNCERTAINTY, None)
+    psf = psf_from_tensors(tensors, what=str(path))
+    if numbers is None:
+        return psf, None
+    if numbers.dtype != np.float64 or numbers.shape != (3,):
+        raise BundleError(f"{path}: {UNCERTAINTY} must be float64 (3,); got {numbers.shape}")
+    noise, shift_px, width = numbers.tolist()
+    try:
+        return psf, PsfUncertainty(noise=noise, shift_px=shift_px, width=width)
+    except ContractError as error:
+        raise BundleError(f"{path} is refused: {error}") from error
 
 
 def read_optics_bytes(path: Path, *, what: str) -> bytes:

@@ -6,6 +6,7 @@ photographs     psf, noise, flat, geometry
 displays        targets, tone, pairs
 camera_bundles  bundle, lensfun_in, lensfun_out
 body_focus      camera_body, as `camkit freeze --unit`
+foreign_psf     import_psf, as `camkit psf import`
 result_files, result_folder    the files of the results, written all or none
 
 What is measured is in `camkit.calibration`; a result gives its facts by `to_record()`.
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from camkit.calibrate.body_focus import camera_body
     from camkit.calibrate.camera_bundles import bundle, lensfun_in, lensfun_out
     from camkit.calibrate.displays import pairs, targets, tone
+    from camkit.calibrate.foreign_psf import import_psf
     from camkit.calibrate.photographs import flat, geometry, noise, psf
 
 __all__ = [
@@ -25,6 +27,7 @@ __all__ = [
     "camera_body",
     "flat",
     "geometry",
+    "import_psf",
     "lensfun_in",
     "lensfun_out",
     "noise",
@@ -37,6 +40,7 @@ __all__ = [
 _HOMES: Final = {
     "bundle": "camkit.calibrate.camera_bundles",
     "camera_body": "camkit.calibrate.body_focus",
+    "import_psf": "camkit.calibrate.foreign_psf",
     "lensfun_in": "camkit.calibrate.camera_bundles",
     "lensfun_out": "camkit.calibrate.camera_bundles",
     "pairs": "camkit.calibrate.displays",

@@ -78,7 +78,8 @@ def bundle(
         geometry: Distortion and optical centre (.toml of `geometry`).
         flat: Vignetting (.toml of `flat`).
         noise: Gain, read noise and levels (.toml of `noise`).
-        psf: Kernels (.safetensors of `psf`); drops the networks.
+        psf: Kernels (.safetensors of `psf` or `import_psf`), resampled to the pixels of the
+            bundle if need be; drops the networks.
         keep_networks: Keep the networks even if the kernels change.
         page: Page to write (.html); None writes none.
         overwrite: Whether files that exist are replaced.

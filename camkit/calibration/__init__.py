@@ -20,5 +20,6 @@ geometry/  focal length, optical centre and distortion, from a checkerboard
 display/   targets on a display, and captures of them as pairs for training
 record     the result of a calibration, as TOML
 measured_files  the reader of that TOML
+psf_import/  kernels that others measured or computed, from their files to a PSF
 lensfun/   lenses of lensfun's database
 """

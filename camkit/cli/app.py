@@ -35,6 +35,7 @@ from camkit.cli.use.info import info
 from camkit.cli.use.merge import merge
 from camkit.cli.use.plan import plan
 from camkit.cli.use.process import process
+from camkit.cli.use.psf_group.psf_app import psf_app
 from camkit.cli.use.simulate import simulate
 from camkit.errors import CamkitError
 from camkit.stopwatch import Stopwatch
@@ -47,7 +48,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-GROUPS = (analyse_app, lens_app, plate_app, calibrate_app)
+GROUPS = (analyse_app, lens_app, plate_app, calibrate_app, psf_app)
 add_command(app, process, USE, "Restore captures to finished pictures.")
 add_command(app, plan, USE, "Preview what process would do.")
 add_command(app, simulate, USE, "Simulate captures of a scene.")
@@ -69,6 +70,7 @@ add_command(app, fit_bank, MAKE, "Fit a joint-colour filter bank.")
 add_command(app, freeze_norms, MAKE, "Replace instance norms with constants.")
 add_command(app, export, MAKE, "Pack results into a bundle.")
 add_application(app, calibrate_app, MEASURE, "Measure a camera from photographs.")
+add_application(app, psf_app, MEASURE, "Import a measured PSF.")
 
 
 @app.callback(invoke_without_command=True)

@@ -8,13 +8,15 @@ hold no more.
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
-from camkit.bundle.psf_file import read_psf
+from camkit.bundle.psf_file import read_measurement
+from camkit.calibration.psf_import.kernel_resampling import resampled_kernels, window
+from camkit.calibration.psf_import.kernel_uncertainty import drawn_psf
 from camkit.errors import ContractError
 from camkit.models_def.optics.freezable_optics import (
     FieldLayout,
@@ -24,9 +26,11 @@ from camkit.models_def.optics.freezable_optics import (
     uniform_layout,
 )
 from camkit.models_def.optics.psf import TracedPsf
-from camkit.psf import FrozenPsf, depth_weights, grid_heights_mm
+from camkit.psf import FrozenPsf, PsfUncertainty, depth_weights, grid_heights_mm
 from camkit.radial import RadialDistortion
 from camkit.runtime.bank.psf import FieldKernels
+
+MEASURED: Final = ".safetensors"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,10 +40,12 @@ class MeasuredOptics:
     Attributes:
         psf: The kernels, at any pitch.
         name: For people.
+        uncertainty: How far they may be off; None if not known.
     """
 
     psf: FrozenPsf
     name: str
+    uncertainty: PsfUncertainty | None = None
 
     @property
     def facts(self) -> Mapping[str, float]:
@@ -106,8 +112,9 @@ class MeasuredOptics:
         blended = np.stack([field_kernels.at(x_mm, y_mm) for x_mm, y_mm in places]).astype(
             np.float64
         )
-        wide_kernels = resampled(torch.from_numpy(blended), psf.pixel_pitch_um / pitch_um)
-        inside = _window(wide_kernels, side_px)
+        resampled = resampled_kernels(blended, psf.pixel_pitch_um / pitch_um)
+        wide_kernels = torch.from_numpy(resampled)
+        inside = torch.from_numpy(window(resampled, side_px))
         energy = inside.sum((-2, -1)) / wide_kernels.sum((-2, -1))
         return TracedPsf(
             kernels=inside / inside.sum((-2, -1), keepdim=True).clamp_min(1e-30), energy_kept=energy
@@ -142,9 +149,34 @@ class MeasuredOptics:
         return np.interp(np.hypot(fields.x_mm, fields.y_mm), psf.field_heights_mm, light)
 
     def copies(self, count: int, seed: int) -> "tuple[MeasuredOptics, ...]":
-        """Return itself: how others of it would differ was not measured."""
-        del count, seed
-        return (self,)
+        """Return itself and kernels drawn within their uncertainty; itself alone without one."""
+        if self.uncertainty is None:
+            return (self,)
+        rng = np.random.default_rng(seed)
+        drawn_psfs = [drawn_psf(self.psf, self.uncertainty, rng) for _ in range(count - 1)]
+        return (self, *(replace(self, psf=psf) for psf in drawn_psfs))
+
+
+def find_measured(name: str, folder: Path | None = None) -> MeasuredOptics:
+    """Return the PSF that a recipe names.
+
+    Args:
+        name: Path of a .safetensors file relative to `folder`.
+        folder: Of the recipe; None for the working directory.
+
+    Raises:
+        ContractError: If there is none, or it is another kind of file.
+        BundleError: If it is damaged.
+    """
+    path = (folder or Path()) / name
+    if path.suffix.lower() != MEASURED:
+        raise ContractError(
+            f"lens.psf names a PSF of camkit ({MEASURED}); got {name}: convert it by "
+            "`camkit psf import`"
+        )
+    if not path.is_file():
+        raise ContractError(f"lens.psf: there is no {path}; make it by `camkit psf import`")
+    return read_measured(path)
 
 
 def read_measured(path: Path) -> MeasuredOptics:
@@ -153,7 +185,8 @@ def read_measured(path: Path) -> MeasuredOptics:
     Raises:
         BundleError: If it is missing, damaged or not a PSF.
     """
-    return MeasuredOptics(psf=read_psf(path), name=path.stem)
+    psf, uncertainty = read_measurement(path)
+    return MeasuredOptics(psf=psf, name=path.stem, uncertainty=uncertainty)
 
 
 def measured_psf(
@@ -199,33 +232,3 @@ def measured_psf(
         grid_x_mm=None if grid_mm is None else grid_mm[0],
         grid_y_mm=None if grid_mm is None else grid_mm[1],
     )
-
-
-def resampled(kernels: Tensor, ratio: float) -> Tensor:
-    """Return (..., h, w) kernels at another pitch: light spread by the area that samples share.
-
-    Args:
-        kernels: Odd sides; the middle sample stays in the middle.
-        ratio: Pitch of the kernels over the pitch wanted.
-    """
-    if abs(ratio - 1) < 1e-6:
-        return kernels
-    rows, columns = (_shares(side, ratio).to(kernels.dtype) for side in kernels.shape[-2:])
-    return rows @ kernels @ columns.T
-
-
-def _shares(side: int, ratio: float) -> Tensor:
-    """Return (target, source): the share of each sample that falls into each one made."""
-    half = int(np.ceil(side * ratio / 2 - 0.5))
-    target_px = torch.arange(-half, half + 1, dtype=torch.float64)[:, None]
-    source_px = (torch.arange(side, dtype=torch.float64)[None] - side // 2) * ratio
-    low = torch.maximum(target_px - 0.5, source_px - ratio / 2)
-    high = torch.minimum(target_px + 0.5, source_px + ratio / 2)
-    return (high - low).clamp(min=0) / ratio
-
-
-def _window(kernels: Tensor, side_px: int) -> Tensor:
-    """Cut or fill (..., h, w) up to the middle (..., side_px, side_px)."""
-    h, w = kernels.shape[-2:]
-    rows, columns = (side_px - h) // 2, (side_px - w) // 2
-    return torch.nn.functional.pad(kernels, (columns, columns, rows, rows))

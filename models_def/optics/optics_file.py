@@ -1,16 +1,13 @@
 """Optics by their file: a lens, a plate, or a PSF that was measured."""
 
 from pathlib import Path
-from typing import Final
 
 from camkit.models_def.optics.diffraction.plate import is_plate, read_plate
 from camkit.models_def.optics.diffraction.plate_optics import PlateOptics
 from camkit.models_def.optics.freezable_optics import Optics
 from camkit.models_def.optics.lens_file.lens_file import read_lens
 from camkit.models_def.optics.lens_optics import LensOptics
-from camkit.models_def.optics.measured import read_measured
-
-MEASURED: Final = ".safetensors"
+from camkit.models_def.optics.measured import MEASURED, read_measured
 
 
 def read_optics(path: Path) -> Optics:

@@ -197,7 +197,8 @@ def special_part(kind: str, name: str) -> Any | None:
 
     Args:
         kind: Name of the kind.
-        name: FITTING, REFINING, BANK_FITTING or PREPARING.
+        name: FITTING, REFINING, BANK_FITTING, PREPARING, or DESIGNED, a function of a recipe and
+            its folder that returns what `Material.designed` does.
 
     Raises:
         UnsupportedError: If there is no such kind, or it cannot be trained.

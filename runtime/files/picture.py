@@ -6,6 +6,7 @@
     read_light        the same as light, which is never negative
     read_scene_and_space  the same with the colour space that the file states
     read_orientation  how a file says that its samples are to be turned
+    read_samples      the samples of a picture that is no photograph, as they are stored
 
 Samples stay as they are stored; an EXIF orientation is told beside them. The decoders of the
 formats lie in `camkit.runtime.files.formats`.
@@ -312,6 +313,16 @@ def read_orientation(path: Path) -> int:
         return 1
     tags = read_tiff_tags(path)
     return orientation_of(tags if tags.directories else exif_of_picture(path.read_bytes()))
+
+
+def read_samples(path: Path) -> Decoded:
+    """Return the samples of a picture as they are stored, whatever they mean.
+
+    Raises:
+        DecodeError: If the file is damaged or of a kind that is not read.
+        OSError: If it cannot be read.
+    """
+    return _decode(path).decoded
 
 
 def mosaic_advice() -> str:

@@ -10,7 +10,11 @@ import torch
 
 from camkit.bundle.reader import PLATE, PLATE_HEIGHTS, PRESCRIPTION
 from camkit.errors import ContractError
-from camkit.export.designed_optics import SAME_PLATE_SHARE, designed_members
+from camkit.export.designed_optics import (
+    SAME_PLATE_SHARE,
+    designed_members,
+    designed_of,
+)
 from camkit.export.parts import Parts
 from camkit.models_def.optics.diffraction.etching import Etching
 from camkit.models_def.optics.diffraction.geometry import Bench
@@ -77,6 +81,10 @@ def _checkpoint(designed: Mapping[str, bytes]) -> Checkpoint:
     )
 
 
+def _members(parts: Parts, checkpoints: list[Checkpoint], psf: FrozenPsf) -> dict[str, bytes]:
+    return designed_members(parts, designed_of(checkpoints), psf)
+
+
 @pytest.fixture(scope="module")
 def star() -> Plate:
     return _star()
@@ -91,12 +99,12 @@ def test_the_plate_of_the_checkpoints_is_packed_as_it_is(star: Plate, psf: Froze
     members = plate_members(star)
     assert members.keys() == {PLATE}
     both = [_checkpoint(members), _checkpoint({}), _checkpoint(members)]
-    assert designed_members(PARTS, both, psf) == members
+    assert _members(PARTS, both, psf) == members
 
 
 def test_heights_travel_beside_the_plate(star: Plate, psf: FrozenPsf) -> None:
     full = replace(star, pattern=None)
-    members = designed_members(PARTS, [_checkpoint(plate_members(full))], psf)
+    members = _members(PARTS, [_checkpoint(plate_members(full))], psf)
     assert members.keys() == {PLATE, PLATE_HEIGHTS}
     back = plate_of_members(members, "the bundle")
     assert (back.name, back.bench, back.etching) == (full.name, full.bench, full.etching)
@@ -109,10 +117,10 @@ def test_another_plate_may_be_named_and_none_too(
     own = tmp_path / "mine.toml"
     write_plate(replace(star, name="mine"), own)
     carried = [_checkpoint(plate_members(star))]
-    named = designed_members(replace(PARTS, plate=own), carried, psf)
+    named = _members(replace(PARTS, plate=own), carried, psf)
     assert named == {PLATE: own.read_bytes()}
-    assert designed_members(replace(PARTS, plate=own), [_checkpoint({})], psf) == named
-    assert designed_members(replace(PARTS, without_plate=True), carried, psf) == {}
+    assert _members(replace(PARTS, plate=own), [_checkpoint({})], psf) == named
+    assert _members(replace(PARTS, without_plate=True), carried, psf) == {}
 
 
 @pytest.mark.parametrize(
@@ -122,7 +130,7 @@ def test_another_plate_may_be_named_and_none_too(
 )
 def test_a_psf_of_another_plate_is_refused(other: Plate, psf: FrozenPsf) -> None:
     with pytest.raises(ContractError, match=r"not frozen from the plate star: .*use plate=.none."):
-        designed_members(PARTS, [_checkpoint(plate_members(other))], psf)
+        _members(PARTS, [_checkpoint(plate_members(other))], psf)
 
 
 def test_a_psf_that_holds_its_plate_as_well_as_freezing_asks_is_taken(star: Plate) -> None:
@@ -132,28 +140,28 @@ def test_a_psf_that_holds_its_plate_as_well_as_freezing_asks_is_taken(star: Plat
     own, off = _psf(star), _psf(aside)
     mixed = own.kernels * (1 - SAME_PLATE_SHARE / 2) + off.kernels * (SAME_PLATE_SHARE / 2)
     near = replace(own, kernels=mixed.astype(np.float32))
-    assert designed_members(PARTS, [_checkpoint(plate_members(star))], near) != {}
+    assert _members(PARTS, [_checkpoint(plate_members(star))], near) != {}
 
 
 def test_a_lens_and_a_plate_are_not_both_packed(star: Plate, psf: FrozenPsf) -> None:
     lens = find_lens("duet", Path())
     text = format_prescription(lens).encode()
     with pytest.raises(ContractError, match="a lens or a plate; here are the lens duet and the pl"):
-        designed_members(PARTS, [_checkpoint({PRESCRIPTION: text, **plate_members(star)})], psf)
+        _members(PARTS, [_checkpoint({PRESCRIPTION: text, **plate_members(star)})], psf)
 
 
 def test_checkpoints_of_different_optics_are_refused(star: Plate, psf: FrozenPsf) -> None:
     several = [_checkpoint(plate_members(plate)) for plate in (star, _star(share=0.1))]
     with pytest.raises(ContractError, match="trained with different optics"):
-        designed_members(PARTS, several, psf)
+        _members(PARTS, several, psf)
 
 
 def test_a_plate_that_lost_its_heights_is_refused(star: Plate, psf: FrozenPsf) -> None:
     members = plate_members(replace(star, pattern=None))
     del members[PLATE_HEIGHTS]
     with pytest.raises(ContractError, match=r"lacks its heights, plate\.safetensors"):
-        designed_members(PARTS, [_checkpoint(members)], psf)
+        _members(PARTS, [_checkpoint(members)], psf)
 
 
 def test_optics_that_were_not_designed_here_leave_nothing_to_pack(psf: FrozenPsf) -> None:
-    assert designed_members(PARTS, [_checkpoint({})], psf) == {}
+    assert _members(PARTS, [_checkpoint({})], psf) == {}

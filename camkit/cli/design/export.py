@@ -19,12 +19,18 @@ from camkit.export.parts import (
 def export(
     checkpoints: Annotated[
         list[Path],
-        typer.Argument(help="Checkpoints, one per network size.", metavar="CHECKPOINT..."),
+        typer.Argument(
+            help="Checkpoints, one per network size; with --no-network a recipe (.toml).",
+            metavar="CHECKPOINT...",
+        ),
     ],
     out: Annotated[Path, typer.Option("-o", "--out", help="Bundle to write (.camkit).")],
     psf: Annotated[
         Path | None,
-        typer.Option(help=f"PSF of `camkit freeze`; default: {PSF_NAME} beside the checkpoint."),
+        typer.Option(
+            help=f"PSF of `camkit freeze`; default: {PSF_NAME} beside the checkpoint, else the "
+            "recipe's measured one."
+        ),
     ] = None,
     haze: Annotated[
         Path | None,
@@ -60,6 +66,10 @@ def export(
         str | None,
         typer.Option(help="Plate (.toml or name), or 'none'; default: the checkpoint's."),
     ] = None,
+    no_network: Annotated[
+        bool,
+        typer.Option("--no-network", help="Pack a recipe without a network: its filter alone."),
+    ] = False,
     version: Annotated[str, typer.Option(help="Semantic version of the bundle.")] = "0.1.0",
     overwrite: Overwrite = False,
     json_: Json = False,
@@ -81,6 +91,7 @@ def export(
         prescription=prescription,
         plate=plate,
         version=version,
+        network=not no_network,
         overwrite=overwrite,
     )
     print_report(report, json_)

@@ -21,7 +21,7 @@ from torch import Tensor
 from camkit.bundle.stages import Together
 from camkit.bundle.stages.together import Spread
 from camkit.caller import option_text
-from camkit.errors import ContractError
+from camkit.errors import ContractError, UnsupportedError
 from camkit.models_def.kinds.bayer.frames.samples import draw_developed
 from camkit.models_def.kinds.bayer.frames.tiles import Frames
 from camkit.models_def.kinds.bayer.material import BayerMaterial, trace_material
@@ -362,8 +362,13 @@ class BayerBankFitting:
 
     def fit(self, recipe: BayerRecipe, options: BankFitOptions, tell: Tell) -> BankFit:
         """Trace the lens, or read what was traced before, and fit."""
-        _check_folder(recipe.lens.prescription, options)
+        _check_folder(recipe.lens.prescription or recipe.lens.psf, options)
         material = trace_material(recipe, options.recipe_folder, options.cache_folder)
+        if material.bank.grid_x_mm is not None:
+            raise UnsupportedError(
+                "the numbers of a bank run over the field height; kernels on a grid have none: "
+                "leave wiener.together out"
+            )
         return fit_bank(recipe, material, options, tell)
 
 

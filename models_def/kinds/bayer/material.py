@@ -5,12 +5,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
+from camkit.bundle.optics import PSF
+from camkit.bundle.psf_file import psf_to_bytes
 from camkit.bundle.reader import PRESCRIPTION
+from camkit.calibration.psf_import.kernel_resampling import for_sensor
 from camkit.models_def.kinds.bayer.frames.tiles import Frames, frames_folder, read_frames
 from camkit.models_def.kinds.bayer.lens_bank import build_lens_bank
+from camkit.models_def.kinds.bayer.measured_bank import build_measured_bank
 from camkit.models_def.kinds.bayer.psf_bank import PsfBank, read_bank, write_bank
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.optics.lens_file.lens_file import find_lens
+from camkit.models_def.optics.measured import find_measured
 from camkit.models_def.optics.prescription import format_prescription
 
 BANK: Final = "bank.npz"
@@ -23,7 +28,8 @@ class BayerMaterial:
 
     Attributes:
         bank: Of fabricated copies, the frozen PSF beside them.
-        designed: The lens as a bundle holds it; empty for kernels that are of none.
+        designed: The lens, or the measured PSF, as a bundle holds it; empty for kernels that are
+            of none.
         frames: What samples are cut from, of a lens with a haze; None for one without.
     """
 
@@ -58,7 +64,7 @@ def _of_frames(folder: Path, recipe: BayerRecipe | None = None) -> BayerMaterial
 
 
 def trace_material(recipe: BayerRecipe, recipe_folder: Path, cache_folder: Path) -> BayerMaterial:
-    """Trace the lens that a recipe names (about a minute), or read an earlier trace.
+    """Trace the lens that a recipe names (about a minute), read an earlier trace, or its PSF.
 
     Of a lens with a haze the frames are read, which `camkit prepare` photographed.
 
@@ -68,6 +74,26 @@ def trace_material(recipe: BayerRecipe, recipe_folder: Path, cache_folder: Path)
     """
     if recipe.haze is not None:
         return _of_frames(frames_folder(cache_folder, recipe), recipe)
+    designed = designed_optics(recipe, recipe_folder)
+    if recipe.lens.psf:
+        optics = find_measured(recipe.lens.psf, recipe_folder)
+        return BayerMaterial(bank=build_measured_bank(recipe, optics), designed=designed)
     lens = find_lens(recipe.lens.prescription, recipe_folder)
-    bank = build_lens_bank(recipe, lens, cache_folder)
-    return BayerMaterial(bank=bank, designed={PRESCRIPTION: format_prescription(lens).encode()})
+    return BayerMaterial(bank=build_lens_bank(recipe, lens, cache_folder), designed=designed)
+
+
+def designed_optics(recipe: BayerRecipe, recipe_folder: Path) -> dict[str, bytes]:
+    """Return the lens that a recipe names as a bundle holds it, or its measured PSF.
+
+    Raises:
+        ContractError: If there is none.
+    """
+    if recipe.lens.psf:
+        psf = find_measured(recipe.lens.psf, recipe_folder).psf
+        sensor = recipe.sensor
+        return {PSF: psf_to_bytes(for_sensor(psf, sensor.pixel_pitch_um, len(sensor.channels)))}
+    lens = find_lens(recipe.lens.prescription, recipe_folder)
+    return {PRESCRIPTION: format_prescription(lens).encode()}
+
+
+DESIGNED: Final = designed_optics

@@ -13,6 +13,8 @@ from camkit.bundle.light_bound import LightBound
 from camkit.bundle.sensor import BayerSensor
 from camkit.bundle.stages import Dehaze, Together, Wiener
 from camkit.bundle.stages.network import DEFAULT_ROLE
+from camkit.calibration.measured import WAVELENGTHS_UM
+from camkit.calibration.psf_import.own_colours import narrow_response
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.scene_light import DisplayRecipe, WildRecipe
 from camkit.models_def.toml_table import Faults, section, table_digest, typed
@@ -38,16 +40,21 @@ CAMERA_PARTS: Final = (
     *("name", "object_distance_mm", "scale", "sensor", "light", "haze", "wiener", "lens"),
 )
 """What says which camera it is; how its networks are trained may differ."""
+MEASURED_COLOURS: Final = "one measured kernel for each colour"
 _OLDER: Final = {"final": "fine_tuning"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LensRecipe:
-    """The lens and the variation of its copies.
+    """The lens, or its measured PSF, and the variation of its copies.
 
     Attributes:
         prescription: Name of a built-in lens, or path of a file (.toml, .zmx) relative to the
             recipe.
+        psf: In place of it: path of a measured PSF (.safetensors, of `camkit psf import`) relative
+            to the recipe. `fields`, `kernel_px` and `rays` are those of the file then.
+        uncertainty: Of a measured PSF: noise, shift in pixels and width of
+            `camkit.psf.PsfUncertainty`; empty for that of the file.
         copies: Fabricated copies whose PSFs are trained on.
         validation_copies: Further ones that pictures to choose by are taken with, in turn. One
             alone may be an outlier; eight show what the lens is like.
@@ -63,7 +70,8 @@ class LensRecipe:
             whatever `depths_mm` are, in place of their mean.
     """
 
-    prescription: str
+    prescription: str = ""
+    psf: str = ""
     copies: int = 8
     fields: int = 25
     kernel_px: int = 129
@@ -72,8 +80,21 @@ class LensRecipe:
     depths_mm: tuple[float, ...] = ()
     validation_copies: int = 1
     bank_in_focus: bool = False
+    uncertainty: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
+        if bool(self.prescription) == bool(self.psf):
+            raise ContractError(
+                'lens needs prescription = "..." (a lens) or psf = "..." (a measured PSF), one of '
+                "them"
+            )
+        if self.uncertainty and (len(self.uncertainty) != 3 or not self.psf):
+            raise ContractError(
+                "lens.uncertainty is [noise, shift_px, width] of a measured PSF; got "
+                f"{list(self.uncertainty)}"
+            )
+        if self.psf and self.bank_in_focus:
+            raise ContractError("lens.bank_in_focus needs a lens; a measured PSF has its depths")
         if min(self.copies, self.validation_copies) < 1:
             raise ContractError(
                 "lens.copies and lens.validation_copies must be >= 1; got "
@@ -93,6 +114,7 @@ class LensRecipe:
     def to_json(self) -> dict[str, Any]:
         """Return the values that decide the kernels, to name files by, without defaults."""
         usual = {"depths_mm": (), "validation_copies": 1, "bank_in_focus": False}
+        usual |= {"psf": "", "uncertainty": ()}
         return {name: value for name, value in asdict(self).items() if value != usual.get(name)}
 
 
@@ -321,6 +343,8 @@ class BayerRecipe(Recipe):
                 "the tiles of a lens with a haze do not tell where their mosaic begins; leave "
                 "wiener.mosaic out"
             )
+        if self.haze is not None and self.lens.psf:
+            raise ContractError("a haze needs a lens; leave [haze] out, or name a prescription")
         if self.haze is not None and self.lens.depths_mm:
             self._check_hazy_depths()
         shares, depths = len(self.data.depth_shares), len(self.lens.depths_mm)
@@ -387,7 +411,7 @@ def to_bayer_recipe(table: Mapping[str, Any]) -> BayerRecipe:
         ContractError: If keys are unknown, missing or wrong, all of which are named, the sensor has
             no mosaic, or there are frames without a haze.
     """
-    table = with_new_names(table, _OLDER)
+    table = _with_measured_response(with_new_names(table, _OLDER))
     faults = Faults()
     common = faults.read(common_tables, table, kind_keys=OWN_KEYS, roles=ROLES)
     faults.read(_check_frames, table)
@@ -416,6 +440,18 @@ def to_bayer_recipe(table: Mapping[str, Any]) -> BayerRecipe:
 def _check_frames(table: Mapping[str, Any]) -> None:
     if "frames" in table and "haze" not in table:
         raise ContractError("[frames] is for a lens with a haze; there is no table [haze]")
+
+
+def _with_measured_response(table: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Fill in the response of a sensor whose own colours the kernels of a recipe are."""
+    sensor, lens = table.get("sensor"), table.get("lens")
+    if not (isinstance(sensor, Mapping) and isinstance(lens, Mapping) and lens.get("psf")):
+        return table
+    if "channel_response" in sensor:
+        return table
+    waves, rows = (array.tolist() for array in narrow_response(np.array(WAVELENGTHS_UM)))
+    response = {"wavelengths_um": waves, "response": rows, "source": MEASURED_COLOURS}
+    return {**table, "sensor": {**sensor, "channel_response": response}}
 
 
 def _data(table: Any) -> BayerDataRecipe:

@@ -64,7 +64,7 @@ class RecipeDraft:
     prescription: str
     focus_mm: float
     objects_mm: Sequence[float] = ()
-    kernel_px: int = LensRecipe(prescription="").kernel_px
+    kernel_px: int = 129
     blocks: tuple[int, int] | None = None
 
 
@@ -93,7 +93,7 @@ def recipe_text(draft: RecipeDraft) -> str:
         *_sensor_lines(draft.sensor),
         *table_lines("wiener", Wiener, bank, without=_STAGE_KEYS),
         *table_lines("light", LightBound, {"spread": 0.2, "keeps_bright": True}),
-        *table_lines("lens", LensRecipe, lens),
+        *table_lines("lens", LensRecipe, lens, without=("psf", "uncertainty")),
         *table_lines("data", BayerDataRecipe, {**DATA, **_of_blocks(block_px, overlap_px)}),
         *table_lines("schedule", ScheduleRecipe, SCHEDULE),
     ]

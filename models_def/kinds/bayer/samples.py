@@ -222,8 +222,9 @@ def told_depth(recipe: BayerRecipe, copy: int, error: float = 0.0) -> float:
 
 
 def layout_of(recipe: BayerRecipe) -> SampleLayout:
-    """Return the layout of a recipe's samples."""
-    return LAYOUT if recipe.light is None else replace(LAYOUT, masks=(KEPT_PORT,))
+    """Return the layout of a recipe's samples; those of a measured PSF do not turn."""
+    masks = () if recipe.light is None else (KEPT_PORT,)
+    return replace(LAYOUT, masks=masks, turned=not recipe.lens.psf)
 
 
 def finish_of(recipe: BayerRecipe) -> Finish | None:
@@ -330,7 +331,7 @@ def photograph(
     sensor, data = recipe.sensor, recipe.data
     matrix, balance = camera_from_rec709(np.array(sensor.color_matrix))
     gains = balance if exposure.gains is None else exposure.gains
-    illumination = bank.illumination_at(float(np.hypot(exposure.x_mm, exposure.y_mm)))
+    illumination = float(bank.illumination_at(exposure.x_mm, exposure.y_mm))
     cast = np.array(exposure.cast)[:, None]
     to_camera = torch.from_numpy(cast * matrix * exposure.factor).float()
     sharp, true = (

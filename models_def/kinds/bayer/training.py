@@ -52,6 +52,7 @@ FAILS_ON: Final = (
     "thickness 0.03 mm, index 0.0005, focus 0.02 mm)",
 )
 
+FAILS_BEYOND_MEASUREMENT: Final = "and lenses whose PSF is off by more than its uncertainty"
 FAILS_BEHIND_HAZE: Final = "lamps that clip: they throw more haze than the sensor tells"
 
 
@@ -112,7 +113,7 @@ class BayerTraining:
                 Color(),
             ),
             object_distance_mm=recipe.object_distance_mm,
-            fails_on=FAILS_ON if recipe.haze is None else (*FAILS_ON, FAILS_BEHIND_HAZE),
+            fails_on=_fails_on(recipe),
         )
 
     def build_network(self, name: str, **config: Any) -> nn.Module:
@@ -132,7 +133,7 @@ class BayerTraining:
     def prepare(
         self, recipe: BayerRecipe, recipe_folder: Path, cache_folder: Path
     ) -> BayerMaterial:
-        """Trace the lens and its copies."""
+        """Trace the lens and its copies, or read its measured PSF and draw some."""
         return trace_material(recipe, recipe_folder, cache_folder)
 
     def read_material(self, folder: Path) -> BayerMaterial:
@@ -170,6 +171,12 @@ class BayerTraining:
         else:
             captures = make_validation_captures(recipe, material.bank, pictures)
         return BayerJudge(captures=captures, recipe=recipe)
+
+
+def _fails_on(recipe: BayerRecipe) -> tuple[str, ...]:
+    if recipe.lens.psf:
+        return (*FAILS_ON[:-1], FAILS_BEYOND_MEASUREMENT)
+    return FAILS_ON if recipe.haze is None else (*FAILS_ON, FAILS_BEHIND_HAZE)
 
 
 PART: Final = BayerTraining()

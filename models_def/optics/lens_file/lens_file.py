@@ -14,6 +14,8 @@ from camkit.models_def.optics.lens_file.zmx_writer import write_zmx
 from camkit.models_def.optics.prescription import Lens, read_prescription, write_prescription
 
 SUFFIXES: Final = (".toml", ".zmx")
+KERNELS: Final = (".npy", ".npz", ".mat", ".exr", ".png", ".tif", ".tiff", ".txt")
+"""Files that people have kernels in."""
 PRESCRIPTIONS: Final = Path(__file__).resolve().parents[2] / "prescriptions"
 
 _log = logging.getLogger(__name__)
@@ -104,6 +106,15 @@ def _built_in(path: Path) -> Path:
 
 def _suffix(path: Path) -> str:
     suffix = path.suffix.lower()
+    if suffix == ".safetensors":
+        raise UnsupportedError(
+            f"{path.name} is a PSF and no lens: a recipe names it as psf in [lens]"
+        )
+    if suffix in KERNELS:
+        raise UnsupportedError(
+            f"{path.name} is no lens file ({' or '.join(SUFFIXES)}); if it holds kernels of a PSF, "
+            "convert it by `camkit psf import`"
+        )
     if suffix not in SUFFIXES:
         raise UnsupportedError(
             f"a lens file ends in {' or '.join(SUFFIXES)}; got {path.name}: rename or convert it, "

@@ -38,7 +38,7 @@ EXTRA: Final = "pip install 'camkit[tiff]'"
 _EXTRA_PACKAGE: Final = "imagecodecs"
 _ORIENTATION: Final = 274
 _OPAQUE: Final = 255
-_INSIDE_TIFFFILE: Final = (
+INSIDE_TIFFFILE: Final = (
     *(ValueError, TypeError, KeyError, IndexError, NotImplementedError, RuntimeError),
     *(
         struct.error,
@@ -181,7 +181,7 @@ def _read(path: Path, page: TiffPage) -> NDArray[Any]:
         raise DecodeError(f"a TIFF packed by {name} is not read; save it without compression")
     try:
         samples = _read_by_tifffile(path, page)
-    except _INSIDE_TIFFFILE as error:
+    except INSIDE_TIFFFILE as error:
         if _EXTRA_PACKAGE in str(error) or isinstance(error, ImportError):
             name = _COMPRESSIONS.get(page.compression, f"compression {page.compression}")
             more = f" with predictor {page.predictor}" if page.predictor > 1 else ""

@@ -25,7 +25,10 @@ def bundle(
     ] = None,
     psf: Annotated[
         Path | None,
-        typer.Option(help="Kernels (.safetensors of `camkit calibrate psf`); drops the networks."),
+        typer.Option(
+            help="Kernels (.safetensors of `camkit calibrate psf` or `camkit psf import`); drops "
+            "the networks."
+        ),
     ] = None,
     keep_networks: Annotated[
         bool, typer.Option("--keep-networks", help="Keep the networks even if the kernels change.")

@@ -2,6 +2,7 @@
 
 geometry_page    residuals, covered area, distortion of a camera
 psf_page         kernels, light by radius, the target blurred anew
+psf_field_page   imported kernels: where they lie, which way they point
 noise_page       photon transfer of every ISO
 flat_page        relative illumination, the display, what both leave
 tone_page        luminance over level

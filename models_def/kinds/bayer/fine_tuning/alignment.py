@@ -115,10 +115,8 @@ class Aligner:
 
     def illumination(self, points_px: Points) -> NDArray[np.float64]:
         """Return the (n,) relative illumination."""
-        heights_mm = np.hypot(*self.to_sensor_mm(points_px).T)
-        bank = self._bank
-        light = np.interp(heights_mm, bank.frozen_heights_mm, bank.relative_illumination)
-        return np.asarray(light, dtype=np.float64)
+        x_mm, y_mm = self.to_sensor_mm(points_px).T
+        return self._bank.illumination_at(x_mm, y_mm)
 
     def _ideal_grey(self, capture: FloatArray, step: int) -> FloatArray:
         """Return every step-th pixel of the capture without distortion and vignetting, grey."""

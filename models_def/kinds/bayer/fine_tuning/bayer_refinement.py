@@ -16,6 +16,7 @@ from camkit.models_def.networks.catalog import build_network
 from camkit.models_def.networks.vgg import file_digest
 from camkit.models_def.optics.distortion import trace_distortion
 from camkit.models_def.optics.lens_file.lens_file import find_lens
+from camkit.models_def.optics.measured import find_measured
 from camkit.models_def.training.adversarial.content import Conv33, Features
 from camkit.models_def.training.adversarial.opponents import OpponentPlan
 from camkit.models_def.training.adversarial.picture_fitter import Mix, PictureParts, picture_fitter
@@ -32,7 +33,9 @@ Distort = Callable[[BayerRecipe, Path], RadialDistortion | None]
 
 
 def trace_recipe_distortion(recipe: BayerRecipe, folder: Path) -> RadialDistortion:
-    """Return the distortion of a recipe's lens; the recipe lies in `folder`."""
+    """Return the distortion of a recipe's lens or PSF; the recipe lies in `folder`."""
+    if recipe.lens.psf:
+        return find_measured(recipe.lens.psf, folder).distortion(corner_height_mm(recipe), 3)
     lens = find_lens(recipe.lens.prescription, folder)
     return trace_distortion(lens, corner_height_mm(recipe))
 

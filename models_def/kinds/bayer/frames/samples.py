@@ -47,7 +47,7 @@ def developed(
             noise_rise=tile.noise_rise,
             gains=gains,
             frozen=bank.frozen_kernels(x_mm, y_mm),
-            illumination=bank.illumination_at(float(np.hypot(tile.x_mm, tile.y_mm))),
+            illumination=float(bank.illumination_at(tile.x_mm, tile.y_mm)),
             height_mm=float(np.hypot(x_mm, y_mm)),
         ),
     )

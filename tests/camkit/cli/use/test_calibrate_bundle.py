@@ -14,6 +14,7 @@ from camkit.calibration.record import to_toml
 from camkit.cli.exit_code import ExitCode
 from camkit.psf import FrozenPsf
 from camkit.radial import RadialDistortion
+from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work
 from tests.bundle_factory import write_tiny_bundle
@@ -157,8 +158,9 @@ def test_other_kernels_leave_networks_out_unless_they_are_kept(
     np.testing.assert_allclose(made.psf.kernels, psf.kernels)
     assert made.manifest.optics is not None
     assert made.manifest.optics.symmetry == "uniform"
-    # red, the first channel, sees the kernel of the longest wavelength
-    assert made.manifest.sensor.channel_response.response[0] == (0.0, 0.0, 1.0)
+    # red, the first channel, sees the kernel of the longest wavelength and no other
+    seen = color_kernels(made.psf, *made.manifest.sensor.response_arrays()).kernels
+    np.testing.assert_allclose(seen[0], psf.kernels[0, 0, ::-1], atol=1e-5)
     types = [stage.type for stage in made.manifest.stages]
     assert "illumination" not in types
     assert ("network" in types) == keep
