@@ -16,6 +16,7 @@ from camkit.cli.design.fit_bank import fit_bank
 from camkit.cli.design.freeze import freeze
 from camkit.cli.design.freeze_norms import freeze_norms
 from camkit.cli.design.lens.lens_app import lens_app
+from camkit.cli.design.make import make
 from camkit.cli.design.plate.plate_app import plate_app
 from camkit.cli.design.prepare import prepare
 from camkit.cli.design.recipe import recipe
@@ -59,6 +60,7 @@ add_command(app, bench, JUDGE, "Compare speed, accuracy and memory.")
 add_command(app, stress, JUDGE, "Find where a network fails.")
 add_application(app, analyse_app, JUDGE, "Measure resolution and invented detail.")
 add_command(app, doctor, JUDGE, "Examine this computer's camkit installation.")
+add_command(app, make, MAKE, "Make a camera from a lens.")
 add_application(app, lens_app, MAKE, "Draw, improve or convert lenses.")
 add_application(app, plate_app, MAKE, "Design diffractive plates and masks.")
 add_command(app, design, MAKE, "Design lens and network together.")

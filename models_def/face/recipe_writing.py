@@ -1,7 +1,8 @@
 """A lens and a sensor to a recipe: `camkit.recipe` and `camkit recipe`."""
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -11,13 +12,16 @@ from camkit.field_types import check_fields, checked
 from camkit.models_def.face.torch_need import require_torch
 from camkit.runtime.files.in_memory import FilePath
 from camkit.runtime.output.part_file import atomic_output, refuse_existing
-from camkit.units import MM_PER_M
+from camkit.units import MM_PER_M, UM_PER_MM
 
 if TYPE_CHECKING:
     from camkit.models_def.kinds.bayer.recipe_draft import RecipeDraft
     from camkit.models_def.optics.prescription import Lens
+    from camkit.models_def.sensors.sensor_choice import SensorChoice
 
 LENS_SUFFIX: Final = "-lens.toml"
+FIELD_SHARES: Final = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Of the way to the corner of the sensor: what a lens is focused for."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -153,7 +157,7 @@ def describe_camera(
         origin=camera.distance_from,  # type: ignore[arg-type]
     )
     design, notes = read_noted_lens(lens, tuple(map(str, camera.glass)))
-    placed = placed_lens(design, placement)
+    placed = placed_lens(with_fields_of(design, sensor), placement)
     draft = RecipeDraft(
         name=name,
         sensor=sensor,
@@ -162,6 +166,18 @@ def describe_camera(
         objects_mm=placed.objects_mm,
     )
     return DescribedCamera(lens=placed.lens, draft=draft, notes=notes)
+
+
+def with_fields_of(lens: "Lens", sensor: "SensorChoice") -> "Lens":
+    """Return a lens whose fields are those of a sensor: the axis to the corner, in five steps."""
+    from camkit.models_def.optics.paraxial import paraxial_data
+
+    table = sensor.table
+    corner_mm = math.hypot(table["width_px"], table["height_px"]) / 2
+    corner_mm *= table["pixel_pitch_um"] / UM_PER_MM
+    efl_mm = abs(paraxial_data(lens).efl_mm)
+    angles = (math.atan(share * corner_mm / efl_mm) for share in FIELD_SHARES)
+    return replace(lens, field_angles_rad=tuple(angles))
 
 
 def write_camera(camera: DescribedCamera, recipe_path: Path, lens_path: Path) -> None:

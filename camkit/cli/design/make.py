@@ -1,0 +1,115 @@
+"""`camkit make`: a camera from a lens and a sensor, in one command."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from camkit.cli.choices import Debug, GlassFiles, Json, Overwrite
+from camkit.cli.design.camera_options import (
+    VERTEX,
+    DistanceFrom,
+    FNumber,
+    FocusM,
+    ObjectM,
+    Photo,
+    PitchUm,
+    SensorText,
+    StopRadiusMm,
+    distances_m,
+)
+from camkit.cli.say import say
+from camkit.stopwatch import Stopwatch
+
+
+def make(
+    context: typer.Context,
+    optics: Annotated[
+        Path,
+        typer.Argument(
+            help="Lens file (.toml, .zmx), built-in name, or measured PSF (.safetensors).",
+            metavar="LENS",
+        ),
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Bundle to write (.camkit).")],
+    *,
+    sensor: SensorText = None,
+    photo: Photo = None,
+    pitch_um: PitchUm = None,
+    f_number: FNumber = None,
+    stop_radius_mm: StopRadiusMm = None,
+    focus_m: FocusM = None,
+    object_m: ObjectM = None,
+    distance_from: DistanceFrom = VERTEX,
+    glass: GlassFiles = None,
+    minutes: Annotated[
+        float, typer.Option(help="CPU time in min for everything; 0 makes the filter alone.")
+    ] = 15.0,
+    size: Annotated[str, typer.Option(help="Size of the network: S or M.")] = "S",
+    name: Annotated[
+        str | None, typer.Option(help="Name of the camera; default: that of the bundle.")
+    ] = None,
+    data: Annotated[
+        Path | None,
+        typer.Option(help="Folder of pictures to train on; default: procedural scenes."),
+    ] = None,
+    valid: Annotated[
+        Path | None,
+        typer.Option(help="Folder of pictures to judge by; default: procedural scenes."),
+    ] = None,
+    start: Annotated[
+        Path, typer.Option(help="Bundle or checkpoint with the first weights of the network.")
+    ] = Path("duet"),
+    work_dir: Annotated[
+        Path | None,
+        typer.Option(help="Folder of the steps, which go on there; default: NAME.work."),
+    ] = None,
+    workers: Annotated[int, typer.Option(help="Number of processes that make samples.")] = 1,
+    overwrite: Overwrite = False,
+    json_: Json = False,
+    _debug: Debug = False,
+) -> None:
+    """Make a camera from a lens: PSF, filter, network, checks and a page (needs torch).
+
+    The bundle is usable as soon as its filter is written. Called again after an interruption with
+    the same options, it goes on where it was.
+    """
+    from camkit.models_def.face.recipe_writing import CameraWords
+    from camkit.models_def.face.torch_need import require_torch
+
+    require_torch("camkit make")
+    from camkit.report.making.camera_making import make as make_camera
+
+    camera = CameraWords(
+        sensor=sensor,
+        photo=photo,
+        pitch_um=pitch_um,
+        f_number=f_number,
+        stop_radius_mm=stop_radius_mm,
+        focus_m=focus_m,
+        object_m=distances_m(object_m),
+        distance_from=distance_from,
+        glass=tuple(glass or ()),
+    )
+    facts = make_camera(
+        optics,
+        output,
+        camera=camera,
+        minutes=minutes,
+        size=size,
+        name=name,
+        data=data,
+        valid=valid,
+        start=start,
+        work_dir=work_dir,
+        workers=workers,
+        overwrite=overwrite,
+        on_note=lambda text: say(f"camkit make: {text}", err=True),
+        stopwatch=context.find_object(Stopwatch),
+    )
+    if json_:
+        say(json.dumps(facts))
+        return
+    decibels = ", ".join(f"{method} {value:.2f}" for method, value in facts["psnr_db"].items())
+    say(f"{facts['bundle']}: {decibels} dB; see {facts['page']}")

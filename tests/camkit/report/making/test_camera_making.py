@@ -1,0 +1,144 @@
+"""A camera in one command: the order of its steps, what ships, and a filter for real."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from camkit.bundle.reader import open_bundle
+from camkit.cli.app import run
+from camkit.errors import ContractError
+from camkit.models_def.face.recipe_writing import CameraWords
+from camkit.report.making import camera_judging, camera_making, page_parts
+from camkit.report.making.camera_judging import FILTER, Judgement
+from camkit.report.making.camera_steps import CameraSteps
+from camkit.runtime.plan.decision import DEVELOP
+from tests.wide_bundle import write_wide_bundle
+
+SENSOR = "128x96@5um"
+
+
+@pytest.fixture
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Judge little."""
+    values = {"SCENES": 2, "SIDE_PX": 96, "POSITIONS": (0,), "ISOS": (100.0,), "COPIES": 1}
+    for name, value in values.items():
+        monkeypatch.setattr(camera_judging, name, value)
+    monkeypatch.setattr(page_parts, "TIMED_PX", 96)
+
+
+def test_a_lens_becomes_a_proved_filter_and_a_page(
+    small: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "mine.camkit"
+    words = ["make", "al2550-a", "--sensor", SENSOR, "--focus-m", "inf", "-o", str(out), "--json"]
+    assert run([*words, "--minutes", "0"]) == 0
+    told = capsys.readouterr()
+    facts = json.loads(told.out)
+    assert facts["sizes"] == []
+    assert facts["psnr_db"].keys() == {DEVELOP, FILTER}
+    assert list(facts["cpu_s"]) == ["described", "frozen", "filtered"]
+    assert "its filter restores, usable now" in told.err
+    bundle = open_bundle(out)
+    assert bundle.manifest.name == "mine"
+    assert bundle.manifest.sensor.width_px == 128
+    page = Path(facts["page"]).read_text(encoding="utf-8")
+    for heading in ("The camera mine", "Decibels", "The lens", "Blur over the field", "Seconds"):
+        assert heading in page
+    # the same words go on, and do nothing twice
+    stamp = (tmp_path / "mine.work" / "filter.camkit").stat().st_mtime_ns
+    assert run([*words, "--minutes", "0"]) == 0
+    assert (tmp_path / "mine.work" / "filter.camkit").stat().st_mtime_ns == stamp
+    capsys.readouterr()
+    assert run([*words, "--minutes", "1"]) == 2
+    assert "begun with another minutes" in capsys.readouterr().err
+
+
+class Steps:
+    """Steps that do nothing but write a bundle."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, folder: Path, network_db: float) -> None:
+        self.done: list[str] = []
+        self.minutes = 0.0
+        bundle = write_wide_bundle(folder, "any.camkit").path.read_bytes()
+
+        def of(name: str, facts: dict[str, Any], writes: str = "") -> Callable[..., dict[str, Any]]:
+            def step(steps: CameraSteps, *arguments: float) -> dict[str, Any]:
+                self.done.append(name)
+                self.minutes = arguments[0] if arguments else self.minutes
+                if writes:
+                    steps.work.path(writes).write_bytes(bundle)
+                return facts
+
+            return step
+
+        sensor = {"width_px": 320, "height_px": 240, "pixel_pitch_um": 6.0}
+        described = {"notes": ["a note"], "sensor": sensor, "defaults": []}
+        for name, facts, writes in (
+            ("describe", described, ""),
+            ("freeze", {"side_px": 9, "energy_kept": 0.99}, ""),
+            ("export_filter", {}, "filter.camkit"),
+            ("fit_bank", {"gain_db": 0.5}, ""),
+            ("train", {"steps": 7}, ""),
+            ("export_network", {}, "network.camkit"),
+        ):
+            monkeypatch.setattr(CameraSteps, name, of(name, facts, writes))
+        judged = {
+            FILTER: Judgement(psnr_db=(20.0, 20.0), scenes=("a", "b")),
+            "S": Judgement(psnr_db=(network_db, network_db), scenes=("a", "b")),
+        }
+        monkeypatch.setattr(camera_making, "judge_camera", lambda *_: judged)
+        for name in ("pictures_of", "seconds_of", "camera_html", "layout_of"):
+            monkeypatch.setattr(camera_making, name, lambda *_: "")
+
+
+@pytest.mark.parametrize("network_db", [19.9, 20.4])
+def test_a_network_ships_if_it_beats_its_filter(
+    network_db: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    steps, told = Steps(monkeypatch, tmp_path, network_db), []
+    camera_making.make(
+        "any.zmx",
+        tmp_path / "out.camkit",
+        camera=CameraWords(sensor=SENSOR),
+        minutes=10.0,
+        on_note=told.append,
+    )
+    assert steps.done == [
+        *("describe", "freeze", "export_filter", "fit_bank", "train", "export_network"),
+    ]
+    # what is left of the minutes, less what comes after
+    assert steps.minutes == pytest.approx(10 - camera_making.LAST_S / 60, abs=1)
+    assert told[0] == "a note"
+    if network_db > 20:
+        assert "network S: +0.40 +- 0.00 dB over the filter" in told[-1]
+    else:
+        assert "-0.10 +- 0.00 dB over the filter: it stays out of the bundle" in told[-1]
+
+
+def test_few_minutes_leave_the_filter_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    steps, told = Steps(monkeypatch, tmp_path, 30.0), []
+    camera_making.make(
+        "psf.safetensors",
+        tmp_path / "out.camkit",
+        camera=CameraWords(sensor=SENSOR),
+        minutes=1.0,
+        on_note=told.append,
+    )
+    # a measured PSF needs no freezing
+    assert steps.done == ["describe", "export_filter"]
+    assert told[-1] == "no minutes are left to train a network"
+
+
+def test_files_of_others_are_not_replaced(tmp_path: Path) -> None:
+    out = tmp_path / "out.camkit"
+    out.write_bytes(b"mine")
+    with pytest.raises(ContractError, match="exists"):
+        camera_making.make("duet", out, camera=CameraWords(sensor=SENSOR))
+    with pytest.raises(ContractError, match="minutes must be >= 0; got -1"):
+        camera_making.make("duet", out, camera=CameraWords(sensor=SENSOR), minutes=-1.0)
+    assert out.read_bytes() == b"mine"
