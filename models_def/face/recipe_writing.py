@@ -143,12 +143,12 @@ def describe_camera(
     from camkit.models_def.optics.placing import Placement, placed_lens
     from camkit.models_def.sensors.sensor_choice import choose_sensor, sensor_of
 
-    if camera.sensor is not None:
-        sensor = choose_sensor(camera.sensor)
-    else:
+    if camera.photo is not None:
         from camkit.runtime.raw import read_capture
 
         sensor = sensor_of(read_capture(camera.photo), camera.pitch_um)
+    else:
+        sensor = choose_sensor(camera.sensor or "")
     placement = Placement(
         f_number=camera.f_number,
         stop_radius_mm=camera.stop_radius_mm,
