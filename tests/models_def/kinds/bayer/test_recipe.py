@@ -53,7 +53,7 @@ def test_network_schedule_overrides_the_common_one(recipe):
         ("schedule__loss", "l3", "schedule.loss must be one of"),
         ("schedule__precision", "float8", "schedule.precision must be one of"),
         ("schedule__steps", True, "schedule.steps must be of type int"),
-        ("lens__prescription", None, "lens lacks prescription"),
+        ("lens__prescription", None, "lens needs prescription"),
         ("lens__copies", 0, "lens.copies and lens.validation_copies must be >= 1; got 0, 1"),
         ("lens__validation_copies", 0, "lens.validation_copies must be >= 1"),
         ("sensor__width_px", -1, "sensor.width_px"),
