@@ -27,7 +27,7 @@ def counts(seed=3):
 def listing_text(values, *, header="0.4500 to 0.6500 µm at 0.0000, 0.0000 (deg).", middle=True):
     """A listing of one kernel as Zemax writes it."""
     h, w = values.shape
-    lines = ["Listing of Huygens PSF Data", "", "File : lens.zmx", "Title: a lens", ""]
+    lines = ["Listing of Huygens PSF Data", "", "File : lens.zmx", "Title: 50 mm at 4 m", ""]
     lines += [header, f"Data spacing is {PITCH_UM:.3f} µm.", f"Data area is {w * PITCH_UM:.3f} µm"]
     lines += ["Strehl ratio: 0.412", f"Image grid size: {w} by {h}"]
     lines += [f"Center point is: row {h // 2 + 1}, column {w // 2 + 1}"] if middle else []

@@ -8,6 +8,7 @@ import pytest
 import rawpy
 import tifffile
 
+from camkit import train
 from camkit.bundle.reader import open_bundle
 from camkit.cli.app import run
 from camkit.errors import ContractError
@@ -94,6 +95,32 @@ def test_a_point_off_the_axis_is_photographed_with_its_tails_as_in_the_array(lab
     tails |= {(-4, 0): mosaic[row - 4, column]}
     assert tails[0, 2] > 1.5 * tails[0, -2]
     assert tails[4, 0] > 3 * max(tails[-4, 0], 1)
+
+
+def test_a_network_behind_a_measured_psf_carries_it_into_its_bundle(lab, tmp_path):
+    """No file beside the checkpoint: what it was trained behind comes along."""
+    small = """config = { widths = [16, 16], encoder_blocks = [0], decoder_blocks = [0] }
+
+[data]
+procedural_scenes = 2
+scene_px = 128
+sample_px = 32
+margin_px = 16
+pool_samples = 40
+first_samples = 4
+
+[schedule]
+batch = 2
+patch_px = 16
+"""
+    (lab / "small.toml").write_text(RECIPE + small, encoding="utf-8")
+    train(lab / "small.toml", tmp_path, size="S", steps=2, workers=0)
+    export(tmp_path / "lab_S.pt", tmp_path / "net.camkit")
+    with_network, alone = (
+        open_bundle(path) for path in (tmp_path / "net.camkit", lab / "lab.camkit")
+    )
+    assert with_network.manifest.sizes == ("S",)
+    assert with_network.member("psf.safetensors") == alone.member("psf.safetensors")
 
 
 def test_a_recipe_and_checkpoints_are_not_taken_for_each_other(lab):

@@ -28,6 +28,8 @@ _FIELD: Final = re.compile(
 )
 _MIDDLE: Final = re.compile(r"Center point is:\s*(?:row\s*)?(\d+)\s*,\s*(?:column\s*)?(\d+)", re.I)
 _GRID: Final = re.compile(r"Image grid size:\s*(\d+)\s*by\s*(\d+)", re.IGNORECASE)
+_NAMES: Final = ("File", "Title", "Date")
+"""Lines of the header that people write."""
 _UM: Final = {"mm": 1000.0, "nm": 1e-3, "m": 1e6}
 """Micrometres in a unit; every other spelling is of micrometres, whose letter has many codes."""
 
@@ -64,7 +66,7 @@ def read_listing(path: Path) -> Listing:
     if "cross section" in first.lower():
         raise DecodeError(f"{path.name} lists a cross section; save the text of the whole PSF")
     at, values = _table(lines, path)
-    header = "\n".join(lines[:at])
+    header = "\n".join(line for line in lines[:at] if not line.strip().startswith(_NAMES))
     spacing, field, middle = (pattern.search(header) for pattern in (_SPACING, _FIELD, _MIDDLE))
     grid = _GRID.search(header)
     if grid is not None and (int(grid[2]), int(grid[1])) != values.shape:

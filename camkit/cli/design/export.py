@@ -28,8 +28,7 @@ def export(
     psf: Annotated[
         Path | None,
         typer.Option(
-            help=f"PSF of `camkit freeze`; default: {PSF_NAME} beside the checkpoint, else the "
-            "recipe's measured one."
+            help=f"Frozen PSF; default: {PSF_NAME} beside the checkpoint, or the recipe's."
         ),
     ] = None,
     haze: Annotated[

@@ -11,9 +11,16 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from safetensors.numpy import load, save
 
-from camkit.bundle.psf_file import psf_from_bytes, psf_to_bytes, read_psf, write_psf
+from camkit.bundle.psf_file import (
+    UNCERTAINTY,
+    psf_from_bytes,
+    psf_to_bytes,
+    read_measurement,
+    read_psf,
+    write_psf,
+)
 from camkit.errors import BundleError
-from camkit.psf import FrozenPsf, Symmetry, grid_heights_mm
+from camkit.psf import FrozenPsf, PsfUncertainty, Symmetry, grid_heights_mm
 from camkit.radial import RadialDistortion
 from tests.bundle_factory import tiny_psf
 from tests.focus_bundle import SHIFTS_UM, focus_psf
@@ -256,3 +263,23 @@ def test_damaged_kernels_of_a_moved_sensor_are_refused(
     data = save({name: array for name, array in tensors.items() if array is not None})
     with pytest.raises(BundleError, match=message):
         psf_from_bytes(data)
+
+
+def test_an_uncertainty_is_for_files_and_refused_in_a_bundle(tmp_path: Path) -> None:
+    psf, uncertainty = tiny_psf(), PsfUncertainty(noise=0.02, shift_px=0.1, width=0.03)
+    path = tmp_path / "psf.safetensors"
+    write_psf(path, psf, uncertainty)
+    assert read_measurement(path)[1] == uncertainty
+    np.testing.assert_array_equal(read_psf(path).kernels, psf.kernels)
+    with pytest.raises(BundleError, match="unknown: uncertainty"):
+        psf_from_bytes(path.read_bytes())
+    write_psf(path, psf)
+    assert read_measurement(path)[1] is None
+
+
+@pytest.mark.parametrize("numbers", [[0.1, 0.1], [0.1, -1.0, 0.1], [np.nan, 0.1, 0.1]])
+def test_a_damaged_uncertainty_is_refused(tmp_path: Path, numbers: list[float]) -> None:
+    path = tmp_path / "psf.safetensors"
+    path.write_bytes(save(load(psf_to_bytes(tiny_psf())) | {UNCERTAINTY: np.array(numbers)}))
+    with pytest.raises(BundleError, match="uncertainty"):
+        read_psf(path)

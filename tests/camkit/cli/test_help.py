@@ -54,7 +54,7 @@ def test_commands_are_grouped_by_what_a_person_wants() -> None:
     assert {"process", "merge"} <= groups[USE]
     assert {"check", "doctor"} <= groups[JUDGE]
     assert {"train", "export"} <= groups[MAKE]
-    assert groups[MEASURE] == {"calibrate"}
+    assert groups[MEASURE] == {"calibrate", "psf"}
 
 
 @pytest.mark.parametrize("words", sorted(LISTED))

@@ -26,8 +26,7 @@ def bundle(
     psf: Annotated[
         Path | None,
         typer.Option(
-            help="Kernels (.safetensors of `camkit calibrate psf` or `camkit psf import`); drops "
-            "the networks."
+            help="Kernels (.safetensors of `calibrate psf`, `psf import`); drops the networks."
         ),
     ] = None,
     keep_networks: Annotated[

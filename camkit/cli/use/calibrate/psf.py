@@ -17,10 +17,7 @@ if TYPE_CHECKING:
 def psf(
     files: Annotated[
         list[Path],
-        typer.Argument(
-            help="Linear exposures of a point light, a disc or an edge in the dark (kernels: "
-            "`camkit psf import`)."
-        ),
+        typer.Argument(help="Linear exposures of a point light, a disc or an edge in the dark."),
     ],
     out: Annotated[Path, typer.Option("-o", "--out", help="PSF to write (.safetensors).")],
     page: Page = None,

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+import camkit
 from camkit.cli.exit_code import ExitCode
 from camkit.models_def.face.torch_need import INSTALLED_BY
 from camkit.stopwatch import Stopwatch
@@ -47,10 +48,20 @@ def test_export_without_a_frozen_psf_says_where_it_looked(
     camkit_command, tmp_path, monkeypatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    outcome = camkit_command("export", "runs/one.pt", "-o", "one.camkit")
+    recipe = Path(camkit.__file__).parent / "models_def" / "recipes" / "duet.toml"
+    (tmp_path / "runs").mkdir()
+    (tmp_path / "runs" / "duet.toml").write_bytes(recipe.read_bytes())
+    outcome = camkit_command("export", "runs/duet.toml", "--no-network", "-o", "one.camkit")
     assert outcome.code == ExitCode.USAGE
     assert "runs/psf.safetensors" in outcome.err
     assert "camkit freeze" in outcome.err
+
+
+def test_export_names_a_checkpoint_that_is_not_there(camkit_command, tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    outcome = camkit_command("export", "runs/one.pt", "-o", "one.camkit")
+    assert outcome.code == ExitCode.USAGE
+    assert "runs/one.pt" in outcome.err
 
 
 def test_train_hands_every_option_on(camkit_command, tmp_path, monkeypatch) -> None:
