@@ -16,6 +16,7 @@ from camkit.runtime.plan.decision import DEVELOP
 
 NAMES: Final = {DEVELOP: "developed alone", FILTER: "filter"}
 _PAIR: Final = "The same capture by every method; the truth last. Three pixels of the page for one."
+_BLUR: Final = "Kernels at the nearest distance. Logarithm of the light, four decades."
 _ENLARGED: Final = 3
 _CROP_PX: Final = 128
 
@@ -58,7 +59,7 @@ def camera_html(camera: MadeCamera) -> str:
     sections = [
         Section("Decibels", (_decibels(camera.judged),)),
         Section("Before and after", (Picture(_PAIR, _strip(camera.pictures)),)),
-        Section("Blur over the field", (Picture("", to_png(draw_field(bundle.psf))),)),
+        Section("Blur over the field", (Picture(_BLUR, to_png(draw_field(bundle.psf))),)),
         Section("Laws of a picture", (_laws(bundle),)),
         Section("Seconds", (_seconds(camera),)),
     ]

@@ -55,8 +55,11 @@ def psf_field_html(result: ImportedPsf, source: str) -> str:
 
 @chart
 def draw_field(psf: FrozenPsf) -> Figure:
-    """Draw every kernel where it lies on the sensor."""
+    """Draw every kernel where it lies on the sensor; of a lens of revolution side by side."""
     x_mm, y_mm = _positions(psf)
+    is_radial = psf.symmetry == "radial"
+    if is_radial:
+        x_mm, y_mm = y_mm, x_mm
     spacing = min(_step(x_mm), _step(y_mm))
     reach = (np.ptp(x_mm) + 2 * spacing, np.ptp(y_mm) + 2 * spacing)
     scale = float(np.clip(reach[1] / reach[0], 0.3, 2.0))
@@ -69,11 +72,13 @@ def draw_field(psf: FrozenPsf) -> Figure:
     panel.set(
         xlim=(x_mm.min() - spacing, x_mm.max() + spacing),
         ylim=(y_mm.max() + spacing, y_mm.min() - spacing),
-        xlabel="x, mm to the right",
-        ylabel="y, mm down",
+        xlabel="below the axis, mm" if is_radial else "x, mm to the right",
+        ylabel="" if is_radial else "y, mm down",
         aspect="equal",
         facecolor="#ddd",
     )
+    if is_radial:
+        panel.set_yticks([])
     return figure
 
 
