@@ -120,6 +120,8 @@ class Capture:
         window: Where the samples lie in a larger picture; None if the format knows no such thing.
         binning: Squares of the sensor's mosaic that the samples are means over; None for the
             sensor's own samples. Place and pitch are those of the mosaic.
+        rounding: Of samples that were codes of few bits: (2, n) light, and the variance that
+            rounding to codes has there; None for others.
         notes: What a person should know of this decode.
         decoder_peak_mb: Peak memory of the process that decoded; 0 where it was this one.
     """
@@ -143,6 +145,7 @@ class Capture:
     sha256: str | None = None
     window: PictureWindow | None = None
     binning: Binning | None = None
+    rounding: FloatArray | None = None
     notes: tuple[str, ...] = ()
     decoder_peak_mb: float = field(default=0.0, compare=False)
 

@@ -12,6 +12,7 @@ from camkit.caller import option_text
 from camkit.errors import ContractError, one_line
 from camkit.runtime.cancel import Cancel
 from camkit.runtime.capture import MosaicOptions
+from camkit.runtime.files.halves import right_half
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.machine.memory import peak_rss_mb
 from camkit.runtime.network.tiling import Progress
@@ -237,10 +238,12 @@ def identity_of(
     from camkit import __version__
 
     free = ("threads", "max_mem_bytes", "tile_px")
-    settings = {k: v for k, v in asdict(pipeline.options).items() if k not in free}
+    options = pipeline.options
+    settings = {k: v for k, v in asdict(options).items() if k not in free}
     if settings["depth_m"] == math.inf:
         settings["depth_m"] = "inf"  # JSON knows no infinity
-    settings["unit"] = None if pipeline.options.unit is None else asdict(pipeline.options.unit)
+    settings["unit"] = None if options.unit is None else asdict(options.unit)
+    settings["tone"] = None if options.tone is None else options.tone.to_json()
     outputs = pipeline.part.outputs
     settings["format"] = outputs.format(write)
     settings["linear"] = write.linear
@@ -249,8 +252,8 @@ def identity_of(
     settings |= {"preview": True} if write.preview else {}
     settings["mosaic"] = None if mosaic is None else asdict(mosaic)
     settings["of_kind"] = {
-        **dict(pipeline.options.of_kind),
-        **outputs.identity(pipeline.options, source),
+        **dict(options.of_kind),
+        **outputs.identity(options, source),
     }
     identity = {
         "camkit": __version__,
@@ -258,6 +261,10 @@ def identity_of(
         "bundle_sha256": None if pipeline.bundle is None else pipeline.bundle.sha256,
         "options": settings,
     }
+    if options.halves is not None:
+        other = right_half(source, options.halves)
+        identity["other_half"] = str(other)
+        identity["other_half_sha256"] = file_sha256(other) if other.is_file() else None
     return dict(json.loads(json.dumps(identity)))
 
 

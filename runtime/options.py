@@ -12,6 +12,9 @@ from camkit.caller import option_list, option_text
 from camkit.errors import ContractError
 from camkit.field_types import check_fields, check_value
 from camkit.kinds import Kind, KindOption, all_kinds
+from camkit.runtime.capture import check_iso
+from camkit.runtime.files.halves import Halves, check_halves
+from camkit.runtime.files.tone_curve import Tone, read_tone
 from camkit.runtime.unit import Unit, read_unit
 from camkit.units import MM_PER_M
 
@@ -66,6 +69,13 @@ class Options:
         max_mem_bytes: Memory the process may take; None for the default of 0.93 GB.
         threads: Threads in all; None for those the process may use.
         tile_px: Output side of the windows, for tests and measurements; None lets the plan choose.
+        tone: How the codes of developed pictures (JPEG, TIFF, PNG) become light; None for what
+            their files and their bits state.
+        halves: What differs in the paths of the two halves of dual pixels, as in ("_l", "_r");
+            each capture is the left one, and the mean of both is processed. None for whole ones.
+        noise: (shot, read variance) of linear light, white = 1, as sidecars state them; None for
+            the file's, that of the ISO, or measured noise.
+        iso: Sensitivity, for the noise that the bundle states; None for what the file states.
         unit: The camera body, whose facts the stages may use; None for any.
         dtype: Which graph of the bundle, fp32, or fp16 where it holds one (a CPU computes the
             latter in fp32 too, with weights rounded to fp16); or bf16, the graph of fp32
@@ -97,6 +107,10 @@ class Options:
     max_mem_bytes: int | None = None
     threads: int | None = None
     tile_px: int | None = None
+    tone: Tone | None = None
+    halves: Halves | None = None
+    noise: tuple[float, float] | None = None
+    iso: float | None = None
     unit: Unit | None = None
     dtype: Dtype = "fp32"
     provider: Provider = "cpu"
@@ -116,6 +130,9 @@ class Options:
         _check_scale(self)
         _check_dtype(self.dtype, self.provider)
         _check_depth(self.depth_m)
+        _check_noise(self.noise, self.iso)
+        if self.halves is not None:
+            check_halves(self.halves)
         if not 0 <= self.strength <= 1:
             raise ContractError(f"strength must lie in 0..1; got {self.strength}")
         _check_origin(self.origin_px, self.assume)
@@ -169,7 +186,7 @@ def kind_option_names() -> list[str]:
 def with_choices(options: Options, choices: Mapping[str, object]) -> Options:
     """Return options with single ones chosen by name, those that a kind brings among them.
 
-    A camera body may be given by its TOML file.
+    A camera body may be given by its TOML file, a tone curve by its name or its file.
 
     Raises:
         ContractError: If one is unknown, or cannot be what it was given.
@@ -180,6 +197,8 @@ def with_choices(options: Options, choices: Mapping[str, object]) -> Options:
     plain = {name: value for name, value in choices.items() if name not in kind_names}
     if isinstance(body := plain.get("unit"), str | PathLike):
         plain["unit"] = read_unit(Path(body))
+    if isinstance(curve := plain.get("tone"), str | PathLike):
+        plain["tone"] = read_tone(curve)
     of_kind = dict(options.of_kind)
     of_kind |= {
         name: _text_of(name, choices[name]) for name in kind_names if choices.get(name) is not None
@@ -282,6 +301,38 @@ def _check_dtype(dtype: Dtype, provider: Provider) -> None:
 def _check_depth(depth_m: float | None) -> None:
     if depth_m is not None and not depth_m > 0:
         raise ContractError(f"the depth must be > 0 m; got {depth_m}")
+
+
+def _check_noise(noise: tuple[float, float] | None, iso: float | None) -> None:
+    check_iso(iso)
+    if noise is None:
+        return
+    if iso is not None:
+        raise ContractError(
+            f"{option_text('noise')} and {option_text('iso')} both say what the noise is: choose"
+        )
+    shot, read_variance = noise
+    if not (0 < shot < 1 and 0 <= read_variance < 1):
+        raise ContractError(
+            f"{option_text('noise')} takes the shot noise and the read variance of linear light "
+            "with white = 1, such as 5e-5,1e-8 (20,000 electrons at white, 2 of read noise); got "
+            f"{shot:g},{read_variance:g}"
+        )
+
+
+def read_noise(text: str) -> tuple[float, float]:
+    """Read the shot noise and the read variance of a text such as 5e-5,1e-8.
+
+    Raises:
+        ContractError: If it holds anything else.
+    """
+    try:
+        shot, read_variance = (float(part) for part in text.split(","))
+    except ValueError:
+        raise ContractError(
+            f"{option_text('noise')} takes two numbers SHOT,READ_VARIANCE; got {text!r}"
+        ) from None
+    return shot, read_variance
 
 
 def checked_origin(origin_px: Any) -> tuple[int, int]:

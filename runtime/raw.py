@@ -34,6 +34,7 @@ from camkit.runtime.files.formats import foreign
 from camkit.runtime.files.in_memory import Source, stored
 from camkit.runtime.files.raw_tags import sensor_place
 from camkit.runtime.files.tiff_tags import read_tiff_tags
+from camkit.runtime.files.tone_curve import PictureReading, Tone
 
 __all__ = ["Capture", "MosaicOptions", "file_sha256", "is_picture", "named_bundle", "read_capture"]
 
@@ -70,6 +71,8 @@ def read_capture(
     max_memory_mb: int = DEFAULT_MAX_MEMORY_MB,
     mosaic: MosaicOptions | None = None,
     keep_codes: bool = False,
+    tone: Tone | None = None,
+    is_grey: bool = False,
 ) -> Capture:
     """Read a RAW, DNG, EXR, TIFF or PNG file as a capture in sensor orientation.
 
@@ -82,21 +85,24 @@ def read_capture(
         mosaic: What a headerless single-channel picture does not say of itself, or the levels of a
             RAW file where its own are wrong.
         keep_codes: Leave 8-bit pictures coded as they are, white at 255.
+        tone: How the codes of a developed picture become light; None for what the file states.
+        is_grey: Whether the camera has one channel: grey pictures keep theirs.
 
     Raises:
         DecodeError: If the file is missing, damaged, or not believable.
-        ContractError: If a pattern is given for a RAW file, which says it itself, or levels alone
-            for a picture.
+        ContractError: If a pattern or a tone curve is given for a RAW file, which says it itself,
+            or levels alone for a picture.
     """
     limits = _Limits(timeout_s=timeout_s, max_memory_mb=max_memory_mb)
     if not (math.isfinite(timeout_s) and timeout_s > 0 and max_memory_mb > 0):
         raise ContractError(f"limits must be > 0; got {timeout_s} s, {max_memory_mb} MB")
+    reading = PictureReading(keep_codes=keep_codes, tone=tone, is_grey=is_grey)
     with stored(path) as file:
-        return _read(file, limits if isolate else None, mosaic, keep_codes=keep_codes)
+        return _read(file, limits if isolate else None, mosaic, reading)
 
 
 def _read(
-    file: Path, limits: _Limits | None, mosaic: MosaicOptions | None, *, keep_codes: bool
+    file: Path, limits: _Limits | None, mosaic: MosaicOptions | None, reading: PictureReading
 ) -> Capture:
     """Read a file, RAW in a child within its limits; None decodes it here."""
     try:
@@ -104,9 +110,10 @@ def _read(
         head = _head(file)
         foreign.check_not_foreign(head)
         if is_picture(file):
-            capture = _read_picture(file, mosaic, keep_codes=keep_codes)
+            capture = _read_picture(file, mosaic, reading)
             return replace(capture, sha256=file_sha256(file))
         foreign.check_no_jpeg(head)
+        _check_no_tone(file, reading)
         if mosaic is not None and mosaic.cfa is not None:
             raise ContractError(
                 f"a pattern is for headerless PNG or TIFF; {file.name} has its own, omit "
@@ -164,16 +171,25 @@ def file_sha256(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _read_picture(path: Path, mosaic: MosaicOptions | None, *, keep_codes: bool) -> Capture:
+def _check_no_tone(path: Path, reading: PictureReading) -> None:
+    if reading.tone is not None:
+        raise ContractError(
+            f"{path.name} holds the sensor's own light, not codes of a developed picture; leave "
+            f"{option_text('tone')} out"
+        )
+
+
+def _read_picture(path: Path, mosaic: MosaicOptions | None, reading: PictureReading) -> Capture:
     from camkit.runtime.files.picture import read_mosaic, read_picture
 
     if mosaic is None:
-        return read_picture(path, keep_codes=keep_codes)
+        return read_picture(path, reading)
     if mosaic.cfa is None:
         raise ContractError(
             f"{path.name} is a picture, levels are for RAW files; add {option_text('cfa')} too if "
             "it is a headerless mosaic"
         )
+    _check_no_tone(path, reading)
     return read_mosaic(path, mosaic)
 
 

@@ -1,6 +1,8 @@
-"""Readers of the TOML that `camkit calibrate` writes: geometry, flat, tone, noise."""
+"""Readers of the TOML that `camkit calibrate` writes: geometry, flat, noise.
 
-from itertools import pairwise
+That of a tone curve is read by `camkit.runtime.files.tone_curve`.
+"""
+
 from pathlib import Path
 from typing import Annotated, Any, Final, TypeVar
 
@@ -16,7 +18,6 @@ from camkit.side_file import read_side_toml
 Side = Annotated[int, Field(ge=2, le=100_000)]
 Place = Annotated[float, Field(ge=-1e6, le=1e6)]
 Factor = Annotated[float, Field(ge=-MOST_FACTOR, le=MOST_FACTOR)]
-TOP_LEVEL: Final = 255.0
 _T = TypeVar("_T", bound=Entry)
 
 
@@ -70,24 +71,6 @@ class FlatFile(Entry, extra="ignore"):
         )
 
 
-class ToneFile(Entry, extra="ignore"):
-    """A result of `camkit calibrate tone`, as far as pairs take it."""
-
-    levels: Annotated[tuple[NonNegative, ...], Field(min_length=2, max_length=1024)]
-    luminance: tuple[NonNegative, ...]
-
-    @model_validator(mode="after")
-    def _check(self) -> "ToneFile":
-        levels, light = self.levels, self.luminance
-        if len(light) != len(levels):
-            raise ValueError(f"{len(levels)} levels have {len(light)} luminances")
-        if any(b <= a for a, b in pairwise(levels)) or any(b < a for a, b in pairwise(light)):
-            raise ValueError("levels and luminance must rise together")
-        if levels[0] != 0 or levels[-1] != TOP_LEVEL or light[-1] <= light[0]:
-            raise ValueError("levels must reach from 0 to 255, and luminance rise between them")
-        return self
-
-
 class IsoRecord(Entry, extra="ignore"):
     """The measured values at one ISO."""
 
@@ -137,11 +120,6 @@ def read_geometry(path: Path) -> GeometryFile:
 def read_flat(path: Path) -> FlatFile:
     """Read a result of `camkit calibrate flat`; see `read_geometry`."""
     return _read(path, FlatFile, "flat")
-
-
-def read_tone(path: Path) -> ToneFile:
-    """Read a result of `camkit calibrate tone`; see `read_geometry`."""
-    return _read(path, ToneFile, "tone")
 
 
 def read_noise(path: Path) -> NoiseFile:

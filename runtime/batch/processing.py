@@ -104,7 +104,7 @@ def process(  # noqa: PLR0913 - each says one thing to its caller
     bundle_name = None if bundle is None else str(bundle)
     pipelines = Pipelines(_shared(options, write.jobs))
     kind = kind_of_run(bundle_name, options, pipelines)
-    sources = expand(list_paths(files), kind)
+    sources = expand(list_paths(files), kind, options.halves)
     if not sources:
         return []
     tasks = list_tasks(sources, bundle=bundle_name, write=write, options=options, kind=kind)

@@ -8,6 +8,7 @@ from typing import Final
 from camkit.errors import DecodeError
 from camkit.kinds import Kind, all_kinds
 from camkit.regular_file import check_regular
+from camkit.runtime.files.halves import Halves, without_right_halves
 from camkit.runtime.files.in_memory import FilePath
 from camkit.runtime.output.sidecar import read_sidecar
 
@@ -18,7 +19,9 @@ RAW_SUFFIXES: Final = frozenset(
 CAPTURE_SUFFIXES: Final = RAW_SUFFIXES | {".exr", ".tif", ".tiff", ".png"}
 
 
-def expand(files: Sequence[FilePath], kind: Kind | None = None) -> list[Path]:
+def expand(
+    files: Sequence[FilePath], kind: Kind | None = None, halves: Halves | None = None
+) -> list[Path]:
     """Return the captures named by files, folders and globs, each once, in the order given.
 
     A folder stands for the captures directly in it, by name, without the pictures that a sidecar
@@ -28,6 +31,7 @@ def expand(files: Sequence[FilePath], kind: Kind | None = None) -> list[Path]:
     Args:
         files: What was named.
         kind: Of the captures, where that is known: a folder stands for its types of files alone.
+        halves: What differs in the paths of two halves of a capture, which the left one names.
     """
     suffixes = _suffixes(kind)
     paths: dict[Path, None] = {}
@@ -44,7 +48,7 @@ def expand(files: Sequence[FilePath], kind: Kind | None = None) -> list[Path]:
             paths.update(dict.fromkeys(p for p in matches if p.is_file()))
         else:
             paths[path] = None
-    return list(paths)
+    return without_right_halves(list(paths), halves)
 
 
 def _suffixes(kind: Kind | None) -> frozenset[str]:

@@ -20,6 +20,7 @@ from camkit.runtime.options import (
     Quality,
     Scale,
 )
+from camkit.runtime.files.tone_curve import Tone
 from camkit.runtime.output.writer import FileFormat
 from camkit.runtime.unit import Unit
 
@@ -59,6 +60,10 @@ class LoadKeywords(KindKeywords, total=False):
     max_mem_bytes: int | None
     threads: int | None
     tile_px: int | None
+    tone: Tone | FilePath | None
+    halves: tuple[str, str] | None
+    noise: tuple[float, float] | None
+    iso: float | None
     unit: Unit | FilePath | None
     dtype: Dtype
     provider: Provider

@@ -32,6 +32,7 @@ from camkit.runtime.files.formats.decoded import Decoded
 from camkit.runtime.files.formats.opencv_picture import decode_picture
 from camkit.runtime.files.formats.tiff_picture import decode_tiff
 from camkit.runtime.files.tiff_tags import TiffTags, read_tiff_tags
+from camkit.runtime.files.tone_curve import AS_STATED, PictureReading, Tone
 from camkit.runtime.files.white_level import check_said_white
 from camkit.runtime.metadata import Metadata
 
@@ -58,47 +59,89 @@ class _Picture:
     metadata: Metadata = field(default_factory=Metadata)
 
 
-def read_picture(path: Path, *, keep_codes: bool = False) -> Capture:
+def read_picture(path: Path, reading: PictureReading = AS_STATED) -> Capture:
     """Read a picture as a linear capture; grey becomes three equal channels.
 
     Float samples and those of more than 8 bits are taken as linear. Those of 8 bits are decoded
-    from the colour space that the file states, else from sRGB, unless their codes are kept. NaN and
+    from the colour space that the file states, else from sRGB. A tone curve says otherwise. NaN and
     infinite samples are kept and counted in the notes.
 
     Raises:
-        DecodeError: If the file is damaged, of a kind that is not read, or a mosaic.
+        DecodeError: If the file is damaged, of a kind that is not read, or a mosaic; if a tone
+            curve is for samples that are light, or colours come from a grey camera.
         OSError: If it cannot be read.
     """
     picture = _decode(path)
     decoded = picture.decoded
-    samples, notes = decoded.samples, [*decoded.notes]
-    if samples.ndim == 2 and not _begins(path, exr_picture.MAGIC):
-        notes += _grey_notes(path, samples)
-    white = 1.0
-    if 0 < decoded.top <= _MOST_EIGHT:
-        white = 255.0 if keep_codes else 65535.0
-        samples = _full_codes(decoded) if keep_codes else _linear_codes(decoded)
-        notes += _notes_on_eight(decoded, keep_codes=keep_codes)
-    elif decoded.top:
-        white = float(decoded.top)
-    else:
-        bad = int(samples.size - np.count_nonzero(np.isfinite(samples)))
-        notes.extend([f"{bad} samples are NaN or infinite"] if bad else [])
-    if not 0 < decoded.top <= _MOST_EIGHT:
-        notes += _notes_on_linear(decoded)
-    if samples.ndim == 2:
-        samples = np.broadcast_to(samples, (3, *samples.shape))
+    notes = [*decoded.notes]
+    if decoded.samples.ndim == 2 and not (reading.is_grey or _begins(path, exr_picture.MAGIC)):
+        notes += _grey_notes(path, decoded.samples)
+    samples, white, light_notes = _light(decoded, reading)
+    channels, channel_notes = _channels(samples, is_grey=reading.is_grey)
     return Capture(
-        samples=samples,
+        samples=channels,
         cfa=None,
-        black_level=np.zeros(3, dtype=np.float32),
+        black_level=np.zeros(len(channels), dtype=np.float32),
         white_level=white,
         orientation=picture.orientation,
         camera=picture.metadata.camera,
         metadata=picture.metadata,
         window=decoded.window,
-        notes=tuple(notes),
+        rounding=None if reading.keep_codes else _rounding(decoded, reading.tone),
+        notes=(*notes, *light_notes, *channel_notes),
     )
+
+
+def _light(
+    decoded: Decoded, reading: PictureReading
+) -> tuple[NDArray[Any], float, list[str]]:
+    """Return samples of light or kept codes, their white level, and notes on what they mean."""
+    samples, tone, is_eight = decoded.samples, reading.tone, 0 < decoded.top <= _MOST_EIGHT
+    if is_eight and reading.keep_codes:
+        return _full_codes(decoded), 255.0, _notes_on_eight(decoded, keep_codes=True)
+    if tone is not None:
+        if not decoded.top and not tone.is_linear:
+            raise DecodeError(
+                "the samples are floats, which are light and not codes; leave "
+                f"{option_text('tone')} out"
+            )
+        notes = _notes_on_tone(decoded, tone)
+        if decoded.top and not tone.is_linear:
+            return _linear_codes(decoded, tone.space), 65535.0, notes
+        return samples, float(decoded.top or 1), [*notes, *_notes_on_floats(decoded)]
+    if is_eight:
+        codes = _linear_codes(decoded, decoded.space or SRGB)
+        return codes, 65535.0, _notes_on_eight(decoded, keep_codes=False)
+    notes = [*_notes_on_floats(decoded), *_notes_on_linear(decoded)]
+    return samples, float(decoded.top or 1), notes
+
+
+def _channels(samples: NDArray[Any], *, is_grey: bool) -> tuple[NDArray[Any], list[str]]:
+    """Return samples as (c, h, w), and notes.
+
+    Raises:
+        DecodeError: If they have colours, and the camera has not.
+    """
+    if samples.ndim == 2:
+        return (samples[None] if is_grey else np.broadcast_to(samples, (3, *samples.shape))), []
+    if not is_grey:
+        return samples, []
+    if not (samples[1:] == samples[:1]).all():
+        raise DecodeError(
+            "expected a grey picture, as the camera of this bundle takes them, and got one with "
+            f"colours; convert it to grey, or choose another {option_text('bundle')}"
+        )
+    return samples[:1], ["three equal channels: read as a grey picture"]
+
+
+def _rounding(decoded: Decoded, tone: Tone | None) -> FloatArray | None:
+    """Return (2, code - 1) light between codes of few bits, and the variance of rounding there."""
+    if not 0 < decoded.top <= _MOST_EIGHT:
+        return None
+    space = (decoded.space or SRGB) if tone is None else tone.space
+    codes = np.arange(decoded.top + 1, dtype=np.uint8)[None]
+    light = np.sort(space.light_of(codes, decoded.top)[0])
+    return np.stack([(light[1:] + light[:-1]) / 2, np.diff(light) ** 2 / 12])
 
 
 def _grey_notes(path: Path, samples: NDArray[Any]) -> list[str]:
@@ -138,9 +181,9 @@ def _is_mosaic(samples: NDArray[Any]) -> bool:
     return bool(steady > _STEADY * np.abs(offsets).mean())
 
 
-def _linear_codes(decoded: Decoded) -> NDArray[np.uint16]:
-    """Return light of codes of up to 8 bits in 16 bits, cut to 0..1."""
-    space, samples = decoded.space or SRGB, decoded.samples
+def _linear_codes(decoded: Decoded, space: ColorSpace) -> NDArray[np.uint16]:
+    """Return light of codes in 16 bits, cut to 0..1."""
+    samples = decoded.samples
     codes = np.empty(samples.shape, dtype=np.uint16)
     for top in range(0, samples.shape[-2], _LINEAR_ROWS):
         rows = np.s_[..., top : top + _LINEAR_ROWS, :]
@@ -167,6 +210,22 @@ def _notes_on_eight(decoded: Decoded, *, keep_codes: bool) -> list[str]:
         return []
     name = "sRGB" if space is None or space.is_srgb else repr(space.name)
     return [f"8-bit picture: decoded from {name}; a 16-bit linear file would be more exact"]
+
+
+def _notes_on_tone(decoded: Decoded, tone: Tone) -> list[str]:
+    """Return notes on codes that become light as the caller says."""
+    space = decoded.space
+    if space is None or (decoded.top and space.means(tone.space)):
+        return []
+    return [f"the file states the colour space {space.name!r}, in place of which codes are read "
+            f"by the tone curve {tone.name}"]
+
+
+def _notes_on_floats(decoded: Decoded) -> list[str]:
+    if decoded.top:
+        return []
+    bad = int(decoded.samples.size - np.count_nonzero(np.isfinite(decoded.samples)))
+    return [f"{bad} samples are NaN or infinite"] if bad else []
 
 
 def _notes_on_linear(decoded: Decoded) -> list[str]:

@@ -23,7 +23,7 @@ GENERAL: Final = frozenset({"max_mem_bytes", "threads", "method"})
 ON_A_SENSOR: Final = frozenset({"assume", "origin_px"})
 """What means something wherever the size of the sensor is known."""
 WITH_A_BUNDLE: Final = frozenset({"force_bundle"})
-ALWAYS: Final = frozenset({"unit"})
+ALWAYS: Final = frozenset({"unit", "tone", "halves"})
 OF_CAPTURE: Final = ON_A_SENSOR | WITH_A_BUNDLE | ALWAYS
 """What may be said of how a photograph was taken."""
 

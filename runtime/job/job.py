@@ -12,8 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from camkit.arrays import FloatArray
 from camkit.bundle.plane import Plane
 from camkit.bundle.reader import Bundle
+from camkit.caller import option_text
 from camkit.colorimetry import Matrix
 from camkit.errors import ContractError
 from camkit.noise import NoiseModel
@@ -29,7 +31,7 @@ from camkit.runtime.options import Options
 from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.planner import Plan
 from camkit.runtime.rows import RowSource
-from camkit.runtime.signal.noise import measure_noise
+from camkit.runtime.signal.noise import measure_noise, over_rounding
 
 Gains = tuple[float, ...]
 
@@ -139,11 +141,14 @@ class Job:
         return self.measured_noise
 
     def with_noise(self) -> "Job":
-        """Return the job with the noise: the file's, the bundle's at its ISO, or measured."""
+        """Return the job with the noise: stated, the file's, the bundle's at its ISO, measured."""
         if self.measured_noise is not None:
             return self
         manifest = self.known_bundle.manifest
-        if self.capture.noise is not None:
+        if self.options.noise is not None:
+            shot, read_variance = ((value,) * self.capture.channels for value in self.options.noise)
+            source, noise = "stated", NoiseModel(shot=shot, read_variance=read_variance)
+        elif self.capture.noise is not None:
             source, noise = "file", self.capture.noise
         elif self.capture.iso is not None:
             source, noise = "bundle", manifest.light_sensor.noise_at(self.capture.iso)
@@ -152,6 +157,7 @@ class Job:
         else:
             with self.log.clock.stage("noise"):
                 source, noise = "measured", measure_noise(self.capture)
+            self.log.notes += _doubts(noise, self.capture.rounding)
         self.log.record["noise"] = {
             "source": source,
             "shot": noise.shot,
@@ -193,3 +199,16 @@ class Job:
     def with_new_log(self, probe_end: int | None = None) -> "Job":
         """Return the same job for a walk whose counts and notes nobody hears."""
         return replace(self, log=Log(meter=Meter(None, self.cancel)), probe_end=probe_end)
+
+
+def _doubts(noise: NoiseModel, rounding: FloatArray | None) -> list[str]:
+    """Return a note where noise that was measured lies below that of rounding to codes."""
+    if rounding is None:
+        return []
+    share = over_rounding(noise, rounding)
+    if share >= 1:
+        return []
+    return [
+        f"the noise measured is {share:.2f} of what rounding to 8 bits alone leaves: blur and "
+        f"rounding hide the camera's; state it by {option_text('noise')} or {option_text('iso')}"
+    ]

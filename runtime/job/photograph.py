@@ -38,6 +38,8 @@ def know_photograph(job: Job) -> Job:
         ContractError: If capture, bundle and options do not fit each other.
     """
     job.log.clipped_fraction = 0.0
+    if job.options.iso is not None:
+        job = replace(job, capture=replace(job.capture, iso=job.options.iso, noise=None))
     job.log.notes += _first_notes(job)
     extent = None if job.bundle is None else job.bundle.manifest.sensor.extent
     placement = place(job.capture, extent, job.options.assume)

@@ -205,6 +205,18 @@ def measure_noise(capture: Capture) -> NoiseModel:
     return NoiseModel(shot=(shot,) * count, read_variance=(read_variance,) * count)
 
 
+def over_rounding(noise: NoiseModel, rounding: FloatArray) -> float:
+    """Return the variance of noise over that of rounding to codes, the median over codes.
+
+    Args:
+        noise: Of a linear signal.
+        rounding: (2, n) levels, and the variance of rounding there.
+    """
+    levels, variances = rounding[:, rounding[1] > 0]
+    of_noise = np.mean(noise.shot) * levels + np.mean(noise.read_variance)
+    return float(np.median(of_noise / variances))
+
+
 def _sample_planes(capture: Capture) -> Iterator[FloatArray]:
     """Yield same-colour planes of bands spread over the picture; clipped samples are NaN."""
     step = max(_BAND_ROWS, capture.height // _MAX_BANDS // 2 * 2)

@@ -57,7 +57,7 @@ WEIGHT_BYTES: Final = 8.8
 """Memory of a session for each weight: the number, and its place in a block (measured)."""
 OPTIONS: Final = (
     *("size", "quality", "max_seconds", "max_error_db", "mode", "on_unsafe", "tile_px"),
-    *("dtype", "provider", "laws", "strength"),
+    *("dtype", "provider", "laws", "strength", "noise", "iso"),
 )
 NOTED_FRACTION: Final = 0.01
 """Of the picture; a network that moves much light in more of it is worth a note."""

@@ -51,7 +51,7 @@ from camkit.runtime.rows import Rows
 from camkit.runtime.unit import FOCUS
 
 METHODS: Final = ("wiener", "rl", "admm-tv")
-OPTIONS: Final = ("depth_m",)
+OPTIONS: Final = ("depth_m", "noise", "iso")
 FACTS: Final = (FOCUS,)
 FOLLOWS: Final = "noise and level of every block, hence the ISO"
 ESTIMATED: Final = "estimated"

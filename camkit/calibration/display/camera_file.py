@@ -7,18 +7,17 @@ from typing import Final
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator, RectBivariateSpline
+from scipy.interpolate import RectBivariateSpline
 
 from camkit.calibration.geometry.camera_model import MODELS, Camera
 from camkit.calibration.measured_files import (
-    TOP_LEVEL,
     read_flat,
     read_geometry,
-    read_tone,
 )
-from camkit.colorimetry import decode_srgb
 from camkit.errors import DecodeError
 from camkit.radial import RadialIllumination
+from camkit.runtime.files.formats.color_space import srgb_curve
+from camkit.runtime.files.tone_curve import TOP_LEVEL, measured_light
 from camkit.units import to_mm
 
 FloatGrid = NDArray[np.float64]
@@ -28,7 +27,6 @@ NODES: Final = 64
 """Along the longer side of a picture, between which the undoing of distortion is interpolated."""
 _ROUNDS: Final = 60
 _DONE_PX: Final = 1e-6
-_GAMMA: Final = 2.2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -138,21 +136,13 @@ class Tone:
     def read(cls, path: Path | None) -> "Tone":
         """Read the TOML of `camkit calibrate tone`; sRGB without one.
 
-        Black is taken off: it is the same in all that is shown.
-
         Raises:
             DecodeError: If it is not what that command writes, or does not reach from 0 to 255.
         """
-        every = np.arange(TOP_LEVEL + 1)
         if path is None:
-            light = decode_srgb((every / TOP_LEVEL).astype(np.float32)).astype(np.float64)
+            light = srgb_curve(np.arange(TOP_LEVEL + 1) / TOP_LEVEL)
             return cls(light=light, measured=False)
-        file = read_tone(path)
-        light = np.array(file.luminance)
-        # a power of about 2.2 makes the curve nearly straight between steps
-        share = (light - light[0]) / (light[-1] - light[0])
-        root = PchipInterpolator(np.array(file.levels), share ** (1 / _GAMMA))(every)
-        return cls(light=np.asarray(root**_GAMMA / root[-1] ** _GAMMA), measured=True)
+        return cls(light=measured_light(path), measured=True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -43,7 +43,7 @@ def print_plans(
     pipelines = Pipelines(options)
     kind = kind_of_run(bundle, options, pipelines)
     done = True
-    sources = expand(files, kind)
+    sources = expand(files, kind, options.halves)
     if not sources:
         return None
     tasks = list_tasks(

@@ -88,6 +88,34 @@ def process(
     mosaic: MosaicCfa = None,
     black_level: BlackLevel = None,
     white_level: WhiteLevel = None,
+    tone: Annotated[
+        str | None,
+        typer.Option(
+            help="Light of the codes of JPEG, TIFF and PNG: srgb, linear, or a file (.toml of "
+            "`camkit calibrate tone`); default: as the file states.",
+            metavar="CURVE",
+        ),
+    ] = None,
+    halves: Annotated[
+        str | None,
+        typer.Option(
+            help="What differs in the names of dual-pixel halves, such as _l,_r; their mean is "
+            "the capture.",
+            metavar="LEFT,RIGHT",
+        ),
+    ] = None,
+    noise: Annotated[
+        str | None,
+        typer.Option(
+            help="Shot noise and read variance of linear light (white 1), such as 5e-5,1e-8; "
+            "default: stated or measured.",
+            metavar="SHOT,READ_VARIANCE",
+        ),
+    ] = None,
+    iso: Annotated[
+        float | None,
+        typer.Option(help="ISO for the bundle's noise model; default: the file's."),
+    ] = None,
     depth_m: DepthM = None,
     method: Annotated[
         str | None,
@@ -179,8 +207,10 @@ def process(
     from camkit.cli.use.cluster import cluster_client
     from camkit.cli.use.results import print_result
     from camkit.runtime.batch import process as run
+    from camkit.runtime.files.halves import read_halves
+    from camkit.runtime.files.tone_curve import read_tone
     from camkit.runtime.machine.memory import keep_memory_for_good
-    from camkit.runtime.options import Options, parse_memory, with_choices
+    from camkit.runtime.options import Options, parse_memory, read_noise, with_choices
     from camkit.runtime.unit import read_unit
     from camkit.runtime.write_options import WriteOptions
 
@@ -208,6 +238,10 @@ def process(
         strength=strength,
         max_mem_bytes=None if max_mem is None else parse_memory(max_mem),
         threads=threads,
+        tone=None if tone is None else read_tone(tone),
+        halves=None if halves is None else read_halves(halves),
+        noise=None if noise is None else read_noise(noise),
+        iso=iso,
         unit=None if unit is None else read_unit(unit),
         dtype=dtype,  # type: ignore[arg-type]
         provider=provider,  # type: ignore[arg-type]

@@ -1,11 +1,13 @@
-"""Colour photographs behind a mosaic."""
+"""Photographs: behind a mosaic, or of full planes of colour or of grey."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from camkit.bundle.manifest import Manifest
 from camkit.bundle.reader import Bundle
 from camkit.runtime.capture import Capture, MosaicOptions
+from camkit.runtime.files.halves import mean_of_halves, right_half
 from camkit.runtime.kind import RuntimePart
 from camkit.runtime.options import Options
 from camkit.runtime.raw import read_capture
@@ -15,10 +17,15 @@ if TYPE_CHECKING:
 
 
 def read(
-    file: Path, mosaic: MosaicOptions | None, _manifest: Manifest | None, _options: Options
+    file: Path, mosaic: MosaicOptions | None, manifest: Manifest | None, options: Options
 ) -> Capture:
-    """Read RAW, DNG, EXR, TIFF or PNG."""
-    return read_capture(file, mosaic=mosaic)
+    """Read RAW, DNG, EXR, TIFF, PNG or JPEG; of dual pixels the mean of both halves."""
+    is_grey = manifest is not None and len(manifest.sensor.channels) == 1
+    read_one = partial(read_capture, mosaic=mosaic, tone=options.tone, is_grey=is_grey)
+    if options.halves is None:
+        return read_one(file)
+    other = right_half(file, options.halves)
+    return mean_of_halves(read_one(file), read_one(other), (file.name, other.name))
 
 
 def write(path: Path, simulation: "Simulation", bundle: Bundle) -> None:

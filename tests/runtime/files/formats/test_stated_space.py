@@ -20,6 +20,7 @@ from camkit.runtime.files.formats.color_space import (
 )
 from camkit.runtime.files.formats.icc_profile import PCS_WHITE
 from camkit.runtime.files.picture import read_light, read_picture, read_scene
+from camkit.runtime.files.tone_curve import PictureReading
 from camkit.runtime.output.icc import SRGB_CURVE, _assemble, _curve, _text, _xyz
 from camkit.runtime.raw import read_capture
 from tests.data_folder import data_path
@@ -342,6 +343,6 @@ def test_a_mosaic_is_not_colour_managed(tmp_path, suffix):
 
 def test_codes_that_are_kept_name_the_space(tmp_path):
     path = write(tmp_path / "a.png", COLOURS, profile_of("Adobe RGB"))
-    found = read_picture(path, keep_codes=True)
+    found = read_picture(path, PictureReading(keep_codes=True))
     assert np.array_equal(found.samples, np.moveaxis(COLOURS, -1, 0))
     assert "'Adobe RGB' is not applied" in found.notes[0]

@@ -16,6 +16,7 @@ from camkit.colorimetry import decode_srgb, encode_srgb
 from camkit.errors import DecodeError
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.files.picture import read_mosaic, read_picture, read_scene
+from camkit.runtime.files.tone_curve import PictureReading
 from camkit.runtime.raw import read_capture
 from tests.data_folder import data_path
 from tests.tiff_factory import packed_page, write_tiff
@@ -64,7 +65,7 @@ def test_colour_of_any_type_layout_and_byte_order_is_read(
     path = write(
         tmp_path / "a.tif", stored.astype(np.dtype(dtype).newbyteorder(byteorder)), **options
     )
-    found = read_picture(path, keep_codes=True).samples
+    found = read_picture(path, PictureReading(keep_codes=True)).samples
     assert np.array_equal(found, planes(samples).astype(found.dtype))
     assert found.dtype == (dtype if np.issubdtype(dtype, np.integer) else np.float32)
 
@@ -74,7 +75,7 @@ def test_colour_of_any_type_layout_and_byte_order_is_read(
 def test_min_is_white_is_inverted(tmp_path, dtype, layout):
     grey = (EIGHT if dtype == np.uint8 else DEEP)[..., 0]
     path = write(tmp_path / "a.tif", grey, photometric="miniswhite", **layout)
-    found = read_picture(path, keep_codes=True)
+    found = read_picture(path, PictureReading(keep_codes=True))
     top = np.iinfo(dtype).max
     assert np.array_equal(found.samples, np.stack([top - grey] * 3))
     assert any("MinIsWhite" in note for note in found.notes)
@@ -136,7 +137,7 @@ def test_the_picture_behind_a_thumbnail_is_read(tmp_path, marked, children, bits
     ]
     tags = tags | {274: ("H", 1)} | ({330: ("I", None)} if children else {})
     path = write_tiff(tmp_path / "a.tif", [(small[0] | tags, small[1]), packed_page(samples, bits)])
-    found = read_picture(path, keep_codes=True)
+    found = read_picture(path, PictureReading(keep_codes=True))
     assert np.array_equal(found.samples, planes(samples))
     assert any("page 2 of the TIFF is read" in note for note in found.notes)
 
@@ -186,7 +187,7 @@ def test_palettes_are_looked_up(tmp_path, bits, scale):
     table = RNG.integers(0, 256, (3, 1 << bits), dtype=np.uint16)
     table[0, 0] = 255
     page = packed_page(indices, bits, photometric=3, tags={320: ("H", (table * scale).ravel())})
-    found = read_picture(write_tiff(tmp_path / "a.tif", [page]), keep_codes=True)
+    found = read_picture(write_tiff(tmp_path / "a.tif", [page]), PictureReading(keep_codes=True))
     assert np.array_equal(found.samples, table[:, indices])
 
 
@@ -205,7 +206,7 @@ def test_compressed_files_of_pillow_are_read_or_named(tmp_path, compression, mod
     picture.save(path, compression=compression)
     again = Image.open(path)
     wanted = np.asarray(again if mode == "I;16" else again.convert("RGB"))
-    found = read_picture(path, keep_codes=True).samples
+    found = read_picture(path, PictureReading(keep_codes=True)).samples
     expected = np.stack([wanted] * 3) if mode == "I;16" else planes(wanted)
     tolerance = 3 if compression == "jpeg" else 0
     assert np.abs(found.astype(int) - expected).max() <= tolerance
@@ -220,7 +221,7 @@ def test_alpha_does_not_change_colours(tmp_path):
             photometric="rgb",
             extrasamples=["unassalpha"],
         )
-        found = read_picture(path, keep_codes=True)
+        found = read_picture(path, PictureReading(keep_codes=True))
         assert np.array_equal(found.samples, planes(colours))
         assert "alpha channel dropped" in found.notes
 
@@ -320,9 +321,10 @@ def test_sparse_tiles_are_dark_and_told(tmp_path, bits, photometric):
     tags[339] = ("H", 1)
     path = write_tiff(tmp_path / "a.tif", [(tags, tiles)])
     sparse_tiff(path, 5)
-    found = read_picture(path, keep_codes=True)
+    found = read_picture(path, PictureReading(keep_codes=True))
     assert "1 strips or tiles hold no data: their samples are 0" in found.notes
-    wanted = read_picture(write_tiff(tmp_path / "b.tif", [(tags, tiles)]), keep_codes=True).samples
+    wanted_path = write_tiff(tmp_path / "b.tif", [(tags, tiles)])
+    wanted = read_picture(wanted_path, PictureReading(keep_codes=True)).samples
     hole = np.zeros(wanted.shape[1:], dtype=bool)
     hole[16:32, 16:32] = True
     assert np.array_equal(found.samples[:, ~hole], wanted[:, ~hole])
