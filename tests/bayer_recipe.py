@@ -89,6 +89,23 @@ def recipe(recipe_path):
     return read_recipe(recipe_path)
 
 
+def planes_text(channels="RGB"):
+    """Give the recipe of a camera without a mosaic, whose pictures are developed."""
+    mosaic = [line for line in RECIPE.splitlines() if line.startswith(("cfa", "color_matrix"))]
+    planes = f'type = "planes"\nchannels = {list(channels)}'.replace("'", '"')
+    text = RECIPE.replace(mosaic[0], planes).replace(mosaic[1], "")
+    if len(channels) == 1:
+        text = text.replace("[[0.0, 0.1, 1.0], [0.1, 1.0, 0.1], [1.0, 0.1, 0.0]]", "[[1, 1, 1]]")
+    return text
+
+
+@pytest.fixture(scope="session")
+def planes_recipe(tmp_path_factory):
+    path = tmp_path_factory.mktemp("recipe") / "planes.toml"
+    path.write_text(planes_text(), encoding="utf-8")
+    return read_recipe(path)
+
+
 @pytest.fixture(scope="session")
 def bank(recipe):
     return gaussian_bank(sensor_height_mm=corner_height_mm(recipe), axis_px=0.9, corner_px=1.8)

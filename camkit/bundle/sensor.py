@@ -23,6 +23,7 @@ from camkit.errors import ContractError, UnsupportedError
 from camkit.noise import NoiseModel
 
 RGB: Final = ("R", "G", "B")
+GREY: Final = ("Y",)
 MOSAIC: Final = ("cfa",)
 Side = Annotated[int, Field(gt=0, le=100_000)]
 Row = tuple[float, float, float]

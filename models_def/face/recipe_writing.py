@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from camkit.bundle.sensor import RGB
 from camkit.caller import command_text, option_text
 from camkit.errors import ContractError
 from camkit.field_types import check_fields, checked
@@ -29,8 +30,9 @@ class CameraWords:
     """A camera as people describe it.
 
     Attributes:
-        sensor: WIDTHxHEIGHT@PITCHum or a name; None where a photograph shows it.
-        photo: A RAW file of the camera, whose sensor is taken.
+        sensor: WIDTHxHEIGHT@PITCHum or a name, with :BGGR, :planes or :grey; None where a
+            photograph shows it.
+        photo: A RAW file of the camera, whose sensor is taken, or a developed picture.
         pitch_um: Pixel pitch, where the photograph does not state it.
         f_number: EFL / entrance pupil diameter; None for that of the lens file.
         stop_radius_mm: Of the stop, in place of an F-number.
@@ -85,6 +87,7 @@ class DescribedCamera:
             "f_number": round(abs(data.f_number), 3),
             "focus_mm": self.draft.focus_mm,
             "objects_mm": list(self.draft.objects_mm),
+            "channels": len(sensor.table.get("channels", RGB)),
             "sensor": {k: sensor.table[k] for k in ("width_px", "height_px", "pixel_pitch_um")},
             "defaults": [k for k, source in sensor.sources.items() if source.startswith("default")],
             "notes": list(self.notes),

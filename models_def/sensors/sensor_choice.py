@@ -1,8 +1,9 @@
 """The sensor of a camera by few words: a size and a pitch, a name, or a photograph of it.
 
     "6000x4000@3.9um", "6000x4000@3.9um:BGGR"    what is not said are stated defaults
-    "IMX264", "IMX264:BGGR"                      facts of `named_sensors.toml`, with their source
-    shot.dng                                     what the file says of its sensor
+    "768x512@46.9um:planes", "...:grey"          no mosaic: developed pictures, three colours or one
+    "IMX264", "IMX264:BGGR", "IMX264:grey"       facts of `named_sensors.toml`, with their source
+    shot.dng, shot.jpg                           what the file says of its sensor
 
 The result is the table `[sensor]` of a recipe, and for every key where its value comes from.
 """
@@ -17,6 +18,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from camkit.bundle.sensor import GREY, RGB
 from camkit.caller import option_text
 from camkit.cfa import CFA_PATTERNS, shifted_cfa
 from camkit.errors import ContractError
@@ -30,6 +32,11 @@ WHITE_LEVEL: Final = 4095.0
 WELL_E_PER_UM2: Final = 2000.0
 """Between 900 (machine vision, global shutter) and 3700 (photography)."""
 READ_NOISE_E: Final = 3.0
+PLANES: Final[Mapping[str, tuple[str, ...]]] = {"PLANES": RGB, "GREY": GREY}
+"""Words in place of a pattern -> channels of a sensor without a mosaic."""
+PICTURE_WHITE: Final = 65535.0
+MOST_PICTURE_WELL_E: Final = 200_000.0
+"""Shot noise of so many electrons is what rounding to 8 bits of sRGB leaves, at any level."""
 ISOS: Final = (100, 200, 400, 800, 1600, 3200, 6400)
 COLOR_MATRIX: Final = (
     (0.6640, -0.1847, -0.0503),
@@ -90,7 +97,8 @@ def choose_sensor(text: str) -> SensorChoice:
         names = ", ".join(entry["name"] for entry in named.values())
         raise ContractError(
             f"{option_text('sensor')} takes WIDTHxHEIGHT@PITCHum, such as 6000x4000@3.9um (with "
-            f"or without :BGGR for another pattern), or one of {names}; got {text!r}"
+            "or without :BGGR for another pattern, :planes for developed pictures, :grey), or one "
+            f"of {names}; got {text!r}"
         )
     source = f"{facts.pop('name')}: {facts.pop('source')}"
     sources = dict.fromkeys(facts, source)
@@ -100,35 +108,35 @@ def choose_sensor(text: str) -> SensorChoice:
 
 
 def sensor_of(capture: Capture, pitch_um: float | None = None) -> SensorChoice:
-    """Return the sensor that a photograph was taken with.
+    """Return the sensor that a photograph was taken with; of a developed one its size alone.
 
     Args:
-        capture: Of a mosaic.
+        capture: Of a mosaic, or of three colours.
         pitch_um: Of the pixels; None for what the file states.
 
     Raises:
-        ContractError: If it has no mosaic, or nobody states the pitch.
+        ContractError: If nobody states the pitch.
     """
-    if capture.cfa is None:
-        raise ContractError(
-            f"the sensor is read from a RAW file with a mosaic; describe it by "
-            f"{option_text('sensor')}"
-        )
     pitch = capture.pixel_pitch_um if pitch_um is None else pitch_um
     if pitch is None:
         raise ContractError(
             f"the file states no pixel pitch; state it by {option_text('pitch_um')}"
         )
-    height, width = capture.samples.shape
+    height, width = capture.samples.shape[-2:]
     width, height = capture.sensor_size_px or (width, height)
     facts: dict[str, Any] = {
         "width_px": width,
         "height_px": height,
         "pixel_pitch_um": float(pitch),
-        "cfa": shifted_cfa(capture.cfa, capture.origin_px or (0, 0)),
-        "black_level": round(float(np.mean(capture.black_level)), 4),
-        "white_level": float(capture.white_level),
     }
+    if capture.cfa is None:
+        facts["cfa"] = "PLANES"
+    else:
+        facts |= {
+            "cfa": shifted_cfa(capture.cfa, capture.origin_px or (0, 0)),
+            "black_level": round(float(np.mean(capture.black_level)), 4),
+            "white_level": float(capture.white_level),
+        }
     if capture.color_matrix is not None:
         facts["color_matrix"] = tuple(map(tuple, np.round(capture.color_matrix, 5).tolist()))
     if capture.noise is not None and capture.iso is not None:
@@ -150,18 +158,17 @@ def named_sensors() -> Mapping[str, Mapping[str, Any]]:
 
 def _completed(facts: dict[str, Any], sources: dict[str, str]) -> SensorChoice:
     """Return a sensor with defaults where nothing is known."""
-    if facts["cfa"] not in CFA_PATTERNS:
+    channels = PLANES.get(facts["cfa"])
+    if channels is None and facts["cfa"] not in CFA_PATTERNS:
         raise ContractError(
-            f"the pattern of a sensor is one of {', '.join(CFA_PATTERNS)}; got {facts['cfa']!r}"
+            f"the pattern of a sensor is one of {', '.join((*CFA_PATTERNS, *PLANES))}; got "
+            f"{facts['cfa']!r}"
         )
-    pitch = facts["pixel_pitch_um"]
-    usual = {
-        "black_level": (BLACK_LEVEL, DEFAULT),
-        "white_level": (WHITE_LEVEL, DEFAULT),
-        "full_well_e": (WELL_E_PER_UM2 * pitch**2, f"default: {WELL_E_PER_UM2:g} a square um"),
-        "read_noise_e": (READ_NOISE_E, DEFAULT),
-        "color_matrix": (COLOR_MATRIX, MATRIX_SOURCE),
-    }
+    usual = _usual(facts["pixel_pitch_um"], is_mosaic=channels is None)
+    if channels is not None:
+        facts = {"type": "planes", "channels": channels, **facts}
+        sources["channels"] = sources.pop("cfa")
+        del facts["cfa"]
     for key, (value, source) in usual.items():
         if key not in facts:
             facts[key], sources[key] = value, source
@@ -172,7 +179,8 @@ def _completed(facts: dict[str, Any], sources: dict[str, str]) -> SensorChoice:
     )
     span = facts["white_level"] - facts["black_level"]
     facts["full_well_e"] = float(f"{facts['full_well_e']:.6g}")
-    facts["illuminant"] = "D65"
+    if channels is None:
+        facts["illuminant"] = "D65"
     facts["noise"] = [
         {
             "iso": float(iso),
@@ -184,12 +192,35 @@ def _completed(facts: dict[str, Any], sources: dict[str, str]) -> SensorChoice:
     sharpness = 4 * np.log(2) / WIDTH_UM**2
     waves = np.array(WAVELENGTHS_UM)
     response = np.exp(-sharpness * np.square(waves - np.array(PEAKS_UM)[:, None]))
+    if channels == GREY:
+        response = response.sum(axis=0, keepdims=True)
     return SensorChoice(
         table=facts,
         response={
             "wavelengths_um": WAVELENGTHS_UM,
             "response": tuple(map(tuple, np.round(response, 4).tolist())),
-            "source": RESPONSE_SOURCE,
+            "source": f"{RESPONSE_SOURCE}{', summed' if channels == GREY else ''}",
         },
         sources=sources,
     )
+
+
+def _usual(pitch_um: float, *, is_mosaic: bool) -> dict[str, tuple[Any, str]]:
+    """Return the values of keys that nobody states, and where they come from."""
+    well_e, well_text = WELL_E_PER_UM2 * pitch_um**2, f"default: {WELL_E_PER_UM2:g} a square um"
+    usual: dict[str, tuple[Any, str]] = {"read_noise_e": (READ_NOISE_E, DEFAULT)}
+    if is_mosaic:
+        return usual | {
+            "black_level": (BLACK_LEVEL, DEFAULT),
+            "white_level": (WHITE_LEVEL, DEFAULT),
+            "full_well_e": (well_e, well_text),
+            "color_matrix": (COLOR_MATRIX, MATRIX_SOURCE),
+        }
+    if well_e > MOST_PICTURE_WELL_E:
+        well_e = MOST_PICTURE_WELL_E
+        well_text = f"default: noise of {well_e:,.0f} electrons is that of rounding to 8 bits"
+    return usual | {
+        "black_level": (0.0, "default: light of developed pictures"),
+        "white_level": (PICTURE_WHITE, DEFAULT),
+        "full_well_e": (well_e, well_text),
+    }

@@ -14,7 +14,15 @@ from typing import Any, Final, TypeVar
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
-from camkit.bundle.sensor import BayerSensor, Sensor, nested_sensor
+from camkit.bundle.sensor import (
+    GREY,
+    RGB,
+    BayerSensor,
+    ColorSensor,
+    PlanesSensor,
+    Sensor,
+    nested_sensor,
+)
 from camkit.errors import ContractError
 from camkit.models_def.toml_table import Faults, check_keys, section, typed
 
@@ -32,6 +40,7 @@ _FLAT: Final = ("bayer", "planes", "spad", "extent")
 """Parts of the place of an error that a recipe does not spell out."""
 
 M = TypeVar("M", bound=BaseModel)
+_S = TypeVar("_S", bound=ColorSensor)
 
 
 def check_share(where: str, value: float) -> None:
@@ -326,6 +335,27 @@ def mosaic_sensor(sensor: Sensor) -> BayerSensor:
     """
     if not isinstance(sensor, BayerSensor):
         raise ContractError("this kind of camera has a Bayer mosaic; sensor.cfa is missing")
+    return _known_sensor(sensor)
+
+
+def picture_sensor(sensor: Sensor) -> ColorSensor:
+    """Return a sensor with a mosaic, or with full planes: R, G, B or one of grey.
+
+    Raises:
+        ContractError: If it is another, or its size or response is not stated.
+    """
+    if isinstance(sensor, BayerSensor):
+        return _known_sensor(sensor)
+    if not isinstance(sensor, PlanesSensor) or sensor.channels not in (RGB, GREY):
+        raise ContractError(
+            "this kind of camera has a Bayer mosaic (sensor.cfa), or planes with the channels "
+            'R, G, B or Y alone (sensor.type = "planes", sensor.channels)'
+        )
+    return _known_sensor(sensor)
+
+
+def _known_sensor(sensor: _S) -> _S:
+    """Refuse a sensor whose size or response is not stated."""
     if sensor.extent is None or sensor.channel_response is None:
         raise ContractError("sensor needs width_px, height_px, pixel_pitch_um, channel_response")
     return sensor

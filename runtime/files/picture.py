@@ -92,9 +92,7 @@ def read_picture(path: Path, reading: PictureReading = AS_STATED) -> Capture:
     )
 
 
-def _light(
-    decoded: Decoded, reading: PictureReading
-) -> tuple[NDArray[Any], float, list[str]]:
+def _light(decoded: Decoded, reading: PictureReading) -> tuple[NDArray[Any], float, list[str]]:
     """Return samples of light or kept codes, their white level, and notes on what they mean."""
     samples, tone, is_eight = decoded.samples, reading.tone, 0 < decoded.top <= _MOST_EIGHT
     if is_eight and reading.keep_codes:
@@ -217,8 +215,10 @@ def _notes_on_tone(decoded: Decoded, tone: Tone) -> list[str]:
     space = decoded.space
     if space is None or (decoded.top and space.means(tone.space)):
         return []
-    return [f"the file states the colour space {space.name!r}, in place of which codes are read "
-            f"by the tone curve {tone.name}"]
+    return [
+        f"the file states the colour space {space.name!r}, in place of which codes are read "
+        f"by the tone curve {tone.name}"
+    ]
 
 
 def _notes_on_floats(decoded: Decoded) -> list[str]:

@@ -85,6 +85,8 @@ def _write_picture(
         orientation=1 if write.format == "dng" else work.capture.orientation,
         tone="linear" if write.linear else "srgb",
         jpeg_quality=write.quality,
+        # a DNG of one channel holds three that are equal
+        is_grey=len(work.white_balance) == 1 and write.format != "dng",
         origin=work.origin.stripped() if write.strip_metadata else work.origin,
     )
     seconds, preview = 0.0, None

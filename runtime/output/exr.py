@@ -24,11 +24,12 @@ _log = logging.getLogger(__name__)
 
 
 class ExrWriter(PictureWriter):
-    """Writes linear RGB with chromaticities and white luminance; PIZ for half, ZIP for float."""
+    """Writes linear RGB or Y with chromaticities and white luminance; PIZ for half, ZIP for float."""
 
     def __init__(self, path: Path, picture: PictureFormat) -> None:
         super().__init__(path, picture)
         self.is_half = not picture.full_float
+        self._names = "Y" if picture.is_grey else "RGB"
         self._stored = 0
         self._file = self._open()
 
@@ -44,7 +45,7 @@ class ExrWriter(PictureWriter):
             self._promote()
         samples = rows.astype(np.float16 if self.is_half else np.float32, copy=False)
         planes = (np.ascontiguousarray(plane) for plane in samples)
-        self._file.writePixels(dict(zip("RGB", planes, strict=True)), rows.shape[1])
+        self._file.writePixels(dict(zip(self._names, planes, strict=True)), rows.shape[1])
         self._stored += rows.shape[1]
 
     def finish(self) -> None:
@@ -65,7 +66,7 @@ class ExrWriter(PictureWriter):
         kind = Imath.PixelType.HALF if self.is_half else Imath.PixelType.FLOAT
         packing = "PIZ_COMPRESSION" if self.is_half else "ZIP_COMPRESSION"
         header["compression"] = Imath.Compression(getattr(Imath.Compression, packing))
-        header["channels"] = {c: Imath.Channel(Imath.PixelType(kind)) for c in "RGB"}
+        header["channels"] = {c: Imath.Channel(Imath.PixelType(kind)) for c in self._names}
         point = Imath.point(0.0, 0.0)
         self._place(header)
         header["chromaticities"] = Imath.Chromaticities(point, point, point, point)
@@ -94,7 +95,7 @@ class ExrWriter(PictureWriter):
         filler = np.zeros((COPY_ROWS, width), dtype=np.float16)
         for top in range(row_count, height, COPY_ROWS):
             rows = min(COPY_ROWS, height - top)
-            self._file.writePixels(dict.fromkeys("RGB", filler[:rows]), rows)
+            self._file.writePixels(dict.fromkeys(self._names, filler[:rows]), rows)
         self._file.close()
         draft = self.path.with_name(f"{self.path.stem}-half{self.path.suffix}")
         self.path.replace(draft)
@@ -113,9 +114,10 @@ class ExrWriter(PictureWriter):
         for top in range(0, count, COPY_ROWS):
             bottom = min(top + COPY_ROWS, count)
             planes = [
-                np.frombuffer(source.channel(c, kind, top, bottom - 1), np.float32) for c in "RGB"
+                np.frombuffer(source.channel(c, kind, top, bottom - 1), np.float32)
+                for c in self._names
             ]
-            self.store(np.stack(planes).reshape(3, bottom - top, width))
+            self.store(np.stack(planes).reshape(-1, bottom - top, width))
         source.close()
 
 

@@ -25,15 +25,18 @@ SRGB_CURVE: Final = (2.4, 1 / 1.055, 0.055 / 1.055, 1 / 12.92, 0.04045)
 SPACE_TITLES: Final = {"rec709": "Rec.709", "acescg": "ACEScg", "camera": "camera"}
 
 
-def icc_profile(stage: ColorStage, *, tone: str) -> bytes:
+def icc_profile(stage: ColorStage, *, tone: str, is_grey: bool = False) -> bytes:
     """Return the profile of pictures in an output space.
 
     Args:
         stage: Colour stage; its primaries and white define the colorants.
         tone: "srgb" for the sRGB curve, anything else for linear.
+        is_grey: Whether they have one channel, to which the curve alone applies.
     """
     is_srgb = stage.space == "rec709" and tone == "srgb"
     curve = "sRGB tone" if tone == "srgb" else "linear"
+    if is_grey:
+        return _grey_profile(f"grey {curve} (camkit)", tone == "srgb")
     title = "sRGB (camkit)" if is_srgb else f"{SPACE_TITLES[stage.space]} {curve} (camkit)"
     return _profile(title, (*stage.primaries, stage.white), tone == "srgb")
 
@@ -59,7 +62,18 @@ def _profile(title: str, points: tuple[tuple[float, float], ...], is_srgb_tone: 
     return _assemble(tags)
 
 
-def _assemble(tags: list[tuple[bytes, bytes]]) -> bytes:
+@cache
+def _grey_profile(title: str, is_srgb_tone: bool) -> bytes:
+    tags = [
+        (b"desc", _text(title)),
+        (b"cprt", _text(COPYRIGHT)),
+        (b"wtpt", _xyz(PCS_XYZ)),
+        (b"kTRC", _curve(SRGB_CURVE) if is_srgb_tone else _curve((1.0,))),
+    ]
+    return _assemble(tags, space=b"GRAY")
+
+
+def _assemble(tags: list[tuple[bytes, bytes]], *, space: bytes = b"RGB ") -> bytes:
     start = HEADER_BYTES + 4 + 12 * len(tags)
     table, data = struct.pack(">I", len(tags)), b""
     offsets: dict[bytes, int] = {}
@@ -74,7 +88,7 @@ def _assemble(tags: list[tuple[bytes, bytes]]) -> bytes:
         start + len(data),
         VERSION_4_3,
         b"mntr",
-        b"RGB ",
+        space,
         b"XYZ ",
         *CREATED,
         b"acsp",

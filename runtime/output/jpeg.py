@@ -27,7 +27,7 @@ MAX_SIDE_PX: Final = 65500
 def encode_jpeg(
     picture: Image.Image, *, quality: int, icc: bytes = b"", exif: bytes = b""
 ) -> bytes:
-    """Encode an RGB picture.
+    """Encode an RGB or grey picture.
 
     Args:
         picture: 8 bits per channel.
@@ -63,17 +63,18 @@ class JpegWriter(PictureWriter):
                 f"a JPEG has sides of at most {MAX_SIDE_PX} px; got {width}x{height}; "
                 f"choose {option_text('format')} png or tiff"
             )
-        self._image = Image.new("RGB", (width, height))
+        self._image = Image.new("L" if picture.is_grey else "RGB", (width, height))
         self._stored = 0
 
     def encode(self, band: FloatArray) -> Codes:
-        """Return the band as (3, rows, w) uint8 codes."""
+        """Return the band as uint8 codes."""
         return encode_uint8(band, tone=self.picture.tone)
 
     def store(self, rows: Codes) -> None:
         """Store rows, interleaved."""
         interleaved = np.ascontiguousarray(rows.transpose(1, 2, 0))
-        self._image.paste(Image.fromarray(interleaved), (0, self._stored))
+        pixels = interleaved[..., 0] if self.picture.is_grey else interleaved
+        self._image.paste(Image.fromarray(pixels), (0, self._stored))
         self._stored += rows.shape[1]
 
     def finish(self) -> None:
@@ -81,7 +82,9 @@ class JpegWriter(PictureWriter):
         coded = encode_jpeg(
             self._image,
             quality=self.picture.jpeg_quality,
-            icc=icc_profile(self.picture.color, tone=self.picture.tone),
+            icc=icc_profile(
+                self.picture.color, tone=self.picture.tone, is_grey=self.picture.is_grey
+            ),
             exif=self._exif(),
         )
         self.path.write_bytes(coded)
@@ -91,12 +94,13 @@ class JpegWriter(PictureWriter):
 
     def _exif(self) -> bytes:
         width, height = self.picture.file_size
+        components = bytes((1, 0, 0, 0) if self.picture.is_grey else (1, 2, 3, 0))
         return exif_block(
             self.picture.origin.metadata,
             main={531: (Kind.SHORT, 1)},  # YCbCrPositioning: centred
             exif={
                 **color_tags(self.picture),
-                37121: (Kind.UNDEFINED, bytes((1, 2, 3, 0))),  # ComponentsConfiguration: YCbCr
+                37121: (Kind.UNDEFINED, components),  # ComponentsConfiguration: Y, or YCbCr
                 40962: (Kind.LONG, width),  # PixelXDimension
                 40963: (Kind.LONG, height),  # PixelYDimension
             },

@@ -39,6 +39,7 @@ class PictureFormat:
         tone: Curve of TIFF, PNG and JPEG.
         jpeg_quality: Of JPEG, 1..100.
         full_float: EXR in 32 bits, whatever its values.
+        is_grey: Whether the file holds one channel, the first of three that are equal.
         origin: Where the picture comes from.
     """
 
@@ -49,6 +50,7 @@ class PictureFormat:
     tone: Tone = "srgb"
     jpeg_quality: int = DEFAULT_JPEG_QUALITY
     full_float: bool = False
+    is_grey: bool = False
     origin: Origin = field(default_factory=Origin)
 
     def __post_init__(self) -> None:
@@ -58,6 +60,11 @@ class PictureFormat:
             raise ContractError(f"EXIF orientation must be 1..8; got {self.orientation}")
         if not 1 <= self.jpeg_quality <= 100:
             raise ContractError(f"JPEG quality must be 1..100; got {self.jpeg_quality}")
+
+    @property
+    def channels(self) -> int:
+        """Return the number of channels of the file."""
+        return 1 if self.is_grey else 3
 
     @property
     def file_size(self) -> tuple[int, int]:
@@ -81,11 +88,11 @@ class PictureWriter(ABC):
 
     @abstractmethod
     def encode(self, band: FloatArray) -> Codes:
-        """Return the band as the file holds it: (3, rows, w)."""
+        """Return the band as the file holds it: (channel, rows, w)."""
 
     @abstractmethod
     def store(self, rows: Codes) -> None:
-        """Append coded (3, rows, w) in file orientation."""
+        """Append coded (channel, rows, w) in file orientation."""
 
     @abstractmethod
     def finish(self) -> None:
@@ -143,7 +150,7 @@ class PictureWriter(ABC):
         self._check(band)
         top = self._rows
         self._rows += band.shape[1]
-        coded = self.encode(band)
+        coded = self.encode(band[: self.picture.channels])
         if self.picture.orientation == UPRIGHT:
             self.store(coded)
         else:
@@ -153,7 +160,7 @@ class PictureWriter(ABC):
         """Copy rows to their place in the picture as it will be turned."""
         width, height = self.picture.file_size
         if self._turned is None:
-            self._turned = np.empty((3, height, width), dtype=coded.dtype)
+            self._turned = np.empty((len(coded), height, width), dtype=coded.dtype)
         elif not np.can_cast(coded.dtype, self._turned.dtype):
             self._turned = self._turned.astype(coded.dtype)  # EXR beyond the range of half
         stored = turn_back(self._turned, self.picture.orientation)

@@ -19,6 +19,7 @@ from camkit.runtime.output.icc import icc_profile
 from camkit.runtime.output.picture_writer import Codes, PictureFormat, PictureWriter
 
 SIGNATURE: Final = b"\x89PNG\r\n\x1a\n"
+GREY: Final = 0
 RGB_COLOR: Final = 2
 UP_FILTER: Final = 2
 # Level 1 with the up filter: a quarter of the time of level 6 for a few percent of size.
@@ -26,25 +27,26 @@ ZLIB_LEVEL: Final = 1
 
 
 class PngWriter(PictureWriter):
-    """Writes RGB of 8 or 16 bits; every row is stored as its difference to the row above."""
+    """Writes RGB or grey of 8 or 16 bits; every row is stored as its difference to the row above."""
 
     def __init__(self, path: Path, picture: PictureFormat, *, bits: int = 16) -> None:
         super().__init__(path, picture)
         self._bits = bits
         width, height = picture.file_size
-        self._last_line = np.zeros(width * 3 * bits // 8, dtype=np.uint8)
+        self._last_line = np.zeros(width * picture.channels * bits // 8, dtype=np.uint8)
         self._packer = zlib.compressobj(ZLIB_LEVEL)
         self._file = path.open("wb")
         self._file.write(SIGNATURE)
-        self._chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, RGB_COLOR, 0, 0, 0))
-        profile = icc_profile(picture.color, tone=picture.tone)
+        color = GREY if picture.is_grey else RGB_COLOR
+        self._chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, color, 0, 0, 0))
+        profile = icc_profile(picture.color, tone=picture.tone, is_grey=picture.is_grey)
         self._chunk(b"iCCP", b"camkit\0\0" + zlib.compress(profile, 9))
         exif = exif_block(picture.origin.metadata, main=NOTHING, exif=color_tags(picture))
         if exif:
             self._chunk(b"eXIf", exif)
 
     def encode(self, band: FloatArray) -> Codes:
-        """Return the band as (3, rows, w) codes."""
+        """Return the band as codes."""
         encode = encode_uint16 if self._bits == 16 else encode_uint8
         return encode(band, tone=self.picture.tone)
 

@@ -16,7 +16,11 @@ SensorText = Annotated[
 ]
 Photo = Annotated[
     Path | None,
-    typer.Option("--from", help="RAW file of the camera, whose sensor is taken.", metavar="FILE"),
+    typer.Option(
+        "--from",
+        help="RAW file of the camera, whose sensor is taken, or a developed picture.",
+        metavar="FILE",
+    ),
 ]
 PitchUm = Annotated[
     float | None, typer.Option(help="Pixel pitch in um, where the RAW file does not state it.")

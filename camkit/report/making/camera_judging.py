@@ -22,6 +22,7 @@ from camkit.report.sensor_geometry import in_sensor_geometry
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.plan.decision import DEVELOP
+from camkit.runtime.twin.light import stated_balance
 from camkit.scenes.procedural import procedural_scene
 
 FILTER: Final = "wiener"
@@ -92,11 +93,10 @@ def restored_by(pipeline: Pipeline, exposed: Exposed) -> FloatArray:
     """Return what a pipeline makes of a capture: (3, h, w) linear Rec.709."""
     simulation = exposed.simulation
     x, y = (int(v) for v in simulation.window.origin_px)
-    red, green, blue = simulation.white_balance
     capture = pipeline.capture_of(
         simulation.samples,
         iso=simulation.iso,
-        white_balance=(red, green, blue),
+        white_balance=stated_balance(simulation.white_balance),
         origin_px=(x, y),
     )
     return pipeline.start(capture).fill()

@@ -138,10 +138,13 @@ class _Making:
             self._tell(f"kernels of {frozen['side_px']} px hold {frozen['energy_kept']:.1%}")
         work.step("filtered", steps.export_filter)
         self._ship(FILTER_BUNDLE, "its filter restores, usable now")
-        if self._left_s() > LEAST_FIT_S or work.is_done("fitted"):
+        is_grey = facts["channels"] == 1
+        if not is_grey and (self._left_s() > LEAST_FIT_S or work.is_done("fitted")):
             fitted = work.step("fitted", steps.fit_bank)
             self._ship(FILTER_BUNDLE, f"colours restored together: {fitted['gain_db']:+.2f} dB")
-        judged = self._with_network()
+        if is_grey and self._wish.minutes:
+            self._tell("networks are trained on three colours; a grey camera has its filter alone")
+        judged = self._judged(FILTER_BUNDLE) if is_grey else self._with_network()
         bundle = open_bundle(self._out)
         page = self._out.with_suffix(PAGE_SUFFIX)
         write_together({page: self._page(bundle, judged).encode()})

@@ -1,4 +1,4 @@
-"""A colour camera behind a mosaic: its lens photographed through, its Wiener bank in front.
+"""A camera for photographs, behind a mosaic or of planes: its lens, its Wiener bank in front.
 
 scene_light            a display that shows scenes; daylight and lights beyond white
 recipe                 what a person edits beside the common tables

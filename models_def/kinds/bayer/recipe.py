@@ -1,4 +1,7 @@
-"""Recipes of cameras behind a mosaic: a lens, its light, a Wiener bank, and fine-tuning."""
+"""Recipes of cameras for photographs: a lens, its light, a Wiener bank, and fine-tuning.
+
+The sensor has a mosaic, or gives planes: three colours, as developed pictures have, or grey.
+"""
 
 import math
 from collections.abc import Mapping
@@ -10,7 +13,7 @@ import numpy as np
 
 from camkit.arrays import FloatArray
 from camkit.bundle.light_bound import LightBound
-from camkit.bundle.sensor import BayerSensor
+from camkit.bundle.sensor import ColorSensor
 from camkit.bundle.stages import Dehaze, Together, Wiener
 from camkit.bundle.stages.network import DEFAULT_ROLE
 from camkit.calibration.measured import WAVELENGTHS_UM
@@ -26,8 +29,8 @@ from camkit.models_def.training.recipe import (
     check_share,
     common_tables,
     model,
-    mosaic_sensor,
     own_schedule,
+    picture_sensor,
     with_new_names,
 )
 
@@ -311,10 +314,10 @@ class FineTuningRecipe:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BayerRecipe(Recipe):
-    """A camera behind a mosaic and how its networks are trained.
+    """A camera for photographs and how its networks are trained.
 
     Attributes:
-        sensor: With a mosaic, a size and the response of its colours.
+        sensor: With a mosaic or with planes, a size and the response of its colours.
         data: How samples are made.
         object_distance_mm: Distance the lens is focused on; inf is allowed.
         scale: Divisor of the stabilised planes, see the manifest.
@@ -326,7 +329,7 @@ class BayerRecipe(Recipe):
         frames: Of a lens with a haze, whose samples are cut from whole frames.
     """
 
-    sensor: BayerSensor
+    sensor: ColorSensor
     data: BayerDataRecipe
     object_distance_mm: float
     scale: float
@@ -338,6 +341,11 @@ class BayerRecipe(Recipe):
     frames: FramesRecipe = field(default_factory=FramesRecipe)
 
     def __post_init__(self) -> None:
+        if self.sensor.cfa is None and (self.haze is not None or self.wiener.mosaic is not None):
+            raise ContractError(
+                "a sensor of planes has no mosaic, which [haze] and wiener.mosaic need; leave them "
+                "out"
+            )
         if self.haze is not None and self.wiener.mosaic is not None:
             raise ContractError(
                 "the tiles of a lens with a haze do not tell where their mosaic begins; leave "
@@ -408,13 +416,14 @@ def to_bayer_recipe(table: Mapping[str, Any]) -> BayerRecipe:
     """Convert a parsed TOML table to a recipe.
 
     Raises:
-        ContractError: If keys are unknown, missing or wrong, all of which are named, the sensor has
-            no mosaic, or there are frames without a haze.
+        ContractError: If keys are unknown, missing or wrong, all of which are named, the sensor is
+            of another kind, or there are frames without a haze.
     """
     table = _with_measured_response(with_new_names(table, _OLDER))
     faults = Faults()
     common = faults.read(common_tables, table, kind_keys=OWN_KEYS, roles=ROLES)
     faults.read(_check_frames, table)
+    faults.read(_check_pattern, table)
     distance_mm = faults.read(typed, "object_distance_mm", table.get("object_distance_mm"), float)
     parts = {
         "scale": faults.read(typed, "scale", table.get("scale", 64.0), float),
@@ -430,11 +439,19 @@ def to_bayer_recipe(table: Mapping[str, Any]) -> BayerRecipe:
     return BayerRecipe(
         name=common.name,
         kind=common.kind,
-        sensor=mosaic_sensor(common.sensor),
+        sensor=picture_sensor(common.sensor),
         networks=common.networks,
         object_distance_mm=distance_mm,
         **parts,
     )
+
+
+def _check_pattern(table: Mapping[str, Any]) -> None:
+    sensor = table.get("sensor")
+    if isinstance(sensor, Mapping) and not {"cfa", "type"} & sensor.keys():
+        raise ContractError(
+            'sensor.cfa is missing; a sensor without a mosaic states type = "planes"'
+        )
 
 
 def _check_frames(table: Mapping[str, Any]) -> None:

@@ -94,7 +94,7 @@ def recipe_text(draft: RecipeDraft) -> str:
         *table_lines("wiener", Wiener, bank, without=_STAGE_KEYS),
         *table_lines("light", LightBound, {"spread": 0.2, "keeps_bright": True}),
         *table_lines("lens", LensRecipe, lens, without=("psf", "uncertainty")),
-        *table_lines("data", BayerDataRecipe, {**DATA, **_of_blocks(block_px, overlap_px)}),
+        *table_lines("data", BayerDataRecipe, _data_of(draft.sensor, block_px, overlap_px)),
         *table_lines("schedule", ScheduleRecipe, SCHEDULE),
     ]
     for size, (network, overshoot) in NETWORKS.items():
@@ -108,9 +108,15 @@ def recipe_text(draft: RecipeDraft) -> str:
     return "\n".join(lines)
 
 
-def _of_blocks(block_px: int, overlap_px: int) -> dict[str, Any]:
-    """Return what samples take from the bank: half its overlap, half the way between blocks."""
-    return {"margin_px": overlap_px // 2, "block_jitter_px": (block_px - overlap_px) / 2}
+def _data_of(sensor: SensorChoice, block_px: int, overlap_px: int) -> dict[str, Any]:
+    """Return the settings of samples.
+
+    From the bank they take half its overlap, and half the way between blocks. Developed pictures
+    are white-balanced already.
+    """
+    balanced = {} if "cfa" in sensor.table else {"light_share": 0.0}
+    blocks = {"margin_px": overlap_px // 2, "block_jitter_px": (block_px - overlap_px) / 2}
+    return {**DATA, **balanced, **blocks}
 
 
 def _sensor_lines(sensor: SensorChoice) -> list[str]:

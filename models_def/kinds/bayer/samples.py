@@ -20,7 +20,6 @@ from camkit.arrays import FloatArray
 from camkit.bundle.facts import Port
 from camkit.bundle.light_bound import BRIGHT
 from camkit.bundle.stages import Wiener
-from camkit.colorimetry import camera_from_rec709
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.psf_bank import PsfBank
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
@@ -34,6 +33,7 @@ from camkit.noise import NoiseModel
 from camkit.runtime.bank.blocks import Block, taper_edges
 from camkit.runtime.bank.blocks import to_otf as to_runtime_otf
 from camkit.runtime.bank.wiener import wiener_filter
+from camkit.runtime.twin.light import camera_space
 from camkit.units import MM_PER_M
 
 CLIPPED_REACH_PX: Final = 4
@@ -255,7 +255,7 @@ def _draw_light(
         red, blue = np.exp(rng.uniform(0, np.log(MOST_GAIN), 2))
         gains = (float(red), 1.0, float(blue))
     elif kind == 2:  # raw values of a grey are about equal
-        _, balance = camera_from_rec709(np.array(recipe.sensor.color_matrix))
+        _, balance = camera_space(recipe.sensor)
         cast = _peak_one(np.array(balance) * np.exp(rng.normal(0, 0.1, 3)))
     if kind in (1, 3):
         cast = _peak_one(np.exp(rng.uniform(np.log(LEAST_CAST), 0, 3)))
@@ -329,7 +329,7 @@ def photograph(
     if not crop.shape == truth.shape == (3, side, side):
         raise ContractError(f"a crop must be (3, {side}, {side}); got {crop.shape}")
     sensor, data = recipe.sensor, recipe.data
-    matrix, balance = camera_from_rec709(np.array(sensor.color_matrix))
+    matrix, balance = camera_space(sensor)
     gains = balance if exposure.gains is None else exposure.gains
     illumination = float(bank.illumination_at(exposure.x_mm, exposure.y_mm))
     cast = np.array(exposure.cast)[:, None]
@@ -369,8 +369,13 @@ def photograph(
     )
 
 
-def _red_of(recipe: BayerRecipe, borders: Sides) -> tuple[int, int]:
-    """Return (row, column) of red in the first cell of planes that borders may be mirrored in."""
+def _red_of(recipe: BayerRecipe, borders: Sides) -> tuple[int, int] | None:
+    """Return (row, column) of red in the first cell of planes that borders may be mirrored in.
+
+    None of a sensor without a mosaic.
+    """
+    if recipe.sensor.cfa is None:
+        return None
     row, column = divmod(recipe.sensor.cfa.index("R"), 2)
     beyond_px = [recipe.data.margin_px if borders[side] else 0 for side in (0, 2)]
     return (row + beyond_px[0]) % 2, (column + beyond_px[1]) % 2
@@ -496,14 +501,21 @@ def _planes(
 ) -> tuple[Tensor, Tensor]:
     """White-balance and demosaic; return (1, 3, h, w) planes and (1, 1, h, w) clipped pixels.
 
+    Planes are white-balanced alone.
+
     Where the picture ends, what lies beyond is cut before the demosaic and mirrored afterwards.
     """
     cfa = recipe.sensor.cfa
     top, bottom, left, right = (recipe.data.margin_px if side else 0 for side in borders)
-    height, width = capture.shape
-    inside = np.s_[top : height - bottom, left : width - right]
-    planes = developed(np.ascontiguousarray(capture[inside]), gains, cfa)
-    unknown = torch.from_numpy(np.ascontiguousarray(saturated[inside]))[None, None].float()
+    height, width = capture.shape[-2:]
+    inside = np.s_[..., top : height - bottom, left : width - right]
+    samples, clipped = (np.ascontiguousarray(array[inside]) for array in (capture, saturated))
+    if cfa is None:
+        planes = torch.from_numpy(samples)[None] * torch.tensor(gains).reshape(1, -1, 1, 1)
+        clipped = clipped.any(axis=0)
+    else:
+        planes = developed(samples, gains, cfa)
+    unknown = torch.from_numpy(clipped)[None, None].float()
     if any(borders):
         outside = (left, right, top, bottom)
         planes = torch.nn.functional.pad(planes, outside, mode="reflect")

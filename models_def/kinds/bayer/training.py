@@ -1,4 +1,4 @@
-"""A camera behind a mosaic as training sees it."""
+"""A camera for photographs as training sees it."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -7,6 +7,7 @@ from typing import Any, Final
 import numpy as np
 from torch import nn
 
+from camkit.bundle.chain import rewired
 from camkit.bundle.stages import (
     Color,
     Demosaic,
@@ -100,18 +101,22 @@ class BayerTraining:
         )
         hazy = () if recipe.haze is None else (recipe.haze,)
         restoring: tuple[Stage, ...] = (*hazy, wiener, network)
+        usual = (
+            Linearise(),
+            Repair(),
+            WhiteBalance(),
+            Demosaic(method="fast"),
+            *restoring,
+            RaiseClipped(),
+            Illumination(),
+            Undistort(interpolation="cubic", overshoot="limited"),
+            Color(),
+        )
+        absent = _without_meaning(recipe)
         return Design(
-            stages=(
-                Linearise(),
-                Repair(),
-                WhiteBalance(),
-                Demosaic(method="fast"),
-                *restoring,
-                RaiseClipped(),
-                Illumination(),
-                Undistort(interpolation="cubic", overshoot="limited"),
-                Color(),
-            ),
+            stages=rewired([stage for stage in usual if not isinstance(stage, absent)], usual)
+            if absent
+            else usual,
             object_distance_mm=recipe.object_distance_mm,
             fails_on=_fails_on(recipe),
         )
@@ -171,6 +176,14 @@ class BayerTraining:
         else:
             captures = make_validation_captures(recipe, material.bank, pictures)
         return BayerJudge(captures=captures, recipe=recipe)
+
+
+def _without_meaning(recipe: BayerRecipe) -> tuple[type[Stage], ...]:
+    """Return the stages that mean nothing to a sensor of planes."""
+    if recipe.sensor.cfa is not None:
+        return ()
+    is_grey = len(recipe.sensor.channels) == 1
+    return (Demosaic, WhiteBalance, RaiseClipped) if is_grey else (Demosaic,)
 
 
 def _fails_on(recipe: BayerRecipe) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from camkit.arrays import FloatArray
-from camkit.colorimetry import apply_matrix, camera_from_rec709, encode_srgb
+from camkit.colorimetry import apply_matrix, encode_srgb
 from camkit.models_def.kinds.bayer.psf_bank import PsfBank
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.kinds.bayer.samples import (
@@ -27,6 +27,7 @@ from camkit.models_def.kinds.bayer.samples import (
 from camkit.models_def.sensors.stabilise import unstabilise
 from camkit.models_def.training.kind import Restorer, Score, mean_score
 from camkit.models_def.training.pictures import SCENE_SEED, list_pictures, read_picture, to_linear
+from camkit.runtime.twin.light import camera_space
 from camkit.scenes import procedural_scene
 
 FIELD_SHARES: Final = (0.0, 0.3, 0.55, 0.8, 0.98)
@@ -182,7 +183,7 @@ def to_srgb(stable: Tensor, capture: ValidationCapture, recipe: BayerRecipe) -> 
     noise = capture.shot.noise
     shot, read = torch.tensor(noise.shot), torch.tensor(noise.read_variance)
     linear = unstabilise(stable[None].float(), shot, read, scale=recipe.scale)[0]
-    matrix, _ = camera_from_rec709(np.array(recipe.sensor.color_matrix))
+    matrix, _ = camera_space(recipe.sensor)
     even: FloatArray = (linear / capture.shot.illumination).numpy()
     to_rec709 = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
     return encode_srgb(apply_matrix(to_rec709, even))

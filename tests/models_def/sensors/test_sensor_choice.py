@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from camkit.cfa import CFA_PATTERNS
+from camkit.colorimetry import decode_srgb
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.kinds.bayer.recipe_draft import RecipeDraft, recipe_text
@@ -45,6 +46,51 @@ def test_a_pattern_may_be_stated() -> None:
     assert choose_sensor("IMX477").table["cfa"] == "BGGR"
 
 
+@pytest.mark.parametrize(
+    ("kind", "channels"), [("planes", ("R", "G", "B")), ("grey", ("Y",)), ("Grey", ("Y",))]
+)
+def test_a_sensor_may_have_no_mosaic(kind: str, channels: tuple[str, ...]) -> None:
+    choice = choose_sensor(f"768x512@46.875um:{kind}")
+    assert choice.sources["channels"] == "stated"
+    marked = {key for key, source in choice.sources.items() if source.startswith("default")}
+    assert marked == {"black_level", "white_level", "full_well_e"}
+    recipe = recipe_of(f"768x512@46.875um:{kind}")
+    sensor = recipe.sensor
+    assert (sensor.cfa, sensor.channels, sensor.color_matrix) == (None, channels, None)
+    assert sensor.channel_response is not None
+    assert len(sensor.channel_response.response) == len(channels)
+    assert recipe.data.light_share == 0, "developed pictures are white-balanced"
+
+
+def test_noise_of_a_developed_picture_is_at_least_that_of_rounding_to_8_bits() -> None:
+    levels = decode_srgb(np.arange(256, dtype=np.float32) / 255).astype(np.float64)
+    rounding = np.diff(levels) ** 2 / 12
+    shot, _ = recipe_of("768x512@46.875um:planes").sensor.one_noise_at(100)
+    ratios = shot * (levels[1:] + levels[:-1])[40:] / 2 / rounding[40:]
+    assert 0.7 < ratios.min() < ratios.max() < 1.5
+    # small pixels hold fewer electrons, whose noise is what counts
+    assert recipe_of("6000x4000@3.9um:planes").sensor.full_well_e == pytest.approx(2000 * 3.9**2)
+
+
+def test_a_named_sensor_comes_in_grey() -> None:
+    named, grey = choose_sensor("IMX264"), choose_sensor("IMX264:grey")
+    assert grey.table["channels"] == ("Y",)
+    assert grey.table["full_well_e"] == named.table["full_well_e"]
+    assert "cfa" not in grey.table
+
+
+def test_a_developed_picture_states_its_size_alone() -> None:
+    planes = photo(
+        samples=np.zeros((3, 48, 64), np.uint16),
+        cfa=None,
+        black_level=np.zeros(3, np.float32),
+        noise=None,
+    )
+    table = sensor_of(planes).table
+    assert (table["type"], table["channels"]) == ("planes", ("R", "G", "B"))
+    assert (table["width_px"], table["height_px"], table["white_level"]) == (64, 48, 65535.0)
+
+
 @pytest.mark.parametrize("name", sorted(named_sensors()))
 def test_named_sensors_make_recipes_and_state_their_source(name: str) -> None:
     entry, recipe = named_sensors()[name], recipe_of(name)
@@ -58,7 +104,7 @@ def test_named_sensors_make_recipes_and_state_their_source(name: str) -> None:
     ("text", "message"),
     [
         ("6000x4000", "takes WIDTHxHEIGHT@PITCHum.* one of IMX174.*got '6000x4000'"),
-        ("6000x4000@3.9um:RGBW", "one of RGGB, BGGR, GRBG, GBRG; got 'RGBW'"),
+        ("6000x4000@3.9um:RGBW", "one of RGGB, BGGR, GRBG, GBRG, PLANES, GREY; got 'RGBW'"),
         ("IMX9", "got 'IMX9'"),
     ],
 )
@@ -94,11 +140,7 @@ def test_a_photograph_states_its_sensor() -> None:
     assert choice.sources["cfa"] == "Maker Model"
 
 
-def test_a_photograph_without_mosaic_or_pitch_is_refused() -> None:
-    planes = {"samples": np.zeros((3, 8, 8), np.uint16), "cfa": None}
-    black = {"black_level": np.zeros(3, np.float32)}
-    with pytest.raises(ContractError, match="RAW file with a mosaic"):
-        sensor_of(photo(**planes, **black))
+def test_a_photograph_without_pitch_is_refused() -> None:
     with pytest.raises(ContractError, match="states no pixel pitch; state it by pitch_um"):
         sensor_of(photo(pixel_pitch_um=None))
     assert sensor_of(photo(pixel_pitch_um=None), 3.0).table["pixel_pitch_um"] == 3.0

@@ -78,6 +78,27 @@ def test_noise_is_the_files_before_the_bundles_before_a_measured_one(bundle: Bun
     assert job.white_balance == OWN_BALANCE
     at_iso = start(bundle, replace(captures["bundle"], iso=400.0)).job.noise
     assert at_iso == tiny_sensor().noise_at(400)
+    for capture in captures.values():
+        said = start(bundle, capture, noise=(2e-4, 3e-7)).job
+        assert said.log.record["noise"]["source"] == "stated"
+        assert said.noise == NoiseModel(shot=(2e-4,) * 3, read_variance=(3e-7,) * 3)
+        at_said_iso = start(bundle, capture, iso=400.0)
+        assert at_said_iso.record["noise"]["source"] == "bundle"
+        assert at_said_iso.job.noise == tiny_sensor().noise_at(400)
+        assert at_said_iso.origin.metadata.iso == 400
+
+
+def test_noise_below_that_of_rounding_to_codes_is_noted(bundle: Bundle) -> None:
+    codes = np.random.default_rng(0).normal(120, 4.0, (3, *SHAPE)).round()
+    levels = np.stack([np.arange(0.5, 255) / 255, np.full(255, 1 / 255**2 / 12)])
+    smooth = np.broadcast_to(np.linspace(0.2, 0.8, SHAPE[1], dtype=np.float32), (3, *SHAPE))
+    tiny = np.random.default_rng(1).normal(0, 1e-5, smooth.shape).astype(np.float32)
+    for samples, is_noted in ((codes.astype(np.float32) / 255, False), (smooth + tiny, True)):
+        for rounding in (levels, None):
+            capture = made_planes(samples=samples, iso=None, rounding=rounding)
+            notes = " ".join(start(bundle, capture).job.log.notes)
+            assert ("blur and rounding hide" in notes) == (is_noted and rounding is not None)
+            assert "hide" not in " ".join(start(bundle, capture, iso=100.0).job.log.notes)
 
 
 def test_noise_is_known_for_every_channel_of_a_camera(tmp_path: Path) -> None:

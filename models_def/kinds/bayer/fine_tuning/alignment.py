@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.arrays import FloatArray
-from camkit.bundle.sensor import BayerSensor
+from camkit.bundle.sensor import ColorSensor
 from camkit.colorimetry import apply_matrix, encode_srgb
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.fine_tuning.homography import (
@@ -59,7 +59,7 @@ class Aligner:
     """Aligns pairs of one camera; pixels x, y of a capture that covers the whole sensor."""
 
     def __init__(
-        self, sensor: BayerSensor, bank: PsfBank, distortion: RadialDistortion | None
+        self, sensor: ColorSensor, bank: PsfBank, distortion: RadialDistortion | None
     ) -> None:
         """Store the sensor; without a distortion the lens counts as free of it."""
         self._sensor, self._bank, self._distortion = sensor, bank, distortion

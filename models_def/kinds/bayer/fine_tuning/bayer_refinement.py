@@ -7,7 +7,6 @@ from typing import Final
 import numpy as np
 import torch
 
-from camkit.colorimetry import rec709_from_camera
 from camkit.models_def.kinds.bayer.fine_tuning.pairs import read_pairs
 from camkit.models_def.kinds.bayer.material import BayerMaterial
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe, FineTuningRecipe
@@ -26,6 +25,7 @@ from camkit.models_def.training.fitter import BETAS, Fitter
 from camkit.models_def.training.recipe import ContentRecipe, NetworkRecipe
 from camkit.models_def.training.refinement import FineTuningOptions, Refinement
 from camkit.radial import RadialDistortion
+from camkit.runtime.twin.light import camera_space
 
 NAME: Final = "fine_tuned"
 OPPONENT_SEED: Final = 2
@@ -56,7 +56,7 @@ def make_refinement(
     first = read_first_weights(options.start, options.size)
     # without VGG-19 the sRGB values themselves are compared
     features: Features = torch.Tensor.contiguous if options.vgg is None else Conv33(options.vgg)
-    matrix = rec709_from_camera(np.array(recipe.sensor.color_matrix))
+    matrix = np.linalg.inv(camera_space(recipe.sensor)[0])
 
     def make_fitter(entry: NetworkRecipe, material: BayerMaterial) -> Fitter:
         mix: Mix | None = None

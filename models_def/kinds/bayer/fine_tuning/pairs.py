@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from camkit.arrays import FloatArray
 from camkit.caller import option_text
-from camkit.colorimetry import camera_from_rec709
 from camkit.errors import ContractError, DecodeError
 from camkit.models_def.kinds.bayer.fine_tuning.alignment import CLIPPED_ABOVE, AlignedPair, Aligner
 from camkit.models_def.kinds.bayer.fine_tuning.homography import Homography, warp_to
@@ -39,6 +38,7 @@ from camkit.models_def.training.pool import cut_patch
 from camkit.models_def.training.sample import Batch, Sample
 from camkit.noise import NoiseModel
 from camkit.radial import RadialDistortion
+from camkit.runtime.twin.light import camera_space
 from camkit.side_file import read_side_toml
 from camkit.units import to_mm
 
@@ -188,7 +188,7 @@ def _read_settings(path: Path, recipe: BayerRecipe) -> PairSettings:
         raise ContractError(
             f"real pairs need {path} with iso and optionally white_balance: {error}"
         ) from error
-    _, gains = camera_from_rec709(np.array(recipe.sensor.color_matrix))
+    _, gains = camera_space(recipe.sensor)
     iso, balance = table.pop("iso", None), table.pop("white_balance", list(gains))
     numbers = [iso, *balance] if isinstance(balance, list) else []
     plain = all(isinstance(n, int | float) and n > 0 for n in numbers)

@@ -59,7 +59,13 @@ def test_a_lens_becomes_a_proved_filter_and_a_page(
 class Steps:
     """Steps that do nothing but write a bundle."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, folder: Path, network_db: float) -> None:
+    def __init__(
+        self,
+        monkeypatch: pytest.MonkeyPatch,
+        folder: Path,
+        network_db: float,
+        channels: int = 3,
+    ) -> None:
         self.done: list[str] = []
         self.minutes = 0.0
         bundle = write_wide_bundle(folder, "any.camkit").path.read_bytes()
@@ -75,7 +81,7 @@ class Steps:
             return step
 
         sensor = {"width_px": 320, "height_px": 240, "pixel_pitch_um": 6.0}
-        described = {"notes": ["a note"], "sensor": sensor, "defaults": []}
+        described = {"notes": ["a note"], "sensor": sensor, "defaults": [], "channels": channels}
         for name, facts, writes in (
             ("describe", described, ""),
             ("freeze", {"side_px": 9, "energy_kept": 0.99}, ""),
@@ -132,6 +138,32 @@ def test_few_minutes_leave_the_filter_alone(
     # a measured PSF needs no freezing
     assert steps.done == ["describe", "export_filter"]
     assert told[-1] == "no minutes are left to train a network"
+
+
+def test_a_grey_camera_has_its_filter_and_says_why(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    steps, told = Steps(monkeypatch, tmp_path, 30.0, channels=1), []
+    camera_making.make(
+        "any.zmx",
+        tmp_path / "out.camkit",
+        camera=CameraWords(sensor=f"{SENSOR}:grey"),
+        on_note=told.append,
+    )
+    assert steps.done == ["describe", "freeze", "export_filter"]
+    assert "networks are trained on three colours" in told[-1]
+
+
+@pytest.mark.parametrize("kind", ["planes", "grey"])
+def test_a_camera_without_a_mosaic_is_made(kind: str, small: None, tmp_path: Path) -> None:
+    out = tmp_path / "mine.camkit"
+    words = CameraWords(sensor=f"{SENSOR}:{kind}", focus_m=float("inf"))
+    facts = camera_making.make("al2550-a", out, camera=words, minutes=0.0)
+    assert facts["psnr_db"][FILTER] > facts["psnr_db"][DEVELOP]
+    manifest = open_bundle(out).manifest
+    assert manifest.sensor.type == "planes"
+    assert manifest.sensor.channels == (("Y",) if kind == "grey" else ("R", "G", "B"))
+    assert "demosaic" not in [stage.type for stage in manifest.stages]
 
 
 def test_files_of_others_are_not_replaced(tmp_path: Path) -> None:

@@ -1,8 +1,9 @@
-"""The fixtures of a small camera behind a mosaic."""
+"""The fixtures of small cameras, behind a mosaic and of planes."""
 
 from tests.bayer_recipe import (  # noqa: F401
     bank,
     material,
+    planes_recipe,
     recipe,
     recipe_path,
 )

@@ -5,9 +5,11 @@ import pytest
 
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.recipe import CAMERA_PARTS, samples_digest
-from camkit.models_def.training.kind import read_recipe, to_recipe
+from camkit.models_def.training.kind import read_recipe, to_recipe, training_kind
 from camkit.models_def.training.recipe import differing_part
+from tests.bayer_recipe import planes_text
 from tests.changed_table import changed_table
+from tests.together_factory import TOGETHER
 
 RECIPES = Path(__file__).resolve().parents[4] / "models_def" / "recipes"
 SHIPPED = RECIPES / "duet.toml"
@@ -198,3 +200,39 @@ def test_all_faults_are_named_at_once() -> None:
         "data.iso_max must be of type float; got 'x'",
     ):
         assert fault in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("channels", "absent"),
+    [("RGB", {"demosaic"}), ("Y", {"demosaic", "white_balance", "raise_clipped"})],
+)
+def test_a_sensor_of_planes_has_no_stage_of_a_mosaic(channels, absent):
+    recipe = to_recipe(tomllib.loads(planes_text(channels)))
+    types = [stage.type for stage in training_kind("bayer").design(recipe).stages]
+    usual = [*(s.type for s in training_kind("bayer").design(read_recipe(SHIPPED)).stages)]
+    assert types == [name for name in usual if name not in absent]
+
+
+@pytest.mark.parametrize(
+    ("change", "value", "named"),
+    [
+        ("sensor__channels", ["R", "G"], "channels R, G, B or Y alone"),
+        ("sensor__channel_response", None, "sensor needs width_px.*channel_response"),
+        ("sensor__width_px", None, "width_px"),
+        ("wiener__mosaic", {"within_mm": 1.0}, "a sensor of planes has no mosaic, which"),
+    ],
+)
+def test_a_wrong_sensor_of_planes_is_refused(change, value, named):
+    table = changed_table(planes_text(), **{change: value})
+    if change == "sensor__channels":
+        table["sensor"]["channel_response"]["response"].pop()
+    if change == "wiener__mosaic":
+        table["wiener"]["together"] = TOGETHER.model_dump(mode="json")
+    with pytest.raises(ContractError, match=named):
+        to_recipe(table)
+
+
+def test_a_grey_camera_is_not_trained_and_the_reason_is_said(tmp_path):
+    recipe = to_recipe(tomllib.loads(planes_text("Y")))
+    with pytest.raises(ContractError, match="trained on three colours, and the camera tiny is"):
+        training_kind("bayer").prepare(recipe, tmp_path, tmp_path)

@@ -318,3 +318,46 @@ def test_as_many_samples_drift_as_the_recipe_says(recipe, bank):
 def test_crop_of_another_size_is_refused(recipe, bank):
     with pytest.raises(ContractError, match="a crop must be"):
         make_shot(np.zeros((3, 8, 8), np.float32), CENTRE, recipe, bank, np.random.default_rng(0))
+
+
+# ------------------------------------------------------------------------------- planes
+
+
+def test_without_a_mosaic_every_pixel_has_the_noise_of_the_sensor(planes_recipe, sharp_bank):
+    rng = np.random.default_rng(3)
+    shot = make_shot(grey(planes_recipe, sharp_bank, 0.3), CENTRE, planes_recipe, sharp_bank, rng)
+    noise = (shot.sample.inputs["capture"] - shot.sample.target).numpy()
+    assert noise.std(axis=(1, 2)) == pytest.approx(0.5 / planes_recipe.scale, rel=0.06)
+
+
+def test_without_blur_and_noise_planes_are_their_target_at_any_detail(planes_recipe, sharp_bank):
+    side = scene_side_px(planes_recipe, sharp_bank)
+    crop = np.random.default_rng(1).uniform(0.1, 0.8, (3, side, side)).astype(np.float32)
+    quiet = replace(planes_recipe, sensor=with_wells(planes_recipe.sensor, 1e5))
+    for borders in ((False,) * 4, (True, False, False, True)):
+        exposure = replace(CENTRE, borders=borders)
+        developed = photograph(crop, exposure, quiet, sharp_bank, np.random.default_rng(0))
+        margin = planes_recipe.data.margin_px
+        middle = developed.planes[..., margin:-margin, margin:-margin]
+        assert float((middle - developed.true).abs().max()) < 2e-3
+        assert developed.circumstances.red is None
+        assert developed.circumstances.gains == (1.0, 1.0, 1.0)
+
+
+def test_a_pixel_of_planes_is_unknown_where_one_colour_clipped(planes_recipe, sharp_bank):
+    scene = grey(planes_recipe, sharp_bank, 0.2)
+    scene[1, 50:54, 50:54] = 5.0
+    developed = photograph(scene, CENTRE, planes_recipe, sharp_bank, np.random.default_rng(0))
+    assert developed.unknown.shape[1] == 1
+    assert int(developed.unknown.sum()) == 16
+
+
+def test_samples_of_planes_are_drawn_in_any_light(planes_recipe, bank):
+    data = replace(planes_recipe.data, light_share=1.0)
+    recipe = replace(planes_recipe, data=data)
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        exposure = draw_exposure(rng, recipe, bank)
+        scene = grey(recipe, bank, 0.3)
+        shot = make_shot(scene, exposure, recipe, bank, rng)
+        assert all(torch.isfinite(plane).all() for plane in shot.sample.inputs.values())

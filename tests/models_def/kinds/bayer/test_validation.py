@@ -107,3 +107,14 @@ def test_scores_are_told_by_copy_where_there_are_several(recipe, bank):
     found = BayerJudge(captures=make_validation_captures(recipe, several, None), recipe=recipe)
     by_copy = found.score(lambda planes: planes[:, 3:]).parts["by_copy"]
     assert set(by_copy) == {"0", "1", "2"}
+
+
+def test_planes_are_judged_as_a_mosaic_is(planes_recipe, bank):
+    captures = make_validation_captures(planes_recipe, bank, None)
+    baselines = BayerJudge(captures=captures, recipe=planes_recipe).baselines()
+    assert baselines["wiener"] > baselines["capture"]
+    for capture in captures[:2]:
+        sample = capture.shot.sample
+        asked = (sample.target != sample.inputs["wiener"]).all(0).numpy()
+        gap = np.abs(to_srgb(sample.target, capture, planes_recipe) - capture.sharp)
+        assert gap[:, asked].max() < 2e-3
