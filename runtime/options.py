@@ -131,8 +131,7 @@ class Options:
         _check_dtype(self.dtype, self.provider)
         _check_depth(self.depth_m)
         _check_noise(self.noise, self.iso)
-        if self.halves is not None:
-            check_halves(self.halves)
+        check_halves(self.halves)
         if not 0 <= self.strength <= 1:
             raise ContractError(f"strength must lie in 0..1; got {self.strength}")
         _check_origin(self.origin_px, self.assume)

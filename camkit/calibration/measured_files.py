@@ -4,7 +4,7 @@ That of a tone curve is read by `camkit.runtime.files.tone_curve`.
 """
 
 from pathlib import Path
-from typing import Annotated, Any, Final, TypeVar
+from typing import Annotated, Any, TypeVar
 
 from pydantic import Field, ValidationError, model_validator
 

@@ -1,4 +1,4 @@
-"""Light recorded by a sensor, behind a mosaic or in planes: photons, read noise, clipping, digital numbers."""
+"""Light recorded by a sensor, behind a mosaic or in planes: photons, read noise, clipping, DN."""
 
 import numpy as np
 import torch

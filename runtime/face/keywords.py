@@ -8,6 +8,7 @@ from os import PathLike
 from typing import Literal, TypedDict
 
 from camkit.runtime.files.in_memory import FilePath
+from camkit.runtime.files.tone_curve import Tone
 from camkit.runtime.options import (
     Assumption,
     DemosaicMethod,
@@ -20,7 +21,6 @@ from camkit.runtime.options import (
     Quality,
     Scale,
 )
-from camkit.runtime.files.tone_curve import Tone
 from camkit.runtime.output.writer import FileFormat
 from camkit.runtime.unit import Unit
 

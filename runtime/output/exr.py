@@ -24,7 +24,7 @@ _log = logging.getLogger(__name__)
 
 
 class ExrWriter(PictureWriter):
-    """Writes linear RGB or Y with chromaticities and white luminance; PIZ for half, ZIP for float."""
+    """Writes linear RGB or grey with chromaticities and white; PIZ for half, ZIP for float."""
 
     def __init__(self, path: Path, picture: PictureFormat) -> None:
         super().__init__(path, picture)

@@ -27,7 +27,7 @@ ZLIB_LEVEL: Final = 1
 
 
 class PngWriter(PictureWriter):
-    """Writes RGB or grey of 8 or 16 bits; every row is stored as its difference to the row above."""
+    """Writes RGB or grey of 8 or 16 bits; a row is stored as its difference to the row above."""
 
     def __init__(self, path: Path, picture: PictureFormat, *, bits: int = 16) -> None:
         super().__init__(path, picture)

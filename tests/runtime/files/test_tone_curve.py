@@ -1,5 +1,7 @@
 """Codes of developed pictures become light by sRGB, by nothing, or by a measured curve."""
 
+import re
+
 import cv2
 import numpy as np
 import pytest
@@ -79,7 +81,8 @@ def test_raw_files_and_mosaics_have_no_curve(tmp_path):
     cv2.imwrite(str(mosaic), np.full((8, 8), 500, np.uint16))
     options = MosaicOptions(cfa="RGGB", black_level=0, white_level=1023)
     for file, said in ((path, None), (mosaic, options)):
-        with pytest.raises(ContractError, match=f"{file.name} holds the sensor's own light"):
+        text = re.escape(f"{file.name} holds the sensor's own light")
+        with pytest.raises(ContractError, match=text):
             read_capture(file, mosaic=said, tone=read_tone("srgb"))
 
 
@@ -92,7 +95,7 @@ def test_what_is_no_curve_is_refused(tmp_path, text):
 
 
 def test_a_name_that_is_no_curve_is_refused_with_those_that_are():
-    with pytest.raises(ContractError, match="tone takes srgb, linear or a file .*adobe"):
+    with pytest.raises(ContractError, match=r"tone takes srgb, linear or a file .*adobe"):
         read_tone("adobe")
 
 

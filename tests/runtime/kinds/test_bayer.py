@@ -24,8 +24,8 @@ from camkit.runtime.kind import runtime_part
 from camkit.runtime.options import Options
 from camkit.runtime.output.exr import ExrWriter
 from camkit.runtime.output.picture_writer import PictureFormat
-from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.output.sidecar import sidecar_path
+from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.raw import read_capture
 from camkit.runtime.twin.simulate import SimulationOptions
 from tests.planes_bundle import SIZE_PX, planes_sensor, write_planes_bundle
