@@ -35,6 +35,7 @@ from camkit.models_def.sensors.together import (
 )
 from camkit.models_def.sensors.tone import encode_srgb
 from camkit.models_def.sensors.wiener import block_facts, to_otf
+from camkit.models_def.training.recipe import mosaic_sensor
 
 GRID_PX: Final = 256
 LEAST_ELECTRONS_SQUARED: Final = 1e-4
@@ -101,7 +102,7 @@ class Camera:
             margin_px: Recorded around a patch for the filter and cut off again.
 
         Raises:
-            ContractError: If its bank restores every colour alone.
+            ContractError: If its bank restores every colour alone, or its sensor has no mosaic.
         """
         if recipe.wiener.together is None:
             raise ContractError(
@@ -110,7 +111,8 @@ class Camera:
             )
         self.recipe, self.choice, self.margin_px = recipe, choice, margin_px
         self.together: Together = recipe.wiener.together
-        matrix = np.array(recipe.sensor.color_matrix)
+        sensor = mosaic_sensor(recipe.sensor)
+        self._cfa, matrix = sensor.cfa, np.array(sensor.color_matrix)
         to_camera, self.gains = camera_from_rec709(matrix)
         self._to_camera = torch.from_numpy(to_camera).float()
         self.to_rec709 = torch.from_numpy(rec709_from_camera(matrix)).float()
@@ -145,11 +147,10 @@ class Camera:
         Returns:
             (b, 3, h, w) white-balanced camera colours.
         """
-        cfa = self.recipe.sensor.cfa
         light = blur(_turned(sharp, self._to_camera).clamp(min=0), kernels.to(sharp.dtype))
         variance = _columns(noise.shot) * light.detach() + _columns(noise.read)
         recorded = light + variance.clamp(min=0).sqrt() * normal
-        return demosaic(mosaic(recorded, cfa), cfa)
+        return demosaic(mosaic(recorded, self._cfa), self._cfa)
 
     def restored(self, planes: Tensor, kernels: Tensor, spread: Tensor, noise: Noise) -> Tensor:
         """Return developed patches (b, 3, h, w) behind the bank, each a periodic block.

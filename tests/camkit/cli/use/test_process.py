@@ -93,6 +93,12 @@ def test_a_failed_file_is_told_on_stderr(captures, camkit_command) -> None:
         (["--jobs", "0"], "jobs"),
         (["--threads", "0"], "threads"),
         (["--resume", "--overwrite"], "choose one"),
+        (["--tone", "gamma"], "--tone takes srgb, linear or a file"),
+        (["--halves", "_l"], "--halves takes two texts that differ"),
+        (["--noise", "1e-5"], "--noise takes two numbers SHOT,READ_VARIANCE"),
+        (["--noise", "0,1e-9"], "--noise takes the shot noise and the read variance"),
+        (["--noise", "1e-5,0", "--iso", "100"], "--noise and --iso both say"),
+        (["--iso", "0"], "iso must be a number"),
     ],
 )
 def test_a_wrong_option_is_refused_in_one_line_before_any_work(
@@ -196,6 +202,37 @@ def test_options_reach_the_sidecar(captures, camkit_command) -> None:
     }
     assert record["options"].items() >= wanted.items()
     assert "undistort" not in record["seconds"]
+
+
+def test_stated_noise_and_iso_reach_the_sidecar(captures, camkit_command) -> None:
+    words = ("process", "a.dng", "--bundle", "tiny.camkit", "--overwrite")
+    assert camkit_command(*words, "--noise", "2e-5,1e-8").code == 0
+    noise = _record(captures)["plan"]["noise"]
+    assert noise == {"source": "stated", "shot": [2e-5] * 3, "read_variance": [1e-8] * 3}
+    assert camkit_command(*words, "--iso", "800").code == 0
+    record = _record(captures)
+    assert (record["plan"]["noise"]["source"], record["iso"]) == ("bundle", 800.0)
+
+
+def test_halves_of_developed_pictures_become_one_by_the_curve_that_is_stated(
+    captures, camkit_command
+) -> None:
+    for half, code in (("l", 100), ("r", 200)):
+        cv2.imwrite(str(captures / f"x_{half}.png"), np.full((8, 8, 3), code, np.uint8))
+    curve = "levels = [0, 100, 200, 255]\nluminance = [0.0, 0.1, 0.5, 1.0]\n"
+    (captures / "maker.toml").write_text(curve)
+    outcome = camkit_command(
+        *("process", "x_?.png", "--bundle", "none", "--halves", "_l,_r"),
+        *("--tone", "maker.toml", "--format", "tiff", "--linear"),
+    )
+    assert outcome.code == 0, outcome.err
+    assert outcome.out.count(" -> ") == 1
+    picture = cv2.imread(str(captures / "x_l.tif"), cv2.IMREAD_UNCHANGED)
+    assert picture.mean() / 65535 == pytest.approx(0.3, abs=1e-4)
+    record = _record(captures, "x_l.tif")
+    assert record["other_half"] == "x_r.png"
+    assert record["options"]["halves"] == ["_l", "_r"]
+    assert record["options"]["tone"]["name"] == "maker.toml"
 
 
 def test_a_headerless_mosaic_is_developed_with_its_three_options(captures, camkit_command) -> None:
