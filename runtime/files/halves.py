@@ -49,19 +49,19 @@ def check_halves(halves: Halves | None) -> None:
         )
 
 
-def right_half(left: Path, halves: Halves) -> Path:
+def right_half(file: Path, halves: Halves) -> Path:
     """Return the right half of a left one: its last part of a path that differs, replaced.
 
     Raises:
         ContractError: If the path is not that of a left half.
     """
-    head, is_there, tail = str(left.with_suffix("")).rpartition(halves[0])
+    head, is_there, tail = str(file.with_suffix("")).rpartition(halves[0])
     if not is_there:
         raise ContractError(
-            f"{left.name} is no left half: {option_text('halves')} states that {halves[0]!r} is "
+            f"{file.name} is no left half: {option_text('halves')} states that {halves[0]!r} is "
             "part of its name or folder"
         )
-    return Path(f"{head}{halves[1]}{tail}{left.suffix}")
+    return Path(f"{head}{halves[1]}{tail}{file.suffix}")
 
 
 def without_right_halves(files: Sequence[Path], halves: Halves | None) -> list[Path]:

@@ -20,7 +20,7 @@ from camkit.side_file import read_side_toml
 FloatGrid = NDArray[np.float64]
 
 TOP_LEVEL: Final = 255.0
-NAMED: Final = {
+CURVES: Final = {
     "srgb": SRGB,
     "linear": ColorSpace(name="linear light", curves=(power_curve(1.0),), to_rec709=np.eye(3)),
 }
@@ -97,7 +97,7 @@ class Tone:
     def space(self) -> ColorSpace:
         """Return the colour space of the codes; its primaries are those of Rec.709."""
         if not self.light:
-            return NAMED[self.name]
+            return CURVES[self.name]
         roots = np.array(self.light) ** (1 / _GAMMA)
         levels = np.linspace(0, 1, len(roots))
         return ColorSpace(
@@ -116,7 +116,7 @@ class Tone:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PictureReading:
-    """How a developed picture is read.
+    """The caller's words on a developed picture.
 
     Attributes:
         keep_codes: Whether codes of up to 8 bits stay as they are, white at 255.
@@ -138,13 +138,13 @@ def read_tone(choice: str | PathLike[str]) -> Tone:
     Raises:
         ContractError: If it is neither.
     """
-    if str(choice) in NAMED:
+    if str(choice) in CURVES:
         return Tone(name=str(choice))
     path = Path(choice)
     try:
         return Tone(name=path.name, light=tuple(measured_light(path).tolist()))
     except DecodeError as error:
         raise ContractError(
-            f"{option_text('tone')} takes {', '.join(NAMED)} or a file of `camkit calibrate "
+            f"{option_text('tone')} takes {', '.join(CURVES)} or a file of `camkit calibrate "
             f"tone`; {error}"
         ) from error

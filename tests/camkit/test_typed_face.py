@@ -17,6 +17,7 @@ from camkit.field_types import check_value
 from camkit.kinds import KINDS
 from camkit.runtime.face.keywords import KindKeywords, LoadKeywords, ProcessKeywords
 from camkit.runtime.files.in_memory import FilePath
+from camkit.runtime.files.tone_curve import Tone
 from camkit.runtime.options import Options
 from camkit.runtime.unit import Unit
 from camkit.runtime.write_options import WriteOptions
@@ -172,7 +173,10 @@ def test_the_keywords_are_the_fields_of_the_options_and_of_the_kinds() -> None:
     kinds, load, process = map(get_type_hints, (KindKeywords, LoadKeywords, ProcessKeywords))
     assert set(kinds) == set(of_kinds)
     del options["of_kind"]
-    assert load == options | kinds | {"unit": Unit | FilePath | None}
+    assert load == options | kinds | {
+        "unit": Unit | FilePath | None,
+        "tone": Tone | FilePath | None,
+    }
     out_dir = process.pop("out_dir")
     assert process == load | {name: kind for name, kind in write.items() if name != "out_dir"}
     check_value("out_dir", "pictures", out_dir)

@@ -330,7 +330,8 @@ def photograph(
         raise ContractError(f"a crop must be (3, {side}, {side}); got {crop.shape}")
     sensor, data = recipe.sensor, recipe.data
     matrix, balance = camera_space(sensor)
-    gains = balance if exposure.gains is None else exposure.gains
+    red, green, blue = balance if exposure.gains is None else exposure.gains
+    gains = red, green, blue
     illumination = float(bank.illumination_at(exposure.x_mm, exposure.y_mm))
     cast = np.array(exposure.cast)[:, None]
     to_camera = torch.from_numpy(cast * matrix * exposure.factor).float()
@@ -509,13 +510,13 @@ def _planes(
     top, bottom, left, right = (recipe.data.margin_px if side else 0 for side in borders)
     height, width = capture.shape[-2:]
     inside = np.s_[..., top : height - bottom, left : width - right]
-    samples, clipped = (np.ascontiguousarray(array[inside]) for array in (capture, saturated))
+    samples, clipped = np.ascontiguousarray(capture[inside]), saturated[inside]
     if cfa is None:
         planes = torch.from_numpy(samples)[None] * torch.tensor(gains).reshape(1, -1, 1, 1)
-        clipped = clipped.any(axis=0)
+        clipped = np.any(clipped, axis=0)
     else:
         planes = developed(samples, gains, cfa)
-    unknown = torch.from_numpy(clipped)[None, None].float()
+    unknown = torch.from_numpy(np.ascontiguousarray(clipped))[None, None].float()
     if any(borders):
         outside = (left, right, top, bottom)
         planes = torch.nn.functional.pad(planes, outside, mode="reflect")

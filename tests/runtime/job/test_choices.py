@@ -12,6 +12,7 @@ from camkit.bundle.stages import Color, Linearise, Repair
 from camkit.bundle.writer import write_bundle
 from camkit.caller import option_text, speaking
 from camkit.errors import ContractError
+from camkit.runtime.files.tone_curve import Tone
 from camkit.runtime.job.choices import check_choices, check_idle
 from camkit.runtime.options import Options
 from camkit.runtime.unit import Unit
@@ -45,16 +46,22 @@ CHANGED: dict[str, Any] = {
     "tile_px": 32,
     "dtype": "fp16",
     "provider": "cuda",
+    "noise": (1e-5, 1e-9),
+    "iso": 400.0,
+    "tone": Tone(name="srgb"),
+    "halves": ("_l", "_r"),
     "unit": None,
 }
 """Every option away from its default; a unit is tested by itself."""
 FREE = {"max_mem_bytes", "threads", "method"}
+OF_FILES = {"tone", "halves"}
+"""What may be said of any photograph's file."""
 OF_STAGE = {
     "network": {
         *("size", "quality", "max_seconds", "max_error_db", "mode", "on_unsafe", "tile_px"),
-        *("dtype", "provider", "laws", "strength"),
+        *("dtype", "provider", "laws", "strength", "noise", "iso"),
     },
-    "wiener": {"depth_m"},
+    "wiener": {"depth_m", "noise", "iso"},
     "demosaic": {"demosaic", "scale"},
     "white_balance": {"white_balance"},
     "color": {"color", "exposure_ev"},
@@ -86,7 +93,8 @@ def test_every_option_is_in_the_list_of_this_test() -> None:
     # those that kinds bring are tested with a kind that brings some (test_maker.py)
     assert set(CHANGED) == {field.name for field in dataclasses.fields(Options)} - {"of_kind"}
     claimed = set.union(*OF_STAGE.values())
-    assert set(CHANGED) == claimed | FREE | {"assume", "force_bundle", "origin_px", "unit"}
+    others = {"assume", "force_bundle", "origin_px", "unit"}
+    assert set(CHANGED) == claimed | FREE | OF_FILES | others
 
 
 @pytest.mark.parametrize("name", CHANGED)
@@ -96,7 +104,7 @@ def test_a_camera_of_every_stage_knows_every_option(tiny: Bundle, name: str) -> 
 
 @pytest.mark.parametrize("name", sorted(set(CHANGED) - {"unit"}))
 def test_each_option_that_means_nothing_is_refused_by_name(bare: Bundle, name: str) -> None:
-    if name in FREE | {"force_bundle"}:
+    if name in FREE | OF_FILES | {"force_bundle"}:
         check_choices(bare, Options(**{name: CHANGED[name]}))
         return
     said = _refused(bare, **{name: CHANGED[name]})
@@ -105,7 +113,7 @@ def test_each_option_that_means_nothing_is_refused_by_name(bare: Bundle, name: s
 
 @pytest.mark.parametrize("name", sorted(set(CHANGED) - {"unit"}))
 def test_each_option_that_means_nothing_without_a_bundle_is_refused_by_name(name: str) -> None:
-    if name in FREE | {"color", "exposure_ev", "white_balance", "demosaic", "scale"}:
+    if name in FREE | OF_FILES | {"color", "exposure_ev", "white_balance", "demosaic", "scale"}:
         check_choices(None, Options(**{name: CHANGED[name]}))
         return
     said = _refused(None, **{name: CHANGED[name]})
@@ -131,6 +139,7 @@ def test_a_camera_without_a_stage_refuses_its_options_and_no_other(
     write_bundle(path, tiny_manifest(stages=tiny_stages(*left_out), **changes), members)
     bundle = open_bundle(path)
     foreign = set.union(*(OF_STAGE[stage] for stage in left_out))
+    foreign -= set.union(*(OF_STAGE[stage] for stage in OF_STAGE.keys() - left_out))
     for name, value in CHANGED.items():
         if name in foreign:
             assert option_text(name) in _refused(bundle, **{name: value})
