@@ -13,7 +13,7 @@ from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.spot import slopes_for_heights
 from camkit.psf import FrozenPsf
 from camkit.radial import RadialDistortion
-from camkit.runtime.geometry.distortion import distort_points
+from camkit.runtime.geometry.distortion import distort_points, reference_channel
 from camkit.units import UM_PER_MM
 
 FIT_POINTS: Final = 16
@@ -78,8 +78,10 @@ def check_distortion(lens: Lens, psf: FrozenPsf, path: Path) -> None:
     frozen = psf.distortion
     lens_distortion = trace_distortion(lens, frozen.radius_mm, channels=len(frozen.coefficients))
     points_mm = np.stack([np.linspace(0.0, frozen.radius_mm, 33), np.zeros(33)], axis=1)
+    middle = reference_channel(frozen)
     off_mm = np.abs(
-        distort_points(points_mm, lens_distortion) - distort_points(points_mm, frozen)
+        distort_points(points_mm, lens_distortion, channel=middle)
+        - distort_points(points_mm, frozen, channel=middle)
     ).max()
     refuse_other_lens(lens, path, float(off_mm * UM_PER_MM / psf.pixel_pitch_um), SAME_LENS_PX)
 
