@@ -15,6 +15,7 @@ from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.plan.decision import Work
 from camkit.runtime.plan.ways import without_networks
+from camkit.runtime.twin.light import stated_balance
 from camkit.runtime.twin.simulate import Simulation, SimulationOptions
 from camkit.runtime.twin.truth import light_sensor, true_picture
 
@@ -126,7 +127,7 @@ class Darkroom:
         capture = pipeline.capture_of(
             simulation.samples,
             iso=simulation.iso,
-            white_balance=simulation.white_balance,  # type: ignore[arg-type]
+            white_balance=stated_balance(simulation.white_balance),
             origin_px=(int(x_px), int(y_px)),
         )
         work = pipeline.start(capture)
