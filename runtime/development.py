@@ -12,7 +12,6 @@ from camkit.caller import option_text
 from camkit.errors import ContractError, one_line
 from camkit.runtime.cancel import Cancel
 from camkit.runtime.capture import MosaicOptions
-from camkit.runtime.files.halves import right_half
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.machine.memory import peak_rss_mb
 from camkit.runtime.network.tiling import Progress
@@ -20,6 +19,7 @@ from camkit.runtime.output.part_file import atomic_outputs
 from camkit.runtime.output.sidecar import read_sidecar, sidecar_path, sidecar_text
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.raw import file_sha256
+from camkit.runtime.signal.halves import right_half
 from camkit.runtime.write_options import WriteOptions
 
 Status = Literal["ok", "failed", "skipped"]

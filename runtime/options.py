@@ -13,8 +13,8 @@ from camkit.errors import ContractError
 from camkit.field_types import check_fields, check_value
 from camkit.kinds import Kind, KindOption, all_kinds
 from camkit.runtime.capture import check_iso
-from camkit.runtime.files.halves import Halves, check_halves
-from camkit.runtime.files.tone_curve import Tone, read_tone
+from camkit.runtime.signal.halves import Halves, check_halves
+from camkit.runtime.signal.tone_curve import Tone, read_tone
 from camkit.runtime.unit import Unit, read_unit
 from camkit.units import MM_PER_M
 

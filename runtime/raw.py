@@ -34,7 +34,7 @@ from camkit.runtime.files.formats import foreign
 from camkit.runtime.files.in_memory import Source, stored
 from camkit.runtime.files.raw_tags import sensor_place
 from camkit.runtime.files.tiff_tags import read_tiff_tags
-from camkit.runtime.files.tone_curve import PictureReading, Tone
+from camkit.runtime.signal.tone_curve import PictureReading, Tone
 
 __all__ = ["Capture", "MosaicOptions", "file_sha256", "is_picture", "named_bundle", "read_capture"]
 

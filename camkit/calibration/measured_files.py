@@ -1,6 +1,6 @@
 """Readers of the TOML that `camkit calibrate` writes: geometry, flat, noise.
 
-That of a tone curve is read by `camkit.runtime.files.tone_curve`.
+That of a tone curve is read by `camkit.runtime.signal.tone_curve`.
 """
 
 from pathlib import Path

@@ -8,9 +8,9 @@ from typing import Final
 from camkit.errors import DecodeError
 from camkit.kinds import Kind, all_kinds
 from camkit.regular_file import check_regular
-from camkit.runtime.files.halves import Halves, without_right_halves
 from camkit.runtime.files.in_memory import FilePath
 from camkit.runtime.output.sidecar import read_sidecar
+from camkit.runtime.signal.halves import Halves, without_right_halves
 
 RAW_SUFFIXES: Final = frozenset(
     {".dng", ".arw", ".cr2", ".cr3", ".crw", ".nef", ".nrw", ".raf", ".rw2", ".orf", ".pef"}

@@ -8,7 +8,6 @@ from os import PathLike
 from typing import Literal, TypedDict
 
 from camkit.runtime.files.in_memory import FilePath
-from camkit.runtime.files.tone_curve import Tone
 from camkit.runtime.options import (
     Assumption,
     DemosaicMethod,
@@ -22,6 +21,7 @@ from camkit.runtime.options import (
     Scale,
 )
 from camkit.runtime.output.writer import FileFormat
+from camkit.runtime.signal.tone_curve import Tone
 from camkit.runtime.unit import Unit
 
 

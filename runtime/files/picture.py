@@ -32,9 +32,9 @@ from camkit.runtime.files.formats.decoded import Decoded
 from camkit.runtime.files.formats.opencv_picture import decode_picture
 from camkit.runtime.files.formats.tiff_picture import decode_tiff
 from camkit.runtime.files.tiff_tags import TiffTags, read_tiff_tags
-from camkit.runtime.files.tone_curve import AS_STATED, PictureReading, Tone
 from camkit.runtime.files.white_level import check_said_white
 from camkit.runtime.metadata import Metadata
+from camkit.runtime.signal.tone_curve import AS_STATED, PictureReading, Tone
 
 COUNTS_SUFFIXES: Final = (".tif", ".tiff")
 FAINT: Final = 0.01
@@ -105,13 +105,18 @@ def _light(decoded: Decoded, reading: PictureReading) -> tuple[NDArray[Any], flo
             )
         notes = _notes_on_tone(decoded, tone)
         if decoded.top and not tone.is_linear:
-            return _linear_codes(decoded, tone.space), 65535.0, notes
+            return _linear_codes(decoded, _space_of(tone)), 65535.0, notes
         return samples, float(decoded.top or 1), [*notes, *_notes_on_floats(decoded)]
     if is_eight:
         codes = _linear_codes(decoded, decoded.space or SRGB)
         return codes, 65535.0, _notes_on_eight(decoded, keep_codes=False)
     notes = [*_notes_on_floats(decoded), *_notes_on_linear(decoded)]
     return samples, float(decoded.top or 1), notes
+
+
+def _space_of(tone: Tone) -> ColorSpace:
+    """Return the colour space of a tone curve; its primaries are those of Rec.709."""
+    return ColorSpace(name=tone.name, curves=(tone.light_at,), to_rec709=np.eye(3))
 
 
 def _channels(samples: NDArray[Any], *, is_grey: bool) -> tuple[NDArray[Any], list[str]]:
@@ -136,7 +141,7 @@ def _rounding(decoded: Decoded, tone: Tone | None) -> FloatArray | None:
     """Return (2, code - 1) light between codes of few bits, and the variance of rounding there."""
     if not 0 < decoded.top <= _MOST_EIGHT:
         return None
-    space = (decoded.space or SRGB) if tone is None else tone.space
+    space = (decoded.space or SRGB) if tone is None else _space_of(tone)
     codes = np.arange(decoded.top + 1, dtype=np.uint8)[None]
     light = np.sort(space.light_of(codes, decoded.top)[0])
     return np.stack([(light[1:] + light[:-1]) / 2, np.diff(light) ** 2 / 12])
@@ -213,7 +218,7 @@ def _notes_on_eight(decoded: Decoded, *, keep_codes: bool) -> list[str]:
 def _notes_on_tone(decoded: Decoded, tone: Tone) -> list[str]:
     """Return notes on codes that become light as the caller says."""
     space = decoded.space
-    if space is None or (decoded.top and space.means(tone.space)):
+    if space is None or (decoded.top and space.means(_space_of(tone))):
         return []
     return [
         f"the file states the colour space {space.name!r}, in place of which codes are read "

@@ -17,8 +17,8 @@ from camkit.field_types import check_value
 from camkit.kinds import KINDS
 from camkit.runtime.face.keywords import KindKeywords, LoadKeywords, ProcessKeywords
 from camkit.runtime.files.in_memory import FilePath
-from camkit.runtime.files.tone_curve import Tone
 from camkit.runtime.options import Options
+from camkit.runtime.signal.tone_curve import Tone
 from camkit.runtime.unit import Unit
 from camkit.runtime.write_options import WriteOptions
 from tests.bundle_factory import write_tiny_bundle

@@ -17,7 +17,7 @@ from camkit.calibration.measured_files import (
 from camkit.errors import DecodeError
 from camkit.radial import RadialIllumination
 from camkit.runtime.files.formats.color_space import srgb_curve
-from camkit.runtime.files.tone_curve import TOP_LEVEL, measured_light
+from camkit.runtime.signal.tone_curve import TOP_LEVEL, measured_light
 from camkit.units import to_mm
 
 FloatGrid = NDArray[np.float64]

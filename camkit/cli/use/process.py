@@ -207,10 +207,10 @@ def process(
     from camkit.cli.use.cluster import cluster_client
     from camkit.cli.use.results import print_result
     from camkit.runtime.batch import process as run
-    from camkit.runtime.files.halves import read_halves
-    from camkit.runtime.files.tone_curve import read_tone
     from camkit.runtime.machine.memory import keep_memory_for_good
     from camkit.runtime.options import Options, parse_memory, read_noise, with_choices
+    from camkit.runtime.signal.halves import read_halves
+    from camkit.runtime.signal.tone_curve import read_tone
     from camkit.runtime.unit import read_unit
     from camkit.runtime.write_options import WriteOptions
 

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Final
 from camkit.bundle.manifest import Manifest
 from camkit.bundle.reader import Bundle
 from camkit.runtime.capture import Capture, MosaicOptions
-from camkit.runtime.files.halves import mean_of_halves, right_half
 from camkit.runtime.kind import RuntimePart
 from camkit.runtime.options import Options
 from camkit.runtime.raw import read_capture
+from camkit.runtime.signal.halves import mean_of_halves, right_half
 
 if TYPE_CHECKING:
     from camkit.runtime.twin.simulate import Simulation

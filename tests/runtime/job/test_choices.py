@@ -12,9 +12,9 @@ from camkit.bundle.stages import Color, Linearise, Repair
 from camkit.bundle.writer import write_bundle
 from camkit.caller import option_text, speaking
 from camkit.errors import ContractError
-from camkit.runtime.files.tone_curve import Tone
 from camkit.runtime.job.choices import check_choices, check_idle
 from camkit.runtime.options import Options
+from camkit.runtime.signal.tone_curve import Tone
 from camkit.runtime.unit import Unit
 from tests.bundle_factory import tiny_manifest, tiny_members, tiny_stages, write_tiny_bundle
 from tests.deep_bundle import write_deep_bundle

@@ -20,9 +20,9 @@ from camkit.runtime.files.formats.color_space import (
 )
 from camkit.runtime.files.formats.icc_profile import PCS_WHITE
 from camkit.runtime.files.picture import read_light, read_picture, read_scene
-from camkit.runtime.files.tone_curve import PictureReading
 from camkit.runtime.output.icc import SRGB_CURVE, _assemble, _curve, _text, _xyz
 from camkit.runtime.raw import read_capture
+from camkit.runtime.signal.tone_curve import PictureReading
 from tests.data_folder import data_path
 
 TWO_CODES = 2.1 / 255

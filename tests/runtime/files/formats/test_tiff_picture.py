@@ -16,8 +16,8 @@ from camkit.colorimetry import decode_srgb, encode_srgb
 from camkit.errors import DecodeError
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.files.picture import read_mosaic, read_picture, read_scene
-from camkit.runtime.files.tone_curve import PictureReading
 from camkit.runtime.raw import read_capture
+from camkit.runtime.signal.tone_curve import PictureReading
 from tests.data_folder import data_path
 from tests.tiff_factory import packed_page, write_tiff
 

@@ -8,7 +8,7 @@ import pytest
 
 from camkit.errors import ContractError, DecodeError
 from camkit.noise import NoiseModel
-from camkit.runtime.files.halves import (
+from camkit.runtime.signal.halves import (
     mean_of_halves,
     read_halves,
     right_half,

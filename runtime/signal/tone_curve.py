@@ -13,17 +13,17 @@ from pydantic import Field, ValidationError, model_validator
 
 from camkit.bundle.entry import Entry, NonNegative
 from camkit.caller import option_text
+from camkit.colorimetry import decode_srgb
 from camkit.errors import ContractError, DecodeError
-from camkit.runtime.files.formats.color_space import SRGB, ColorSpace, power_curve
 from camkit.side_file import read_side_toml
 
 FloatGrid = NDArray[np.float64]
 
 TOP_LEVEL: Final = 255.0
-CURVES: Final = {
-    "srgb": SRGB,
-    "linear": ColorSpace(name="linear light", curves=(power_curve(1.0),), to_rec709=np.eye(3)),
-}
+SRGB_CURVE: Final = "srgb"
+NO_CURVE: Final = "linear"
+CURVES: Final = (SRGB_CURVE, NO_CURVE)
+"""Names in place of a file."""
 _GAMMA: Final = 2.2
 
 
@@ -91,20 +91,16 @@ class Tone:
     @property
     def is_linear(self) -> bool:
         """Return whether codes are light already."""
-        return not self.light and self.name == "linear"
+        return not self.light and self.name == NO_CURVE
 
-    @property
-    def space(self) -> ColorSpace:
-        """Return the colour space of the codes; its primaries are those of Rec.709."""
+    def light_at(self, codes: FloatGrid) -> FloatGrid:
+        """Return the light of codes, both 0..1."""
+        if self.is_linear:
+            return codes
         if not self.light:
-            return CURVES[self.name]
+            return decode_srgb(codes.astype(np.float32)).astype(np.float64)
         roots = np.array(self.light) ** (1 / _GAMMA)
-        levels = np.linspace(0, 1, len(roots))
-        return ColorSpace(
-            name=self.name,
-            curves=(lambda codes: np.interp(codes, levels, roots) ** _GAMMA,),
-            to_rec709=np.eye(3),
-        )
+        return np.asarray(np.interp(codes, np.linspace(0, 1, len(roots)), roots) ** _GAMMA)
 
     def to_json(self) -> dict[str, Any]:
         """Return the name, and the hash of a measured curve."""

@@ -10,8 +10,8 @@ import tifffile
 from camkit.colorimetry import decode_srgb
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.capture import MosaicOptions
-from camkit.runtime.files.tone_curve import Tone, read_tone
 from camkit.runtime.raw import read_capture
+from camkit.runtime.signal.tone_curve import Tone, read_tone
 from tests.dng_factory import write_scene
 
 CURVE = "levels = [0.0, 64.0, 128.0, 192.0, 255.0]\nluminance = [0.0, 0.03, 0.12, 0.4, 1.0]\n"
