@@ -19,10 +19,13 @@ import numpy as np
 
 from camkit.caller import option_text
 from camkit.cfa import CFA_PATTERNS, shifted_cfa
+from camkit.entry_points import entry_points, load_entry_point
 from camkit.errors import ContractError
 from camkit.runtime.capture import Capture
 
 DATA: Final = "named_sensors.toml"
+GROUP: Final = "camkit.sensors"
+"""Of entry points, by which packages bring sensors: mappings with the keys of that file."""
 DEFAULT: Final = "default"
 STATED: Final = "stated"
 BLACK_LEVEL: Final = 256.0
@@ -85,9 +88,9 @@ def choose_sensor(text: str) -> SensorChoice:
         return _completed(facts, sources)
     named = named_sensors()
     name, _, pattern = text.strip().partition(":")
-    facts = dict(named.get(name.casefold(), {}))
+    facts = dict(named.get(name.casefold()) or _sensor_of_package(name))
     if not facts:
-        names = ", ".join(entry["name"] for entry in named.values())
+        names = ", ".join([*(entry["name"] for entry in named.values()), *entry_points(GROUP)])
         raise ContractError(
             f"{option_text('sensor')} takes WIDTHxHEIGHT@PITCHum, such as 6000x4000@3.9um (with "
             f"or without :BGGR for another pattern), or one of {names}; got {text!r}"
@@ -146,6 +149,26 @@ def named_sensors() -> Mapping[str, Mapping[str, Any]]:
     """Return the facts of the sensors that camkit knows, by their names in small letters."""
     text = (resources.files("camkit.models_def.sensors") / DATA).read_text(encoding="utf-8")
     return {entry["name"].casefold(): entry for entry in tomllib.loads(text)["sensor"]}
+
+
+def _sensor_of_package(name: str) -> Mapping[str, Any]:
+    """Return the facts of a sensor that a package brings; nothing if none has this name.
+
+    Raises:
+        ContractError: If they are not those of a sensor.
+    """
+    point = next(
+        (p for n, p in entry_points(GROUP).items() if n.casefold() == name.casefold()), None
+    )
+    if point is None:
+        return {}
+    facts = load_entry_point(point, "sensor")
+    needed = {"width_px", "height_px", "pixel_pitch_um", "source"}
+    if not isinstance(facts, Mapping) or not needed <= facts.keys():
+        raise ContractError(
+            f"the sensor {point.name!r} of {point.value} must state {', '.join(sorted(needed))}"
+        )
+    return {"name": point.name, **facts}
 
 
 def _completed(facts: dict[str, Any], sources: dict[str, str]) -> SensorChoice:
