@@ -316,6 +316,31 @@ def largest_activations(
     return largest
 
 
+def tensor_values(
+    model: bytes, names: Sequence[str], feeds: dict[str, FloatArray]
+) -> dict[str, Any]:
+    """Return tensors of a model that need not be admissible yet, computed as it stands.
+
+    Args:
+        model: A model in which these tensors are outputs.
+        names: Tensors to return.
+        feeds: Inputs by name.
+
+    Raises:
+        BundleError: If onnxruntime refuses the model, or cannot run it.
+    """
+    options = ort.SessionOptions()
+    options.intra_op_num_threads = 1
+    options.graph_optimization_level = ort.GraphOptimizationLevel.ORT_DISABLE_ALL
+    options.log_severity_level = 4
+    try:
+        session = ort.InferenceSession(model, options, providers=[PROVIDER_NAMES["cpu"]])
+        values = session.run(list(names), feeds)
+    except (RuntimeError, *_ORT_ERRORS) as error:
+        raise BundleError(f"onnxruntime cannot run it: {error}") from error
+    return dict(zip(names, values, strict=True))
+
+
 def _run(session: Any, binding: Any, cancel: Cancel | None, shape: tuple[int, ...]) -> None:
     """Run a session until it is done or cancelled.
 

@@ -8,6 +8,7 @@ samples reads, in integers, so that the phase of the stride is exact:
     transposed convolution                        ceil((first + p - span) / s)   (last + p) // s
     DepthToSpace b, nearest resize by b           first // b             last // b
     SpaceToDepth b                                first b                last b + b - 1
+    Pad by p: zeros, edge or mirrored             first - p              last - p
 """
 
 import math
@@ -25,8 +26,13 @@ ELEMENTWISE: Final = (
     frozenset({"Add", "Sub", "Mul", "Div", "Max", "Min", "Neg", "Abs", "Sqrt"})
     | {"Relu", "LeakyRelu", "PRelu", "Elu", "Gelu", "Sigmoid", "HardSigmoid", "HardSwish"}
     | {"Tanh", "Softplus", "Clip", "Identity", "Cast", "BatchNormalization"}
+    | {"Pow", "Exp", "Log", "Erf", "Where"}
+    | {"Greater", "GreaterOrEqual", "Less", "LessOrEqual", "Equal"}
 )
 """One sample out from the same sample in; second inputs may be constants per channel."""
+COMPARISONS: Final = frozenset({"Greater", "GreaterOrEqual", "Less", "LessOrEqual", "Equal"})
+"""They give true or false, which only Where takes."""
+PAD_MODES: Final = ("constant", "reflect", "edge")
 NORMALIZATIONS: Final = frozenset({"InstanceNormalization", "GroupNormalization"})
 REDUCTIONS: Final = frozenset({"ReduceMean", "ReduceSum", "ReduceMax", "ReduceMin"})
 GLOBAL_POOLS: Final = frozenset({"GlobalAveragePool", "GlobalMaxPool"})
@@ -205,6 +211,29 @@ def unshuffle_window(block: int) -> Window:
         size=lambda n: n // block,
         reads=lambda first, last: (first * block, last * block + block - 1),
     )
+
+
+def pad_windows(node: Node, pads: list[int]) -> Windows:
+    """Return the windows of a Pad.
+
+    What lies beyond the picture's border is made of samples within the reach of who reads it.
+
+    Args:
+        node: The Pad.
+        pads: Samples before every axis, then behind every axis.
+
+    Raises:
+        BundleError: If it pads other axes than rows and columns, cuts, or has another mode.
+    """
+    mode = node.text("mode", "constant")
+    if mode not in PAD_MODES:
+        raise BundleError(f"{node.label}: Pad of the mode {mode!r} is refused")
+    if len(pads) != 2 * _NDIM or any(pads[i] for i in (0, 1, _NDIM, _NDIM + 1)):
+        raise BundleError(f"{node.label}: Pad is admitted along rows and columns only")
+    if min(pads) < 0 or max(pads) > _MAX_KERNEL:
+        raise BundleError(f"{node.label}: pads {pads} are out of range")
+    rows, columns = (_convolved(1, 0, (pads[i], pads[i + _NDIM]), 0) for i in _SPATIAL)
+    return rows, columns
 
 
 def resize_windows(node: Node, constants: Constants) -> Windows:

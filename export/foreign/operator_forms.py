@@ -1,0 +1,308 @@
+"""Every node in the form that opset 20 and the graph reader know; sizes that move are taken out.
+
+Identity, Dropout, Cast, whole Slice, Pad by 0,   nothing
+Expand and Resize to the same size
+Pow 2, 0.5, 1                                     Mul, Sqrt, nothing
+Reciprocal, Sum, Mean, ReduceL2, HardSigmoid ...  their parts
+axes and parts as attributes                      as inputs
+Resize to a size                                  Resize by a factor
+GroupNormalization, InstanceNormalization,        their parts, so that what looks at the whole
+a norm of channels that lie last                  picture is a mean
+"""
+
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any, Final
+
+import numpy as np
+
+from camkit.export.foreign.draft import Draft, attributes_of, make_node, scalar
+from camkit.runtime.network.operators import COMPARISONS
+
+Form = Callable[[Draft, Any], bool]
+"""Rewrites a node if it can; returns whether it did."""
+_SPATIAL: Final = [2, 3]
+_REDUCTIONS: Final = ("ReduceMean", "ReduceSum", "ReduceMax", "ReduceMin", "ReduceL2")
+_SAME: Final = ("Identity", "Dropout", "Slice", "Expand", "Reshape", "Pad", "Resize", "Cast")
+_SAME_IF_EQUAL: Final = ("Flatten", "Squeeze", "Unsqueeze", "Transpose", "Concat", "Tile")
+_MAX_FACTOR: Final = 64
+
+
+def rewrite_nodes(draft: Draft) -> None:
+    """Rewrite the nodes of a draft until nothing changes."""
+    changed = True
+    while changed:
+        changed = False
+        for node in list(draft.nodes):
+            if node not in draft.nodes:
+                continue
+            changed |= any(form(draft, node) for form in _FORMS)
+        draft.prune()
+
+
+def _nothing(draft: Draft, node: Any) -> bool:
+    """Remove a node that gives its input as it is."""
+    if node.op_type not in _SAME or node.output[0] not in draft.shapes:
+        return False
+    if len(node.output) > 1 and any(draft.readers(name) for name in node.output[1:]):
+        return False
+    given = node.input[0]
+    same = draft.shapes.get(given) == draft.shapes[node.output[0]]
+    if not same and node.op_type not in ("Identity", "Dropout"):
+        return False
+    if node.op_type == "Slice" and not _is_forward(draft, node):
+        return False
+    if node.op_type == "Cast" and (attributes_of(node)["to"] != 1 or _is_truth(draft, given)):
+        return False
+    if node.op_type == "Identity" and given == draft.source and node.output[0] == draft.target:
+        return False
+    draft.bypass(node)
+    return True
+
+
+def _is_truth(draft: Draft, name: str) -> bool:
+    return any(name in node.output and node.op_type in COMPARISONS for node in draft.nodes)
+
+
+def _mask(draft: Draft, node: Any) -> bool:
+    """Make numbers of what a comparison gives by a Where."""
+    if node.op_type != "Cast" or not _is_truth(draft, node.input[0]):
+        return False
+    one, zero = (draft.constant(np.float32(value)) for value in (1, 0))
+    draft.replace([node], [make_node("Where", [node.input[0], one, zero], node.output[0])])
+    return True
+
+
+def _is_forward(draft: Draft, node: Any) -> bool:
+    steps = draft.constants.get(node.input[4]) if len(node.input) > 4 else None
+    return steps is None or bool((steps > 0).all())
+
+
+def _power(draft: Draft, node: Any) -> bool:
+    exponent = scalar(draft.constants, node.input[1]) if node.op_type == "Pow" else None
+    given, made = node.input[0], node.output[0]
+    if exponent == 2.0:
+        draft.replace([node], [make_node("Mul", [given, given], made)])
+    elif exponent == 0.5:
+        draft.replace([node], [make_node("Sqrt", [given], made)])
+    elif exponent == 1.0:
+        draft.bypass(node)
+    else:
+        return _floating(draft, node) if exponent is not None else False
+    return True
+
+
+def _floating(draft: Draft, node: Any) -> bool:
+    """Make an exponent of whole numbers float32, as the picture is."""
+    values = draft.constants[node.input[1]]
+    if values.dtype == np.float32:
+        return False
+    node.input[1] = draft.constant(values.astype(np.float32))
+    return True
+
+
+def _parts(draft: Draft, node: Any) -> bool:
+    """Replace a node by plain ones."""
+    op, made = node.op_type, node.output[0]
+    if op == "Reciprocal":
+        one = draft.constant(np.float32(1))
+        draft.replace([node], [make_node("Div", [one, node.input[0]], made)])
+        return True
+    if op == "Sum" and len(node.input) > 1:
+        draft.replace([node], _added(draft, list(node.input), made))
+        return True
+    if op == "ReduceL2":
+        square, total = draft.name("square"), draft.name("total")
+        summed = make_node("ReduceSum", [square, *node.input[1:]], total)
+        summed.attribute.extend(node.attribute)
+        nodes = [make_node("Mul", [node.input[0]] * 2, square), summed]
+        draft.replace([node], [*nodes, make_node("Sqrt", [total], made)])
+        return True
+    if op == "Swish" or (op == "Mish" and draft.opset >= 18):
+        return _gated(draft, node)
+    return False
+
+
+def _gated(draft: Draft, node: Any) -> bool:
+    """Replace an activation by the picture times a curve of it."""
+    given, made, curve = node.input[0], node.output[0], draft.name("curve")
+    if node.op_type == "Mish":
+        soft = draft.name("soft")
+        nodes = [make_node("Softplus", [given], soft), make_node("Tanh", [soft], curve)]
+    elif attributes_of(node).get("alpha", 1.0) == 1.0:
+        nodes = [make_node("Sigmoid", [given], curve)]
+    else:
+        return False
+    draft.replace([node], [*nodes, make_node("Mul", [given, curve], made)])
+    return True
+
+
+def _added(draft: Draft, names: list[str], made: str) -> list[Any]:
+    nodes, total = [], names[0]
+    for place, name in enumerate(names[1:], start=2):
+        output = made if place == len(names) else draft.name("sum")
+        nodes.append(make_node("Add", [total, name], output))
+        total = output
+    return nodes
+
+
+def _axes(draft: Draft, node: Any) -> bool:
+    """State the axes of a reduction as an input, counted from 0."""
+    if node.op_type not in _REDUCTIONS or node.input[0] not in draft.shapes:
+        return False
+    attributes, rank = attributes_of(node), len(draft.shapes[node.input[0]][0])
+    if len(node.input) > 1:
+        axes = draft.constants.get(node.input[1], np.zeros(0, np.int64)).ravel().tolist()
+    else:
+        axes = list(attributes.get("axes", []))
+    whole = sorted(axis % rank for axis in axes) or list(range(rank))
+    if len(node.input) > 1 and axes == whole:
+        return False
+    name = draft.constant(np.array(whole, np.int64))
+    keep = attributes.get("keepdims", 1)
+    new = make_node(node.op_type, [node.input[0], name], node.output[0], keepdims=keep)
+    draft.replace([node], [new])
+    return True
+
+
+def _split(draft: Draft, node: Any) -> bool:
+    if node.op_type != "Split" or (len(node.input) > 1 and node.input[1]):
+        return False
+    attributes = attributes_of(node)
+    sizes, axis = attributes.get("split"), attributes.get("axis", 0)
+    if sizes is None and any(name not in draft.shapes for name in node.output):
+        return False
+    if sizes is None:
+        sizes = [draft.shapes[name][0][axis] for name in node.output]
+    new = make_node("Split", [node.input[0], draft.constant(np.array(sizes))], "", axis=axis)
+    del new.output[:]
+    new.output.extend(node.output)
+    draft.replace([node], [new])
+    return True
+
+
+def _resize(draft: Draft, node: Any) -> bool:
+    """Resize by a factor where a size of the picture is asked for."""
+    if node.op_type != "Resize" or len(node.input) < 4 or not node.input[3]:
+        return False
+    shapes = draft.shapes.get(node.input[0]), draft.shapes.get(node.output[0])
+    if shapes[0] is None or shapes[1] is None:
+        return False
+    factors = {
+        tuple(Fraction(b, a) for a, b in zip(given, made, strict=True))
+        for given, made in zip(*shapes, strict=True)
+    }
+    if len(factors) != 1:
+        return False
+    scales = np.array([float(f) for f in factors.pop()], np.float32)
+    new = make_node("Resize", [node.input[0], "", draft.constant(scales)], node.output[0])
+    new.attribute.extend(node.attribute)
+    draft.replace([node], [new])
+    return True
+
+
+def _sliced(draft: Draft, node: Any) -> bool:
+    """State every Slice along the channels by constant bounds."""
+    if node.op_type != "Slice" or node.output[0] not in draft.shapes:
+        return False
+    if len(node.input) < 3 or all(name in draft.constants for name in node.input[1:] if name):
+        return False
+    given, made = (draft.shapes[name][0] for name in (node.input[0], node.output[0]))
+    if given[2:] != made[2:] or len(given) != 4:
+        return False
+    starts = draft.constants.get(node.input[1])
+    if starts is None or starts.size != 1:
+        return False
+    bounds = (int(starts.ravel()[0]), int(starts.ravel()[0]) + made[1], 1)
+    names = [draft.constant(np.array([value], np.int64)) for value in bounds]
+    draft.replace([node], [make_node("Slice", [node.input[0], *names], node.output[0])])
+    return True
+
+
+def _softmax(draft: Draft, node: Any) -> bool:
+    """State the axis of a Softmax, which was another one before opset 13."""
+    if node.op_type != "Softmax" or node.output[0] not in draft.shapes:
+        return False
+    rank = len(draft.shapes[node.output[0]][0])
+    axis = attributes_of(node).get("axis", 1 if draft.opset < 13 else -1) % rank
+    if draft.opset < 13 and axis != rank - 1:
+        return False
+    if attributes_of(node).get("axis") == axis:
+        return False
+    draft.replace([node], [make_node("Softmax", [node.input[0]], node.output[0], axis=axis)])
+    return True
+
+
+def _instance_norm(draft: Draft, node: Any) -> bool:
+    """Replace a norm of every channel over the picture by its parts."""
+    if node.op_type != "InstanceNormalization" or len(draft.shapes[node.output[0]][0]) != 4:
+        return False
+    if not all(name in draft.constants for name in node.input[1:3]):
+        return False
+    scale, bias = (draft.constants[name].reshape(1, -1, 1, 1) for name in node.input[1:3])
+    epsilon = attributes_of(node).get("epsilon", 1e-5)
+    nodes = normed(draft, node.input[0], node.output[0], _SPATIAL, (scale, bias, epsilon))
+    draft.replace([node], nodes)
+    return True
+
+
+def normed(
+    draft: Draft,
+    given: str,
+    made: str,
+    axes: list[int],
+    norm: tuple[Any, Any, float],
+) -> list[Any]:
+    """Return the nodes of a norm over some axes: (x - mean) / sqrt(variance + epsilon), affine."""
+    scale, bias, epsilon = norm
+    over = draft.constant(np.array(axes, np.int64))
+    mean, rest, square, variance, lifted, root, even, scaled = map(
+        draft.name, ("mean", "rest", "square", "variance", "lifted", "root", "even", "scaled")
+    )
+    nodes = [
+        make_node("ReduceMean", [given, over], mean, keepdims=1),
+        make_node("Sub", [given, mean], rest),
+        make_node("Mul", [rest, rest], square),
+        make_node("ReduceMean", [square, over], variance, keepdims=1),
+        make_node("Add", [variance, draft.constant(np.float32(epsilon))], lifted),
+        make_node("Sqrt", [lifted], root),
+        make_node("Div", [rest, root], even),
+        make_node("Mul", [even, draft.constant(np.asarray(scale, np.float32))], scaled),
+        make_node("Add", [scaled, draft.constant(np.asarray(bias, np.float32))], made),
+    ]
+    whole = draft.shapes[given]
+    flat = tuple(tuple(1 if i in axes else n for i, n in enumerate(shape)) for shape in whole)
+    draft.shapes |= dict.fromkeys((rest, square, even, scaled), whole)
+    draft.shapes |= dict.fromkeys((mean, variance, lifted, root), (flat[0], flat[1]))
+    return nodes
+
+
+def _channel_norm(draft: Draft, node: Any) -> bool:
+    """Replace a norm of channels that were put last, between two Transposes, by its parts."""
+    if node.op_type != "LayerNormalization" or len(node.output) != 1:
+        return False
+    before = next((n for n in draft.nodes if node.input[0] in n.output), None)
+    after = draft.only_reader(node.output[0])
+    for neighbour, order in ((before, [0, 2, 3, 1]), (after, [0, 3, 1, 2])):
+        if neighbour is None or neighbour.op_type != "Transpose":
+            return False
+        if list(attributes_of(neighbour).get("perm", [])) != order:
+            return False
+    if attributes_of(node).get("axis", -1) not in (-1, 3):
+        return False
+    given, made = before.input[0], after.output[0]
+    scale = draft.constants[node.input[1]].reshape(1, -1, 1, 1)
+    bias = (
+        draft.constants[node.input[2]].reshape(1, -1, 1, 1)
+        if len(node.input) > 2 and node.input[2]
+        else np.zeros_like(scale)
+    )
+    epsilon = attributes_of(node).get("epsilon", 1e-5)
+    draft.replace([node, after], normed(draft, given, made, [1], (scale, bias, epsilon)))
+    return True
+
+
+_FORMS: Final[tuple[Form, ...]] = (
+    *(_nothing, _mask, _power, _parts, _axes, _split, _resize, _sliced, _softmax),
+    *(_instance_norm, _channel_norm),
+)
