@@ -1,0 +1,245 @@
+"""Every obstacle of a foreign network at once; what it costs, and how a picture is tiled."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from camkit.bundle.facts import NetworkFacts, Port
+from camkit.errors import BundleError, ContractError, ParityError
+from camkit.export.foreign.canonical import canonical_draft, prove_equal, to_model
+from camkit.export.foreign.contract import Contract
+from camkit.export.foreign.onnx_file import ForeignModel, read_model
+from camkit.runtime.content import CELL_PX
+from camkit.runtime.job.walker import FIXED_BYTES
+from camkit.runtime.network.engine import NetworkEngine
+from camkit.runtime.network.graph import inspect_graph
+from camkit.runtime.network.graph_walk import GraphFacts
+from camkit.runtime.network.windows import NetworkWindows, SizedNetwork, WindowLimits, lay_network
+from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES
+
+PICTURE_PX: Final = (4000, 6000)
+"""(height, width) of a picture of 24 megapixels."""
+STAGES_BYTES: Final = 60_000_000
+"""What the stages around a network take at that size, roughly."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Inspection:
+    """What is known of a network.
+
+    Attributes:
+        name: Of its file.
+        model: Decoded.
+        obstacles: What must change before it can be added, all of it.
+        warnings: What its owner should know.
+        facts: Read from its canonical graph; None where there is none.
+        difference: From the original.
+        tiles: How a picture of 24 megapixels is tiled within the usual cap; None where it cannot.
+        needed_bytes: What that takes, the stages around it included.
+    """
+
+    name: str
+    model: ForeignModel
+    obstacles: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
+    facts: GraphFacts | None = None
+    difference: float | None = None
+    tiles: dict[str, Any] | None = None
+    needed_bytes: int | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain JSON values."""
+        model, facts = self.model, self.facts
+        record: dict[str, Any] = {
+            "network": self.name,
+            "opset": model.opset,
+            "type": model.type,
+            "input_channels": model.channels,
+            "obstacles": list(self.obstacles),
+            "warnings": list(self.warnings),
+        }
+        if facts is None:
+            return record
+        return record | {
+            "output_channels": facts.output_channels,
+            "scale": facts.output_scale,
+            "reach_px": facts.receptive_field_radius_px,
+            "stride_px": facts.stride_px,
+            "global_operators": list(facts.global_operators),
+            "parameters": facts.parameters,
+            "kmac_per_pixel": round(facts.mac_per_pixel / 1e3, 3),
+            "bytes_per_pixel": round(facts.block_bytes_per_pixel, 1),
+            "difference": self.difference,
+            "tiles_24mp": self.tiles,
+            "needed_mb_24mp": None if self.needed_bytes is None else self.needed_bytes // 10**6,
+        }
+
+    def lines(self) -> list[str]:
+        """Return lines for people."""
+        model, facts = self.model, self.facts
+        lines = [f"{self.name}: opset {model.opset}, {model.type}, {model.channels} channels in"]
+        if facts is not None:
+            finer = "" if facts.output_scale == 1 else f", {facts.output_scale} times as fine"
+            lines += [
+                f"  gives     {facts.output_channels} channels{finer}",
+                f"  reach     {facts.receptive_field_radius_px} px, stride {facts.stride_px} px",
+                f"  cost      {facts.mac_per_pixel / 1e3:.3g} kMAC per pixel, "
+                f"{facts.block_bytes_per_pixel:.4g} bytes per pixel, {facts.parameters} parameters",
+            ]
+        if self.difference is not None:
+            lines.append(f"  canonical graph within {self.difference:.1e} of the original")
+        if self.tiles is not None and self.needed_bytes is not None:
+            plan = ", ".join(f"{key} {value}" for key, value in self.tiles.items() if key != "mode")
+            lines.append(f"  24 MP     {self.needed_bytes // 10**6} MB: {plan}")
+        lines += [f"  warning   {text}" for text in self.warnings]
+        lines += [f"  obstacle  {text}" for text in self.obstacles]
+        if not self.obstacles:
+            lines.append("  nothing stands in its way")
+        return lines
+
+
+def inspect_network(path: Path, contract: Contract | None = None) -> Inspection:
+    """Look for everything that stands in the way of a network.
+
+    Args:
+        path: Its ONNX.
+        contract: What it should take and give; None looks at the graph alone.
+
+    Raises:
+        DecodeError: If the file cannot be read.
+        BundleError: If it is no network of one picture.
+    """
+    model = read_model(path)
+    draft, obstacles = canonical_draft(model)
+    if draft is None or obstacles:
+        return Inspection(name=path.name, model=model, obstacles=obstacles)
+    try:
+        data = to_model(draft, model.channels)
+        facts = inspect_graph(data)
+        difference, _ = prove_equal(model, data, facts)
+    except (BundleError, ParityError) as error:
+        return Inspection(name=path.name, model=model, obstacles=(str(error),))
+    found = [*_global_obstacles(facts, contract), *contract_obstacles(facts, contract)]
+    tiles = None
+    try:
+        tiles = lay_24_megapixels(data, facts)
+    except ContractError as error:
+        found.append(f"a picture of 24 megapixels within {DEFAULT_MAX_MEM_BYTES // 10**6} MB: {error}")
+    fixed = FIXED_BYTES + STAGES_BYTES
+    return Inspection(
+        name=path.name,
+        model=model,
+        obstacles=tuple(found),
+        warnings=tuple(_warnings(facts)),
+        facts=facts,
+        difference=difference,
+        tiles=None if tiles is None else tiles.to_json(),
+        needed_bytes=None if tiles is None else fixed + tiles.needed_bytes(),
+    )
+
+
+def _global_obstacles(facts: GraphFacts, contract: Contract | None) -> list[str]:
+    names, mode = facts.global_operators, "refuse" if contract is None else contract.mode
+    if not names or mode != "refuse":
+        return []
+    shown = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+    return [
+        f"it looks at the whole picture ({shown}), so tiles would differ from the whole: state "
+        '[global] mode = "constants", "local:N" or "whole" in the contract'
+    ]
+
+
+def contract_obstacles(facts: GraphFacts, contract: Contract | None) -> list[str]:
+    """Return where a graph and a contract disagree."""
+    if contract is None:
+        return []
+    found = []
+    if facts.input_channels != contract.channels:
+        parts = " + ".join(map(str, contract.plane_channels)) + (" + 1" if contract.noise else "")
+        found.append(
+            f"it takes {facts.input_channels} channels; planes of the contract have {parts}"
+        )
+    if contract.scale not in (None, facts.output_scale):
+        found.append(
+            f"its output is {facts.output_scale} time(s) as fine as its input, the contract says "
+            f"{contract.scale}"
+        )
+    if contract.residual != "none":
+        last = contract.plane_channels[-1]
+        if (facts.output_channels, facts.output_scale) != (last, 1):
+            found.append(f"a residual has the {last} channel(s) and the grid of its last plane")
+    expected = {"packed": {(3, 2), (4, 1)}, "mosaic": {(3, 1), (1, 1)}}
+    if contract.is_of_mosaic:
+        allowed = expected[contract.planes]
+        if (facts.output_channels, facts.output_scale) not in allowed:
+            texts = " or ".join(f"{c} channels at scale {s}" for c, s in sorted(allowed))
+            found.append(
+                f"from {contract.planes} planes it gives {facts.output_channels} channels at scale "
+                f"{facts.output_scale}; expected {texts}"
+            )
+    elif facts.output_channels != 3:
+        found.append(f"it gives {facts.output_channels} channels; red, green and blue are expected")
+    return found
+
+
+def _warnings(facts: GraphFacts) -> list[str]:
+    found = []
+    if facts.unblocked_convolutions:
+        names = facts.unblocked_convolutions
+        found.append(
+            f"{len(names)} convolutions off onnxruntime's blocked path ({names[0]}, ...): tiles "
+            "are compared with the whole when it is added"
+        )
+    return found
+
+
+def lay_24_megapixels(data: bytes, facts: GraphFacts) -> NetworkWindows:
+    """Plan the windows of a picture of 24 megapixels within the usual cap.
+
+    Raises:
+        ContractError: If the memory does not do.
+    """
+    engine = NetworkEngine(
+        data, threads=1, scale=facts.output_scale, block_bytes=facts.block_bytes_per_pixel
+    )
+    network = SizedNetwork(
+        size="M",
+        run=engine.run,
+        facts=plain_facts(facts),
+        block_bytes=facts.block_bytes_per_pixel,
+        segments=engine.segments,
+    )
+    limits = WindowLimits(
+        cap_bytes=DEFAULT_MAX_MEM_BYTES,
+        spent_bytes=FIXED_BYTES + STAGES_BYTES,
+        mode="exact",
+        cell_px=CELL_PX,
+    )
+    return lay_network(PICTURE_PX, [network], limits)
+
+
+def plain_facts(facts: GraphFacts, **changes: Any) -> NetworkFacts:
+    """Return facts as a manifest states them, nothing measured yet.
+
+    Args:
+        facts: Read from the graph.
+        changes: Fields that are known besides.
+    """
+    fields: dict[str, Any] = {
+        "member": "network.onnx",
+        "inputs": (Port(name="planes", channels=facts.input_channels),),
+        "outputs": (
+            Port(name="clean", channels=facts.output_channels, scale=facts.output_scale),
+        ),
+        "receptive_field_radius_px": facts.receptive_field_radius_px,
+        "receptive_field_probe_px": 0,
+        "stride_px": facts.stride_px,
+        "global_operators": facts.global_operators,
+        "max_activation": 0.0,
+        "fp16_safe": False,
+        "mac_per_pixel": facts.mac_per_pixel,
+        "bytes_per_pixel": facts.bytes_per_pixel,
+        "parity_max_abs": 0.0,
+        "parameters": facts.parameters,
+    }
+    return NetworkFacts(**(fields | changes))
