@@ -3,6 +3,7 @@
     golden_cases    small captures of known scenes
     folding         its nodes in the form that costs least
     onnx_graph      a network becomes ONNX, held against torch
+    graph_measurements  what running a graph shows
     network_facts   what is measured about it
     proving         golden members, activations on golden cases, the check before a name
     remeasured      a bundle that is there, with parts that were measured
@@ -10,6 +11,7 @@
     energy, card    the card and the preview for people
     parts           the parts of a bundle, and the usual names of their files
     assemble        everything packed, proved, written
+    foreign         trained networks of others
     packing         `camkit.export.bundle` and `camkit export`
 
 Nothing is written when a proof fails.

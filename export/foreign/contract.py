@@ -109,7 +109,7 @@ class Contract:
 
     @property
     def channels(self) -> int:
-        """Return the channels that a network of this contract takes, a map of the noise included."""
+        """Return the channels that its network takes, a map of the noise included."""
         return sum(self.plane_channels) + self.noise
 
 

@@ -122,9 +122,13 @@ def inspect_network(path: Path, contract: Contract | None = None) -> Inspection:
     found = [*_global_obstacles(facts, contract), *contract_obstacles(facts, contract)]
     tiles = None
     try:
-        tiles = lay_24_megapixels(data, facts)
+        size_px = PICTURE_PX
+        if contract is not None and contract.planes == "packed":
+            size_px = (PICTURE_PX[0] // 2, PICTURE_PX[1] // 2)
+        if not facts.global_operators or (contract is not None and contract.mode == "whole"):
+            tiles = lay_whole_picture(data, facts, size_px)
     except ContractError as error:
-        found.append(f"a picture of 24 megapixels within {DEFAULT_MAX_MEM_BYTES // 10**6} MB: {error}")
+        found.append(f"at 24 megapixels, {error}")
     fixed = FIXED_BYTES + STAGES_BYTES
     return Inspection(
         name=path.name,
@@ -193,8 +197,13 @@ def _warnings(facts: GraphFacts) -> list[str]:
     return found
 
 
-def lay_24_megapixels(data: bytes, facts: GraphFacts) -> NetworkWindows:
-    """Plan the windows of a picture of 24 megapixels within the usual cap.
+def lay_whole_picture(data: bytes, facts: GraphFacts, size_px: tuple[int, int]) -> NetworkWindows:
+    """Plan the windows of a picture within the usual cap.
+
+    Args:
+        data: A canonical graph.
+        facts: Read from it.
+        size_px: (height, width) on the grid of its input.
 
     Raises:
         ContractError: If the memory does not do.
@@ -215,7 +224,7 @@ def lay_24_megapixels(data: bytes, facts: GraphFacts) -> NetworkWindows:
         mode="exact",
         cell_px=CELL_PX,
     )
-    return lay_network(PICTURE_PX, [network], limits)
+    return lay_network(size_px, [network], limits)
 
 
 def plain_facts(facts: GraphFacts, **changes: Any) -> NetworkFacts:
@@ -228,9 +237,7 @@ def plain_facts(facts: GraphFacts, **changes: Any) -> NetworkFacts:
     fields: dict[str, Any] = {
         "member": "network.onnx",
         "inputs": (Port(name="planes", channels=facts.input_channels),),
-        "outputs": (
-            Port(name="clean", channels=facts.output_channels, scale=facts.output_scale),
-        ),
+        "outputs": (Port(name="clean", channels=facts.output_channels, scale=facts.output_scale),),
         "receptive_field_radius_px": facts.receptive_field_radius_px,
         "receptive_field_probe_px": 0,
         "stride_px": facts.stride_px,
