@@ -17,17 +17,18 @@
 Nothing is written when a proof fails.
 """
 
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from camkit.export.foreign.doors import add_network, inspect_network
     from camkit.export.packing import bundle
 
-__all__ = ["bundle"]
+__all__ = ["add_network", "bundle", "inspect_network"]
 
 
 def __getattr__(name: str) -> object:
     if name not in __all__:
         raise AttributeError(f"module 'camkit.export' has no attribute {name!r}")
-    from camkit.export import packing
-
-    return packing.bundle
+    home = "camkit.export.packing" if name == "bundle" else "camkit.export.foreign.doors"
+    return getattr(import_module(home), name)

@@ -22,6 +22,8 @@ from camkit.runtime.files.in_memory import FilePath
 from camkit.runtime.output.part_file import refuse_existing
 
 NO_PLATE: Final = "none"
+FOREIGN: Final = (".onnx", ".pth")
+NETWORK_ADD: Final = "camkit network add NET --contract contract.toml --to CAMERA -o NAME.camkit"
 
 
 @checked
@@ -73,6 +75,12 @@ def bundle(
     paths = tuple(map(Path, several))
     if not paths:
         raise ContractError("export needs at least one checkpoint")
+    for path in paths:
+        if path.suffix.lower() in FOREIGN:
+            raise ContractError(
+                f"{path} is no checkpoint of camkit (.pt); a network of your own comes in by "
+                f"`{NETWORK_ADD}`"
+            )
     folder = paths[0].parent
     optics = _usual_file(psf, folder, PSF_NAME)
     if optics is None:

@@ -25,6 +25,8 @@ from camkit.regular_file import check_regular
 MAX_BUNDLE_BYTES: Final = 128 * 2**20
 """Cap on the sum of the uncompressed members (and on the file itself): kernels of 7 fields and 3
 wavelengths, 901 px a side, are 68 MB."""
+NETWORKS: Final = (".onnx", ".pth", ".pt")
+"""Ends of names of files that hold a network."""
 MAX_MEMBERS: Final = 64
 MAX_RATIO: Final = 100
 
@@ -120,7 +122,8 @@ def container_from_bytes(data: bytes, *, what: str, max_bytes: int = MAX_BUNDLE_
     if len(data) > max_bytes:
         raise BundleError(f"{what} is larger than the cap of {max_bytes} bytes; refused")
     if not data.startswith(b"PK\x03\x04"):
-        raise BundleError(f"{what} is not a zip, so not a bundle; expected a .camkit file")
+        hint = "; a network goes into one by `camkit network add`" * what.endswith(NETWORKS)
+        raise BundleError(f"{what} is not a zip, so not a bundle; expected a .camkit file{hint}")
     # Counted before zipfile makes an object of each entry; a few more may occur by chance in
     # compressed data.
     if data.count(_ENTRY_MAGIC) > 2 * MAX_MEMBERS:

@@ -34,7 +34,7 @@ from camkit.export.foreign.global_statistics import (
     with_residual,
 )
 from camkit.export.foreign.inspection import contract_obstacles, plain_facts
-from camkit.export.foreign.onnx_file import read_model
+from camkit.export.foreign.onnx_file import ForeignModel
 from camkit.export.foreign.own_pairs import prove_pairs, read_pairs
 from camkit.export.foreign.wiring import ROLE, ports_of, stages_of
 from camkit.export.golden_cases import (
@@ -55,6 +55,7 @@ from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.plan.decision import DEVELOP
 from camkit.runtime.proof.golden_run import case_work
 from camkit.runtime.proof.laws.proof import MeasuredLaws, measure_laws, with_laws
+from camkit.runtime.proof.one_window import prove_one_window
 
 SIZE: Final = "M"
 MEMBER: Final = f"{ROLE}_{SIZE}.onnx"
@@ -117,8 +118,8 @@ class _Draft:
     warnings: list[str] = field(default_factory=list)
 
 
-def add_network(
-    network: Path,
+def bundle_with_network(
+    model: ForeignModel,
     contract: Contract,
     camera: Bundle,
     out: Path,
@@ -127,7 +128,7 @@ def add_network(
     """Put a network into a copy of a camera's bundle and prove it.
 
     Args:
-        network: Its ONNX.
+        model: The network, decoded.
         contract: What it takes and gives.
         camera: Its own networks are left out.
         out: Bundle to write.
@@ -141,7 +142,6 @@ def add_network(
         ContractError: If network, contract and camera do not go together; names all of it.
         ParityError: If a proof fails; nothing is written then.
     """
-    model = read_model(network)
     canonical = canonical_graph(model)
     _refuse(canonical, contract)
     data = canonical.model
@@ -205,9 +205,12 @@ def _hold_pairs(draft: _Draft) -> None:
 def _settle_statistics(draft: _Draft, folder: Path) -> None:
     """Freeze means over the picture or make them local, and measure what that costs."""
     contract, facts = draft.contract, inspect_graph(draft.data)
-    if not facts.global_operators or contract.mode == "whole":
+    if not facts.global_operators:
         return
     whole = _trial(draft, folder / "whole.camkit")
+    if contract.mode == "whole":
+        draft.report["global_mode"] = prove_one_window(whole, ROLE, SIZE)
+        return
     if contract.mode == "local":
         draft.data = with_local_means(draft.data, contract.local_px)
     else:

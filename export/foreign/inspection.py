@@ -1,14 +1,13 @@
 """Every obstacle of a foreign network at once; what it costs, and how a picture is tiled."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Final
 
 from camkit.bundle.facts import NetworkFacts, Port
 from camkit.errors import BundleError, ContractError, ParityError
 from camkit.export.foreign.canonical import canonical_draft, prove_equal, to_model
 from camkit.export.foreign.contract import Contract
-from camkit.export.foreign.onnx_file import ForeignModel, read_model
+from camkit.export.foreign.onnx_file import ForeignModel
 from camkit.runtime.content import CELL_PX
 from camkit.runtime.job.walker import FIXED_BYTES
 from camkit.runtime.network.engine import NetworkEngine
@@ -98,27 +97,23 @@ class Inspection:
         return lines
 
 
-def inspect_network(path: Path, contract: Contract | None = None) -> Inspection:
+def inspection_of(name: str, model: ForeignModel, contract: Contract | None = None) -> Inspection:
     """Look for everything that stands in the way of a network.
 
     Args:
-        path: Its ONNX.
+        name: Of its file.
+        model: Decoded.
         contract: What it should take and give; None looks at the graph alone.
-
-    Raises:
-        DecodeError: If the file cannot be read.
-        BundleError: If it is no network of one picture.
     """
-    model = read_model(path)
     draft, obstacles = canonical_draft(model)
     if draft is None or obstacles:
-        return Inspection(name=path.name, model=model, obstacles=obstacles)
+        return Inspection(name=name, model=model, obstacles=obstacles)
     try:
         data = to_model(draft, model.channels)
         facts = inspect_graph(data)
         difference, _ = prove_equal(model, data, facts)
     except (BundleError, ParityError) as error:
-        return Inspection(name=path.name, model=model, obstacles=(str(error),))
+        return Inspection(name=name, model=model, obstacles=(str(error),))
     found = [*_global_obstacles(facts, contract), *contract_obstacles(facts, contract)]
     tiles = None
     try:
@@ -131,7 +126,7 @@ def inspect_network(path: Path, contract: Contract | None = None) -> Inspection:
         found.append(f"at 24 megapixels, {error}")
     fixed = FIXED_BYTES + STAGES_BYTES
     return Inspection(
-        name=path.name,
+        name=name,
         model=model,
         obstacles=tuple(found),
         warnings=tuple(_warnings(facts)),
