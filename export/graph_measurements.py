@@ -9,7 +9,7 @@ from camkit.arrays import FloatArray
 from camkit.bundle.facts import HaloError
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.graph_walk import GraphFacts
-from camkit.runtime.network.probe import halo_error_curve, perturbation_reach
+from camkit.runtime.network.probe import TILE_PX, halo_error_curve, perturbation_reach
 from camkit.runtime.network.ranges import node_activations
 
 PROBE_SEED: Final = 5
@@ -55,8 +55,10 @@ def measured_of(
         scale=graph.output_scale,
     )
     reach_px = max(reach.halo_px, graph.receptive_field_radius_px)
-    curve = _halo_error(engine, windows[0][0], reach_px, graph.stride_px)
-    return facts | {"receptive_field_probe_px": reach.halo_px, "halo_error": curve}
+    facts["receptive_field_probe_px"] = reach.halo_px
+    if min(windows[0].shape[2:]) > TILE_PX:
+        facts["halo_error"] = _halo_error(engine, windows[0][0], reach_px, graph.stride_px)
+    return facts
 
 
 def _probe_size(radius_px: int, stride_px: int) -> int:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import permutations
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, Final, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from camkit.arrays import FloatArray
 from camkit.bundle.stages.foreign.pack import CELL_PX, PLACES
 from camkit.colorimetry import Matrix
 from camkit.errors import ContractError, DecodeError, ParityError
-from camkit.export.foreign.contract import SPACES, Affine, Contract, Order
+from camkit.export.foreign.contract import SPACES, Affine, Contract, Residual
 from camkit.regular_file import check_regular
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.rows import ArrayRows
@@ -50,6 +50,21 @@ class Pair:
     given: FloatArray
     made: FloatArray
     noise: FloatArray | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Trial:
+    """A way to read pairs.
+
+    Attributes:
+        contract: With its residual, which need not be that of the graph.
+        baked: Residual that is part of the graph.
+        swapped: Where red and blue are swapped: input, output, or both in words.
+    """
+
+    contract: Contract
+    baked: Residual
+    swapped: str = ""
 
 
 def read_pairs(path: Path) -> tuple[Pair, ...]:
@@ -124,58 +139,62 @@ def prove_pairs(
     """
     engine = NetworkEngine(data, threads=1, scale=scale)
 
-    def worst(one: Contract, *, swapped: str = "") -> float:
-        return max(_difference(p, one, engine.run, matrix, stride_px, swapped) for p in pairs)
+    def worst(trial: _Trial) -> float:
+        return max(_difference(pair, trial, engine.run, matrix, stride_px) for pair in pairs)
 
-    difference = worst(contract)
+    usual = _Trial(contract=contract, baked=contract.residual)
+    difference = worst(usual)
     if difference <= TOLERANCE:
         return difference
-    for reason, other, swapped in _mistakes(contract):
-        if worst(other, swapped=swapped) <= EXPLAINED:
-            raise ParityError(
-                f"the owner's pairs differ by {difference:.3g} of full scale through the contract, "
-                f"allowed {TOLERANCE:g}. They agree {reason}"
-            )
+    reasons = [reason for reason, trial in _mistakes(usual) if worst(trial) <= EXPLAINED]
+    hint = (
+        f"They agree {', or '.join(dict.fromkeys(reasons))}"
+        if reasons
+        else "None of the common mistakes explains it (R and B, order of a cell, range, curve, "
+        "residual, space of the pairs)"
+    )
     raise ParityError(
         f"the owner's pairs differ by {difference:.3g} of full scale through the contract, allowed "
-        f"{TOLERANCE:g}. None of the common mistakes explains it (R and B, order of a cell, range, "
-        "curve, residual, space of the pairs)"
+        f"{TOLERANCE:g}. {hint}"
     )
 
 
-def _mistakes(contract: Contract) -> Iterator[tuple[str, Contract, str]]:
-    """Yield how pairs would agree: in words, the contract without a mistake, what is swapped."""
+def _mistakes(usual: _Trial) -> Iterator[tuple[str, _Trial]]:
+    """Yield common mistakes: how the pairs would agree, and the way to read them then."""
+    contract = usual.contract
     for what in ("input and output", "input", "output"):
-        yield f"with R and B of {what} swapped", contract, what
-    for top in (255.0, 1.0):
-        full = Affine(gain=(top,), offset=(0.0,))
-        both = replace(contract, numbers=full, output_numbers=full)
-        yield f"with range = [0, {top:g}]", both, ""
-        yield f"with input.range = [0, {top:g}]", replace(contract, numbers=full), ""
-        yield f"with output.range = [0, {top:g}]", replace(contract, output_numbers=full), ""
-    signed = Affine(gain=(2.0,), offset=(-1.0,))
-    yield (
-        "with range = [-1, 1]",
-        replace(contract, numbers=signed, output_numbers=signed),
-        "",
-    )
-    spaces = [name for name, coding in SPACES.items() if coding is not None]
-    for space in spaces:
+        yield f"with R and B of {what} swapped", replace(usual, swapped=what)
+    for reason, changes in _changes(contract):
+        yield f"with {reason}", replace(usual, contract=replace(contract, **changes))
+
+
+def _changes(contract: Contract) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield changes of a contract, one common mistake each."""
+    ends = {
+        "[0, 255]": Affine(gain=(255.0,)),
+        "[0, 1]": Affine(),
+        "[-1, 1]": Affine(gain=(2.0,), offset=(-1.0,)),
+    }
+    for text, numbers in ends.items():
+        yield f"range = {text}", {"numbers": numbers, "output_numbers": numbers}
+        yield f"input.range = {text}", {"numbers": numbers}
+        yield f"output.range = {text}", {"output_numbers": numbers}
+    for space in (name for name, coding in SPACES.items() if coding is not None):
         if not contract.is_of_mosaic:
-            other = replace(contract, space=space, output_space=space)
-            yield f'with space = "{space}"', other, ""
-        yield f'with output.space = "{space}"', replace(contract, output_space=space), ""
-        yield f'with proof.space = "{space}"', replace(contract, pairs_space=space), ""
+            yield f'space = "{space}"', {"space": space, "output_space": space}
+        yield f'output.space = "{space}"', {"output_space": space}
+        yield f'proof.space = "{space}"', {"pairs_space": space}
+    for residual in get_args(Residual):
+        if residual != contract.residual:
+            yield f'residual = "{residual}"', {"residual": residual}
     if contract.planes == "packed":
         for order in permutations(PLACES):
             named = ", ".join(f'"{colour}"' for colour in order)
-            yield f"with order = [{named}]", replace(contract, order=cast("Order", order)), ""
+            yield f"order = [{named}]", {"order": order}
 
 
-def _difference(
-    pair: Pair, contract: Contract, run: Run, matrix: Matrix, stride_px: int, swapped: str
-) -> float:
-    made = _through(pair, contract, run, matrix, stride_px, swapped)
+def _difference(pair: Pair, trial: _Trial, run: Run, matrix: Matrix, stride_px: int) -> float:
+    made = _through(pair, trial, run, matrix, stride_px)
     height, width = made.shape[1:]
     expected = pair.made[:, :height, :width]
     if expected.shape != made.shape:
@@ -187,13 +206,10 @@ def _difference(
     return float(np.abs(made - expected).max(initial=0)) / largest
 
 
-def _through(
-    pair: Pair, contract: Contract, run: Run, matrix: Matrix, stride_px: int, swapped: str
-) -> FloatArray:
+def _through(pair: Pair, trial: _Trial, run: Run, matrix: Matrix, stride_px: int) -> FloatArray:
     """Return what the stages of a contract make of a picture, in the space of the pairs."""
+    contract = trial.contract
     light = _light(pair, contract, matrix, stride_px)
-    if "input" in swapped:
-        light = light[::-1].copy()
     if contract.planes == "packed":
         rows = PackedRows(ArrayRows(light), "RGGB", contract.order)
         cells = rows.read(0, rows.shape[1] - 1)  # without the last ones, which are mirrored
@@ -204,21 +220,33 @@ def _through(
     for count in contract.plane_channels:
         end = start + count
         coding.encode(light[start:end], planes[start:end])
+        if "input" in trial.swapped:
+            planes[start:end] = planes[start:end][::-1].copy()
         start = end
     if contract.noise and pair.noise is not None:
         planes[start:] = pair.noise[:, : light.shape[1], : light.shape[2]]
-    made = run(planes[None])[0].copy()
+    last = planes[start - contract.plane_channels[-1] : start]
+    made = _with_residual(run(planes[None])[0].copy(), last, trial)
+    if "output" in trial.swapped:
+        made = made[::-1].copy()
     _coding(contract.output_space, matrix, contract.output_numbers, contract.exposure).decode(made)
     if made.shape[0] == len(PLACES):
         woven = WovenRows(ArrayRows(made), contract.order)
         made = woven.read(0, woven.shape[1])
-    if "output" in swapped:
-        made = made[::-1].copy()
     if made.shape[0] == _COLOURS:
         out = np.empty_like(made)
         _coding(contract.pairs_space, matrix).encode(made, out)
         return out
     return made
+
+
+def _with_residual(made: FloatArray, plane: FloatArray, trial: _Trial) -> FloatArray:
+    """Return what a graph with one residual would give with another."""
+    wanted = trial.contract.residual
+    if wanted == trial.baked or made.shape != plane.shape:
+        return made
+    raw = {"none": made, "added": made - plane, "subtracted": plane - made}[trial.baked]
+    return {"none": raw, "added": plane + raw, "subtracted": plane - raw}[wanted]
 
 
 def _light(pair: Pair, contract: Contract, matrix: Matrix, stride_px: int) -> FloatArray:

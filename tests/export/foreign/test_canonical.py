@@ -130,7 +130,7 @@ def test_weights_in_a_file_beside_the_model_are_taken_in(tmp_path: Path) -> None
     made = canonical_graph(read_model(tmp_path / "net.onnx"))
     assert made.difference <= TOLERANCE
     (tmp_path / "w").unlink()
-    with pytest.raises(DecodeError, match="net.onnx"):
+    with pytest.raises(DecodeError, match=r"net\.onnx"):
         read_model(tmp_path / "net.onnx")
 
 

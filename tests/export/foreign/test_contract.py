@@ -67,9 +67,7 @@ def test_mean_and_deviation_are_those_of_torchvision() -> None:
         ),
     ],
 )
-def test_values_that_do_not_go_together_are_refused(
-    given: dict[str, object], message: str
-) -> None:
+def test_values_that_do_not_go_together_are_refused(given: dict[str, object], message: str) -> None:
     with pytest.raises(ContractError, match=message):
         to_contract({"input": given})
 

@@ -18,8 +18,8 @@ from camkit.export.foreign.global_statistics import (
 from camkit.export.foreign.onnx_file import foreign_model
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.graph import inspect_graph
-from camkit.runtime.rows import ArrayRows
 from camkit.runtime.network.tiling import TileLimits, infer_bands, lay_windows
+from camkit.runtime.rows import ArrayRows
 from tests.bundle_factory import make_model
 from tests.foreign_networks import NAFNet, NormedUnet, exported, seeded
 
@@ -82,7 +82,7 @@ def test_an_extreme_of_the_whole_picture_has_no_local_mean() -> None:
         helper.make_node("Div", ["input", "most"], ["output"], "share"),
     ]
     data = make_model(nodes, {}, channels=(3, 3)).SerializeToString()
-    with pytest.raises(BundleError, match="pool: a GlobalMaxPool .* has no local mean"):
+    with pytest.raises(BundleError, match=r"pool: a GlobalMaxPool .* has no local mean"):
         with_local_means(data, 64)
 
 
