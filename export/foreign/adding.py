@@ -89,7 +89,7 @@ _PROBE: Final = CaseRecipe(scene_seed=30, exposure=0.9, iso=400.0, field=0.6, si
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Label:
-    """What the new bundle is called.
+    """The name of the new bundle, and what is known of its weights.
 
     Attributes:
         name: Of the camera; None for that of the file.
@@ -125,7 +125,7 @@ def bundle_with_network(
     out: Path,
     label: Label | None = None,
 ) -> dict[str, Any]:
-    """Put a network into a copy of a camera's bundle and prove it.
+    """Add a network to a copy of a camera's bundle and prove it.
 
     Args:
         model: The network, decoded.
@@ -166,17 +166,17 @@ def bundle_with_network(
 
 
 def _refuse(canonical: CanonicalGraph, contract: Contract) -> None:
-    found = contract_obstacles(canonical.facts, contract)
+    findings = contract_obstacles(canonical.facts, contract)
     if canonical.facts.global_operators and contract.mode == "refuse":
         names = ", ".join(canonical.facts.global_operators[:3])
-        found.append(
+        findings.append(
             f"the network looks at the whole picture ({names}, "
             f"{len(canonical.facts.global_operators)} in all), so tiles would differ from the "
             'whole: state [global] mode = "constants" (frozen on calibration pictures), "local:N" '
             '(means of N px around) or "whole" (one window)'
         )
-    if found:
-        raise ContractError("; ".join(found))
+    if findings:
+        raise ContractError("; ".join(findings))
 
 
 def _hold_pairs(draft: _Draft) -> None:
@@ -255,8 +255,8 @@ def _members(draft: _Draft) -> dict[str, bytes]:
         for facts in sizes.values()
         for name in (facts.member, facts.fp16_member)
     }
-    kept = [name for name in camera.names if name not in networks and name not in _LEFT_OUT]
-    return {name: camera.member(name) for name in kept} | {MEMBER: draft.data}
+    remaining = [name for name in camera.names if name not in networks and name not in _LEFT_OUT]
+    return {name: camera.member(name) for name in remaining} | {MEMBER: draft.data}
 
 
 def _manifest(draft: _Draft, facts: NetworkFacts) -> Manifest:

@@ -91,11 +91,11 @@ def _obstacles(draft: Draft) -> list[str]:
     for node in draft.nodes:
         if node.op_type not in ALLOWED_OPERATORS:
             counts[node.op_type] = counts.get(node.op_type, 0) + 1
-    found = []
+    findings = []
     for op, count in counts.items():
         times = "" if count == 1 else f" ({count} times)"
         reason = _REASONS.get(op, "it is not among the operators whose reach is known")
-        found.append(f"operator {op}{times}: {reason}")
+        findings.append(f"operator {op}{times}: {reason}")
     moving = sorted(
         {
             node.op_type
@@ -103,8 +103,8 @@ def _obstacles(draft: Draft) -> list[str]:
             if node.op_type in ALLOWED_OPERATORS and draft.moving.keys() & set(node.input)
         }
     )
-    found += [f"{op} by numbers that depend on the size of the picture" for op in moving]
-    return found
+    findings += [f"{op} by numbers that depend on the size of the picture" for op in moving]
+    return findings
 
 
 def to_model(draft: Draft, channels: int) -> bytes:
@@ -195,13 +195,13 @@ def prove_equal(
     is_half = model.type in ("float16", "bfloat16")
     worst, worst_half = 0.0, 0.0
     for window in (*_windows(facts), *more):
-        made = engine.run(window)
+        result = engine.run(window)
         expected = tensor_values(widened, [target], {source: window})[target]
-        worst = max(worst, _difference(made, expected))
+        worst = max(worst, _difference(result, expected))
         if is_half and float(np.abs(window).max(initial=0)) <= 1:
             half = {source: window.astype(np.float16)}
             expected = tensor_values(model.original, [target], half)[target]
-            worst_half = max(worst_half, _difference(made, expected.astype(np.float32)))
+            worst_half = max(worst_half, _difference(result, expected.astype(np.float32)))
     if not worst <= TOLERANCE or not worst_half <= HALF_TOLERANCE:
         raise ParityError(
             f"the canonical graph differs from the original by {max(worst, worst_half):.3g} of "
@@ -221,8 +221,10 @@ def _windows(facts: GraphFacts) -> list[FloatArray]:
     ]
 
 
-def _difference(made: FloatArray, expected: FloatArray) -> float:
-    if made.shape != expected.shape:
-        raise ParityError(f"the canonical graph gives {made.shape}, the original {expected.shape}")
+def _difference(result: FloatArray, expected: FloatArray) -> float:
+    if result.shape != expected.shape:
+        raise ParityError(
+            f"the canonical graph gives {result.shape}, the original {expected.shape}"
+        )
     largest = max(1.0, float(np.abs(expected).max(initial=0)))
-    return float(np.abs(made - expected).max(initial=0)) / largest
+    return float(np.abs(result - expected).max(initial=0)) / largest

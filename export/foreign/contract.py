@@ -1,4 +1,4 @@
-"""What a foreign network takes and gives, as its owner states it in a TOML file.
+"""The contract of a foreign network: what it takes and gives, by its owner's TOML file.
 
     [input]   planes, order, space, range or mean and std, gain, noise, scale
     [output]  space, range or mean and std, residual, scale

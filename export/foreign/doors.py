@@ -40,10 +40,10 @@ def inspect_network(
         ContractError: If the contract has faults, or the state dict needs a module.
         BundleError: If it is no network of one picture.
     """
-    stated = None if contract is None else read_contract(Path(contract))
+    terms = None if contract is None else read_contract(Path(contract))
     path = Path(network)
     model = _model(path, module, config or {}, "network inspect")
-    return inspection.inspection_of(path.name, model, stated)
+    return inspection.inspection_of(path.name, model, terms)
 
 
 @checked
@@ -52,7 +52,7 @@ def add_network(
     out: FilePath,
     *,
     contract: FilePath | Mapping[str, Any],
-    to: FilePath,
+    camera: FilePath,
     pairs: FilePath | None = None,
     module: str | None = None,
     config: Mapping[str, Any] | None = None,
@@ -62,13 +62,13 @@ def add_network(
     training_data: str = "not stated",
     overwrite: bool = False,
 ) -> dict[str, Any]:
-    """Put a trained network into a copy of a camera's bundle and prove it.
+    """Add a trained network to a copy of a camera's bundle and prove it.
 
     Args:
         network: ONNX, or a state dict of torch.
         out: Bundle to write (.camkit).
         contract: What it takes and gives: a file (.toml), or its tables.
-        to: Bundle of the camera, name or path; its own networks are left out.
+        camera: Its bundle, name or path; its own networks are left out.
         pairs: Pairs of the owner's own script (.npz); None for those of the contract, if any.
         module: Class of a state dict's network, "package:Class" (needs torch).
         config: Arguments of that class.
@@ -87,13 +87,13 @@ def add_network(
         ParityError: If a proof fails; nothing is written then.
     """
     refuse_existing([Path(out)], overwrite=overwrite)
-    stated = _contract(contract)
+    terms = _contract(contract)
     if pairs is not None:
-        stated = replace(stated, pairs=Path(pairs))
-    camera = open_bundle(find_bundle(str(to)))
+        terms = replace(terms, pairs=Path(pairs))
+    bundle = open_bundle(find_bundle(str(camera)))
     model = _model(Path(network), module, config or {}, "network add")
     label = adding.Label(name=name, version=version, licence=licence, training_data=training_data)
-    return adding.bundle_with_network(model, stated, camera, Path(out), label)
+    return adding.bundle_with_network(model, terms, bundle, Path(out), label)
 
 
 def to_config(words: Sequence[str]) -> dict[str, Any]:

@@ -57,27 +57,27 @@ class Draft:
         return readers[0] if len(readers) == 1 and name != self.target else None
 
     def replace(self, old: Iterable[Any], new: Iterable[Any]) -> None:
-        """Put nodes in the place of the last of some others."""
-        gone = list(old)
-        place = max(self.nodes.index(node) for node in gone)
+        """Write nodes in the place of the last of some others."""
+        old_nodes = list(old)
+        place = max(self.nodes.index(node) for node in old_nodes)
         self.nodes[place + 1 : place + 1] = list(new)
-        for node in gone:
+        for node in old_nodes:
             self.nodes.remove(node)
 
     def bypass(self, node: Any) -> None:
         """Remove a node that gives its first input as it is."""
-        given, made = node.input[0], node.output[0]
+        source, result = node.input[0], node.output[0]
         self.nodes.remove(node)
-        if made == self.target:
-            self._rename(given, made)
+        if result == self.target:
+            self._rename(source, result)
             return
         for other in self.nodes:
             for place, name in enumerate(other.input):
-                if name == made:
-                    other.input[place] = given
+                if name == result:
+                    other.input[place] = source
 
     def _rename(self, old: str, new: str) -> None:
-        """Let the tensor `old` be called as the output, unless it is the input."""
+        """Rename the tensor `old` to that of the output, unless it is the input."""
         if old == self.source or old in self.constants:
             self.nodes.append(make_node("Identity", [old], new))
             return
@@ -89,14 +89,14 @@ class Draft:
 
     def prune(self) -> None:
         """Remove nodes and constants that lead nowhere."""
-        needed, kept = {self.target}, []
+        names_read, remaining = {self.target}, []
         for node in reversed(self.nodes):
-            if needed.intersection(node.output):
-                needed.update(name for name in node.input if name)
-                kept.append(node)
-        self.nodes = kept[::-1]
-        self.constants = {name: a for name, a in self.constants.items() if name in needed}
-        self.moving = {name: a for name, a in self.moving.items() if name in needed}
+            if names_read.intersection(node.output):
+                names_read.update(name for name in node.input if name)
+                remaining.append(node)
+        self.nodes = remaining[::-1]
+        self.constants = {name: a for name, a in self.constants.items() if name in names_read}
+        self.moving = {name: a for name, a in self.moving.items() if name in names_read}
 
     def channels(self, name: str) -> int:
         """Return the channels of a tensor."""

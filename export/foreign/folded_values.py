@@ -41,9 +41,9 @@ def folded(model: ForeignModel) -> Draft:
             constants[name] = first[name]
         else:
             moving[name] = first[name], second[name]
-    found = {id(node) for node in still}
+    still_ids = {id(node) for node in still}
     draft = Draft(
-        nodes=[_copied(node) for node in graph.node if id(node) not in found],
+        nodes=[_copied(node) for node in graph.node if id(node) not in still_ids],
         constants=constants,
         moving=moving,
         shapes={},
@@ -62,14 +62,14 @@ def _copied(node: Any) -> Any:
     return copy
 
 
-def _independent(nodes: Any, known: set[str]) -> list[Any]:
+def _independent(nodes: Any, still_names: set[str]) -> list[Any]:
     """Return the nodes that do not look at the picture's samples."""
     still = []
     for node in nodes:
         if node.op_type in _RANDOM:
             continue
-        if node.op_type in _SHAPES or known.issuperset(node.input):
-            known.update(node.output)
+        if node.op_type in _SHAPES or still_names.issuperset(node.input):
+            still_names.update(node.output)
             still.append(node)
     return still
 
@@ -114,7 +114,7 @@ def _shapes_at(draft: Draft, channels: int, index: int) -> dict[str, Shape]:
     )
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", draft.opset)])
     inferred = onnx.shape_inference.infer_shapes(model, data_prop=True).graph
-    shapes = {draft.source: (1, channels, *SIZES_PX[index])}
+    shapes: dict[str, Shape] = {draft.source: (1, channels, *SIZES_PX[index])}
     for value in (*inferred.value_info, *inferred.output):
         dims = value.type.tensor_type.shape.dim
         if value.type.tensor_type.HasField("shape") and all(d.HasField("dim_value") for d in dims):

@@ -41,20 +41,20 @@ def with_constants(data: bytes, windows: Iterable[FloatArray]) -> bytes:
         BundleError: If one of them cannot be frozen.
     """
     names = {node.label: node.outputs[0] for node in _global_nodes(data)}
-    asked = onnx.load_from_string(data)
-    del asked.graph.output[:]
-    asked.graph.output.extend(onnx.ValueInfoProto(name=name) for name in names.values())
+    probe = onnx.load_from_string(data)
+    del probe.graph.output[:]
+    probe.graph.output.extend(onnx.ValueInfoProto(name=name) for name in names.values())
     sums: dict[str, Any] = {}
     count = 0
     for window in windows:
-        values = tensor_values(asked.SerializeToString(), list(names.values()), {"input": window})
+        values = tensor_values(probe.SerializeToString(), list(names.values()), {"input": window})
         for name, value in values.items():
             sums[name] = sums.get(name, 0.0) + value.astype(np.float64)
         count += 1
     proto = onnx.load_from_string(data)
-    kept = [node for node in proto.graph.node if node.name not in names]
+    remaining = [node for node in proto.graph.node if node.name not in names]
     del proto.graph.node[:]
-    proto.graph.node.extend(kept)
+    proto.graph.node.extend(remaining)
     proto.graph.initializer.extend(
         numpy_helper.from_array((value / count).astype(np.float32), name)
         for name, value in sums.items()
@@ -147,12 +147,12 @@ def _local_mean(proto: Any, node: Node, walk: Walk, side_px: int) -> list[Any]:
     if side_px < _LEAST_CELLS * cell * step:
         cell = 1
     count = max(1, round(side_px / float(step * cell)) // 2 * 2 + 1)
-    nodes, given = [], node.inputs[0]
+    nodes, source = [], node.inputs[0]
     if cell > 1:
-        given = f"{name}_cells"
-        nodes.append(_pool(node.inputs[0], given, (cell, cell), strides=[cell, cell]))
+        source = f"{name}_cells"
+        nodes.append(_pool(node.inputs[0], source, (cell, cell), strides=[cell, cell]))
     wide = f"{name}_rows"
-    nodes.append(_pool(given, wide, (count, 1)))
+    nodes.append(_pool(source, wide, (count, 1)))
     last = f"{name}_means" if cell > 1 else name
     nodes.append(_pool(wide, last, (1, count)))
     if cell > 1:
@@ -173,14 +173,14 @@ def _local_mean(proto: Any, node: Node, walk: Walk, side_px: int) -> list[Any]:
     return nodes
 
 
-def _pool(given: str, made: str, kernel: tuple[int, int], **facts: Any) -> Any:
+def _pool(source: str, result: str, kernel: tuple[int, int], **facts: Any) -> Any:
     """Return a mean that leaves out what lies beyond the picture."""
     pads = [0] * 4 if facts else [kernel[0] // 2, kernel[1] // 2] * 2
     return helper.make_node(
         "AveragePool",
-        [given],
-        [made],
-        name=made,
+        [source],
+        [result],
+        name=result,
         kernel_shape=list(kernel),
         pads=pads,
         count_include_pad=0,

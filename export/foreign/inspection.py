@@ -24,7 +24,7 @@ STAGES_BYTES: Final = 60_000_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Inspection:
-    """What is known of a network.
+    """The findings about a network.
 
     Attributes:
         name: Of its file.
@@ -98,7 +98,7 @@ class Inspection:
 
 
 def inspection_of(name: str, model: ForeignModel, contract: Contract | None = None) -> Inspection:
-    """Look for everything that stands in the way of a network.
+    """Find everything that stands in the way of a network.
 
     Args:
         name: Of its file.
@@ -114,7 +114,7 @@ def inspection_of(name: str, model: ForeignModel, contract: Contract | None = No
         difference, _ = prove_equal(model, data, facts)
     except (BundleError, ParityError) as error:
         return Inspection(name=name, model=model, obstacles=(str(error),))
-    found = [*_global_obstacles(facts, contract), *contract_obstacles(facts, contract)]
+    findings = [*_global_obstacles(facts, contract), *contract_obstacles(facts, contract)]
     tiles = None
     try:
         size_px = PICTURE_PX
@@ -123,12 +123,12 @@ def inspection_of(name: str, model: ForeignModel, contract: Contract | None = No
         if not facts.global_operators or (contract is not None and contract.mode == "whole"):
             tiles = lay_whole_picture(data, facts, size_px)
     except ContractError as error:
-        found.append(f"at 24 megapixels, {error}")
+        findings.append(f"at 24 megapixels, {error}")
     fixed = FIXED_BYTES + STAGES_BYTES
     return Inspection(
         name=name,
         model=model,
-        obstacles=tuple(found),
+        obstacles=tuple(findings),
         warnings=tuple(_warnings(facts)),
         facts=facts,
         difference=difference,
@@ -141,9 +141,10 @@ def _global_obstacles(facts: GraphFacts, contract: Contract | None) -> list[str]
     names, mode = facts.global_operators, "refuse" if contract is None else contract.mode
     if not names or mode != "refuse":
         return []
-    shown = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+    names_text = ", ".join(names[:3]) + more
     return [
-        f"it looks at the whole picture ({shown}), so tiles would differ from the whole: state "
+        f"it looks at the whole picture ({names_text}), so tiles would differ from it: state "
         '[global] mode = "constants", "local:N" or "whole" in the contract'
     ]
 
@@ -152,44 +153,46 @@ def contract_obstacles(facts: GraphFacts, contract: Contract | None) -> list[str
     """Return where a graph and a contract disagree."""
     if contract is None:
         return []
-    found = []
+    findings = []
     if facts.input_channels != contract.channels:
         parts = " + ".join(map(str, contract.plane_channels)) + (" + 1" if contract.noise else "")
-        found.append(
+        findings.append(
             f"it takes {facts.input_channels} channels; planes of the contract have {parts}"
         )
     if contract.scale not in (None, facts.output_scale):
-        found.append(
+        findings.append(
             f"its output is {facts.output_scale} time(s) as fine as its input, the contract says "
             f"{contract.scale}"
         )
     if contract.residual != "none":
         last = contract.plane_channels[-1]
         if (facts.output_channels, facts.output_scale) != (last, 1):
-            found.append(f"a residual has the {last} channel(s) and the grid of its last plane")
+            findings.append(f"a residual has the {last} channel(s) and the grid of its last plane")
     expected = {"packed": {(3, 2), (4, 1)}, "mosaic": {(3, 1), (1, 1)}}
     if contract.is_of_mosaic:
         allowed = expected[contract.planes]
         if (facts.output_channels, facts.output_scale) not in allowed:
             texts = " or ".join(f"{c} channels at scale {s}" for c, s in sorted(allowed))
-            found.append(
+            findings.append(
                 f"from {contract.planes} planes it gives {facts.output_channels} channels at scale "
                 f"{facts.output_scale}; expected {texts}"
             )
     elif facts.output_channels != 3:
-        found.append(f"it gives {facts.output_channels} channels; red, green and blue are expected")
-    return found
+        findings.append(
+            f"it gives {facts.output_channels} channels; red, green and blue are expected"
+        )
+    return findings
 
 
 def _warnings(facts: GraphFacts) -> list[str]:
-    found = []
+    findings = []
     if facts.unblocked_convolutions:
         names = facts.unblocked_convolutions
-        found.append(
+        findings.append(
             f"{len(names)} convolutions off onnxruntime's blocked path ({names[0]}, ...): tiles "
             "are compared with the whole when it is added"
         )
-    return found
+    return findings
 
 
 def lay_whole_picture(data: bytes, facts: GraphFacts, size_px: tuple[int, int]) -> NetworkWindows:

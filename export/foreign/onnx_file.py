@@ -96,19 +96,19 @@ def foreign_model(proto: Any) -> ForeignModel:
 
 
 def _obstacles(proto: Any, opset: int, type_: str) -> list[str]:
-    found = []
+    findings = []
     if opset not in OPSETS:
-        found.append(f"opset {opset}; {OPSETS[0]} to {OPSETS[-1]} are taken: export it again")
+        findings.append(f"opset {opset}; {OPSETS[0]} to {OPSETS[-1]} are taken: export it again")
     if len(proto.graph.output) != 1:
         names = ", ".join(value.name for value in proto.graph.output)
-        found.append(f"{len(proto.graph.output)} outputs ({names}); one is taken")
+        findings.append(f"{len(proto.graph.output)} outputs ({names}); one is taken")
     if type_ not in ("float", "float16", "bfloat16", "double"):
-        found.append(f"an input of {type_}; numbers of floating point are taken")
+        findings.append(f"an input of {type_}; numbers of floating point are taken")
     foreign = {(node.domain, node.op_type) for node in proto.graph.node} - {
         (domain, node.op_type) for domain in _DOMAINS for node in proto.graph.node
     }
-    found += [f"operator {op} of the domain {domain}" for domain, op in sorted(foreign)]
-    return found
+    findings += [f"operator {op} of the domain {domain}" for domain, op in sorted(foreign)]
+    return findings
 
 
 def _input(proto: Any) -> Any:
@@ -124,20 +124,18 @@ def _input(proto: Any) -> Any:
 
 
 def _open_sides(proto: Any) -> int:
-    """Leave height and width open, one picture at a time; return the channels of the input."""
-    given = _input(proto)
-    dims = list(given.type.tensor_type.shape.dim)
+    """Open height and width, one picture at a time; return the channels of the input."""
+    port = _input(proto)
+    dims = list(port.type.tensor_type.shape.dim)
     if len(dims) != 4:
         raise BundleError(
-            f"its input {given.name!r} has {len(dims)} axes; (1, channels, height, width) is taken"
+            f"its input {port.name!r} has {len(dims)} axes; (1, channels, height, width) is taken"
         )
     channels = dims[1].dim_value if dims[1].HasField("dim_value") else _first_weights(proto)
     if not channels:
-        raise BundleError(f"its input {given.name!r} does not state its channels")
-    kind = given.type.tensor_type.elem_type
-    given.CopyFrom(
-        helper.make_tensor_value_info(given.name, kind, [1, channels, "height", "width"])
-    )
+        raise BundleError(f"its input {port.name!r} does not state its channels")
+    kind = port.type.tensor_type.elem_type
+    port.CopyFrom(helper.make_tensor_value_info(port.name, kind, [1, channels, "height", "width"]))
     for output in proto.graph.output:
         output.type.tensor_type.ClearField("shape")
     return int(channels)
@@ -153,7 +151,7 @@ def _first_weights(proto: Any) -> int:
 
 
 def _widen(proto: Any) -> None:
-    """Turn numbers of half, brain and double precision into float32, in place."""
+    """Convert numbers of half, brain and double precision to float32, in place."""
     graph = proto.graph
     for tensor in graph.initializer:
         _widen_tensor(tensor)

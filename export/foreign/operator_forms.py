@@ -46,15 +46,15 @@ def _nothing(draft: Draft, node: Any) -> bool:
         return False
     if len(node.output) > 1 and any(draft.readers(name) for name in node.output[1:]):
         return False
-    given = node.input[0]
-    same = draft.shapes.get(given) == draft.shapes[node.output[0]]
+    source = node.input[0]
+    same = draft.shapes.get(source) == draft.shapes[node.output[0]]
     if not same and node.op_type not in ("Identity", "Dropout"):
         return False
     if node.op_type == "Slice" and not _is_forward(draft, node):
         return False
-    if node.op_type == "Cast" and (attributes_of(node)["to"] != 1 or _is_truth(draft, given)):
+    if node.op_type == "Cast" and (attributes_of(node)["to"] != 1 or _is_truth(draft, source)):
         return False
-    if node.op_type == "Identity" and given == draft.source and node.output[0] == draft.target:
+    if node.op_type == "Identity" and source == draft.source and node.output[0] == draft.target:
         return False
     draft.bypass(node)
     return True
@@ -80,11 +80,11 @@ def _is_forward(draft: Draft, node: Any) -> bool:
 
 def _power(draft: Draft, node: Any) -> bool:
     exponent = scalar(draft.constants, node.input[1]) if node.op_type == "Pow" else None
-    given, made = node.input[0], node.output[0]
+    source, result = node.input[0], node.output[0]
     if exponent == 2.0:
-        draft.replace([node], [make_node("Mul", [given, given], made)])
+        draft.replace([node], [make_node("Mul", [source, source], result)])
     elif exponent == 0.5:
-        draft.replace([node], [make_node("Sqrt", [given], made)])
+        draft.replace([node], [make_node("Sqrt", [source], result)])
     elif exponent == 1.0:
         draft.bypass(node)
     else:
@@ -103,20 +103,20 @@ def _floating(draft: Draft, node: Any) -> bool:
 
 def _parts(draft: Draft, node: Any) -> bool:
     """Replace a node by plain ones."""
-    op, made = node.op_type, node.output[0]
+    op, result = node.op_type, node.output[0]
     if op == "Reciprocal":
         one = draft.constant(np.float32(1))
-        draft.replace([node], [make_node("Div", [one, node.input[0]], made)])
+        draft.replace([node], [make_node("Div", [one, node.input[0]], result)])
         return True
     if op == "Sum" and len(node.input) > 1:
-        draft.replace([node], _added(draft, list(node.input), made))
+        draft.replace([node], _added(draft, list(node.input), result))
         return True
     if op == "ReduceL2":
         square, total = draft.name("square"), draft.name("total")
         summed = make_node("ReduceSum", [square, *node.input[1:]], total)
         summed.attribute.extend(node.attribute)
         nodes = [make_node("Mul", [node.input[0]] * 2, square), summed]
-        draft.replace([node], [*nodes, make_node("Sqrt", [total], made)])
+        draft.replace([node], [*nodes, make_node("Sqrt", [total], result)])
         return True
     if op == "Swish" or (op == "Mish" and draft.opset >= 18):
         return _gated(draft, node)
@@ -125,29 +125,29 @@ def _parts(draft: Draft, node: Any) -> bool:
 
 def _gated(draft: Draft, node: Any) -> bool:
     """Replace an activation by the picture times a curve of it."""
-    given, made, curve = node.input[0], node.output[0], draft.name("curve")
+    source, result, curve = node.input[0], node.output[0], draft.name("curve")
     if node.op_type == "Mish":
         soft = draft.name("soft")
-        nodes = [make_node("Softplus", [given], soft), make_node("Tanh", [soft], curve)]
+        nodes = [make_node("Softplus", [source], soft), make_node("Tanh", [soft], curve)]
     elif attributes_of(node).get("alpha", 1.0) == 1.0:
-        nodes = [make_node("Sigmoid", [given], curve)]
+        nodes = [make_node("Sigmoid", [source], curve)]
     else:
         return False
-    draft.replace([node], [*nodes, make_node("Mul", [given, curve], made)])
+    draft.replace([node], [*nodes, make_node("Mul", [source, curve], result)])
     return True
 
 
-def _added(draft: Draft, names: list[str], made: str) -> list[Any]:
+def _added(draft: Draft, names: list[str], result: str) -> list[Any]:
     nodes, total = [], names[0]
     for place, name in enumerate(names[1:], start=2):
-        output = made if place == len(names) else draft.name("sum")
+        output = result if place == len(names) else draft.name("sum")
         nodes.append(make_node("Add", [total, name], output))
         total = output
     return nodes
 
 
 def _axes(draft: Draft, node: Any) -> bool:
-    """State the axes of a reduction as an input, counted from 0."""
+    """Write the axes of a reduction as an input, counted from 0."""
     if node.op_type not in _REDUCTIONS or node.input[0] not in draft.shapes:
         return False
     attributes, rank = attributes_of(node), len(draft.shapes[node.input[0]][0])
@@ -182,15 +182,15 @@ def _split(draft: Draft, node: Any) -> bool:
 
 
 def _resize(draft: Draft, node: Any) -> bool:
-    """Resize by a factor where a size of the picture is asked for."""
+    """Replace a Resize to a size by one by a factor where a size of the picture is asked for."""
     if node.op_type != "Resize" or len(node.input) < 4 or not node.input[3]:
         return False
-    shapes = draft.shapes.get(node.input[0]), draft.shapes.get(node.output[0])
-    if shapes[0] is None or shapes[1] is None:
+    if node.input[0] not in draft.shapes or node.output[0] not in draft.shapes:
         return False
+    shapes = draft.shapes[node.input[0]], draft.shapes[node.output[0]]
     factors = {
-        tuple(Fraction(b, a) for a, b in zip(given, made, strict=True))
-        for given, made in zip(*shapes, strict=True)
+        tuple(Fraction(b, a) for a, b in zip(source, result, strict=True))
+        for source, result in zip(*shapes, strict=True)
     }
     if len(factors) != 1:
         return False
@@ -202,25 +202,25 @@ def _resize(draft: Draft, node: Any) -> bool:
 
 
 def _sliced(draft: Draft, node: Any) -> bool:
-    """State every Slice along the channels by constant bounds."""
+    """Write every Slice along the channels by constant bounds."""
     if node.op_type != "Slice" or node.output[0] not in draft.shapes:
         return False
     if len(node.input) < 3 or all(name in draft.constants for name in node.input[1:] if name):
         return False
-    given, made = (draft.shapes[name][0] for name in (node.input[0], node.output[0]))
-    if given[2:] != made[2:] or len(given) != 4:
+    source, result = (draft.shapes[name][0] for name in (node.input[0], node.output[0]))
+    if source[2:] != result[2:] or len(source) != 4:
         return False
     starts = draft.constants.get(node.input[1])
     if starts is None or starts.size != 1:
         return False
-    bounds = (int(starts.ravel()[0]), int(starts.ravel()[0]) + made[1], 1)
+    bounds = (int(starts.ravel()[0]), int(starts.ravel()[0]) + result[1], 1)
     names = [draft.constant(np.array([value], np.int64)) for value in bounds]
     draft.replace([node], [make_node("Slice", [node.input[0], *names], node.output[0])])
     return True
 
 
 def _softmax(draft: Draft, node: Any) -> bool:
-    """State the axis of a Softmax, which was another one before opset 13."""
+    """Write the axis of a Softmax, which was another one before opset 13."""
     if node.op_type != "Softmax" or node.output[0] not in draft.shapes:
         return False
     rank = len(draft.shapes[node.output[0]][0])
@@ -248,29 +248,29 @@ def _instance_norm(draft: Draft, node: Any) -> bool:
 
 def normed(
     draft: Draft,
-    given: str,
-    made: str,
+    source: str,
+    result: str,
     axes: list[int],
     norm: tuple[Any, Any, float],
 ) -> list[Any]:
     """Return the nodes of a norm over some axes: (x - mean) / sqrt(variance + epsilon), affine."""
     scale, bias, epsilon = norm
-    over = draft.constant(np.array(axes, np.int64))
+    axes_name = draft.constant(np.array(axes, np.int64))
     mean, rest, square, variance, lifted, root, even, scaled = map(
         draft.name, ("mean", "rest", "square", "variance", "lifted", "root", "even", "scaled")
     )
     nodes = [
-        make_node("ReduceMean", [given, over], mean, keepdims=1),
-        make_node("Sub", [given, mean], rest),
+        make_node("ReduceMean", [source, axes_name], mean, keepdims=1),
+        make_node("Sub", [source, mean], rest),
         make_node("Mul", [rest, rest], square),
-        make_node("ReduceMean", [square, over], variance, keepdims=1),
+        make_node("ReduceMean", [square, axes_name], variance, keepdims=1),
         make_node("Add", [variance, draft.constant(np.float32(epsilon))], lifted),
         make_node("Sqrt", [lifted], root),
         make_node("Div", [rest, root], even),
         make_node("Mul", [even, draft.constant(np.asarray(scale, np.float32))], scaled),
-        make_node("Add", [scaled, draft.constant(np.asarray(bias, np.float32))], made),
+        make_node("Add", [scaled, draft.constant(np.asarray(bias, np.float32))], result),
     ]
-    whole = draft.shapes[given]
+    whole = draft.shapes[source]
     flat = tuple(tuple(1 if i in axes else n for i, n in enumerate(shape)) for shape in whole)
     draft.shapes |= dict.fromkeys((rest, square, even, scaled), whole)
     draft.shapes |= dict.fromkeys((mean, variance, lifted, root), (flat[0], flat[1]))
@@ -290,7 +290,8 @@ def _channel_norm(draft: Draft, node: Any) -> bool:
             return False
     if attributes_of(node).get("axis", -1) not in (-1, 3):
         return False
-    given, made = before.input[0], after.output[0]
+    assert before is not None
+    source, result = before.input[0], after.output[0]
     scale = draft.constants[node.input[1]].reshape(1, -1, 1, 1)
     bias = (
         draft.constants[node.input[2]].reshape(1, -1, 1, 1)
@@ -298,7 +299,7 @@ def _channel_norm(draft: Draft, node: Any) -> bool:
         else np.zeros_like(scale)
     )
     epsilon = attributes_of(node).get("epsilon", 1e-5)
-    draft.replace([node, after], normed(draft, given, made, [1], (scale, bias, epsilon)))
+    draft.replace([node, after], normed(draft, source, result, [1], (scale, bias, epsilon)))
     return True
 
 

@@ -42,13 +42,13 @@ class Pair:
     """A picture and what the owner's script made of it.
 
     Attributes:
-        given: (c, h, w) float32; a mosaic has one channel and begins with red.
-        made: (c, H, W) float32.
+        picture: (c, h, w) float32; a mosaic has one channel and begins with red.
+        result: (c, H, W) float32.
         noise: (1, h, w) float32, the map that the network is given besides; None for none.
     """
 
-    given: FloatArray
-    made: FloatArray
+    picture: FloatArray
+    result: FloatArray
     noise: FloatArray | None
 
 
@@ -87,15 +87,17 @@ def read_pairs(path: Path) -> tuple[Pair, ...]:
     if missing := [key for key in _KEYS if key not in arrays]:
         have = ", ".join(arrays) or "nothing"
         raise DecodeError(f"{path} lacks {' and '.join(missing)}; it holds {have}")
-    given, made = (_stack(arrays[key], key) for key in _KEYS)
-    if len(given) != len(made):
-        raise DecodeError(f"{path}: {len(given)} inputs and {len(made)} outputs make no pairs")
-    noise: list[FloatArray | None] = [None] * len(given)
+    picture, result = (_stack(arrays[key], key) for key in _KEYS)
+    if len(picture) != len(result):
+        raise DecodeError(f"{path}: {len(picture)} inputs and {len(result)} outputs make no pairs")
+    noise: list[FloatArray | None] = [None] * len(picture)
     if "noise" in arrays:
         noise = list(_stack(arrays["noise"], "noise"))
-    if len(noise) != len(given):
-        raise DecodeError(f"{path}: {len(noise)} maps of the noise for {len(given)} pictures")
-    return tuple(Pair(given=a, made=b, noise=n) for a, b, n in zip(given, made, noise, strict=True))
+    if len(noise) != len(picture):
+        raise DecodeError(f"{path}: {len(noise)} maps of the noise for {len(picture)} pictures")
+    return tuple(
+        Pair(picture=a, result=b, noise=n) for a, b, n in zip(picture, result, noise, strict=True)
+    )
 
 
 def _stack(array: NDArray[Any], name: str) -> FloatArray:
@@ -189,24 +191,24 @@ def _changes(contract: Contract) -> Iterator[tuple[str, dict[str, Any]]]:
             yield f'residual = "{residual}"', {"residual": residual}
     if contract.planes == "packed":
         for order in permutations(PLACES):
-            named = ", ".join(f'"{colour}"' for colour in order)
-            yield f"order = [{named}]", {"order": order}
+            order_text = ", ".join(f'"{colour}"' for colour in order)
+            yield f"order = [{order_text}]", {"order": order}
 
 
 def _difference(pair: Pair, trial: _Trial, run: Run, matrix: Matrix, stride_px: int) -> float:
-    made = _through(pair, trial, run, matrix, stride_px)
-    height, width = made.shape[1:]
-    expected = pair.made[:, :height, :width]
-    if expected.shape != made.shape:
+    result = _restored(pair, trial, run, matrix, stride_px)
+    height, width = result.shape[1:]
+    expected = pair.result[:, :height, :width]
+    if expected.shape != result.shape:
         raise ContractError(
-            f"the contract makes {made.shape} of a pair's {pair.given.shape}, its owner made "
-            f"{pair.made.shape}"
+            f"the contract makes {result.shape} of a pair's {pair.picture.shape}, its owner made "
+            f"{pair.result.shape}"
         )
     largest = max(1.0, float(np.abs(expected).max(initial=0)))
-    return float(np.abs(made - expected).max(initial=0)) / largest
+    return float(np.abs(result - expected).max(initial=0)) / largest
 
 
-def _through(pair: Pair, trial: _Trial, run: Run, matrix: Matrix, stride_px: int) -> FloatArray:
+def _restored(pair: Pair, trial: _Trial, run: Run, matrix: Matrix, stride_px: int) -> FloatArray:
     """Return what the stages of a contract make of a picture, in the space of the pairs."""
     contract = trial.contract
     light = _light(pair, contract, matrix, stride_px)
@@ -226,27 +228,29 @@ def _through(pair: Pair, trial: _Trial, run: Run, matrix: Matrix, stride_px: int
     if contract.noise and pair.noise is not None:
         planes[start:] = pair.noise[:, : light.shape[1], : light.shape[2]]
     last = planes[start - contract.plane_channels[-1] : start]
-    made = _with_residual(run(planes[None])[0].copy(), last, trial)
+    result = _with_residual(run(planes[None])[0].copy(), last, trial)
     if "output" in trial.swapped:
-        made = made[::-1].copy()
-    _coding(contract.output_space, matrix, contract.output_numbers, contract.exposure).decode(made)
-    if made.shape[0] == len(PLACES):
-        woven = WovenRows(ArrayRows(made), contract.order)
-        made = woven.read(0, woven.shape[1])
-    if made.shape[0] == _COLOURS:
-        out = np.empty_like(made)
-        _coding(contract.pairs_space, matrix).encode(made, out)
+        result = result[::-1].copy()
+    _coding(contract.output_space, matrix, contract.output_numbers, contract.exposure).decode(
+        result
+    )
+    if result.shape[0] == len(PLACES):
+        woven = WovenRows(ArrayRows(result), contract.order)
+        result = woven.read(0, woven.shape[1])
+    if result.shape[0] == _COLOURS:
+        out = np.empty_like(result)
+        _coding(contract.pairs_space, matrix).encode(result, out)
         return out
-    return made
+    return result
 
 
-def _with_residual(made: FloatArray, plane: FloatArray, trial: _Trial) -> FloatArray:
+def _with_residual(result: FloatArray, plane: FloatArray, trial: _Trial) -> FloatArray:
     """Return what a graph with one residual would give with another."""
-    wanted = trial.contract.residual
-    if wanted == trial.baked or made.shape != plane.shape:
-        return made
-    raw = {"none": made, "added": made - plane, "subtracted": plane - made}[trial.baked]
-    return {"none": raw, "added": plane + raw, "subtracted": plane - raw}[wanted]
+    residual = trial.contract.residual
+    if residual == trial.baked or result.shape != plane.shape:
+        return result
+    raw = {"none": result, "added": result - plane, "subtracted": plane - result}[trial.baked]
+    return {"none": raw, "added": plane + raw, "subtracted": plane - raw}[residual]
 
 
 def _light(pair: Pair, contract: Contract, matrix: Matrix, stride_px: int) -> FloatArray:
@@ -256,14 +260,14 @@ def _light(pair: Pair, contract: Contract, matrix: Matrix, stride_px: int) -> Fl
         ContractError: If it does not fit the contract.
     """
     step = stride_px * (CELL_PX if contract.planes == "packed" else 1)
-    height, width = (side // step * step for side in pair.given.shape[1:])
-    light = pair.given[:, :height, :width].copy()
+    height, width = (side // step * step for side in pair.picture.shape[1:])
+    light = pair.picture[:, :height, :width].copy()
     channels = 1 if contract.is_of_mosaic else sum(contract.plane_channels)
     if light.size == 0 or light.shape[0] != channels or (contract.noise and pair.noise is None):
-        needed = " and a map `noise`" if contract.noise else ""
+        map_text = " and a map `noise`" if contract.noise else ""
         raise ContractError(
-            f'the input of a pair is {pair.given.shape}; planes = "{contract.planes}" begins with '
-            f"{channels} channel(s){needed}, at least {step} px a side"
+            f'the input of a pair is {pair.picture.shape}; planes = "{contract.planes}" begins '
+            f"with {channels} channel(s){map_text}, at least {step} px a side"
         )
     if not contract.is_of_mosaic:
         for start in range(0, channels, _COLOURS):

@@ -94,11 +94,12 @@ class _Block(nn.Module):
         self.beta, self.gamma = (nn.Parameter(Tensor(1, c, 1, 1)) for _ in range(2))
         self.gate = _Gate()
 
-    def forward(self, given: Tensor) -> Tensor:
+    def forward(self, picture: Tensor) -> Tensor:
         """Return the restored features."""
-        x = self.gate(self.conv2(self.conv1(self.norm1(given))))
-        y = given + self.conv3(x * self.sca(x)) * self.beta
-        return y + self.conv5(self.gate(self.conv4(self.norm2(y)))) * self.gamma
+        x = self.gate(self.conv2(self.conv1(self.norm1(picture))))
+        y = picture + self.conv3(x * self.sca(x)) * self.beta
+        result: Tensor = y + self.conv5(self.gate(self.conv4(self.norm2(y)))) * self.gamma
+        return result
 
 
 class _NafNet(nn.Module):
@@ -110,8 +111,8 @@ class _NafNet(nn.Module):
         self.in_channels = channels
         self.intro = nn.Conv2d(channels, width, 3, padding=1)
         self.ending = nn.Conv2d(width, channels, 3, padding=1)
-        for name in ("encoders", "decoders", "ups", "downs"):
-            setattr(self, name, nn.ModuleList())
+        self.encoders, self.decoders = nn.ModuleList(), nn.ModuleList()
+        self.ups, self.downs = nn.ModuleList(), nn.ModuleList()
         c = width
         for count in counts["encoders"]:
             self.encoders.append(nn.Sequential(*[_Block(c) for _ in range(count)]))
@@ -119,22 +120,23 @@ class _NafNet(nn.Module):
             c *= 2
         self.middle_blks = nn.Sequential(*[_Block(c) for _ in range(counts["middle"])])
         for count in counts["decoders"]:
-            up = nn.Conv2d(c, 2 * c, 1, bias=False)
-            self.ups.append(nn.Sequential(up, nn.PixelShuffle(2)))
+            enlarging = nn.Conv2d(c, 2 * c, 1, bias=False)
+            self.ups.append(nn.Sequential(enlarging, nn.PixelShuffle(2)))
             c //= 2
             self.decoders.append(nn.Sequential(*[_Block(c) for _ in range(count)]))
 
-    def forward(self, given: Tensor) -> Tensor:
+    def forward(self, picture: Tensor) -> Tensor:
         """Return the restored picture."""
-        x, skips = self.intro(given), []
-        for encoder, down in zip(self.encoders, self.downs, strict=True):
+        x, skips = self.intro(picture), []
+        for encoder, shrinking in zip(self.encoders, self.downs, strict=True):
             x = encoder(x)
             skips.append(x)
-            x = down(x)
+            x = shrinking(x)
         x = self.middle_blks(x)
-        for decoder, up, skip in zip(self.decoders, self.ups, skips[::-1], strict=True):
-            x = decoder(up(x) + skip)
-        return self.ending(x) + given
+        for decoder, enlarging, skip in zip(self.decoders, self.ups, skips[::-1], strict=True):
+            x = decoder(enlarging(x) + skip)
+        result: Tensor = self.ending(x) + picture
+        return result
 
 
 def _nafnet(state: State) -> nn.Module:

@@ -15,7 +15,10 @@ from camkit.export.foreign.draft import Draft, attributes_of, make_node
 
 _MODES: Final = {"CRD": ([0, 1, 4, 2, 5, 3], (1, 2, 2)), "DCR": ([0, 3, 4, 1, 5, 2], (2, 2, 1))}
 """Of DepthToSpace -> order of the Transpose, and which of its axes are channels and blocks."""
-_UNSHUFFLE: Final = {(0, 1, 3, 5, 2, 4): "apart", (0, 3, 5, 1, 2, 4): "together"}
+_UNSHUFFLE: Final[dict[tuple[int, ...], str]] = {
+    (0, 1, 3, 5, 2, 4): "apart",
+    (0, 3, 5, 1, 2, 4): "together",
+}
 
 
 def join_shuffles(draft: Draft) -> None:
@@ -40,22 +43,22 @@ def join_shuffles(draft: Draft) -> None:
 
 def _shuffle(draft: Draft, names: tuple[str, str, str], order: list[int]) -> list[Any]:
     """Return the nodes that stand for a triple; none if it is another one."""
-    given, split, made = (draft.shapes[name] for name in names)
-    if any(len(shape) != 4 for shape in (*given, *made)) or any(len(s) != 6 for s in split):
+    source, split, result = (draft.shapes[name] for name in names)
+    if any(len(shape) != 4 for shape in (*source, *result)) or any(len(s) != 6 for s in split):
         return []
-    if made[0][2] > given[0][2]:
-        return _to_space(names, order, (given, split, made))
-    return _to_depth(draft, names, order, (given, split, made))
+    if result[0][2] > source[0][2]:
+        return _to_space(names, order, (source, split, result))
+    return _to_depth(draft, names, order, (source, split, result))
 
 
 def _to_space(names: tuple[str, str, str], order: list[int], shapes: Any) -> list[Any]:
-    given, split, made = shapes
-    block = made[0][2] // given[0][2]
+    source, split, result = shapes
+    block = result[0][2] // source[0][2]
     for mode, (turn, _) in _MODES.items():
         fits = all(
             shape == (g[0], *_split_channels(mode, g[1], block), *g[2:])
             and m == (g[0], g[1] // block**2, g[2] * block, g[3] * block)
-            for g, shape, m in zip(given, split, made, strict=True)
+            for g, shape, m in zip(source, split, result, strict=True)
         )
         if fits and order == turn:
             node = make_node("DepthToSpace", [names[0]], names[2], blocksize=block, mode=mode)
@@ -64,28 +67,28 @@ def _to_space(names: tuple[str, str, str], order: list[int], shapes: Any) -> lis
 
 
 def _split_channels(mode: str, channels: int, block: int) -> tuple[int, int, int]:
-    left = channels // block**2
-    return (left, block, block) if mode == "CRD" else (block, block, left)
+    groups = channels // block**2
+    return (groups, block, block) if mode == "CRD" else (block, block, groups)
 
 
 def _to_depth(
     draft: Draft, names: tuple[str, str, str], order: list[int], shapes: Any
 ) -> list[Any]:
-    given, split, made = shapes
-    block = given[0][2] // max(made[0][2], 1)
+    source, split, result = shapes
+    block = source[0][2] // max(result[0][2], 1)
     fits = block > 1 and all(
         shape == (g[0], g[1], g[2] // block, block, g[3] // block, block)
         and m == (g[0], g[1] * block**2, g[2] // block, g[3] // block)
-        for g, shape, m in zip(given, split, made, strict=True)
+        for g, shape, m in zip(source, split, result, strict=True)
     )
     kind = _UNSHUFFLE.get(tuple(order))
     if not fits or kind is None:
         return []
-    channels = given[0][1]
+    channels = source[0][1]
     if kind == "together" or channels == 1:
         return [make_node("SpaceToDepth", [names[0]], names[2], blocksize=block)]
     deep = draft.name("deep")
-    draft.shapes[deep] = made
+    draft.shapes[deep] = result
     # (b b c) -> (c b b)
     places = np.arange(channels * block**2).reshape(block**2, channels).T.ravel()
     weight = np.eye(places.size, dtype=np.float32)[places][:, :, None, None]

@@ -26,6 +26,8 @@ _WRAPPERS: Final = ("params_ema", "params", "state_dict", "model_state_dict", "m
 _PREFIXES: Final = ("module.", "_orig_mod.")
 _STRIDES: Final = (1, 2, 4, 8, 16, 32, 64)
 _MOST_NAMED: Final = 3
+STRIDE: Final = "stride_px"
+"""Attribute by which the exporter knows what divides the sides."""
 _FAILURES: Final = (
     RuntimeError,
     ValueError,
@@ -82,13 +84,13 @@ def _network(
         return _filled(_built(module, config), state, module)
     if config:
         raise ContractError(f"{option_text('config')} goes with {option_text('module')}")
-    known = published_network(state)
-    if known is not None:
-        name, network, weights = known
+    published = published_network(state)
+    if published is not None:
+        name, network, weights = published
         return _filled(network, weights, name)
-    found = spandrel_network(state)
-    if found is not None:
-        return found
+    descriptor = spandrel_network(state)
+    if descriptor is not None:
+        return descriptor
     keys = ", ".join(list(state)[:_MOST_NAMED])
     raise DecodeError(
         f"{path} is a state dict of a network that is not known ({keys}, ...): name its class by "
@@ -106,14 +108,14 @@ def _built(module: str, config: Mapping[str, Any]) -> nn.Module:
     if not (package and colon and name):
         raise ContractError(f"{option_text('module')} takes package:Class; got {module!r}")
     try:
-        made = getattr(importlib.import_module(package), name)(**config)
+        network = getattr(importlib.import_module(package), name)(**config)
     except (ImportError, *_FAILURES) as error:
         raise ContractError(
             f"{module} cannot be made of {dict(config)}: {type(error).__name__}: {error}"
         ) from error
-    if not isinstance(made, nn.Module):
-        raise ContractError(f"{module} makes no torch network, but {type(made).__name__}")
-    return made
+    if not isinstance(network, nn.Module):
+        raise ContractError(f"{module} makes no torch network, but {type(network).__name__}")
+    return network
 
 
 def _filled(network: nn.Module, state: dict[str, Tensor], name: str) -> nn.Module:
@@ -122,13 +124,13 @@ def _filled(network: nn.Module, state: dict[str, Tensor], name: str) -> nn.Modul
     Raises:
         ContractError: If names or shapes disagree.
     """
-    wanted = network.state_dict()
-    missing = [key for key in wanted if key not in state]
-    extra = [key for key in state if key not in wanted]
+    expected = network.state_dict()
+    missing = [key for key in expected if key not in state]
+    extra = [key for key in state if key not in expected]
     shapes = [
-        f"{key} {tuple(state[key].shape)} for {tuple(wanted[key].shape)}"
-        for key in wanted
-        if key in state and state[key].shape != wanted[key].shape
+        f"{key} {tuple(state[key].shape)} for {tuple(expected[key].shape)}"
+        for key in expected
+        if key in state and state[key].shape != expected[key].shape
     ]
     faults = {"missing": missing, "not in it": extra, "of another shape": shapes}
     texts = [
@@ -153,10 +155,10 @@ def spandrel_network(state: dict[str, Tensor]) -> nn.Module | None:
     except (ImportError, RuntimeError):  # its torchvision need not load beside this torch
         return None
     try:
-        found = spandrel.ModelLoader(device="cpu").load_from_state_dict(state)
+        descriptor = spandrel.ModelLoader(device="cpu").load_from_state_dict(state)
     except (spandrel.UnsupportedModelError, *_FAILURES):
         return None
-    model: nn.Module = found.model
+    model: nn.Module = descriptor.model
     return model.eval()
 
 
@@ -166,13 +168,13 @@ def _exported(network: nn.Module, channels: int, path: Path) -> bytes:
     Raises:
         UnsupportedError: If it cannot be exported.
     """
-    declared = getattr(network, "stride_px", None)
+    declared = getattr(network, STRIDE, None)
     strides = _STRIDES if declared is None else (int(declared),)
     reason = ""
     for stride in strides:
         try:
             scale = _scale(network, channels, stride)
-            network.stride_px = stride
+            setattr(network, STRIDE, stride)
             return to_onnx(network, channels=channels, scale=scale)
         except _FAILURES as error:
             reason = reason or f"{type(error).__name__} at {5 * stride} px"
@@ -186,8 +188,8 @@ def _scale(network: nn.Module, channels: int, stride: int) -> int:
     """Return the samples of the output for one of the input, tried on sides that nothing shares."""
     height, width = 5 * stride, 7 * stride
     with torch.no_grad():
-        made = network.eval()(torch.zeros(1, channels, height, width))
-    scale = made.shape[2] // height
-    if made.shape[2:] != (scale * height, scale * width):
-        raise ValueError(f"{tuple(made.shape)} of {height}x{width}")
+        picture = network.eval()(torch.zeros(1, channels, height, width))
+    scale = picture.shape[2] // height
+    if picture.shape[2:] != (scale * height, scale * width):
+        raise ValueError(f"{tuple(picture.shape)} of {height}x{width}")
     return int(scale)

@@ -90,9 +90,9 @@ def _on_mosaic(
     if output_channels == 3:
         return (*before, *middle, *_renamed(parts, last))
     demosaic = after[0].model_copy(update={"takes": (last,)})
-    behind = (demosaic, *after[1:], *[parts.bank][: parts.bank is not None])
+    rest = (demosaic, *after[1:], *(() if parts.bank is None else (parts.bank,)))
     result = parts.plane if parts.bank is None else parts.bank.gives[0]
-    return (*before, *middle, *behind, *_renamed(parts, result))
+    return (*before, *middle, *rest, *_renamed(parts, result))
 
 
 def _parts(manifest: Manifest) -> _Parts:
@@ -108,8 +108,8 @@ def _parts(manifest: Manifest) -> _Parts:
             front=stages[:first], bank=None, tail=stages[first:], plane=plane, restored=plane
         )
     first, last = places[0], places[-1]
-    between = [s for s in stages[first : last + 1] if not isinstance(s, Wiener | Network)]
-    if between or manifest.kind != "bayer":
+    strangers = [s for s in stages[first : last + 1] if not isinstance(s, Wiener | Network)]
+    if strangers or manifest.kind != "bayer":
         raise ContractError(
             f"{manifest.name} is a camera of the kind {manifest.kind} with stages of its own "
             f"({', '.join(s.type for s in stages)}); networks are added to those of the kind bayer"

@@ -5,13 +5,14 @@ import math
 import os
 import sys
 import threading
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from functools import cache
 from pathlib import Path
 from typing import Any, Final, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from camkit.arrays import FloatArray
 from camkit.errors import BundleError, ContractError, UnsupportedError
@@ -317,7 +318,7 @@ def largest_activations(
 
 
 def tensor_values(
-    model: bytes, names: Sequence[str], feeds: dict[str, FloatArray]
+    model: bytes, names: Sequence[str], feeds: Mapping[str, NDArray[Any]]
 ) -> dict[str, Any]:
     """Return tensors of a model that need not be admissible yet, computed as it stands.
 
@@ -335,7 +336,7 @@ def tensor_values(
     options.log_severity_level = 4
     try:
         session = ort.InferenceSession(model, options, providers=[PROVIDER_NAMES["cpu"]])
-        values = session.run(list(names), feeds)
+        values = session.run(list(names), dict(feeds))
     except (RuntimeError, *_ORT_ERRORS) as error:
         raise BundleError(f"onnxruntime cannot run it: {error}") from error
     return dict(zip(names, values, strict=True))

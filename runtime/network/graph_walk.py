@@ -27,6 +27,7 @@ from camkit.runtime.network.operators import (
     Node,
     Windows,
     check_broadcast,
+    check_extents,
     convolution_windows,
     is_corner_aligned,
     pad_windows,
@@ -46,8 +47,6 @@ _LARGE_BLOCK: Final = 16
 # How much longer a sample takes that is pooled, or multiplied in groups or off the blocked path.
 _SLOWNESS: Final = 16
 _CHANNEL_AXIS: Final = 1
-_MAX_CHANNELS: Final = 2**16
-_MAX_EXTRA_PX: Final = 64
 # Operators that may take several computed tensors; all others take one, the rest is constant.
 _FLOATS: Final = (1, 10)  # of TensorProto.DataType: float32 and float16
 _FREE: Final = (
@@ -223,23 +222,9 @@ def walk_nodes(nodes: Sequence[Node], constants: Constants, source: tuple[str, i
     walk = Walk(constants=constants, extents={source[0]: start})
     for node in nodes:
         extents = _node_extents(walk, node)
-        _check_extents(node, extents)
+        check_extents(node, extents)
         walk.extents.update(zip(node.outputs, extents, strict=False))
     return walk
-
-
-def _check_extents(node: Node, extents: Sequence[Extent]) -> None:
-    """Refuse tensors that would be absurdly large whatever the picture."""
-    for extent in extents:
-        if extent.channels > _MAX_CHANNELS:
-            raise BundleError(
-                f"{node.label}: gives {extent.channels} channels; at most {_MAX_CHANNELS} are "
-                "admitted"
-            )
-        if any(axis.extra * axis.step > _MAX_EXTRA_PX for axis in extent.axes or ()):
-            raise BundleError(
-                f"{node.label}: pads the picture by more than {_MAX_EXTRA_PX} px; refused"
-            )
 
 
 def _final(extents: Mapping[str, Extent], target: tuple[str, int | None]) -> tuple[Extent, int]:

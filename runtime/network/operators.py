@@ -12,7 +12,7 @@ samples reads, in integers, so that the phase of the stride is exact:
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, Final
@@ -43,6 +43,8 @@ _MAX_SCALE: Final = 64
 _MAX_KERNEL: Final = 4096
 _MIN_STEP: Final = Fraction(1, 8)
 _MAX_STEP: Final = 4096
+_MAX_CHANNELS: Final = 2**16
+_MAX_EXTRA_PX: Final = 64
 
 Constants = Mapping[str, NDArray[Any]]
 
@@ -313,4 +315,18 @@ def check_broadcast(node: Node, constants: Constants) -> None:
         if len(shape) > _NDIM or any(side != 1 for side in shape[-2:]):
             raise BundleError(
                 f"{node.label}: constant {name!r} of shape {shape} varies over space; refused"
+            )
+
+
+def check_extents(node: Node, extents: Sequence[Extent]) -> None:
+    """Refuse tensors that would be absurdly large whatever the picture."""
+    for extent in extents:
+        if extent.channels > _MAX_CHANNELS:
+            raise BundleError(
+                f"{node.label}: gives {extent.channels} channels; at most {_MAX_CHANNELS} are "
+                "admitted"
+            )
+        if any(axis.extra * axis.step > _MAX_EXTRA_PX for axis in extent.axes or ()):
+            raise BundleError(
+                f"{node.label}: pads the picture by more than {_MAX_EXTRA_PX} px; refused"
             )

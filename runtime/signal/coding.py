@@ -49,14 +49,14 @@ class PlaneCoding:
 
     def encode(self, light: FloatArray, out: FloatArray) -> None:
         """Fill `out` with the numbers of (c, h, w) light."""
-        values = light.astype(np.float64) * self.exposure
+        values: Doubles = light.astype(np.float64) * self.exposure
         values = self._turned(values, self.matrix)
         if self.space == "srgb":
             values = srgb_curve(values)
         out[...] = values * _column(self.gain) + _column(self.offset)
 
     def decode(self, values: FloatArray) -> None:
-        """Turn (c, h, w) numbers into light, in place."""
+        """Convert (c, h, w) numbers to light, in place."""
         light = (values.astype(np.float64) - _column(self.offset)) / _column(self.gain)
         if self.space == "srgb":
             light = linear_of_srgb(light)
@@ -74,13 +74,13 @@ class PlaneCoding:
         variance = np.maximum(light.astype(np.float64), 0) * shot + read
         variance *= self.exposure**2
         if self.space != "camera":
-            variance = self._turned(variance, self.matrix**2)
+            variance = self._turned(variance, np.square(self.matrix))
         if self.space == "srgb":
             turned = self._turned(light.astype(np.float64) * self.exposure, self.matrix)
             variance *= srgb_slope(turned) ** 2
         variance *= _column(self.gain) ** 2
         total = sum(variance[1:], start=variance[0]) / variance.shape[0]
-        return np.sqrt(total)[None].astype(np.float32)
+        return np.asarray(np.sqrt(total)[None], np.float32)
 
     def largest_light(self, largest: float) -> float:
         """Return the most light that a number of at most this size may stand for."""

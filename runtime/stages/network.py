@@ -138,11 +138,11 @@ def given_rows(entry: Network, job: Job, streams: Sequence[Stream]) -> RowSource
 
 def coding_of(entry: Network, job: Job, *, output: bool = False) -> PlaneCoding | None:
     """Return the numbers that a network takes, or gives; None where they are the stages' own."""
-    coding = entry.coding
-    if coding is None or entry.transform in ("stabilise", "none"):
+    coding, space = entry.coding, entry.space
+    if coding is None or space is None:
         return None
     return PlaneCoding(
-        space=coding.output if output else entry.transform,
+        space=coding.output if output else space,
         matrix=rec709_of_planes(job.color_matrix),
         exposure=coding.exposure,
         gain=coding.output_gain if output else coding.gain,
@@ -155,8 +155,8 @@ def _is_one_coding(entry: Network) -> bool:
     coding = entry.coding
     if coding is None:
         return True
-    given = entry.transform, coding.gain, coding.offset
-    return given == (coding.output, coding.output_gain, coding.output_offset)
+    numbers = entry.transform, coding.gain, coding.offset
+    return numbers == (coding.output, coding.output_gain, coding.output_offset)
 
 
 def _sample_noise(job: Job, stream: Stream) -> NoiseModel:
@@ -328,13 +328,13 @@ class _NetworkStage:
         entry, job = self._entry, self._job
         if noise is not None:
             return light_bound(entry.most_light, noise, scale=entry.scale)
-        given, made = coding_of(entry, job), coding_of(entry, job, output=True)
-        if given is None or made is None:
+        numbers_in, numbers_out = (coding_of(entry, job, output=output) for output in (False, True))
+        if numbers_in is None or numbers_out is None:
             return plain_bound(entry.most_light)
         plain = plain_bound(entry.most_light)
 
         def bound(largest: float) -> tuple[float, float]:
-            most = made.largest_number(plain(given.largest_light(largest))[1])
+            most = numbers_out.largest_number(plain(numbers_in.largest_light(largest))[1])
             return -most, most
 
         return bound

@@ -87,4 +87,5 @@ class PackedRows:
 def mirrored(places: np.ndarray, size: int) -> np.ndarray:
     """Return places on an axis, those outside mirrored about the border sample."""
     inside = np.abs(places)
-    return np.clip(np.where(inside >= size, 2 * (size - 1) - inside, inside), 0, size - 1)
+    back = np.where(inside >= size, 2 * (size - 1) - inside, inside)
+    return np.asarray(np.clip(back, 0, size - 1))

@@ -4,7 +4,7 @@ A stage names the planes that it takes and gives, and says by `join` what it mak
 does stands in the module of the same name in `camkit.runtime.stages`, or in the one that it names.
 
 linearise, repair, white_balance, demosaic    the front
-pack, unpack                                  a mosaic as planes of half the size, and back
+foreign                                       what networks of somebody else need
 haze, wiener, highlights, deglare, network    the restoration
 raise_clipped, illumination, undistort, color  what every picture needs behind it
 correct, super_resolve, sharpen, lifetime     single photons

@@ -1,7 +1,7 @@
 """A network on planes."""
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self, cast
 
 from pydantic import Field, model_validator
 
@@ -19,7 +19,7 @@ from camkit.bundle.stages.entry import (
     need_masks,
     need_rows,
 )
-from camkit.bundle.stages.foreign.coding import Coding, Numbers
+from camkit.bundle.stages.foreign.coding import Coding, Numbers, Space
 from camkit.bundle.stages.foreign.pack import CODED
 
 DEFAULT_ROLE = "restore"
@@ -111,6 +111,11 @@ class Network(StageEntry):
             )
             for port in outputs
         )
+
+    @property
+    def space(self) -> Space | None:
+        """Return the space of its coded planes; None where they are not coded."""
+        return None if self.coding is None else cast("Space", self.transform)
 
     @property
     def takes_noise(self) -> bool:

@@ -155,7 +155,7 @@ def test_wrong_pairs_stop_the_work_before_a_bundle(tmp_path: Path) -> None:
             tmp_path / "net.onnx",
             tmp_path / "mine.camkit",
             contract={"input": SRGB},
-            to=tmp_path / "tiny.camkit",
+            camera=tmp_path / "tiny.camkit",
             pairs=tmp_path / "io.npz",
         )
     assert not (tmp_path / "mine.camkit").exists()

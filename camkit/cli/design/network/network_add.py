@@ -34,14 +34,14 @@ def add(
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Put a trained network into a copy of a camera's bundle and prove it."""
+    """Add a trained network to a copy of a camera's bundle and prove it."""
     from camkit.export.foreign import doors
 
     report = doors.add_network(
         network,
         out,
         contract=contract,
-        to=camera,
+        camera=camera,
         pairs=pairs,
         module=module,
         config=doors.to_config(config or []),

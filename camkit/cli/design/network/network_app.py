@@ -11,10 +11,10 @@ from camkit.cli.groups import add_command
 NETWORK: Final = "Bring a network"
 
 network_app = typer.Typer(name="network", no_args_is_help=True)
-add_command(network_app, inspect, NETWORK, "List everything in a network's way.")
-add_command(network_app, add, NETWORK, "Put a network into a camera.")
+add_command(network_app, inspect, NETWORK, "Show everything in a network's way.")
+add_command(network_app, add, NETWORK, "Add a network to a camera.")
 
 
 @network_app.callback()
 def network() -> None:
-    """Inspect a trained network of your own, or put it into a camera's bundle."""
+    """Check a trained network of your own, or add it to a camera's bundle."""

@@ -23,16 +23,16 @@ def inspect(
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """List all obstacles of a network at once, with its reach, cost, memory and tiles."""
+    """Show all obstacles of a network at once, with its reach, cost, memory and tiles."""
     from camkit.export.foreign import doors
 
-    found = doors.inspect_network(
+    findings = doors.inspect_network(
         network, contract=contract, module=module, config=doors.to_config(config or [])
     )
     if json_:
-        say(json.dumps(found.to_json()))
+        say(json.dumps(findings.to_json()))
     else:
-        for line in found.lines():
+        for line in findings.lines():
             say(line)
-    if found.obstacles:
+    if findings.obstacles:
         raise typer.Exit(ExitCode.INPUT_FAILED)
