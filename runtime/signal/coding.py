@@ -60,7 +60,7 @@ class PlaneCoding:
         light = (values.astype(np.float64) - _column(self.offset)) / _column(self.gain)
         if self.space == "srgb":
             light = linear_of_srgb(light)
-        light = self._turned(light, np.linalg.inv(self.matrix))
+        light = self._turned(light, np.asarray(np.linalg.inv(self.matrix), np.float64))
         values[...] = light / self.exposure
 
     def deviation(self, light: FloatArray, noise: NoiseModel) -> FloatArray:
