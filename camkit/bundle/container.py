@@ -114,6 +114,10 @@ def read_container(path: Path, *, max_bytes: int = MAX_BUNDLE_BYTES) -> Containe
         raise BundleError(f"cannot read the bundle {path}: {error.strerror}") from error
     except DecodeError as error:
         raise BundleError(f"cannot read the bundle {path}: {error}") from error
+    if str(path).endswith(NETWORKS) and b"manifest.json" not in data:
+        raise BundleError(
+            f"{path} is a network, not a bundle; it goes into one by `camkit network add`"
+        )
     return container_from_bytes(data, what=str(path), max_bytes=max_bytes)
 
 
@@ -122,8 +126,7 @@ def container_from_bytes(data: bytes, *, what: str, max_bytes: int = MAX_BUNDLE_
     if len(data) > max_bytes:
         raise BundleError(f"{what} is larger than the cap of {max_bytes} bytes; refused")
     if not data.startswith(b"PK\x03\x04"):
-        hint = "; a network goes into one by `camkit network add`" * what.endswith(NETWORKS)
-        raise BundleError(f"{what} is not a zip, so not a bundle; expected a .camkit file{hint}")
+        raise BundleError(f"{what} is not a zip, so not a bundle; expected a .camkit file")
     # Counted before zipfile makes an object of each entry; a few more may occur by chance in
     # compressed data.
     if data.count(_ENTRY_MAGIC) > 2 * MAX_MEMBERS:

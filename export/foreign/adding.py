@@ -26,7 +26,7 @@ from camkit.bundle.stages import Parts, Stage
 from camkit.bundle.writer import write_bundle
 from camkit.errors import ContractError
 from camkit.export.card import card_text, laws_text, picture_psnr_db, preview_png
-from camkit.export.foreign.canonical import CanonicalGraph, canonical_graph
+from camkit.export.foreign.canonical import CanonicalGraph, canonical_graph, prove_equal
 from camkit.export.foreign.contract import Contract
 from camkit.export.foreign.global_statistics import (
     with_constants,
@@ -112,6 +112,7 @@ class _Draft:
     contract: Contract
     label: Label
     out: Path
+    model: ForeignModel
     data: bytes
     canonical: CanonicalGraph
     report: dict[str, Any] = field(default_factory=dict)
@@ -153,6 +154,7 @@ def bundle_with_network(
         contract=contract,
         label=label or Label(),
         out=out,
+        model=model,
         data=data,
         canonical=canonical,
     )
@@ -331,7 +333,12 @@ def _packed(draft: _Draft, folder: Path) -> dict[str, Any]:
     cases = photograph_all(first)
     probe = _photographed(first, {"probe": _PROBE})
     windows = _inputs(first, probe | cases)
-    facts = _facts(draft, graph, measured_of(draft.data, graph, windows))
+    difference, _ = prove_equal(
+        draft.model, draft.canonical.model, draft.canonical.facts, tuple(windows)
+    )
+    draft.report["canonical_difference"] = difference
+    measured = measured_of(draft.data, graph, windows)
+    facts = _facts(draft, graph, {"parity_max_abs": difference, **measured})
     manifest, members = _manifest(draft, facts), _members(draft)
     second = write_bundle(folder / "second.camkit", manifest, members)
     golden = add_outputs(second, cases)

@@ -3,10 +3,13 @@
 from dataclasses import dataclass
 from typing import Any, Final
 
+import numpy as np
+
 from camkit.bundle.facts import NetworkFacts, Port
 from camkit.errors import BundleError, ContractError, ParityError
 from camkit.export.foreign.canonical import canonical_draft, prove_equal, to_model
 from camkit.export.foreign.contract import Contract
+from camkit.export.foreign.global_statistics import with_constants, with_local_means
 from camkit.export.foreign.onnx_file import ForeignModel
 from camkit.runtime.content import CELL_PX
 from camkit.runtime.job.walker import FIXED_BYTES
@@ -20,6 +23,7 @@ PICTURE_PX: Final = (4000, 6000)
 """(height, width) of a picture of 24 megapixels."""
 STAGES_BYTES: Final = 60_000_000
 """What the stages around a network take at that size, roughly."""
+_EVEN_PX: Final = 64
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -117,12 +121,13 @@ def inspection_of(name: str, model: ForeignModel, contract: Contract | None = No
     findings = [*_global_obstacles(facts, contract), *contract_obstacles(facts, contract)]
     tiles = None
     try:
+        data, facts = _settled(data, facts, contract)
         size_px = PICTURE_PX
         if contract is not None and contract.planes == "packed":
             size_px = (PICTURE_PX[0] // 2, PICTURE_PX[1] // 2)
         if not facts.global_operators or (contract is not None and contract.mode == "whole"):
             tiles = lay_whole_picture(data, facts, size_px)
-    except ContractError as error:
+    except (BundleError, ContractError) as error:
         findings.append(f"at 24 megapixels, {error}")
     fixed = FIXED_BYTES + STAGES_BYTES
     return Inspection(
@@ -135,6 +140,22 @@ def inspection_of(name: str, model: ForeignModel, contract: Contract | None = No
         tiles=None if tiles is None else tiles.to_json(),
         needed_bytes=None if tiles is None else fixed + tiles.needed_bytes(),
     )
+
+
+def _settled(data: bytes, facts: GraphFacts, contract: Contract | None) -> tuple[bytes, GraphFacts]:
+    """Return a graph whose statistics of the whole picture are settled as a contract says.
+
+    Its constants are those of an even picture: they change no cost.
+    """
+    if contract is None or not facts.global_operators:
+        return data, facts
+    if contract.mode == "local":
+        data = with_local_means(data, contract.local_px)
+    elif contract.mode == "constants":
+        side = -(-_EVEN_PX // facts.stride_px) * facts.stride_px
+        even = np.full((1, facts.input_channels, side, side), 0.5, np.float32)
+        data = with_constants(data, [even])
+    return data, inspect_graph(data)
 
 
 def _global_obstacles(facts: GraphFacts, contract: Contract | None) -> list[str]:

@@ -46,6 +46,12 @@ def test_all_obstacles_are_listed_and_the_command_fails(
     Path("naf.onnx").write_bytes(exported(seeded(NAFNet), "legacy", opset=17))
     assert run(["network", "inspect", "naf.onnx"]) == 1
     assert 'mode = "constants", "local:N" or "whole"' in capsys.readouterr().out
+    planes = CONTRACT.partition("[output]")[0]
+    Path("local.toml").write_text(planes + '[global]\nmode = "local:64"\n')
+    assert run(["network", "inspect", "naf.onnx", "--as", "local.toml", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["obstacles"] == found["global_operators"] == []
+    assert found["reach_px"] > 12
 
 
 def test_a_network_is_added_by_one_command(
