@@ -15,6 +15,7 @@ from camkit.export.foreign.onnx_file import ForeignModel
 from camkit.export.foreign.operator_forms import rewrite_nodes
 from camkit.export.foreign.pads import fold_pads
 from camkit.export.foreign.shuffles import join_shuffles
+from camkit.export.foreign.transposed import replace_transposed
 from camkit.runtime.network.engine import NetworkEngine, tensor_values
 from camkit.runtime.network.graph import ALLOWED_OPERATORS, MAX_IR, inspect_graph
 from camkit.runtime.network.graph_walk import GraphFacts
@@ -83,6 +84,7 @@ def canonical_draft(model: ForeignModel) -> tuple[Draft | None, tuple[str, ...]]
     join_shuffles(draft)
     rewrite_nodes(draft)
     fold_pads(draft)
+    replace_transposed(draft)
     return draft, tuple(_obstacles(draft))
 
 

@@ -34,8 +34,8 @@ CASES: list[tuple[type[nn.Module], Exporter, int, int, bool, tuple[int, int, int
     (Sid, "legacy", 4, 11, True, (8, 2, 2)),
     (NAFNet, "dynamo", 3, 20, False, (12, 4, 1)),
     (NAFNet, "legacy", 3, 17, True, (12, 4, 1)),
-    (NormedUnet, "legacy", 3, 11, False, (10, 2, 1)),
-    (NormedUnet, "dynamo", 3, 18, False, (10, 2, 1)),
+    (NormedUnet, "legacy", 3, 11, False, (11, 2, 1)),
+    (NormedUnet, "dynamo", 3, 18, False, (11, 2, 1)),
 ]
 
 
@@ -94,6 +94,21 @@ def test_reshaped_blocks_become_shuffles_and_zero_pads_part_of_convolutions(toge
     expected = {"SpaceToDepth", "Mul", "Conv", "DepthToSpace"}
     assert _ops(made.model) == expected
     assert made.facts.receptive_field_radius_px == 2
+
+
+@pytest.mark.parametrize(
+    ("kernel", "stride", "pad", "growth"), [(2, 2, 0, 0), (3, 2, 1, 1), (4, 2, 1, 0), (6, 4, 1, 0)]
+)
+def test_transposed_convolutions_lie_on_the_coarse_grid(
+    kernel: int, stride: int, pad: int, growth: int
+) -> None:
+    torch.manual_seed(4)
+    up = nn.ConvTranspose2d(8, 4, kernel, stride=stride, padding=pad, output_padding=growth)
+    network = nn.Sequential(nn.Conv2d(3, 8, 3, padding=1), up).eval()
+    made = canonical_graph(_model(exported(network, "legacy", opset=17)))
+    assert _ops(made.model) == {"Conv", "DepthToSpace"}
+    assert not made.facts.unblocked_convolutions
+    assert made.facts.output_scale == stride
 
 
 class _Curves(nn.Module):
