@@ -23,7 +23,7 @@ from camkit.runtime.output.part_file import refuse_existing
 
 NO_PLATE: Final = "none"
 FOREIGN: Final = (".onnx", ".pth")
-NETWORK_ADD: Final = "camkit network add NET --contract contract.toml --to CAMERA -o NAME.camkit"
+NETWORK_ADD: Final = "camkit network add"
 
 
 @checked
