@@ -8,6 +8,7 @@ a second bundle        -> measured facts, outputs, laws, card
 everything             -> `check_bundle` -> the bundle
 """
 
+import re
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -24,6 +25,7 @@ from camkit.bundle.manifest import LIGHT_VERSION, Manifest, format_of, planes_of
 from camkit.bundle.reader import CARD, GOLDEN, PREVIEW, Bundle
 from camkit.bundle.stages import Parts, Stage
 from camkit.bundle.writer import write_bundle
+from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.export.card import card_text, laws_text, picture_psnr_db, preview_png
 from camkit.export.foreign.canonical import CanonicalGraph, canonical_graph, prove_equal
@@ -60,6 +62,9 @@ from camkit.runtime.proof.one_window import prove_one_window
 SIZE: Final = "M"
 MEMBER: Final = f"{ROLE}_{SIZE}.onnx"
 PACKAGES: Final = ("camkit", "numpy", "scipy", "onnx", "onnxruntime")
+_NAME: Final = re.compile(r"[a-z0-9][a-z0-9_-]{0,63}")
+_VERSION: Final = re.compile(r"[0-9]+\.[0-9]+\.[0-9]+(-[0-9A-Za-z.-]+)?")
+_LIKE: Final = {"name": "my-camera_2", "version": "0.1.0"}
 _LEFT_OUT: Final = (CARD, PREVIEW, GOLDEN)
 _CALIBRATION: Final = {
     f"calibration_{seed}": CaseRecipe(
@@ -139,7 +144,7 @@ def bundle_with_network(
         What was shown, flat; `warnings` is a list.
 
     Raises:
-        BundleError: If operators of the network cannot be taken; names all of them.
+        UnsupportedError: If operators of the network cannot be taken; names all of them.
         ContractError: If network, contract and camera do not go together; names all of it.
         ParityError: If a proof fails; nothing is written then.
     """
@@ -149,10 +154,17 @@ def bundle_with_network(
     if contract.residual != "none":
         subtracted = contract.residual == "subtracted"
         data = with_residual(data, contract.plane_channels, subtracted=subtracted)
+    label = label or Label()
+    for what, text, pattern in (
+        ("name", label.name or out.stem, _NAME),
+        ("version", label.version, _VERSION),
+    ):
+        if not pattern.fullmatch(text):
+            raise ContractError(f"{option_text(what)} must read like {_LIKE[what]}; got {text!r}")
     draft = _Draft(
         camera=camera,
         contract=contract,
-        label=label or Label(),
+        label=label,
         out=out,
         model=model,
         data=data,

@@ -8,7 +8,7 @@ import onnx
 from onnx import TensorProto, helper, numpy_helper
 
 from camkit.arrays import FloatArray
-from camkit.errors import BundleError, ParityError
+from camkit.errors import BundleError, ParityError, UnsupportedError
 from camkit.export.foreign.draft import Draft
 from camkit.export.foreign.folded_values import folded
 from camkit.export.foreign.onnx_file import ForeignModel
@@ -161,14 +161,17 @@ def canonical_graph(model: ForeignModel) -> CanonicalGraph:
     """Return the canonical graph of a network, proved against the original.
 
     Raises:
-        BundleError: Naming every obstacle, if there are any.
+        UnsupportedError: Naming every obstacle, if there are any.
         ParityError: If the two disagree.
     """
     draft, obstacles = canonical_draft(model)
     if draft is None or obstacles:
-        raise BundleError("the network cannot be taken: " + "; ".join(obstacles))
-    data = to_model(draft, model.channels)
-    facts = inspect_graph(data)
+        raise UnsupportedError("the network cannot be taken: " + "; ".join(obstacles))
+    try:
+        data = to_model(draft, model.channels)
+        facts = inspect_graph(data)
+    except BundleError as error:
+        raise UnsupportedError(f"the network cannot be taken: {error}") from error
     difference, half = prove_equal(model, data, facts)
     return CanonicalGraph(model=data, facts=facts, difference=difference, half_difference=half)
 

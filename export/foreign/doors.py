@@ -83,7 +83,7 @@ def add_network(
 
     Raises:
         ContractError: If network, contract and camera do not go together; names all of it.
-        BundleError: If operators of the network cannot be taken; names all of them.
+        UnsupportedError: If operators of the network cannot be taken; names all of them.
         ParityError: If a proof fails; nothing is written then.
     """
     refuse_existing([Path(out)], overwrite=overwrite)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 import camkit
 from camkit.bundle.reader import Bundle, open_bundle
 from camkit.bundle.stages import Network
-from camkit.errors import BundleError, ContractError, ParityError
+from camkit.errors import ContractError, ParityError, UnsupportedError
 from camkit.export.foreign.adding import bundle_with_network
 from camkit.export.foreign.contract import to_contract
 from camkit.export.foreign.onnx_file import foreign_model
@@ -129,7 +129,7 @@ def test_a_map_of_the_noise_lies_behind_the_planes(tmp_path: Path) -> None:
 
 
 def test_attention_is_refused_by_all_of_its_operators(tmp_path: Path) -> None:
-    with pytest.raises(BundleError, match=r"Reshape.*MatMul"):
+    with pytest.raises(UnsupportedError, match=r"Reshape.*MatMul"):
         _added(tmp_path, Mdta, SRGB)
 
 
@@ -142,6 +142,13 @@ def test_channels_and_scale_that_contradict_the_contract_are_named_together(
     text = str(caught.value)
     assert "takes 4 channels; planes of the contract have 3" in text
     assert "a residual has the 3 channel(s) and the grid of its last plane" in text
+
+
+def test_a_name_that_no_camera_may_have_is_refused_before_work(tmp_path: Path) -> None:
+    camera = open_bundle(write_tiny_bundle(tmp_path))
+    model = foreign_model(onnx.load_from_string(_data(DnCNN)))
+    with pytest.raises(ContractError, match="name must read like my-camera_2; got 'My Camera'"):
+        bundle_with_network(model, to_contract({"input": SRGB}), camera, tmp_path / "My Camera")
 
 
 def test_wrong_pairs_stop_the_work_before_a_bundle(tmp_path: Path) -> None:

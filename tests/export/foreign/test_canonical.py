@@ -10,7 +10,7 @@ from onnx import TensorProto, helper, numpy_helper
 from torch import Tensor, nn
 from torch.nn import functional
 
-from camkit.errors import BundleError, DecodeError
+from camkit.errors import DecodeError, UnsupportedError
 from camkit.export.foreign.canonical import TOLERANCE, canonical_draft, canonical_graph
 from camkit.export.foreign.onnx_file import ForeignModel, foreign_model, read_model
 from camkit.runtime.network.graph import parse_graph
@@ -65,7 +65,7 @@ def test_attention_over_the_picture_names_all_that_is_in_its_way() -> None:
     text = "; ".join(obstacles)
     assert "MatMul (2 times): it multiplies tensors of the picture" in text
     assert "Reshape (4 times)" in text
-    with pytest.raises(BundleError, match=r"cannot be taken: .*Reshape.*MatMul"):
+    with pytest.raises(UnsupportedError, match=r"cannot be taken: .*Reshape.*MatMul"):
         canonical_graph(_model(exported(seeded(Mdta))))
 
 
