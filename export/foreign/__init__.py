@@ -4,6 +4,7 @@ onnx_file        a file decoded: one opset range, weights inside, float32, open 
 draft            its nodes while they are rewritten
 folded_values    what does not depend on the picture, found by running it at two sizes
 operator_forms   every node in the form that opset 20 and the graph reader know
+norms            norms by their parts, so that statistics are means
 shuffles, pads   patterns of nodes that one node stands for
 transposed       transposed convolutions on the coarse grid
 canonical        all of that, and the proof against the original

@@ -12,7 +12,7 @@ import onnx
 from onnx import TensorProto, helper, numpy_helper
 
 from camkit.errors import BundleError
-from camkit.export.foreign.draft import Array, Draft, Shape
+from camkit.export.foreign.draft import Array, Draft, Shape, make_node
 from camkit.export.foreign.onnx_file import ForeignModel
 from camkit.runtime.network.engine import tensor_values
 
@@ -105,8 +105,15 @@ def _shapes_at(draft: Draft, channels: int, index: int) -> dict[str, Shape]:
     picture = helper.make_tensor_value_info(
         draft.source, TensorProto.FLOAT, [1, channels, *SIZES_PX[index]]
     )
+    # the shape of this operator is not inferred
+    nodes = [
+        make_node("Identity", [node.input[0]], node.output[0])
+        if node.op_type == "GroupNormalization"
+        else node
+        for node in draft.nodes
+    ]
     graph = helper.make_graph(
-        draft.nodes,
+        nodes,
         "shapes",
         [picture],
         [onnx.ValueInfoProto(name=draft.target)],

@@ -17,11 +17,11 @@ from typing import Any, Final
 import numpy as np
 
 from camkit.export.foreign.draft import Draft, attributes_of, make_node, scalar
+from camkit.export.foreign.norms import channel_norm, group_norm, instance_norm
 from camkit.runtime.network.operators import COMPARISONS
 
 Form = Callable[[Draft, Any], bool]
 """Rewrites a node if it can; returns whether it did."""
-_SPATIAL: Final = [2, 3]
 _REDUCTIONS: Final = ("ReduceMean", "ReduceSum", "ReduceMax", "ReduceMin", "ReduceL2")
 _SAME: Final = ("Identity", "Dropout", "Slice", "Expand", "Reshape", "Pad", "Resize", "Cast")
 _SAME_IF_EQUAL: Final = ("Flatten", "Squeeze", "Unsqueeze", "Transpose", "Concat", "Tile")
@@ -233,77 +233,7 @@ def _softmax(draft: Draft, node: Any) -> bool:
     return True
 
 
-def _instance_norm(draft: Draft, node: Any) -> bool:
-    """Replace a norm of every channel over the picture by its parts."""
-    if node.op_type != "InstanceNormalization" or len(draft.shapes[node.output[0]][0]) != 4:
-        return False
-    if not all(name in draft.constants for name in node.input[1:3]):
-        return False
-    scale, bias = (draft.constants[name].reshape(1, -1, 1, 1) for name in node.input[1:3])
-    epsilon = attributes_of(node).get("epsilon", 1e-5)
-    nodes = normed(draft, node.input[0], node.output[0], _SPATIAL, (scale, bias, epsilon))
-    draft.replace([node], nodes)
-    return True
-
-
-def normed(
-    draft: Draft,
-    source: str,
-    result: str,
-    axes: list[int],
-    norm: tuple[Any, Any, float],
-) -> list[Any]:
-    """Return the nodes of a norm over some axes: (x - mean) / sqrt(variance + epsilon), affine."""
-    scale, bias, epsilon = norm
-    axes_name = draft.constant(np.array(axes, np.int64))
-    mean, rest, square, variance, lifted, root, even, scaled = map(
-        draft.name, ("mean", "rest", "square", "variance", "lifted", "root", "even", "scaled")
-    )
-    nodes = [
-        make_node("ReduceMean", [source, axes_name], mean, keepdims=1),
-        make_node("Sub", [source, mean], rest),
-        make_node("Mul", [rest, rest], square),
-        make_node("ReduceMean", [square, axes_name], variance, keepdims=1),
-        make_node("Add", [variance, draft.constant(np.float32(epsilon))], lifted),
-        make_node("Sqrt", [lifted], root),
-        make_node("Div", [rest, root], even),
-        make_node("Mul", [even, draft.constant(np.asarray(scale, np.float32))], scaled),
-        make_node("Add", [scaled, draft.constant(np.asarray(bias, np.float32))], result),
-    ]
-    whole = draft.shapes[source]
-    flat = tuple(tuple(1 if i in axes else n for i, n in enumerate(shape)) for shape in whole)
-    draft.shapes |= dict.fromkeys((rest, square, even, scaled), whole)
-    draft.shapes |= dict.fromkeys((mean, variance, lifted, root), (flat[0], flat[1]))
-    return nodes
-
-
-def _channel_norm(draft: Draft, node: Any) -> bool:
-    """Replace a norm of channels that were put last, between two Transposes, by its parts."""
-    if node.op_type != "LayerNormalization" or len(node.output) != 1:
-        return False
-    before = next((n for n in draft.nodes if node.input[0] in n.output), None)
-    after = draft.only_reader(node.output[0])
-    for neighbour, order in ((before, [0, 2, 3, 1]), (after, [0, 3, 1, 2])):
-        if neighbour is None or neighbour.op_type != "Transpose":
-            return False
-        if list(attributes_of(neighbour).get("perm", [])) != order:
-            return False
-    if attributes_of(node).get("axis", -1) not in (-1, 3):
-        return False
-    assert before is not None
-    source, result = before.input[0], after.output[0]
-    scale = draft.constants[node.input[1]].reshape(1, -1, 1, 1)
-    bias = (
-        draft.constants[node.input[2]].reshape(1, -1, 1, 1)
-        if len(node.input) > 2 and node.input[2]
-        else np.zeros_like(scale)
-    )
-    epsilon = attributes_of(node).get("epsilon", 1e-5)
-    draft.replace([node, after], normed(draft, source, result, [1], (scale, bias, epsilon)))
-    return True
-
-
 _FORMS: Final[tuple[Form, ...]] = (
     *(_nothing, _mask, _power, _parts, _axes, _split, _resize, _sliced, _softmax),
-    *(_instance_norm, _channel_norm),
+    *(instance_norm, group_norm, channel_norm),
 )

@@ -111,6 +111,35 @@ def test_transposed_convolutions_lie_on_the_coarse_grid(
     assert made.facts.output_scale == stride
 
 
+class _Norms(nn.Module):
+    """Norms of groups over the picture, and of a pixel over its channels."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.conv = nn.Conv2d(3, 8, 3, padding=1)
+        self.groups = nn.GroupNorm(2, 8)
+        self.pixel = nn.LayerNorm(8)
+        self.last = nn.Conv2d(8, 3, 1)
+        for norm in (self.groups, self.pixel):
+            nn.init.uniform_(norm.weight, 0.5, 1.5)
+            nn.init.uniform_(norm.bias, -0.5, 0.5)
+
+    def forward(self, x: Tensor) -> Tensor:
+        y = self.groups(self.conv(x))
+        y = self.pixel(y.permute(0, 2, 3, 1)).permute(0, 3, 1, 2)
+        return self.last(y)
+
+
+@pytest.mark.parametrize(("exporter", "opset"), [("dynamo", 20), ("dynamo", 21), ("legacy", 17)])
+def test_norms_become_means_over_the_picture_or_the_channels(
+    exporter: Exporter, opset: int
+) -> None:
+    torch.manual_seed(6)
+    made = canonical_graph(_model(exported(_Norms().eval(), exporter, opset=opset)))
+    assert len(made.facts.global_operators) == 2
+    assert "GroupNormalization" not in _ops(made.model)
+
+
 class _Curves(nn.Module):
     """Pointwise curves as networks that work on display values have them."""
 
