@@ -137,10 +137,10 @@ def _mean(draft: Draft, source: str, result: str, norm: Norm) -> list[Any]:
     axes = draft.constant(np.array(norm.axes, np.int64))
     if not norm.groups:
         return [make_node("ReduceMean", [source, axes], result, keepdims=1)]
-    channels, own = norm.scale.size, draft.name("own_mean")
+    channels, mean = norm.scale.size, draft.name("channel_mean")
     size = channels // norm.groups
     weight = np.kron(np.eye(norm.groups), np.full((size, size), 1 / size)).astype(np.float32)
     return [
-        make_node("ReduceMean", [source, axes], own, keepdims=1),
-        make_node("Conv", [own, draft.constant(weight[:, :, None, None])], result),
+        make_node("ReduceMean", [source, axes], mean, keepdims=1),
+        make_node("Conv", [mean, draft.constant(weight[:, :, None, None])], result),
     ]
