@@ -18,7 +18,15 @@ def test_every_key_of_a_table_is_written_with_what_it_is(kind: type) -> None:
     table = tomllib.loads("\n".join(lines))["part"]
     absent = {f.name for f in fields(kind)} - table.keys()  # type: ignore[arg-type]
     # tables of their own, and what is empty by default
-    assert absent <= {"display", "wild", "depths_mm", "depth_shares", "content", "critic", "uncertainty"}
+    assert absent <= {
+        "display",
+        "wild",
+        "depths_mm",
+        "depth_shares",
+        "content",
+        "critic",
+        "uncertainty",
+    }
     for before, line in pairwise(lines):
         assert line.startswith(("#", "[")) or not line or before.startswith("#"), line
     assert max(map(len, lines)) <= 100
