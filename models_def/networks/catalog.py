@@ -112,7 +112,7 @@ def _all_builders(name: str) -> Builders:
 
 
 def _not_loaded(**_: Any) -> nn.Module:
-    """Stand for a network that nobody asked for."""
+    """Refuse to build: nobody asks for it."""
     raise AssertionError
 
 

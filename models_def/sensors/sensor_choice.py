@@ -27,7 +27,7 @@ DATA: Final = "named_sensors.toml"
 GROUP: Final = "camkit.sensors"
 """Of entry points, by which packages bring sensors: mappings with the keys of that file."""
 DEFAULT: Final = "default"
-STATED: Final = "stated"
+FROM_CALLER: Final = "stated"
 BLACK_LEVEL: Final = 256.0
 WHITE_LEVEL: Final = 4095.0
 WELL_E_PER_UM2: Final = 2000.0
@@ -47,7 +47,7 @@ WAVELENGTHS_UM: Final = tuple(round(0.42 + 0.02 * i, 2) for i in range(14))
 RESPONSE_SOURCE: Final = (
     "model: Gaussians at 0.600, 0.540 and 0.460 um with a full width of 0.090 um at half maximum"
 )
-_STATED: Final = re.compile(
+_DESCRIPTION: Final = re.compile(
     r"(?P<width>\d+)x(?P<height>\d+)@(?P<pitch>\d+(?:\.\d+)?|\.\d+)um(?::(?P<cfa>[A-Za-z]+))?"
 )
 
@@ -73,24 +73,24 @@ def choose_sensor(text: str) -> SensorChoice:
     Raises:
         ContractError: If it does neither.
     """
-    stated = _STATED.fullmatch(text.strip())
-    if stated is not None:
-        pattern = (stated["cfa"] or "RGGB").upper()
+    match = _DESCRIPTION.fullmatch(text.strip())
+    if match is not None:
+        pattern = (match["cfa"] or "RGGB").upper()
         facts: dict[str, Any] = {
-            "width_px": int(stated["width"]),
-            "height_px": int(stated["height"]),
-            "pixel_pitch_um": float(stated["pitch"]),
+            "width_px": int(match["width"]),
+            "height_px": int(match["height"]),
+            "pixel_pitch_um": float(match["pitch"]),
             "cfa": pattern,
         }
-        sources = dict.fromkeys(facts, STATED)
-        if stated["cfa"] is None:
+        sources = dict.fromkeys(facts, FROM_CALLER)
+        if match["cfa"] is None:
             sources["cfa"] = DEFAULT
         return _completed(facts, sources)
-    named = named_sensors()
+    entries = named_sensors()
     name, _, pattern = text.strip().partition(":")
-    facts = dict(named.get(name.casefold()) or _sensor_of_package(name))
+    facts = dict(entries.get(name.casefold()) or _sensor_of_package(name))
     if not facts:
-        names = ", ".join([*(entry["name"] for entry in named.values()), *entry_points(GROUP)])
+        names = ", ".join([*(entry["name"] for entry in entries.values()), *entry_points(GROUP)])
         raise ContractError(
             f"{option_text('sensor')} takes WIDTHxHEIGHT@PITCHum, such as 6000x4000@3.9um (with "
             f"or without :BGGR for another pattern), or one of {names}; got {text!r}"
@@ -98,7 +98,10 @@ def choose_sensor(text: str) -> SensorChoice:
     source = f"{facts.pop('name')}: {facts.pop('source')}"
     sources = dict.fromkeys(facts, source)
     if pattern or "cfa" not in facts:
-        facts["cfa"], sources["cfa"] = pattern.upper() or "RGGB", STATED if pattern else DEFAULT
+        facts["cfa"], sources["cfa"] = (
+            pattern.upper() or "RGGB",
+            FROM_CALLER if pattern else DEFAULT,
+        )
     return _completed(facts, sources)
 
 
@@ -140,7 +143,7 @@ def sensor_of(capture: Capture, pitch_um: float | None = None) -> SensorChoice:
         facts["read_noise_e"] = float(np.sqrt(np.mean(capture.noise.read_variance))) / shot
     sources = dict.fromkeys(facts, capture.camera or "the photograph")
     if pitch_um is not None:
-        sources["pixel_pitch_um"] = STATED
+        sources["pixel_pitch_um"] = FROM_CALLER
     return _completed(facts, sources)
 
 
@@ -163,10 +166,10 @@ def _sensor_of_package(name: str) -> Mapping[str, Any]:
     if point is None:
         return {}
     facts = load_entry_point(point, "sensor")
-    needed = {"width_px", "height_px", "pixel_pitch_um", "source"}
-    if not isinstance(facts, Mapping) or not needed <= facts.keys():
+    keys = {"width_px", "height_px", "pixel_pitch_um", "source"}
+    if not isinstance(facts, Mapping) or not keys <= facts.keys():
         raise ContractError(
-            f"the sensor {point.name!r} of {point.value} must state {', '.join(sorted(needed))}"
+            f"the sensor {point.name!r} of {point.value} must state {', '.join(sorted(keys))}"
         )
     return {"name": point.name, **facts}
 
