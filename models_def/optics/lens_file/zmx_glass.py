@@ -160,8 +160,8 @@ def glass_note(record: Record, order: GlassOrder, glass: Glass) -> str | None:
     index_d, abbe = index_and_abbe(catalogue_glass)
     way = "name" if glass == catalogue_glass else "numbers"
     return (
-        f"{name} states {text}, {catalogue_glass.name} has {index_d:.6g} and {abbe:.4g}: read by its {way} "
-        f"({option_text('glass')} decides)"
+        f"{name} states {text}, {catalogue_glass.name} has {index_d:.6g} and {abbe:.4g}: read by "
+        f"its {way} ({option_text('glass')} decides)"
     )
 
 
