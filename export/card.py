@@ -76,7 +76,8 @@ def card_text(
     for name, arrays in _pictures(golden).items():
         images, white = arrays.outputs[IMAGE], np.float32((whites or {}).get(name, 1.0))
         values = (
-            f"{_psnr_db(images[size] / white, arrays.reference / white):.2f}" for size in sizes
+            f"{picture_psnr_db(images[size] / white, arrays.reference / white):.2f}"
+            for size in sizes
         )
         lines.append(f"| {name} | " + " | ".join(values) + " |")
     lines += [
@@ -189,7 +190,8 @@ def _pictures(golden: Mapping[str, GoldenArrays]) -> dict[str, GoldenArrays]:
     return {name: arrays for name, arrays in golden.items() if IMAGE in arrays.outputs}
 
 
-def _psnr_db(image: FloatArray, reference: FloatArray) -> float:
+def picture_psnr_db(image: FloatArray, reference: FloatArray) -> float:
+    """Return the PSNR of (3, h, w) linear pictures in dB of sRGB values, borders left out."""
     inside = np.s_[:, BORDER_PX:-BORDER_PX, BORDER_PX:-BORDER_PX]
     error = encode_srgb(image[inside]) - encode_srgb(reference[inside])
     return float(-10 * np.log10(max(float(np.mean(np.square(error))), 1e-12)))

@@ -7,30 +7,20 @@ torch network -> draft_network     its graph, and the facts that follow from it:
 from dataclasses import dataclass
 from typing import Final
 
-import numpy as np
 from torch import nn
 
 from camkit.arrays import FloatArray
 from camkit.bundle.container import MAX_BUNDLE_BYTES
-from camkit.bundle.facts import HaloError, NetworkFacts
+from camkit.bundle.facts import NetworkFacts
 from camkit.errors import ContractError, UnsupportedError
+from camkit.export.graph_measurements import arena_bytes, measured_of
 from camkit.export.onnx_graph import check_parity, to_fp16, to_onnx
 from camkit.models_def.networks.instance_norm import live_norms
 from camkit.models_def.training.sample import SampleLayout
 from camkit.progress import working
-from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.graph import inspect_graph
-from camkit.runtime.network.graph_walk import GraphFacts
-from camkit.runtime.network.probe import halo_error_curve, perturbation_reach
-from camkit.runtime.network.ranges import node_activations
 
-PROBE_SEED: Final = 5
 FP16_HEADROOM: Final = 4.0
-HALO_STEP_PX: Final = 16
-DEEP_STRIDE_PX: Final = 32
-DEEP_ARENA: Final = 1.5
-"""What onnxruntime's arena takes over the live tensors of a network whose stride is at least that
-(measured, decision 28): its tensors are of many sizes, whose holes stay empty."""
 MOST_HALF_BYTES: Final = MAX_BUNDLE_BYTES // 2
 """Of both precisions of a network; a larger one has fp32 alone, or no bundle could hold it."""
 
@@ -74,7 +64,7 @@ def draft_network(name: str, network: nn.Module, layout: SampleLayout) -> Export
         max_activation=0.0,
         fp16_safe=False,
         mac_per_pixel=graph.mac_per_pixel,
-        bytes_per_pixel=_arena_bytes(graph),
+        bytes_per_pixel=arena_bytes(graph),
         parity_max_abs=0.0,
         parameters=graph.parameters,
     )
@@ -99,28 +89,14 @@ def measure_network(
     facts = draft.facts
     model = draft.members[facts.member]
     parity = check_parity(network, model, windows, scale=facts.output_scale)
-    engine = NetworkEngine(model, threads=1, scale=facts.output_scale)
-    activations = node_activations(model, windows)
-    reach = perturbation_reach(
-        engine.run,
-        _probe_size(facts.receptive_field_radius_px, facts.stride_px),
-        np.random.default_rng(PROBE_SEED),
-        stride_px=facts.stride_px,
-        channels=facts.input_channels,
-        scale=facts.output_scale,
-    )
-    reach_px = max(reach.halo_px, facts.receptive_field_radius_px)
+    measured = dict(measured_of(model, inspect_graph(model), windows))
     members = dict(draft.members)
-    half = _half(model, activations)
+    half = _half(model, measured["node_activation"])
     fp16_member = None if half is None else facts.member.replace(".onnx", "_fp16.onnx")
     if fp16_member is not None and half is not None:
         members[fp16_member] = half
-    measured = {
+    measured |= {
         "fp16_member": fp16_member,
-        "receptive_field_probe_px": reach.halo_px,
-        "halo_error": _halo_error(engine, windows[0][0], reach_px, facts.stride_px),
-        "max_activation": max(activations.values()),
-        "node_activation": activations,
         "fp16_headroom": FP16_HEADROOM,
         "fp16_safe": fp16_member is not None,
         "parity_max_abs": parity,
@@ -128,12 +104,6 @@ def measure_network(
     return ExportedNetwork(
         facts=NetworkFacts.model_validate({**dict(facts), **measured}), members=members
     )
-
-
-def _arena_bytes(graph: GraphFacts) -> float:
-    """Return the memory of a window per pixel."""
-    share = DEEP_ARENA if graph.stride_px >= DEEP_STRIDE_PX else 1.0
-    return graph.bytes_per_pixel * share
 
 
 def _half(model: bytes, activations: dict[str, float]) -> bytes | None:
@@ -144,20 +114,3 @@ def _half(model: bytes, activations: dict[str, float]) -> bytes | None:
         return to_fp16(model, activations, headroom=FP16_HEADROOM)
     except UnsupportedError:
         return None
-
-
-def _probe_size(radius_px: int, stride_px: int) -> int:
-    """Return a window that shows the whole reach with a stride to spare on each side."""
-    side = max(2 * radius_px + 4 * stride_px, 8 * stride_px)
-    return -(-side // (2 * stride_px)) * 2 * stride_px
-
-
-def _halo_error(
-    engine: NetworkEngine, sample: FloatArray, reach_px: int, stride_px: int
-) -> tuple[HaloError, ...]:
-    halos = range(0, reach_px + HALO_STEP_PX, HALO_STEP_PX)
-    costs = halo_error_curve(engine.run, sample, halos, stride_px=stride_px, scale=engine.scale)
-    return tuple(
-        HaloError(halo_px=cost.halo_px, max_abs=cost.max_abs, psnr_db=cost.psnr_db)
-        for cost in costs
-    )

@@ -213,7 +213,8 @@ def _stripped(traced: onnx.ModelProto, outputs: int, scale: int) -> bytes:
     for i, node in enumerate(graph.node):
         sloped = node.name.endswith(PRELU)
         name = f"{i:03d}{PRELU if sloped else '_' + node.op_type.lower()}"
-        renamed.update({value: renamed.get(value, name) for value in node.output})
+        for number, value in enumerate(node.output):
+            renamed.setdefault(value, f"{name}_{number}" if number else name)
         inputs = [renamed.get(value, value) for value in node.input]
         clean = helper.make_node(
             node.op_type, inputs, [renamed[value] for value in node.output], name

@@ -23,6 +23,8 @@ from camkit.runtime.output.part_file import refuse_existing
 
 NO_PLATE: Final = "none"
 RECIPE: Final = ".toml"
+FOREIGN: Final = (".onnx", ".pth")
+NETWORK_ADD: Final = "camkit network add"
 
 
 @checked
@@ -77,6 +79,12 @@ def bundle(
     paths = tuple(map(Path, several))
     if not paths:
         raise ContractError("export needs at least one checkpoint")
+    for path in paths:
+        if path.suffix.lower() in FOREIGN:
+            raise ContractError(
+                f"{path} is no checkpoint of camkit (.pt); a network of your own comes in by "
+                f"`{NETWORK_ADD}`"
+            )
     _check_first(paths, network=network)
     folder = paths[0].parent
     optics = _usual_file(psf, folder, PSF_NAME)

@@ -76,13 +76,15 @@ def check_keys(where: str, table: Mapping[str, Any], keys: set[str]) -> None:
     unknown = sorted(set(table) - keys)
     if unknown:
         names = ", ".join(map(repr, unknown))
-        known = sorted(keys)
-        if len(known) > MOST_LISTED:
-            near = (difflib.get_close_matches(name, known, MOST_LISTED, 0.0) for name in unknown)
-            known = list(dict.fromkeys(chain.from_iterable(zip(*near, strict=True))))[:MOST_LISTED]
+        choices = sorted(keys)
+        if len(choices) > MOST_LISTED:
+            near = (difflib.get_close_matches(name, choices, MOST_LISTED, 0.0) for name in unknown)
+            choices = list(dict.fromkeys(chain.from_iterable(zip(*near, strict=True))))[
+                :MOST_LISTED
+            ]
         raise ContractError(
             f"{where}: unknown key{'s' * (len(unknown) > 1)} {names}; known are "
-            f"{', '.join(known)}{' and others' * (len(known) < len(keys))}"
+            f"{', '.join(choices)}{' and others' * (len(choices) < len(keys))}"
         )
 
 

@@ -41,7 +41,8 @@ def load_torch(path: Path, what: str) -> Any:
     except DecodeError as error:
         raise ContractError(f"cannot read {what} {path}: {error}") from error
     except _DAMAGED as error:
-        reason = (str(error).splitlines() or [""])[0]
+        # torch's own words advise to run code of the file
         raise ContractError(
-            f"{path} is no {what}: it holds no plain tensors of torch ({reason})"
+            f"{path} is no {what}: it holds no plain tensors and values that torch saved "
+            "(no code of a file is ever run)"
         ) from error

@@ -25,6 +25,8 @@ from camkit.regular_file import check_regular
 MAX_BUNDLE_BYTES: Final = 128 * 2**20
 """Cap on the sum of the uncompressed members (and on the file itself): kernels of 7 fields and 3
 wavelengths, 901 px a side, are 68 MB."""
+NETWORKS: Final = (".onnx", ".pth", ".pt")
+"""Ends of names of files that hold a network."""
 MAX_MEMBERS: Final = 64
 MAX_RATIO: Final = 100
 
@@ -112,6 +114,10 @@ def read_container(path: Path, *, max_bytes: int = MAX_BUNDLE_BYTES) -> Containe
         raise BundleError(f"cannot read the bundle {path}: {error.strerror}") from error
     except DecodeError as error:
         raise BundleError(f"cannot read the bundle {path}: {error}") from error
+    if str(path).endswith(NETWORKS) and b"manifest.json" not in data:
+        raise BundleError(
+            f"{path} is a network, not a bundle; it goes into one by `camkit network add`"
+        )
     return container_from_bytes(data, what=str(path), max_bytes=max_bytes)
 
 

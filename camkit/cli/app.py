@@ -17,6 +17,7 @@ from camkit.cli.design.freeze import freeze
 from camkit.cli.design.freeze_norms import freeze_norms
 from camkit.cli.design.lens.lens_app import lens_app
 from camkit.cli.design.make import make
+from camkit.cli.design.network.network_app import network_app
 from camkit.cli.design.plate.plate_app import plate_app
 from camkit.cli.design.prepare import prepare
 from camkit.cli.design.recipe import recipe
@@ -49,7 +50,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-GROUPS = (analyse_app, lens_app, plate_app, calibrate_app, psf_app)
+GROUPS = (analyse_app, lens_app, plate_app, network_app, calibrate_app, psf_app)
 add_command(app, process, USE, "Restore captures to finished pictures.")
 add_command(app, plan, USE, "Preview what process would do.")
 add_command(app, simulate, USE, "Simulate captures of a scene.")
@@ -71,6 +72,7 @@ add_command(app, train, MAKE, "Train a camera's restoration network.")
 add_command(app, fit_bank, MAKE, "Fit a joint-colour filter bank.")
 add_command(app, freeze_norms, MAKE, "Replace instance norms with constants.")
 add_command(app, export, MAKE, "Pack results into a bundle.")
+add_application(app, network_app, MAKE, "Bring a network of your own.")
 add_application(app, calibrate_app, MEASURE, "Measure a camera from photographs.")
 add_application(app, psf_app, MEASURE, "Import a measured PSF.")
 

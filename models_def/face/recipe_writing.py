@@ -143,7 +143,7 @@ def describe_camera(
     """
     from camkit.models_def.kinds.bayer.recipe_draft import RecipeDraft
     from camkit.models_def.optics.lens_file.lens_file import read_noted_lens
-    from camkit.models_def.optics.placing import Placement, placed_lens
+    from camkit.models_def.optics.lens_file.placing import Placement, placed_lens
     from camkit.models_def.sensors.sensor_choice import choose_sensor, sensor_of
 
     if camera.photo is not None:
@@ -160,15 +160,15 @@ def describe_camera(
         origin=camera.distance_from,  # type: ignore[arg-type]
     )
     design, notes = read_noted_lens(lens, tuple(map(str, camera.glass)))
-    placed = placed_lens(with_fields_of(design, sensor), placement)
+    use = placed_lens(with_fields_of(design, sensor), placement)
     draft = RecipeDraft(
         name=name,
         sensor=sensor,
         prescription=prescription,
-        focus_mm=placed.lens.object_distance_mm,
-        objects_mm=placed.objects_mm,
+        focus_mm=use.lens.object_distance_mm,
+        objects_mm=use.objects_mm,
     )
-    return DescribedCamera(lens=placed.lens, draft=draft, notes=notes)
+    return DescribedCamera(lens=use.lens, draft=draft, notes=notes)
 
 
 def with_fields_of(lens: "Lens", sensor: "SensorChoice") -> "Lens":

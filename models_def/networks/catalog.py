@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from torch import nn
 
+from camkit.entry_points import entry_points, load_entry_point
 from camkit.errors import ContractError
 from camkit.models_def.networks.constant_unet import ConstantConfig, ConstantUnet
 from camkit.models_def.networks.full_unet import FullConfig, FullUnet
@@ -22,6 +23,9 @@ from camkit.models_def.networks.nafnet import NafConfig, Nafnet
 from camkit.models_def.networks.near_lights import REACH_PX, NearLights
 from camkit.models_def.networks.normed_unet import NormedConfig, NormedUnet
 from camkit.models_def.networks.trimmed_unet import TrimmedConfig, TrimmedUnet
+
+GROUP: Final = "camkit.networks"
+"""Of entry points, by which packages bring networks: what builds one of keyword arguments."""
 
 Builders = Mapping[str, Callable[..., nn.Module]]
 """Name -> what builds a network of the fields of its config."""
@@ -45,7 +49,7 @@ _NEAR_LIGHTS: Final[Builders] = {
     "lights_s": changed(_near_lights, LIGHTS_S),
     "lights_m": changed(_near_lights, LIGHTS_M),
 }
-_BUILDERS: Final[Builders] = {
+_BUILDERS: Final[dict[str, Callable[..., nn.Module]]] = {
     "lean_s": changed(LeanUnet, LEAN_S),
     "lean_m": changed(LeanUnet, LEAN_M),
     "lean_l": changed(LeanUnet, LEAN_L),
@@ -82,7 +86,7 @@ def build_network(name: str, **config: Any) -> nn.Module:
     """Build an untrained network.
 
     Args:
-        name: One of `NETWORK_NAMES`.
+        name: One of `NETWORK_NAMES`, or an entry point of the group `camkit.networks`.
         config: Fields of the network's config that differ from its defaults, as a recipe has them
             (lists are taken for tuples).
 
@@ -93,7 +97,23 @@ def build_network(name: str, **config: Any) -> nn.Module:
     Raises:
         ContractError: If the name or a field is unknown or a value is out of range.
     """
-    return build_one(_BUILDERS, name, config)
+    return build_one(_all_builders(name), name, config)
+
+
+def _all_builders(name: str) -> Builders:
+    """Return the networks of camkit, and that of this name if a package brings it."""
+    installed = entry_points(GROUP)
+    if name in _BUILDERS or name not in installed:
+        return _BUILDERS | dict.fromkeys(installed, _not_loaded)
+    builder = load_entry_point(installed[name], "network")
+    if not callable(builder):
+        raise ContractError(f"the network {name!r} of {installed[name].value} builds nothing")
+    return {name: builder}
+
+
+def _not_loaded(**_: Any) -> nn.Module:
+    """Refuse to build: nobody asks for it."""
+    raise AssertionError
 
 
 def build_one(builders: Builders, name: str, config: Mapping[str, Any]) -> nn.Module:

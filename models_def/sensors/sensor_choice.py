@@ -21,12 +21,15 @@ import numpy as np
 from camkit.bundle.sensor import GREY, RGB
 from camkit.caller import option_text
 from camkit.cfa import CFA_PATTERNS, shifted_cfa
+from camkit.entry_points import entry_points, load_entry_point
 from camkit.errors import ContractError
 from camkit.runtime.capture import Capture
 
 DATA: Final = "named_sensors.toml"
+GROUP: Final = "camkit.sensors"
+"""Of entry points, by which packages bring sensors: mappings with the keys of that file."""
 DEFAULT: Final = "default"
-STATED: Final = "stated"
+FROM_CALLER: Final = "stated"
 BLACK_LEVEL: Final = 256.0
 WHITE_LEVEL: Final = 4095.0
 WELL_E_PER_UM2: Final = 2000.0
@@ -51,7 +54,7 @@ WAVELENGTHS_UM: Final = tuple(round(0.42 + 0.02 * i, 2) for i in range(14))
 RESPONSE_SOURCE: Final = (
     "model: Gaussians at 0.600, 0.540 and 0.460 um with a full width of 0.090 um at half maximum"
 )
-_STATED: Final = re.compile(
+_DESCRIPTION: Final = re.compile(
     r"(?P<width>\d+)x(?P<height>\d+)@(?P<pitch>\d+(?:\.\d+)?|\.\d+)um(?::(?P<cfa>[A-Za-z]+))?"
 )
 
@@ -77,24 +80,24 @@ def choose_sensor(text: str) -> SensorChoice:
     Raises:
         ContractError: If it does neither.
     """
-    stated = _STATED.fullmatch(text.strip())
-    if stated is not None:
-        pattern = (stated["cfa"] or "RGGB").upper()
+    match = _DESCRIPTION.fullmatch(text.strip())
+    if match is not None:
+        pattern = (match["cfa"] or "RGGB").upper()
         facts: dict[str, Any] = {
-            "width_px": int(stated["width"]),
-            "height_px": int(stated["height"]),
-            "pixel_pitch_um": float(stated["pitch"]),
+            "width_px": int(match["width"]),
+            "height_px": int(match["height"]),
+            "pixel_pitch_um": float(match["pitch"]),
             "cfa": pattern,
         }
-        sources = dict.fromkeys(facts, STATED)
-        if stated["cfa"] is None:
+        sources = dict.fromkeys(facts, FROM_CALLER)
+        if match["cfa"] is None:
             sources["cfa"] = DEFAULT
         return _completed(facts, sources)
-    named = named_sensors()
+    entries = named_sensors()
     name, _, pattern = text.strip().partition(":")
-    facts = dict(named.get(name.casefold(), {}))
+    facts = dict(entries.get(name.casefold()) or _sensor_of_package(name))
     if not facts:
-        names = ", ".join(entry["name"] for entry in named.values())
+        names = ", ".join([*(entry["name"] for entry in entries.values()), *entry_points(GROUP)])
         raise ContractError(
             f"{option_text('sensor')} takes WIDTHxHEIGHT@PITCHum, such as 6000x4000@3.9um (with "
             "or without :BGGR for another pattern, :planes for developed pictures, :grey), or one "
@@ -103,7 +106,10 @@ def choose_sensor(text: str) -> SensorChoice:
     source = f"{facts.pop('name')}: {facts.pop('source')}"
     sources = dict.fromkeys(facts, source)
     if pattern or "cfa" not in facts:
-        facts["cfa"], sources["cfa"] = pattern.upper() or "RGGB", STATED if pattern else DEFAULT
+        facts["cfa"], sources["cfa"] = (
+            pattern.upper() or "RGGB",
+            FROM_CALLER if pattern else DEFAULT,
+        )
     return _completed(facts, sources)
 
 
@@ -145,7 +151,7 @@ def sensor_of(capture: Capture, pitch_um: float | None = None) -> SensorChoice:
         facts["read_noise_e"] = float(np.sqrt(np.mean(capture.noise.read_variance))) / shot
     sources = dict.fromkeys(facts, capture.camera or "the photograph")
     if pitch_um is not None:
-        sources["pixel_pitch_um"] = STATED
+        sources["pixel_pitch_um"] = FROM_CALLER
     return _completed(facts, sources)
 
 
@@ -154,6 +160,26 @@ def named_sensors() -> Mapping[str, Mapping[str, Any]]:
     """Return the facts of the sensors that camkit knows, by their names in small letters."""
     text = (resources.files("camkit.models_def.sensors") / DATA).read_text(encoding="utf-8")
     return {entry["name"].casefold(): entry for entry in tomllib.loads(text)["sensor"]}
+
+
+def _sensor_of_package(name: str) -> Mapping[str, Any]:
+    """Return the facts of a sensor that a package brings; nothing if none has this name.
+
+    Raises:
+        ContractError: If they are not those of a sensor.
+    """
+    point = next(
+        (p for n, p in entry_points(GROUP).items() if n.casefold() == name.casefold()), None
+    )
+    if point is None:
+        return {}
+    facts = load_entry_point(point, "sensor")
+    keys = {"width_px", "height_px", "pixel_pitch_um", "source"}
+    if not isinstance(facts, Mapping) or not keys <= facts.keys():
+        raise ContractError(
+            f"the sensor {point.name!r} of {point.value} must state {', '.join(sorted(keys))}"
+        )
+    return {"name": point.name, **facts}
 
 
 def _completed(facts: dict[str, Any], sources: dict[str, str]) -> SensorChoice:

@@ -110,7 +110,10 @@ def read_table(path: Path) -> dict[str, Any]:
     """
     table = load_torch(path, "checkpoint of camkit")
     if not isinstance(table, dict) or "format" not in table:
-        raise ContractError(f"{path} is no checkpoint of camkit")
+        raise ContractError(
+            f"{path} is no checkpoint of camkit; a network of your own comes in by "
+            "`camkit network add`"
+        )
     return table
 
 

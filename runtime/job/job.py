@@ -174,8 +174,13 @@ class Job:
         return window.resampled(ratio, (width, height))
 
     def grid_px(self, plane: Plane) -> tuple[int, int]:
-        """Return (height, width) of a plane of this capture."""
+        """Return (height, width) of a plane of this capture.
+
+        Of cells there is one more than would do, since they begin with red (`stages.pack`).
+        """
         ratio = plane.grid.pitch_ratio
+        if ratio > 1:
+            return int(self.capture.height // ratio) + 1, int(self.capture.width // ratio) + 1
         return round(self.capture.height / ratio), round(self.capture.width / ratio)
 
     def probe(self, *planes: str) -> tuple[RowSource, ...]:

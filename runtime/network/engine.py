@@ -5,13 +5,14 @@ import math
 import os
 import sys
 import threading
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from functools import cache
 from pathlib import Path
 from typing import Any, Final, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from camkit.arrays import FloatArray
 from camkit.errors import BundleError, ContractError, UnsupportedError
@@ -314,6 +315,31 @@ def largest_activations(
         for name, value in zip(names, values, strict=True):
             largest[name] = float(np.maximum(largest[name], np.abs(value).max(initial=0)))
     return largest
+
+
+def tensor_values(
+    model: bytes, names: Sequence[str], feeds: Mapping[str, NDArray[Any]]
+) -> dict[str, Any]:
+    """Return tensors of a model that need not be admissible yet, computed as it stands.
+
+    Args:
+        model: A model in which these tensors are outputs.
+        names: Tensors to return.
+        feeds: Inputs by name.
+
+    Raises:
+        BundleError: If onnxruntime refuses the model, or cannot run it.
+    """
+    options = ort.SessionOptions()
+    options.intra_op_num_threads = 1
+    options.graph_optimization_level = ort.GraphOptimizationLevel.ORT_DISABLE_ALL
+    options.log_severity_level = 4
+    try:
+        session = ort.InferenceSession(model, options, providers=[PROVIDER_NAMES["cpu"]])
+        values = session.run(list(names), dict(feeds))
+    except (RuntimeError, *_ORT_ERRORS) as error:
+        raise BundleError(f"onnxruntime cannot run it: {error}") from error
+    return dict(zip(names, values, strict=True))
 
 
 def _run(session: Any, binding: Any, cancel: Cancel | None, shape: tuple[int, ...]) -> None:

@@ -24,6 +24,7 @@ from camkit.errors import BundleError
 from camkit.runtime.machine.limits import NETWORK_WORK
 from camkit.runtime.network.graph_walk import GraphFacts, walk_graph
 from camkit.runtime.network.operators import (
+    COMPARISONS,
     ELEMENTWISE,
     GLOBAL_POOLS,
     NORMALIZATIONS,
@@ -36,7 +37,7 @@ ALLOWED_OPERATORS: Final = (
     | NORMALIZATIONS
     | REDUCTIONS
     | GLOBAL_POOLS
-    | {"Conv", "ConvTranspose", "MaxPool", "AveragePool", "Concat", "Slice", "Split"}
+    | {"Conv", "ConvTranspose", "MaxPool", "AveragePool", "Concat", "Slice", "Split", "Pad"}
     | {"DepthToSpace", "SpaceToDepth", "Resize", "Softmax", "Constant"}
 )
 OPSETS: Final = range(18, 21)
@@ -321,7 +322,7 @@ def check_graph(data: bytes, facts: NetworkFacts) -> GraphFacts:
 
 
 def with_node_outputs(data: bytes) -> tuple[bytes, tuple[str, ...]]:
-    """Return a model whose every tensor is an output, to measure activations.
+    """Return a model whose every tensor of numbers is an output, to measure activations.
 
     Returns:
         The model, and the names of its outputs in the order of the graph.
@@ -330,7 +331,8 @@ def with_node_outputs(data: bytes) -> tuple[bytes, tuple[str, ...]]:
         BundleError: If the model is not admissible.
     """
     graph = parse_graph(data)
-    names = tuple(dict.fromkeys(name for node in graph.nodes for name in node.outputs if name))
+    nodes = (node for node in graph.nodes if node.op not in COMPARISONS)
+    names = tuple(dict.fromkeys(name for node in nodes for name in node.outputs if name))
     model = _decode(data)
     del model.graph.output[:]
     model.graph.output.extend(

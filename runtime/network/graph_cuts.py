@@ -136,6 +136,8 @@ class _Cuts:
         if place in (0, len(self._nodes)):
             return True
         crossing = set(self._crossing(place))
+        if not crossing.isdisjoint(self._walk.booleans):
+            return False
         whole = all(
             axis.extra == 0 for name in crossing for axis in self._walk.extents[name].axes or ()
         )

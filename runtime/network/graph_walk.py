@@ -16,6 +16,7 @@ from camkit.runtime.network.activation_memory import (
     tensor_names,
 )
 from camkit.runtime.network.operators import (
+    COMPARISONS,
     ELEMENTWISE,
     GLOBAL_POOLS,
     NORMALIZATIONS,
@@ -26,8 +27,10 @@ from camkit.runtime.network.operators import (
     Node,
     Windows,
     check_broadcast,
+    check_extents,
     convolution_windows,
     is_corner_aligned,
+    pad_windows,
     place_run,
     reduced_axes,
     reduces_space,
@@ -44,11 +47,11 @@ _LARGE_BLOCK: Final = 16
 # How much longer a sample takes that is pooled, or multiplied in groups or off the blocked path.
 _SLOWNESS: Final = 16
 _CHANNEL_AXIS: Final = 1
-_MAX_CHANNELS: Final = 2**16
-_MAX_EXTRA_PX: Final = 64
 # Operators that may take several computed tensors; all others take one, the rest is constant.
 _FLOATS: Final = (1, 10)  # of TensorProto.DataType: float32 and float16
-_FREE: Final = frozenset({"Add", "Sub", "Mul", "Div", "Max", "Min", "Concat"})
+_FREE: Final = (
+    frozenset({"Add", "Sub", "Mul", "Div", "Max", "Min", "Concat", "Where"}) | COMPARISONS
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,6 +103,7 @@ class Walk:
         global_operators: "name (type)" of nodes that see the whole picture.
         unblocked: Convolutions off onnxruntime's blocked path.
         blocked: Outputs of those on it.
+        booleans: Outputs of comparisons.
         workspace: Output of a node -> values per pixel that it needs besides.
         mac_per_pixel: Multiply-accumulates.
         slow_per_pixel: Those of pooling, of groups and off the blocked path.
@@ -111,6 +115,7 @@ class Walk:
     global_operators: list[str] = field(default_factory=list)
     unblocked: list[str] = field(default_factory=list)
     blocked: set[str] = field(default_factory=set)
+    booleans: set[str] = field(default_factory=set)
     workspace: dict[str, float] = field(default_factory=dict)
     mac_per_pixel: float = 0.0
     slow_per_pixel: float = 0.0
@@ -217,23 +222,9 @@ def walk_nodes(nodes: Sequence[Node], constants: Constants, source: tuple[str, i
     walk = Walk(constants=constants, extents={source[0]: start})
     for node in nodes:
         extents = _node_extents(walk, node)
-        _check_extents(node, extents)
+        check_extents(node, extents)
         walk.extents.update(zip(node.outputs, extents, strict=False))
     return walk
-
-
-def _check_extents(node: Node, extents: Sequence[Extent]) -> None:
-    """Refuse tensors that would be absurdly large whatever the picture."""
-    for extent in extents:
-        if extent.channels > _MAX_CHANNELS:
-            raise BundleError(
-                f"{node.label}: gives {extent.channels} channels; at most {_MAX_CHANNELS} are "
-                "admitted"
-            )
-        if any(axis.extra * axis.step > _MAX_EXTRA_PX for axis in extent.axes or ()):
-            raise BundleError(
-                f"{node.label}: pads the picture by more than {_MAX_EXTRA_PX} px; refused"
-            )
 
 
 def _final(extents: Mapping[str, Extent], target: tuple[str, int | None]) -> tuple[Extent, int]:
@@ -321,6 +312,13 @@ def _check_inputs(walk: Walk, node: Node) -> None:
                 walk.constant_shape(node, index)
     if node.op == "Cast" and node.integer("to", 0) not in _FLOATS:
         raise BundleError(f"{node.label}: casts to float32 and float16 alone are admitted")
+    places = [index for index, name in enumerate(node.inputs) if name in walk.booleans]
+    if places != ([0] if node.op == "Where" else []):
+        raise BundleError(
+            f"{node.label}: what a comparison gives is the first input of a Where, nothing else"
+        )
+    if node.op in COMPARISONS:
+        walk.booleans.update(node.outputs)
 
 
 def _node_extents(walk: Walk, node: Node) -> list[Extent]:
@@ -338,6 +336,8 @@ def _node_extents(walk: Walk, node: Node) -> list[Extent]:
             walk.mark_global(node)
         windows = resize_windows(node, walk.constants)
         return [walk.pass_through(node, walk.extent(node).channels, windows)]
+    if node.op == "Pad":
+        return [_pad(walk, node)]
     if node.op in ("Concat", "Split", "Slice"):
         return _regroup(walk, node)
     return [_global(walk, node)]
@@ -436,6 +436,13 @@ def _common_extent(node: Node, extents: Sequence[Extent], channels: int) -> Exte
             "their sizes cannot agree"
         )
     return Extent(channels=channels, axes=next(iter(axes), None))
+
+
+def _pad(walk: Walk, node: Node) -> Extent:
+    if len(node.inputs) > 3 and node.inputs[3]:
+        raise BundleError(f"{node.label}: Pad with axes is refused; state the pads of all axes")
+    windows = pad_windows(node, walk.integers(node, 1))
+    return walk.pass_through(node, walk.extent(node).channels, windows)
 
 
 def _shuffle(walk: Walk, node: Node) -> Extent:

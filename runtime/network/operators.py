@@ -8,10 +8,11 @@ samples reads, in integers, so that the phase of the stride is exact:
     transposed convolution                        ceil((first + p - span) / s)   (last + p) // s
     DepthToSpace b, nearest resize by b           first // b             last // b
     SpaceToDepth b                                first b                last b + b - 1
+    Pad by p: zeros, edge or mirrored             first - p              last - p
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, Final
@@ -25,8 +26,13 @@ ELEMENTWISE: Final = (
     frozenset({"Add", "Sub", "Mul", "Div", "Max", "Min", "Neg", "Abs", "Sqrt"})
     | {"Relu", "LeakyRelu", "PRelu", "Elu", "Gelu", "Sigmoid", "HardSigmoid", "HardSwish"}
     | {"Tanh", "Softplus", "Clip", "Identity", "Cast", "BatchNormalization"}
+    | {"Pow", "Exp", "Log", "Erf", "Where"}
+    | {"Greater", "GreaterOrEqual", "Less", "LessOrEqual", "Equal"}
 )
 """One sample out from the same sample in; second inputs may be constants per channel."""
+COMPARISONS: Final = frozenset({"Greater", "GreaterOrEqual", "Less", "LessOrEqual", "Equal"})
+"""They give true or false, which only Where takes."""
+PAD_MODES: Final = ("constant", "reflect", "edge")
 NORMALIZATIONS: Final = frozenset({"InstanceNormalization", "GroupNormalization"})
 REDUCTIONS: Final = frozenset({"ReduceMean", "ReduceSum", "ReduceMax", "ReduceMin"})
 GLOBAL_POOLS: Final = frozenset({"GlobalAveragePool", "GlobalMaxPool"})
@@ -37,6 +43,8 @@ _MAX_SCALE: Final = 64
 _MAX_KERNEL: Final = 4096
 _MIN_STEP: Final = Fraction(1, 8)
 _MAX_STEP: Final = 4096
+_MAX_CHANNELS: Final = 2**16
+_MAX_EXTRA_PX: Final = 64
 
 Constants = Mapping[str, NDArray[Any]]
 
@@ -207,6 +215,29 @@ def unshuffle_window(block: int) -> Window:
     )
 
 
+def pad_windows(node: Node, pads: list[int]) -> Windows:
+    """Return the windows of a Pad.
+
+    What lies beyond the picture's border is made of samples within the reach of who reads it.
+
+    Args:
+        node: The Pad.
+        pads: Samples before every axis, then behind every axis.
+
+    Raises:
+        BundleError: If it pads other axes than rows and columns, cuts, or has another mode.
+    """
+    mode = node.text("mode", "constant")
+    if mode not in PAD_MODES:
+        raise BundleError(f"{node.label}: Pad of the mode {mode!r} is refused")
+    if len(pads) != 2 * _NDIM or any(pads[i] for i in (0, 1, _NDIM, _NDIM + 1)):
+        raise BundleError(f"{node.label}: Pad is admitted along rows and columns only")
+    if min(pads) < 0 or max(pads) > _MAX_KERNEL:
+        raise BundleError(f"{node.label}: pads {pads} are out of range")
+    rows, columns = (_convolved(1, 0, (pads[i], pads[i + _NDIM]), 0) for i in _SPATIAL)
+    return rows, columns
+
+
 def resize_windows(node: Node, constants: Constants) -> Windows:
     """Return the windows of a Resize by constant factors, nearest or linear.
 
@@ -284,4 +315,18 @@ def check_broadcast(node: Node, constants: Constants) -> None:
         if len(shape) > _NDIM or any(side != 1 for side in shape[-2:]):
             raise BundleError(
                 f"{node.label}: constant {name!r} of shape {shape} varies over space; refused"
+            )
+
+
+def check_extents(node: Node, extents: Sequence[Extent]) -> None:
+    """Refuse tensors that would be absurdly large whatever the picture."""
+    for extent in extents:
+        if extent.channels > _MAX_CHANNELS:
+            raise BundleError(
+                f"{node.label}: gives {extent.channels} channels; at most {_MAX_CHANNELS} are "
+                "admitted"
+            )
+        if any(axis.extra * axis.step > _MAX_EXTRA_PX for axis in extent.axes or ()):
+            raise BundleError(
+                f"{node.label}: pads the picture by more than {_MAX_EXTRA_PX} px; refused"
             )

@@ -17,6 +17,8 @@ from camkit.runtime.network.tiling import Run, TileLimits, infer_bands, lay_wind
 from camkit.runtime.rows import ArrayRows
 
 _MOST_PHASES: Final = 32
+TILE_PX: Final = 128
+"""Side of the tiles by which the cost of a short halo is measured."""
 _KICK: Final = 1e3  # far beyond the base, so that it survives rounding after many layers
 
 
@@ -134,7 +136,7 @@ def halo_error_curve(
     *,
     stride_px: int,
     scale: int = 1,
-    tile_px: int = 128,
+    tile_px: int = TILE_PX,
 ) -> tuple[HaloCost, ...]:
     """Measure what a halo shorter than the reach costs.
 

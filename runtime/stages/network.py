@@ -24,7 +24,7 @@ from camkit.runtime.job.stream import Stream
 from camkit.runtime.job.walker import USUAL_BYTES
 from camkit.runtime.machine.memory import trim_heap
 from camkit.runtime.network.engine import NetworkEngine
-from camkit.runtime.network.guard import TileGuard, light_bound, plain_bound
+from camkit.runtime.network.guard import Bound, TileGuard, light_bound, plain_bound
 from camkit.runtime.network.light_bound import LARGE_CHANGE, KeptRows
 from camkit.runtime.network.light_keeper import LightKeeper
 from camkit.runtime.network.tiling import Run
@@ -41,6 +41,7 @@ from camkit.runtime.plan.estimate import network_seconds, role_window_mp
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.plan.ways import planned
 from camkit.runtime.rows import RowSource, changed_bands
+from camkit.runtime.signal.coding import CodedRows, PlaneCoding
 from camkit.runtime.signal.stabilise import (
     StackedRows,
     familiar_noise,
@@ -72,7 +73,7 @@ _OTHER_CAUSES: Final = (
 
 def look(entry: Network, job: Job) -> Job:
     """Check the capture against the envelope, unless another network did."""
-    if entry.transform == "stabilise":
+    if entry.transform == "stabilise" or entry.takes_noise:
         job = job.with_noise()
     return job if "envelope" in job.log.record else _compared(job)
 
@@ -118,6 +119,11 @@ def given_rows(entry: Network, job: Job, streams: Sequence[Stream]) -> RowSource
     Behind them come those that say where it is kept, if the stage takes a mask.
     """
     planes, masks = _parted(streams)
+    coding = coding_of(entry, job)
+    if coding is not None:
+        pieced = [stream.pieced() for stream in planes]
+        noise = _sample_noise(job, planes[-1]) if entry.takes_noise else None
+        return CodedRows(pieced, coding, noise=noise, threads=job.threads)
     noises = None
     if entry.transform == "stabilise":
         noises = [_familiar_noise(job, stream) for stream in planes]
@@ -128,6 +134,41 @@ def given_rows(entry: Network, job: Job, streams: Sequence[Stream]) -> RowSource
         threads=job.threads,
         masks=[KeptRows(mask.rows()) for mask in masks],
     )
+
+
+def coding_of(entry: Network, job: Job, *, output: bool = False) -> PlaneCoding | None:
+    """Return the numbers that a network takes, or gives; None where they are the stages' own."""
+    coding, space = entry.coding, entry.space
+    if coding is None or space is None:
+        return None
+    return PlaneCoding(
+        space=coding.output if output else space,
+        matrix=rec709_of_planes(job.color_matrix),
+        exposure=coding.exposure,
+        gain=coding.output_gain if output else coding.gain,
+        offset=coding.output_offset if output else coding.offset,
+    )
+
+
+def _is_one_coding(entry: Network) -> bool:
+    """Return whether a network gives the numbers that it takes."""
+    coding = entry.coding
+    if coding is None:
+        return True
+    numbers = entry.transform, coding.gain, coding.offset
+    return numbers == (coding.output, coding.output_gain, coding.output_offset)
+
+
+def _sample_noise(job: Job, stream: Stream) -> NoiseModel:
+    """Return the noise of the samples of a stream; those of a mosaic count as the mean colour."""
+    noise, channels = job.noise.with_gains(stream.gains), stream.plane.channels
+    colours = job.known_bundle.manifest.sensor.channels
+    places = [colours.index(name[0]) for name in channels if name[0] in colours]
+    if len(places) == len(channels):
+        shots, reads = ([part[i] for i in places] for part in (noise.shot, noise.read_variance))
+        return NoiseModel(shot=tuple(shots), read_variance=tuple(reads))
+    shot, read = (float(np.mean(part)) for part in (noise.shot, noise.read_variance))
+    return NoiseModel(shot=(shot,) * len(channels), read_variance=(read,) * len(channels))
 
 
 def _parted(streams: Sequence[Stream]) -> tuple[list[Stream], list[Stream]]:
@@ -263,9 +304,7 @@ class _NetworkStage:
             fallback=job.options.on_unsafe == "fallback",
             stand_in=stand_in,
             inputs=facts.input_channels,
-            bound=plain_bound(entry.most_light)
-            if noise is None
-            else light_bound(entry.most_light, noise, scale=entry.scale),
+            bound=self._bound(noise),
         )
         bands = self._windows.bands(
             given_rows(entry, job, streams),
@@ -277,9 +316,28 @@ class _NetworkStage:
         )
         if self._keeper is not None and self._keeper.measured:
             bands = self._counted(bands, self._keeper)
+        coding = coding_of(entry, job, output=True)
         if noise is not None:
             bands = self._linear(bands, noise)
+        elif coding is not None:
+            bands = changed_bands(bands, lambda rows, _: coding.decode(rows), threads=job.threads)
         return self._split(bands, planes[-1], [port.channels for port in facts.outputs])
+
+    def _bound(self, noise: NoiseModel | None) -> Bound:
+        """Return what is believed of the output of a tile."""
+        entry, job = self._entry, self._job
+        if noise is not None:
+            return light_bound(entry.most_light, noise, scale=entry.scale)
+        numbers_in, numbers_out = (coding_of(entry, job, output=output) for output in (False, True))
+        if numbers_in is None or numbers_out is None:
+            return plain_bound(entry.most_light)
+        plain = plain_bound(entry.most_light)
+
+        def bound(largest: float) -> tuple[float, float]:
+            most = numbers_out.largest_number(plain(numbers_in.largest_light(largest))[1])
+            return -most, most
+
+        return bound
 
     def _light_keeper(
         self, stand_in: slice | None, *, masked: bool, noise: NoiseModel | None
@@ -346,7 +404,8 @@ class _NetworkStage:
     def _stand_in(self, streams: Sequence[Stream]) -> slice | None:
         """Return the channels of the input that stand for the output where it is not had."""
         planes = self._job.known_bundle.manifest.planes
-        if len(self._entry.gives) != 1:
+        entry = self._entry
+        if len(entry.gives) != 1 or not _is_one_coding(entry):
             return None
         output_plane = planes[self._entry.gives[0]]
         ends = np.cumsum([stream.shape[0] for stream in streams])

@@ -4,6 +4,7 @@ A stage names the planes that it takes and gives, and says by `join` what it mak
 does stands in the module of the same name in `camkit.runtime.stages`, or in the one that it names.
 
 linearise, repair, white_balance, demosaic    the front
+foreign                                       what networks of somebody else need
 haze, wiener, highlights, deglare, network    the restoration
 raise_clipped, illumination, undistort, color  what every picture needs behind it
 correct, super_resolve, sharpen, lifetime     single photons
@@ -15,6 +16,8 @@ from camkit.bundle.stages.correct import Correct
 from camkit.bundle.stages.deglare import Deglare
 from camkit.bundle.stages.demosaic import Demosaic
 from camkit.bundle.stages.entry import JoinError, PackageStage, Parts, StageEntry
+from camkit.bundle.stages.foreign.pack import Pack
+from camkit.bundle.stages.foreign.unpack import Unpack
 from camkit.bundle.stages.haze import Dehaze
 from camkit.bundle.stages.highlights import Highlights
 from camkit.bundle.stages.illumination import Illumination
@@ -44,6 +47,7 @@ __all__ = [
     "Linearise",
     "Mosaic",
     "Network",
+    "Pack",
     "PackageStage",
     "Parts",
     "RaiseClipped",
@@ -54,6 +58,7 @@ __all__ = [
     "SuperResolve",
     "Together",
     "Undistort",
+    "Unpack",
     "WhiteBalance",
     "Wiener",
     "all_stages",

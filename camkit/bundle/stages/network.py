@@ -1,14 +1,15 @@
 """A network on planes."""
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, Self, cast
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from camkit.bundle.entry import Positive, Word
 from camkit.bundle.facts import NetworkFacts, Port
 from camkit.bundle.light_bound import BOUND_REACH_PX, LightBound
 from camkit.bundle.plane import Plane
+from camkit.bundle.sensor import RGB
 from camkit.bundle.stages.entry import (
     BOUNDED,
     JoinError,
@@ -18,6 +19,8 @@ from camkit.bundle.stages.entry import (
     need_masks,
     need_rows,
 )
+from camkit.bundle.stages.foreign.coding import Coding, Numbers, Space
+from camkit.bundle.stages.foreign.pack import CODED
 
 DEFAULT_ROLE = "restore"
 MAX_FINER = 64
@@ -34,7 +37,8 @@ class Network(StageEntry):
     Attributes:
         role: Key of `networks` in the manifest.
         transform: stabilise takes linear planes to equal noise (k-sigma, then square root) before
-            the network and back behind it; none hands them on as they are.
+            the network and back behind it; none hands them on as they are; camera, rec709 and
+            srgb code them as `coding` says and take them back behind it (format 2.11).
         scale: Divisor behind the square root; the noise there is 0.5 / scale at any ISO.
         most_light: How many times the largest light of its tile an output may have; what exceeds
             it is not believed.
@@ -45,6 +49,7 @@ class Network(StageEntry):
         keeps_white: Whether its output is at least its last plane, or white where that is brighter
             (format 2.8): no lamp ends darker than what is known before the network, in the
             colours of the camera and in those of the output.
+        coding: The numbers of a network whose transform is a space (format 2.11); else None.
     """
 
     stands_in: ClassVar[int] = 1
@@ -52,12 +57,19 @@ class Network(StageEntry):
     takes: tuple[Word, ...] = ("rgb", "restored")
     gives: tuple[Word, ...] = ("clean",)
     role: Word = DEFAULT_ROLE
-    transform: Literal["stabilise", "none"] = "stabilise"
+    transform: Literal["stabilise", "none", "camera", "rec709", "srgb"] = "stabilise"
     scale: Positive = 64.0
     most_light: Positive = 16.0
     lights_px: Annotated[int, Field(ge=1, le=1024)] | None = None
     light: Annotated[LightBound | None, BOUNDED] = None
     keeps_white: Annotated[bool, BOUNDED] = False
+    coding: Annotated[Coding | None, CODED] = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if (self.coding is None) != (self.transform in ("stabilise", "none")):
+            raise ValueError("coding goes with the transforms camera, rec709 and srgb, all of them")
+        return self
 
     @property
     def extra_reach_px(self) -> int:
@@ -75,26 +87,20 @@ class Network(StageEntry):
         for plane in planes:
             if plane.grid != first.grid or plane.axes != first.axes:
                 raise JoinError("its planes must lie on one grid")
-            need_domain(plane, "linear" if self.transform == "stabilise" else first.domain)
+            need_domain(plane, first.domain if self.transform == "none" else "linear")
             if self.transform == "stabilise":
                 _check_noise(len(plane.channels), parts)
         for size, facts in sizes.items():
-            _check_ports(size, facts.inputs, planes)
+            _check_ports(size, facts.inputs, planes, noise=self.takes_noise)
         outputs = _outputs(sizes)
+        if self.coding is not None:
+            self._check_coding(self.coding, planes, outputs, parts)
         if self.light is not None or self.keeps_white:
             self._check_bound(planes[-1], outputs)
-        if self.transform == "stabilise":
-            for port in outputs:
-                _check_noise(port.channels, parts)
         last = planes[-1]
         _check_finest(last, outputs)
-        if self.transform == "stabilise" and any(
-            port.channels != len(last.channels) for port in outputs
-        ):
-            raise JoinError(
-                f"stabilised outputs become light by the noise of its last plane, which has "
-                f"{len(last.channels)} channel(s)"
-            )
+        if self.transform == "stabilise":
+            _check_stabilised(last, outputs, parts)
         return tuple(
             last.model_copy(
                 update={
@@ -105,6 +111,34 @@ class Network(StageEntry):
             )
             for port in outputs
         )
+
+    @property
+    def space(self) -> Space | None:
+        """Return the space of its coded planes; None where they are not coded."""
+        return None if self.coding is None else cast("Space", self.transform)
+
+    @property
+    def takes_noise(self) -> bool:
+        """Return whether a map of the noise lies behind its planes."""
+        return self.coding is not None and self.coding.noise
+
+    def _check_coding(
+        self, coding: Coding, planes: Sequence[Plane], outputs: Sequence[Port], parts: Parts
+    ) -> None:
+        """Refuse numbers of other channels than there are, and colours of what has none."""
+        for plane in planes:
+            _check_colours(self.transform, plane.channels)
+            _check_numbers(coding.gain, len(plane.channels))
+            _check_numbers(coding.offset, len(plane.channels))
+        for port in outputs:
+            if coding.output != "camera" and port.channels not in (1, len(RGB)):
+                raise JoinError(
+                    f"{coding.output} has red, green and blue; it gives {port.channels}"
+                )
+            _check_numbers(coding.output_gain, port.channels)
+            _check_numbers(coding.output_offset, port.channels)
+        if coding.noise and len(parts.sensor.channels) not in (1, len(RGB)):
+            raise JoinError("a map of the noise is known of grey or of red, green and blue")
 
     def _without_masks(self, planes: Sequence[Plane]) -> list[Plane]:
         """Return the planes that are inputs, without the masks behind them."""
@@ -127,9 +161,19 @@ class Network(StageEntry):
             raise JoinError("its light is bounded by its last plane, which its output must match")
 
 
-def _check_ports(size: str, ports: Sequence[Port], planes: Sequence[Plane]) -> None:
+def _check_colours(space: str, channels: tuple[str, ...]) -> None:
+    if space != "camera" and len(channels) != 1 and channels != RGB:
+        raise JoinError(f"{space} has red, green and blue; a plane has {', '.join(channels)}")
+
+
+def _check_numbers(numbers: Numbers, channels: int) -> None:
+    if len(numbers) not in (1, channels):
+        raise JoinError(f"{len(numbers)} gains or offsets do not go with {channels} channels")
+
+
+def _check_ports(size: str, ports: Sequence[Port], planes: Sequence[Plane], *, noise: bool) -> None:
     expected = [port.channels for port in ports]
-    got = [len(plane.channels) for plane in planes]
+    got = [*(len(plane.channels) for plane in planes), *[1][:noise]]
     if expected != got:
         raise JoinError(
             f"its network of size {size} has inputs of {_listed(expected)} channels "
@@ -144,6 +188,17 @@ def _check_noise(count: int, parts: Parts) -> None:
         raise JoinError(
             f"it stabilises by the noise of {', '.join(channels)}, one of each; a plane has {count}"
         )
+
+
+def _check_stabilised(last: Plane, outputs: Sequence[Port], parts: Parts) -> None:
+    """Refuse outputs that cannot be taken back to light."""
+    for port in outputs:
+        _check_noise(port.channels, parts)
+        if port.channels != len(last.channels):
+            raise JoinError(
+                f"stabilised outputs become light by the noise of its last plane, which has "
+                f"{len(last.channels)} channel(s)"
+            )
 
 
 def _check_finest(plane: Plane, outputs: Sequence[Port]) -> None:

@@ -14,6 +14,8 @@ from camkit.bundle.stages.correct import Correct
 from camkit.bundle.stages.deglare import Deglare
 from camkit.bundle.stages.demosaic import Demosaic
 from camkit.bundle.stages.entry import PackageStage, StageEntry
+from camkit.bundle.stages.foreign.pack import Pack
+from camkit.bundle.stages.foreign.unpack import Unpack
 from camkit.bundle.stages.haze import Dehaze
 from camkit.bundle.stages.highlights import Highlights
 from camkit.bundle.stages.illumination import Illumination
@@ -36,12 +38,14 @@ BUILT_IN: Final[tuple[type[StageEntry], ...]] = (
     Linearise,
     Repair,
     WhiteBalance,
+    Pack,
     Demosaic,
     Highlights,
     Deglare,
     Dehaze,
     Wiener,
     Network,
+    Unpack,
     RaiseClipped,
     Illumination,
     Undistort,

@@ -27,9 +27,13 @@ from camkit.calibration.psf_import.kernel_stack import (
 )
 from camkit.calibration.psf_import.zemax_listing import Listing, read_listing
 from camkit.caller import option_text
+from camkit.entry_points import entry_points, load_entry_point
 from camkit.errors import ContractError
 
 READ: Final = (*array_files.SUFFIXES, *kernel_pictures.SUFFIXES, *zemax_listing.SUFFIXES)
+GROUP: Final = "camkit.psf_readers"
+"""Of entry points, by which packages bring readers of kernels: suffix without its dot -> a function
+of a path that returns an array, whose axes the caller states as those of .npy."""
 _PARTS: Final = {
     "{row}": r"(?P<row>\d+)",
     "{col}": r"(?P<col>\d+)",
@@ -85,7 +89,14 @@ def _of_file(path: Path, options: ImportOptions) -> KernelStack:
         raise ContractError(
             f"{path.name} is a PSF of camkit already: name it in a recipe ([lens] psf)"
         )
-    raise ContractError(f"{path.name} is no file of kernels; expected {', '.join(READ)}")
+    point = entry_points(GROUP).get(suffix.removeprefix("."))
+    if point is not None:
+        reader = load_entry_point(point, "PSF reader")
+        if not callable(reader):
+            raise ContractError(f"the PSF reader {point.name!r} of {point.value} reads nothing")
+        return KernelStack(values=ordered(np.asarray(reader(path)), options, path.name))
+    suffixes = (*READ, *(f".{name}" for name in entry_points(GROUP)))
+    raise ContractError(f"{path.name} is no file of kernels; expected {', '.join(suffixes)}")
 
 
 def _of_folder(folder: Path, options: ImportOptions) -> KernelStack:

@@ -69,16 +69,16 @@ def judge_camera(
     Returns:
         Method -> judgement.
     """
-    found: dict[str, list[float]] = {}
+    psnr_by_method: dict[str, list[float]] = {}
     names: list[str] = []
     pipelines = pipelines_of(bundle)
     for shot, exposed in captures_of(bundle, pictures, cache_folder):
         names.append(shot.picture.name)
         for method, pipeline in pipelines.items():
             truth, got = inner_srgb(restored_by(pipeline, exposed), exposed.sharp)
-            found.setdefault(method, []).append(psnr(truth, got))
+            psnr_by_method.setdefault(method, []).append(psnr(truth, got))
     scenes = tuple(names)
-    return {m: Judgement(psnr_db=tuple(db), scenes=scenes) for m, db in found.items()}
+    return {m: Judgement(psnr_db=tuple(db), scenes=scenes) for m, db in psnr_by_method.items()}
 
 
 def pipelines_of(bundle: Bundle) -> dict[str, Pipeline]:

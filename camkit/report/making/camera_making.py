@@ -167,11 +167,11 @@ class _Making:
         judged = self._judged(NETWORK_BUNDLE)
         size = self._wish.size
         gain_db, error_db = judged[size].gain_over(judged[FILTER])
-        told = f"network {size}: {gain_db:+.2f} +- {error_db:.2f} dB over the filter"
+        line = f"network {size}: {gain_db:+.2f} +- {error_db:.2f} dB over the filter"
         if best_size(judged, [size]) is None:
-            self._tell(f"{told}: it stays out of the bundle; train for more minutes")
+            self._tell(f"{line}: it stays out of the bundle; train for more minutes")
         else:
-            self._ship(NETWORK_BUNDLE, told)
+            self._ship(NETWORK_BUNDLE, line)
         return judged
 
     @working("judging the camera")
@@ -179,9 +179,9 @@ class _Making:
         bundle = open_bundle(self._work.path(name))
         return judge_camera(bundle, self._wish.valid, self._work.folder)
 
-    def _ship(self, name: str, told: str) -> None:
+    def _ship(self, name: str, line: str) -> None:
         self._steps.ship(name, self._out)
-        self._tell(f"{self._out}: {told} ({self._work.spent_s():.0f} CPU-s so far)")
+        self._tell(f"{self._out}: {line} ({self._work.spent_s():.0f} CPU-s so far)")
 
     def _page(self, bundle: Bundle, judged: Mapping[str, Judgement]) -> str:
         return camera_html(

@@ -42,7 +42,7 @@ FIT_STEPS: Final = 120
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraWish:
-    """What camera is asked for.
+    """The camera that is asked for.
 
     Attributes:
         optics: Lens file, name of a built-in lens, or measured PSF (.safetensors).

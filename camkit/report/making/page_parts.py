@@ -25,11 +25,11 @@ MEGAPIXEL: Final = 1e6
 def pictures_of(bundle: Bundle, pictures: Path | None, cache_folder: Path) -> dict[str, FloatArray]:
     """Return one capture by every method and the truth: title -> (3, h, w) sRGB values."""
     _, exposed = next(iter(captures_of(bundle, pictures, cache_folder)))
-    shown = {
+    by_method = {
         name: encode_srgb(restored_by(pipeline, exposed))
         for name, pipeline in pipelines_of(bundle).items()
     }
-    return {**shown, "truth": exposed.sharp}
+    return {**by_method, "truth": exposed.sharp}
 
 
 def seconds_of(bundle: Bundle) -> dict[str, float]:
@@ -37,12 +37,12 @@ def seconds_of(bundle: Bundle) -> dict[str, float]:
     sensor = bundle.manifest.light_sensor
     height, width = (min(TIMED_PX, side // 2 * 2) for side in (sensor.height_px, sensor.width_px))
     scene = procedural_scene(SEED, height, width)
-    taken = photograph(
+    simulation = photograph(
         scene, bundle, SimulationOptions(iso=400.0, depth_mm=bundle.psf.depths_mm[0])
     )
     share = sensor.width_px * sensor.height_px / (height * width)
     seconds = {}
-    exposed = Exposed(simulation=taken, truths={})
+    exposed = Exposed(simulation=simulation, truths={})
     for name, pipeline in pipelines_of(bundle).items():
         began_s = time.process_time()
         restored_by(pipeline, exposed)

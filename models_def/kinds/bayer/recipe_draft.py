@@ -10,10 +10,10 @@ from typing import Any, Final
 from camkit.bundle.light_bound import LightBound
 from camkit.bundle.stages import Wiener
 from camkit.models_def.kinds.bayer.recipe import BayerDataRecipe, LensRecipe
+from camkit.models_def.recipe_text import table_lines
 from camkit.models_def.sensors.sensor_choice import SensorChoice
 from camkit.models_def.toml_table import key_line
 from camkit.models_def.training.recipe import ScheduleRecipe
-from camkit.models_def.training.recipe_text import table_lines
 
 WIENER: Final[Mapping[str, Any]] = {
     "block_px": 256,
@@ -46,7 +46,7 @@ _STAGE_KEYS: Final = ("type", "takes", "gives")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecipeDraft:
-    """What a recipe is made of.
+    """The parts of a recipe.
 
     Attributes:
         name: Of the camera.
@@ -91,9 +91,9 @@ def recipe_text(draft: RecipeDraft) -> str:
         key_line("scale", 64.0),
         "",
         *_sensor_lines(draft.sensor),
-        *table_lines("wiener", Wiener, bank, without=_STAGE_KEYS),
+        *table_lines("wiener", Wiener, bank, left_out=_STAGE_KEYS),
         *table_lines("light", LightBound, {"spread": 0.2, "keeps_bright": True}),
-        *table_lines("lens", LensRecipe, lens, without=("psf", "uncertainty")),
+        *table_lines("lens", LensRecipe, lens, left_out=("psf", "uncertainty")),
         *table_lines("data", BayerDataRecipe, _data_of(draft.sensor, block_px, overlap_px)),
         *table_lines("schedule", ScheduleRecipe, SCHEDULE),
     ]

@@ -8,5 +8,6 @@ In the order in which data flows:
 - `zmx_field`: fields of any type as field angles
 - `zmx_reader`: a .zmx file as a `Lens`, with notes on what was left out
 - `zmx_writer`: a `Lens` as a .zmx file
+- `placing`: a lens stopped and focused, and where its objects lie
 - `lens_file`: read or write a lens by the suffix of its file
 """

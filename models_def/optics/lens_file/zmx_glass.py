@@ -70,7 +70,7 @@ class GlassOrder:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StatedNumbers:
-    """What a GLAS line states beside the name.
+    """The numbers of a GLAS line beside the name.
 
     Attributes:
         index_d: n_d.
@@ -87,11 +87,11 @@ class StatedNumbers:
         index_d, abbe = index_and_abbe(glass)
         if not index_d:
             return 0.0
-        stated, known = (
+        ours, theirs = (
             (n - 1) / v if v else 0.0
             for n, v in ((self.index_d, self.abbe_number), (index_d, abbe))
         )
-        return max(abs(self.index_d - index_d), abs(stated - known))
+        return max(abs(self.index_d - index_d), abs(ours - theirs))
 
 
 def glass_order(
@@ -150,18 +150,18 @@ def glass_note(record: Record, order: GlassOrder, glass: Glass) -> str | None:
     name, numbers = record.words[0], stated_numbers(record)
     if name == MODEL_NAME or numbers is None:
         return None
-    stated = f"n_d {numbers.index_d:.6g} and V_d {numbers.abbe_number:.4g}"
+    text = f"n_d {numbers.index_d:.6g} and V_d {numbers.abbe_number:.4g}"
     try:
-        known = find_zmx_glass(name, order)
+        catalogue_glass = find_zmx_glass(name, order)
     except ContractError:
-        return f"{name} is no glass of one catalogue: read by its numbers, {stated}"
-    if numbers.difference(known) < LEAST_DIFFERENCE:
+        return f"{name} is no glass of one catalogue: read by its numbers, {text}"
+    if numbers.difference(catalogue_glass) < LEAST_DIFFERENCE:
         return None
-    index_d, abbe = index_and_abbe(known)
-    way = "name" if glass == known else "numbers"
+    index_d, abbe = index_and_abbe(catalogue_glass)
+    way = "name" if glass == catalogue_glass else "numbers"
     return (
-        f"{name} states {stated}, {known.name} has {index_d:.6g} and {abbe:.4g}: read by its {way} "
-        f"({option_text('glass')} decides)"
+        f"{name} states {text}, {catalogue_glass.name} has {index_d:.6g} and {abbe:.4g}: read by "
+        f"its {way} ({option_text('glass')} decides)"
     )
 
 

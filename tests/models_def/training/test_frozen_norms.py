@@ -7,7 +7,8 @@ import pytest
 import torch
 
 from camkit.errors import ContractError
-from camkit.export.network_facts import DEEP_ARENA, draft_network
+from camkit.export.graph_measurements import DEEP_ARENA
+from camkit.export.network_facts import draft_network
 from camkit.models_def.kinds.bayer.samples import LAYOUT
 from camkit.models_def.networks.instance_norm import freeze_norms
 from camkit.models_def.networks.normed_unet import NormedConfig, NormedUnet

@@ -816,3 +816,55 @@ def test_constant_that_is_no_number_is_refused() -> None:
     nodes = [NODE("Constant", [], ["a"], value_string="x"), NODE("Relu", ["input"], ["output"])]
     with pytest.raises(BundleError, match="constants of numbers"):
         parse_graph(_bytes(make_model(nodes, {}, channels=(3, 3))))
+
+
+# ---------------------------------------------------------------------------- curves and pads
+
+
+def _pad(mode: str, pads: list[int]) -> tuple[str, dict[str, object], tuple[np.ndarray, ...]]:
+    return ("Pad", {"mode": mode}, (np.array(pads, np.int64),))
+
+
+@pytest.mark.parametrize("mode", ["reflect", "edge", "constant"])
+def test_a_pad_reaches_as_the_convolution_behind_it(mode: str) -> None:
+    pads = [0, 0, 2, 2, 0, 0, 2, 2]
+    found = inspect_graph(_bytes(_chain(_pad(mode, pads), _conv(5, pads=[0] * 4))))
+    assert found.receptive_field_radius_px == 2
+    assert not found.global_operators
+
+
+@pytest.mark.parametrize(
+    ("mode", "pads", "message"),
+    [
+        ("wrap", [0, 0, 1, 1, 0, 0, 1, 1], "mode 'wrap'"),
+        ("edge", [0, 1, 1, 1, 0, 0, 1, 1], "rows and columns only"),
+        ("reflect", [0, 0, -1, 1, 0, 0, 1, 1], "out of range"),
+    ],
+)
+def test_a_pad_that_cannot_be_followed_is_refused(mode: str, pads: list[int], message: str) -> None:
+    with pytest.raises(BundleError, match=message):
+        inspect_graph(_bytes(_chain(_pad(mode, pads), _conv(3, pads=[0] * 4))))
+
+
+def _choice(*, misused: bool = False) -> bytes:
+    """Build x where it is above a half, else its square root; the truth alone if misused."""
+    nodes = [
+        NODE("Greater", ["input", "half"], ["is_bright"], "is_bright"),
+        NODE("Pow", ["input", "half"], ["root"], "root"),
+        NODE("Where", ["is_bright", "input", "root"], ["output"], "where"),
+    ]
+    if misused:
+        nodes[1] = NODE("Abs", ["is_bright"], ["root"], "root")
+    return _bytes(make_model(nodes, {"half": np.full(1, 0.5, np.float32)}, channels=(3, 3)))
+
+
+def test_a_choice_by_a_comparison_is_pointwise() -> None:
+    found = inspect_graph(_choice())
+    assert found.receptive_field_radius_px == 0
+    names = with_node_outputs(_choice())[1]
+    assert names == ("root", "output")  # truth has no range
+
+
+def test_the_truth_of_a_comparison_is_taken_by_a_choice_alone() -> None:
+    with pytest.raises(BundleError, match="first input of a Where, nothing else"):
+        inspect_graph(_choice(misused=True))

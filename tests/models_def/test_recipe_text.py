@@ -8,8 +8,8 @@ import pytest
 
 from camkit.bundle.stages import Wiener
 from camkit.models_def.kinds.bayer.recipe import BayerDataRecipe, LensRecipe
+from camkit.models_def.recipe_text import attribute_notes, table_lines
 from camkit.models_def.training.recipe import ScheduleRecipe
-from camkit.models_def.training.recipe_text import attribute_notes, table_lines
 
 
 @pytest.mark.parametrize("kind", [BayerDataRecipe, LensRecipe, ScheduleRecipe])
@@ -18,7 +18,15 @@ def test_every_key_of_a_table_is_written_with_what_it_is(kind: type) -> None:
     table = tomllib.loads("\n".join(lines))["part"]
     absent = {f.name for f in fields(kind)} - table.keys()  # type: ignore[arg-type]
     # tables of their own, and what is empty by default
-    assert absent <= {"display", "wild", "depths_mm", "depth_shares", "content", "critic", "uncertainty"}
+    assert absent <= {
+        "display",
+        "wild",
+        "depths_mm",
+        "depth_shares",
+        "content",
+        "critic",
+        "uncertainty",
+    }
     for before, line in pairwise(lines):
         assert line.startswith(("#", "[")) or not line or before.startswith("#"), line
     assert max(map(len, lines)) <= 100
@@ -26,7 +34,7 @@ def test_every_key_of_a_table_is_written_with_what_it_is(kind: type) -> None:
 
 def test_values_stand_in_place_of_defaults_and_keys_may_be_left_out() -> None:
     values = {"prior_scale": 1.0, "prior_exponent": 2.0, "block_px": 64, "overlap_px": 32}
-    lines = table_lines("wiener", Wiener, values, without=("type", "takes", "gives"))
+    lines = table_lines("wiener", Wiener, values, left_out=("type", "takes", "gives"))
     table = tomllib.loads("\n".join(lines))["wiener"]
     assert values.items() <= table.items()
     assert not {"type", "takes", "gives", "together"} & table.keys()

@@ -27,7 +27,7 @@ _SETTLED_MM: Final = 1e-9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Placement:
-    """How a lens is used.
+    """The use of a lens: stop, focus, scene.
 
     Attributes:
         f_number: EFL / entrance pupil diameter to stop to; None for that of the file.
@@ -119,9 +119,9 @@ def _focused(lens: Lens, placement: Placement) -> Lens:
     focused = lens
     for _ in range(_ROUNDS):
         distance_mm = _from_vertex(focused, placement.focus_mm, placement.origin)
-        placed = with_focus(replace(focused, object_distance_mm=distance_mm), placement.merit)
-        moved_mm = abs(track_mm(placed) - track_mm(focused))
-        focused = placed
+        refocused = with_focus(replace(focused, object_distance_mm=distance_mm), placement.merit)
+        moved_mm = abs(track_mm(refocused) - track_mm(focused))
+        focused = refocused
         if placement.origin != "sensor" or math.isinf(distance_mm) or moved_mm < _SETTLED_MM:
             return focused
     raise ContractError(

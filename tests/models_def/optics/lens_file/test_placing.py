@@ -7,8 +7,8 @@ import pytest
 
 from camkit.errors import ContractError
 from camkit.models_def.optics.lens_file.lens_file import find_lens
+from camkit.models_def.optics.lens_file.placing import Placement, placed_lens, track_mm
 from camkit.models_def.optics.paraxial import paraxial_data, paraxial_image
-from camkit.models_def.optics.placing import Placement, placed_lens, track_mm
 
 LENS = find_lens("double-gauss")
 

@@ -20,7 +20,7 @@ _ENTRY: Final = re.compile(r"^ {4}(\w+): (.*)$")
 
 
 def table_lines(
-    name: str, kind: type, values: Mapping[str, Any], *, without: Collection[str] = ()
+    name: str, kind: type, values: Mapping[str, Any], *, left_out: Collection[str] = ()
 ) -> list[str]:
     """Return a table: the given values and the defaults of all other keys, each with a comment.
 
@@ -30,13 +30,13 @@ def table_lines(
         name: Of the table.
         kind: The dataclass or pydantic model that reads it.
         values: Key -> value.
-        without: Keys that no recipe states.
+        left_out: Keys that no recipe states.
     """
     notes = attribute_notes(kind)
     lines = [f"[{name}]"]
     for key, default in _defaults(kind).items():
         value = values.get(key, default)
-        if key not in without and _is_plain(value):
+        if key not in left_out and _is_plain(value):
             comment = textwrap.wrap(notes.get(key, ""), WIDTH)
             lines += [*(f"# {line}" for line in comment), key_line(key, value)]
     return [*lines, ""]

@@ -1,0 +1,1 @@
+"""`camkit network`: trained networks of others, looked at and added to a camera."""
