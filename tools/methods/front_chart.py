@@ -1,6 +1,7 @@
 """The chart of the front of methods: decibels against CPU-seconds a megapixel."""
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -23,9 +24,13 @@ KINDS: Final = {
     "shipped": "camkit's networks as shipped",
 }
 TICKS_S: Final = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
-NEAR_TIMES: Final = 2.5
-NEAR_DB: Final = 0.6
-"""Points whose names might meet: seconds within a factor, decibels within a difference."""
+LETTER_PT: Final = (3.7, 8.0)
+"""Width and height of a letter of a name, with a little room."""
+OFFSETS_PT: Final = ((7, 3), (7, -9), (-7, 3), (-7, -9), (7, 13), (-7, 13), (7, -19), (-7, -19))
+"""Where a name may stand, the best place first; left of its point where the first is below 0."""
+POINT_PT: Final = 5.0
+
+Box = tuple[float, float, float, float]
 DEVELOPED: Final = "input"
 """The row whose decibels the others gain; it restores nothing, so it is no point."""
 
@@ -60,15 +65,6 @@ def draw(record: Mapping[str, Any]) -> Drawing:
             _draw_points(panel, points, COLORS[kind], label.format(minutes=record["minutes"]))
     front = front_of(rows)
     panel.plot(*zip(*front, strict=True), color="0.75", linewidth=1, zorder=0)
-    for row, offset in zip(rows, label_places(rows), strict=True):
-        panel.annotate(
-            row["title"],
-            (row["cpu_s_per_mp"], row["gain_db"]),
-            xytext=offset,
-            textcoords="offset points",
-            fontsize=7,
-            color=COLORS[row["kind"]],
-        )
     panel.set_xscale("log")
     low, high = panel.get_xlim()
     ticks = [tick for tick in TICKS_S if low < tick < 2 * high]
@@ -78,6 +74,23 @@ def draw(record: Mapping[str, Any]) -> Drawing:
     panel.set_xlabel("CPU-seconds a megapixel, one thread, from developed to restored planes")
     panel.set_ylabel("dB gained over the picture as taken\n(bars: error of the difference to S)")
     panel.legend(loc="best")
+    figure.draw_without_rendering()  # its layout decides where points lie
+    places_pt = panel.transData.transform([(r["cpu_s_per_mp"], r["gain_db"]) for r in rows])
+    places_pt *= 72 / figure.dpi
+    titles = [row["title"] for row in rows]
+    left_pt = panel.bbox.x0 * 72 / figure.dpi
+    offsets = label_offsets(places_pt.tolist(), titles, left_pt)
+    for row, offset in zip(rows, offsets, strict=True):
+        name = panel.annotate(
+            row["title"],
+            (row["cpu_s_per_mp"], row["gain_db"]),
+            xytext=offset,
+            textcoords="offset points",
+            horizontalalignment="left" if offset[0] > 0 else "right",
+            fontsize=7,
+            color=COLORS[row["kind"]],
+        )
+        name.set_in_layout(False)
     return figure
 
 
@@ -100,20 +113,38 @@ def front_of(rows: Sequence[Mapping[str, Any]]) -> list[tuple[float, float]]:
     return front
 
 
-def label_places(rows: Sequence[Mapping[str, Any]]) -> list[tuple[int, int]]:
-    """Return (right, up) in points of every name: above its point, lower where others lie near."""
-    places = []
-    for row in rows:
-        gaps_db = [
-            other["gain_db"] - row["gain_db"]
-            for other in rows
-            if other is not row
-            and 1 / NEAR_TIMES < other["cpu_s_per_mp"] / row["cpu_s_per_mp"] < NEAR_TIMES
-            and abs(other["gain_db"] - row["gain_db"]) < NEAR_DB
-        ]
-        crowded_above, crowded_below = any(g >= 0 for g in gaps_db), any(g < 0 for g in gaps_db)
-        places.append((7, (-3 if crowded_below else -9) if crowded_above else 3))
-    return places
+def label_offsets(
+    places_pt: Sequence[Sequence[float]], titles: Sequence[str], left_pt: float
+) -> list[tuple[int, int]]:
+    """Return (right, up) of every name in points: the first place that meets nothing.
+
+    Args:
+        places_pt: (x, y) of every point.
+        titles: Its name.
+        left_pt: Where the panel begins; its right has room.
+    """
+    boxes: list[Box] = [
+        (x - POINT_PT, y - POINT_PT, x + POINT_PT, y + POINT_PT) for x, y in places_pt
+    ]
+    boxes.append((-math.inf, -math.inf, left_pt, math.inf))
+    offsets = []
+    for number, ((x, y), title) in enumerate(zip(places_pt, titles, strict=True)):
+        others = [box for i, box in enumerate(boxes) if i != number]
+        choices = {offset: _label_box(x, y, offset, title) for offset in OFFSETS_PT}
+        best = min(choices, key=lambda offset: sum(_meet(choices[offset], o) for o in others))
+        boxes.append(choices[best])
+        offsets.append(best)
+    return offsets
+
+
+def _label_box(x: float, y: float, offset: tuple[int, int], title: str) -> Box:
+    width, height = LETTER_PT[0] * len(title), LETTER_PT[1]
+    left = x + offset[0] - (width if offset[0] < 0 else 0)
+    return left, y + offset[1], left + width, y + offset[1] + height
+
+
+def _meet(one: Box, other: Box) -> bool:
+    return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
 
 
 def _draw_points(panel: Panel, rows: Sequence[Mapping[str, Any]], color: str, label: str) -> None:

@@ -3,6 +3,5 @@
 - `gallery`: all pictures of README and gallery
 - `views`: every built-in camera at work
 - `crops`: crops of a capture, restored and sharp
-- `front`: speed against accuracy, as a small chart
 - `captions`: rows of pictures in one file, a caption over each
 """

@@ -4,7 +4,7 @@
 
 NAME.jpg        three crops at 100 %: as taken, restored, truth
 NAME-small.jpg  two of them, smaller, for tables
-front.png       decibels gained against seconds: the front of methods, once its record is there
+front.png       decibels gained against seconds: the front of methods
                 (`tools.methods`), else cameras of the measured bench
 """
 
@@ -18,7 +18,6 @@ import numpy as np
 from camkit.arrays import FloatArray
 from tools.methods.front_chart import RECORD, write_front_chart
 from tools.pictures.captions import write_captioned, write_pixels
-from tools.pictures.front import write_front
 from tools.pictures.views import VIEWS, View
 
 SMALL_PX: Final = (96, 128)
@@ -43,10 +42,7 @@ def main() -> None:
             total += (size := path.stat().st_size)
             print(f"  {path}: {size / 1000:.0f} kB")
     front = out_dir / "front.png"
-    if RECORD.is_file():
-        write_front_chart(front, RECORD)
-    else:
-        write_front(front)
+    write_front_chart(front, RECORD)
     total += (size := front.stat().st_size)
     print(f"{front}: {size / 1000:.0f} kB\n{total / 1000:.0f} kB in all")
 

@@ -1,6 +1,5 @@
 """The pictures of README and gallery: each camera's view, its files, and the chart."""
 
-import json
 import sys
 from pathlib import Path
 
@@ -12,30 +11,8 @@ from tests.bundle_factory import write_tiny_bundle
 from tests.hdr_bundle import write_hdr_bundle
 from tools.hdr import night_gallery as nights
 from tools.pictures import gallery, views
-from tools.pictures.front import gained_db, restored_rows, write_front
 
 SIDE = 24
-
-
-def row(bundle: str, method: str, size: str | None, psnr_db: float, seconds: float) -> dict:
-    return {
-        "bundle": bundle, "method": method, "size": size, "error": None,
-        "psnr_db": psnr_db, "input_psnr_db": 20.0, "s_per_24mp": seconds,
-        "mode": None, "dtype": "fp32", "provider": "cpu", "threads": 2, "variant": False,
-    }  # fmt: skip
-
-
-def record() -> dict:
-    rows = [
-        row("lens", "develop", None, 20, 1),
-        row("lens", "wiener", None, 23, 4),
-        row("lens", "net", "M", 25, 9),
-        row("plate", "net", "M", 30, 2),
-        {**row("lens", "net", "M", 27, 20), "threads": 1},
-        {**row("lens", "net", "M", 28, 20), "mode": "whole"},
-        {**row("broken", "wiener", None, 25, 9), "error": "too large"},
-    ]
-    return {"machine": {"cores": 2, "threads": 2}, "rows": rows}
 
 
 def write_scene(folder: Path) -> None:
@@ -47,17 +24,6 @@ def check(view: views.View, side: int) -> None:
     for pictures in view.rows.values():
         assert [name.partition(": ")[0] for name in pictures] == ["as taken", "restored", "truth"]
         assert {picture.shape for picture in pictures.values()} == {(3, side, side)}
-
-
-def test_the_chart_has_cameras_with_a_filter_and_a_network(tmp_path: Path) -> None:
-    found = restored_rows(record())
-    assert {name: list(rows) for name, rows in found.items()} == {"lens": ["wiener", "M"]}
-    assert gained_db(found["lens"]["M"]) == 5
-    (tmp_path / "bench.json").write_text(json.dumps(record()))
-    write_front(tmp_path / "front.png", tmp_path / "bench.json")
-    chart = cv2.imread(str(tmp_path / "front.png"))
-    assert chart is not None
-    assert chart.min() < 100
 
 
 def test_a_photograph_is_taken_restored_and_cut_alike(
@@ -107,9 +73,6 @@ def test_the_command_writes_a_view_a_small_one_and_the_chart(
     rows = {"A scene": {"as taken: 1.0 dB": picture, "restored: 2.0 dB": picture, "truth": picture}}
     made = views.View(title="toy 1.0", rows=rows)
     monkeypatch.setattr(gallery, "VIEWS", {"toy": lambda _: made})
-    record = tmp_path / "methods.json"
-    monkeypatch.setattr(gallery, "RECORD", record)
-    monkeypatch.setattr(gallery, "write_front", lambda path: path.write_bytes(b"chart"))
     monkeypatch.setattr(
         gallery, "write_front_chart", lambda path, _: path.write_bytes(b"front of methods")
     )
@@ -119,8 +82,5 @@ def test_the_command_writes_a_view_a_small_one_and_the_chart(
     assert small is not None
     assert small.shape == (gallery.SMALL_PX[0], 2 * gallery.SMALL_PX[1] + gallery.GAP_PX, 3)
     assert cv2.imread(str(tmp_path / "toy.jpg")) is not None
-    assert (tmp_path / "front.png").read_bytes() == b"chart"
-    record.touch()
-    gallery.main()
     assert (tmp_path / "front.png").read_bytes() == b"front of methods"
     assert "kB in all" in capsys.readouterr().out
