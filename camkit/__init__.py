@@ -6,6 +6,7 @@ The public face, free of torch and loaded only when touched:
     camkit.process(files, ...)     captures in, pictures and sidecars out
     camkit.simulate(scene, ...)    a sharp scene to a capture of a camera
     camkit.calibrate               measurements of a camera: calibrate.noise(...), ...
+    camkit.make(lens, ...)         a lens and a sensor to a proved bundle (needs torch)
     camkit.recipe(lens, ...)       a lens and a sensor to a training recipe (needs torch)
     camkit.freeze(optics, ...)     optics to a frozen PSF (needs torch)
     camkit.train(recipe, ...)      a recipe to a checkpoint (needs torch)
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from camkit.models_def.face.network_training import train
     from camkit.models_def.face.optics_freezing import freeze
     from camkit.models_def.face.recipe_writing import CameraWords, recipe
+    from camkit.report.making.camera_making import make
     from camkit.runtime.batch import process
     from camkit.runtime.cancel import Cancelled
     from camkit.runtime.capture import MosaicOptions
@@ -59,6 +61,7 @@ __all__ = [
     "export",
     "freeze",
     "load",
+    "make",
     "process",
     "recipe",
     "simulate",
@@ -76,6 +79,7 @@ _HOMES = {
     "MosaicOptions": "camkit.runtime.capture",
     "simulate": "camkit.runtime.face.simulation",
     "freeze": "camkit.models_def.face.optics_freezing",
+    "make": "camkit.report.making.camera_making",
     "recipe": "camkit.models_def.face.recipe_writing",
     "CameraWords": "camkit.models_def.face.recipe_writing",
     "train": "camkit.models_def.face.network_training",

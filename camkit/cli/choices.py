@@ -37,8 +37,7 @@ GlassFiles = Annotated[
     list[Path] | None,
     typer.Option(
         "--glass",
-        help="Your own glass catalogue (.agf), and 'names' or 'numbers': what holds where a .zmx "
-        "file has both (default: the name, if its index fits the number); may be repeated.",
+        help="Glass catalogue (.agf), or what decides in a .zmx: names or numbers; may be repeated.",
     ),
 ]
 

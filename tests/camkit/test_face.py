@@ -11,6 +11,7 @@ from tests.bundle_factory import write_tiny_bundle
 
 PUBLIC = [
     "BundleError",
+    "CameraWords",
     "CamkitError",
     "Cancelled",
     "ContractError",
@@ -25,7 +26,9 @@ PUBLIC = [
     "export",
     "freeze",
     "load",
+    "make",
     "process",
+    "recipe",
     "simulate",
     "train",
 ]

@@ -10,8 +10,7 @@ from camkit.errors import ContractError
 SensorText = Annotated[
     str | None,
     typer.Option(
-        help="Sensor: WIDTHxHEIGHT@PITCHum such as 6000x4000@3.9um (with :BGGR for another "
-        "pattern than RGGB), or a name such as IMX264."
+        help="Sensor as WIDTHxHEIGHT@PITCHum, such as 6000x4000@3.9um, or a name such as IMX264."
     ),
 ]
 Photo = Annotated[
@@ -35,8 +34,7 @@ StopRadiusMm = Annotated[
 FocusM = Annotated[
     float | None,
     typer.Option(
-        help="Distance in m ('inf' for infinity) that the lens is focused on by moving as a "
-        "whole; default: the sensor stays where the lens file has it."
+        help="Distance in m ('inf' for infinity) to focus the lens on; default: the file's."
     ),
 ]
 ObjectM = Annotated[

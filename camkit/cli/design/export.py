@@ -65,10 +65,10 @@ def export(
         str | None,
         typer.Option(help="Plate (.toml or name), or 'none'; default: the checkpoint's."),
     ] = None,
-    no_network: Annotated[
+    network: Annotated[
         bool,
-        typer.Option("--no-network", help="Pack a recipe without a network: its filter alone."),
-    ] = False,
+        typer.Option("--network/--no-network", help="Pack a network, or a recipe's filter alone."),
+    ] = True,
     version: Annotated[str, typer.Option(help="Semantic version of the bundle.")] = "0.1.0",
     overwrite: Overwrite = False,
     json_: Json = False,
@@ -90,7 +90,7 @@ def export(
         prescription=prescription,
         plate=plate,
         version=version,
-        network=not no_network,
+        network=network,
         overwrite=overwrite,
     )
     print_report(report, json_)

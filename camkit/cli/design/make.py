@@ -63,7 +63,7 @@ def make(
     ] = Path("duet"),
     work_dir: Annotated[
         Path | None,
-        typer.Option(help="Folder of the steps, which go on there; default: NAME.work."),
+        typer.Option(help="Folder of the steps; default: NAME.work beside the bundle."),
     ] = None,
     workers: Annotated[int, typer.Option(help="Number of processes that make samples.")] = 1,
     overwrite: Overwrite = False,
@@ -72,8 +72,8 @@ def make(
 ) -> None:
     """Make a camera from a lens: PSF, filter, network, checks and a page (needs torch).
 
-    The bundle is usable as soon as its filter is written. Called again after an interruption with
-    the same options, it goes on where it was.
+    The bundle is usable as soon as its filter is written. After an interruption the same command
+    repeats no finished step.
     """
     from camkit.models_def.face.recipe_writing import CameraWords
     from camkit.models_def.face.torch_need import require_torch

@@ -11,7 +11,7 @@ from camkit.bundle.reader import open_bundle
 from camkit.cli.app import run
 from camkit.errors import ContractError
 from camkit.models_def.face.recipe_writing import CameraWords
-from camkit.report.making import camera_judging, camera_making, page_parts
+from camkit.report.making import camera_judging, camera_making, making_run, page_parts
 from camkit.report.making.camera_judging import FILTER, Judgement
 from camkit.report.making.camera_steps import CameraSteps
 from camkit.runtime.plan.decision import DEVELOP
@@ -95,9 +95,9 @@ class Steps:
             FILTER: Judgement(psnr_db=(20.0, 20.0), scenes=("a", "b")),
             "S": Judgement(psnr_db=(network_db, network_db), scenes=("a", "b")),
         }
-        monkeypatch.setattr(camera_making, "judge_camera", lambda *_: judged)
+        monkeypatch.setattr(making_run, "judge_camera", lambda *_: judged)
         for name in ("pictures_of", "seconds_of", "camera_html", "layout_of"):
-            monkeypatch.setattr(camera_making, name, lambda *_: "")
+            monkeypatch.setattr(making_run, name, lambda *_: "")
 
 
 @pytest.mark.parametrize("network_db", [19.9, 20.4])
@@ -116,7 +116,7 @@ def test_a_network_ships_if_it_beats_its_filter(
         *("describe", "freeze", "export_filter", "fit_bank", "train", "export_network"),
     ]
     # what is left of the minutes, less what comes after
-    assert steps.minutes == pytest.approx(10 - camera_making.LAST_S / 60, abs=1)
+    assert steps.minutes == pytest.approx(10 - making_run.LAST_S / 60, abs=1)
     assert told[0] == "a note"
     if network_db > 20:
         assert "network S: +0.40 +- 0.00 dB over the filter" in told[-1]
