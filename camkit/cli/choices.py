@@ -37,7 +37,7 @@ GlassFiles = Annotated[
     list[Path] | None,
     typer.Option(
         "--glass",
-        help="Glass catalogue (.agf), or what decides in a .zmx: names or numbers; may be repeated.",
+        help="Glass catalogue (.agf), or what decides in a .zmx: names or numbers; repeatable.",
     ),
 ]
 

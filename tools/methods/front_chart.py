@@ -139,8 +139,8 @@ def label_offsets(
 
 def _label_box(x: float, y: float, offset: tuple[int, int], title: str) -> Box:
     width, height = LETTER_PT[0] * len(title), LETTER_PT[1]
-    left = x + offset[0] - (width if offset[0] < 0 else 0)
-    return left, y + offset[1], left + width, y + offset[1] + height
+    x0, y0 = x + offset[0] - (width if offset[0] < 0 else 0), y + offset[1]
+    return x0, y0, x0 + width, y0 + height
 
 
 def _meet(one: Box, other: Box) -> bool:

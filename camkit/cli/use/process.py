@@ -91,8 +91,7 @@ def process(
     tone: Annotated[
         str | None,
         typer.Option(
-            help="Light of the codes of JPEG, TIFF and PNG: srgb, linear, or a file (.toml of "
-            "`camkit calibrate tone`); default: as the file states.",
+            help="Tone curve of JPEG, TIFF, PNG: srgb, linear or FILE.toml; default: the file's.",
             metavar="CURVE",
         ),
     ] = None,
@@ -107,8 +106,7 @@ def process(
     noise: Annotated[
         str | None,
         typer.Option(
-            help="Shot noise and read variance of linear light (white 1), such as 5e-5,1e-8; "
-            "default: stated or measured.",
+            help="Noise of linear light, such as 5e-5,1e-8; default: as stated or measured.",
             metavar="SHOT,READ_VARIANCE",
         ),
     ] = None,

@@ -9,6 +9,7 @@ from camkit.bundle.optics import PSF
 from camkit.bundle.psf_file import psf_to_bytes
 from camkit.bundle.reader import PRESCRIPTION
 from camkit.calibration.psf_import.kernel_resampling import for_sensor
+from camkit.caller import command_text, option_text
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.frames.tiles import Frames, frames_folder, read_frames
 from camkit.models_def.kinds.bayer.lens_bank import build_lens_bank
@@ -76,8 +77,9 @@ def trace_material(recipe: BayerRecipe, recipe_folder: Path, cache_folder: Path)
     if len(recipe.sensor.channels) == 1:
         raise ContractError(
             "networks and banks of colours together are trained on three colours, and the camera "
-            f"{recipe.name} is grey; it has its filter: `camkit export --no-network`, or "
-            "`camkit make` with --minutes 0"
+            f"{recipe.name} is grey; its filter comes by {command_text('export')} with "
+            f"{option_text('network', value=False)} or {command_text('make')} with "
+            f"{option_text('minutes', 0)}"
         )
     if recipe.haze is not None:
         return _of_frames(frames_folder(cache_folder, recipe), recipe)

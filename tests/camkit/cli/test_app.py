@@ -25,9 +25,10 @@ OPTIONS = {
     "simulate": "--bundle --iso --seed --origin-px -o --debug",
     "merge": "-o --times --response --reference --mosaic --black-level --white-level --overwrite "
     "--json --debug",
-    "make": "-o --sensor --from --pitch-um --f-number --stop-radius-mm --focus-m --object-m --glass "
-    "--distance-from --minutes --size --data --valid --start --work-dir --overwrite --json --debug",
-    "recipe": "-o --sensor --from --f-number --focus-m --object-m --name --overwrite --json --debug",
+    "make": "-o --sensor --from --pitch-um --f-number --stop-radius-mm --focus-m --object-m "
+    "--glass --distance-from --minutes --size --data --valid --start --work-dir --overwrite --json "
+    "--debug",
+    "recipe": "-o --sensor --from --f-number --focus-m --object-m --name --overwrite --debug",
     "freeze": "-o --stress-out --report --quick --debug",
     "bench": "--all --data --images --out-dir --sizes --methods --modes --dtypes --providers "
     "--threads --tile --reference --capture --width --height --repeat --quick --work-dir --json "
