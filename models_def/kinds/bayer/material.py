@@ -78,8 +78,8 @@ def trace_material(recipe: BayerRecipe, recipe_folder: Path, cache_folder: Path)
         raise ContractError(
             "networks and banks of colours together are trained on three colours, and the camera "
             f"{recipe.name} is grey; its filter comes by {command_text('export')} with "
-            f"{option_text('network', value=False)} or {command_text('make')} with "
-            f"{option_text('minutes', 0)}"
+            f"{option_text('network', value=False)} or {command_text('make')} for "
+            "0 minutes"
         )
     if recipe.haze is not None:
         return _of_frames(frames_folder(cache_folder, recipe), recipe)
