@@ -43,7 +43,8 @@ def test_there_are_no_modules_that_no_bundle_can_list() -> None:
 
 
 def test_no_two_stages_have_a_method_of_one_name_and_few_options_are_shared() -> None:
-    for what, shared in (("METHODS", set()), ("OPTIONS", {"depth_m", "demosaic", "size"})):
+    options = {"demosaic", "depth_m", "iso", "noise", "size"}
+    for what, shared in (("METHODS", set()), ("OPTIONS", options)):
         types = [name for name in TYPES if what == "OPTIONS" or name not in OF_PHOTONS]
         named = [name for type_ in types for name in getattr(stage_module(type_), what)]
         assert {name for name in named if named.count(name) > 1} == shared, what

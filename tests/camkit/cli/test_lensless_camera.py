@@ -73,7 +73,7 @@ def _camkit(*arguments: object) -> subprocess.CompletedProcess[str]:
 
 def _check_hand(picture: Path, shrink: int) -> None:
     """Check that a bright hand lies on dark ground."""
-    levels = cv2.imread(str(picture), cv2.IMREAD_UNCHANGED)[..., 0] / 65535
+    levels = cv2.imread(str(picture), cv2.IMREAD_UNCHANGED) / 65535
     assert levels.shape == (1200 // shrink, 1600 // shrink)
     palm = levels[600 // shrink : 700 // shrink, 800 // shrink : 950 // shrink]
     finger = levels[600 // shrink : 630 // shrink, 1150 // shrink : 1350 // shrink]

@@ -68,8 +68,8 @@ def test_it_makes_pictures_twice_the_size(
     assert picture.is_file()
     if format_ != "exr":
         levels = cv2.imread(str(picture), cv2.IMREAD_UNCHANGED)
-        assert levels.shape == (SCALE * HEIGHT_PX, SCALE * WIDTH_PX, 3)
-        assert (levels[..., 0] == levels[..., 2]).all()
+        # its one channel is grey, and so is the file
+        assert levels.shape == (SCALE * HEIGHT_PX, SCALE * WIDTH_PX)
 
 
 def test_it_proves_itself_layer_by_layer(toy: Path, camkit_command) -> None:
