@@ -178,7 +178,7 @@ def test_shares_of_depths_must_fit_the_depths(recipe_path, shares, message):
 
 def test_all_faults_are_named_at_once() -> None:
     table = {
-        "nam": "x",
+        "called": "x",
         "sensor": {"cfa": "RGGB", "width_px": -1},
         "wiener": {"block": 3},
         "lens": {"copies": "many"},
@@ -187,7 +187,7 @@ def test_all_faults_are_named_at_once() -> None:
     with pytest.raises(ContractError) as refusal:
         to_recipe(table)
     for fault in (
-        "unknown key 'nam'",
+        "unknown key 'called'",
         "name is missing",
         "sensor.width_px: ",
         "sensor.noise is missing",
