@@ -16,7 +16,7 @@ PROBE_SEED: Final = 5
 HALO_STEP_PX: Final = 16
 DEEP_STRIDE_PX: Final = 32
 DEEP_ARENA: Final = 1.5
-"""What onnxruntime's arena takes over the live tensors of a network whose stride is at least that
+"""Taken by onnxruntime's arena over the live tensors of a network whose stride is at least that
 (measured, decision 28): its tensors are of many sizes, whose holes stay empty."""
 MOST_HALOS: Final = 32
 """Of an error curve; a network that reaches far has coarser steps."""

@@ -90,7 +90,7 @@ def recipe(recipe_path):
 
 
 def planes_text(channels="RGB"):
-    """Give the recipe of a camera without a mosaic, whose pictures are developed."""
+    """Return the recipe of a camera without a mosaic, whose pictures are developed."""
     mosaic = [line for line in RECIPE.splitlines() if line.startswith(("cfa", "color_matrix"))]
     planes = f'type = "planes"\nchannels = {list(channels)}'.replace("'", '"')
     text = RECIPE.replace(mosaic[0], planes).replace(mosaic[1], "")

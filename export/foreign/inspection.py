@@ -22,7 +22,7 @@ from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES
 PICTURE_PX: Final = (4000, 6000)
 """(height, width) of a picture of 24 megapixels."""
 STAGES_BYTES: Final = 60_000_000
-"""What the stages around a network take at that size, roughly."""
+"""Taken by the stages around a network at that size, roughly."""
 _EVEN_PX: Final = 64
 
 

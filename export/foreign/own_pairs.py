@@ -30,7 +30,7 @@ from camkit.runtime.stages.unpack import WovenRows
 TOLERANCE: Final = 1e-5
 """Over the largest number of the owner's output, or 1."""
 EXPLAINED: Final = 1e-3
-"""What a contract with one mistake less may differ by, so that the mistake is named."""
+"""Largest difference of a contract with one mistake less, for the mistake to be named."""
 _MOST: Final = {np.dtype(np.uint8): 255.0, np.dtype(np.uint16): 65535.0}
 _KEYS: Final = ("input", "output")
 _COLOURS: Final = 3

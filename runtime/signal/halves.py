@@ -17,7 +17,7 @@ from camkit.errors import ContractError, DecodeError
 from camkit.runtime.capture import Capture
 
 Halves = tuple[str, str]
-"""What differs in the paths of a left and a right half."""
+"""The texts by which the paths of a left and a right half differ."""
 OF_MEAN: Final = 0.5
 """Variance of the mean of two samples, in that of one."""
 

@@ -150,15 +150,6 @@ def coding_of(entry: Network, job: Job, *, output: bool = False) -> PlaneCoding 
     )
 
 
-def _is_one_coding(entry: Network) -> bool:
-    """Return whether a network gives the numbers that it takes."""
-    coding = entry.coding
-    if coding is None:
-        return True
-    numbers = entry.transform, coding.gain, coding.offset
-    return numbers == (coding.output, coding.output_gain, coding.output_offset)
-
-
 def _sample_noise(job: Job, stream: Stream) -> NoiseModel:
     """Return the noise of the samples of a stream; those of a mosaic count as the mean colour."""
     noise, channels = job.noise.with_gains(stream.gains), stream.plane.channels
@@ -405,7 +396,7 @@ class _NetworkStage:
         """Return the channels of the input that stand for the output where it is not had."""
         planes = self._job.known_bundle.manifest.planes
         entry = self._entry
-        if len(entry.gives) != 1 or not _is_one_coding(entry):
+        if len(entry.gives) != 1 or not entry.is_one_coding:
             return None
         output_plane = planes[self._entry.gives[0]]
         ends = np.cumsum([stream.shape[0] for stream in streams])

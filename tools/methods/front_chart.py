@@ -27,7 +27,7 @@ TICKS_S: Final = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 LETTER_PT: Final = (3.7, 8.0)
 """Width and height of a letter of a name, with a little room."""
 OFFSETS_PT: Final = ((7, 3), (7, -9), (-7, 3), (-7, -9), (7, 13), (-7, 13), (7, -19), (-7, -19))
-"""Where a name may stand, the best place first; left of its point where the first is below 0."""
+"""Places of a name, the best first; left of its point where the first is below 0."""
 POINT_PT: Final = 5.0
 
 Box = tuple[float, float, float, float]

@@ -113,6 +113,15 @@ class Network(StageEntry):
         )
 
     @property
+    def is_one_coding(self) -> bool:
+        """Return whether the network gives the numbers that it takes."""
+        coding = self.coding
+        if coding is None:
+            return True
+        numbers = self.transform, coding.gain, coding.offset
+        return numbers == (coding.output, coding.output_gain, coding.output_offset)
+
+    @property
     def space(self) -> Space | None:
         """Return the space of its coded planes; None where they are not coded."""
         return None if self.coding is None else cast("Space", self.transform)

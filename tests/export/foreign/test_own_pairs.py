@@ -36,7 +36,7 @@ def _contract(**given: Any) -> Contract:
 
 @pytest.fixture
 def pairs(tmp_path: Path) -> Path:
-    """What a script on sRGB pictures of 0 to 255 does, in plain numpy."""
+    """Compute what a script on sRGB pictures of 0 to 255 gives, in plain numpy."""
     picture = RNG.integers(0, 256, (3, 24, 32), dtype=np.uint8)
     fed = picture.astype(np.float32)[None]
     made = NetworkEngine(_network(), threads=1).run(fed)[0] / 255

@@ -55,7 +55,7 @@ CHANGED: dict[str, Any] = {
 """Every option away from its default; a unit is tested by itself."""
 FREE = {"max_mem_bytes", "threads", "method"}
 OF_FILES = {"tone", "halves"}
-"""What may be said of any photograph's file."""
+"""Options that may be said of any photograph's file."""
 OF_STAGE = {
     "network": {
         *("size", "quality", "max_seconds", "max_error_db", "mode", "on_unsafe", "tile_px"),
