@@ -43,7 +43,7 @@ def fabricated_optics(
     a minute and a half for a plate of 24 megapixels.
 
     Errors are uniform: radius +-0.2 %, thickness +-0.03 mm, index +-0.0005; the copy is focused at
-    assembly to +-0.02 mm.
+    assembly to +-0.02 mm (lengths less below 40 mm of focal length, see `usual_errors`).
 
     Args:
         bundle: Names the lens, the camera and the grid.

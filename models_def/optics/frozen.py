@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from camkit.bundle.sensor import ColorSensor
-from camkit.caller import option_text
+from camkit.caller import command_text, option_text
 from camkit.errors import ContractError
 from camkit.models_def.optics.freezable_optics import FieldLayout, FloatGrid, Optics, radial_layout
 from camkit.models_def.optics.psf import TracedPsf
@@ -128,7 +128,7 @@ def freeze_at(optics: Optics, sensor: ColorSensor, grid: FreezeGrid, fields: Fie
         for depth_mm in depths_mm
     ]
     weights = torch.from_numpy(wavelength_weights(fine_um, response_um, response))
-    side_px, energy = _smallest_side(traced, weights, grid)
+    side_px, energy = _smallest_side(traced, weights, grid, fields)
     averaged = [_average(t, bands, side_px) for t in traced]
     if optics.wavelengths_um is None:
         share = torch.from_numpy(wavelength_weights(waves_um, response_um, response))
@@ -267,20 +267,27 @@ def wavelength_bands(waves_um: FloatGrid) -> tuple[FloatGrid, Tensor]:
     return fine_um, torch.from_numpy(triangles / triangles.sum(axis=1, keepdims=True))
 
 
-def _smallest_side(traced: list[TracedPsf], weights: Tensor, grid: FreezeGrid) -> tuple[int, float]:
+def _smallest_side(
+    traced: list[TracedPsf], weights: Tensor, grid: FreezeGrid, fields: FieldLayout
+) -> tuple[int, float]:
     """Return smallest odd side that holds the wanted light of every colour, and what it holds."""
     full = torch.stack([t.kernels * t.energy_kept[..., None, None] for t in traced])
     colours = torch.einsum("cw,dfwij->dfcij", weights, full)
+    light = torch.zeros(len(fields.heights_mm), dtype=torch.float64)
     energy = 0.0
     for side_px in range(grid.least_side_px, grid.max_side_px + 1, 2):
-        energy = float(_centre(colours, side_px).sum((-2, -1)).min())
+        light = _centre(colours, side_px).sum((-2, -1)).amin((0, 2))
+        energy = float(light.min())
         if energy >= grid.energy:
             return side_px, energy
     if grid.least_energy is not None and energy >= grid.least_energy:
         return grid.max_side_px, energy
+    height_mm = fields.heights_mm[int(light.argmin())]
     raise ContractError(
-        f"kernels of {grid.max_side_px} px hold {energy:.4f} of the light, wanted {grid.energy}; "
-        f"raise {option_text('max_side_px')}, lower the energy, or use a better lens"
+        f"kernels of {grid.max_side_px} px hold {energy:.4f} of the light {height_mm:.3g} mm from "
+        f"the axis ({float(light[0]):.4f} on it), wanted {grid.energy}; stop the lens down, take "
+        f"larger pixels or a smaller sensor, or raise {option_text('max_side_px')} of "
+        f"{command_text('freeze')}"
     )
 
 

@@ -1,7 +1,7 @@
 """Kernels per colour for training: the nominal lens and fabricated copies of it."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -20,6 +20,8 @@ from camkit.models_def.optics.prescription import (
 from camkit.models_def.optics.psf import trace_psf
 from camkit.models_def.optics.pupil import with_fixed_stop
 
+USUAL_EFL_MM: Final = 40.0
+"""Focal length from which errors of length grow no more."""
 GAUSS_FWHM: Final = 2 * math.sqrt(2 * math.log(2))
 
 
@@ -68,6 +70,16 @@ def wavelength_grid(count: int, low_um: float = 0.42, high_um: float = 0.68) -> 
     return np.linspace(low_um, high_um, count)
 
 
+def usual_errors(lens: Lens) -> FabricationErrors:
+    """Return the tolerances of a lens: lengths are those of 40 mm, of a shorter lens in proportion.
+
+    So a lens and its enlargement have copies whose PSFs are enlargements of each other.
+    """
+    share = min(1.0, abs(paraxial_data(lens).efl_mm) / USUAL_EFL_MM)
+    whole = FabricationErrors()
+    return replace(whole, thickness_mm=share * whole.thickness_mm, focus_mm=share * whole.focus_mm)
+
+
 def fabricated_copies(
     lens: Lens, count: int, seed: int, errors: FabricationErrors | None = None
 ) -> tuple[Lens, ...]:
@@ -77,10 +89,10 @@ def fabricated_copies(
         lens: Nominal.
         count: At least 1.
         seed: Copy i is drawn from (seed, i), whatever the count.
-        errors: The tolerances by default.
+        errors: The usual ones by default.
     """
     nominal = with_fixed_stop(lens)
-    widths = errors or FabricationErrors()
+    widths = errors or usual_errors(nominal)
     draws = (np.random.default_rng((seed, i)) for i in range(1, count))
     return (nominal, *(perturb(nominal, widths, rng) for rng in draws))
 

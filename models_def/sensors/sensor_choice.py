@@ -41,6 +41,8 @@ PICTURE_WHITE: Final = 65535.0
 MOST_PICTURE_WELL_E: Final = 200_000.0
 """Shot noise of so many electrons is what rounding to 8 bits of sRGB leaves, at any level."""
 ISOS: Final = (100, 200, 400, 800, 1600, 3200, 6400)
+LEAST_WHITE_E: Final = 250.0
+"""Of electrons at white: a pixel that holds few is not used at a high ISO."""
 COLOR_MATRIX: Final = (
     (0.6640, -0.1847, -0.0503),
     (-0.5238, 1.3010, 0.2474),
@@ -72,6 +74,12 @@ class SensorChoice:
     table: Mapping[str, Any]
     response: Mapping[str, Any]
     sources: Mapping[str, str]
+
+
+def isos_of(full_well_e: float) -> tuple[int, ...]:
+    """Return the ISOs of a sensor: at the highest one white is still `LEAST_WHITE_E` electrons."""
+    enough = tuple(iso for iso in ISOS if full_well_e * ISOS[0] / iso >= LEAST_WHITE_E)
+    return enough or ISOS[:1]
 
 
 def choose_sensor(text: str) -> SensorChoice:
@@ -213,7 +221,7 @@ def _completed(facts: dict[str, Any], sources: dict[str, str]) -> SensorChoice:
             "gain_e_per_dn": float(f"{facts['full_well_e'] / span * 100 / iso:.7g}"),
             "read_noise_e": float(f"{read_e:.4g}"),
         }
-        for iso in ISOS
+        for iso in isos_of(facts["full_well_e"])
     ]
     sharpness = 4 * np.log(2) / WIDTH_UM**2
     waves = np.array(WAVELENGTHS_UM)

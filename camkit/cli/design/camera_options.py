@@ -45,6 +45,9 @@ DistanceFrom = Annotated[
     str,
     typer.Option(help="What distances count from: vertex (of the first surface), sensor or pupil."),
 ]
+DefocusMm = Annotated[
+    float, typer.Option(help="Shift of the sensor behind its place in focus, in mm.")
+]
 VERTEX: Final = "vertex"
 
 

@@ -9,6 +9,7 @@ import typer
 from camkit.cli.choices import Debug, GlassFiles, Json, Overwrite
 from camkit.cli.design.camera_options import (
     VERTEX,
+    DefocusMm,
     DistanceFrom,
     FNumber,
     FocusM,
@@ -42,6 +43,7 @@ def make(
     focus_m: FocusM = None,
     object_m: ObjectM = None,
     distance_from: DistanceFrom = VERTEX,
+    defocus_mm: DefocusMm = 0.0,
     glass: GlassFiles = None,
     minutes: Annotated[
         float, typer.Option(help="CPU time in min for everything; 0 makes the filter alone.")
@@ -90,6 +92,7 @@ def make(
         focus_m=focus_m,
         object_m=distances_m(object_m),
         distance_from=distance_from,
+        defocus_mm=defocus_mm,
         glass=tuple(glass or ()),
     )
     facts = make_camera(

@@ -9,6 +9,7 @@ import typer
 from camkit.cli.choices import Debug, GlassFiles, Json, Overwrite
 from camkit.cli.design.camera_options import (
     VERTEX,
+    DefocusMm,
     DistanceFrom,
     FNumber,
     FocusM,
@@ -37,6 +38,7 @@ def recipe(
     focus_m: FocusM = None,
     object_m: ObjectM = None,
     distance_from: DistanceFrom = VERTEX,
+    defocus_mm: DefocusMm = 0.0,
     glass: GlassFiles = None,
     name: Annotated[
         str | None, typer.Option(help="Name of the camera; default: that of the recipe.")
@@ -57,6 +59,7 @@ def recipe(
         focus_m=focus_m,
         object_m=distances_m(object_m),
         distance_from=distance_from,
+        defocus_mm=defocus_mm,
         glass=tuple(glass or ()),
     )
     facts = recipe_writing.recipe(lens, output, camera=camera, name=name, overwrite=overwrite)

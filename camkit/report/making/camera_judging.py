@@ -26,6 +26,7 @@ from camkit.runtime.twin.light import stated_balance
 from camkit.scenes.procedural import procedural_scene
 
 FILTER: Final = "wiener"
+TRUTH: Final = "truth"
 SCENES: Final = 6
 SIDE_PX: Final = 384
 FIRST_SEED: Final = 91_000

@@ -3,7 +3,6 @@
 Minutes are those of the CPU, and count everything but the page.
 """
 
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
@@ -13,6 +12,7 @@ from camkit.errors import ContractError
 from camkit.field_types import checked
 from camkit.models_def.face.recipe_writing import CameraWords
 from camkit.models_def.face.torch_need import require_torch
+from camkit.report.making.work_folder import WorkFolder, remove_work
 from camkit.runtime.files.in_memory import FilePath, optional_path
 from camkit.runtime.output.part_file import refuse_existing
 from camkit.stopwatch import Stopwatch
@@ -75,12 +75,11 @@ def make(
     if minutes < 0:
         raise ContractError(f"minutes must be >= 0; got {minutes:g}")
     if overwrite:
-        shutil.rmtree(work_path, ignore_errors=True)
+        remove_work(work_path)
     elif not work_path.is_dir():
         refuse_existing((path, path.with_suffix(PAGE_SUFFIX)), overwrite=False)
     from camkit.report.making.camera_steps import CameraSteps, CameraWish
     from camkit.report.making.making_run import Making
-    from camkit.report.making.work_folder import WorkFolder
 
     wish = CameraWish(
         optics=Path(optics),

@@ -9,13 +9,13 @@ import numpy as np
 from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle
 from camkit.report.figure import encode_png, levels_of, to_png
-from camkit.report.making.camera_judging import FILTER, Judgement
+from camkit.report.making.camera_judging import FILTER, TRUTH, Judgement
 from camkit.report.pages.calibration.psf_field_page import draw_field
 from camkit.report.pages.page import Page, Part, Picture, Section, Table, sentences, to_html
 from camkit.runtime.plan.decision import DEVELOP
 
-NAMES: Final = {DEVELOP: "developed alone", FILTER: "filter"}
-_PAIR: Final = "The same capture by every method; the truth last. Three pixels of the page for one."
+NAMES: Final = {DEVELOP: "developed alone", FILTER: "filter", TRUTH: TRUTH}
+_PAIR: Final = "The same capture, from left to right: {}. Three pixels of the page for one."
 _BLUR: Final = "Kernels at the nearest distance. Logarithm of the light, four decades."
 _ENLARGED: Final = 3
 _CROP_PX: Final = 128
@@ -58,7 +58,7 @@ def camera_html(camera: MadeCamera) -> str:
         lead.append(f"Defaults of the sensor, not facts: {', '.join(facts['defaults'])}.")
     sections = [
         Section("Decibels", (_decibels(camera.judged),)),
-        Section("Before and after", (Picture(_PAIR, _strip(camera.pictures)),)),
+        Section("Before and after", (_before_and_after(camera.pictures),)),
         Section("Blur over the field", (Picture(_BLUR, to_png(draw_field(bundle.psf))),)),
         Section("Laws of a picture", (_laws(bundle),)),
         Section("Seconds", (_seconds(camera),)),
@@ -68,6 +68,10 @@ def camera_html(camera: MadeCamera) -> str:
     return to_html(Page(title=f"The camera {bundle.manifest.name}", lead=lead, sections=sections))
 
 
+def _name_of(method: str) -> str:
+    return NAMES.get(method, f"network {method}")
+
+
 def _decibels(judged: Mapping[str, Judgement]) -> Table:
     rows = []
     for method, judgement in judged.items():
@@ -75,8 +79,7 @@ def _decibels(judged: Mapping[str, Judgement]) -> Table:
             "" if method == base else _with_error(judgement.gain_over(judged[base]))
             for base in (DEVELOP, FILTER)
         ]
-        name = NAMES.get(method, f"network {method}")
-        rows.append((name, f"{np.mean(judgement.psnr_db):.2f}", *gains))
+        rows.append((_name_of(method), f"{np.mean(judgement.psnr_db):.2f}", *gains))
     return Table(
         header=("method", "PSNR, dB", "over developed alone", "over the filter"),
         rows=rows,
@@ -86,6 +89,11 @@ def _decibels(judged: Mapping[str, Judgement]) -> Table:
 
 def _with_error(gain: tuple[float, float]) -> str:
     return f"{gain[0]:+.2f} ± {gain[1]:.2f}"
+
+
+def _before_and_after(pictures: Mapping[str, FloatArray]) -> Picture:
+    names = ", ".join(_name_of(title) for title in pictures)
+    return Picture(_PAIR.format(names), _strip(pictures))
 
 
 def _strip(pictures: Mapping[str, FloatArray]) -> bytes:

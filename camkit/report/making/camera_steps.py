@@ -2,6 +2,7 @@
 
 described   lens stopped and focused, sensor found       recipe.toml, lens.toml
 frozen      PSF at a fixed grid, without a search        psf.safetensors, freeze.json
+            (a measured PSF is taken as it is            measured.safetensors)
 filtered    a bundle without a network: usable           filter.camkit
 fitted      the bank that restores colours together      recipe.toml
 trained     a network behind it                          NAME_SIZE.pt
@@ -20,6 +21,7 @@ from camkit.models_def.face.recipe_writing import (
     CameraWords,
     DescribedCamera,
     describe_camera,
+    is_measured,
     write_camera,
 )
 from camkit.models_def.kinds.bayer.recipe_draft import recipe_text
@@ -69,7 +71,7 @@ class CameraWish:
     @property
     def is_measured(self) -> bool:
         """Return whether the optics are a PSF that was measured."""
-        return self.optics.suffix.lower() == Path(MEASURED).suffix
+        return is_measured(self.optics)
 
     def to_json(self) -> dict[str, Any]:
         """Return all that decides the result, plain values."""
@@ -106,11 +108,16 @@ class CameraSteps:
     def describe(self) -> Facts:
         """Read lens and sensor; write recipe and lens."""
         described = self._described()
-        write_camera(described, self.recipe, self.work.path(LENS))
+        write_camera(described, self.recipe, self.work.path(self._optics_name))
         return described.facts()
 
     def _described(self) -> DescribedCamera:
-        return describe_camera(self.wish.optics, self.wish.camera, self.wish.name, LENS)
+        wish = self.wish
+        return describe_camera(wish.optics, wish.camera, wish.name, self._optics_name)
+
+    @property
+    def _optics_name(self) -> str:
+        return MEASURED if self.wish.is_measured else LENS
 
     def freeze(self) -> Facts:
         """Freeze the PSF, and write the recipe anew with the kernels and blocks that suit it."""

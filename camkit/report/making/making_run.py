@@ -23,7 +23,7 @@ from camkit.runtime.output.part_file import write_together
 PAGE_SUFFIX: Final = ".html"
 LEAST_FIT_S: Final = 240.0
 """Left of the minutes, from which fitting the bank leaves something to train with."""
-LAST_S: Final = 75.0
+LAST_S: Final = 100.0
 """Kept for export and judging."""
 LEAST_TRAINING_S: Final = 60.0
 
@@ -49,7 +49,8 @@ class Making:
         work.step("filtered", steps.export_filter)
         self._ship(FILTER_BUNDLE, "its filter restores, usable now")
         is_grey = facts["channels"] == 1
-        if not is_grey and (self._left_s() > LEAST_FIT_S or work.is_done("fitted")):
+        fits = not is_grey and not facts["is_grid"]
+        if fits and (self._left_s() > LEAST_FIT_S or work.is_done("fitted")):
             fitted = work.step("fitted", steps.fit_bank)
             self._ship(FILTER_BUNDLE, f"colours restored together: {fitted['gain_db']:+.2f} dB")
         if is_grey and self._wish.minutes:
@@ -82,6 +83,8 @@ class Making:
             self._tell(f"{line}: it stays out of the bundle; train for more minutes")
         else:
             self._ship(NETWORK_BUNDLE, line)
+            for text in broken_laws(open_bundle(self._out)):
+                self._tell(text)
         return judged
 
     @working("judging the camera")
@@ -121,3 +124,13 @@ class Making:
             },
             "cpu_s": self._work.seconds(),
         }
+
+
+def broken_laws(bundle: Bundle) -> list[str]:
+    """Return a line for every law of a picture that a network of a bundle breaks."""
+    return [
+        f"network {size} breaks the law {name}: {law.worst:.3g}, admitted are {law.limit:.3g}"
+        for size, laws in (bundle.manifest.laws or {}).items()
+        for name, law in laws.items()
+        if not law.kept
+    ]

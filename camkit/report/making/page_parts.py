@@ -10,7 +10,12 @@ from camkit.colorimetry import encode_srgb
 from camkit.models_def.optics.analysis.sampling import Pupil
 from camkit.models_def.optics.lens_file.lens_file import read_lens
 from camkit.report.figure import to_png
-from camkit.report.making.camera_judging import captures_of, pipelines_of, restored_by
+from camkit.report.making.camera_judging import (
+    TRUTH,
+    captures_of,
+    pipelines_of,
+    restored_by,
+)
 from camkit.report.pages.lens.layout import draw_layout
 from camkit.report.pages.lens.lens_facts import analyse
 from camkit.report.quality import Exposed
@@ -29,7 +34,7 @@ def pictures_of(bundle: Bundle, pictures: Path | None, cache_folder: Path) -> di
         name: encode_srgb(restored_by(pipeline, exposed))
         for name, pipeline in pipelines_of(bundle).items()
     }
-    return {**by_method, "truth": exposed.sharp}
+    return {**by_method, TRUTH: exposed.sharp}
 
 
 def seconds_of(bundle: Bundle) -> dict[str, float]:

@@ -4,6 +4,7 @@ steps.json      what was asked for, and of every finished step its facts and CPU
 """
 
 import json
+import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -14,7 +15,25 @@ from camkit.runtime.output.part_file import atomic_output
 from camkit.stopwatch import Stopwatch
 
 RECORD: Final = "steps.json"
+LASTING: Final = "filtered"
+"""The first step whose result somebody uses."""
 Facts = dict[str, Any]
+
+
+def remove_work(folder: Path) -> None:
+    """Remove the folder of an earlier making, if it is there.
+
+    Raises:
+        ContractError: If it holds something else.
+    """
+    if not folder.is_dir() or not any(folder.iterdir()):
+        return
+    if not (folder / RECORD).is_file():
+        raise ContractError(
+            f"{folder} holds no steps of a camera ({RECORD}), so nothing in it is replaced; name "
+            f"another folder by {option_text('work_dir')}"
+        )
+    shutil.rmtree(folder)
 
 
 class WorkFolder:
@@ -25,7 +44,8 @@ class WorkFolder:
 
         Args:
             folder: Made if it is not there.
-            words: What is asked for, plain JSON values; steps of other words are not taken.
+            words: What is asked for, plain JSON values; steps of other words are not taken, and
+                forgotten if nothing came of them yet (`LASTING`).
             stopwatch: Counts CPU time, that of this process's start included.
 
         Raises:
@@ -36,19 +56,16 @@ class WorkFolder:
         self._path = folder / RECORD
         self._record: dict[str, Any] = {"words": dict(words), "steps": {}}
         if self._path.is_file():
-            self._record = json.loads(self._path.read_text(encoding="utf-8"))
-            self._check(words)
+            begun = json.loads(self._path.read_text(encoding="utf-8"))
+            others = _others(begun["words"], words)
+            if others and LASTING in begun["steps"]:
+                raise ContractError(
+                    f"{folder} was begun with another {', '.join(others)}: give the same, or begin "
+                    f"anew with {option_text('overwrite')}"
+                )
+            if not others:
+                self._record = begun
         folder.mkdir(parents=True, exist_ok=True)
-
-    def _check(self, words: Mapping[str, Any]) -> None:
-        begun = self._record["words"]
-        plain = json.loads(json.dumps(dict(words)))
-        other = sorted(k for k in begun.keys() | plain.keys() if begun.get(k) != plain.get(k))
-        if other:
-            raise ContractError(
-                f"{self.folder} was begun with another {', '.join(other)}: give the same, or "
-                f"begin anew with {option_text('overwrite')}"
-            )
 
     def step(self, name: str, work: Callable[[], Facts]) -> Facts:
         """Return the facts of a step, doing it if it is not done."""
@@ -84,3 +101,9 @@ class WorkFolder:
     def _write(self) -> None:
         with atomic_output(self._path) as part:
             part.write_text(json.dumps(self._record, indent=1) + "\n", encoding="utf-8")
+
+
+def _others(begun: Mapping[str, Any], words: Mapping[str, Any]) -> list[str]:
+    """Return the names of words that two calls do not share."""
+    plain = json.loads(json.dumps(dict(words)))
+    return sorted(k for k in begun.keys() | plain.keys() if begun.get(k) != plain.get(k))

@@ -23,7 +23,6 @@ from camkit.models_def.optics.prescription import Lens, format_prescription
 from camkit.models_def.optics.psf import with_object_distance
 from camkit.progress import counted
 
-WAVELENGTHS: Final = 27
 LEAST_ENERGY: Final = 0.97
 TRACING: Final = 2
 """Counts how kernels and light have been traced so far: what was kept before is traced again."""
@@ -97,7 +96,7 @@ def _trace(recipe: BayerRecipe, lens: Lens) -> PsfBank:
 def _response(recipe: BayerRecipe) -> ChannelResponse:
     """Resample the sensor's response so finely that lateral colour leaves no steps."""
     wavelengths_um, response = recipe.sensor.response_arrays()
-    dense = np.linspace(wavelengths_um[0], wavelengths_um[-1], WAVELENGTHS)
+    dense = np.linspace(wavelengths_um[0], wavelengths_um[-1], recipe.lens.wavelengths)
     sampled = np.stack([np.interp(dense, wavelengths_um, row) for row in response])
     return ChannelResponse(
         wavelengths_um=dense,

@@ -43,6 +43,8 @@ CAMERA_PARTS: Final = (
     *("name", "object_distance_mm", "scale", "sensor", "light", "haze", "wiener", "lens"),
 )
 """What says which camera it is; how its networks are trained may differ."""
+WAVELENGTHS: Final = 27
+"""Traced by default: so many that lateral colour leaves no steps."""
 MEASURED_COLOURS: Final = "one measured kernel for each colour"
 _OLDER: Final = {"final": "fine_tuning"}
 
@@ -64,6 +66,8 @@ class LensRecipe:
         fields: Field heights of the kernel bank.
         kernel_px: Side of its kernels, odd.
         rays: Rays in half the pupil.
+        wavelengths: Of the sensor's band that are traced; between two of them lateral colour should
+            move light by less than a pixel.
         seed: Seed of the fabrication errors.
         depths_mm: Object distances, increasing, with the sensor where the prescription has it; a
             sample is taken at one of them by chance, the Wiener filter has their mean kernel.
@@ -79,6 +83,7 @@ class LensRecipe:
     fields: int = 25
     kernel_px: int = 129
     rays: int = 4096
+    wavelengths: int = WAVELENGTHS
     seed: int = 101
     depths_mm: tuple[float, ...] = ()
     validation_copies: int = 1
@@ -98,6 +103,11 @@ class LensRecipe:
             )
         if self.psf and self.bank_in_focus:
             raise ContractError("lens.bank_in_focus needs a lens; a measured PSF has its depths")
+        if min(self.fields, self.wavelengths) < 2:
+            raise ContractError(
+                "lens.fields and lens.wavelengths must be >= 2; got "
+                f"{self.fields}, {self.wavelengths}"
+            )
         if min(self.copies, self.validation_copies) < 1:
             raise ContractError(
                 "lens.copies and lens.validation_copies must be >= 1; got "
@@ -117,7 +127,7 @@ class LensRecipe:
     def to_json(self) -> dict[str, Any]:
         """Return the values that decide the kernels, to name files by, without defaults."""
         usual = {"depths_mm": (), "validation_copies": 1, "bank_in_focus": False}
-        usual |= {"psf": "", "uncertainty": ()}
+        usual |= {"psf": "", "uncertainty": (), "wavelengths": WAVELENGTHS}
         return {name: value for name, value in asdict(self).items() if value != usual.get(name)}
 
 

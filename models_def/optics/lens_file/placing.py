@@ -1,6 +1,6 @@
 """A lens stopped, focused and told where its objects lie, as people state it.
 
-    stop -> focus on a distance (the whole lens moves) -> distances of objects from the first vertex
+    stop -> focus on a distance (the whole lens moves), defocus -> distances from the first vertex
 
 Lens scales count from the sensor, programs from the first vertex, theory from the entrance pupil;
 camkit counts from the first vertex. From the sensor, a distance and where the sensor stands depend
@@ -16,7 +16,7 @@ from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.models_def.optics.focus import FocusMerit, with_focus
 from camkit.models_def.optics.paraxial import paraxial_data
-from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.prescription import Lens, with_focus_shift
 from camkit.models_def.optics.scaling import with_f_number
 
 DistanceOrigin = Literal["vertex", "sensor", "pupil"]
@@ -37,6 +37,7 @@ class Placement:
         objects_mm: Distances of the scene, in any order; none for where the lens is focused.
         origin: What `focus_mm` and `objects_mm` count from.
         merit: What is best in focus.
+        defocus_mm: By which the sensor lies behind its place in focus.
     """
 
     f_number: float | None = None
@@ -45,6 +46,7 @@ class Placement:
     objects_mm: Sequence[float] = ()
     origin: DistanceOrigin = "vertex"
     merit: FocusMerit = "spot"
+    defocus_mm: float = 0.0
 
     def __post_init__(self) -> None:
         if self.f_number is not None and self.stop_radius_mm is not None:
@@ -58,6 +60,10 @@ class Placement:
             )
         lengths = {"focus_mm": self.focus_mm, "stop_radius_mm": self.stop_radius_mm}
         lengths |= {f"object_mm {i + 1}": value for i, value in enumerate(self.objects_mm)}
+        if not math.isfinite(self.defocus_mm):
+            raise ContractError(
+                f"{option_text('defocus_mm')} must be finite; got {self.defocus_mm}"
+            )
         wrong = [f"{k} {v}" for k, v in lengths.items() if v is not None and not v > 0]
         if wrong:
             raise ContractError(f"lengths must be > 0; got {', '.join(wrong)}")
@@ -82,34 +88,37 @@ def placed_lens(lens: Lens, placement: Placement) -> PlacedLens:
     Raises:
         ContractError: If an object would lie within the lens, or the lens cannot be focused.
     """
-    stopped = _stopped(lens, placement)
-    focused = _focused(stopped, placement)
+    stopped = stopped_lens(
+        lens, f_number=placement.f_number, stop_radius_mm=placement.stop_radius_mm
+    )
+    focused = with_focus_shift(_focused(stopped, placement), placement.defocus_mm)
     objects = [_from_vertex(focused, value, placement.origin) for value in placement.objects_mm]
     return PlacedLens(
         lens=focused, objects_mm=tuple(sorted(set(objects))) or (focused.object_distance_mm,)
     )
 
 
-def track_mm(lens: Lens) -> float:
-    """Return the way from the first vertex to the sensor."""
-    return sum(surface.thickness_mm for surface in lens.surfaces)
-
-
-def _stopped(lens: Lens, placement: Placement) -> Lens:
-    if placement.f_number is not None:
-        return with_f_number(lens, placement.f_number)
-    if placement.stop_radius_mm is None:
+def stopped_lens(lens: Lens, *, f_number: float | None, stop_radius_mm: float | None) -> Lens:
+    """Return a lens stopped to an F-number or a radius of its stop; as it is with neither."""
+    if f_number is not None:
+        return with_f_number(lens, f_number)
+    if stop_radius_mm is None:
         return lens
     surfaces = list(lens.surfaces)
     stop = surfaces[lens.stop]
-    rim_mm = max(stop.semi_diameter_mm, placement.stop_radius_mm)
+    rim_mm = max(stop.semi_diameter_mm, stop_radius_mm)
     surfaces[lens.stop] = replace(stop, semi_diameter_mm=rim_mm)
     return replace(
         lens,
         surfaces=tuple(surfaces),
         aperture_kind="stop_semi_diameter_mm",
-        aperture_value=placement.stop_radius_mm,
+        aperture_value=stop_radius_mm,
     )
+
+
+def track_mm(lens: Lens) -> float:
+    """Return the way from the first vertex to the sensor."""
+    return sum(surface.thickness_mm for surface in lens.surfaces)
 
 
 def _focused(lens: Lens, placement: Placement) -> Lens:

@@ -9,6 +9,7 @@ from typing import Final
 from camkit.errors import DecodeError, UnsupportedError
 from camkit.models_def.optics.glass.catalogue import AIR, GlassCatalogue
 from camkit.models_def.optics.glass.encoding import read_text
+from camkit.models_def.optics.lens_file.zmx_collimator import without_collimator
 from camkit.models_def.optics.lens_file.zmx_field import with_fields
 from camkit.models_def.optics.lens_file.zmx_glass import (
     OLD_SCHOTT,
@@ -78,7 +79,7 @@ def parse_zmx(
     name: str = "lens",
 ) -> ZmxLens:
     """Read a lens from the text of a .zmx file; see `read_zmx`."""
-    records = parse_records(text)
+    records, collimator_notes = without_collimator(parse_records(text))
     system = records.system
     mode = last(system, "MODE")
     if mode is not None and mode.words[:1] not in {(), ("SEQ",)}:
@@ -109,7 +110,8 @@ def parse_zmx(
     )
     lens = _with_object_aperture(lens, system)
     lens, aperture_notes = _with_rim_aperture(lens, records, scale)
-    notes = (*aperture_notes, *_notes(records, surfaces), *_glass_notes(records, surfaces, order))
+    notes = (*collimator_notes, *aperture_notes, *_notes(records, surfaces))
+    notes += _glass_notes(records, surfaces, order)
     return ZmxLens(lens=with_fields(lens, system, scale), notes=notes)
 
 

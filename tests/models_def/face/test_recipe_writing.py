@@ -8,7 +8,7 @@ import pytest
 
 import camkit
 from camkit.cli.app import run
-from camkit.errors import ContractError
+from camkit.errors import ContractError, UnsupportedError
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.optics.lens_file.lens_file import find_lens, read_lens
 from camkit.models_def.optics.paraxial import paraxial_image
@@ -78,4 +78,18 @@ def test_wrong_words_are_one_line(
 ) -> None:
     assert run(["recipe", "duet", "-o", str(tmp_path / "mine.toml"), *words]) != 0
     assert message in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("optics", "says"),
+    [
+        ("streak-3", "streak-3 is a diffractive plate: its camera is of another kind"),
+        ("thin-plate", "thin-plate has grooves, which throw a haze over the picture"),
+    ],
+)
+def test_a_plate_is_refused_by_its_name(optics: str, says: str, tmp_path: Path) -> None:
+    camera = camkit.CameraWords(sensor="3000x2000@6um")
+    with pytest.raises(UnsupportedError, match=says):
+        camkit.recipe(optics, tmp_path / "mine.toml", camera=camera)
     assert not list(tmp_path.iterdir())

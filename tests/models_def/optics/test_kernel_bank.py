@@ -5,15 +5,18 @@ import pytest
 
 from camkit.errors import ContractError
 from camkit.models_def.optics.kernel_bank import (
+    USUAL_EFL_MM,
     ChannelResponse,
     colour_kernels,
     fabricated_copies,
     focused_copies,
     gaussian_response,
+    usual_errors,
     wavelength_grid,
 )
 from camkit.models_def.optics.paraxial import paraxial_data
-from camkit.models_def.optics.prescription import read_prescription
+from camkit.models_def.optics.prescription import FabricationErrors, read_prescription
+from camkit.models_def.optics.scaling import scale_to_efl
 
 DUET = Path(__file__).resolve().parents[3] / "models_def" / "prescriptions" / "duet.toml"
 
@@ -68,3 +71,22 @@ def test_focused_copies_keep_the_designed_distance_from_their_focus() -> None:
     drift = [abs(defocus_mm(i, raw) - defocus_mm(0, raw)) for i in range(1, 6)]
     assert max(moved) <= 0.02 + 1e-12
     assert max(drift) > 0.05
+
+
+def test_a_small_lens_has_the_copies_of_its_enlargement_on_smaller_pixels() -> None:
+    response, heights_mm = gaussian_response(wavelength_grid(3)), np.array([0.0, 8.0])
+    large = scale_to_efl(read_prescription(DUET), USUAL_EFL_MM)
+    small = scale_to_efl(large, USUAL_EFL_MM / 10)
+    (_, copy), (_, tiny) = (focused_copies(lens, 2, 7) for lens in (large, small))
+    (of_copy, _), (of_tiny, _) = (
+        colour_kernels(a, response, heights_mm / s, size_px=65, pitch_um=6.0 / s, rays=300)
+        for a, s in ((copy, 1), (tiny, 10))
+    )
+    assert of_tiny == pytest.approx(of_copy, abs=1e-5)
+
+
+def test_errors_of_longer_lenses_are_those_of_the_usual_length() -> None:
+    lens = read_prescription(DUET)
+    assert usual_errors(scale_to_efl(lens, 200.0)) == FabricationErrors()
+    assert usual_errors(scale_to_efl(lens, 20.0)).thickness_mm == pytest.approx(0.015)
+    assert usual_errors(scale_to_efl(lens, 20.0)).index == FabricationErrors().index

@@ -10,16 +10,19 @@ from camkit.colorimetry import decode_srgb
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.kinds.bayer.recipe_draft import RecipeDraft, recipe_text
-from camkit.models_def.sensors.sensor_choice import choose_sensor, named_sensors, sensor_of
+from camkit.models_def.sensors.sensor_choice import (
+    choose_sensor,
+    isos_of,
+    named_sensors,
+    sensor_of,
+)
 from camkit.models_def.training.kind import to_recipe
 from camkit.noise import NoiseModel
 from camkit.runtime.capture import Capture
 
 
 def recipe_of(text: str) -> BayerRecipe:
-    draft = RecipeDraft(
-        name="any", sensor=choose_sensor(text), prescription="duet", focus_mm=np.inf
-    )
+    draft = RecipeDraft(name="any", sensor=choose_sensor(text), optics="duet", focus_mm=np.inf)
     recipe = to_recipe(tomllib.loads(recipe_text(draft)))
     assert isinstance(recipe, BayerRecipe)
     return recipe
@@ -144,3 +147,12 @@ def test_a_photograph_without_pitch_is_refused() -> None:
     with pytest.raises(ContractError, match="states no pixel pitch; state it by pitch_um"):
         sensor_of(photo(pixel_pitch_um=None))
     assert sensor_of(photo(pixel_pitch_um=None), 3.0).table["pixel_pitch_um"] == 3.0
+
+
+def test_a_small_pixel_has_no_high_iso() -> None:
+    assert isos_of(72_000.0)[-1] == 6400
+    assert isos_of(8000.0)[-1] == 3200
+    assert isos_of(3920.0)[-1] == 800
+    assert isos_of(20.0) == (100,)
+    (last,) = choose_sensor("1600x1200@1.4um").table["noise"][-1:]
+    assert last["iso"] == 800.0

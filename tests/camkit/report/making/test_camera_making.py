@@ -2,19 +2,25 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+from camkit import recipe
 from camkit.bundle.reader import open_bundle
+from camkit.calibrate import import_psf
 from camkit.cli.app import run
 from camkit.errors import ContractError
 from camkit.models_def.face.recipe_writing import CameraWords
+from camkit.models_def.training.kind import read_recipe
 from camkit.report.making import camera_judging, camera_making, making_run, page_parts
 from camkit.report.making.camera_judging import FILTER, Judgement
 from camkit.report.making.camera_steps import CameraSteps
 from camkit.runtime.plan.decision import DEVELOP
+from tests.psf_files import counts
 from tests.wide_bundle import write_wide_bundle
 
 SENSOR = "128x96@5um"
@@ -56,6 +62,13 @@ def test_a_lens_becomes_a_proved_filter_and_a_page(
     assert "begun with another minutes" in capsys.readouterr().err
 
 
+def measured_grid(path: Path) -> Path:
+    """Write the PSF of a laboratory: kernels of three colours on a grid."""
+    np.save(path.with_suffix(".npy"), counts())
+    import_psf(path.with_suffix(".npy"), path, pitch_um=5.0, span_mm="0.6x0.4")
+    return path
+
+
 class Steps:
     """Steps that do nothing but write a bundle."""
 
@@ -82,6 +95,7 @@ class Steps:
 
         sensor = {"width_px": 320, "height_px": 240, "pixel_pitch_um": 6.0}
         described = {"notes": ["a note"], "sensor": sensor, "defaults": [], "channels": channels}
+        described["is_grid"] = False
         for name, facts, writes in (
             ("describe", described, ""),
             ("freeze", {"side_px": 9, "energy_kept": 0.99}, ""),
@@ -174,3 +188,30 @@ def test_files_of_others_are_not_replaced(tmp_path: Path) -> None:
     with pytest.raises(ContractError, match="minutes must be >= 0; got -1"):
         camera_making.make("duet", out, camera=CameraWords(sensor=SENSOR), minutes=-1.0)
     assert out.read_bytes() == b"mine"
+
+
+def test_a_measured_psf_becomes_a_camera_and_words_of_a_lens_are_refused(
+    small: None, tmp_path: Path
+) -> None:
+    psf = measured_grid(tmp_path / "lab.safetensors")
+    camera = CameraWords(sensor=SENSOR)
+    facts = camera_making.make(psf, tmp_path / "mine.camkit", camera=camera, minutes=0.0)
+    assert facts["psnr_db"].keys() == {DEVELOP, FILTER}
+    bundle = open_bundle(tmp_path / "mine.camkit")
+    assert bundle.psf.symmetry == "grid"
+    assert bundle.psf.pixel_pitch_um == 5.0
+    recipe = (tmp_path / "mine.work" / "recipe.toml").read_text(encoding="utf-8")
+    assert 'psf = "measured.safetensors"' in recipe
+    assert "channel_response" not in recipe
+    assert "A measured point spread function" in Path(facts["page"]).read_text(encoding="utf-8")
+    wrong = replace(camera, f_number=4.0, focus_m=1.0)
+    with pytest.raises(ContractError, match=r"measured PSF, .* leave f_number, focus_m out"):
+        camera_making.make(psf, tmp_path / "other.camkit", camera=wrong, minutes=0.0)
+
+
+def test_the_recipe_of_a_measured_psf_is_read_back(tmp_path: Path) -> None:
+    psf = measured_grid(tmp_path / "lab.safetensors")
+    facts = recipe(psf, tmp_path / "new" / "mine.toml", camera=CameraWords(sensor=SENSOR))
+    assert Path(facts["lens"]).name == "mine-psf.safetensors"
+    assert Path(facts["lens"]).read_bytes() == psf.read_bytes()
+    assert read_recipe(Path(facts["recipe"])).lens.psf == "mine-psf.safetensors"

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from camkit.errors import ContractError
-from camkit.report.making.work_folder import WorkFolder
+from camkit.report.making.work_folder import LASTING, RECORD, WorkFolder, remove_work
 
 
 class Watch:
@@ -53,7 +53,29 @@ def test_a_step_that_fails_is_not_done(tmp_path: Path) -> None:
 
 def test_a_folder_of_other_words_is_refused(tmp_path: Path) -> None:
     watch = Watch()
-    WorkFolder(tmp_path, {"a": 1, "b": (1.0, 2.0)}, watch).step("x", dict)  # type: ignore[arg-type]
+    begun = WorkFolder(tmp_path, {"a": 1, "b": (1.0, 2.0)}, watch)  # type: ignore[arg-type]
+    begun.step(LASTING, dict)
     WorkFolder(tmp_path, {"a": 1, "b": [1.0, 2.0]}, watch)  # type: ignore[arg-type]
     with pytest.raises(ContractError, match="begun with another a, c: give the same, or begin"):
         WorkFolder(tmp_path, {"a": 2, "b": [1.0, 2.0], "c": 3}, watch)  # type: ignore[arg-type]
+
+
+def test_only_the_folder_of_a_making_is_removed(tmp_path: Path) -> None:
+    own, other = tmp_path / "mine.work", tmp_path / "photographs"
+    WorkFolder(own, {}, Watch()).step("first", dict)  # type: ignore[arg-type]
+    assert (own / RECORD).is_file()
+    remove_work(own)
+    assert not own.exists()
+    remove_work(own)
+    other.mkdir()
+    (other / "one.jpg").write_bytes(b"light")
+    with pytest.raises(ContractError, match="holds no steps of a camera"):
+        remove_work(other)
+    assert (other / "one.jpg").read_bytes() == b"light"
+
+
+def test_steps_of_which_nothing_came_are_forgotten_for_other_words(tmp_path: Path) -> None:
+    watch = Watch()
+    WorkFolder(tmp_path, {"a": 1}, watch).step("described", dict)  # type: ignore[arg-type]
+    assert WorkFolder(tmp_path, {"a": 1}, watch).is_done("described")  # type: ignore[arg-type]
+    assert not WorkFolder(tmp_path, {"a": 2}, watch).is_done("described")  # type: ignore[arg-type]

@@ -87,3 +87,15 @@ def test_what_lies_within_the_lens_is_refused() -> None:
     # nearer than four focal lengths no plane and its image are
     with pytest.raises(ContractError, match=r"cannot be focused|lies within"):
         placed_lens(LENS, Placement(focus_mm=150.0, origin="sensor", merit="paraxial"))
+
+
+def test_a_defocus_moves_the_sensor_behind_its_place_in_focus() -> None:
+    sharp = placed_lens(LENS, Placement(focus_mm=1500.0, objects_mm=(900.0,), origin="sensor"))
+    blurred = placed_lens(
+        LENS, Placement(focus_mm=1500.0, objects_mm=(900.0,), origin="sensor", defocus_mm=0.25)
+    )
+    assert track_mm(blurred.lens) == pytest.approx(track_mm(sharp.lens) + 0.25, abs=1e-9)
+    # the plane is placed from the sensor where it is
+    assert blurred.objects_mm[0] == pytest.approx(sharp.objects_mm[0] - 0.25, abs=1e-9)
+    with pytest.raises(ContractError, match="defocus_mm must be finite"):
+        Placement(defocus_mm=math.nan)
