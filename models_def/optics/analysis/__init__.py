@@ -11,5 +11,6 @@ In the order in which data flows (every result states its pupil, see `camkit...o
 - `wavefront`: optical path differences at the exit pupil
 - `wave_psf`: the diffraction PSF summed from them
 - `mtf`: contrast from rays or from a PSF, and its diffraction limit
+- `pair_transfer`: the blur between two stops of a lens, block by block of a picture
 - `psf_model`: whether a lens needs waves, and why
 """

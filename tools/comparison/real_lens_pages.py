@@ -1,0 +1,157 @@
+"""The page and the pictures of the comparison of a real lens."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from camkit.arrays import FloatArray
+from tools.pictures.captions import write_captioned
+from tools.tables.records import markdown_table
+
+if TYPE_CHECKING:
+    from tools.comparison.real_lens import Comparison
+
+CREDIT: Final = "Photographs by LinYark/Sdirt (MIT)"
+SIDE_PX: Final = 200
+PLACES: Final = {"centre": (388, 266), "corner": (568, 312)}
+"""(x, y) of the first pixel of a crop."""
+FORWARD: Final = ("blur", "setting")
+HEADS: Final = ("dB", "red", "green", "blue", "centre", "corner")
+CAPTIONS: Final = {"untouched": "f/4", "wiener": "filter", "rl": "Richardson-Lucy"}
+DIFFERENCE_GAIN: Final = 4.0
+
+COMMAND: Final = (
+    "python -m tools.comparison.real_lens --data FOLDER{held_out} -o docs/results/real-lens "
+    "--crops CROPS"
+)
+INTRODUCTION: Final = (
+    "Canon RF 50 mm f/1.8 from its patent, and photographs of a poster through it by LinYark/Sdirt "
+    "(commit 5fa8ff5, MIT): 768x512 pixels of 46.875 um, halves of dual pixels averaged, read by "
+    "the curve that they measured. What it means, and pictures: [real-lens.md](../real-lens.md). "
+    "Data: [real-lens.json](real-lens.json). Machine: {machine}."
+)
+FORWARD_TEXT: Final = (
+    "PSNR of codes, white at 1, of the f/4 picture predicted from the f/20 one. For every blur "
+    "alike a gain of each colour and its fall with r^2 are fitted on half of the blocks and judged "
+    "on the other half; {share:.0%} of the frame counts (no clipped sample near, no border). Sizes "
+    "of Gaussian and disc are fitted to the very picture; {lens}."
+)
+OF_FIT: Final = "of the lens only the defocus is, where the sensor was moved"
+OF_HELD_OUT: Final = (
+    "nothing of the lens is: defocus and curve are those of 1.5 m, and this shot was judged once"
+)
+INVERSE_TEXT: Final = (
+    "PSNR of codes against the f/20 picture, judged likewise; cameras as `camkit make` has them "
+    "after its filter."
+)
+
+
+def page_text(record: Mapping[str, Any], names: Sequence[str]) -> str:
+    """Return the page of a record.
+
+    Args:
+        record: What `tools.comparison.real_lens` found.
+        names: Of the shots; the first one was fitted on.
+    """
+    facts = record["distance"]
+    origins = markdown_table(
+        ("distances from", "in best focus, dB", "sensor moved, mm", "then, dB"),
+        [
+            (
+                one["distance_from"],
+                f"{one['in_focus_db']:.2f}",
+                f"{one['defocus_mm']:+.3f} +- {one['defocus_error_mm']:.3f}",
+                f"{one['moved_db']:.2f}",
+            )
+            for one in facts["origins"]
+        ],
+    )
+    machine = record["machine"]
+    machine_text = f"{machine['cores']} cores of an {machine['processor']}"
+    held_out = " --held-out FOLDER" if len(names) > 1 else ""
+    parts = [
+        "# A real lens",
+        INTRODUCTION.format(machine=machine_text),
+        "    " + COMMAND.format(held_out=held_out),
+        "## The pair at 1.5 m",
+        f"> {facts['sentence']}",
+        "\n".join(f"- {note}" for note in facts["notes"]),
+        origins,
+    ]
+    for name in names:
+        shot, is_fitted = record[name], name == names[0]
+        title = name if is_fitted else f"{name}, held back"
+        lens = OF_FIT if is_fitted else OF_HELD_OUT
+        parts += [
+            f"## Forward, {title}",
+            FORWARD_TEXT.format(share=shot["share"], lens=lens),
+            markdown_table((*FORWARD, *HEADS), map(_forward_row, shot["forward"])),
+            f"## Inverse, {title}",
+            INVERSE_TEXT,
+            markdown_table(("restored by", *HEADS), map(_inverse_row, shot["inverse"])),
+        ]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _numbers(row: Mapping[str, Any]) -> list[str]:
+    values = [row["psnr_db"], *row["colours_db"], row["centre_db"], row["corner_db"]]
+    return ["-" if value is None else f"{value:.2f}" for value in values]
+
+
+def _forward_row(row: Mapping[str, Any]) -> list[str]:
+    return [row["blur"], row["setting"], *_numbers(row)]
+
+
+def _inverse_row(row: Mapping[str, Any]) -> list[str]:
+    return [row["method"], *_numbers(row)]
+
+
+def write_crops(
+    folder: Path, comparison: "Comparison", pictures: Mapping[str, FloatArray]
+) -> list[Path]:
+    """Write crops at 100 %: the blur predicted, and the picture restored.
+
+    Args:
+        folder: Of the pictures.
+        comparison: The shot.
+        pictures: Method -> (3, h, w) light.
+    """
+    pair = comparison.scene.judges[comparison.tone.name].pair
+    wide, sharp = pair.codes_of(pair.wide), pair.codes_of(pair.sharp)
+    predicted = pair.codes_of(comparison.predicted())
+    difference = 0.5 + DIFFERENCE_GAIN * (predicted - wide)
+    forward = {
+        "f/20": sharp,
+        "f/20, blurred by the lens": predicted,
+        "f/4": wide,
+        f"difference x {DIFFERENCE_GAIN:g}": difference,
+    }
+    inverse = {
+        caption: pair.codes_of(comparison.scaled(_first(pictures, method)))
+        for method, caption in CAPTIONS.items()
+    }
+    inverse["f/20"] = sharp
+    folder.mkdir(parents=True, exist_ok=True)
+    number = comparison.shot.name.split()[0]
+    paths = []
+    for kind, columns in (("forward", forward), ("inverse", inverse)):
+        rows = {
+            place: {caption: _crop(picture, corner) for caption, picture in columns.items()}
+            for place, corner in PLACES.items()
+        }
+        paths.append(folder / f"real-lens-{number}-{kind}.jpg")
+        heading = f"Canon RF 50 mm at {comparison.shot.name}. {CREDIT}."
+        write_captioned(paths[-1], heading, rows)
+    return paths
+
+
+def _first(pictures: Mapping[str, FloatArray], method: str) -> FloatArray:
+    """Return the picture by a method and the lens as it was found."""
+    return next(picture for name, picture in pictures.items() if name.split(",")[0] == method)
+
+
+def _crop(picture: FloatArray, corner: tuple[int, int]) -> FloatArray:
+    x, y = corner
+    return np.ascontiguousarray(picture[:, y : y + SIDE_PX, x : x + SIDE_PX])
