@@ -100,10 +100,15 @@ def planes_text(channels="RGB"):
 
 
 @pytest.fixture(scope="session")
-def planes_recipe(tmp_path_factory):
+def planes_recipe_path(tmp_path_factory):
     path = tmp_path_factory.mktemp("recipe") / "planes.toml"
     path.write_text(planes_text(), encoding="utf-8")
-    return read_recipe(path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def planes_recipe(planes_recipe_path):
+    return read_recipe(planes_recipe_path)
 
 
 @pytest.fixture(scope="session")

@@ -57,7 +57,7 @@ def train(
         fine_tune: Checkpoint or bundle to fine-tune with discriminators.
         vgg: VGG-19 weights (.pth, .safetensors), for losses that compare features.
         sharp: Folder of sharp pictures without captures, for the critic of an adversarial loss.
-        pairs: Folder of real pairs, for `fine_tune` and losses that use pairs.
+        pairs: Folder of real pairs (`pairs.toml`), which are mixed into the batches.
         resume: Continue from the checkpoint in `out_dir`.
         overwrite: Start anew over a checkpoint there.
         threads: Threads of torch.

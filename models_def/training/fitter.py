@@ -30,6 +30,10 @@ NetworkBuilder = Callable[..., nn.Module]
 """Of a kind: name and configuration -> an untrained network."""
 
 
+Mix = Callable[[Batch, int], Batch]
+"""A batch and the number of its step -> the batch with patches of real pairs among its own."""
+
+
 class Stateful(Protocol):
     """Something that a step changes beside the network, such as a critic."""
 
@@ -70,6 +74,7 @@ def run_planes(fitter: "Fitter", batch: Batch, progress: float) -> Tensor:
 def patch_objective(
     finish: Finish | None = None,
     run: Callable[["Fitter", Batch, float], Tensor] = run_planes,
+    mix: Mix | None = None,
 ) -> Objective:
     """Return the loss of a schedule, on the errors of patches in the square-root domain.
 
@@ -77,10 +82,12 @@ def patch_objective(
         finish: What is done behind the network before its output is judged; None for nothing.
         run: The fitter, a batch and the share of the schedule that lies behind -> the output of
             the network.
+        mix: Real pairs among the patches; None for none.
     """
 
     def loss(fitter: "Fitter", batch: Batch, step: int, progress: float) -> Tensor:
-        del step
+        if mix is not None:
+            batch = mix(batch, step)
         schedule, output = fitter.schedule, run(fitter, batch, progress)
         if finish is not None:
             output = finish(output, batch)

@@ -19,9 +19,9 @@ from camkit.models_def.training.recipe import PICTURE_LOSSES, NetworkRecipe
 _FILES: Final = (
     ("vgg", "VGG-19", True),
     ("sharp", "sharp pictures without captures", False),
-    ("pairs", "real pairs", True),
+    ("pairs", "real pairs", False),
 )
-"""Files of a request: option, what it holds, whether fine-tuning takes it."""
+"""Files of a request: option, what it holds, whether fine-tuning alone takes it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -74,7 +74,7 @@ class TrainOptions:
         device: cpu or cuda.
         vgg: Weights of VGG-19, where the loss of the role looks at it.
         sharp_folder: Sharp pictures without captures, where the loss of the role has a critic.
-        pairs: Folder of real pairs, where the loss of the role takes them.
+        pairs: Folder of real pairs, where the kind of camera trains on them.
         checkpoint_s: Seconds between checkpoints.
         validate_s: Seconds between validations.
     """

@@ -67,7 +67,7 @@ def train(
     ] = None,
     pairs: Annotated[
         Path | None,
-        typer.Option(help="Folder of real pairs, for --fine-tune and losses that use pairs."),
+        typer.Option(help="Folder of real pairs (pairs.toml), mixed into the batches."),
     ] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue from the checkpoint in --out-dir.")

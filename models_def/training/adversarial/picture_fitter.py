@@ -7,7 +7,6 @@ batch (+ real pairs) -> generator -> views -+-> opponents, scores of true and ge
 All that is drawn follows from the number of the step.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
@@ -18,13 +17,10 @@ from camkit.models_def.training.adversarial.game import weighted_sum
 from camkit.models_def.training.adversarial.opponents import OpponentPlan, Opponents
 from camkit.models_def.training.adversarial.views import make_views
 from camkit.models_def.training.first_weights import FirstWeights
-from camkit.models_def.training.fitter import BETAS, Fitter, NetworkBuilder, Objective
+from camkit.models_def.training.fitter import BETAS, Fitter, Mix, NetworkBuilder, Objective
 from camkit.models_def.training.recipe import ContentRecipe, NetworkRecipe
 from camkit.models_def.training.sample import Batch
 from camkit.models_def.training.schedule import learning_rate
-
-Mix = Callable[[Batch, int], Batch]
-"""A batch and the number of its step -> the batch with patches of real pairs among its own."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,10 +16,10 @@ from camkit.errors import ContractError
 from camkit.models_def.networks.vgg import file_digest
 from camkit.models_def.training.adversarial.content import Relu32
 from camkit.models_def.training.adversarial.opponents import OpponentPlan
-from camkit.models_def.training.adversarial.picture_fitter import Mix, PictureParts, picture_fitter
+from camkit.models_def.training.adversarial.picture_fitter import PictureParts, picture_fitter
 from camkit.models_def.training.adversarial.sharp import SharpCrops
 from camkit.models_def.training.adversarial.wasserstein import Wasserstein
-from camkit.models_def.training.fitter import BETAS, Fitter, NetworkBuilder
+from camkit.models_def.training.fitter import BETAS, Fitter, Mix, NetworkBuilder
 from camkit.models_def.training.fitting import FitRequest, OwnFitting
 from camkit.models_def.training.recipe import PICTURE_LOSSES, ScheduleRecipe
 

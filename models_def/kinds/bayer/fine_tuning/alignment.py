@@ -26,6 +26,7 @@ from camkit.models_def.kinds.bayer.fine_tuning.homography import (
     refine_homography,
     warp_to,
 )
+from camkit.models_def.kinds.bayer.fine_tuning.pair_photographs import Photograph
 from camkit.models_def.kinds.bayer.psf_bank import PsfBank
 from camkit.radial import RadialDistortion
 from camkit.runtime.geometry.distortion import distort_points, undistort_points
@@ -33,7 +34,6 @@ from camkit.units import to_mm
 
 Points = NDArray[np.float64]
 
-CLIPPED_ABOVE: Final = 0.999
 COLOUR_STEP_PX: Final = 8
 LEAST_COLOUR_POINTS: Final = 64
 
@@ -44,15 +44,43 @@ class AlignedPair:
 
     Attributes:
         capture: (3, h, w) linear, 1.0 = white level.
-        reference: (3, m, n) linear light of the plane, in camera colours as captured.
+        clipped: (h, w) where a colour of it clipped.
+        reference: (3, m, n) linear light, in camera colours as captured.
+        unknown: (m, n) where the light of the reference is not known.
         to_reference: (n, 2) pixels x, y of the capture -> pixels of the reference.
+        illumination: (n, 2) pixels of the capture -> (n,) what the reference is multiplied by
+            there.
         homography: From the reference to the capture as it would be without distortion.
     """
 
     capture: FloatArray
+    clipped: NDArray[np.bool_]
     reference: FloatArray
+    unknown: NDArray[np.bool_]
     to_reference: Callable[[Points], Points]
+    illumination: Callable[[Points], NDArray[np.float64]]
     homography: Homography
+
+    def warped(
+        self, first_px: tuple[int, int], size_px: tuple[int, int]
+    ) -> tuple[FloatArray, NDArray[np.bool_]]:
+        """Return the reference as it lies in a rectangle of the capture.
+
+        Args:
+            first_px: (x, y) of the first pixel.
+            size_px: (width, height).
+
+        Returns:
+            (3, height, width) light without illumination, and (height, width) whether it is known.
+        """
+        width, height = size_px
+        grid = np.mgrid[0:height, 0:width][::-1].reshape(2, -1).T + np.array(first_px, np.float64)
+        at = self.to_reference(grid).reshape(height, width, 2)
+        light, inside = warp_to(self.reference, at[..., 0], at[..., 1])
+        if self.unknown.any():
+            x, y = (at[..., axis].astype(np.float32) for axis in range(2))
+            inside &= cv2.remap(self.unknown.astype(np.float32), x, y, cv2.INTER_LINEAR) == 0
+        return light, inside
 
 
 class Aligner:
@@ -66,16 +94,11 @@ class Aligner:
         self._centre = np.array([sensor.width_px - 1, sensor.height_px - 1]) / 2
         self._pitch_mm = to_mm(sensor.pixel_pitch_um)
 
-    def align(self, capture: FloatArray, reference: FloatArray) -> AlignedPair:
-        """Align a pair.
-
-        Args:
-            capture: (3, h, w) linear camera colours, 1.0 = white level.
-            reference: (3, m, n) linear Rec.709.
+    def check_size(self, capture: FloatArray) -> None:
+        """Refuse a (3, h, w) capture that does not cover the sensor.
 
         Raises:
-            ContractError: If the capture has not the size of the sensor, or the two cannot be
-                aligned.
+            ContractError: Naming both sizes.
         """
         sensor = self._sensor
         if capture.shape[1:] != (sensor.height_px, sensor.width_px):
@@ -83,18 +106,31 @@ class Aligner:
                 f"a capture must cover the sensor, {sensor.width_px}x{sensor.height_px} px; got "
                 f"{capture.shape[2]}x{capture.shape[1]}"
             )
+
+    def align(self, capture: Photograph, reference: Photograph) -> AlignedPair:
+        """Align a pair whose reference a display showed.
+
+        Args:
+            capture: Linear camera colours.
+            reference: Linear Rec.709, of any size.
+
+        Raises:
+            ContractError: If the capture has not the size of the sensor, or the two cannot be
+                aligned.
+        """
+        self.check_size(capture.light)
         # One step of the lattice is a pixel of the picture that is matched.
-        step = -(-max(capture.shape[1:]) // WORK_SIDE_PX)
-        grey = self._ideal_grey(capture, step)
-        homography = find_homography(_encoded(reference.mean(0)), _encoded(grey))
-        pair = self._pair(capture, reference, homography, step)
-        light = apply_matrix(self._fit_colours(pair), reference)
+        step = -(-max(capture.clipped.shape) // WORK_SIDE_PX)
+        grey = self._ideal_grey(capture.light, step)
+        homography = find_homography(display_coded(reference.light.mean(0)), display_coded(grey))
+        pair = self._pair(capture, reference.light, homography, step)
+        light = apply_matrix(self._fit_colours(pair), reference.light)
         # In the capture's own colours and in linear light, blur and noise are all that differs.
         homography = refine_homography(homography, light.mean(0), grey)
         return self._pair(capture, light, homography, step)
 
     def _pair(
-        self, capture: FloatArray, reference: FloatArray, homography: Homography, step: int
+        self, capture: Photograph, reference: FloatArray, homography: Homography, step: int
     ) -> AlignedPair:
         """Return a pair by a homography to every step-th pixel."""
         matrix = np.diag([step, step, 1.0]) @ homography.matrix
@@ -106,7 +142,13 @@ class Aligner:
 
         full = replace(homography, matrix=matrix, residual_px=step * homography.residual_px)
         return AlignedPair(
-            capture=capture, reference=reference, to_reference=to_reference, homography=full
+            capture=capture.light,
+            clipped=capture.clipped,
+            reference=reference,
+            unknown=np.zeros(reference.shape[1:], dtype=bool),
+            to_reference=to_reference,
+            illumination=self.illumination,
+            homography=full,
         )
 
     def to_sensor_mm(self, points_px: Points) -> Points:
@@ -149,7 +191,8 @@ class Aligner:
         height, width = (side // step * step for side in pair.capture.shape[1:])
         capture = pair.capture[:, :height, :width]
         coarse = capture.reshape(3, height // step, step, width // step, step).mean((2, 4))
-        clipped = capture.max(0).reshape(height // step, step, width // step, step).max((1, 3))
+        clipped = pair.clipped[:height, :width]
+        squares = clipped.reshape(height // step, step, width // step, step)
         rows, columns = np.mgrid[0 : height // step, 0 : width // step]
         points = np.stack([columns, rows], -1).reshape(-1, 2) * step + (step - 1) / 2.0
         at = pair.to_reference(points).reshape(*rows.shape, 2)
@@ -158,7 +201,7 @@ class Aligner:
         reference, inside = warp_to(_smooth(pair.reference, reach), at[..., 0], at[..., 1])
         # A step at the edge of the plane also holds what lies beside it.
         whole = cv2.erode(inside.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-        good = whole & (clipped < CLIPPED_ABOVE)
+        good = whole & ~np.asarray(squares.any((1, 3)))
         if good.sum() < LEAST_COLOUR_POINTS:
             raise ContractError("the reference covers too little of the capture, or all is clipped")
         light = self.illumination(points).reshape(rows.shape)[good]
@@ -173,6 +216,6 @@ def _smooth(picture: FloatArray, side: int) -> FloatArray:
     return np.stack([cv2.blur(plane, (side | 1, side | 1)) for plane in picture])
 
 
-def _encoded(grey: FloatArray) -> FloatArray:
+def display_coded(grey: FloatArray) -> FloatArray:
     """Return (h, w) with the curve of a display, stretched to the brightest light."""
     return encode_srgb(grey / max(float(np.percentile(grey, 99.5)), 1e-6))

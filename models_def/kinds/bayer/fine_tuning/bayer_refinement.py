@@ -18,10 +18,10 @@ from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.measured import find_measured
 from camkit.models_def.training.adversarial.content import Conv33, Features
 from camkit.models_def.training.adversarial.opponents import OpponentPlan
-from camkit.models_def.training.adversarial.picture_fitter import Mix, PictureParts, picture_fitter
+from camkit.models_def.training.adversarial.picture_fitter import PictureParts, picture_fitter
 from camkit.models_def.training.adversarial.relativistic import Relativistic
 from camkit.models_def.training.first_weights import read_first_weights
-from camkit.models_def.training.fitter import BETAS, Fitter
+from camkit.models_def.training.fitter import BETAS, Fitter, Mix
 from camkit.models_def.training.recipe import ContentRecipe, NetworkRecipe
 from camkit.models_def.training.refinement import FineTuningOptions, Refinement
 from camkit.radial import RadialDistortion

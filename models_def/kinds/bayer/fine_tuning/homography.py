@@ -85,9 +85,18 @@ def find_homography(reference: FloatArray, capture: FloatArray) -> Homography:
 
 
 def refine_homography(
-    homography: Homography, reference: FloatArray, capture: FloatArray
+    homography: Homography,
+    reference: FloatArray,
+    capture: FloatArray,
+    unknown: NDArray[np.bool_] | None = None,
 ) -> Homography:
     """Improve a homography with a reference that resembles the capture more; as `find_homography`.
+
+    Args:
+        homography: To begin with.
+        reference: (h, w).
+        capture: (m, n).
+        unknown: (h, w) pixels of the reference that do not count; None for none.
 
     Raises:
         ContractError: If the pictures do not correlate.
@@ -95,7 +104,8 @@ def refine_homography(
     scales = _work_scales(reference, capture)
     small = [_shrunk(p, s) for p, s in zip((reference, capture), scales, strict=True)]
     start = _scaling(scales[1]) @ homography.matrix @ np.linalg.inv(_scaling(scales[0]))
-    matrix, correlation = _refined(small[0], small[1], start / start[2, 2])
+    counts = None if unknown is None else _shrunk(unknown.astype(np.float32), scales[0]) == 0
+    matrix, correlation = _refined(small[0], small[1], start / start[2, 2], counts)
     return replace(homography, matrix=_at_full_size(matrix, scales), correlation=correlation)
 
 
@@ -193,10 +203,16 @@ def _ransac(source: Matrix, target: Matrix) -> tuple[Matrix, NDArray[np.bool_]]:
     return np.asarray(matrix, dtype=np.float64), agree
 
 
-def _refined(reference: FloatArray, capture: FloatArray, start: Matrix) -> tuple[Matrix, float]:
+def _refined(
+    reference: FloatArray,
+    capture: FloatArray,
+    start: Matrix,
+    counts: NDArray[np.bool_] | None = None,
+) -> tuple[Matrix, float]:
     """Minimise |capture(H x) - gain reference(x) - offset|^2 over the homography, in float64.
 
-    Positions are scaled to about -1..1, or the normal equations lose most of their digits.
+    Only pixels of the reference that count are compared. Positions are scaled to about -1..1, or
+    the normal equations lose most of their digits.
 
     References: Lucas and Kanade 1981; Baker and Matthews 2004 (Gauss-Newton, forwards additive).
     """
@@ -204,6 +220,7 @@ def _refined(reference: FloatArray, capture: FloatArray, start: Matrix) -> tuple
     slopes = [cv2.Sobel(picture, cv2.CV_32F, dx, 1 - dx, scale=1 / 8) for dx in (1, 0)]
     y, x = (v.ravel() for v in np.mgrid[: reference.shape[0], : reference.shape[1]])
     keep = _is_inner(x, y, reference.shape)
+    keep = keep if counts is None else keep & counts.ravel()
     pixels = np.column_stack([x[keep], y[keep]]).astype(np.float64)
     values = _as_sharp(reference, picture, map_points(start, pixels), keep)
     to_unit = _unit(reference.shape)

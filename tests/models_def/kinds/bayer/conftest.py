@@ -4,6 +4,7 @@ from tests.bayer_recipe import (  # noqa: F401
     bank,
     material,
     planes_recipe,
+    planes_recipe_path,
     recipe,
     recipe_path,
 )

@@ -174,12 +174,14 @@ def test_files_that_no_term_looks_at_are_refused(recipe_path, sharp_folder):
     recipe = read_recipe(recipe_path)
     for size, given, said in (
         ("l1", {"sharp": sharp_folder}, "does not look at sharp pictures without captures: leave"),
-        ("l1", {"pairs": sharp_folder}, "does not look at real pairs: leave pairs away"),
+        ("l1", {"pairs": sharp_folder, "vgg": sharp_folder}, "does not look at VGG-19: leave"),
         ("gram", {"sharp": sharp_folder}, "the loss content has no critic: leave sharp away"),
         ("adversarial", {"vgg": sharp_folder / "x.pth"}, "looks at no features .* vgg away"),
     ):
         with pytest.raises(ContractError, match=said):
             own_fitting("bayer", request(recipe, size, **given))
+    with pytest.raises(ContractError, match="does not look at real pairs: leave pairs away"):
+        own_fitting("spad", request(recipe, "l1", pairs=sharp_folder))
     with pytest.raises(ContractError, match="kind 'spad' cannot be trained by the loss advers"):
         own_fitting("spad", request(recipe, "adversarial"))
 

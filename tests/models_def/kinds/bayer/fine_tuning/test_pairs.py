@@ -10,7 +10,8 @@ import torch
 from camkit.colorimetry import camera_from_rec709, encode_srgb
 from camkit.errors import ContractError, DecodeError
 from camkit.models_def.kinds.bayer.fine_tuning.homography import map_points
-from camkit.models_def.kinds.bayer.fine_tuning.pairs import read_capture, read_pairs
+from camkit.models_def.kinds.bayer.fine_tuning.pair_photographs import read_capture
+from camkit.models_def.kinds.bayer.fine_tuning.pairs import read_pairs
 from camkit.models_def.kinds.bayer.samples import corner_height_mm
 from camkit.radial import RadialDistortion
 from camkit.scenes import procedural_scene
@@ -123,11 +124,31 @@ def test_another_reference_is_an_error_that_names_the_pair(tmp_path, folder, rec
 
 
 @pytest.mark.parametrize(
-    "text", ["", "iso = -1.0", 'iso = "x"', "iso = 100\nblack = 3", "iso = 1\nwhite_balance = [1]"]
+    ("text", "said"),
+    [
+        ("", "one of iso > 0 and noise"),
+        ("iso = -1.0", "iso must be > 0"),
+        ('iso = "x"', "iso must be of type float"),
+        ("iso = 100\nblack = 3", "unknown key 'black'"),
+        ("iso = 1\nwhite_balance = [1]", r"white_balance must be \[R, G, B\]"),
+        ("iso = 1\nnoise = [1e-5, 0]", "one of iso > 0 and noise"),
+        ("noise = [0, 0]", r"noise must be \[SHOT, READ_VARIANCE\]"),
+        ('iso = 1\nreference = "drawn"', "reference must be one of shown, photographed"),
+        ("iso = 1\nparts = [[0, 0, 0, 9]]", r"parts must be rectangles .* got \[0, 0, 0, 9\]"),
+        ("iso = 1\ndepth_m = 0", "depth_m must be > 0"),
+        ("iso = 1\ndepth_m = 1", "depth_m is for cameras whose filters are told a distance"),
+        ('iso = 1\nhalves = ["_l"]', "halves must be two texts"),
+        ('iso = 1\ntone = "srgb"', "tone are for cameras of developed pictures"),
+    ],
 )
-def test_wrong_settings_are_refused(tmp_path, recipe, bank, text):
+def test_wrong_settings_are_refused(tmp_path, recipe, bank, text, said):
     (tmp_path / "pairs.toml").write_text(text, encoding="utf-8")
-    with pytest.raises(ContractError, match="must hold iso > 0"):
+    with pytest.raises(ContractError, match=said):
+        read_pairs(tmp_path, recipe, bank, None, seed=1)
+
+
+def test_a_folder_without_settings_is_refused(tmp_path, recipe, bank):
+    with pytest.raises(ContractError, match=r"real pairs need .*pairs\.toml, with iso at least"):
         read_pairs(tmp_path, recipe, bank, None, seed=1)
 
 
@@ -144,5 +165,5 @@ def test_captures_of_another_kind_are_refused(tmp_path, folder, recipe, bank):
 def test_a_bank_that_finds_the_distance_is_refused(folder, recipe, bank):
     wiener = recipe.wiener.model_copy(update={"depth": "estimated"})
     deep = replace(recipe, wiener=wiener, lens=replace(recipe.lens, depths_mm=(500.0, 1000.0)))
-    with pytest.raises(ContractError, match="fine-tune without pairs"):
+    with pytest.raises(ContractError, match=r"state depth_m in pairs\.toml"):
         read_pairs(folder, deep, bank, None, seed=1)
