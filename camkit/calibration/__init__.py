@@ -11,6 +11,7 @@ measured   a measured PSF and the facts about it
 psf        the whole measurement: a bracket of a small light to a frozen PSF
 edge_psf   a slanted edge to a PSF that is round
 dots       one light through a plate of dots to the PSF that an array of small pixels sees
+blur/      edges in ordinary photographs to the PSF of a lens over the field
 edges      straight edges of a target in a capture, and their profile in every colour
 focus      the focus of a camera body, from captures of edges
 flat/      pictures of an uneven display to relative illumination
@@ -18,6 +19,7 @@ noise/     pairs of frames to gain, read noise and fixed patterns of every ISO
 tone       pictures of grey steps to the tone curve of a display
 geometry/  focal length, optical centre and distortion, from a checkerboard
 display/   targets on a display, and captures of them as pairs for training
+blur_pair/  two pictures of one plane to the blur between them
 record     the result of a calibration, as TOML
 measured_files  the reader of that TOML
 psf_import/  kernels that others measured or computed, from their files to a PSF

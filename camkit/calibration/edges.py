@@ -130,7 +130,7 @@ def find_edges(capture: Capture) -> FoundEdges:
     unusable_cells: Sites = np.max(_as_cells(unusable), axis=0)
     edges: list[Edge] = []
     clipped = 0
-    for y_px, x_px, angle in _steps(_searched_cells(linear, capture)):
+    for y_px, x_px, angle in _steps(searched_cells(linear, capture)):
         if any(math.hypot(y_px - edge.y_px, x_px - edge.x_px) < STEP_PX for edge in edges):
             continue
         top, left = (round(at - SQUARE_PX / 2) // _CELL_PX * _CELL_PX for at in (y_px, x_px))
@@ -159,7 +159,7 @@ def _as_cells(pixels: NDArray[Any]) -> NDArray[Any]:
     return np.stack([pixels[y:height:2, x:width:2] for y in (0, 1) for x in (0, 1)])
 
 
-def _searched_cells(linear: NDArray[np.float32], capture: Capture) -> FloatGrid:
+def searched_cells(linear: NDArray[np.float32], capture: Capture) -> FloatGrid:
     """Return one value for each cell: the mean of its green samples, or of the middle plane."""
     if capture.cfa is None:
         searched = _as_cells(linear[len(linear) // 2])
@@ -267,13 +267,13 @@ def edge_samples(
 def _fitted(line: Line, samples: Samples) -> Line | None:
     """Fit a line until its profile explains the samples best; None if it never does."""
     fit = fit_line(line, samples, (SQUARE_PX, SQUARE_PX))
-    if fit is None or fit[2] < LEAST_EXPLAINED or not _is_even(fit[1]):
+    if fit is None or fit[2] < LEAST_EXPLAINED or not is_even(fit[1]):
         return None
     return fit[0]
 
 
 def fit_line(
-    line: Line, samples: Samples, size: tuple[int, int]
+    line: Line, samples: Samples, size: tuple[int, int], reach_px: float = REACH_PX
 ) -> tuple[Line, Profile, float] | None:
     """Fit place and angle of a line until its profile explains the samples near it best.
 
@@ -284,6 +284,7 @@ def fit_line(
         line: To begin with.
         samples: Of one colour.
         size: (h, w) of their picture.
+        reach_px: To both sides of the line, how far samples count.
 
     Returns:
         The line, the profile, and the share of the variance that it explains; None where the line
@@ -293,10 +294,10 @@ def fit_line(
     explained, profile = 0.0, None
     for _ in range(_ROUNDS):
         distance, position = line.distances(y, x), line.along(y, x)
-        profile = _profile(distance, values)
+        profile = _profile(distance, values, reach_px)
         if profile is None:
             return None
-        near = np.abs(distance) < REACH_PX
+        near = np.abs(distance) < reach_px
         is_outside = not (0 <= line.y <= size[0] and 0 <= line.x <= size[1])
         if is_outside or not values[near].var() > 0:
             return None
@@ -311,22 +312,22 @@ def fit_line(
     return None if profile is None else (line, profile, explained)
 
 
-def _is_even(profile: Profile) -> bool:
+def is_even(profile: Profile, reach_px: float = REACH_PX) -> bool:
     """Return whether both sides of a step are flat."""
     distance, value = profile.distance_px, profile.value
     ends = []
     for side in (-1, 1):
-        outer = side * distance > _OUTER * REACH_PX
+        outer = side * distance > _OUTER * reach_px
         mean, slope = value[outer].mean(), np.polyfit(distance[outer], value[outer], 1)[0]
-        ends.append((mean, slope * (1 - _OUTER) * REACH_PX))
+        ends.append((mean, slope * (1 - _OUTER) * reach_px))
     step = ends[1][0] - ends[0][0]
     return bool(step > 0 and max(abs(rise) for _, rise in ends) < MOST_UNEVEN * step)
 
 
-def _profile(distance: FloatLine, values: FloatLine) -> Profile | None:
+def _profile(distance: FloatLine, values: FloatLine, reach_px: float = REACH_PX) -> Profile | None:
     """Return the means of bins within the reach; None where a side of the edge is not seen."""
-    count = 2 * REACH_PX * BINS_PER_PX
-    number = np.floor((distance + REACH_PX) * BINS_PER_PX).astype(np.intp)
+    count = math.ceil(2 * reach_px * BINS_PER_PX)
+    number = np.floor((distance + reach_px) * BINS_PER_PX).astype(np.intp)
     near = (number >= 0) & (number < count)
     number = number[near]
     counts = np.bincount(number, minlength=count).astype(np.float64)

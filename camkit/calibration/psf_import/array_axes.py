@@ -12,6 +12,7 @@ from camkit.errors import ContractError
 ORDER: Final = ("row", "col", "c", "h", "w")
 RUNNING: Final = "i"
 NONE: Final = "1"
+COLOURS: Final = 3
 _USUAL: Final = {2: "h,w", 4: "row,col,h,w", 5: "row,col,c,h,w"}
 
 
@@ -82,6 +83,8 @@ def _names(array: NDArray[Any], options: ImportOptions, what: str) -> list[str]:
 
 def _usual(shape: tuple[int, ...]) -> str | None:
     """Return the usual axes of a shape; None where there are several."""
+    if len(shape) == 4 and COLOURS in shape:
+        return None  # a grid of three rows or columns, or colours of numbered places
     if len(shape) == 3:
         first, last = shape[0] in (1, 3), shape[2] in (1, 3)
         return None if first == last else ("c,h,w" if first else "h,w,c")

@@ -183,7 +183,7 @@ def _wavelengths(stack: KernelStack, options: ImportOptions) -> tuple[tuple[floa
     if waves is None:
         return (), [
             f"axis c has {count} entries; name them by {option_text('colours')} (RGB) or "
-            f"{option_text('wavelengths_um')}"
+            f"{option_text('wavelengths_um')}, or the axes in their order by {option_text('axes')}"
         ]
     option_name = option_text("colours" if options.wavelengths_um is None else "wavelengths_um")
     if len(waves) != count:

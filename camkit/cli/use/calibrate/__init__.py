@@ -6,6 +6,7 @@ psf       the point spread function, from a bracket of a point, of a disc, or fr
 geometry  focal length, optical centre and distortion, from photographs of a checkerboard
 flat      relative illumination, from pictures of an uneven display in several poses
 noise     gain, read noise and fixed patterns, from pairs of dark and flat frames
+distance  what the distances of a lens count from, from two pictures of one plane
 targets   what a display shows to be photographed
 pairs     captures of it as pairs for training
 bundle    what was measured, into a copy of a bundle

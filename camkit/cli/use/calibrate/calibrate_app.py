@@ -5,7 +5,9 @@ from typing import Final
 import typer
 
 from camkit.cli.groups import MEASURE, add_command
+from camkit.cli.use.calibrate.blur import blur
 from camkit.cli.use.calibrate.bundle import bundle
+from camkit.cli.use.calibrate.distance import distance
 from camkit.cli.use.calibrate.flat import flat
 from camkit.cli.use.calibrate.geometry import geometry
 from camkit.cli.use.calibrate.lensfun_in import lensfun_in
@@ -21,9 +23,11 @@ BUNDLE: Final = "Use the measurements"
 
 calibrate_app = typer.Typer(name="calibrate", no_args_is_help=True)
 add_command(calibrate_app, psf, MEASURE, "Measure the point spread function.")
+add_command(calibrate_app, blur, MEASURE, "Measure a lens on ordinary photographs.")
 add_command(calibrate_app, noise, MEASURE, "Measure gain and read noise.")
 add_command(calibrate_app, flat, MEASURE, "Measure the vignetting.")
 add_command(calibrate_app, geometry, MEASURE, "Measure focal length and distortion.")
+add_command(calibrate_app, distance, MEASURE, "Find a lens's distance origin.")
 add_command(calibrate_app, targets, DISPLAY, "Write pictures for a display.")
 add_command(calibrate_app, tone, DISPLAY, "Measure a display's tone curve.")
 add_command(calibrate_app, pairs, DISPLAY, "Align captures as training pairs.")

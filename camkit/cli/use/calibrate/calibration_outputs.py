@@ -40,5 +40,6 @@ def print_result(
     for note in record.get("notes", ()):
         say(f"note: {note}", err=True)
     files = [record[name] for name in ("out", "page") if name in record]
-    for line in (f"{', '.join(files)}: {summary}".rstrip(), *lines):
+    head = f"{', '.join(files)}: {summary}".rstrip() if files else summary
+    for line in (head, *lines):
         say(line)

@@ -73,6 +73,18 @@ def test_axes_may_come_in_any_order(tmp_path, axes, order):
     assert np.array_equal(psf.kernels, usual.kernels)
 
 
+def test_colours_of_numbered_places_are_not_taken_for_a_grid(tmp_path):
+    kernels = counts()
+    np.save(tmp_path / "flat.npy", kernels.reshape(-1, *kernels.shape[2:]))
+    given = {"pitch_um": PITCH_UM, "span_mm": SPAN}
+    with pytest.raises(ContractError, match="name its axes by axes"):
+        import_psf(tmp_path / "flat.npy", **given)
+    grid = "x".join(map(str, kernels.shape[:2]))
+    flat = import_psf(tmp_path / "flat.npy", axes="i,c,h,w", grid=grid, **given).psf
+    np.save(tmp_path / "usual.npy", kernels)
+    assert np.array_equal(flat.kernels, import_psf(tmp_path / "usual.npy", **given).psf.kernels)
+
+
 def test_deeplens_and_optiland_arrays_need_no_axes(tmp_path):
     np.save(tmp_path / "map.npy", counts()[:, :, :1].astype(np.float32))
     np.save(tmp_path / "fft.npy", np.pad(counts()[0, 0, 0], ((1, 0), (1, 0))))
