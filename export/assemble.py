@@ -51,7 +51,7 @@ from camkit.calibration.psf_import.kernel_resampling import for_sensor
 from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.export.card import card_text, laws_text, preview_png
-from camkit.export.designed_optics import designed_members, designed_of
+from camkit.export.designed_optics import check_measured, designed_members, designed_of
 from camkit.export.golden_cases import (
     CaseRecipe,
     Cases,
@@ -254,6 +254,8 @@ def _optics(
         optics = read_optics_file(parts.psf, channels=channels)
         if PSF in designed:  # the file may be the one that was imported
             psf = for_sensor(optics.psf, recipe.sensor.known_extent.pixel_pitch_um, channels)
+            measured = psf_from_bytes(designed[PSF], what="the measured PSF")
+            check_measured(measured, psf, parts.psf)
             optics = replace(optics, psf=psf)
     elif PSF in designed:
         optics = FrozenOptics(psf=psf_from_bytes(designed[PSF], what="the measured PSF"))

@@ -11,7 +11,8 @@ import numpy as np
 import torch
 
 from camkit.bundle.reader import PLATE, PRESCRIPTION
-from camkit.caller import option_text
+from camkit.calibration.psf_import.kernel_resampling import window
+from camkit.caller import command_text, option_text
 from camkit.errors import ContractError
 from camkit.export.parts import PSF_NAME, Parts
 from camkit.models_def.optics.diffraction.plate import (
@@ -28,6 +29,8 @@ from camkit.models_def.optics.thin.hazy_freezing import check_peaks
 from camkit.models_def.training.checkpoint import Checkpoint
 from camkit.psf import FrozenPsf
 
+MEASURED_TOLERANCE: Final = 0.02
+"""Of the peak: what windows, resampling and half floats change in a kernel."""
 SAME_PLATE_SHARE: Final = 0.015
 """Of the light of the middle wavelength. Built-in plates frozen for one sensor differ by 0.029 and
 more from each other, and by 0.008 at most from what was computed of them."""
@@ -96,6 +99,39 @@ def _plate_of(parts: Parts, designed: Mapping[str, bytes]) -> Plate | None:
     if PLATE not in designed or parts.without_plate:
         return None
     return plate_of_members(designed, "the checkpoints")
+
+
+def check_measured(measured: FrozenPsf, psf: FrozenPsf, path: Path) -> None:
+    """Refuse a PSF that was frozen from other kernels than those that a recipe names.
+
+    Args:
+        measured: What the recipe names, at the pitch of its sensor.
+        psf: Frozen, at that pitch.
+        path: Its file.
+
+    Raises:
+        ContractError: If places, colours or kernels are others.
+    """
+    of_same = (
+        psf.symmetry == measured.symmetry
+        and psf.field_heights_mm.shape == measured.field_heights_mm.shape
+        and psf.wavelengths_um.shape == measured.wavelengths_um.shape
+        and np.allclose(psf.field_heights_mm, measured.field_heights_mm)
+        and np.allclose(psf.wavelengths_um, measured.wavelengths_um)
+    )
+    if of_same:
+        side_px = min(psf.kernels.shape[-1], measured.kernels.shape[-1])
+        ours, theirs = (
+            window(kernels[:, -1].astype(np.float64), side_px)
+            for kernels in (psf.kernels, measured.kernels)
+        )
+        ours, theirs = (k / k.sum((-2, -1), keepdims=True) for k in (ours, theirs))
+        of_same = bool(np.abs(ours - theirs).max() <= MEASURED_TOLERANCE * theirs.max())
+    if not of_same:
+        raise ContractError(
+            f"{path} was not frozen from the PSF that the recipe names in lens.psf: remove it, or "
+            f"freeze that PSF anew by {command_text('freeze')}"
+        )
 
 
 def _check_plate(plate: Plate, psf: FrozenPsf, path: Path) -> None:

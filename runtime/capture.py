@@ -114,6 +114,8 @@ class Capture:
         sensor_size_px: (w, h) of the full sensor that `origin_px` refers to.
         pixel_pitch_um: Pixel pitch; None if not stated.
         bundle_name: The bundle that the file itself names (captures made by camkit).
+        psf_sha256: Hash of that bundle's PSF, which tells bundles of one name apart; None if not
+            stated.
         camera: Make and model as people read it; empty if not stated.
         metadata: What the file says of its photograph, to be carried into pictures.
         sha256: Hash of the file; None for arrays.
@@ -140,6 +142,7 @@ class Capture:
     sensor_size_px: tuple[int, int] | None = None
     pixel_pitch_um: float | None = None
     bundle_name: str | None = None
+    psf_sha256: str | None = None
     camera: str = ""
     metadata: Metadata = field(default_factory=Metadata)
     sha256: str | None = None

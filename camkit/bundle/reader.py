@@ -85,6 +85,12 @@ class Bundle:
         return self._container.sha256
 
     @property
+    def psf_sha256(self) -> str | None:
+        """Hash of the frozen PSF; None if there is none."""
+        member = self.manifest.members.get(PSF)
+        return None if member is None else member.sha256
+
+    @property
     def frozen_optics(self) -> FrozenOptics:
         """The optics with all that light does in them.
 

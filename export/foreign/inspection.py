@@ -6,6 +6,7 @@ from typing import Any, Final
 import numpy as np
 
 from camkit.bundle.facts import NetworkFacts, Port
+from camkit.caller import command_text
 from camkit.errors import BundleError, ContractError, ParityError, UnsupportedError
 from camkit.export.foreign.canonical import canonical_draft, prove_equal, to_model
 from camkit.export.foreign.contract import Contract
@@ -127,7 +128,9 @@ def inspection_of(name: str, model: ForeignModel, contract: Contract | None = No
             size_px = (PICTURE_PX[0] // 2, PICTURE_PX[1] // 2)
         if not facts.global_operators or (contract is not None and contract.mode == "whole"):
             tiles = lay_whole_picture(data, facts, size_px)
-    except (BundleError, ContractError, UnsupportedError) as error:
+    except ContractError as error:  # of the memory, which whoever processes may raise
+        findings.append(f"24 megapixels by {command_text('process')}: {error}")
+    except (BundleError, UnsupportedError) as error:
         findings.append(f"at 24 megapixels, {error}")
     fixed = FIXED_BYTES + STAGES_BYTES
     return Inspection(

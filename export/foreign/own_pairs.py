@@ -149,11 +149,13 @@ def prove_pairs(
     if difference <= TOLERANCE:
         return difference
     reasons = [reason for reason, trial in _mistakes(usual) if worst(trial) <= EXPLAINED]
+    reasons.sort(key=lambda reason: "proof.space" not in reason)
+    choice = "; which is true, only who made the pairs knows" if len(reasons) > 1 else ""
     hint = (
-        f"They agree {', or '.join(dict.fromkeys(reasons))}"
+        f"They agree {', or '.join(dict.fromkeys(reasons))}{choice}"
         if reasons
         else "None of the common mistakes explains it (R and B, order of a cell, range, curve, "
-        "residual, space of the pairs)"
+        "residual, space of the pairs); two at once are not tried"
     )
     raise ParityError(
         f"the owner's pairs differ by {difference:.3g} of full scale through the contract, allowed "

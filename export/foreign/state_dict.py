@@ -5,8 +5,10 @@ a file -> weights, no code of it is run   (load_torch)
 -> ONNX                            (onnx_graph)
 """
 
+import contextlib
 import importlib
-from collections.abc import Mapping
+import sys
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -98,6 +100,17 @@ def _network(
     )
 
 
+@contextlib.contextmanager
+def _working_folder_searched() -> Iterator[None]:
+    """Yield while modules are found in the working folder first, as by `python -m`."""
+    folder = str(Path.cwd())
+    sys.path.insert(0, folder)
+    try:
+        yield
+    finally:
+        sys.path.remove(folder)
+
+
 def _built(module: str, config: Mapping[str, Any]) -> nn.Module:
     """Make the network of a class that the caller names.
 
@@ -108,8 +121,16 @@ def _built(module: str, config: Mapping[str, Any]) -> nn.Module:
     if not (package and colon and name):
         raise ContractError(f"{option_text('module')} takes package:Class; got {module!r}")
     try:
-        network = getattr(importlib.import_module(package), name)(**config)
+        with _working_folder_searched():
+            kind = getattr(importlib.import_module(package), name)
     except (ImportError, *_FAILURES) as error:
+        raise ContractError(
+            f"{module} cannot be imported from here or from the environment: "
+            f"{type(error).__name__}: {error}"
+        ) from error
+    try:
+        network = kind(**config)
+    except _FAILURES as error:
         raise ContractError(
             f"{module} cannot be made of {dict(config)}: {type(error).__name__}: {error}"
         ) from error

@@ -101,6 +101,7 @@ def to_capture(
         sensor_size_px=place.sensor_size_px,
         pixel_pitch_um=place.pixel_pitch_um,
         bundle_name=place.bundle_name,
+        psf_sha256=place.psf_sha256,
         camera=raw_tags.camera_name(tags, decode.metadata),
         metadata=decode.metadata,
         notes=tuple(notes),

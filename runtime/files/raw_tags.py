@@ -32,6 +32,7 @@ class SensorPlace:
     """Records that camkit leaves in a capture of its own; all None for other files."""
 
     bundle_name: str | None = None
+    psf_sha256: str | None = None
     origin_px: tuple[int, int] | None = None
     sensor_size_px: tuple[int, int] | None = None
     pixel_pitch_um: float | None = None
@@ -95,9 +96,10 @@ def sensor_place(tags: TiffTags) -> SensorPlace:
         bundle = record.get("bundle", model_bundle)
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return SensorPlace(bundle_name=model_bundle)
-    pitch = record.get("pixel_pitch_um")
+    pitch, psf = record.get("pixel_pitch_um"), record.get("psf_sha256")
     return SensorPlace(
         bundle_name=bundle if isinstance(bundle, str) else model_bundle,
+        psf_sha256=psf if isinstance(psf, str) else None,
         origin_px=_whole_pair(record.get("origin_px"), least=0),
         sensor_size_px=_whole_pair(record.get("sensor_size_px"), least=1),
         pixel_pitch_um=float(pitch) if isinstance(pitch, int | float) and 0 < pitch < 1e4 else None,

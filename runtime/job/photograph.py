@@ -189,11 +189,18 @@ def _camera_notes(capture: Capture, bundle: Bundle, options: Options) -> list[st
     manifest, notes = bundle.manifest, list[str]()
     if manifest.optics is None and manifest.sensor.extent is None:
         return notes
-    if capture.bundle_name not in (None, manifest.name):
+    has_optics = capture.psf_sha256 in (None, bundle.psf_sha256)
+    if capture.bundle_name == manifest.name and not has_optics:
+        notes.append(
+            f"the capture was made through other kernels than those of {bundle.path.name}, though "
+            f"by a bundle of the same name: name that one by {option_text('bundle')}"
+        )
+    is_of_optics = has_optics and capture.psf_sha256 is not None
+    if capture.bundle_name not in (None, manifest.name) and not is_of_optics:
         text = f"the capture names bundle {capture.bundle_name}, not {manifest.name}"
         if not options.force_bundle:
             raise ContractError(
-                f"{text}; leave {option_text('bundle')} out, or add {option_text('force_bundle')}"
+                f"{text}; name that one, or add {option_text('force_bundle')} if both have one lens"
             )
         notes.append(f"{text}: the result is right only if both have the same lens")
     is_file = capture.sha256 is not None

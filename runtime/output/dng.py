@@ -106,10 +106,11 @@ def camkit_description(
     sensor_size_px: tuple[int, int],
     pixel_pitch_um: float,
     object_distance_mm: float | None = None,
+    psf_sha256: str | None = None,
 ) -> str:
     """Return the JSON that tells a later reader where on which sensor the capture lies.
 
-    The object distance (inf as "inf") is left out if None.
+    The object distance (inf as "inf") and the hash of the PSF are left out if None.
     """
     record: dict[str, Any] = {
         "bundle": bundle,
@@ -120,6 +121,8 @@ def camkit_description(
     if object_distance_mm is not None:
         finite = math.isfinite(object_distance_mm)
         record["object_distance_mm"] = object_distance_mm if finite else "inf"
+    if psf_sha256 is not None:
+        record["psf_sha256"] = psf_sha256
     return json.dumps({"camkit": record})
 
 

@@ -176,10 +176,17 @@ def bare_psf(bundle: Bundle) -> FrozenPsf:
     return psf_of_streaks(bundle.streaks, len(bundle.manifest.sensor.channels), bare=True)
 
 
-def write_capture(path: Path, simulation: Simulation, sensor: Sensor, bundle_name: str) -> None:
+def write_capture(
+    path: Path,
+    simulation: Simulation,
+    sensor: Sensor,
+    bundle_name: str,
+    psf_sha256: str | None = None,
+) -> None:
     """Write a simulated capture as a DNG that names its bundle and its place on the sensor.
 
-    Without its plate it is another camera and named so: its bundle is not taken unasked.
+    Without its plate it is another camera and named so: its bundle is not taken unasked. The hash
+    of the bundle's PSF tells cameras of one name apart.
 
     Raises:
         ContractError: If a side is shorter than RAW developers take.
@@ -215,6 +222,7 @@ def write_capture(path: Path, simulation: Simulation, sensor: Sensor, bundle_nam
             sensor_size_px=window.sensor_size_px,
             pixel_pitch_um=window.pitch_um,
             object_distance_mm=simulation.depth_mm,
+            psf_sha256=psf_sha256 if simulation.plate else None,
         ),
     )
     with atomic_output(path) as part:

@@ -154,3 +154,20 @@ def test_other_kernels_and_another_pitch_go_into_a_copy(lab, tmp_path, capsys):
     notes = " ".join(json.loads(capsys.readouterr().out)["notes"])
     assert "samples of 12.5 um and were resampled to 25 um" in notes
     assert open_bundle(tmp_path / "fine.camkit").psf.grid_x_mm.tolist()[-1] == 4.0
+
+
+def test_a_frozen_psf_of_other_kernels_is_refused(lab, tmp_path):
+    """One that lies beside a recipe by chance would take the place of the one it names."""
+    recipe = (lab / "lab.toml").read_text(encoding="utf-8")
+    (tmp_path / "lab.toml").write_text(recipe, encoding="utf-8")
+    (tmp_path / "lab.safetensors").write_bytes((lab / "lab.safetensors").read_bytes())
+    words = ["--recipe", str(tmp_path / "lab.toml"), "--quick"]
+    frozen = ["-o", str(tmp_path / "psf.safetensors")]
+    assert run(["freeze", str(tmp_path / "lab.safetensors"), *frozen, *words]) == 0
+    export(tmp_path / "lab.toml", tmp_path / "own.camkit", network=False)
+    np.save(tmp_path / "other.npy", counts(seed=4))
+    other = ["-o", str(tmp_path / "lab.safetensors"), "--overwrite"]
+    given = ["--pitch-um", "25", "--span-mm", SPAN]
+    assert run(["psf", "import", str(tmp_path / "other.npy"), *other, *given]) == 0
+    with pytest.raises(ContractError, match="was not frozen from the PSF that the recipe names"):
+        export(tmp_path / "lab.toml", tmp_path / "other.camkit", network=False)

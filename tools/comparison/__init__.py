@@ -8,5 +8,6 @@
 - `copies`: how far a copy's transfer lies off the frozen one
 - `rows`: the rows of the comparison
 - `paired`: gains on the same captures, with their error
+- `real_lens`, `real_lens_pages`: a real lens, its blur against photographs and photographs restored
 - `quality_table`: means, gains and the page
 """

@@ -33,7 +33,8 @@ def write(path: Path, simulation: "Simulation", bundle: Bundle) -> None:
     # imported late: reading needs no twin
     from camkit.runtime.twin.simulate import write_capture
 
-    write_capture(path, simulation, bundle.manifest.sensor, bundle.manifest.name)
+    manifest = bundle.manifest
+    write_capture(path, simulation, manifest.sensor, manifest.name, bundle.psf_sha256)
 
 
 PART: Final = RuntimePart(read=read, write=write, suffixes=(".dng",))

@@ -178,11 +178,13 @@ def _most_unlike(once: FloatArray, twice: FloatArray) -> float:
     """Return by how much, of a block's brightest colour, light is not doubled in 19 of 20 blocks.
 
     The worst block is the darkest, where a filter that follows the power of its block is off by as
-    much as a network.
+    much as a network. A picture that is black all over holds none of its light: 1.
     """
     level = 2 * once.max(axis=0)
     error = np.abs(twice - 2 * once).max(axis=0)
     lit = level > 0.02
+    if not lit.any():
+        return 1.0
     return float(np.quantile(error[lit] / level[lit], SURE))
 
 

@@ -55,10 +55,10 @@ def test_a_class_that_is_named_is_filled(tmp_path: Path) -> None:
     [
         ("tests.foreign_networks:Sid", {"width": 8}, r"weights do not fit .*of another shape"),
         ("tests.foreign_networks:DnCNN", {}, r"weights do not fit .*missing: 0\.weight.*not in it"),
-        ("tests.foreign_networks:Nobody", {}, "cannot be made"),
+        ("tests.foreign_networks:Nobody", {}, "cannot be imported"),
         ("tests.foreign_networks:Sid", {"colour": 1}, "cannot be made"),
         ("tests.foreign_networks", {}, "takes package:Class"),
-        ("tests.foreign_networks:io.BytesIO", {}, "cannot be made"),
+        ("tests.foreign_networks:io.BytesIO", {}, "cannot be imported"),
         ("pathlib:Path", {}, "makes no torch network"),
     ],
 )

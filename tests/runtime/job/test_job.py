@@ -146,6 +146,18 @@ def test_a_capture_of_another_camera_is_refused_unless_it_is_forced(bundle: Bund
     assert start(bundle, made_mosaic(bundle_name="tiny")).job.log.notes == []
 
 
+def test_captures_of_the_same_optics_need_no_force_and_others_of_one_name_are_noted(
+    bundle: Bundle,
+) -> None:
+    own = bundle.psf_sha256
+    derived = made_mosaic(bundle_name="trio", psf_sha256=own)
+    assert start(bundle, derived).job.log.notes == []
+    (note,) = start(bundle, made_mosaic(bundle_name="tiny", psf_sha256="0" * 64)).job.log.notes
+    assert note.startswith("the capture was made through other kernels than those of tiny")
+    with pytest.raises(ContractError, match=r"names bundle trio, not tiny; .* force_bundle"):
+        start(bundle, made_mosaic(bundle_name="trio", psf_sha256="0" * 64))
+
+
 def test_a_foreign_camera_whose_place_is_assumed_is_warned_of(bundle: Bundle) -> None:
     small = np.full((32, 48), 500, np.uint16)
     foreign = made_mosaic(samples=small, camera="Nikon D850")

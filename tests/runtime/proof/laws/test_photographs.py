@@ -172,3 +172,8 @@ def test_charts_hold_lamps_of_every_size_and_patches_of_every_ratio() -> None:
         inside = patches.scene[:, patches.labels == number]
         assert np.ptp(inside, axis=1).max() == 0
         assert inside.max() == pytest.approx(0.4)
+
+
+def test_a_black_picture_breaks_the_law_of_double_light() -> None:
+    black = Room(network=np.zeros_like, front=lambda scene: scene)
+    assert photographs._double(black).worst == 1.0  # type: ignore[arg-type]
