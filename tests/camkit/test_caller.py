@@ -47,7 +47,7 @@ NAMES_OF_FILES = {
     "runtime/kinds/spad/twin/photon_twin.py": "arrays of an NPZ",
     "runtime/network/tiling.py": "for tests and measurements, no flag",
     "runtime/plan/planner.py": "a mistake of the caller in Python",
-    "models_def/kinds/bayer/fine_tuning/pairs.py": "keys of a TOML",
+    "models_def/kinds/bayer/fine_tuning/pair_settings.py": "keys of a TOML",
     "camkit/bundle/sensor.py": "a key of the manifest",
 }
 """Files in which a message names what has the name of an option and is none."""

@@ -63,6 +63,7 @@ def test_curve_and_blur_of_a_lens_in_focus_are_found_and_the_doubt_is_said(
 
 
 @pytest.mark.usefixtures("_few_rays")
+@pytest.mark.slow
 def test_two_planes_separate_the_origin_from_the_defocus(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

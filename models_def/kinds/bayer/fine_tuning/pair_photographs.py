@@ -20,7 +20,6 @@ from camkit.errors import ContractError, DecodeError
 from camkit.models_def.kinds.bayer.fine_tuning.pair_settings import PairSettings
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.training.pictures import read_picture, to_linear
-from camkit.runtime.kinds import bayer
 from camkit.runtime.options import Options
 from camkit.runtime.signal.halves import right_half, without_right_halves
 from camkit.runtime.signal.tone_curve import CURVES, Tone, read_tone
@@ -114,6 +113,8 @@ def _of_light(light: FloatArray) -> Photograph:
 
 
 def _read_developed(path: Path, options: Options) -> Photograph:
+    from camkit.runtime.kinds import bayer  # onnxruntime, which training has no need of
+
     capture: Any = bayer.read(path, None, None, options)
     if capture.is_of_mosaic or capture.channels != len(RGB):
         raise ContractError(f"{path.name} must be a developed picture of three colours")
