@@ -78,6 +78,7 @@ def freeze(
     require_torch(command_text("freeze"))
     from camkit.models_def.optics.freezer import FreezeRequest, freeze_optics
     from camkit.models_def.optics.optics_file import read_optics
+    from camkit.models_def.torch_threads import one_torch_thread
 
     if (stress_haze is None) != (haze is None or stress_out is None):
         raise ContractError(
@@ -98,7 +99,8 @@ def freeze(
         stress=stress_out is not None,
         quick=quick,
     )
-    freezing = freeze_optics(source, request)
+    with one_torch_thread():
+        freezing = freeze_optics(source, request)
     write_optics_files(freezing.optics, Path(out), haze_path)
     if stress_path is not None and freezing.stress is not None:
         write_optics_files(freezing.stress, stress_path, stress_haze_path)

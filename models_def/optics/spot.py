@@ -58,8 +58,12 @@ def chief_heights(lens: Lens, slopes: Tensor, wavelength_um: float | None = None
     rays, _ = pupil_rays(lens, tensors, pupil_centre(), slopes[:, None])
     landings = trace(tensors, rays)
     if not bool(landings.valid.all()):
-        failed = slopes[~landings.valid[:, 0]].tolist()
-        raise ContractError(f"the chief ray is lost at field slopes {failed}; use smaller fields")
+        lost_slopes = torch.rad2deg(torch.atan(slopes[~landings.valid[:, 0]])).tolist()
+        angles = ", ".join(dict.fromkeys(f"{angle:.1f}" for angle in lost_slopes))
+        raise ContractError(
+            f"the chief ray is lost at {angles} degrees: the lens does not image so far; use "
+            "smaller fields or a smaller sensor"
+        )
     return landings.y[:, 0]
 
 

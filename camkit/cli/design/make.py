@@ -114,5 +114,7 @@ def make(
     if json_:
         say(json.dumps(facts))
         return
-    decibels = ", ".join(f"{method} {value:.2f}" for method, value in facts["psnr_db"].items())
+    from camkit.report.making.camera_page import name_of
+
+    decibels = ", ".join(f"{name_of(key)} {value:.2f}" for key, value in facts["psnr_db"].items())
     say(f"{facts['bundle']}: {decibels} dB; see {facts['page']}")

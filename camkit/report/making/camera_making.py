@@ -78,6 +78,7 @@ def make(
         remove_work(work_path)
     elif not work_path.is_dir():
         refuse_existing((path, path.with_suffix(PAGE_SUFFIX)), overwrite=False)
+    from camkit.models_def.torch_threads import one_torch_thread
     from camkit.report.making.camera_steps import CameraSteps, CameraWish
     from camkit.report.making.making_run import Making
 
@@ -93,7 +94,8 @@ def make(
         minutes=minutes,
     )
     work = WorkFolder(work_path, wish.to_json(), stopwatch or Stopwatch())
-    return Making(CameraSteps(wish=wish, work=work), path, on_note or _ignore).run()
+    with one_torch_thread():
+        return Making(CameraSteps(wish=wish, work=work), path, on_note or _ignore).run()
 
 
 def _ignore(_text: str) -> None:

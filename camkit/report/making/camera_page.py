@@ -68,7 +68,8 @@ def camera_html(camera: MadeCamera) -> str:
     return to_html(Page(title=f"The camera {bundle.manifest.name}", lead=lead, sections=sections))
 
 
-def _name_of(method: str) -> str:
+def name_of(method: str) -> str:
+    """Return what people call a method."""
     return NAMES.get(method, f"network {method}")
 
 
@@ -79,7 +80,7 @@ def _decibels(judged: Mapping[str, Judgement]) -> Table:
             "" if method == base else _with_error(judgement.gain_over(judged[base]))
             for base in (DEVELOP, FILTER)
         ]
-        rows.append((_name_of(method), f"{np.mean(judgement.psnr_db):.2f}", *gains))
+        rows.append((name_of(method), f"{np.mean(judgement.psnr_db):.2f}", *gains))
     return Table(
         header=("method", "PSNR, dB", "over developed alone", "over the filter"),
         rows=rows,
@@ -92,7 +93,7 @@ def _with_error(gain: tuple[float, float]) -> str:
 
 
 def _before_and_after(pictures: Mapping[str, FloatArray]) -> Picture:
-    names = ", ".join(_name_of(title) for title in pictures)
+    names = ", ".join(name_of(title) for title in pictures)
     return Picture(_PAIR.format(names), _strip(pictures))
 
 

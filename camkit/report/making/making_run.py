@@ -19,6 +19,7 @@ from camkit.report.making.camera_page import MadeCamera, camera_html
 from camkit.report.making.camera_steps import FILTER_BUNDLE, LENS, NETWORK_BUNDLE, CameraSteps
 from camkit.report.making.page_parts import layout_of, pictures_of, seconds_of
 from camkit.runtime.output.part_file import write_together
+from camkit.runtime.plan.decision import DEVELOP
 
 PAGE_SUFFIX: Final = ".html"
 LEAST_FIT_S: Final = 240.0
@@ -53,9 +54,18 @@ class Making:
         if fits and (self._left_s() > LEAST_FIT_S or work.is_done("fitted")):
             fitted = work.step("fitted", steps.fit_bank)
             self._ship(FILTER_BUNDLE, f"colours restored together: {fitted['gain_db']:+.2f} dB")
+        elif fits and self._wish.minutes:
+            self._tell("colours are not restored together: that takes four minutes")
         if is_grey and self._wish.minutes:
             self._tell("networks are trained on three colours; a grey camera has its filter alone")
         judged = self._judged(FILTER_BUNDLE) if is_grey else self._with_network()
+        gain_db, error_db = judged[FILTER].gain_over(judged[DEVELOP])
+        if gain_db <= error_db:
+            self._tell(
+                f"the filter does not surely beat developing alone ({gain_db:+.2f} +- "
+                f"{error_db:.2f} dB): the lens is sharper than the pixels, or its copies differ "
+                "too much"
+            )
         bundle = open_bundle(self._out)
         page = self._out.with_suffix(PAGE_SUFFIX)
         write_together({page: self._page(bundle, judged).encode()})

@@ -106,6 +106,7 @@ class Steps:
         ):
             monkeypatch.setattr(CameraSteps, name, of(name, facts, writes))
         judged = {
+            DEVELOP: Judgement(psnr_db=(19.0, 19.0), scenes=("a", "b")),
             FILTER: Judgement(psnr_db=(20.0, 20.0), scenes=("a", "b")),
             "S": Judgement(psnr_db=(network_db, network_db), scenes=("a", "b")),
         }
@@ -215,3 +216,17 @@ def test_the_recipe_of_a_measured_psf_is_read_back(tmp_path: Path) -> None:
     assert Path(facts["lens"]).name == "mine-psf.safetensors"
     assert Path(facts["lens"]).read_bytes() == psf.read_bytes()
     assert read_recipe(Path(facts["recipe"])).lens.psf == "mine-psf.safetensors"
+
+
+def test_a_filter_that_gains_nothing_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Steps(monkeypatch, tmp_path, 30.0)
+    even = Judgement(psnr_db=(20.0, 20.0), scenes=("a", "b"))
+    monkeypatch.setattr(making_run, "judge_camera", lambda *_: {DEVELOP: even, FILTER: even})
+    told: list[str] = []
+    camera = CameraWords(sensor=SENSOR)
+    camera_making.make(
+        "any.zmx", tmp_path / "out.camkit", camera=camera, minutes=0.0, on_note=told.append
+    )
+    assert "the filter does not surely beat developing alone (+0.00 +- 0.00 dB)" in told[-1]
