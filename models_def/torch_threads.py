@@ -1,6 +1,6 @@
 """Threads of torch for work of many small steps, such as aiming rays.
 
-Two threads took 97 CPU-seconds for a freeze that one does in 7: they wait for each other after
+Two threads took 97 CPU-seconds for a freeze that one does in 8: they wait for each other after
 every step (`camkit make` of a double Gauss, 2 cores of an AMD EPYC, torch 2.13).
 """
 

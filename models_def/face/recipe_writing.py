@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 LENS_SUFFIX: Final = "-lens.toml"
 PSF_SUFFIX: Final = "-psf.safetensors"
-OF_A_LENS: Final = ("f_number", "stop_radius_mm", "focus_m", "object_m", "glass")
+OF_A_LENS: Final = ("f_number", "stop_radius_mm", "focus_m", "object_m", "defocus_mm", "glass")
 """Words that a measured PSF answers by itself."""
 FIELD_SHARES: Final = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Of the way to the corner of the sensor: what a lens is focused for."""
@@ -185,7 +185,7 @@ def _measured_camera(
     from camkit.models_def.kinds.bayer.recipe_draft import RecipeDraft
     from camkit.models_def.optics.measured import read_measured
 
-    useless = [word for word in OF_A_LENS if getattr(camera, word) not in (None, ())]
+    useless = [word for word in OF_A_LENS if getattr(camera, word) not in (None, (), 0.0)]
     if useless:
         raise ContractError(
             f"{optics.name} is a measured PSF, stopped and focused as it was measured: leave "

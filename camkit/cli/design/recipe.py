@@ -26,7 +26,11 @@ from camkit.units import MM_PER_M
 
 def recipe(
     lens: Annotated[
-        Path, typer.Argument(help="Lens file (.toml, .zmx) or built-in name.", metavar="LENS")
+        Path,
+        typer.Argument(
+            help="Lens file (.toml, .zmx), built-in name, or measured PSF (.safetensors).",
+            metavar="LENS",
+        ),
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="Recipe to write (.toml).")],
     *,
@@ -71,6 +75,8 @@ def recipe(
     if facts["defaults"]:
         say(f"defaults of the sensor, not facts: {', '.join(facts['defaults'])}", err=True)
     size = "{width_px}x{height_px} of {pixel_pitch_um:g} um".format(**facts["sensor"])
-    optics = f"{facts['efl_mm']:.4g} mm F/{facts['f_number']:.3g}"
+    optics = "a measured PSF"
+    if "efl_mm" in facts:
+        optics = f"{facts['efl_mm']:.4g} mm F/{facts['f_number']:.3g}"
     focus = f"{facts['focus_mm'] / MM_PER_M:.4g} m"
     say(f"{facts['recipe']}, {facts['lens']}: {optics} on {size}, focused on {focus}")

@@ -210,12 +210,19 @@ def test_a_measured_psf_becomes_a_camera_and_words_of_a_lens_are_refused(
         camera_making.make(psf, tmp_path / "other.camkit", camera=wrong, minutes=0.0)
 
 
-def test_the_recipe_of_a_measured_psf_is_read_back(tmp_path: Path) -> None:
+def test_the_recipe_of_a_measured_psf_is_read_back(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     psf = measured_grid(tmp_path / "lab.safetensors")
     facts = recipe(psf, tmp_path / "new" / "mine.toml", camera=CameraWords(sensor=SENSOR))
     assert Path(facts["lens"]).name == "mine-psf.safetensors"
     assert Path(facts["lens"]).read_bytes() == psf.read_bytes()
     assert read_recipe(Path(facts["recipe"])).lens.psf == "mine-psf.safetensors"
+    again = ["recipe", str(psf), "--sensor", SENSOR, "-o", str(tmp_path / "cli.toml")]
+    assert run(again) == 0
+    assert "a measured PSF on 128x96 of 5 um" in capsys.readouterr().out
+    assert run([*again, "--overwrite", "--defocus-mm", "0.1"]) == 2
+    assert "leave --defocus-mm out" in capsys.readouterr().err
 
 
 def test_a_filter_that_gains_nothing_is_told(
