@@ -115,5 +115,5 @@ def _lines(facts: "DistanceFacts") -> list[str]:
     options = " ".join(
         f"--{name.replace('_', '-')} {value}" for name, value in facts.options.items()
     )
-    where = "" if facts.is_sure else " (at this distance alone)"
+    where = "" if facts.is_sure else " (not sure: for this distance alone)"
     return [*lines, f"  for camkit make{where}: {options}"]
