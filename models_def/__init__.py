@@ -9,6 +9,7 @@
     kinds/                     what each kind of camera brings to training
     face/                      `camkit.freeze` and `camkit.train`
     toml_table, torch_file     what people wrote, what torch wrote, checked
+    model_faults               what pydantic finds in it, in words of camkit
     torch_threads              work of many small steps on one thread
 
 Design time calls the runtime where no gradient is needed; the runtime never imports design time.

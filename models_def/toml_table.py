@@ -7,16 +7,26 @@ import difflib
 import hashlib
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import MISSING, fields
 from itertools import chain
 from types import NoneType, UnionType
 from typing import Any, Final, Literal, ParamSpec, TypeVar, get_args, get_origin, get_type_hints
 
-from camkit.errors import ContractError
+from camkit.errors import ContractError, UnsupportedError
 
 MOST_LISTED: Final = 6
 """Keys that a message lists: the nearest ones where there are more."""
+TYPE_NAMES: Final[Mapping[Any, str]] = {
+    str: "a text",
+    bool: "true or false",
+    int: "a whole number",
+    float: "a number",
+    list: "a list",
+    dict: "a table",
+    Mapping: "a table",
+}
 
 T = TypeVar("T")
 P = ParamSpec("P")
@@ -47,6 +57,21 @@ class Faults:
         """
         if self._texts:
             raise ContractError("; ".join(dict.fromkeys(self._texts)))
+
+
+@contextmanager
+def faults_of(what: str) -> Iterator[None]:
+    """Raise the faults of this block with the name of a file before them.
+
+    Raises:
+        ContractError: A fault with the file before it; an UnsupportedError likewise.
+    """
+    try:
+        yield
+    except ContractError as error:
+        raise ContractError(f"{what}: {error}") from error
+    except UnsupportedError as error:
+        raise UnsupportedError(f"{what}: {error}") from error
 
 
 def section(where: str, kind: type[T], table: Any) -> T:
@@ -119,7 +144,7 @@ def typed(where: str, value: Any, kind: Any) -> Any:
     if isinstance(value, float) and math.isnan(value):
         raise ContractError(f"{where} must be a number; got nan")
     if not isinstance(value, kind) or isinstance(value, bool) != (kind is bool):
-        raise ContractError(f"{where} must be of type {kind.__name__}; got {value!r}")
+        raise ContractError(f"{where} must be {TYPE_NAMES.get(kind, kind.__name__)}; got {value!r}")
     return value
 
 

@@ -48,7 +48,7 @@ from camkit.export.golden_cases import (
 )
 from camkit.export.graph_measurements import arena_bytes, measured_of
 from camkit.export.proving import golden_members, write_proved
-from camkit.progress import working
+from camkit.progress import Task, counted, working
 from camkit.runtime.color import rec709_of_planes
 from camkit.runtime.network.graph import inspect_graph
 from camkit.runtime.network.graph_walk import GraphFacts
@@ -65,6 +65,17 @@ PACKAGES: Final = ("camkit", "numpy", "scipy", "onnx", "onnxruntime")
 _NAME: Final = re.compile(r"[a-z0-9][a-z0-9_-]{0,63}")
 _VERSION: Final = re.compile(r"[0-9]+\.[0-9]+\.[0-9]+(-[0-9A-Za-z.-]+)?")
 _LIKE: Final = {"name": "my-camera_2", "version": "0.1.0"}
+STEPS: Final = (
+    "comparing the network with its canonical form",
+    "comparing the network with pairs of its owner",
+    "settling statistics of the whole picture",
+    "measuring the network in the camera",
+    "developing the golden cases",
+    "measuring the laws of a picture",
+    "proving the bundle",
+    "comparing its pictures with those that are only developed",
+)
+"""Of `bundle_with_network`, as its progress shows them."""
 _LEFT_OUT: Final = (CARD, PREVIEW, GOLDEN)
 _CALIBRATION: Final = {
     f"calibration_{seed}": CaseRecipe(
@@ -111,8 +122,9 @@ class Label:
 
 @dataclass(slots=True, kw_only=True)
 class _Draft:
-    """A bundle in the making."""
+    """A bundle in the making; `task` shows its steps."""
 
+    task: Task
     camera: Bundle
     contract: Contract
     label: Label
@@ -148,13 +160,19 @@ def bundle_with_network(
         ContractError: If network, contract and camera do not go together; names all of it.
         ParityError: If a proof fails; nothing is written then.
     """
+    with working(STEPS[0], len(STEPS), is_even=False) as task:
+        return _added(task, model, contract, camera, out, label or Label())
+
+
+def _added(
+    task: Task, model: ForeignModel, contract: Contract, camera: Bundle, out: Path, label: Label
+) -> dict[str, Any]:
     canonical = canonical_graph(model)
     _refuse(canonical, contract)
     data = canonical.model
     if contract.residual != "none":
         subtracted = contract.residual == "subtracted"
         data = with_residual(data, contract.plane_channels, subtracted=subtracted)
-    label = label or Label()
     for what, text, pattern in (
         ("name", label.name or out.stem, _NAME),
         ("version", label.version, _VERSION),
@@ -162,6 +180,7 @@ def bundle_with_network(
         if not pattern.fullmatch(text):
             raise ContractError(f"{option_text(what)} must read like {_LIKE[what]}; got {text!r}")
     draft = _Draft(
+        task=task,
         camera=camera,
         contract=contract,
         label=label,
@@ -193,9 +212,16 @@ def _refuse(canonical: CanonicalGraph, contract: Contract) -> None:
         raise ContractError("; ".join(findings))
 
 
+def _begin(task: Task, number: int) -> None:
+    """Show that a step is in progress."""
+    task.count(number)
+    task.tell(STEPS[number])
+
+
 def _hold_pairs(draft: _Draft) -> None:
     """Compare with the owner's own pairs, where there are any."""
     contract = draft.contract
+    _begin(draft.task, 1)
     if contract.pairs is None:
         draft.warnings.append(
             "no pairs of your own script were given, so a wrong order, range or curve in the "
@@ -215,10 +241,10 @@ def _hold_pairs(draft: _Draft) -> None:
     )
 
 
-@working("settling statistics of the whole picture")
 def _settle_statistics(draft: _Draft, folder: Path) -> None:
     """Freeze means over the picture or make them local, and measure what that costs."""
     contract, facts = draft.contract, inspect_graph(draft.data)
+    _begin(draft.task, 2)
     if not facts.global_operators:
         return
     whole = _trial(draft, folder / "whole.camkit")
@@ -305,7 +331,7 @@ def _manifest(draft: _Draft, facts: NetworkFacts) -> Manifest:
 
 def _photographed(bundle: Bundle, recipes: Mapping[str, CaseRecipe]) -> Cases:
     cases: Cases = {}
-    for name, recipe in recipes.items():
+    for name, recipe in counted(list(recipes.items()), "photographing", "captures"):
         case, capture, reference = photograph(name, recipe, bundle)
         cases[name] = case, GoldenArrays(capture=capture, reference=reference)
     return cases
@@ -325,7 +351,7 @@ def _inputs(bundle: Bundle, cases: Cases) -> list[FloatArray]:
 def _mean_db(bundle: Bundle, cases: Cases, method: str | None = None) -> float:
     """Return the PSNR of some captures against their scenes, in dB of sRGB values."""
     values = []
-    for case, arrays in cases.values():
+    for case, arrays in counted(list(cases.values()), "developing", "captures"):
         pipeline = Pipeline(bundle, Options(threads=1, method=method))
         capture = pipeline.capture_of(
             np.ascontiguousarray(arrays.capture),
@@ -341,6 +367,7 @@ def _mean_db(bundle: Bundle, cases: Cases, method: str | None = None) -> float:
 def _packed(draft: _Draft, folder: Path) -> dict[str, Any]:
     """Measure, prove and write the bundle."""
     graph = inspect_graph(draft.data)
+    _begin(draft.task, 3)
     first = _trial(draft, folder / "first.camkit")
     cases = photograph_all(first)
     probe = _photographed(first, {"probe": _PROBE})
@@ -353,16 +380,19 @@ def _packed(draft: _Draft, folder: Path) -> dict[str, Any]:
     facts = _facts(draft, graph, {"parity_max_abs": difference, **measured})
     manifest, members = _manifest(draft, facts), _members(draft)
     second = write_bundle(folder / "second.camkit", manifest, members)
+    _begin(draft.task, 4)
     golden = add_outputs(second, cases)
     members |= golden_members(second, golden)
     manifest = manifest.model_copy(update={"golden": tuple(case for case, _ in cases.values())})
     third = write_bundle(folder / "third.camkit", manifest, members)
+    _begin(draft.task, 5)
     laws = measure_laws(third)
     manifest = with_laws(manifest, laws)
     if manifest.has_kernels:
         members[CARD] = (card_text(second, golden) + laws_text(laws)).encode()
         members[PREVIEW] = preview_png(second, golden)
     draft.out.parent.mkdir(parents=True, exist_ok=True)
+    _begin(draft.task, 6)
     bundle, report = write_proved(draft.out, manifest, members)
     _judge(draft, bundle, cases, laws)
     return {
@@ -377,6 +407,7 @@ def _packed(draft: _Draft, folder: Path) -> dict[str, Any]:
 
 def _judge(draft: _Draft, bundle: Bundle, cases: Cases, laws: MeasuredLaws) -> None:
     """Compare the pictures with those that are only developed; warn of worse ones."""
+    _begin(draft.task, 7)
     before, after = _mean_db(draft.camera, cases, DEVELOP), _mean_db(bundle, cases)
     draft.report |= {"developed_db": round(before, 2), "network_db": round(after, 2)}
     if after < before:

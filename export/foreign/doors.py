@@ -15,6 +15,7 @@ from camkit.export.foreign.inspection import Inspection
 from camkit.export.foreign.onnx_file import ForeignModel, read_model
 from camkit.field_types import checked
 from camkit.models_def.face.torch_need import require_torch
+from camkit.progress import working
 from camkit.runtime.files.in_memory import FilePath
 from camkit.runtime.output.part_file import refuse_existing
 
@@ -43,7 +44,8 @@ def inspect_network(
     terms = None if contract is None else read_contract(Path(contract))
     path = Path(network)
     model = _model(path, module, config or {}, "network inspect")
-    return inspection.inspection_of(path.name, model, terms)
+    with working(f"inspecting {path.name}"):
+        return inspection.inspection_of(path.name, model, terms)
 
 
 @checked
@@ -126,6 +128,7 @@ def _model(path: Path, module: str | None, config: Mapping[str, Any], command: s
             raise ContractError(f"{option_text('module')} belongs to a state dict, not to an ONNX")
         return read_model(path)
     require_torch(command_text(command))
-    from camkit.export.foreign.state_dict import model_of_state_dict
+    with working(f"loading torch for {path.name}"):
+        from camkit.export.foreign.state_dict import model_of_state_dict
 
     return model_of_state_dict(path, module, config)

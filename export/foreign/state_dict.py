@@ -22,6 +22,7 @@ from camkit.export.foreign.onnx_file import ForeignModel, foreign_model
 from camkit.export.foreign.published import published_network
 from camkit.export.onnx_graph import to_onnx
 from camkit.models_def.torch_file import load_torch
+from camkit.progress import note, working
 
 _WRAPPERS: Final = ("params_ema", "params", "state_dict", "model_state_dict", "model", "net")
 """Keys under which trainers put the weights; averaged ones first."""
@@ -54,10 +55,15 @@ def model_of_state_dict(path: Path, module: str | None, config: Mapping[str, Any
         DecodeError: If nobody knows the network.
         UnsupportedError: If torch cannot export it.
     """
-    state = _weights(path)
-    network = _network(path, state, module, config)
-    channels = next((v.shape[1] for v in state.values() if v.ndim == 4), 0)
-    return foreign_model(onnx.load_from_string(_exported(network, int(channels), path)))
+    with working(f"loading {path.name}") as task:
+        state = _weights(path)
+        task.tell(f"loading {module or f'the network of {path.name}'}")
+        network = _network(path, state, module, config)
+        name, count = type(network).__name__, sum(weights.numel() for weights in state.values())
+        note(f"{path.name}: {count:,} weights of {module or name}")
+        task.tell(f"turning {name} into ONNX")
+        channels = next((v.shape[1] for v in state.values() if v.ndim == 4), 0)
+        return foreign_model(onnx.load_from_string(_exported(network, int(channels), path)))
 
 
 def _weights(path: Path) -> dict[str, Tensor]:

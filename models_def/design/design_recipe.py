@@ -17,7 +17,7 @@ from camkit.models_def.networks.catalog import NETWORK_NAMES
 from camkit.models_def.optics.prescription import FabricationErrors
 from camkit.models_def.optics.search.limits import Limits
 from camkit.models_def.optics.search.variables import Variable
-from camkit.models_def.toml_table import check_keys, section, table_digest, typed
+from camkit.models_def.toml_table import check_keys, faults_of, section, table_digest, typed
 from camkit.models_def.training.recipe import SceneRecipe
 from camkit.side_file import read_side_toml
 
@@ -175,7 +175,9 @@ def read_design(path: Path) -> DesignRecipe:
     Raises:
         ContractError: If the file is missing, is no TOML, or a key is unknown, missing or wrong.
     """
-    return to_design(read_side_toml(path, "design recipe"))
+    table = read_side_toml(path, "design recipe")
+    with faults_of(f"design recipe {path}"):
+        return to_design(table)
 
 
 def to_design(table: Mapping[str, Any]) -> DesignRecipe:

@@ -2,6 +2,7 @@
 
 torch_need        the check that torch is there
 recipe_writing    `camkit.recipe`: a lens and a sensor to a recipe
+lens_checks       whether a lens reaches the corner of a sensor, and what its rims take
 optics_freezing   `camkit.freeze`: optics to a frozen PSF
 network_training  `camkit.train`: a recipe to a checkpoint
 """

@@ -13,7 +13,7 @@ from camkit.field_types import check_fields, checked
 from camkit.models_def.face.torch_need import require_torch
 from camkit.runtime.files.in_memory import FilePath
 from camkit.runtime.output.part_file import atomic_output, refuse_existing
-from camkit.units import MM_PER_M, UM_PER_MM
+from camkit.units import MM_PER_M
 
 if TYPE_CHECKING:
     from camkit.models_def.kinds.bayer.recipe_draft import RecipeDraft
@@ -209,6 +209,7 @@ def _measured_camera(
 def _lens_camera(
     lens: Path, camera: CameraWords, name: str, place: "tuple[str, SensorChoice]"
 ) -> DescribedCamera:
+    from camkit.models_def.face.lens_checks import aperture_notes, check_image_circle
     from camkit.models_def.kinds.bayer.recipe_draft import RecipeDraft
     from camkit.models_def.optics.diffraction.plate import is_plate
     from camkit.models_def.optics.lens_file.lens_file import read_noted_lens
@@ -234,6 +235,7 @@ def _lens_camera(
             "recipe of its own with [haze] (docs/thin-plate.md)"
         )
     use = placed_lens(with_fields_of(design, place[1]), placement)
+    check_image_circle(use, place[1], lens.name)
     draft = RecipeDraft(
         name=name,
         sensor=place[1],
@@ -241,6 +243,7 @@ def _lens_camera(
         focus_mm=use.lens.object_distance_mm,
         objects_mm=use.objects_mm,
     )
+    notes = (*notes, *aperture_notes(design, use.lens))
     return DescribedCamera(draft=draft, notes=notes, lens=use.lens)
 
 
@@ -248,11 +251,8 @@ def with_fields_of(lens: "Lens", sensor: "SensorChoice") -> "Lens":
     """Return a lens whose fields are those of a sensor: the axis to the corner, in five steps."""
     from camkit.models_def.optics.paraxial import paraxial_data
 
-    table = sensor.table
-    corner_mm = math.hypot(table["width_px"], table["height_px"]) / 2
-    corner_mm *= table["pixel_pitch_um"] / UM_PER_MM
     efl_mm = abs(paraxial_data(lens).efl_mm)
-    angles = (math.atan(share * corner_mm / efl_mm) for share in FIELD_SHARES)
+    angles = (math.atan(share * sensor.corner_mm / efl_mm) for share in FIELD_SHARES)
     return replace(lens, field_angles_rad=tuple(angles))
 
 

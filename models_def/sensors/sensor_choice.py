@@ -8,6 +8,7 @@
 The result is the table `[sensor]` of a recipe, and for every key where its value comes from.
 """
 
+import math
 import re
 import tomllib
 from collections.abc import Mapping
@@ -24,6 +25,7 @@ from camkit.cfa import CFA_PATTERNS, shifted_cfa
 from camkit.entry_points import entry_points, load_entry_point
 from camkit.errors import ContractError
 from camkit.runtime.capture import Capture
+from camkit.units import UM_PER_MM
 
 DATA: Final = "named_sensors.toml"
 GROUP: Final = "camkit.sensors"
@@ -74,6 +76,12 @@ class SensorChoice:
     table: Mapping[str, Any]
     response: Mapping[str, Any]
     sources: Mapping[str, str]
+
+    @property
+    def corner_mm(self) -> float:
+        """Half the diagonal, by the outermost pixel edges."""
+        diagonal_px = math.hypot(self.table["width_px"], self.table["height_px"])
+        return diagonal_px / 2 * float(self.table["pixel_pitch_um"]) / UM_PER_MM
 
 
 def isos_of(full_well_e: float) -> tuple[int, ...]:

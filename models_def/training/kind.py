@@ -20,7 +20,7 @@ from torch import Tensor, nn
 from camkit.bundle.stages import Stage
 from camkit.errors import ContractError
 from camkit.kinds import find_kind
-from camkit.models_def.toml_table import typed
+from camkit.models_def.toml_table import faults_of, typed
 from camkit.models_def.training.recipe import DEFAULT_KIND, Recipe, with_new_names
 from camkit.models_def.training.sample import Finish, Sample, SampleLayout
 from camkit.side_file import read_side_toml
@@ -213,7 +213,9 @@ def read_recipe(path: Path) -> Recipe:
         ContractError: If the file is missing, is no TOML, or a key is unknown, missing or wrong.
         UnsupportedError: If its kind cannot be trained.
     """
-    return to_recipe(read_side_toml(path, "recipe"))
+    table = read_side_toml(path, "recipe")
+    with faults_of(f"recipe {path}"):
+        return to_recipe(table)
 
 
 def to_recipe(table: Mapping[str, Any]) -> Recipe:

@@ -24,6 +24,7 @@ from camkit.bundle.sensor import (
     nested_sensor,
 )
 from camkit.errors import ContractError
+from camkit.models_def.model_faults import fault_texts
 from camkit.models_def.toml_table import Faults, check_keys, section, typed
 
 PICTURE_LOSSES = ("content", "adversarial")
@@ -413,7 +414,7 @@ def model(where: str, kind: type[M], table: Mapping[str, Any]) -> M:
     try:
         return kind.model_validate(table.get(where, {}))
     except ValidationError as error:
-        raise _refusal(where, error) from error
+        raise ContractError("; ".join(fault_texts(where, error, left_out=_FLAT))) from error
 
 
 def _sensor(table: Any) -> Sensor:
@@ -422,16 +423,7 @@ def _sensor(table: Any) -> Sensor:
     try:
         return _SENSOR.validate_python(nested_sensor(table))
     except ValidationError as error:
-        raise _refusal("sensor", error) from error
-
-
-def _refusal(where: str, error: ValidationError) -> ContractError:
-    texts = []
-    for fault in error.errors():
-        key = ".".join([where, *(str(part) for part in fault["loc"] if part not in _FLAT)])
-        is_missing = fault["type"] == "missing"
-        texts.append(f"{key} is missing" if is_missing else f"{key}: {fault['msg']}")
-    return ContractError("; ".join(texts))
+        raise ContractError("; ".join(fault_texts("sensor", error, left_out=_FLAT))) from error
 
 
 def _networks(

@@ -9,6 +9,7 @@ kernel_stack        the stack, and the caller's options
 kernel_places       where the kernels lie over the field
 clean_kernels       background, negative values, middle, pitch, sum -> a frozen PSF
 kernel_resampling   another pitch
+psf_facts           the result for people: places, span, colours, widths
 own_colours         the response of a sensor whose own colours the kernels are
 kernel_uncertainty  how far the kernels may be off: estimated, and copies within it
 """

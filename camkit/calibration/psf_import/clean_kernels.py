@@ -23,6 +23,7 @@ from camkit.calibration.psf_import.kernel_stack import (
     refuse,
 )
 from camkit.calibration.psf_import.kernel_uncertainty import estimate_uncertainty
+from camkit.calibration.psf_import.psf_facts import span_note
 from camkit.calibration.psf_import.psf_source import read_source
 from camkit.caller import option_text
 from camkit.psf import FrozenPsf, PsfUncertainty
@@ -159,6 +160,7 @@ def imported_psf(source: str | Path, options: ImportOptions) -> ImportedPsf:
         grid_y_mm=places.y_mm,
     )
     uncertainty = options.uncertainty
+    span_notes = filter(None, [span_note(psf)])
     return ImportedPsf(
         psf=psf,
         uncertainty=uncertainty or estimate_uncertainty(psf, normalised.border_noise),
@@ -166,7 +168,7 @@ def imported_psf(source: str | Path, options: ImportOptions) -> ImportedPsf:
         normalised=normalised,
         shape=stack.values.shape,
         files=stack.files,
-        notes=(*stack.notes, *_notes(normalised, stack.values.shape, options)),
+        notes=(*stack.notes, *_notes(normalised, stack.values.shape, options), *span_notes),
     )
 
 
@@ -314,11 +316,18 @@ def _notes(normalised: Normalised, shape: Sequence[int], options: ImportOptions)
         )
     if normalised.border_share > LEAST_BORDER and not normalised.background:
         notes.append(
-            f"the level along the border would hold {normalised.border_share:.1%} of the light; if "
-            f"it is background, add {option_text('background', 'border')}"
+            f"the level along the border, all over the kernel, is {normalised.border_share:.1%} of "
+            f"the light: {option_text('background', 'border')} takes it off if it is background; "
+            "if it is blur that reaches past the border, give larger kernels"
         )
     if normalised.negative_share > LEAST_NEGATIVE:
-        notes.append(f"negative values, {normalised.negative_share:.2%} of the light, were cut")
+        share = f"{normalised.negative_share:.2%} of the light"
+        notes.append(
+            f"noise below the subtracted level, {share}, was cut, and about as much above it "
+            f"stays: {option_text('side_px')} leaves it out"
+            if normalised.background
+            else f"negative values, {share}, were cut"
+        )
     if normalised.centroid_px > max(1.0, min(h, w) / 8):
         notes.append(
             f"the light of a kernel lies {normalised.centroid_px:.1f} samples off the middle: it "

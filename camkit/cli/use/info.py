@@ -1,4 +1,4 @@
-"""`camkit info`: what a bundle or a capture is, or the schema of the manifest."""
+"""`camkit info`: what a bundle, a PSF or a capture is, or the schema of the manifest."""
 
 import json
 from pathlib import Path
@@ -14,6 +14,7 @@ from camkit.errors import ContractError
 if TYPE_CHECKING:
     from camkit.bundle.reader import Bundle
 
+PSF_SUFFIX: Final = ".safetensors"
 LONGEST: Final = 300
 """Characters of a value of a part of a list that are printed."""
 
@@ -21,7 +22,9 @@ LONGEST: Final = 300
 def info(
     file: Annotated[
         str | None,
-        typer.Argument(help="Bundle (NAME or PATH) or capture to describe.", metavar="FILE"),
+        typer.Argument(
+            help="Bundle (NAME or PATH), PSF (.safetensors) or capture to describe.", metavar="FILE"
+        ),
     ] = None,
     schema: Annotated[
         bool, typer.Option("--schema", help="Print the JSON schema of the bundle manifest.")
@@ -32,14 +35,14 @@ def info(
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Print what a bundle or a capture contains."""
+    """Print what a bundle, a PSF or a capture contains."""
     if schema:
         from camkit.bundle.manifest import manifest_schema
 
         say(json.dumps(manifest_schema(), indent=2))
         return
     if file is None:
-        raise ContractError("give a bundle or a capture, or --schema")
+        raise ContractError("give a bundle, a PSF or a capture, or --schema")
 
     options = mosaic_options(mosaic, black_level, white_level)
     facts = _describe(file, options)
@@ -58,6 +61,8 @@ def _describe(file: str, mosaic: Any) -> dict[str, Any]:
     path = Path(file)
     if path.suffix == SUFFIX or (not path.exists() and file in built_in_bundles()):
         return _describe_bundle(file)
+    if path.suffix.lower() == PSF_SUFFIX:
+        return _describe_psf_file(path)
     if not (path.exists() or path.suffix):
         from camkit.bundle.reader import find_bundle
 
@@ -79,6 +84,15 @@ def _describe_bundle(file: str) -> dict[str, Any]:
         "psf": _describe_psf(bundle),
         **manifest,
     }
+
+
+def _describe_psf_file(path: Path) -> dict[str, Any]:
+    from camkit.bundle.psf_file import read_measurement
+    from camkit.calibration.psf_import.psf_facts import psf_facts
+    from camkit.runtime.raw import file_sha256
+
+    psf, uncertainty = read_measurement(path)
+    return {"psf": str(path), "sha256": file_sha256(path), **psf_facts(psf, uncertainty)}
 
 
 def _laws_text(laws: dict[str, dict[str, Any]]) -> dict[str, dict[str, str]]:

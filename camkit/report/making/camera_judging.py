@@ -16,6 +16,7 @@ import numpy as np
 from camkit.arrays import FloatArray
 from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.reader import PRESCRIPTION, Bundle
+from camkit.progress import working
 from camkit.report.fabricated_optics import fabricated_optics
 from camkit.report.quality import Exposed, Shot, expose, inner_srgb, list_set, psnr, read_picture
 from camkit.report.sensor_geometry import in_sensor_geometry
@@ -73,13 +74,19 @@ def judge_camera(
     psnr_by_method: dict[str, list[float]] = {}
     names: list[str] = []
     pipelines = pipelines_of(bundle)
-    for shot, exposed in captures_of(bundle, pictures, cache_folder):
-        names.append(shot.picture.name)
-        for method, pipeline in pipelines.items():
-            truth, got = inner_srgb(restored_by(pipeline, exposed), exposed.sharp)
-            psnr_by_method.setdefault(method, []).append(psnr(truth, got))
-    scenes = tuple(names)
-    return {m: Judgement(psnr_db=tuple(db), scenes=scenes) for m, db in psnr_by_method.items()}
+    scenes = SCENES if pictures is None else len(list_set(pictures, SCENES))
+    total = scenes * len(POSITIONS) * len(ISOS)
+    with working("judging the camera", total, unit="captures") as task:
+        for shot, exposed in captures_of(bundle, pictures, cache_folder):
+            names.append(shot.picture.name)
+            for method, pipeline in pipelines.items():
+                truth, got = inner_srgb(restored_by(pipeline, exposed), exposed.sharp)
+                psnr_by_method.setdefault(method, []).append(psnr(truth, got))
+            task.count(len(names))
+    return {
+        method: Judgement(psnr_db=tuple(db), scenes=tuple(names))
+        for method, db in psnr_by_method.items()
+    }
 
 
 def pipelines_of(bundle: Bundle) -> dict[str, Pipeline]:

@@ -7,21 +7,24 @@ page
 """
 
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from camkit.bundle.reader import Bundle, open_bundle
-from camkit.progress import working
+from camkit.caller import option_text
 from camkit.report.making.camera_judging import FILTER, Judgement, best_size, judge_camera
 from camkit.report.making.camera_page import MadeCamera, camera_html
 from camkit.report.making.camera_steps import FILTER_BUNDLE, LENS, NETWORK_BUNDLE, CameraSteps
 from camkit.report.making.page_parts import layout_of, pictures_of, seconds_of
 from camkit.runtime.output.part_file import write_together
 from camkit.runtime.plan.decision import DEVELOP
+from camkit.runtime.raw import file_sha256
 
 PAGE_SUFFIX: Final = ".html"
+FINISHED: Final = "finished"
 LEAST_FIT_S: Final = 240.0
 """Left of the minutes, from which fitting the bank leaves something to train with."""
 LAST_S: Final = 100.0
@@ -41,6 +44,13 @@ class Making:
     def run(self) -> dict[str, Any]:
         """Make the camera; return what is known of it."""
         steps, work = self._steps, self._work
+        finished = self._finished()
+        if finished is not None:
+            self._tell(
+                f"{finished['bundle']} is finished, and its page {finished['page']}: nothing is "
+                f"done anew ({option_text('overwrite')} begins anew)"
+            )
+            return finished
         facts = work.step("described", steps.describe)
         for text in facts["notes"]:
             self._tell(text)
@@ -69,7 +79,22 @@ class Making:
         bundle = open_bundle(self._out)
         page = self._out.with_suffix(PAGE_SUFFIX)
         write_together({page: self._page(bundle, judged).encode()})
-        return self._result(bundle, judged, page)
+        result = self._result(bundle, judged, page)
+        work.step(FINISHED, lambda: {"result": result, "sha256": self._digests(page)})
+        return result
+
+    def _finished(self) -> dict[str, Any] | None:
+        """Return the result of an earlier call whose files are there as it wrote them."""
+        if not self._work.is_done(FINISHED):
+            return None
+        earlier = self._work.step(FINISHED, dict)
+        is_there = earlier["sha256"] == self._digests(self._out.with_suffix(PAGE_SUFFIX))
+        return dict(earlier["result"]) if is_there else None
+
+    def _digests(self, page: Path) -> dict[str, str]:
+        """Return path -> hash of the bundle and the page that are there."""
+        paths = (path for path in (self._out, page) if path.is_file())
+        return {str(path): file_sha256(path) for path in paths}
 
     def _left_s(self) -> float:
         return 60 * self._wish.minutes - self._work.spent_s()
@@ -97,10 +122,17 @@ class Making:
                 self._tell(text)
         return judged
 
-    @working("judging the camera")
     def _judged(self, name: str) -> Mapping[str, Judgement]:
-        bundle = open_bundle(self._work.path(name))
-        return judge_camera(bundle, self._wish.valid, self._work.folder)
+        def judge() -> dict[str, Any]:
+            bundle = open_bundle(self._work.path(name))
+            judged = judge_camera(bundle, self._wish.valid, self._work.folder)
+            return {"methods": {method: asdict(one) for method, one in judged.items()}}
+
+        facts = self._work.step("judged", judge)
+        return {
+            method: Judgement(psnr_db=tuple(one["psnr_db"]), scenes=tuple(one["scenes"]))
+            for method, one in facts["methods"].items()
+        }
 
     def _ship(self, name: str, line: str) -> None:
         self._steps.ship(name, self._out)

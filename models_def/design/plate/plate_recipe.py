@@ -10,7 +10,7 @@ from camkit.models_def.design.plate.goal import Goal
 from camkit.models_def.design.plate.reader_recipe import ReaderRecipe
 from camkit.models_def.optics.diffraction.etching import Etching
 from camkit.models_def.optics.diffraction.geometry import Bench
-from camkit.models_def.toml_table import check_keys, section, table_digest, typed
+from camkit.models_def.toml_table import check_keys, faults_of, section, table_digest, typed
 from camkit.side_file import read_side_toml
 
 MapKind = Literal["full", "rank", "gratings", "zernike", "radial"]
@@ -147,7 +147,9 @@ def read_plate_recipe(path: Path) -> PlateRecipe:
     Raises:
         ContractError: If the file is missing, is no TOML, or a key is unknown, missing or wrong.
     """
-    return to_plate_recipe(read_side_toml(path, "plate recipe"))
+    table = read_side_toml(path, "plate recipe")
+    with faults_of(f"plate recipe {path}"):
+        return to_plate_recipe(table)
 
 
 def to_plate_recipe(table: Mapping[str, Any]) -> PlateRecipe:

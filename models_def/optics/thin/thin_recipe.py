@@ -10,7 +10,7 @@ import torch
 from camkit.errors import ContractError
 from camkit.models_def.optics.glass.catalogue import find_glass
 from camkit.models_def.optics.glass.dispersion import refractive_index
-from camkit.models_def.toml_table import check_keys, section, typed
+from camkit.models_def.toml_table import check_keys, faults_of, section, typed
 from camkit.side_file import read_side_toml
 from camkit.units import to_radians
 
@@ -198,15 +198,16 @@ def read_thin_recipe(path: Path) -> ThinRecipe:
         ContractError: If a key is unknown, missing or of a wrong type, or a value is refused.
     """
     table = read_side_toml(path, "recipe")
-    check_keys(path.name, table, {"name", "note", "plate", "partition", "stop", "solver"})
-    missing = [key for key in ("name", "plate", "partition") if key not in table]
-    if missing:
-        raise ContractError(f"{path.name} lacks {', '.join(missing)}")
-    return ThinRecipe(
-        name=typed("name", table["name"], str),
-        note=typed("note", table.get("note", ""), str),
-        plate=section("plate", PlateTable, table["plate"]),
-        partition=section("partition", PartitionTable, table["partition"]),
-        stop=section("stop", StopTable, table.get("stop", {})),
-        solver=section("solver", SolverTable, table.get("solver", {})),
-    )
+    with faults_of(f"recipe {path}"):
+        check_keys("recipe", table, {"name", "note", "plate", "partition", "stop", "solver"})
+        missing = [key for key in ("name", "plate", "partition") if key not in table]
+        if missing:
+            raise ContractError(f"recipe lacks {', '.join(missing)}")
+        return ThinRecipe(
+            name=typed("name", table["name"], str),
+            note=typed("note", table.get("note", ""), str),
+            plate=section("plate", PlateTable, table["plate"]),
+            partition=section("partition", PartitionTable, table["partition"]),
+            stop=section("stop", StopTable, table.get("stop", {})),
+            solver=section("solver", SolverTable, table.get("solver", {})),
+        )

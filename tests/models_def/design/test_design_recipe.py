@@ -85,7 +85,7 @@ def change(key: str, **entries: Any) -> Callable[[dict[str, Any]], None]:
         (change("loss", kind="l7"), "one of"),
         (change("network", name="resnet"), "network must be one of"),
         (change("schedule", steps=0), "must be >= 1"),
-        (change("schedule", lens_rate="fast"), "type float"),
+        (change("schedule", lens_rate="fast"), "must be a number"),
         (change("pixels", kernel_px=32), "odd"),
         (change("pixels", wavelengths_um=[0.5]), "three rows"),
         (change("pixels", cfa="RGBW"), "cfa must be one of RGGB"),

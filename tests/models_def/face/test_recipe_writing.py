@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from pathlib import Path
 
 import pytest
@@ -93,3 +94,42 @@ def test_a_plate_is_refused_by_its_name(optics: str, says: str, tmp_path: Path) 
     with pytest.raises(UnsupportedError, match=says):
         camkit.recipe(optics, tmp_path / "mine.toml", camera=camera)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("lens", ["cooke-triplet-f5", "double-gauss", "duet"])
+@pytest.mark.parametrize("object_m", [(), (0.4, 2.0)])
+def test_a_sensor_that_the_lens_does_not_reach_is_refused_before_any_work(
+    lens: str, object_m: tuple[float, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["recipe", lens, "--focus-m", "2", "-o", str(tmp_path / "mine.toml")]
+    words += ["--object-m", ",".join(map(str, object_m))] if object_m else []
+    assert run([*words, "--sensor", "9000x9000@10um"]) == 2
+    told = re.search(
+        rf"{lens} images up to (.*) mm from its axis, but .* lies at 63.64 mm: .* (\d+)x(\d+) px",
+        capsys.readouterr().err,
+    )
+    assert told is not None
+    reach_mm, covered_px = float(told[1]), int(told[2])
+    assert not list(tmp_path.iterdir())
+    assert covered_px * 0.01 * math.sqrt(0.5) == pytest.approx(reach_mm, rel=1e-3)
+    inside_px = int(0.8 * covered_px)
+    assert run([*words, "--sensor", f"{inside_px}x{inside_px}@10um"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("more", "note"),
+    [
+        (["--f-number", "4"], None),
+        (["--f-number", "8"], None),
+        (["--f-number", "3.9"], "F/3.9 is wider than the F/4 of the file: its rims let all of"),
+        (["--f-number", "2"], r"F/2 is wider than .* rims let 3\d% of the light of F/2 through"),
+        (["--stop-radius-mm", "20"], "F/1.25 is wider than the F/4 of the file"),
+    ],
+)
+def test_a_lens_that_is_opened_beyond_its_file_is_noted(
+    more: list[str], note: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["recipe", "duet", "--sensor", "3000x2000@6um", "-o", str(tmp_path / "mine.toml")]
+    assert run([*words, *more]) == 0
+    told = capsys.readouterr().err
+    assert ("rims" not in told) if note is None else re.search(note, told) is not None

@@ -99,10 +99,10 @@ def test_a_file_gives_grooves_back(tmp_path: Path) -> None:
     [
         ("groove_walls = false", "surface 2: groove_walls without groove_depth_um"),
         ("tool_radius_um = 16.0", "surface 2: tool_radius_um without groove_depth_um"),
-        ("groove_depth_um = 'x'", "surface 2.groove_depth_um must be of type float"),
+        ("groove_depth_um = 'x'", "surface 2.groove_depth_um must be a number"),
         (
             "groove_depth_um = 100.0\ngroove_walls = 1",
-            "surface 2.groove_walls must be of type bool",
+            "surface 2.groove_walls must be true or false",
         ),
         ("groove_depth_um = 0.05", "surface 2: a groove is narrower than 1 um"),
         (

@@ -1,10 +1,13 @@
 """The common tables of a recipe; those of a kind are tested beside it."""
 
+import math
+import re
+
 import pytest
 
 from camkit.bundle.sensor import PlanesSensor
 from camkit.errors import ContractError, UnsupportedError
-from camkit.models_def.training.kind import to_recipe, training_kind
+from camkit.models_def.training.kind import read_recipe, to_recipe, training_kind
 from camkit.models_def.training.recipe import (
     AHEAD,
     DataRecipe,
@@ -86,7 +89,7 @@ def test_networks_of_no_role_are_refused(networks, message):
         ({"lens": {}}, "unknown key 'lens'"),
         ({"sensor": {**TABLE["sensor"], "black_level": 300.0}}, "sensor: .*must lie above"),
         ({"sensor": {**TABLE["sensor"], "width_px": 0}}, r"sensor\.width_px"),
-        ({"name": 3}, "name must be of type str"),
+        ({"name": 3}, "name must be a text"),
     ],
 )
 def test_wrong_common_tables_are_refused_by_naming_the_key(change, message):
@@ -137,3 +140,47 @@ def test_what_a_kind_does_not_bring_is_said(monkeypatch):
         training_kind("bayer")
     with pytest.raises(UnsupportedError, match="not fine-tuned"):
         refining_kind("bayer")
+
+
+SENSOR = TABLE["sensor"] | {
+    "cfa": "RGGB",
+    "width_px": 64,
+    "height_px": 48,
+    "pixel_pitch_um": 5.0,
+}
+SENSOR.pop("channels")
+
+
+@pytest.mark.parametrize(
+    ("sensor", "message"),
+    [
+        ({"width_px": "wide"}, "sensor.width_px must be a whole number; got 'wide'"),
+        ({"width_px": 3.5}, "sensor.width_px must be a whole number; got 3.5"),
+        ({"height_px": 0}, "sensor.height_px must be greater than 0; got 0"),
+        ({"pixel_pitch_um": "x"}, "sensor.pixel_pitch_um must be a number; got 'x'"),
+        ({"black_level": math.inf}, "sensor.black_level must be a finite number; got inf"),
+        ({"noise": 3}, "sensor.noise must be a list; got 3"),
+        ({"noise": [{"iso": 1.0, "gain_e_per_dn": "x"}]}, "sensor.noise[0].gain_e_per_dn must be"),
+        ({"noise": [{"iso": 1.0}]}, "sensor.noise[0].gain_e_per_dn is missing"),
+        ({"color_matrix": "x"}, "sensor.color_matrix must be a list; got 'x'"),
+        ({"channel_response": 3}, "sensor.channel_response must be a table; got 3"),
+        ({"colour": 3}, "sensor.colour is an unknown key"),
+        ({"cfa": "RGBB"}, "sensor.cfa must "),
+        ({"type": "film"}, "sensor.type must be one of 'bayer', 'planes', 'spad'; got 'film'"),
+    ],
+)
+def test_faults_of_a_sensor_name_the_key_and_what_was_expected(sensor, message):
+    with pytest.raises(ContractError) as refused:
+        made(sensor=SENSOR | sensor)
+    text = str(refused.value)
+    assert message in text
+    assert not re.search("Input|should|valid|validation|discriminator", text)
+
+
+@pytest.mark.parametrize("kind", ["bayer", "nobody"])
+def test_a_refused_recipe_is_named_by_its_file(kind, tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(f'name = 3\nkind = "{kind}"\n', encoding="utf-8")
+    with pytest.raises((ContractError, UnsupportedError)) as refused:
+        read_recipe(path)
+    assert str(refused.value).startswith(f"recipe {path}: ")

@@ -129,9 +129,9 @@ def _merit(recipe: LensRecipe, lens: Lens) -> float:
     ("change", "message"),
     [
         (("seed = 11", "sed = 11"), "unknown key"),
-        (("seed = 11", 'seed = "x"'), "of type int"),
-        (("efl_mm = 50.0", "efl_mm = [50.0]"), "of type float"),
-        (("efl_mm = 50.0", "efl_mm = true"), "of type float"),
+        (("seed = 11", 'seed = "x"'), "must be a whole number"),
+        (("efl_mm = 50.0", "efl_mm = [50.0]"), "must be a number"),
+        (("efl_mm = 50.0", "efl_mm = true"), "must be a number"),
         (("efl_mm = 50.0", "efl_mm = 50.0\nobject_distance_mm = -1.0"), "must be > 0"),
         (("kept = 16", "kept = 999"), "kept must be"),
         (("fields = 9", "fields = 9\nmerit_fields = 10"), "merit_fields must be"),

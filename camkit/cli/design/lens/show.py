@@ -2,13 +2,15 @@
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 
 from camkit.cli.choices import Debug, GlassFiles, Json, Overwrite
 from camkit.cli.say import say
 from camkit.progress import working
+
+PAGE: Final = ".html"
 
 
 def show(
@@ -25,7 +27,9 @@ def show(
     ] = "hexapolar:6",
     out_dir: Annotated[
         Path | None,
-        typer.Option("-o", "--out-dir", help="Folder for NAME.html and its pictures (PNG, SVG)."),
+        typer.Option(
+            "-o", "--out-dir", help="Folder for NAME.html and its pictures, or the page (.html)."
+        ),
     ] = None,
     glass: GlassFiles = None,
     overwrite: Overwrite = False,
@@ -34,7 +38,7 @@ def show(
 ) -> None:
     """Draw and measure a lens: layout, spots, MTF, curves, Seidel sums (needs torch).
 
-    Without -o and --json the page NAME.html is written to the current folder.
+    Without -o and --json NAME.html and its pictures are written to the current folder.
     """
     from camkit.cli.design.design_time import refuse_existing, require_torch
 
@@ -46,14 +50,16 @@ def show(
     from camkit.report.pages.page import page_path
 
     rays = Pupil(definition=pupil, sampling=sampling)  # type: ignore[arg-type]
-    folder = out_dir if out_dir is not None or json_ else Path()
+    folder, name = out_dir if out_dir is not None or json_ else Path(), file.stem
+    if folder is not None and folder.suffix.lower() == PAGE and not folder.is_dir():
+        folder, name = folder.parent, folder.stem
     if folder is not None:
-        refuse_existing([page_path(folder, file.stem)], overwrite=overwrite)
+        refuse_existing([page_path(folder, name)], overwrite=overwrite)
     lens, notes = read_noted_lens(file, glass or ())
     with working(f"measuring {lens.name}"):
         facts = analyse(lens, rays, notes)
     with working("drawing the page"):
-        written = [] if folder is None else write_lens_page(facts, folder, file.stem)
+        written = [] if folder is None else write_lens_page(facts, folder, name)
     if json_:
         say(json.dumps(to_json(facts), allow_nan=False))
         return

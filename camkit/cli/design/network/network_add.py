@@ -2,13 +2,20 @@
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.cli.design.network.network_options import Config, Module, Network
 from camkit.cli.say import say
+
+COST: Final = "statistics_cost_db"
+
+
+def cost_text(cost_db: float) -> str:
+    """Return what frozen or local statistics cost; by chance pictures may be better with them."""
+    return f"{cost_db:.2f} dB" + (": no loss" if round(cost_db, 2) <= 0 else " lost")
 
 
 def add(
@@ -56,6 +63,8 @@ def add(
         return
     warnings = report.pop("warnings")
     width = max(map(len, report))
+    if COST in report:
+        report[COST] = cost_text(report[COST])
     for key, value in report.items():
         say(f"{key:<{width}}  {value}")
     for warning in warnings:

@@ -90,6 +90,7 @@ def psf_import(
 ) -> None:
     """Convert kernels (npy, npz, mat, PNG, TIFF, EXR, Zemax text) to a PSF of camkit."""
     from camkit.calibrate import foreign_psf
+    from camkit.calibration.psf_import.psf_facts import places_text
 
     for name, value, choices in (
         ("--centre", centre, ("middle", "peak", "centroid")),
@@ -122,12 +123,7 @@ def psf_import(
         overwrite=overwrite,
     )
     record = with_files({"source": source, **result.to_record()}, out, page)
-    psf = result.psf
-    summary = (
-        f"{psf.field_heights_mm.size} places ({psf.symmetry}), {psf.wavelengths_um.size} colours, "
-        f"{psf.kernels.shape[-1]} px at {psf.pixel_pitch_um:g} um"
-    )
-    print_result(record, _lines(record), as_json=json_, summary=summary)
+    print_result(record, _lines(record), as_json=json_, summary=places_text(result.psf))
 
 
 def _lines(record: dict[str, object]) -> list[str]:

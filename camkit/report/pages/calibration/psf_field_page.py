@@ -7,6 +7,7 @@ import numpy as np
 from camkit.arrays import FloatArray
 from camkit.calibration.psf_import.clean_kernels import ImportedPsf
 from camkit.calibration.psf_import.kernel_stack import FloatGrid
+from camkit.calibration.psf_import.psf_facts import places_text
 from camkit.psf import FrozenPsf
 from camkit.report.figure import Figure, chart, new_figure, to_png
 from camkit.report.pages.page import Page, Picture, Section, Table, sentences, to_html
@@ -30,11 +31,7 @@ _PLACE: Final = 0.7
 def psf_field_html(result: ImportedPsf, source: str) -> str:
     """Return the page."""
     psf, record = result.psf, result.to_record()
-    summary = (
-        f"{source}: {psf.field_heights_mm.size} places ({psf.symmetry}), "
-        f"{psf.wavelengths_um.size} colours, kernels of {psf.kernels.shape[-1]} px at "
-        f"{psf.pixel_pitch_um:g} um."
-    )
+    summary = f"{source}: {places_text(psf)}."
     estimated = "estimated" if result.is_estimated else "as stated"
     rows = [(name.replace("_", " "), str(value)) for name, value in record["normalised"].items()]
     rows += [

@@ -11,8 +11,11 @@ import numpy as np
 import pytest
 
 from camkit.bundle.manifest import Manifest, manifest_to_bytes, read_manifest
+from camkit.bundle.psf_file import write_psf
 from camkit.bundle.reader import open_bundle
 from camkit.cli.exit_code import ExitCode
+from camkit.models_def.optics.measured import measured_psf
+from camkit.psf import PsfUncertainty
 from camkit.runtime.files.doubts import NOTHING_DARK
 from camkit.runtime.raw import read_capture
 
@@ -155,3 +158,42 @@ def test_what_is_not_there_ends_with_its_code(
 
 def test_no_file_and_no_schema_is_a_usage_error(camkit_command) -> None:
     assert camkit_command("info").code == ExitCode.USAGE
+
+
+@pytest.mark.parametrize("uncertainty", [None, PsfUncertainty(noise=0.02)])
+def test_a_psf_is_described_by_places_span_colours_and_widths(
+    uncertainty: PsfUncertainty | None, camkit_command, tmp_path: Path
+) -> None:
+    y, x = np.mgrid[-15:16, -15:16]
+    sigmas = np.array([1.5, 2.0, 3.0])
+    kernels = np.exp(-(x**2 + y**2) / (2 * sigmas[:, None, None] ** 2)) * np.ones((2, 3, 3, 1, 1))
+    psf = measured_psf(
+        kernels.reshape(2, 3, 3, 31, 31),
+        pixel_pitch_um=4.0,
+        wavelengths_um=(0.46, 0.54, 0.6),
+        grid_mm=(np.array([-6.0, 0.0, 6.0]), np.array([-4.0, 4.0])),
+    )
+    path = tmp_path / "lab.psf.safetensors"
+    write_psf(path, psf, uncertainty)
+    facts = json.loads(camkit_command("info", str(path), "--json").out)
+    assert (facts["places"], facts["symmetry"], facts["colours"]) == (6, "grid", 3)
+    assert (facts["span_mm"], facts["pixel_pitch_um"], facts["side_px"]) == ([12.0, 8.0], 4.0, 31)
+    assert facts["sigma_px"] == pytest.approx([1.5, 3.0], abs=2e-3)
+    assert ("measured" in facts["source"]) == (uncertainty is not None)
+    assert (facts["uncertainty"] or {}).get("noise") == (0.02 if uncertainty else None)
+    text = camkit_command("info", str(path)).out
+    assert "places: 6" in text
+    assert ("uncertainty:" in text) == (uncertainty is not None)
+
+
+@pytest.mark.parametrize("data", [b"", b"no tensors at all", None])
+def test_a_file_that_is_no_psf_is_refused_by_its_name(
+    data: bytes | None, camkit_command, tmp_path: Path
+) -> None:
+    path = tmp_path / "lab.safetensors"
+    if data is not None:
+        path.write_bytes(data)
+    outcome = camkit_command("info", str(path))
+    assert outcome.code not in (0, None)
+    assert "lab.safetensors" in outcome.err
+    assert len(outcome.err.strip().splitlines()) == 1

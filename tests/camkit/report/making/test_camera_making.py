@@ -16,6 +16,7 @@ from camkit.cli.app import run
 from camkit.errors import ContractError
 from camkit.models_def.face.recipe_writing import CameraWords
 from camkit.models_def.training.kind import read_recipe
+from camkit.progress import Board, listening
 from camkit.report.making import camera_judging, camera_making, making_run, page_parts
 from camkit.report.making.camera_judging import FILTER, Judgement
 from camkit.report.making.camera_steps import CameraSteps
@@ -36,7 +37,10 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_lens_becomes_a_proved_filter_and_a_page(
-    small: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    small: None,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     out = tmp_path / "mine.camkit"
     words = ["make", "al2550-a", "--sensor", SENSOR, "--focus-m", "inf", "-o", str(out), "--json"]
@@ -45,7 +49,7 @@ def test_a_lens_becomes_a_proved_filter_and_a_page(
     facts = json.loads(told.out)
     assert facts["sizes"] == []
     assert facts["psnr_db"].keys() == {DEVELOP, FILTER}
-    assert list(facts["cpu_s"]) == ["described", "frozen", "filtered"]
+    assert list(facts["cpu_s"]) == ["described", "frozen", "filtered", "judged"]
     assert "its filter restores, usable now" in told.err
     bundle = open_bundle(out)
     assert bundle.manifest.name == "mine"
@@ -53,11 +57,22 @@ def test_a_lens_becomes_a_proved_filter_and_a_page(
     page = Path(facts["page"]).read_text(encoding="utf-8")
     for heading in ("The camera mine", "Decibels", "The lens", "Blur over the field", "Seconds"):
         assert heading in page
-    # the same words go on, and do nothing twice
-    stamp = (tmp_path / "mine.work" / "filter.camkit").stat().st_mtime_ns
+    # the same words say that it is finished, and do nothing twice
+    monkeypatch.setattr(making_run, "judge_camera", None)
+    stamps = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*")}
     assert run([*words, "--minutes", "0"]) == 0
-    assert (tmp_path / "mine.work" / "filter.camkit").stat().st_mtime_ns == stamp
-    capsys.readouterr()
+    told = capsys.readouterr()
+    assert json.loads(told.out) == facts
+    assert f"{out} is finished, and its page {facts['page']}: nothing is done anew" in told.err
+    assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*")} == stamps
+    # a file that is gone is made again, without judging
+    for path in (out, Path(facts["page"])):
+        kept = path.read_bytes()
+        path.unlink()
+        assert run([*words, "--minutes", "0"]) == 0
+        assert json.loads(capsys.readouterr().out)["psnr_db"] == facts["psnr_db"]
+        assert path.is_file()
+        assert path != out or path.read_bytes() == kept
     assert run([*words, "--minutes", "1"]) == 2
     assert "begun with another minutes" in capsys.readouterr().err
 
@@ -137,6 +152,25 @@ def test_a_network_ships_if_it_beats_its_filter(
         assert "network S: +0.40 +- 0.00 dB over the filter" in told[-1]
     else:
         assert "-0.10 +- 0.00 dB over the filter: it stays out of the bundle" in told[-1]
+
+
+def test_judging_shows_its_share(
+    small: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(camera_judging, "ISOS", (100.0, 200.0))
+    bundle, board = write_wide_bundle(tmp_path, "any.camkit"), Board(note=lambda _: None)
+    done = []
+
+    def restored(pipeline: Any, exposed: Any) -> Any:
+        (task,) = (task for task in board.tasks if task.what == "judging the camera")
+        done.append((task.done, task.total, task.unit))
+        return exposed.sharp
+
+    monkeypatch.setattr(camera_judging, "restored_by", restored)
+    monkeypatch.setattr(camera_judging, "pipelines_of", lambda _: {DEVELOP: None})
+    with listening(board):
+        camera_judging.judge_camera(bundle, None, tmp_path)
+    assert done == [(number, 4, "captures") for number in range(4)]
 
 
 def test_few_minutes_leave_the_filter_alone(

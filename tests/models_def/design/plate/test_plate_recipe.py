@@ -77,7 +77,7 @@ def test_a_reader_decides_a_run_too_and_none_leaves_older_checkpoints_their_dige
         ({"reader": {"recipe": "x.toml"}}, "reader lacks size"),
         ({"reader": {"recipe": "x.toml", "size": "S", "batch": 0}}, "batch, patch_px, scenes"),
         ({"reader": {"recipe": "x.toml", "size": "S", "weight": -1.0}}, "weight >= 0"),
-        ({"cells": "many"}, "cells must be of type int"),
+        ({"cells": "many"}, "cells must be a whole number"),
         ({"etching": {"range_um": 0.3, "levels": 1}}, "levels are 2, 4, 8"),
     ],
 )

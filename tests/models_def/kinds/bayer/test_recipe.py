@@ -44,7 +44,7 @@ def test_network_schedule_overrides_the_common_one(recipe):
     [
         ("colour", 1, "recipe: unknown key 'colour'"),
         ("data__sampel_px", 64, "data: unknown key 'sampel_px'"),
-        ("data__sample_px", 64.5, "data.sample_px must be of type int"),
+        ("data__sample_px", 64.5, "data.sample_px must be a whole number"),
         ("data__picture_share", 1.5, "data.picture_share must lie in 0..1"),
         ("data__drift_share", -0.1, "data.drift_share must lie in 0..1"),
         ("data__drift_scale", 0.5, "data.drift_scale must be in"),
@@ -54,7 +54,7 @@ def test_network_schedule_overrides_the_common_one(recipe):
         ("schedule__overshoot", -1.0, "schedule.overshoot must be >= 0"),
         ("schedule__loss", "l3", "schedule.loss must be one of"),
         ("schedule__precision", "float8", "schedule.precision must be one of"),
-        ("schedule__steps", True, "schedule.steps must be of type int"),
+        ("schedule__steps", True, "schedule.steps must be a whole number"),
         ("lens__prescription", None, "lens needs prescription"),
         ("lens__copies", 0, "lens.copies and lens.validation_copies must be >= 1; got 0, 1"),
         ("lens__validation_copies", 0, "lens.validation_copies must be >= 1"),
@@ -71,7 +71,7 @@ def test_network_schedule_overrides_the_common_one(recipe):
         ("sensor__channel_response", None, "channel_response"),
         ("fine_tuning", 3, "fine_tuning must be a table"),
         ("frames", {"count": 2}, "there is no table .haze."),
-        ("kind", 3, "kind must be of type str"),
+        ("kind", 3, "kind must be a text"),
         ("networks", {}, "at least one table"),
         ("name", None, "name is missing"),
     ],
@@ -189,15 +189,15 @@ def test_all_faults_are_named_at_once() -> None:
     for fault in (
         "unknown key 'called'",
         "name is missing",
-        "sensor.width_px: ",
+        "sensor.width_px must be greater than 0; got -1",
         "sensor.noise is missing",
         "at least one table [networks.SIZE]",
         "object_distance_mm is missing",
         "wiener.prior_scale is missing",
-        "wiener.block: ",
-        "lens.copies must be of type int; got 'many'",
+        "wiener.block is an unknown key",
+        "lens.copies must be a whole number; got 'many'",
         "data: unknown key 'foo'; known are ",
-        "data.iso_max must be of type float; got 'x'",
+        "data.iso_max must be a number; got 'x'",
     ):
         assert fault in str(refusal.value)
 

@@ -52,7 +52,7 @@ def test_a_network_without_role_makes_pictures_finer(tiny: SpadRecipe) -> None:
         ({"data__photons_min": 1e9}, "data.photons_min"),
         ({"data__detected": 2.0}, "detected in"),
         ({"data__dark_counts": -1.0}, "dark_counts"),
-        ({"data__told": 1}, "data.told must be of type bool"),
+        ({"data__told": 1}, "data.told must be true or false"),
         ({"lens": {}}, "unknown key 'lens'"),
     ],
 )

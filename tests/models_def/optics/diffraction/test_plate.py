@@ -74,7 +74,7 @@ def test_its_psf_is_that_of_the_heights_as_made() -> None:
     ("change", "message"),
     [
         (("[bench]", "[bank]"), "unknown key 'bank'"),
-        (("diameter_mm = 2.0", "diameter_mm = 'x'"), r"bench\.diameter_mm must be of type float"),
+        (("diameter_mm = 2.0", "diameter_mm = 'x'"), r"bench\.diameter_mm must be a number"),
         (('glass = "SILICA"', 'glass = "SAND"'), "SAND"),
         (('heights = "plate.safetensors"', 'heights = "../plate.safetensors"'), "lie beside it"),
         (

@@ -21,10 +21,10 @@ def test_glass_comes_back_from_its_table() -> None:
     ("change", "message"),
     [
         ({"extra": 1}, "unknown key 'extra'"),
-        ({"name": 1}, "name must be of type str"),
+        ({"name": 1}, "name must be a text"),
         ({"range_um": [0.3]}, "range_um"),
         ({"range_um": 0.3}, "range_um must be a list"),
-        ({"coefficients": ["1"]}, r"coefficients\[0\] must be of type float"),
+        ({"coefficients": ["1"]}, r"coefficients\[0\] must be a number"),
         ({"formula": "magic"}, "formula must be one of"),
     ],
 )

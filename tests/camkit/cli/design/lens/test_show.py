@@ -56,3 +56,30 @@ def test_what_was_left_out_of_a_file_stands_in_its_json(camkit_command, tmp_path
     path.write_text(LA1131.replace("VCYN 0 0", "VCYN 0 0.2"))
     outcome = camkit_command("lens", "show", path, "--json")
     assert "VCYN" in json.loads(outcome.out)["notes"][0]
+
+
+@pytest.mark.parametrize(
+    ("more", "page"),
+    [
+        ([], "cooke-triplet-f5.html"),
+        (["-o", "out"], "out/cooke-triplet-f5.html"),
+        (["-o", "out/mine.html"], "out/mine.html"),
+        (["-o", "mine.HTML"], "mine.html"),
+        (["-o", "mine.html", "--json"], "mine.html"),
+    ],
+)
+def test_a_page_goes_where_it_is_asked_for_and_every_file_is_printed(
+    more: list[str],
+    page: str,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(["lens", "show", str(LENS), *more]) == ExitCode.DONE
+    there = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.*")}
+    assert page in there
+    assert {Path(name).parent for name in there} == {Path(page).parent}
+    assert all(name.startswith(page.removesuffix(".html")) for name in there)
+    if "--json" not in more:
+        assert set(capsys.readouterr().out.split()) == there

@@ -1,6 +1,7 @@
 """`camkit network` on the command line, and messages that point to it."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -8,6 +9,9 @@ import torch
 
 from camkit.bundle.reader import open_bundle
 from camkit.cli.app import run
+from camkit.cli.design.network.network_add import cost_text
+from camkit.export.foreign import adding, doors
+from camkit.progress import Board, Task, listening
 from tests.bundle_factory import write_tiny_bundle
 from tests.foreign_networks import DnCNN, Mdta, NAFNet, exported, seeded
 
@@ -98,3 +102,45 @@ def test_a_config_without_a_key_is_refused(
     words = ["network", "inspect", "dncnn.pth", "--module", "a:B", "--config", "width"]
     assert run(words) == 2
     assert "--config takes KEY=VALUE" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("cost_db", "text"),
+    [(-0.021, "-0.02 dB: no loss"), (0.0, "0.00 dB: no loss"), (0.089, "0.09 dB lost")],
+)
+def test_a_negative_cost_reads_as_no_loss(cost_db: float, text: str) -> None:
+    assert cost_text(cost_db) == text
+
+
+def test_every_step_and_what_is_loaded_are_shown(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[str] = []
+    monkeypatch.setattr(Task, "__setattr__", _recorder(seen))
+    lines: list[str] = []
+    with listening(Board(note=lines.append)):
+        doors.add_network(
+            "dncnn.pth",
+            "mine.camkit",
+            contract="contract.toml",
+            camera="tiny.camkit",
+            module="tests.foreign_networks:DnCNN",
+        )
+    steps = [text for text in seen if text in adding.STEPS]
+    assert steps == list(adding.STEPS)
+    assert "loading torch for dncnn.pth" in seen
+    assert "loading tests.foreign_networks:DnCNN" in seen
+    assert "turning DnCNN into ONNX" in seen
+    (line,) = lines
+    assert line.endswith("weights of tests.foreign_networks:DnCNN")
+
+
+def _recorder(seen: list[str]) -> Callable[[Task, str, object], None]:
+    """Return a setter that keeps every text of a task."""
+
+    def set_value(task: Task, name: str, value: object) -> None:
+        if name == "what":
+            seen.append(str(value))
+        object.__setattr__(task, name, value)
+
+    return set_value

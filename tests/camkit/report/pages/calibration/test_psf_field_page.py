@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from camkit.calibrate import import_psf
+from camkit.calibration.psf_import.psf_facts import places_text
 from camkit.report.pages.calibration.psf_field_page import draw_field, draw_impulse, psf_field_html
 from tests.psf_files import SIDE, counts
 
@@ -28,7 +29,7 @@ def test_every_symmetry_has_its_page(tmp_path, kernels, options):
     result = _import(tmp_path, kernels, **options)
     html = psf_field_html(result, "psf.npy")
     assert html.count("data:image/png") == 2
-    assert f"{result.psf.field_heights_mm.size} places ({result.psf.symmetry})" in html
+    assert f"psf.npy: {places_text(result.psf)}." in html
 
 
 def test_rows_run_down_and_columns_right(tmp_path):

@@ -128,7 +128,7 @@ def test_another_reference_is_an_error_that_names_the_pair(tmp_path, folder, rec
     [
         ("", "one of iso > 0 and noise"),
         ("iso = -1.0", "iso must be > 0"),
-        ('iso = "x"', "iso must be of type float"),
+        ('iso = "x"', "iso must be a number"),
         ("iso = 100\nblack = 3", "unknown key 'black'"),
         ("iso = 1\nwhite_balance = [1]", r"white_balance must be \[R, G, B\]"),
         ("iso = 1\nnoise = [1e-5, 0]", "one of iso > 0 and noise"),
