@@ -13,7 +13,6 @@ Three definitions of the pupil; spots and PSFs differ by them, so each states it
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final, Literal, get_args
 
@@ -21,6 +20,9 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
+from camkit.models_def.optics.aiming.aim import aim
+from camkit.models_def.optics.aiming.newton import Aim
+from camkit.models_def.optics.aiming.start import launch, with_open_apertures
 from camkit.models_def.optics.paraxial import Paraxial, paraxial_data
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.trace import (
@@ -30,15 +32,11 @@ from camkit.models_def.optics.trace import (
     refract,
     surface_tensors,
     trace,
-    without_walls,
 )
 
 PupilDefinition = Literal["paraxial", "chief", "stop"]
 PUPIL_DEFINITIONS: Final[tuple[PupilDefinition, ...]] = get_args(PupilDefinition)
 
-AIM_STEPS: Final = 8
-AIM_TOLERANCE_MM: Final = 1e-8
-_DIFFERENCE_MM: Final = 1e-5
 _GOLDEN_ANGLE_RAD: Final = math.pi * (3 - math.sqrt(5))
 
 
@@ -100,115 +98,6 @@ def with_fixed_stop(lens: Lens) -> Lens:
     return replace(lens, aperture_kind="stop_semi_diameter_mm", aperture_value=stop_mm)
 
 
-def launch(x: Tensor, y: Tensor, slope: Tensor, object_distance_mm: float) -> Rays:
-    """Start rays at points of the vertex plane of the first surface.
-
-    Args:
-        x: Points in mm; broadcasts with y and slope.
-        y: Points in mm.
-        slope: tan of the field angle: the object point lies in the direction (0, -slope, -1)
-            seen from the first vertex, its image at +y.
-        object_distance_mm: From the first vertex; inf for parallel rays.
-    """
-    blank = torch.zeros_like(x + y + slope)
-    x, y, slope = x + blank, y + blank, slope + blank
-    if math.isinf(object_distance_mm):
-        dx, dy = torch.zeros_like(x), slope
-    else:
-        dx, dy = x / object_distance_mm, y / object_distance_mm + slope
-    n = 1 / torch.sqrt(1 + dx**2 + dy**2)
-    return Rays(
-        x=x,
-        y=y,
-        z=torch.zeros_like(x),
-        l=dx * n,
-        m=dy * n,
-        n=n,
-        fate=torch.zeros(x.shape, dtype=torch.int8),
-    )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Aim:
-    """The launch points of rays that pass wanted points of the stop.
-
-    Attributes:
-        x: Launch points in mm in the vertex plane of the first surface.
-        y: The same.
-        weight: Beam area per stop area; 0 where no launch point was found.
-    """
-
-    x: Tensor
-    y: Tensor
-    weight: Tensor
-
-
-def aim(
-    tensors: SurfaceTensors, stop: int, target: PupilSamples, slope: Tensor, distance_mm: float
-) -> Aim:
-    """Find launch points by Newton's method, without gradient.
-
-    Args:
-        tensors: The lens at the wavelength of the rays.
-        stop: Index of the stop surface.
-        target: Wanted points on the stop in mm; broadcasts with slope.
-        slope: tan of the field angle.
-        distance_mm: Object distance, inf allowed.
-    """
-    blank = torch.zeros_like(target.x + slope)
-    wanted_x, wanted_y, slope = target.x + blank, target.y + blank, slope + blank
-    if stop == 0 and not bool(tensors.curvature_per_mm[0].any()) and not tensors.aspheric[0]:
-        return Aim(x=wanted_x, y=wanted_y, weight=torch.ones_like(wanted_x))
-    tensors = with_open_apertures(tensors)
-
-    def at_stop(x: Tensor, y: Tensor) -> Rays:
-        rays = launch(x, y, slope, distance_mm)
-        rays = trace(tensors, rays, surfaces=range(stop))
-        return refract(tensors, rays, stop)
-
-    axis = torch.zeros_like(wanted_x + tensors.index[0])
-    with torch.no_grad():
-        return newton_aim(at_stop, (wanted_x, wanted_y), (axis, axis))
-
-
-def newton_aim(
-    at_stop: Callable[[Tensor, Tensor], Rays],
-    target: tuple[Tensor, Tensor],
-    begin: tuple[Tensor, Tensor],
-    *,
-    steps: int = AIM_STEPS,
-    fresh: int = AIM_STEPS,
-) -> Aim:
-    """Find launch points by Newton's method with differences for slopes.
-
-    Args:
-        at_stop: Takes launch points x and y in mm to the rays on the stop, rims open.
-        target: x and y in mm on the stop; broadcast with `begin`.
-        begin: Launch points to begin from.
-        steps: The last one only judges.
-        fresh: So many first steps measure the slopes, at three traces each; the others keep them.
-    """
-    x, y = begin
-    step, converged = _DIFFERENCE_MM, torch.zeros_like(x, dtype=torch.bool)
-    determinant = torch.ones_like(x)
-    for number in range(steps):
-        here = at_stop(x, y)
-        if number < fresh:
-            right, down = at_stop(x + step, y), at_stop(x, y + step)
-            xx, yx = (right.x - here.x) / step, (right.y - here.y) / step
-            xy, yy = (down.x - here.x) / step, (down.y - here.y) / step
-        alive = here.valid & right.valid & down.valid
-        product = xx * yy - xy * yx
-        good = alive & (torch.abs(product) > 1e-9)
-        determinant = torch.where(good, product, 1.0)
-        ex, ey = target[0] - here.x, target[1] - here.y
-        converged = good & (ex**2 + ey**2 < AIM_TOLERANCE_MM**2)
-        # a dead probe ray steps back to the axis, from where it may try again
-        x = torch.where(good, x + (yy * ex - xy * ey) / determinant, 0.5 * x)
-        y = torch.where(good, y + (xx * ey - yx * ex) / determinant, 0.5 * y)
-    return Aim(x=x, y=y, weight=torch.where(converged, 1 / torch.abs(determinant), 0.0))
-
-
 def real_stop_radius_mm(lens: Lens) -> float:
     """Return the height at the stop of the real marginal ray of the reference wavelength.
 
@@ -231,12 +120,6 @@ def real_stop_radius_mm(lens: Lens) -> float:
             "stop_semi_diameter_mm"
         )
     return abs(float(met.y))
-
-
-def with_open_apertures(tensors: SurfaceTensors) -> SurfaceTensors:
-    """Return the lens without the limits of its surfaces: no rim and no wall of a groove."""
-    tensors = without_walls(tensors)
-    return replace(tensors, semi_diameter_mm=torch.full_like(tensors.semi_diameter_mm, math.inf))
 
 
 def beam_radius_mm(lens: Lens) -> float:
@@ -307,5 +190,5 @@ def marked(rays: Rays, weight: Tensor) -> Rays:
 def _aim_at(
     lens: Lens, tensors: SurfaceTensors, samples: PupilSamples, slope: Tensor, radius_mm: float
 ) -> Aim:
-    target = PupilSamples(x=samples.x * radius_mm, y=samples.y * radius_mm)
-    return aim(tensors, lens.stop, target, slope, lens.object_distance_mm)
+    target = (samples.x * radius_mm, samples.y * radius_mm)
+    return aim(lens, tensors, target, slope)

@@ -1,24 +1,25 @@
 """Landing points of rays on the sensor: chief rays, field slopes for sensor heights, spots."""
 
+import math
 from dataclasses import dataclass, replace
 from typing import Final
 
+import numpy as np
 import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
+from camkit.models_def.optics.aiming.chief_path import WIDEST_DEG, chief_path
+from camkit.models_def.optics.aiming.start import with_open_apertures
 from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.pupil import (
-    PupilDefinition,
-    PupilSamples,
-    pupil_centre,
-    pupil_rays,
-)
-from camkit.models_def.optics.trace import surface_tensors, trace, without_walls
+from camkit.models_def.optics.pupil import PupilDefinition, PupilSamples, pupil_centre, pupil_rays
+from camkit.models_def.optics.trace import surface_tensors, trace
+from camkit.units import to_radians
 
 _SLOPE_STEPS: Final = 12
 _SLOPE_TOLERANCE_MM: Final = 1e-9
 _SLOPE_DIFFERENCE: Final = 1e-6
+_STEEPEST: Final = math.tan(to_radians(WIDEST_DEG))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,7 +44,8 @@ class Spots:
 def chief_heights(lens: Lens, slopes: Tensor, wavelength_um: float | None = None) -> Tensor:
     """Return the heights (field,) in mm at which chief rays of field slopes meet the sensor.
 
-    The chief ray passes the centre of the stop; no wall of a groove takes it.
+    The chief ray passes the centre of the stop; it is a reference, which no rim and no wall of a
+    groove takes.
 
     Args:
         lens: The prescription.
@@ -54,15 +56,16 @@ def chief_heights(lens: Lens, slopes: Tensor, wavelength_um: float | None = None
         ContractError: If a chief ray is lost.
     """
     wave = lens.reference_wavelength_um if wavelength_um is None else wavelength_um
-    tensors = without_walls(surface_tensors(lens, torch.tensor(wave, dtype=torch.float64)))
+    tensors = surface_tensors(lens, torch.tensor(wave, dtype=torch.float64))
+    tensors = with_open_apertures(tensors)
     rays, _ = pupil_rays(lens, tensors, pupil_centre(), slopes[:, None])
     landings = trace(tensors, rays)
     if not bool(landings.valid.all()):
         lost_slopes = torch.rad2deg(torch.atan(slopes[~landings.valid[:, 0]])).tolist()
         angles = ", ".join(dict.fromkeys(f"{angle:.1f}" for angle in lost_slopes))
         raise ContractError(
-            f"the chief ray is lost at {angles} degrees: the lens does not image so far; use "
-            "smaller fields or a smaller sensor"
+            f"the chief ray is lost at {angles} degrees: {lens.name} is aimed to "
+            f"{chief_path(lens).reach}; use smaller fields or a smaller sensor"
         )
     return landings.y[:, 0]
 
@@ -70,23 +73,52 @@ def chief_heights(lens: Lens, slopes: Tensor, wavelength_um: float | None = None
 def slopes_for_heights(lens: Lens, heights_mm: Tensor) -> Tensor:
     """Find the field slopes (field,) whose reference chief ray lands at given heights.
 
-    Newton's method from the paraxial slope, without gradient.
+    Newton's method without gradient: from the paraxial slopes, and where that fails from the chief
+    rays that were followed out from the axis (`chief_path`).
 
     Raises:
-        ContractError: If a height cannot be reached.
+        ContractError: If a height cannot be reached; it names the height that can.
     """
+    heights_mm = heights_mm.to(torch.float64)
     with torch.no_grad():
-        step = torch.full((1,), _SLOPE_DIFFERENCE, dtype=torch.float64)
-        scale = chief_heights(lens, step)[0] / _SLOPE_DIFFERENCE
-        slopes = heights_mm.to(torch.float64) / scale
-        for _ in range(_SLOPE_STEPS):
-            both = chief_heights(lens, torch.cat([slopes, slopes + _SLOPE_DIFFERENCE]))
-            here, ahead = both.chunk(2)
-            missed_by = heights_mm - here
-            if bool((torch.abs(missed_by) < _SLOPE_TOLERANCE_MM).all()):
-                return slopes
-            slopes = slopes + missed_by * _SLOPE_DIFFERENCE / (ahead - here)
-    raise ContractError(f"no field reaches the sensor heights {heights_mm.tolist()} mm")
+        try:
+            step = torch.full((1,), _SLOPE_DIFFERENCE, dtype=torch.float64)
+            scale = chief_heights(lens, step)[0] / _SLOPE_DIFFERENCE
+            found = _corrected_slopes(lens, heights_mm, heights_mm / scale)
+        except ContractError:
+            found = None
+        if found is None:
+            found = _corrected_slopes(lens, heights_mm, _followed_slopes(lens, heights_mm))
+    if found is None:
+        raise ContractError(f"no field reaches the sensor heights {heights_mm.tolist()} mm")
+    return found
+
+
+def _corrected_slopes(lens: Lens, heights_mm: Tensor, slopes: Tensor) -> Tensor | None:
+    """Return slopes that land at the heights by Newton's method; None if that does not settle."""
+    for _ in range(_SLOPE_STEPS):
+        both = chief_heights(lens, torch.cat([slopes, slopes + _SLOPE_DIFFERENCE]))
+        here, ahead = both.chunk(2)
+        missed_by = heights_mm - here
+        if bool((torch.abs(missed_by) < _SLOPE_TOLERANCE_MM).all()):
+            # what Newton finds at grazing angles is no field of the lens
+            return slopes if bool((slopes.abs() < _STEEPEST).all()) else None
+        slopes = slopes + missed_by * _SLOPE_DIFFERENCE / (ahead - here)
+    return None
+
+
+def _followed_slopes(lens: Lens, heights_mm: Tensor) -> Tensor:
+    """Return slopes near those of the heights, from the chief rays that `chief_path` found."""
+    path = chief_path(lens)
+    widest_mm = path.heights_mm.max()
+    if float(heights_mm.abs().max()) > widest_mm:
+        raise ContractError(
+            f"{lens.name} is aimed to {path.reach}; the sensor's corner is at "
+            f"{float(heights_mm.abs().max()):.2f} mm: use a smaller sensor"
+        )
+    rising = slice(int(path.heights_mm.argmax()) + 1)
+    angles = np.interp(np.abs(heights_mm.numpy()), path.heights_mm[rising], path.angles_rad[rising])
+    return torch.from_numpy(np.tan(angles)) * torch.sign(heights_mm)
 
 
 def trace_spots(

@@ -5,15 +5,16 @@ import math
 import pytest
 import torch
 
+from camkit.models_def.optics.aiming.newton import newton_aim
+from camkit.models_def.optics.aiming.start import launch
 from camkit.models_def.optics.paraxial import (
     entrance_pupil,
     focal_lengths,
     image_of_stop,
     trace_paraxial,
 )
-from camkit.models_def.optics.pupil import PupilSamples, aim, launch
 from camkit.models_def.optics.reverse import reverse
-from camkit.models_def.optics.trace import Rays, trace
+from camkit.models_def.optics.trace import Rays, refract, trace
 from tests.physics.printed_lenses import double_gauss, rays_at
 
 STOP = 5
@@ -101,8 +102,13 @@ def test_real_chief_rays_are_those_of_the_listing(
     angle_deg: float, image_y_mm: float, first_y_mm: float, pupil_mm: float
 ) -> None:
     slope = _column(math.tan(math.radians(angle_deg)))
-    middle = PupilSamples(x=_column(0.0), y=_column(0.0))
-    aimed = aim(double_gauss(), STOP, middle, slope, math.inf)
+
+    def at_stop(x: torch.Tensor, y: torch.Tensor) -> Rays:
+        rays = trace(double_gauss(), launch(x, y, slope, math.inf), surfaces=range(STOP))
+        return refract(double_gauss(), rays, STOP)
+
+    zero = _column(0.0)
+    aimed = newton_aim(at_stop, (zero, zero), (zero, zero))
     seen: list[Rays] = []
     landed = trace(double_gauss(), launch(aimed.x, aimed.y, slope, math.inf), surface_rays=seen)
     assert float(landed.y) == pytest.approx(image_y_mm, abs=SIX_DIGITS)

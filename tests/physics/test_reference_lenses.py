@@ -5,9 +5,10 @@ from dataclasses import replace
 import pytest
 import torch
 
+from camkit.models_def.optics.aiming.start import launch
 from camkit.models_def.optics.paraxial import focal_lengths, paraxial_data, with_paraxial_focus
 from camkit.models_def.optics.prescription import Lens, Surface
-from camkit.models_def.optics.pupil import PupilSamples, hexapolar, launch
+from camkit.models_def.optics.pupil import PupilSamples, hexapolar
 from camkit.models_def.optics.spot import chief_heights, rms_radius, trace_spots
 from camkit.models_def.optics.trace import Rays, SurfaceTensors, surface_tensors, trace
 from tests.physics.reference_lenses import (

@@ -5,10 +5,10 @@ import math
 import pytest
 import torch
 
+from camkit.models_def.optics.aiming.start import launch
 from camkit.models_def.optics.analysis.first_order import ParaxialRay, ParaxialRays
 from camkit.models_def.optics.analysis.seidel import seidel_of_rays
 from camkit.models_def.optics.paraxial import focal_lengths, trace_paraxial
-from camkit.models_def.optics.pupil import launch
 from camkit.models_def.optics.trace import Rays, SurfaceTensors, trace
 from camkit.models_def.optics.tracing.profile import sag, sag_slope
 from tests.physics.printed_lenses import cooke_tensors, lens_tensors, rays_at

@@ -8,9 +8,9 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
+from camkit.models_def.optics.aiming.start import launch, with_open_apertures
 from camkit.models_def.optics.paraxial import paraxial_data, trace_paraxial
 from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.pupil import launch, with_open_apertures
 from camkit.models_def.optics.trace import SurfaceTensors, surface_tensors, trace
 from camkit.units import UM_PER_MM
 

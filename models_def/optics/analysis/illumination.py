@@ -11,15 +11,12 @@ from dataclasses import replace
 import torch
 from torch import Tensor
 
+from camkit.models_def.optics.aiming.newton import newton_aim
+from camkit.models_def.optics.aiming.start import with_open_apertures
 from camkit.models_def.optics.analysis.spots import analysis_tensors, chief_landings
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.psf import with_object_distance
-from camkit.models_def.optics.pupil import (
-    half_disc,
-    newton_aim,
-    real_stop_radius_mm,
-    with_open_apertures,
-)
+from camkit.models_def.optics.pupil import half_disc, real_stop_radius_mm
 from camkit.models_def.optics.render.beam import light_of, rays_from, stop_labels
 from camkit.models_def.optics.render.lens_view import lens_optics
 from camkit.models_def.optics.reverse import reverse, trace_to_scene

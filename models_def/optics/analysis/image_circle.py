@@ -6,42 +6,36 @@ from typing import Final
 import torch
 
 from camkit.errors import ContractError
+from camkit.models_def.optics.aiming.chief_path import chief_path
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import half_disc
 from camkit.models_def.optics.spot import chief_heights, trace_spots
 from camkit.models_def.optics.trace import Fate
 
-_FIRST_STEP_DEG: Final = 4.0
-_LAST_STEP_DEG: Final = 2e-4
-_END_DEG: Final = 90.0
+_HALVINGS: Final = 16
 _RAYS: Final = 512
 
 
 def image_radius_mm(lens: Lens) -> float:
-    """Return the height on the sensor of the outermost chief ray that arrives.
+    """Return the height on the sensor of the outermost field from which light arrives.
 
-    Field angles grow from the axis until a chief ray is lost, or lands nearer to the axis again.
+    Fields are those of `chief_path`, up to where chief rays land nearer to the axis again; which
+    is the outermost one that the rims leave some light is found by halving.
     """
-    angle_deg, step_deg, radius_mm = 0.0, _FIRST_STEP_DEG, 0.0
-    while step_deg > _LAST_STEP_DEG:
-        ahead_mm = _height_mm(lens, angle_deg + step_deg)
-        if ahead_mm > radius_mm:
-            angle_deg, radius_mm = angle_deg + step_deg, ahead_mm
-        else:
-            step_deg /= 2
-    return radius_mm
+    path = chief_path(lens)
+    outermost = int(path.heights_mm.argmax())
+    low, high = 0.0, float(path.angles_rad[outermost])
+    if _is_lit(lens, high):
+        return float(path.heights_mm[outermost])
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if _is_lit(lens, middle) else (low, middle)
+    return float(chief_heights(lens, torch.tensor([math.tan(low)], dtype=torch.float64))[0])
 
 
-def _height_mm(lens: Lens, angle_deg: float) -> float:
-    """Return the height of a chief ray; -inf of one that is lost."""
-    if angle_deg >= _END_DEG:
-        return -math.inf
-    slope = math.tan(math.radians(angle_deg))
-    with torch.no_grad():
-        try:
-            return float(chief_heights(lens, torch.tensor([slope], dtype=torch.float64))[0])
-        except ContractError:
-            return -math.inf
+def _is_lit(lens: Lens, angle_rad: float) -> bool:
+    """Return whether the rims let a ray of a field through."""
+    return bool((_fates(lens, angle_rad) == Fate.VALID).any())
 
 
 def open_share(lens: Lens) -> float:
@@ -49,8 +43,15 @@ def open_share(lens: Lens) -> float:
 
     Below 1 where rims are narrower than the beam.
     """
-    axis = torch.zeros(1, dtype=torch.float64)
+    return float((_fates(lens, 0.0) == Fate.VALID).double().mean())
+
+
+def _fates(lens: Lens, angle_rad: float) -> torch.Tensor:
+    """Return what became of the rays that fill the stop from a field; all lost without a chief."""
+    slope = torch.tan(torch.tensor([angle_rad], dtype=torch.float64))
     wave = torch.tensor([lens.reference_wavelength_um], dtype=torch.float64)
     with torch.no_grad():
-        fate = trace_spots(lens, axis, wave, half_disc(_RAYS)).fate
-    return float((fate == Fate.VALID).double().mean())
+        try:
+            return trace_spots(lens, slope, wave, half_disc(_RAYS)).fate
+        except ContractError:
+            return torch.full((1,), int(Fate.MISSED))

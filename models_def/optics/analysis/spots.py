@@ -11,7 +11,9 @@ from typing import Final
 import torch
 from torch import Tensor
 
+from camkit.models_def.optics.aiming.start import with_open_apertures
 from camkit.models_def.optics.analysis.sampling import Pupil, sample_weights
+from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import (
     PupilDefinition,
@@ -20,10 +22,15 @@ from camkit.models_def.optics.pupil import (
     pupil_centre,
     pupil_rays,
     real_stop_radius_mm,
-    with_open_apertures,
 )
 from camkit.models_def.optics.spot import Spots, rms_radius
-from camkit.models_def.optics.trace import Rays, SurfaceTensors, surface_tensors, trace
+from camkit.models_def.optics.trace import (
+    Rays,
+    SurfaceTensors,
+    refract,
+    surface_tensors,
+    trace,
+)
 
 _EDGE_SLACK: Final = 1e-7
 CONVERGENCE_SAMPLINGS: Final = (
@@ -88,6 +95,25 @@ def launch_beams(
     radius = beam_radius_mm(lens) if stop_mm is None else stop_mm
     share_mm2 = math.pi * radius**2 / len(samples.x)
     return Beams(tensors=tensors, rays=rays, area_mm2=weight * share_mm2)
+
+
+def paraxial_pupil_misses(lens: Lens, slopes: Tensor) -> Tensor:
+    """Return how far (field,) beside the stop's middle the middle of the paraxial pupil sends rays.
+
+    At the reference wavelength, as a share of the stop's radius; inf where the ray is lost. From
+    some tenths on, spots by the definition `paraxial` are not those of the lens.
+
+    Args:
+        lens: The prescription.
+        slopes: (field,), tan of the field angles.
+    """
+    waves = torch.tensor([lens.reference_wavelength_um], dtype=torch.float64)
+    beams = launch_beams(lens, slopes, waves, pupil_centre(), "paraxial", open_apertures=True)
+    met = refract(
+        beams.tensors, trace(beams.tensors, beams.rays, surfaces=range(lens.stop)), lens.stop
+    )
+    share = torch.hypot(met.x, met.y) / paraxial_data(lens).stop_semi_diameter_mm
+    return torch.where(met.valid, share, math.inf)[:, 0, 0]
 
 
 def launch_near_chief(

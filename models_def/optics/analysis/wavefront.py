@@ -13,6 +13,7 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
+from camkit.models_def.optics.aiming.start import launch
 from camkit.models_def.optics.analysis.spots import (
     Beams,
     chief_landings,
@@ -21,7 +22,7 @@ from camkit.models_def.optics.analysis.spots import (
 )
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.pupil import PupilDefinition, PupilSamples, launch, pupil_centre
+from camkit.models_def.optics.pupil import PupilDefinition, PupilSamples, pupil_centre
 from camkit.models_def.optics.trace import Rays, SurfaceTensors, trace
 from camkit.units import UM_PER_MM
 

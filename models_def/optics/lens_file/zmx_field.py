@@ -11,6 +11,7 @@ from enum import IntEnum
 import torch
 
 from camkit.errors import UnsupportedError
+from camkit.models_def.optics.aiming.chief_path import chief_path
 from camkit.models_def.optics.lens_file.zmx_records import Records, last
 from camkit.models_def.optics.paraxial import paraxial_data, trace_paraxial
 from camkit.models_def.optics.prescription import Lens
@@ -28,8 +29,8 @@ class FieldType(IntEnum):
     REAL_IMAGE_HEIGHT = 3
 
 
-def with_fields(lens: Lens, system: Records, mm_per_unit: float) -> Lens:
-    """Return the lens with the fields of its file, increasing, each once.
+def with_fields(lens: Lens, system: Records, mm_per_unit: float) -> tuple[Lens, tuple[str, ...]]:
+    """Return the lens with the fields of its file, increasing, each once, and what was left out.
 
     Args:
         lens: Everything else about it.
@@ -54,14 +55,29 @@ def with_fields(lens: Lens, system: Records, mm_per_unit: float) -> Lens:
             "paraxial (2) and real image heights (3)"
         )
     points = _points(system)
+    notes: tuple[str, ...] = ()
     if number == FieldType.ANGLE and math.isinf(lens.object_distance_mm):
         angles = {math.fabs(to_radians(y)) if x == 0 else _skew_angle(x, y) for x, y in points}
     elif number == FieldType.ANGLE:
         angles = {_angle_from_vertex(lens, _skew_angle(x, y)) for x, y in points}
     else:
         heights = sorted({math.hypot(x, y) * mm_per_unit for x, y in points})
+        if number == FieldType.REAL_IMAGE_HEIGHT:
+            heights, notes = _reached(lens, heights)
         angles = set(_angles_of_heights(lens, FieldType(number), heights))
-    return replace(lens, field_angles_rad=tuple(sorted(angles)))
+    return replace(lens, field_angles_rad=tuple(sorted(angles))), notes
+
+
+def _reached(lens: Lens, heights_mm: list[float]) -> tuple[list[float], tuple[str, ...]]:
+    """Return the image heights to which the lens can be aimed, and a note on the others."""
+    path = chief_path(lens)
+    widest_mm = float(path.heights_mm.max())
+    beyond = [height for height in heights_mm if height > widest_mm]
+    if not beyond:
+        return heights_mm, ()
+    names = ", ".join(f"{height:g} mm" for height in beyond)
+    note = f"fields at {names} are left out: the lens is aimed to {path.reach}"
+    return [height for height in heights_mm if height <= widest_mm] or [0.0], (note,)
 
 
 def _points(system: Records) -> list[tuple[float, float]]:

@@ -112,7 +112,8 @@ def parse_zmx(
     lens, aperture_notes = _with_rim_aperture(lens, records, scale)
     notes = (*collimator_notes, *aperture_notes, *_notes(records, surfaces))
     notes += _glass_notes(records, surfaces, order)
-    return ZmxLens(lens=with_fields(lens, system, scale), notes=notes)
+    lens, field_notes = with_fields(lens, system, scale)
+    return ZmxLens(lens=lens, notes=(*notes, *field_notes))
 
 
 def _mm_per_unit(record: Record | None) -> float:

@@ -10,9 +10,10 @@ from typing import Final
 import torch
 from torch import Tensor
 
+from camkit.models_def.optics.aiming.start import launch
 from camkit.models_def.optics.paraxial import entrance_pupil, focal_lengths
 from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.pupil import PupilSamples, launch
+from camkit.models_def.optics.pupil import PupilSamples
 from camkit.models_def.optics.trace import Rays, SurfaceTensors
 
 LEAD_X: Final = (0.0, 0.0, 0.0, 1.0)

@@ -18,8 +18,9 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
+from camkit.models_def.optics.aiming.start import launch
 from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.pupil import PupilSamples, launch, pupil_rays
+from camkit.models_def.optics.pupil import PupilSamples, pupil_rays
 from camkit.models_def.optics.trace import Rays, SurfaceTensors, surface_tensors, trace
 from camkit.units import to_mm
 

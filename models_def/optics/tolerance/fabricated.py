@@ -9,18 +9,17 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
+from camkit.models_def.optics.aiming.newton import newton_aim
+from camkit.models_def.optics.aiming.start import launch, with_open_apertures
 from camkit.models_def.optics.glass.dispersion import D_LINE_UM
 from camkit.models_def.optics.paraxial import trace_paraxial
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import (
     PupilSamples,
-    launch,
     marked,
-    newton_aim,
     pupil_centre,
     pupil_rays,
     with_fixed_stop,
-    with_open_apertures,
 )
 from camkit.models_def.optics.tolerance.deviation import Deviations, no_deviations
 from camkit.models_def.optics.tolerance.elements import glass_elements

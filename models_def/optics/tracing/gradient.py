@@ -8,6 +8,7 @@ is traced again when its gradient is due. So memory is bounded whatever the numb
 from collections.abc import Sequence
 from typing import Any, Final, NamedTuple, Protocol
 
+import numpy as np
 import torch
 from torch import Tensor
 from torch.autograd.function import once_differentiable
@@ -176,7 +177,8 @@ class _Trace(torch.autograd.Function):
         rays, lens = State(*tensors[:6]), LensTensors(*tensors[6:])
         batches = (v.shape[fixed:] for v, fixed in zip(lens, FIXED, strict=True))
         shapes = [fate.shape, *(v.shape for v in rays), *batches]
-        shape: torch.Size = torch.broadcast_shapes(*shapes)  # type: ignore[no-untyped-call]
+        # that of torch loads an algebra system, most of a second
+        shape = torch.Size(np.broadcast_shapes(*map(tuple, shapes)))
         rays, fate = State(*(v.expand(shape) for v in rays)), fate.expand(shape)
         size = shape.numel() * len(spec.settings.aspheric) * 6 * rays.x.element_size()
         gradient = any(ctx.needs_input_grad)

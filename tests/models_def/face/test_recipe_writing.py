@@ -112,7 +112,7 @@ def test_a_sensor_that_the_lens_does_not_reach_is_refused_before_any_work(
     reach_mm, covered_px = float(told[1]), int(told[2])
     assert not list(tmp_path.iterdir())
     assert covered_px * 0.01 * math.sqrt(0.5) == pytest.approx(reach_mm, rel=1e-3)
-    inside_px = int(0.8 * covered_px)
+    inside_px = int(0.98 * covered_px)
     assert run([*words, "--sensor", f"{inside_px}x{inside_px}@10um"]) == 0
 
 

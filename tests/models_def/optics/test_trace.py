@@ -6,8 +6,8 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from camkit.models_def.optics.aiming.start import launch
 from camkit.models_def.optics.prescription import Lens, Surface
-from camkit.models_def.optics.pupil import launch
 from camkit.models_def.optics.trace import (
     Fate,
     SurfaceTensors,

@@ -16,8 +16,12 @@ PAGE: Final = ".html"
 def show(
     file: Annotated[Path, typer.Argument(help="Lens file (.toml or .zmx).", metavar="FILE")],
     pupil: Annotated[
-        str, typer.Option(help="Definition of the pupil: paraxial, chief or stop.")
-    ] = "paraxial",
+        str | None,
+        typer.Option(
+            help="Definition of the pupil: paraxial, chief or stop.",
+            show_default="paraxial; stop where that is wrong",
+        ),
+    ] = None,
     sampling: Annotated[
         str,
         typer.Option(
@@ -45,11 +49,11 @@ def show(
     require_torch("camkit lens show")
     from camkit.models_def.optics.analysis.sampling import Pupil
     from camkit.models_def.optics.lens_file.lens_file import read_noted_lens
-    from camkit.report.pages.lens.lens_facts import analyse, to_json
+    from camkit.report.pages.lens.lens_facts import analyse, to_json, usual_pupil
     from camkit.report.pages.lens.lens_page import write_lens_page
     from camkit.report.pages.page import page_path
 
-    rays = Pupil(definition=pupil, sampling=sampling)  # type: ignore[arg-type]
+    given = Pupil(definition=pupil or "stop", sampling=sampling)  # type: ignore[arg-type]
     folder, name = out_dir if out_dir is not None or json_ else Path(), file.stem
     if folder is not None and folder.suffix.lower() == PAGE and not folder.is_dir():
         folder, name = folder.parent, folder.stem
@@ -57,7 +61,7 @@ def show(
         refuse_existing([page_path(folder, name)], overwrite=overwrite)
     lens, notes = read_noted_lens(file, glass or ())
     with working(f"measuring {lens.name}"):
-        facts = analyse(lens, rays, notes)
+        facts = analyse(lens, given if pupil else usual_pupil(lens, sampling), notes)
     with working("drawing the page"):
         written = [] if folder is None else write_lens_page(facts, folder, name)
     if json_:

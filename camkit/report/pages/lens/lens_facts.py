@@ -3,12 +3,14 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
 import torch
 from torch import Tensor
 
+from camkit.caller import option_text
 from camkit.errors import ContractError
+from camkit.models_def.optics.aiming.chief_path import chief_path
 from camkit.models_def.optics.analysis.curves import distortion
 from camkit.models_def.optics.analysis.first_order import airy_radius_mm
 from camkit.models_def.optics.analysis.illumination import relative_illumination_of
@@ -20,6 +22,7 @@ from camkit.models_def.optics.analysis.spots import (
     chief_landings,
     field_slopes,
     max_from_chief,
+    paraxial_pupil_misses,
     rms_about_centroid,
     rms_about_chief,
     spot_convergence,
@@ -34,6 +37,9 @@ from camkit.models_def.optics.trace import Fate, count_fates
 from camkit.units import to_degrees
 
 Fact = TypeVar("Fact")
+
+WRONG_PUPIL: Final = 0.2
+"""Shares of the stop's radius by which the paraxial pupil may miss its middle."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,12 +112,40 @@ class LensFacts:
         return {fate.name.lower(): count for fate, count in counts.items()}
 
 
+def usual_pupil(lens: Lens, sampling: str) -> Pupil:
+    """Return the paraxial pupil, as other programs have it, or the real one where that is wrong.
+
+    Wrong is what misses the middle of the stop by more than `WRONG_PUPIL` at a field.
+    """
+    finite = math.isfinite(paraxial_data(lens).entrance_pupil_mm)
+    right = finite and not _wrong_pupil(lens)
+    return Pupil(definition="paraxial" if right else "stop", sampling=sampling)
+
+
+def _wrong_pupil(lens: Lens) -> list[str]:
+    """Return how far the paraxial pupil is off, a line for each field where it is wrong."""
+    return [
+        f"field {to_degrees(angle_rad):.4g} degrees: rays to the middle of the paraxial entrance "
+        + (
+            f"pupil miss that of the stop by {miss:.0%} of its radius"
+            if miss < math.inf
+            else "pupil are lost before the stop"
+        )
+        for angle_rad, miss in zip(
+            lens.field_angles_rad,
+            paraxial_pupil_misses(lens, field_slopes(lens)).tolist(),
+            strict=True,
+        )
+        if miss > WRONG_PUPIL
+    ]
+
+
 def analyse(lens: Lens, pupil: Pupil, notes_of_file: Sequence[str] = ()) -> LensFacts:
     """Compute everything but the curves.
 
     Args:
         lens: With a field and a wavelength.
-        pupil: How it is filled.
+        pupil: How it is filled; see `usual_pupil`.
         notes_of_file: What the lens does not carry of the file it was read from.
 
     Raises:
@@ -125,6 +159,8 @@ def analyse(lens: Lens, pupil: Pupil, notes_of_file: Sequence[str] = ()) -> Lens
     data = paraxial_data(lens)
     if pupil.definition == "paraxial" and not math.isfinite(data.entrance_pupil_mm):
         raise ContractError("the entrance pupil lies at infinity; use --pupil stop")
+    if pupil.definition == "paraxial":
+        notes += [f"{line}; use {option_text('pupil')} stop" for line in _wrong_pupil(lens)]
     spots = spot_diagram(lens, slopes, waves, pupil)
     nothing = torch.full((len(slopes), len(waves)), math.nan, dtype=torch.float64)
     convergence = spot_convergence(lens, slopes, pupil.definition)
@@ -188,7 +224,10 @@ def _warnings(lens: Lens, spots: Spots) -> list[str]:
         elif losses:
             warnings.append(f"{name}: of {total} rays {', '.join(losses)}")
         if not bool(torch.isfinite(spots.chief_y_mm[i])):
-            warnings.append(f"{name}: the chief ray does not reach the sensor")
+            reach = chief_path(lens).reach
+            warnings.append(
+                f"{name}: the chief ray does not reach the sensor; the lens is aimed to {reach}"
+            )
     return warnings
 
 
@@ -226,6 +265,8 @@ def to_json(facts: LensFacts) -> dict[str, Any]:
         "reference_wavelength_um": facts.lens.reference_wavelength_um,
         "seidel_mm": None if sums is None else sums.sums_mm.tolist(),
         "third_order_transverse_mm": None if sums is None else sums.transverse_mm(),
+        "aimed_to_deg": to_degrees(float(chief_path(facts.lens).angles_rad[-1])),
+        "aimed_to_mm": float(chief_path(facts.lens).heights_mm[-1]),
         "pupil": facts.pupil.definition,
         "pupil_sampling": facts.pupil.sampling,
         "psf_model": facts.model.regime,

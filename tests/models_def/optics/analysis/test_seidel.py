@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 import torch
 
+from camkit.models_def.optics.aiming.start import launch
 from camkit.models_def.optics.analysis.first_order import paraxial_rays
 from camkit.models_def.optics.analysis.seidel import seidel_sums
 from camkit.models_def.optics.prescription import Lens, Surface, read_prescription
-from camkit.models_def.optics.pupil import launch
 from camkit.models_def.optics.trace import surface_tensors, trace
 from tests.physics.reference_lenses import cooke_triplet
 

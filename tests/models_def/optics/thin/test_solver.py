@@ -8,9 +8,10 @@ import pytest
 import torch
 
 from camkit.errors import UnsupportedError
+from camkit.models_def.optics.aiming.start import launch
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.pupil import half_disc, launch
+from camkit.models_def.optics.pupil import half_disc
 from camkit.models_def.optics.thin.plate_lens import plate_lens
 from camkit.models_def.optics.thin.solver import SolvedPlate, solve_plate
 from camkit.models_def.optics.thin.thin_recipe import ThinRecipe, find_thin_recipe

@@ -7,13 +7,14 @@ import pytest
 import torch
 
 from camkit.errors import ContractError
+from camkit.models_def.optics.aiming.start import launch
 from camkit.models_def.optics.glass.dispersion import C_LINE_UM, D_LINE_UM, F_LINE_UM
 from camkit.models_def.optics.grooves import Grooves
 from camkit.models_def.optics.lens_file.lens_file import read_lens
 from camkit.models_def.optics.paraxial import paraxial_data, paraxial_image
 from camkit.models_def.optics.prescription import Lens, Surface
 from camkit.models_def.optics.psf import trace_psf
-from camkit.models_def.optics.pupil import PupilSamples, half_disc, launch, with_fixed_stop
+from camkit.models_def.optics.pupil import PupilSamples, half_disc, with_fixed_stop
 from camkit.models_def.optics.spot import rms_radius, slopes_for_heights, trace_spots
 from camkit.models_def.optics.tolerance.deviation import Deviations, draw_deviations, no_deviations
 from camkit.models_def.optics.tolerance.elements import glass_elements

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import torch
 
+from camkit.models_def.optics.aiming.start import launch
 from camkit.models_def.optics.lens_file.lens_file import read_lens
 from camkit.models_def.optics.prescription import Lens, Surface
-from camkit.models_def.optics.pupil import launch
 from camkit.models_def.optics.tolerance.deviation import Deviations, no_deviations
 from camkit.models_def.optics.tolerance.elements import glass_elements
 from camkit.models_def.optics.tolerance.fabricated import fabricated_tensors

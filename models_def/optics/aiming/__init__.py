@@ -1,0 +1,1 @@
+"""Launch points of rays that pass wanted points of the stop."""

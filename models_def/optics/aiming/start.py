@@ -1,0 +1,43 @@
+"""Rays as they start: at points of the vertex plane of the first surface."""
+
+import math
+from dataclasses import replace
+
+import torch
+from torch import Tensor
+
+from camkit.models_def.optics.trace import Rays, SurfaceTensors, without_walls
+
+
+def launch(x: Tensor, y: Tensor, slope: Tensor, object_distance_mm: float) -> Rays:
+    """Start rays at points of the vertex plane of the first surface.
+
+    Args:
+        x: Points in mm; broadcasts with y and slope.
+        y: Points in mm.
+        slope: tan of the field angle: the object point lies in the direction (0, -slope, -1)
+            seen from the first vertex, its image at +y.
+        object_distance_mm: From the first vertex; inf for parallel rays.
+    """
+    blank = torch.zeros_like(x + y + slope)
+    x, y, slope = x + blank, y + blank, slope + blank
+    if math.isinf(object_distance_mm):
+        dx, dy = torch.zeros_like(x), slope
+    else:
+        dx, dy = x / object_distance_mm, y / object_distance_mm + slope
+    n = 1 / torch.sqrt(1 + dx**2 + dy**2)
+    return Rays(
+        x=x,
+        y=y,
+        z=torch.zeros_like(x),
+        l=dx * n,
+        m=dy * n,
+        n=n,
+        fate=torch.zeros(x.shape, dtype=torch.int8),
+    )
+
+
+def with_open_apertures(tensors: SurfaceTensors) -> SurfaceTensors:
+    """Return the lens without the limits of its surfaces: no rim and no wall of a groove."""
+    tensors = without_walls(tensors)
+    return replace(tensors, semi_diameter_mm=torch.full_like(tensors.semi_diameter_mm, math.inf))
