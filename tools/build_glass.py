@@ -1,6 +1,7 @@
 """Rewrite the glass data of camkit from a copy of the refractiveindex.info database (CC0).
 
     python -m tools.build_glass path/to/database/data-nk
+    python -m tools.build_glass --obsolete SCHOTT.AGF
     python -m tools.build_glass --classic robb1983_data_final.txt
 
 The folder is `data-nk` of the database (github.com/polyanskiy/refractiveindex.info-database, also
@@ -8,10 +9,14 @@ inside the wheel of `optiland`). Writes one JSON file per catalogue into
 `models_def/optics/glass/data/`; `misc.json` is edited by hand and
 stays. Sumita is left out: its printed n_d and V_d disagree with its coefficients.
 
-The second command writes the glasses that Schott made in 1983 and makes no more, from table V of
-Robb and Mercado as the package `opticalglass` holds it (`opticalglass/data`). Numbers of that
-transcription were misread here and there: a glass is taken only if a glass of another table
-(today's equivalent, or another maker's) bears its index and its dispersion out.
+The second command writes the glasses that Schott's own catalogue file of December 2024 calls
+obsolete, by its coefficients.
+
+The third command writes the glasses that Schott made in 1983 and that neither of its catalogues
+has, from table V of Robb and Mercado as the package `opticalglass` holds it (`opticalglass/data`).
+Numbers of that transcription were misread here and there: a glass is taken only if a glass of
+another table (today's equivalent, or another maker's of today or of table V) bears its index and
+its dispersion out.
 """
 
 import argparse
@@ -21,8 +26,10 @@ from pathlib import Path
 
 import torch
 
+from camkit.models_def.optics.glass.agf import read_agf
 from camkit.models_def.optics.glass.catalogue import builtin_catalogues, trade_name_of
 from camkit.models_def.optics.glass.dispersion import refractive_index
+from camkit.models_def.optics.glass.encoding import read_text
 from camkit.models_def.optics.glass.material import Glass
 
 DATA = Path(__file__).resolve().parents[1] / "models_def" / "optics" / "glass" / "data"
@@ -71,6 +78,11 @@ CLASSIC_SOURCE = (
     "Robb, Mercado 1983, Appl. Opt. 22, 1198, table V: Schott catalogue, fit to 1e-4 or better"
 )
 CLASSIC_UM = (0.4, 0.7)
+OBSOLETE = "SchottObsolete"
+OBSOLETE_SOURCE = "SCHOTT catalogue file of December 2024, revision C, glasses marked obsolete"
+OBSOLETE_STATUS = "2"
+SAME_MELT = "HT"
+"""At the end of a name: the same glass, clearer."""
 WAVES_UM = torch.linspace(0.42, 0.68, 14, dtype=torch.float64)
 THE_SAME = 2e-5
 BASE_UM = 0.574
@@ -139,22 +151,22 @@ def classic_rows(text: str) -> list[str]:
     Today's successor N-X has the very dispersion of X more often than not: then X has its
     coefficients. That is so if table V, or what another maker sells as X, says so.
     """
-    section = text.split("#---", maxsplit=1)[0]
-    table = [line.split() for line in section.splitlines() if line and not line.startswith("#")]
-    listed = {name: (*map(float, numbers[:3]), BASE_UM) for name, *numbers in table}
+    own_section, *sections = text.split("#---")
+    listed = {glass.name: glass for glass in classic_glasses(own_section)}
     catalogues = {c.name: c for c in builtin_catalogues() if not c.literature and c.name != CLASSIC}
     today = catalogues.pop("Schott")
+    obsolete = catalogues[OBSOLETE]
     glasses = [g for c in (today, *catalogues.values()) for g in c.glasses if holds(g)]
+    glasses += [glass for other in sections for glass in classic_glasses(other)]
     curves = torch.stack([refractive_index(glass, WAVES_UM) for glass in glasses])
     successors = [trade_name_of(g).removeprefix("N-") for g in today.glasses]
     rows = []
     for name in sorted({*listed, *successors}):
-        if today.with_trade_name(name):
+        if today.with_trade_name(name) or obsolete.with_trade_name(name):
             continue
         curves_of_name = []
         if name in listed:
-            glass = Glass(name=name, formula="buchdahl", coefficients=listed[name], source="V")
-            curves_of_name.append(refractive_index(glass, WAVES_UM))
+            curves_of_name.append(refractive_index(listed[name], WAVES_UM))
         others = [g for c in catalogues.values() for g in c.with_trade_name(name) if holds(g)]
         curves_of_name += [refractive_index(g, WAVES_UM) for g in others]
         for successor in today.with_trade_name(f"N-{name}"):
@@ -169,10 +181,42 @@ def classic_rows(text: str) -> list[str]:
                 break
         else:
             if name in listed and borne_out(curves - curves_of_name[0]):
-                row = [name, "buchdahl", CLASSIC_UM, None, None, listed[name]]
+                row = [name, "buchdahl", CLASSIC_UM, None, None, listed[name].coefficients]
                 rows.append(json.dumps(row, separators=(",", ":")))
             elif name in listed:
                 print(f"{name}: not borne out, left out")
+    return rows
+
+
+def classic_glasses(section: str) -> list[Glass]:
+    """Return the glasses of one maker in table V: name, base index and two Buchdahl terms."""
+    lines = (line.split() for line in section.splitlines() if line.strip("-"))
+    return [
+        Glass(
+            name=name,
+            formula="buchdahl",
+            coefficients=(*map(float, numbers[:3]), BASE_UM),
+            source="table V",
+        )
+        for name, *numbers in lines
+        if not name.startswith("#")
+    ]
+
+
+def obsolete_rows(path: Path) -> list[str]:
+    """Return the glasses of Schott's file that it calls obsolete and camkit has not yet."""
+    lines = [line.split() for line in read_text(path).splitlines() if line.startswith("NM ")]
+    obsolete = {line[1] for line in lines if line[7:8] == [OBSOLETE_STATUS]}
+    catalogues = [c for c in builtin_catalogues() if c.name in ("Schott", CLASSIC)]
+    rows = []
+    for glass in sorted(read_agf(path).glasses, key=lambda g: g.name):
+        name = trade_name_of(glass)
+        is_known = any(c.with_trade_name(name) for c in catalogues)
+        if name not in obsolete or is_known or name.endswith(SAME_MELT):
+            continue
+        printed = [glass.stated_index_d, glass.stated_abbe_number]
+        facts = [name, glass.formula, glass.range_um, *printed, glass.coefficients]
+        rows.append(json.dumps(facts, separators=(",", ":")))
     return rows
 
 
@@ -194,7 +238,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("database", type=Path, nargs="?")
     parser.add_argument("--classic", type=Path, help="table V, in the package opticalglass")
+    parser.add_argument("--obsolete", type=Path, help="Schott's catalogue file with old glasses")
     arguments = parser.parse_args()
+    if arguments.obsolete:
+        write(OBSOLETE, obsolete_rows(arguments.obsolete), OBSOLETE_SOURCE)
     if arguments.classic:
         write(CLASSIC, classic_rows(arguments.classic.read_text("utf-8")), CLASSIC_SOURCE)
     if arguments.database:

@@ -24,6 +24,7 @@ class PairWords:
         pitch_um: Pixel pitch of the pictures; None for what the files state.
         distance_from: What distances count from, if known: vertex, sensor or pupil.
         glass: Catalogues (.agf), and `names` or `numbers`; see `read_noted_lens`.
+        catalogue: Catalogues of camkit that are asked first, such as schott,hikari.
     """
 
     focus_m: float
@@ -36,6 +37,7 @@ class PairWords:
     pitch_um: float | None = None
     distance_from: str | None = None
     glass: Sequence[FilePath] = ()
+    catalogue: str | None = None
 
     @property
     def planes_m(self) -> tuple[float, ...]:

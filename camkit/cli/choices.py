@@ -40,6 +40,13 @@ GlassFiles = Annotated[
         help="Glass catalogue (.agf), or what decides in a .zmx: names or numbers; repeatable.",
     ),
 ]
+GlassCatalogues = Annotated[
+    str | None,
+    typer.Option(
+        "--catalogue",
+        help="Glass catalogues asked first for a name that several have, such as schott,hikari.",
+    ),
+]
 
 
 def whole_pair(text: str, option: str) -> tuple[int, int]:

@@ -41,12 +41,14 @@ def freeze(
     stress_haze: FilePath | None = None,
     report: FilePath | None = None,
     quick: bool = False,
+    glass: Sequence[FilePath] = (),
+    catalogue: str | None = None,
     overwrite: bool = False,
 ) -> dict[str, Any]:
     """Compute the PSF of a lens or a plate with as few samples as the loss allows (needs torch).
 
     Args:
-        optics: A lens (.toml, .zmx), a plate (.toml, name, bundle) or a measured PSF
+        optics: A lens (.toml, .zmx, .json), a plate (.toml, name, bundle) or a measured PSF
             (.safetensors).
         out: PSF to write (.safetensors).
         recipe: Recipe (.toml) with the sensor and its Wiener bank; None for duet's.
@@ -63,6 +65,8 @@ def freeze(
         report: Also write the facts to this file (.json), for `camkit.export.bundle`.
         quick: Whether fields, wavelengths and blocks are taken as they usually suit, without a
             search that measures what they cost.
+        glass: Catalogues (.agf), and `names` or `numbers`; see `read_noted_lens`.
+        catalogue: Catalogues of camkit that are asked first, such as schott,hikari.
         overwrite: Whether files that exist are replaced.
 
     Returns:
@@ -86,7 +90,7 @@ def freeze(
             f"{option_text('stress_haze')} go together; else omit {option_text('stress_haze')}"
         )
     sensor, bank = _camera_of(default_recipe() if recipe is None else Path(recipe))
-    source = read_optics(Path(optics))
+    source = read_optics(Path(optics), tuple(map(str, glass)), catalogue)
     request = FreezeRequest(
         sensor=sensor,
         bank=bank,

@@ -46,6 +46,7 @@ class CameraWords:
         defocus_mm: By which the sensor lies behind its place in focus, as
             `camkit calibrate distance` finds it.
         glass: Catalogues (.agf), and `names` or `numbers`; see `read_noted_lens`.
+        catalogue: Catalogues of camkit that are asked first, such as schott,hikari.
     """
 
     sensor: str | None = None
@@ -58,6 +59,7 @@ class CameraWords:
     distance_from: str = "vertex"
     defocus_mm: float = 0.0
     glass: Sequence[FilePath] = ()
+    catalogue: str | None = None
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -228,7 +230,7 @@ def _lens_camera(
         origin=camera.distance_from,  # type: ignore[arg-type]
         defocus_mm=camera.defocus_mm,
     )
-    design, notes = read_noted_lens(lens, tuple(map(str, camera.glass)))
+    design, notes = read_noted_lens(lens, tuple(map(str, camera.glass)), camera.catalogue)
     if any(surface.grooves is not None for surface in design.surfaces):
         raise UnsupportedError(
             f"{lens.name} has grooves, which throw a haze over the picture: its camera has a "

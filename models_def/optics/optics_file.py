@@ -1,5 +1,6 @@
 """Optics by their file: a lens, a plate, or a PSF that was measured."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from camkit.models_def.optics.diffraction.plate import is_plate, read_plate
@@ -10,10 +11,17 @@ from camkit.models_def.optics.lens_optics import LensOptics
 from camkit.models_def.optics.measured import MEASURED, read_measured
 
 
-def read_optics(path: Path) -> Optics:
+def read_optics(
+    path: Path, glass: Sequence[Path | str] = (), catalogue: str | None = None
+) -> Optics:
     """Read optics: .safetensors as a measured PSF, TOML with a table [bench] as a plate.
 
     A bundle is read for its plate; anything else is a lens (`read_lens`).
+
+    Args:
+        path: The file, or the name of a built-in lens or plate.
+        glass: Of a lens, see `read_noted_lens`.
+        catalogue: Of a lens, see `read_noted_lens`.
 
     Raises:
         BundleError: If a PSF is missing or damaged, or a bundle is.
@@ -23,4 +31,4 @@ def read_optics(path: Path) -> Optics:
         return read_measured(path)
     if is_plate(path):
         return PlateOptics(plate=read_plate(path))
-    return LensOptics(lens=read_lens(path))
+    return LensOptics(lens=read_lens(path, glass, catalogue))

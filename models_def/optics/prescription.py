@@ -5,7 +5,7 @@ Thickness and glass are those after a surface; the last thickness leads to the s
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, Literal, cast, get_args
@@ -14,7 +14,12 @@ import numpy as np
 
 from camkit.errors import ContractError, UnsupportedError
 from camkit.models_def.optics.glass.agf import read_agf
-from camkit.models_def.optics.glass.catalogue import GlassCatalogue, find_glass, own_glass
+from camkit.models_def.optics.glass.catalogue import (
+    AIR,
+    GlassCatalogue,
+    find_glass,
+    own_glass,
+)
 from camkit.models_def.optics.glass.material import Glass
 from camkit.models_def.optics.glass.table import glass_table, parse_glass_table
 from camkit.models_def.optics.grooves import Grooves, Profile, check_grooves, groove_facts
@@ -52,6 +57,7 @@ class _LensTable:
     stop: int
     surface: list[dict[str, Any]]
     note: str = ""
+    object_glass: str = AIR.name
     object_distance_mm: float | None = None
     field_angles_deg: tuple[float, ...] | None = None
     wavelengths_um: tuple[float, ...] | None = None
@@ -97,12 +103,7 @@ class Surface:
     def __post_init__(self) -> None:
         if not set(self.vary) <= set(VARY):
             raise ContractError(f"vary names some of {', '.join(VARY)}; got {self.vary}")
-        if self.material is None:
-            object.__setattr__(self, "glass", find_glass(self.glass).name)
-        elif self.material.name != self.glass:
-            raise ContractError(
-                f"glass and material must have one name; got {self.glass}, {self.material.name}"
-            )
+        object.__setattr__(self, "glass", _strict_name(self.glass, self.material))
         numbers = (self.curvature_per_mm, self.thickness_mm, self.conic, self.index_offset)
         if not all(map(math.isfinite, (*numbers, *self.even_asphere))):
             raise ContractError(f"a surface needs finite numbers; got {self}")
@@ -132,6 +133,15 @@ class Surface:
         return 1 / self.curvature_per_mm if self.curvature_per_mm else math.inf
 
 
+def _strict_name(name: str, material: Glass | None) -> str:
+    """Return the name of a medium, checked against the glass itself where there is one."""
+    if material is None:
+        return find_glass(name).name
+    if material.name != name:
+        raise ContractError(f"glass and material must have one name; got {name}, {material.name}")
+    return name
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lens:
     """A rotationally symmetric lens in front of a sensor.
@@ -147,6 +157,8 @@ class Lens:
         wavelengths_um: Wavelengths of interest, increasing.
         reference_wavelength_um: Defines the chief ray, the EFL and the focus.
         note: For people: where the design comes from.
+        object_glass: Strict name of the medium between the object and the first surface.
+        object_material: The glass itself where it comes from a user's catalogue.
     """
 
     name: str
@@ -159,8 +171,12 @@ class Lens:
     wavelengths_um: tuple[float, ...] = (0.55,)
     reference_wavelength_um: float = 0.55
     note: str = ""
+    object_glass: str = AIR.name
+    object_material: Glass | None = None
 
     def __post_init__(self) -> None:
+        medium = _strict_name(self.object_glass, self.object_material)
+        object.__setattr__(self, "object_glass", medium)
         if not self.surfaces:
             raise ContractError("a lens needs at least one surface; got none")
         if not 0 <= self.stop < len(self.surfaces):
@@ -178,6 +194,11 @@ class Lens:
         waves = (*self.wavelengths_um, self.reference_wavelength_um)
         if not all(0.2 < w < 20 for w in waves):
             raise ContractError(f"wavelengths must lie in 0.2..20 um; got {waves}")
+
+    @property
+    def object_medium(self) -> Glass:
+        """The glass in front of the first surface."""
+        return self.object_material or find_glass(self.object_glass)
 
 
 def grooves_of(lens: Lens) -> list[dict[str, Any]]:
@@ -243,12 +264,17 @@ def perturb(lens: Lens, errors: FabricationErrors, rng: np.random.Generator) -> 
     return replace(lens, surfaces=tuple(copies))
 
 
-def read_prescription(path: Path, catalogues: Sequence[GlassCatalogue] = ()) -> Lens:
+def read_prescription(
+    path: Path,
+    catalogues: Sequence[GlassCatalogue] = (),
+    preferred: Sequence[GlassCatalogue] = (),
+) -> Lens:
     """Read a lens from a TOML file.
 
     Args:
         path: The file; its `glass_catalogues` are .agf files relative to it.
         catalogues: More glasses, asked after those that the file brings along.
+        preferred: Those of camkit; the first that has a trade name decides.
 
     Raises:
         ContractError: If the file is not TOML, or a key is unknown, missing or of a wrong type.
@@ -256,13 +282,17 @@ def read_prescription(path: Path, catalogues: Sequence[GlassCatalogue] = ()) -> 
     """
     text = read_side_text(path, "the lens")
     try:
-        return parse_prescription(text, catalogues, folder=path.parent)
+        return parse_prescription(text, catalogues, preferred, folder=path.parent)
     except ContractError as error:
         raise ContractError(f"{path.name}: {error}") from error
 
 
 def parse_prescription(
-    text: str, catalogues: Sequence[GlassCatalogue] = (), *, folder: Path | None = None
+    text: str,
+    catalogues: Sequence[GlassCatalogue] = (),
+    preferred: Sequence[GlassCatalogue] = (),
+    *,
+    folder: Path | None = None,
 ) -> Lens:
     """Read a lens from TOML text; see `read_prescription`."""
     table = section("the lens", _LensTable, parse_toml(text.encode(), "the prescription"))
@@ -275,11 +305,20 @@ def parse_prescription(
     if table.field_angles_deg is not None:
         optional["field_angles_rad"] = tuple(map(to_radians, table.field_angles_deg))
     glasses = (*_own_catalogues(table, folder), *catalogues)
+
+    def medium(name: str) -> Glass:
+        return find_glass(name, glasses, preferred)
+
+    object_medium = medium(table.object_glass)
     return Lens(
         name=table.name,
         note=table.note,
+        object_glass=object_medium.name,
+        object_material=own_glass(object_medium, glasses),
         surfaces=tuple(
-            _parse_surface(section(f"surface {i}", _SurfaceTable, one), f"surface {i}", glasses)
+            _parse_surface(
+                section(f"surface {i}", _SurfaceTable, one), f"surface {i}", medium, glasses
+            )
             for i, one in enumerate(table.surface)
         ),
         stop=table.stop,
@@ -320,16 +359,23 @@ def format_prescription(lens: Lens) -> str:
         key_line("note", lens.note),
         f"{lens.aperture_kind} = {lens.aperture_value!r}",
         f"stop = {lens.stop}",
+        *_object_glass_lines(lens),
         f"object_distance_mm = {lens.object_distance_mm!r}",
         f"field_angles_deg = [{angles}]",
         f"wavelengths_um = [{', '.join(map(repr, lens.wavelengths_um))}]",
         f"reference_wavelength_um = {lens.reference_wavelength_um!r}",
     ]
-    for glass in {s.material: None for s in lens.surfaces if s.material is not None}:
+    materials = (lens.object_material, *(s.material for s in lens.surfaces))
+    for glass in {m: None for m in materials if m is not None}:
         lines += ["", "[[glass]]", *(key_line(k, v) for k, v in glass_table(glass).items())]
     for surface in lens.surfaces:
         lines += ["", "[[surface]]", *_surface_lines(surface)]
     return "\n".join(lines) + "\n"
+
+
+def _object_glass_lines(lens: Lens) -> list[str]:
+    is_air = lens.object_glass == AIR.name
+    return [] if is_air else [key_line("object_glass", lens.object_glass)]
 
 
 def _surface_lines(surface: Surface) -> list[str]:
@@ -387,12 +433,15 @@ def _radius_text(curvature_per_mm: float) -> str:
 
 
 def _parse_surface(
-    table: _SurfaceTable, where: str, catalogues: Sequence[GlassCatalogue]
+    table: _SurfaceTable,
+    where: str,
+    medium: Callable[[str], Glass],
+    catalogues: Sequence[GlassCatalogue],
 ) -> Surface:
     if table.radius_mm == 0:
         raise ContractError(f"{where}: radius_mm must not be 0 (a plane is inf)")
     try:
-        glass = find_glass(table.glass, catalogues)
+        glass = medium(table.glass)
         surface = Surface(
             curvature_per_mm=1 / table.radius_mm,
             thickness_mm=table.thickness_mm,

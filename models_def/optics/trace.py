@@ -123,7 +123,7 @@ def surface_tensors(lens: Lens, wavelengths_um: Tensor) -> SurfaceTensors:
         even_asphere=torch.tensor(padded, dtype=torch.float64).reshape(len(surfaces), terms),
         thickness_mm=column([s.thickness_mm for s in surfaces]),
         semi_diameter_mm=column([s.semi_diameter_mm for s in surfaces]),
-        index=torch.stack([torch.ones_like(waves), *glass]),
+        index=torch.stack([refractive_index(lens.object_medium, waves), *glass]),
         aspheric=tuple(any(s.even_asphere) or s.grooves is not None for s in surfaces),
         grooves=tuple(_groove(s) for s in surfaces),
     )

@@ -108,3 +108,34 @@ def test_an_old_glass_is_taken_where_another_one_bears_it_out(
     assert torch.equal(refractive_index(found, waves), refractive_index(two, waves))
     assert "ODD1" not in rows
     assert "rest" not in rows
+
+
+def test_an_old_glass_is_taken_where_another_maker_s_row_of_the_table_bears_it_out(
+    tmp_path: Path, data: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lines = ["# name N0 v1 v2", "ODD1 1.9 -0.9 0.4", "ODD2 1.8 -0.9 0.4", "#---", "# another"]
+    table = tmp_path / "table.txt"
+    table.write_text("\n".join([*lines, "LIKE1 1.9003 -0.90001 0.4"]), encoding="utf-8")
+    run_tool(monkeypatch, "build_glass", "--classic", table)
+    rows = written(data / "schott1983.json")
+    assert "ODD1" in rows
+    assert "ODD2" not in rows
+
+
+def test_glasses_that_schott_marks_obsolete_are_taken_by_its_coefficients(
+    tmp_path: Path, data: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither those of today, nor clearer melts, nor what camkit has already."""
+    file = tmp_path / "SCHOTT.AGF"
+    glasses = [
+        ("OLD1", "1.6 50 0 2"),
+        ("OLD1HT", "1.6 50 0 2"),
+        ("NEW1", "1.6 50 0 1"),
+        ("N-BK7", "1.6 50 0 2"),
+        ("BK7", "1.6 50 0 2"),
+    ]
+    lines = (f"NM {name} 2 0 {rest}\nCD 1.4 0.01\nLD 0.3 2\n" for name, rest in glasses)
+    file.write_text("".join(lines), encoding="utf-8")
+    run_tool(monkeypatch, "build_glass", "--obsolete", file)
+    rows = written(data / "schottobsolete.json")
+    assert rows == {"OLD1": ["sellmeier", [0.3, 2.0], 1.6, 50.0, [1.4, 0.01]]}

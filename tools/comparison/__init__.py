@@ -9,5 +9,6 @@
 - `rows`: the rows of the comparison
 - `paired`: gains on the same captures, with their error
 - `real_lens`, `real_lens_pages`: a real lens, its blur against photographs and photographs restored
+- `lens_files`: lens files of others, what is read of them, and optiland's numbers beside
 - `quality_table`: means, gains and the page
 """

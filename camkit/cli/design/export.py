@@ -59,7 +59,7 @@ def export(
     ] = None,
     prescription: Annotated[
         Path | None,
-        typer.Option(help="Lens (.toml or .zmx); default: the checkpoint's."),
+        typer.Option(help="Lens (.toml, .zmx or .json); default: the checkpoint's."),
     ] = None,
     plate: Annotated[
         str | None,

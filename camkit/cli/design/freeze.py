@@ -9,7 +9,7 @@ from typing import Annotated, Final
 
 import typer
 
-from camkit.cli.choices import Debug, Json, Overwrite
+from camkit.cli.choices import Debug, GlassCatalogues, GlassFiles, Json, Overwrite
 from camkit.errors import ContractError
 
 LIMIT_DB: Final = 0.05
@@ -19,7 +19,8 @@ def freeze(
     optics: Annotated[
         Path,
         typer.Argument(
-            help="Lens (.toml, .zmx), plate (.toml, name, bundle) or measured PSF (.safetensors).",
+            help="Lens (.toml, .zmx, .json), plate (.toml, name, bundle) or measured PSF "
+            "(.safetensors).",
             metavar="OPTICS",
         ),
     ],
@@ -99,6 +100,8 @@ def freeze(
             "--quick", help="Take 7 fields and 5 wavelengths without a search: a preview."
         ),
     ] = False,
+    glass: GlassFiles = None,
+    catalogue: GlassCatalogues = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
@@ -120,6 +123,8 @@ def freeze(
             "--stress-haze": stress_haze,
             "--report": report,
             "--quick": quick or None,
+            "--glass": glass,
+            "--catalogue": catalogue,
             "--limit-db": None if limit_db == LIMIT_DB else limit_db,
             "--energy": energy,
             "--max-side-px": max_side_px,
@@ -153,6 +158,8 @@ def freeze(
         stress_haze=stress_haze,
         report=report,
         quick=quick,
+        glass=tuple(glass or ()),
+        catalogue=catalogue,
         overwrite=overwrite,
     )
     print_report(facts, json_)

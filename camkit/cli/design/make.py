@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from camkit.cli.choices import Debug, GlassFiles, Json, Overwrite
+from camkit.cli.choices import Debug, GlassCatalogues, GlassFiles, Json, Overwrite
 from camkit.cli.design.camera_options import (
     VERTEX,
     DefocusMm,
@@ -29,7 +29,7 @@ def make(
     optics: Annotated[
         Path,
         typer.Argument(
-            help="Lens file (.toml, .zmx), built-in name, or measured PSF (.safetensors).",
+            help="Lens file (.toml, .zmx, .json), built-in name, or measured PSF (.safetensors).",
             metavar="LENS",
         ),
     ],
@@ -45,6 +45,7 @@ def make(
     distance_from: DistanceFrom = VERTEX,
     defocus_mm: DefocusMm = 0.0,
     glass: GlassFiles = None,
+    catalogue: GlassCatalogues = None,
     minutes: Annotated[
         float, typer.Option(help="CPU time in min for everything; 0 makes the filter alone.")
     ] = 15.0,
@@ -94,6 +95,7 @@ def make(
         distance_from=distance_from,
         defocus_mm=defocus_mm,
         glass=tuple(glass or ()),
+        catalogue=catalogue,
     )
     facts = make_camera(
         optics,

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from camkit.cli.choices import Debug, GlassFiles, Json, Overwrite
+from camkit.cli.choices import Debug, GlassCatalogues, GlassFiles, Json, Overwrite
 from camkit.cli.design.camera_options import (
     VERTEX,
     DefocusMm,
@@ -28,7 +28,7 @@ def recipe(
     lens: Annotated[
         Path,
         typer.Argument(
-            help="Lens file (.toml, .zmx), built-in name, or measured PSF (.safetensors).",
+            help="Lens file (.toml, .zmx, .json), built-in name, or measured PSF (.safetensors).",
             metavar="LENS",
         ),
     ],
@@ -44,6 +44,7 @@ def recipe(
     distance_from: DistanceFrom = VERTEX,
     defocus_mm: DefocusMm = 0.0,
     glass: GlassFiles = None,
+    catalogue: GlassCatalogues = None,
     name: Annotated[
         str | None, typer.Option(help="Name of the camera; default: that of the recipe.")
     ] = None,
@@ -65,6 +66,7 @@ def recipe(
         distance_from=distance_from,
         defocus_mm=defocus_mm,
         glass=tuple(glass or ()),
+        catalogue=catalogue,
     )
     facts = recipe_writing.recipe(lens, output, camera=camera, name=name, overwrite=overwrite)
     if json_:

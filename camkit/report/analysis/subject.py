@@ -41,7 +41,7 @@ from camkit.runtime.twin.truth import light_sensor
 USUAL_SENSOR: Final = "duet"
 """Bundle whose sensor stands behind what has none."""
 LENS: Final = "lens:"
-LENS_SUFFIXES: Final = (".toml", ".zmx")
+LENS_SUFFIXES: Final = (".toml", ".zmx", ".json")
 PSF_SUFFIX: Final = ".safetensors"
 HAZE_JOINT: Final = re.compile(r"(?<=\.safetensors)\+", re.IGNORECASE)
 """Between the two files of optics with a haze; a + elsewhere belongs to a name."""

@@ -10,4 +10,5 @@ In the order in which data flows:
 - `catalogue`: named sets of glasses; finding one by name
 - `table`: glasses written into a prescription
 - `dispersion`: the index at a wavelength
+- `nearness`: glasses near in index and Abbe number
 """

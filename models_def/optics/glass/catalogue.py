@@ -13,10 +13,14 @@ from functools import cache
 from importlib import resources
 from typing import Any, Final
 
+from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.models_def.optics.glass.material import Glass
 from camkit.models_def.optics.glass.model_glass import parse_model_name
 
+FORMER: Final = {"schott1983": "schott", "schottobsolete": "schott"}
+"""Catalogues of glasses that a maker has no longer; people know one name for all of his."""
+ALIASES: Final = {"nikon": "hikari", "nikon_hikari": "hikari", "nikon-hikari": "hikari"}
 AIR: Final = Glass(name="air", formula="constant", coefficients=(1.0,), source="reference medium")
 _NEAR: Final = 5
 
@@ -64,11 +68,48 @@ def trade_name_of(glass: Glass) -> str:
 def builtin_catalogues() -> tuple[GlassCatalogue, ...]:
     """Return the catalogues that come with camkit, Schott's first."""
     folder = resources.files("camkit.models_def.optics.glass") / "data"
-    files = ("schott", "schott1983", "ohara", "hoya", "hikari", "cdgm", "misc", "literature")
+    schott = ("schott", "schott1983", "schottobsolete")
+    files = (*schott, "ohara", "hoya", "hikari", "cdgm", "misc", "literature")
     return tuple(
         _catalogue(json.loads((folder / f"{name}.json").read_text(encoding="utf-8")))
         for name in files
     )
+
+
+def maker_of(catalogue: GlassCatalogue) -> str:
+    """Return the name in small letters by which people and lens files ask for a catalogue."""
+    name = catalogue.name.casefold()
+    return FORMER.get(name, name)
+
+
+def catalogues_of(maker: str) -> tuple[GlassCatalogue, ...]:
+    """Return camkit's catalogues of a maker, today's first; none if it has none of that name."""
+    name = ALIASES.get(maker.casefold(), maker.casefold())
+    makers = (c for c in builtin_catalogues() if not c.literature)
+    return tuple(c for c in makers if name in (maker_of(c), c.name.casefold()))
+
+
+def preferred_catalogues(makers: str | None) -> tuple[GlassCatalogue, ...]:
+    """Return the catalogues to be asked first, in their order.
+
+    Args:
+        makers: Names with commas between them, such as schott,hikari; None for none.
+
+    Raises:
+        ContractError: If camkit has no catalogue of a name.
+    """
+    preferred: list[GlassCatalogue] = []
+    for maker in (makers or "").split(","):
+        catalogues = catalogues_of(maker.strip())
+        if not catalogues and makers is not None:
+            names = {maker_of(c): None for c in builtin_catalogues() if not c.literature}
+            raise ContractError(
+                f"{option_text('catalogue')} names some of {', '.join(names)}, such as "
+                f"schott,hikari; got {maker.strip()!r}; a catalogue of yours (.agf) is given by "
+                f"{option_text('glass')}"
+            )
+        preferred += catalogues
+    return tuple(dict.fromkeys(preferred))
 
 
 def _catalogue(table: Mapping[str, Any]) -> GlassCatalogue:
@@ -98,13 +139,18 @@ def _all(catalogues: Iterable[GlassCatalogue]) -> Iterator[Glass]:
         yield from catalogue.glasses
 
 
-def find_glass(name: str, catalogues: Sequence[GlassCatalogue] = ()) -> Glass:
+def find_glass(
+    name: str,
+    catalogues: Sequence[GlassCatalogue] = (),
+    preferred: Sequence[GlassCatalogue] = (),
+) -> Glass:
     """Return the glass of this name.
 
     Args:
         name: A strict name, "air", a model glass (see `model_glass`), or a trade name that exactly
             one catalogue has.
         catalogues: The user's; they are asked before those of camkit.
+        preferred: Those of camkit; the first that has a trade name decides.
 
     Raises:
         ContractError: If there is none, or a trade name stands for several; the message names near
@@ -120,7 +166,7 @@ def find_glass(name: str, catalogues: Sequence[GlassCatalogue] = ()) -> Glass:
     if model is not None:
         return model
     several: list[tuple[Glass, bool]] = []
-    for group in (catalogues, builtin_catalogues()):
+    for group in (catalogues, *((c,) for c in preferred), builtin_catalogues()):
         several = [(g, c.literature) for c in group for g in c.with_trade_name(name)]
         # a material of the literature is no trade name: its source decides its index
         if len(several) == 1 and not several[0][1]:
@@ -128,8 +174,10 @@ def find_glass(name: str, catalogues: Sequence[GlassCatalogue] = ()) -> Glass:
         if several:
             break
     near = [glass.name for glass, _ in several] or _near_names(name, catalogues)
+    choice = f", or choose by {option_text('catalogue')}" if len(several) > 1 else ""
     raise ContractError(
         f"glass must be a known name with its source; got {name!r}; write {' or '.join(near)}"
+        f"{choice}"
     )
 
 

@@ -58,6 +58,16 @@ def abbe_number(glass: Glass) -> float:
     return float((n_d - 1) / (n_f - n_c)) if n_f != n_c else float("inf")
 
 
+def index_and_abbe(glass: Glass) -> tuple[float, float]:
+    """Return n_d and V_d as a lens file holds them; 0 where the glass has none."""
+    low, high = glass.range_um
+    if not (low * (1 - RANGE_TOLERANCE) <= 0.4861 and high * (1 + RANGE_TOLERANCE) >= 0.6563):
+        return 0.0, 0.0
+    line = torch.tensor(D_LINE_UM, dtype=torch.float64)
+    number = abbe_number(glass)
+    return float(refractive_index(glass, line)), number if number != float("inf") else 0.0
+
+
 def _constant(coefficients: _Coefficients, wavelengths_um: Tensor) -> Tensor:
     return torch.full_like(wavelengths_um, coefficients[0])
 

@@ -1,4 +1,7 @@
-"""Read or write a lens by the suffix of its file, .toml or .zmx; a built-in one by its name."""
+"""Read or write a lens by the suffix of its file; a built-in one by its name.
+
+.toml is camkit's own format, .zmx that of lens catalogues, .json that of optiland or DeepLens.
+"""
 
 import logging
 from collections.abc import Sequence
@@ -6,14 +9,21 @@ from pathlib import Path
 from typing import Final
 
 from camkit.caller import option_text
-from camkit.errors import ContractError, UnsupportedError
+from camkit.errors import CamkitError, ContractError, DecodeError, UnsupportedError
 from camkit.models_def.optics.glass.agf import read_agf
+from camkit.models_def.optics.glass.catalogue import GlassCatalogue, preferred_catalogues
+from camkit.models_def.optics.lens_file.deeplens_reader import KEY as DEEPLENS_KEY
+from camkit.models_def.optics.lens_file.deeplens_reader import parse_deeplens
+from camkit.models_def.optics.lens_file.json_table import read_json_table
+from camkit.models_def.optics.lens_file.optiland_reader import KEY as OPTILAND_KEY
+from camkit.models_def.optics.lens_file.optiland_reader import parse_optiland
+from camkit.models_def.optics.lens_file.optiland_writer import write_optiland
 from camkit.models_def.optics.lens_file.zmx_glass import GLASS_RULES
 from camkit.models_def.optics.lens_file.zmx_reader import read_zmx
 from camkit.models_def.optics.lens_file.zmx_writer import write_zmx
 from camkit.models_def.optics.prescription import Lens, read_prescription, write_prescription
 
-SUFFIXES: Final = (".toml", ".zmx")
+SUFFIXES: Final = (".toml", ".zmx", ".json")
 KERNELS: Final = (".npy", ".npz", ".mat", ".exr", ".png", ".tif", ".tiff", ".txt")
 """Files that people have kernels in."""
 PRESCRIPTIONS: Final = Path(__file__).resolve().parents[2] / "prescriptions"
@@ -21,58 +31,83 @@ PRESCRIPTIONS: Final = Path(__file__).resolve().parents[2] / "prescriptions"
 _log = logging.getLogger(__name__)
 
 
-def read_lens(path: Path) -> Lens:
-    """Read a lens; what of a .zmx file is left out is logged as a warning.
+def read_lens(path: Path, glass: Sequence[Path | str] = (), catalogue: str | None = None) -> Lens:
+    """Read a lens; what of a file of another program is left out is logged as a warning.
 
     Args:
-        path: .toml or .zmx, in small or capital letters, or the name of a built-in lens.
+        path: .toml, .zmx or .json, in small or capital letters, or the name of a built-in lens.
+        glass: See `read_noted_lens`.
+        catalogue: See `read_noted_lens`.
 
     Raises:
-        UnsupportedError: If the suffix is another, or a .zmx file holds what camkit lacks.
+        UnsupportedError: If the suffix is another, or a file holds what camkit lacks.
         ContractError: If the lens is wrong or a glass unknown.
         DecodeError: If a file is damaged.
     """
-    lens, notes = read_noted_lens(path)
+    lens, notes = read_noted_lens(path, glass, catalogue)
     for note in notes:
         _log.warning("%s: %s", path.name, note)
     return lens
 
 
-def read_noted_lens(path: Path, glass: Sequence[Path | str] = ()) -> tuple[Lens, tuple[str, ...]]:
+def read_noted_lens(
+    path: Path, glass: Sequence[Path | str] = (), catalogue: str | None = None
+) -> tuple[Lens, tuple[str, ...]]:
     """Read a lens and what of its file it does not carry, one line each; see `read_lens`.
 
     Args:
         path: As of `read_lens`.
         glass: Catalogues (.agf) of the user, and at most one of `names` and `numbers`: what holds
             where a line of a .zmx file has both (`GlassRule`).
+        catalogue: Catalogues of camkit that are asked first for a name that several have, in this
+            order, with commas between them: schott,hikari.
     """
     path = _built_in(path)
     rules = [rule for rule in GLASS_RULES if rule in map(str, glass)]
     if len(rules) > 1:
         raise ContractError(f"{option_text('glass')} takes one of {' and '.join(rules)}")
     catalogues = [read_agf(Path(file)) for file in glass if str(file) not in GLASS_RULES]
-    if _suffix(path) == ".toml":
-        return read_prescription(path, catalogues), ()
-    prescription = read_zmx(path, catalogues, *rules)
+    preferred = preferred_catalogues(catalogue)
+    suffix = _suffix(path)
+    if suffix == ".toml":
+        return read_prescription(path, catalogues, preferred), ()
+    if suffix == ".json":
+        return _read_json(path, catalogues, preferred)
+    rule = rules[0] if rules else "nearest"
+    prescription = read_zmx(path, catalogues, rule, preferred)
     return prescription.lens, prescription.notes
+
+
+def _read_json(
+    path: Path, catalogues: Sequence[GlassCatalogue], preferred: Sequence[GlassCatalogue]
+) -> tuple[Lens, tuple[str, ...]]:
+    table = read_json_table(path)
+    readers = {OPTILAND_KEY: parse_optiland, DEEPLENS_KEY: parse_deeplens}
+    reader = next((reader for key, reader in readers.items() if key in table), None)
+    if reader is None:
+        raise DecodeError(
+            f"{path.name}: no lens file of optiland ({OPTILAND_KEY}) or DeepLens ({DEEPLENS_KEY})"
+        )
+    try:
+        return reader(table, catalogues, preferred, name=path.stem)
+    except CamkitError as error:
+        raise type(error)(f"{path.name}: {error}") from error
 
 
 def ready_for_lens(path: Path) -> None:
     """Refuse a file that no lens can be written to, before any work; make its folder.
 
     Raises:
-        UnsupportedError: If the suffix is neither .toml nor .zmx.
+        UnsupportedError: If the suffix is none of `SUFFIXES`.
     """
     _suffix(path)
     path.parent.mkdir(parents=True, exist_ok=True)
 
 
 def write_lens(lens: Lens, path: Path) -> None:
-    """Write a lens in the format of the suffix; see `write_prescription` and `write_zmx`."""
-    if _suffix(path) == ".toml":
-        write_prescription(lens, path)
-    else:
-        write_zmx(lens, path)
+    """Write a lens in the format of the suffix: camkit's own, .zmx, or optiland's JSON."""
+    writers = {".toml": write_prescription, ".zmx": write_zmx, ".json": write_optiland}
+    writers[_suffix(path)](lens, path)
 
 
 def built_in_lenses() -> tuple[str, ...]:
@@ -84,7 +119,8 @@ def find_lens(name: str, folder: Path | None = None) -> Lens:
     """Return the lens that a recipe names: a built-in one, or that of a file.
 
     Args:
-        name: Name of a built-in lens, or path (.toml or .zmx) relative to `folder`.
+        name: Name of a built-in lens, or path (.toml, .zmx or .json) relative to
+            `folder`.
         folder: Of the recipe; None for the working directory.
 
     Raises:
@@ -95,7 +131,9 @@ def find_lens(name: str, folder: Path | None = None) -> Lens:
     path = (folder or Path()) / name
     if not path.is_file():
         names = ", ".join(built_in_lenses())
-        raise ContractError(f"no lens {name!r}: give a path (.toml or .zmx), or one of {names}")
+        raise ContractError(
+            f"no lens {name!r}: give a path (.toml, .zmx, .json), or one of {names}"
+        )
     return read_lens(path)
 
 

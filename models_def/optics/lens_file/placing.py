@@ -12,9 +12,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Literal, get_args
 
+import torch
+
 from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.models_def.optics.focus import FocusMerit, with_focus
+from camkit.models_def.optics.glass.dispersion import refractive_index
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens, with_focus_shift
 from camkit.models_def.optics.scaling import with_f_number
@@ -113,6 +116,26 @@ def stopped_lens(lens: Lens, *, f_number: float | None, stop_radius_mm: float | 
         surfaces=tuple(surfaces),
         aperture_kind="stop_semi_diameter_mm",
         aperture_value=stop_radius_mm,
+    )
+
+
+def with_object_na(lens: Lens, numerical_aperture: float) -> Lens:
+    """Return a lens opened to a numerical aperture on the side of its object, n sin u.
+
+    Raises:
+        ContractError: If the object is distant, or the sine is none below 1.
+    """
+    wave = torch.tensor(lens.reference_wavelength_um, dtype=torch.float64)
+    sine = numerical_aperture / float(refractive_index(lens.object_medium, wave))
+    if not (0 < sine < 1 and math.isfinite(lens.object_distance_mm)):
+        raise ContractError(
+            "an aperture of the object side needs a near object and NA < 1 (in glass: its index); "
+            f"got NA {numerical_aperture:g} and an object at {lens.object_distance_mm:g} mm"
+        )
+    distance_mm = lens.object_distance_mm + paraxial_data(lens).entrance_pupil_mm
+    diameter_mm = 2 * distance_mm * math.tan(math.asin(sine))
+    return replace(
+        lens, aperture_kind="entrance_pupil_diameter_mm", aperture_value=abs(diameter_mm)
     )
 
 

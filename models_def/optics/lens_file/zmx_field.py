@@ -5,19 +5,20 @@ field from the axis counts, not its sign or azimuth.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from enum import IntEnum
 
 import torch
 
 from camkit.errors import UnsupportedError
-from camkit.models_def.optics.aiming.chief_path import chief_path
+from camkit.models_def.optics.aiming.chief_path import WIDEST_DEG, chief_path
 from camkit.models_def.optics.lens_file.zmx_records import Records, last
 from camkit.models_def.optics.paraxial import paraxial_data, trace_paraxial
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.spot import slopes_for_heights
-from camkit.models_def.optics.trace import surface_tensors
-from camkit.units import to_radians
+from camkit.models_def.optics.trace import SurfaceTensors, surface_tensors
+from camkit.units import to_degrees, to_radians
 
 
 class FieldType(IntEnum):
@@ -54,18 +55,44 @@ def with_fields(lens: Lens, system: Records, mm_per_unit: float) -> tuple[Lens, 
             f"{line}fields are of kind {number}; camkit reads angles (0), object heights (1), "
             "paraxial (2) and real image heights (3)"
         )
-    points = _points(system)
+    return with_field_points(lens, FieldType(number), _points(system), mm_per_unit)
+
+
+def with_field_points(
+    lens: Lens,
+    kind: FieldType,
+    points: Sequence[tuple[float, float]],
+    mm_per_unit: float = 1.0,
+) -> tuple[Lens, tuple[str, ...]]:
+    """Return the lens with fields as other programs state them, and notes on those left out.
+
+    Fields are increasing, each once; left out are those to which the lens cannot be aimed.
+
+    Args:
+        lens: Everything else about it.
+        kind: What the points are.
+        points: (x, y): angles in degrees, or heights in units of the file.
+        mm_per_unit: That unit.
+
+    Raises:
+        UnsupportedError: If object heights belong to a distant object.
+    """
     notes: tuple[str, ...] = ()
-    if number == FieldType.ANGLE and math.isinf(lens.object_distance_mm):
+    if kind == FieldType.ANGLE and math.isinf(lens.object_distance_mm):
         angles = {math.fabs(to_radians(y)) if x == 0 else _skew_angle(x, y) for x, y in points}
-    elif number == FieldType.ANGLE:
+    elif kind == FieldType.ANGLE:
         angles = {_angle_from_vertex(lens, _skew_angle(x, y)) for x, y in points}
     else:
         heights = sorted({math.hypot(x, y) * mm_per_unit for x, y in points})
-        if number == FieldType.REAL_IMAGE_HEIGHT:
+        if kind == FieldType.REAL_IMAGE_HEIGHT:
             heights, notes = _reached(lens, heights)
-        angles = set(_angles_of_heights(lens, FieldType(number), heights))
-    return replace(lens, field_angles_rad=tuple(sorted(angles))), notes
+        angles = set(_angles_of_heights(lens, kind, heights))
+    within = sorted(angle for angle in angles if angle < to_radians(WIDEST_DEG))
+    if len(within) < len(angles):
+        names = ", ".join(f"{to_degrees(angle):.4g}" for angle in sorted(angles - set(within)))
+        note = f"fields at {names} degrees are left out: camkit aims rays up to {WIDEST_DEG}"
+        notes = (*notes, note)
+    return replace(lens, field_angles_rad=tuple(within or [0.0])), notes
 
 
 def _reached(lens: Lens, heights_mm: list[float]) -> tuple[list[float], tuple[str, ...]]:
@@ -114,17 +141,28 @@ def _angles_of_heights(lens: Lens, field_type: FieldType, heights_mm: list[float
             raise UnsupportedError("object heights need an object at a finite distance")
         return [math.atan(height / lens.object_distance_mm) for height in heights_mm]
     if not near:
-        focal_mm = abs(paraxial_data(lens).efl_mm)
+        focal_mm = _front_focal_length(lens)
         return [math.atan(height / focal_mm) for height in heights_mm]
     scale = _magnification(lens) * lens.object_distance_mm
     return [math.atan(height / scale) for height in heights_mm]
 
 
+def _front_focal_length(lens: Lens) -> float:
+    """Return |image height / slope of a distant object|: n over the power of the lens."""
+    tensors, one = _tensors(lens)
+    _, slope = trace_paraxial(tensors, one, 0 * one, range(len(lens.surfaces)))
+    return abs(float(tensors.index[0] / (slope * tensors.index[-1])))
+
+
 def _magnification(lens: Lens) -> float:
-    """Return |image height / object height|: the ratio of the marginal slopes."""
-    wave = torch.tensor(lens.reference_wavelength_um, dtype=torch.float64)
-    tensors = surface_tensors(lens, wave)
-    one = torch.ones((), dtype=torch.float64)
+    """Return |image height / object height|: n over n' times the ratio of the marginal slopes."""
+    tensors, one = _tensors(lens)
     surfaces = range(len(lens.surfaces))
     _, slope = trace_paraxial(tensors, lens.object_distance_mm * one, one, surfaces)
-    return abs(1 / float(slope * tensors.index[-1]))
+    return abs(float(tensors.index[0] / (slope * tensors.index[-1])))
+
+
+def _tensors(lens: Lens) -> tuple[SurfaceTensors, torch.Tensor]:
+    """Return a lens at its reference wavelength, and a paraxial height or slope of 1."""
+    wave = torch.tensor(lens.reference_wavelength_um, dtype=torch.float64)
+    return surface_tensors(lens, wave), torch.ones((), dtype=torch.float64)

@@ -14,24 +14,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal, get_args
 
-import torch
-
 from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.models_def.optics.glass.catalogue import (
     GlassCatalogue,
     builtin_catalogues,
+    catalogues_of,
     find_glass,
+    maker_of,
     trade_name_of,
 )
-from camkit.models_def.optics.glass.dispersion import (
-    D_LINE_UM,
-    RANGE_TOLERANCE,
-    abbe_number,
-    refractive_index,
-)
+from camkit.models_def.optics.glass.dispersion import index_and_abbe
 from camkit.models_def.optics.glass.material import Glass
 from camkit.models_def.optics.glass.model_glass import MODEL_PREFIX, model_glass
+from camkit.models_def.optics.glass.nearness import near_glasses, near_text
 from camkit.models_def.optics.lens_file.zmx_records import Record
 
 MODEL_NAME: Final = "___BLANK"
@@ -42,13 +38,10 @@ MOST_DIFFERENCE: Final = 1e-3
 """In n_d or n_F - n_C, up to which a name holds against the numbers beside it."""
 LEAST_DIFFERENCE: Final = 1e-4
 """From which the two are said to disagree: makers print five digits."""
+_MODEL_FLAG: Final = "1"
 _FILLED_IN: Final = (1.5, 40.0)
 _SAME: Final = 1e-9
 """Other programs write 13 digits or more."""
-_ALIASES: Final = {"nikon": "hikari", "nikon_hikari": "hikari", "nikon-hikari": "hikari"}
-OLD_SCHOTT: Final = "Schott1983"
-_OLDER: Final = {OLD_SCHOTT.casefold(): "schott"}
-"""Catalogues of glasses that another catalogue no longer has; GCAT knows one name for both."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,8 +50,9 @@ class GlassOrder:
 
     Attributes:
         user_catalogues: The user's catalogues; asked first.
-        listed: Those of camkit that the GCAT line names, in its order; the first that has a name
-            decides. A name that none of them has must stand in exactly one of the others.
+        listed: Those of camkit that the user prefers, then those that the GCAT line names, in
+            their order; the first that has a name decides. A name that none of them has must stand
+            in exactly one of the others.
         rule: What holds where a line has a name and numbers; `nearest`: the name as long as its
             index is that of the numbers within `MOST_DIFFERENCE`.
     """
@@ -98,11 +92,17 @@ def glass_order(
     names: Sequence[str],
     user_catalogues: Sequence[GlassCatalogue],
     rule: GlassRule = "nearest",
+    preferred: Sequence[GlassCatalogue] = (),
 ) -> GlassOrder:
-    """Return the order for a GCAT line; catalogues that camkit does not have are passed over."""
-    catalogues = [c for c in builtin_catalogues() if not c.literature]
-    catalogue_names = [_ALIASES.get(name.casefold(), name.casefold()) for name in names]
-    listed = (c for name in catalogue_names for c in catalogues if gcat_name(c) == name.upper())
+    """Return the order for a GCAT line; catalogues that camkit does not have are passed over.
+
+    Args:
+        names: Of the GCAT line.
+        user_catalogues: Asked first.
+        rule: For glasses whose line states numbers beside the name.
+        preferred: Asked before those of the GCAT line.
+    """
+    listed = (*preferred, *(c for name in names for c in catalogues_of(name)))
     return GlassOrder(
         user_catalogues=tuple(user_catalogues), listed=tuple(dict.fromkeys(listed)), rule=rule
     )
@@ -110,8 +110,7 @@ def glass_order(
 
 def gcat_name(catalogue: GlassCatalogue) -> str:
     """Return the name that a GCAT line has for one of camkit's catalogues."""
-    name = catalogue.name.casefold()
-    return _OLDER.get(name, name).upper()
+    return maker_of(catalogue).upper()
 
 
 def stated_numbers(glass: Record) -> StatedNumbers | None:
@@ -120,7 +119,9 @@ def stated_numbers(glass: Record) -> StatedNumbers | None:
         index_d, abbe, *rest = map(float, glass.words[3:6])
     except ValueError:
         return None
-    if index_d <= 1 or abbe <= 0 or (index_d, abbe) == _FILLED_IN:
+    # a model glass may have no dispersion, and any name
+    least_abbe = 0.0 if glass.words[1] == _MODEL_FLAG else math.ulp(0.0)
+    if index_d <= 1 or not abbe >= least_abbe or (index_d, abbe) == _FILLED_IN:
         return None
     return StatedNumbers(index_d=index_d, abbe_number=abbe, deviation=rest[0] if rest else 0.0)
 
@@ -133,8 +134,10 @@ def read_glass(record: Record, order: GlassOrder) -> Glass:
             numbers stand beside it or the rule forbids them.
     """
     numbers = stated_numbers(record)
-    if numbers is None or order.rule == "names":
+    if numbers is None:
         return find_zmx_glass(record.words[0], order)
+    if order.rule == "names":
+        return _by_name(record.words[0], numbers, order)
     model = model_glass(numbers.index_d, numbers.abbe_number, numbers.deviation)
     if order.rule == "numbers":
         return model
@@ -143,6 +146,17 @@ def read_glass(record: Record, order: GlassOrder) -> Glass:
     except ContractError:
         return model
     return glass if numbers.difference(glass) <= MOST_DIFFERENCE else model
+
+
+def _by_name(name: str, numbers: StatedNumbers, order: GlassOrder) -> Glass:
+    """Return the glass of a name; its error names what is near to the numbers beside it."""
+    try:
+        return find_zmx_glass(name, order)
+    except ContractError as error:
+        near = near_text(near_glasses(numbers.index_d, numbers.abbe_number, order.user_catalogues))
+        if not near:
+            raise
+        raise ContractError(f"{error}; near to its n_d and V_d: {near}") from error
 
 
 def glass_note(record: Record, order: GlassOrder, glass: Glass) -> str | None:
@@ -154,7 +168,9 @@ def glass_note(record: Record, order: GlassOrder, glass: Glass) -> str | None:
     try:
         catalogue_glass = find_zmx_glass(name, order)
     except ContractError:
-        return f"{name} is no glass of one catalogue: read by its numbers, {text}"
+        near = near_text(near_glasses(numbers.index_d, numbers.abbe_number, order.user_catalogues))
+        hint = f"; near to them: {near}" if near else ""
+        return f"{name} is no glass of one catalogue: read by its numbers, {text}{hint}"
     if numbers.difference(catalogue_glass) < LEAST_DIFFERENCE:
         return None
     index_d, abbe = index_and_abbe(catalogue_glass)
@@ -182,7 +198,8 @@ def find_zmx_glass(name: str, order: GlassOrder) -> Glass:
     if several:
         names = " or ".join(glass.name for glass in several)
         raise ContractError(
-            f"glass {name} may be {names}; name its catalogue in the GCAT line of the file"
+            f"glass {name} may be {names}; choose by {option_text('catalogue')}, or name its "
+            "catalogue in the GCAT line of the file"
         )
     try:
         return find_glass(name)
@@ -214,16 +231,6 @@ def read_model_glass(numbers: Sequence[float], comment: str, order: GlassOrder) 
         if all(math.isclose(nominal, written, rel_tol=_SAME) for nominal, written in pairs):
             return glass
     return model
-
-
-def index_and_abbe(glass: Glass) -> tuple[float, float]:
-    """Return n_d and V_d as a GLAS line holds them; 0 where the glass has none."""
-    low, high = glass.range_um
-    if not (low * (1 - RANGE_TOLERANCE) <= 0.4861 and high * (1 + RANGE_TOLERANCE) >= 0.6563):
-        return 0.0, 0.0
-    line = torch.tensor(D_LINE_UM, dtype=torch.float64)
-    number = abbe_number(glass)
-    return float(refractive_index(glass, line)), number if number != float("inf") else 0.0
 
 
 def glass_words(glass: Glass, order: GlassOrder, *, is_user_glass: bool) -> tuple[str, str]:

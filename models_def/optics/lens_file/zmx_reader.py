@@ -6,13 +6,23 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
-from camkit.errors import DecodeError, UnsupportedError
-from camkit.models_def.optics.glass.catalogue import AIR, GlassCatalogue
+from camkit.errors import ContractError, DecodeError, UnsupportedError
+from camkit.models_def.optics.glass.catalogue import (
+    AIR,
+    FORMER,
+    GlassCatalogue,
+    own_glass,
+)
 from camkit.models_def.optics.glass.encoding import read_text
+from camkit.models_def.optics.lens_file.placing import with_object_na
 from camkit.models_def.optics.lens_file.zmx_collimator import without_collimator
+from camkit.models_def.optics.lens_file.zmx_completion import (
+    APERTURES,
+    completed,
+    needs_focus,
+)
 from camkit.models_def.optics.lens_file.zmx_field import with_fields
 from camkit.models_def.optics.lens_file.zmx_glass import (
-    OLD_SCHOTT,
     GlassOrder,
     GlassRule,
     glass_note,
@@ -27,16 +37,20 @@ from camkit.models_def.optics.lens_file.zmx_records import (
 )
 from camkit.models_def.optics.lens_file.zmx_surface import (
     SurfaceContext,
+    medium_after,
     read_surface,
     refuse_unsupported,
 )
-from camkit.models_def.optics.paraxial import paraxial_data, widest_stop_mm
+from camkit.models_def.optics.paraxial import (
+    paraxial_image,
+    widest_stop_mm,
+    with_paraxial_focus,
+)
 from camkit.models_def.optics.prescription import ApertureKind, Lens, Surface
 
 _MM_PER_UNIT: Final = {"MM": 1.0, "CM": 10.0, "IN": 25.4, "METER": 1000.0, "M": 1000.0}
 _DEFAULT_WAVE: Final = (0.55, 1.0)
 _NORMAL_AIR: Final = (20.0, 1.0)
-_APERTURES: Final = ("ENPD", "FNUM", "FLOA", "OBNA")
 _VIGNETTING: Final = ("VDXN", "VDYN", "VCXN", "VCYN")
 
 
@@ -54,7 +68,10 @@ class ZmxLens:
 
 
 def read_zmx(
-    path: Path, catalogues: Sequence[GlassCatalogue] = (), rule: GlassRule = "nearest"
+    path: Path,
+    catalogues: Sequence[GlassCatalogue] = (),
+    rule: GlassRule = "nearest",
+    preferred: Sequence[GlassCatalogue] = (),
 ) -> ZmxLens:
     """Read a lens from a .zmx file.
 
@@ -62,37 +79,42 @@ def read_zmx(
         path: UTF-16, UTF-8 or latin-1.
         catalogues: Of the user; asked for glasses before those of the GCAT line.
         rule: For glasses whose line states numbers beside the name.
+        preferred: Catalogues of camkit that are asked before those of the GCAT line.
 
     Raises:
         DecodeError: If the file is damaged; the message gives the line.
         UnsupportedError: If it holds what camkit does not trace; the message names it.
         ContractError: If a glass is unknown or the lens makes no sense.
     """
-    return parse_zmx(read_text(path), catalogues, rule, name=path.stem)
+    return parse_zmx(read_text(path), catalogues, rule, preferred, name=path.stem)
 
 
 def parse_zmx(
     text: str,
     catalogues: Sequence[GlassCatalogue] = (),
     rule: GlassRule = "nearest",
+    preferred: Sequence[GlassCatalogue] = (),
     *,
     name: str = "lens",
 ) -> ZmxLens:
     """Read a lens from the text of a .zmx file; see `read_zmx`."""
-    records, collimator_notes = without_collimator(parse_records(text))
+    records, completion_notes = completed(parse_records(text))
+    records, collimator_notes = without_collimator(records)
     system = records.system
     mode = last(system, "MODE")
     if mode is not None and mode.words[:1] not in {(), ("SEQ",)}:
         raise UnsupportedError(f"line {mode.line}: MODE {mode.text}; camkit reads MODE SEQ")
     scale = _mm_per_unit(last(system, "UNIT"))
     object_mm = _object_distance_mm(records, scale)
-    _check_image(records)
     gcat = last(system, "GCAT")
-    order = glass_order(gcat.words if gcat else (), catalogues, rule)
+    order = glass_order(gcat.words if gcat else (), catalogues, rule, preferred)
     surfaces = tuple(
         read_surface(block, SurfaceContext(number=i, mm_per_unit=scale, order=order))
         for i, block in enumerate(records.surfaces[1:-1], start=1)
     )
+    image_notes = _image_notes(records, surfaces[-1])
+    object_context = SurfaceContext(number=0, mm_per_unit=scale, order=order)
+    object_glass = medium_after(records.surfaces[0], object_context)
     stop = _stop(records)
     waves, reference = _wavelengths(system)
     title = last(system, "NAME")
@@ -105,12 +127,16 @@ def parse_zmx(
         aperture_kind=kind,
         aperture_value=value,
         object_distance_mm=object_mm,
+        object_glass=object_glass.name,
+        object_material=own_glass(object_glass, order.user_catalogues),
         wavelengths_um=waves,
         reference_wavelength_um=reference,
     )
     lens = _with_object_aperture(lens, system)
     lens, aperture_notes = _with_rim_aperture(lens, records, scale)
-    notes = (*collimator_notes, *aperture_notes, *_notes(records, surfaces))
+    lens, focus_notes = _with_image_distance(lens, records)
+    notes = (*completion_notes, *collimator_notes, *aperture_notes, *focus_notes, *image_notes)
+    notes += _notes(records, surfaces)
     notes += _glass_notes(records, surfaces, order)
     lens, field_notes = with_fields(lens, system, scale)
     return ZmxLens(lens=lens, notes=(*notes, *field_notes))
@@ -126,8 +152,6 @@ def _mm_per_unit(record: Record | None) -> float:
 def _object_distance_mm(records: ZmxRecords, scale: float) -> float:
     block = records.surfaces[0]
     refuse_unsupported(block, 0)
-    if last(block, "GLAS") is not None:
-        raise UnsupportedError("the object lies in glass; camkit has it in air")
     curvature, distance = last(block, "CURV"), last(block, "DISZ")
     if curvature is not None and curvature.number(0) != 0:
         raise UnsupportedError(f"line {curvature.line}: the object is curved; camkit has it flat")
@@ -144,19 +168,30 @@ def _object_distance_mm(records: ZmxRecords, scale: float) -> float:
     return value * scale
 
 
-def _check_image(records: ZmxRecords) -> None:
-    block = records.surfaces[-1]
-    refuse_unsupported(block, len(records.surfaces) - 1)
-    curvature = last(block, "CURV")
+def _image_notes(records: ZmxRecords, back: Surface) -> tuple[str, ...]:
+    """Return a note on the medium behind the image, where light has ended.
+
+    Raises:
+        UnsupportedError: If the image is curved or not round.
+        DecodeError: If the medium begins there: a lens of which the rest is missing.
+    """
+    block, number = records.surfaces[-1], len(records.surfaces) - 1
+    refuse_unsupported(block, number)
+    curvature, glass = last(block, "CURV"), last(block, "GLAS")
     if curvature is not None and curvature.number(0) != 0:
         raise UnsupportedError(
             f"line {curvature.line}: the last surface is the image, and curved; a sensor is flat "
             "(or the file is cut off)"
         )
-    if last(block, "GLAS") is not None:
+    if glass is None:
+        return ()
+    last_medium = last(records.surfaces[-2], "GLAS")
+    if last_medium is None or last_medium.words != glass.words:
         raise DecodeError(
-            f"surface {len(records.surfaces) - 1}, the last, has a glass; is the file cut off?"
+            f"surface {number}, the last, has a glass that does not begin before it; "
+            "is the file cut off?"
         )
+    return (f"line {glass.line}: the image lies in {back.glass}: light ends there",)
 
 
 def _stop(records: ZmxRecords) -> int:
@@ -168,10 +203,10 @@ def _stop(records: ZmxRecords) -> int:
 
 def _aperture(records: ZmxRecords, stop: int, scale: float) -> tuple[ApertureKind, float]:
     """Return the aperture; that of OBNA is put in later, when the entrance pupil is known."""
-    apertures = [r for key in _APERTURES if (r := last(records.system, key)) is not None]
+    apertures = [r for key in APERTURES if (r := last(records.system, key)) is not None]
     if len(apertures) != 1:
         keys = ", ".join(record.key for record in apertures) or "none"
-        raise DecodeError(f"the aperture must be one of {', '.join(_APERTURES)}; got {keys}")
+        raise DecodeError(f"the aperture must be one of {', '.join(APERTURES)}; got {keys}")
     record = apertures[0]
     if record.key == "FLOA":
         size_mm = _stop_size_mm(records, stop, scale)
@@ -214,17 +249,27 @@ def _with_rim_aperture(lens: Lens, records: ZmxRecords, scale: float) -> tuple[L
     return replace(lens, aperture_value=semi_mm), [note]
 
 
+def _with_image_distance(lens: Lens, records: ZmxRecords) -> tuple[Lens, tuple[str, ...]]:
+    """Return a list of surfaces without a way to the image focused where it has a real one."""
+    if not needs_focus(records):
+        return lens, ()
+    distance_mm = paraxial_image(lens).distance_mm
+    if not distance_mm > 0:
+        return lens, (f"the paraxial image lies {-distance_mm:.4g} mm in front of the last vertex",)
+    note = f"the last surface states no distance: the sensor is at the focus, {distance_mm:.4g} mm"
+    return with_paraxial_focus(lens), (note,)
+
+
 def _with_object_aperture(lens: Lens, system: Records) -> Lens:
     record = last(system, "OBNA")
     if record is None:
         return lens
-    sine = record.number(0)
     if record.number(1, 0.0) != 0:
         raise UnsupportedError(f"line {record.line}: OBNA given as an angle; give it as NA")
-    if not (sine < 1 and math.isfinite(lens.object_distance_mm)):
-        raise DecodeError(f"line {record.line}: OBNA needs a near object and NA < 1; got {sine}")
-    distance_mm = lens.object_distance_mm + paraxial_data(lens).entrance_pupil_mm
-    return replace(lens, aperture_value=2 * distance_mm * math.tan(math.asin(sine)))
+    try:
+        return with_object_na(lens, record.number(0))
+    except ContractError as error:
+        raise DecodeError(f"line {record.line}: OBNA: {error}") from error
 
 
 def _wavelengths(system: Records) -> tuple[tuple[float, ...], float]:
@@ -287,7 +332,8 @@ def _glass_notes(
 
     Said are those whose name and numbers disagree, and those of a catalogue that GCAT leaves out.
     """
-    catalogues = {c.name for c in (*order.user_catalogues, *order.listed)} - {OLD_SCHOTT}
+    catalogues = {c.name for c in (*order.user_catalogues, *order.listed)}
+    catalogues = {name for name in catalogues if name.casefold() not in FORMER}
     notes: dict[str, str] = {}
     for block, surface in zip(records.surfaces[1:-1], surfaces, strict=True):
         glass = last(block, "GLAS")

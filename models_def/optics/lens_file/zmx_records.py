@@ -9,6 +9,8 @@ from camkit.errors import DecodeError
 
 MAX_SURFACES: Final = 1000
 MAX_NUMBER: Final = 1e12
+MAX_TERM: Final = 1e100
+"""Of PARM: the coefficient of r^16 in metres is 1e45 times that in millimetres."""
 _MOST: Final = 40
 
 _SURFACE_KEYS: Final = frozenset(
@@ -30,7 +32,8 @@ class Record:
         """Return a word as a number.
 
         Raises:
-            DecodeError: If it is missing without default, not finite or beyond `MAX_NUMBER`.
+            DecodeError: If it is missing without default, not finite or beyond `MAX_NUMBER`
+                (`MAX_TERM` for PARM).
         """
         if position >= len(self.words):
             if default is not None:
@@ -41,7 +44,7 @@ class Record:
             value = float(word)
         except ValueError:
             value = math.nan
-        if not abs(value) <= MAX_NUMBER:
+        if not abs(value) <= (MAX_TERM if self.key == "PARM" else MAX_NUMBER):
             raise DecodeError(
                 f"line {self.line}: {self.key} needs a finite number; got {word[:_MOST]!r}"
             )
@@ -65,7 +68,7 @@ class ZmxRecords:
 
 
 def parse_records(text: str) -> ZmxRecords:
-    """Sort the lines of a file.
+    """Sort the lines of a file; one that begins at SURF 1 has an empty object in front.
 
     Raises:
         DecodeError: If it has fewer than three surfaces, more than `MAX_SURFACES`, or their
@@ -75,6 +78,8 @@ def parse_records(text: str) -> ZmxRecords:
     surfaces: list[dict[str, list[Record]]] = []
     for record, indented in _records(text):
         if record.key == "SURF":
+            if not surfaces and record.words[:1] == ("1",):
+                surfaces.append({})
             _check_number(record, len(surfaces))
             surfaces.append({})
             continue

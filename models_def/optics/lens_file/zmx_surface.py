@@ -60,7 +60,7 @@ def read_surface(records: Records, context: SurfaceContext) -> Surface:
             f"line {thickness.line}: surface {context.number} is infinitely thick; "
             "only the object may be"
         )
-    glass = _glass(records, context)
+    glass = medium_after(records, context)
     return Surface(
         curvature_per_mm=_value(records, "CURV") / scale,
         thickness_mm=thickness.number(0) * scale,
@@ -110,7 +110,8 @@ def _value(records: Records, key: str) -> float:
     return record.number(0) if record else 0.0
 
 
-def _glass(records: Records, context: SurfaceContext) -> Glass:
+def medium_after(records: Records, context: SurfaceContext) -> Glass:
+    """Return the glass that a surface states, air where it states none."""
     record = last(records, "GLAS")
     if record is None or not record.words or record.words[0].upper() == "AIR":
         return AIR

@@ -7,6 +7,7 @@ from typing import Final
 
 from camkit.errors import ContractError, UnsupportedError
 from camkit.models_def.optics.glass.catalogue import AIR, builtin_catalogues
+from camkit.models_def.optics.glass.material import Glass
 from camkit.models_def.optics.lens_file.zmx_glass import (
     MODEL_NAME,
     GlassOrder,
@@ -38,11 +39,14 @@ def format_zmx(lens: Lens) -> str:
         raise ContractError("a lens file holds no index offsets; write the nominal lens")
     names = _catalogue_names(lens)
     order = glass_order(names, ())
-    lines = [*_system_lines(lens, names), *_object_lines(lens)]
+    lines = [*_system_lines(lens, names), *_object_lines(lens, order)]
     for i, surface in enumerate(lens.surfaces):
         lines += _surface_lines(lens, surface, i, order)
     last = len(lens.surfaces) + 1
     lines += [f"SURF {last}", "  TYPE STANDARD", '  CURV 0.0 0 0 0 0 ""', *_BLOCK, "  DISZ 0"]
+    # other programs take the medium of the image from its own surface
+    back = lens.surfaces[-1]
+    lines += _glass_lines(back.medium, order, is_user_glass=back.material is not None)[0]
     lines += ['  DIAM 0 0 0 0 1 ""', "TOL TOFF   0   0   0   0   0 0 0", "MNUM 1 1"]
     return "\n".join(lines) + "\n"
 
@@ -55,11 +59,13 @@ def _catalogue_names(lens: Lens) -> list[str]:
     """
     names: dict[str, None] = {}
     makers = [c for c in builtin_catalogues() if not c.literature]
-    for surface in lens.surfaces:
-        if surface.material is not None and "-" in surface.glass:
-            names[surface.glass.rpartition("-")[2]] = None
-        names |= {gcat_name(c): None for c in makers if c.get(surface.glass) is not None}
-    glasses = {surface.glass: surface.medium for surface in lens.surfaces}.values()
+    media = [(lens.object_medium, lens.object_material)]
+    media += [(surface.medium, surface.material) for surface in lens.surfaces]
+    for medium, users_glass in media:
+        if users_glass is not None and "-" in medium.name:
+            names[medium.name.rpartition("-")[2]] = None
+        names |= {gcat_name(c): None for c in makers if c.get(medium.name) is not None}
+    glasses = {medium.name: medium for medium, _ in media}.values()
 
     def model_free_count(order: list[str]) -> int:
         read = glass_order(order, ())
@@ -120,11 +126,23 @@ def _height_text(lens: Lens, angle_rad: float) -> str:
     return repr(height_mm)
 
 
-def _object_lines(lens: Lens) -> list[str]:
+def _object_lines(lens: Lens, order: GlassOrder) -> list[str]:
     near = math.isfinite(lens.object_distance_mm)
     distance = repr(lens.object_distance_mm) if near else "INFINITY"
     head = ["SURF 0", "  TYPE STANDARD", '  CURV 0.0 0 0 0 0 ""', *_BLOCK]
-    return [*head, f"  DISZ {distance}", '  DIAM 0 0 0 0 1 ""']
+    is_user_glass = lens.object_material is not None
+    glass, comment = _glass_lines(lens.object_medium, order, is_user_glass=is_user_glass)
+    return [*head, *comment, f"  DISZ {distance}", *glass, '  DIAM 0 0 0 0 1 ""']
+
+
+def _glass_lines(
+    glass: Glass, order: GlassOrder, *, is_user_glass: bool
+) -> tuple[list[str], list[str]]:
+    """Return the GLAS line of a medium and its comment; nothing for air."""
+    if glass == AIR:
+        return [], []
+    words, comment = glass_words(glass, order, is_user_glass=is_user_glass)
+    return [f"  GLAS {words}"], [f"  COMM {comment}"] if comment else []
 
 
 def _surface_lines(lens: Lens, surface: Surface, position: int, order: GlassOrder) -> list[str]:
@@ -137,32 +155,34 @@ def _surface_lines(lens: Lens, surface: Surface, position: int, order: GlassOrde
             f"surface {position} has {len(surface.even_asphere)} aspheric terms; "
             f"a .zmx file holds {EVEN_TERMS} (to r^{2 * EVEN_TERMS})"
         )
-    glass, comment = ("", "")
-    if surface.glass != AIR.name:
-        glass, comment = glass_words(
-            surface.medium, order, is_user_glass=surface.material is not None
-        )
+    is_user_glass = surface.material is not None
+    glass, comment = _glass_lines(surface.medium, order, is_user_glass=is_user_glass)
     kind = "EVENASPH" if surface.even_asphere else "STANDARD"
     lines = [
         f"SURF {position + 1}",
-        *([f"  COMM {comment}"] if comment else []),
+        *comment,
         *(["  STOP"] if position == lens.stop else []),
         f"  TYPE {kind}",
         f'  CURV {surface.curvature_per_mm!r} 0 0 0 0 ""',
         *_BLOCK,
         *(f"  PARM {i} {a!r}" for i, a in enumerate(surface.even_asphere, start=1)),
         f"  DISZ {surface.thickness_mm!r}",
-        *([f"  GLAS {glass}"] if glass else []),
+        *glass,
         *([f"  CONI {surface.conic!r}"] if surface.conic else []),
     ]
     return lines + _aperture_lines(lens, surface, position)
 
 
 def _aperture_lines(lens: Lens, surface: Surface, position: int) -> list[str]:
-    """Return DIAM, fixed where the surface vignettes; a floating stop holds the aperture there."""
+    """Return DIAM, fixed where the surface vignettes; a floating stop holds the aperture there.
+
+    A fixed one is said again as floating aperture (FLAP), without which some programs let rays by.
+    """
     size_mm, limit = surface.semi_diameter_mm, math.isfinite(surface.semi_diameter_mm)
     floating = position == lens.stop and lens.aperture_kind == "stop_semi_diameter_mm"
     if floating and size_mm != lens.aperture_value:
         clap = [f"  CLAP 0 {size_mm!r} 0"] if limit else []
         return [f'  DIAM {lens.aperture_value!r} 0 0 0 1 ""', *clap]
-    return [f'  DIAM {size_mm!r} 1 0 0 1 ""' if limit else '  DIAM 0 0 0 0 1 ""']
+    if not limit:
+        return ['  DIAM 0 0 0 0 1 ""']
+    return [f'  DIAM {size_mm!r} 1 0 0 1 ""', f"  FLAP 0 {size_mm!r} 0"]

@@ -15,4 +15,5 @@ In the order in which data flows:
 - `hazy_freezing`: both of a lens over the field, as core kernels and a haze in cells
 - `distances`: the same at other distances than that of its focus
 - `sag_table`: a profile for the workshop
+- `lens_sag`: the profiles of all surfaces of a lens in one table
 """

@@ -1,4 +1,4 @@
-"""`camkit lens`: commands for one lens file; all of them read .toml and .zmx.
+"""`camkit lens`: commands for one lens file; all of them read .toml, .zmx and .json.
 
 - `lens_app`: the commands joined
 - `show`: a lens on one page
@@ -7,5 +7,5 @@
 - `peak`: the light near the peak of a point
 - `sag`: the profile of a surface, for the workshop
 - `tolerance`: fabricated copies, their yield, what to tighten first
-- `convert`: between .toml and .zmx
+- `convert`: between .toml, .zmx and .json (optiland), and to a sag table
 """

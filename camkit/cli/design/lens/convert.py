@@ -1,4 +1,4 @@
-"""`camkit lens convert`: a lens file in the other format, scaled or stopped where asked."""
+"""`camkit lens convert`: a lens file in another format, scaled or stopped where asked."""
 
 import json
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from camkit.cli.choices import Debug, GlassFiles, Json, Overwrite
+from camkit.cli.choices import Debug, GlassCatalogues, GlassFiles, Json, Overwrite
 from camkit.cli.say import say
 
 if TYPE_CHECKING:
@@ -14,8 +14,14 @@ if TYPE_CHECKING:
 
 
 def convert(
-    source: Annotated[Path, typer.Argument(help="Lens file (.toml or .zmx).", metavar="IN")],
-    out: Annotated[Path, typer.Argument(help="Lens file to write (.toml or .zmx).", metavar="OUT")],
+    source: Annotated[Path, typer.Argument(help="Lens file (.toml, .zmx or .json).", metavar="IN")],
+    target: Annotated[
+        Path | None,
+        typer.Argument(help="File to write: .toml, .zmx, .json (optiland), .csv.", metavar="OUT"),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="File to write, in place of OUT.")
+    ] = None,
     efl_mm: Annotated[
         float | None, typer.Option(help="Focal length in mm to scale the lens to.")
     ] = None,
@@ -23,42 +29,55 @@ def convert(
         float | None, typer.Option(help="F-number to stop the lens down to, after scaling.")
     ] = None,
     glass: GlassFiles = None,
+    catalogue: GlassCatalogues = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Write a lens in the other format and report on stderr what is lost (needs torch).
+    """Write a lens in another format and report on stderr what is lost (needs torch).
 
-    A finite object distance is scaled with the lens.
+    A finite object distance is scaled with the lens. A table (.csv) holds the sag of every surface.
     """
     from camkit.cli.design.design_time import refuse_existing, require_torch
+    from camkit.errors import ContractError
 
     require_torch("camkit lens convert")
-    refuse_existing([out], overwrite=overwrite)
+    if (target is None) == (out is None):
+        raise ContractError("name one file to write: OUT or --out")
+    path = target or out or Path()
+    refuse_existing([path], overwrite=overwrite)
     from camkit.models_def.optics.lens_file.lens_file import (
         read_noted_lens,
         ready_for_lens,
         write_lens,
     )
     from camkit.models_def.optics.scaling import scale_to_efl, with_f_number
+    from camkit.models_def.optics.thin.lens_sag import write_lens_sag
 
-    ready_for_lens(out)
-    lens, notes = read_noted_lens(source, glass or ())
+    is_table = path.suffix.lower() == ".csv"
+    if is_table:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    else:
+        ready_for_lens(path)
+    lens, notes = read_noted_lens(source, glass or (), catalogue)
     if efl_mm is not None:
         lens = scale_to_efl(lens, efl_mm)
     if f_number is not None:
         lens = with_f_number(lens, f_number)
         notes = (*notes, *_clipped(lens))
-    if out.suffix.lower() == ".zmx" and any(surface.vary for surface in lens.surfaces):
+    if path.suffix.lower() != ".toml" and any(surface.vary for surface in lens.surfaces):
         notes = (*notes, "what `vary` names stays behind: OUT is all fixed")
-    write_lens(lens, out)
+    if is_table:
+        notes = (*notes, *write_lens_sag(lens, path))
+    else:
+        write_lens(lens, path)
     for note in notes:
         say(f"{source.name}: {note}", err=True)
     if json_:
-        record = {"lens": lens.name, "surfaces": len(lens.surfaces), "out": str(out)}
+        record = {"lens": lens.name, "surfaces": len(lens.surfaces), "out": str(path)}
         say(json.dumps({**record, "notes": list(notes)}))
     else:
-        say(f"{out}: {lens.name}, {len(lens.surfaces)} surfaces")
+        say(f"{path}: {lens.name}, {len(lens.surfaces)} surfaces")
 
 
 def _clipped(lens: "Lens") -> list[str]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from camkit.cli.choices import Debug, GlassFiles, Json, Overwrite
+from camkit.cli.choices import Debug, GlassCatalogues, GlassFiles, Json, Overwrite
 from camkit.cli.say import say
 from camkit.errors import ContractError
 from camkit.progress import working
@@ -19,9 +19,11 @@ RINGS: Final = 12
 
 
 def optimize(
-    source: Annotated[Path, typer.Argument(help="Lens file (.toml or .zmx).", metavar="FILE")],
+    source: Annotated[
+        Path, typer.Argument(help="Lens file (.toml, .zmx or .json).", metavar="FILE")
+    ],
     out: Annotated[
-        Path, typer.Option("-o", "--out", help="Improved lens to write (.toml or .zmx).")
+        Path, typer.Option("-o", "--out", help="Improved lens to write (.toml, .zmx or .json).")
     ],
     vary: Annotated[
         str | None,
@@ -51,6 +53,7 @@ def optimize(
     rays: Annotated[int, typer.Option(min=4, help="Number of rays in half the pupil.")] = 24,
     seed: Annotated[int, typer.Option(help="Random seed of the starting points.")] = 1,
     glass: GlassFiles = None,
+    catalogue: GlassCatalogues = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
@@ -69,7 +72,7 @@ def optimize(
     from camkit.models_def.optics.search.own_frame import in_own_frame, too_small_rims
 
     ready_for_lens(out)
-    lens, read_notes = read_noted_lens(source, glass or ())
+    lens, read_notes = read_noted_lens(source, glass or (), catalogue)
     problem = _problem(lens, vary, merit=merit, core_mm=core_um / 1000, rays=rays)
     begin = problem.free.scaled()
     problem = in_own_frame(problem, begin)

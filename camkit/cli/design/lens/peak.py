@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from camkit.cli.choices import Debug, GlassFiles, Json
+from camkit.cli.choices import Debug, GlassCatalogues, GlassFiles, Json
 from camkit.cli.say import say
 from camkit.progress import working
 
@@ -31,11 +31,12 @@ WithWaves = Annotated[
 
 
 def peak(
-    file: Annotated[Path, typer.Argument(help="Lens file (.toml or .zmx).", metavar="FILE")],
+    file: Annotated[Path, typer.Argument(help="Lens file (.toml, .zmx or .json).", metavar="FILE")],
     pitch_um: PitchUm = 5.96,
     waves: WithWaves = False,
     tool_radius_um: ToolRadiusUm = None,
     glass: GlassFiles = None,
+    catalogue: GlassCatalogues = None,
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
@@ -52,7 +53,7 @@ def peak(
     from camkit.models_def.optics.lens_file.lens_file import read_noted_lens
     from camkit.models_def.optics.thin.report import to_text, with_tool
 
-    lens, notes = read_noted_lens(file, glass or ())
+    lens, notes = read_noted_lens(file, glass or (), catalogue)
     if tool_radius_um is not None:
         lens = with_tool(lens, tool_radius_um)
     record = measured(lens, lens.field_angles_rad, pitch_um, waves=waves)

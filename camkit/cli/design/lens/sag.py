@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from camkit.cli.choices import Debug, GlassFiles, Json, Overwrite
+from camkit.cli.choices import Debug, GlassCatalogues, GlassFiles, Json, Overwrite
 from camkit.cli.say import say
 
 
 def sag(
-    file: Annotated[Path, typer.Argument(help="Lens file (.toml or .zmx).", metavar="FILE")],
+    file: Annotated[Path, typer.Argument(help="Lens file (.toml, .zmx or .json).", metavar="FILE")],
     out: Annotated[Path, typer.Option("-o", "--out", help="Table to write (.csv).")],
     surface: Annotated[
         int | None,
@@ -22,6 +22,7 @@ def sag(
     ] = None,
     step_um: Annotated[float, typer.Option(min=0.1, help="Step of the radius in um.")] = 10.0,
     glass: GlassFiles = None,
+    catalogue: GlassCatalogues = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
@@ -38,7 +39,7 @@ def sag(
     from camkit.models_def.optics.lens_file.lens_file import read_noted_lens
     from camkit.models_def.optics.thin.sag_table import sag_table, write_sag_table
 
-    lens, notes = read_noted_lens(file, glass or ())
+    lens, notes = read_noted_lens(file, glass or (), catalogue)
     if surface is None:
         cut = (n for n, face in enumerate(lens.surfaces) if face.grooves is not None)
         surface = next(cut, 0)

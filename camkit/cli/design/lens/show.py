@@ -6,7 +6,7 @@ from typing import Annotated, Final
 
 import typer
 
-from camkit.cli.choices import Debug, GlassFiles, Json, Overwrite
+from camkit.cli.choices import Debug, GlassCatalogues, GlassFiles, Json, Overwrite
 from camkit.cli.say import say
 from camkit.progress import working
 
@@ -14,7 +14,7 @@ PAGE: Final = ".html"
 
 
 def show(
-    file: Annotated[Path, typer.Argument(help="Lens file (.toml or .zmx).", metavar="FILE")],
+    file: Annotated[Path, typer.Argument(help="Lens file (.toml, .zmx or .json).", metavar="FILE")],
     pupil: Annotated[
         str | None,
         typer.Option(
@@ -36,6 +36,7 @@ def show(
         ),
     ] = None,
     glass: GlassFiles = None,
+    catalogue: GlassCatalogues = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
@@ -59,7 +60,7 @@ def show(
         folder, name = folder.parent, folder.stem
     if folder is not None:
         refuse_existing([page_path(folder, name)], overwrite=overwrite)
-    lens, notes = read_noted_lens(file, glass or ())
+    lens, notes = read_noted_lens(file, glass or (), catalogue)
     with working(f"measuring {lens.name}"):
         facts = analyse(lens, given if pupil else usual_pupil(lens, sampling), notes)
     with working("drawing the page"):

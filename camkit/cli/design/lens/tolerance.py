@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from camkit.cli.choices import Debug, GlassFiles, Json, Overwrite
+from camkit.cli.choices import Debug, GlassCatalogues, GlassFiles, Json, Overwrite
 from camkit.cli.say import say
 from camkit.errors import ContractError
 from camkit.progress import working
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def tolerance(
-    file: Annotated[Path, typer.Argument(help="Lens file (.toml or .zmx).", metavar="FILE")],
+    file: Annotated[Path, typer.Argument(help="Lens file (.toml, .zmx or .json).", metavar="FILE")],
     errors: Annotated[
         Path | None,
         typer.Option(
@@ -40,6 +40,7 @@ def tolerance(
         typer.Option("-o", "--out-dir", help="Folder for NAME-tolerance.png, .svg and .json."),
     ] = None,
     glass: GlassFiles = None,
+    catalogue: GlassCatalogues = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
@@ -62,7 +63,7 @@ def tolerance(
     folder = out_dir if out_dir is not None or json_ else Path()
     if folder is not None:
         refuse_existing(chart_paths(folder, file.stem), overwrite=overwrite)
-    lens, notes = read_noted_lens(file, glass or ())
+    lens, notes = read_noted_lens(file, glass or (), catalogue)
     for note in notes:
         say(f"{file.name}: {note}", err=True)
     run = ToleranceRun(

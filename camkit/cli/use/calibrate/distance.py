@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from camkit.cli.choices import Debug, GlassFiles, Json, Overwrite
+from camkit.cli.choices import Debug, GlassCatalogues, GlassFiles, Json, Overwrite
 from camkit.cli.design.camera_options import FNumber, StopRadiusMm, distances_m
 from camkit.cli.use.calibrate.calibration_outputs import print_result
 
@@ -20,7 +20,7 @@ def distance(
             help="A wide, blurred picture and a sharp one of a plane; more planes follow."
         ),
     ],
-    lens: Annotated[Path, typer.Option(help="Lens file (.toml, .zmx) or built-in name.")],
+    lens: Annotated[Path, typer.Option(help="Lens file (.toml, .zmx, .json) or built-in name.")],
     focus_m: Annotated[
         float, typer.Option(help="Distance in m ('inf' for infinity) that the lens is focused on.")
     ],
@@ -64,6 +64,7 @@ def distance(
         typer.Option(help="Known origin: vertex, sensor or pupil; default: all are compared."),
     ] = None,
     glass: GlassFiles = None,
+    catalogue: GlassCatalogues = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
@@ -87,6 +88,7 @@ def distance(
         pitch_um=pitch_um,
         distance_from=distance_from,
         glass=tuple(glass or ()),
+        catalogue=catalogue,
     )
     facts = lens_distance.distance(
         pictures,

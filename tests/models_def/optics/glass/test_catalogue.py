@@ -7,6 +7,8 @@ from camkit.models_def.optics.glass.catalogue import (
     builtin_catalogues,
     find_glass,
     own_glass,
+    preferred_catalogues,
+    trade_name_of,
 )
 from camkit.models_def.optics.glass.dispersion import (
     D_LINE_UM,
@@ -164,3 +166,56 @@ def test_an_old_glass_has_the_coefficients_of_its_successor_only_where_both_are_
     assert find_glass("BK7").coefficients == find_glass("N-BK7").coefficients
     assert find_glass("BK7").range_um == find_glass("N-BK7").range_um
     assert find_glass("LAK9-Schott1983").formula == "buchdahl"
+
+
+@pytest.mark.parametrize(
+    ("name", "code"),
+    [
+        ("SK1", 610567),
+        ("F15", 606378),
+        ("SSK4A", 618551),
+        ("BAF9", 643480),
+        ("K11", 500614),
+        ("LAKN14", 697554),
+        ("SF18", 722293),
+        ("LAF9", 795284),
+        ("FK1", 471673),
+        ("KF1", 540511),
+        ("BALF6", 589530),
+        ("LLF4", 561452),
+        ("LF2", 589410),
+        ("SF7", 640346),
+        ("KZF1", 551496),
+        ("SF3", 740282),
+    ],
+)
+def test_old_glass_has_the_index_and_abbe_number_of_its_six_digits(name: str, code: int) -> None:
+    """The six digits by which makers and patents know these glasses."""
+    schott = preferred_catalogues("schott")
+    glass = find_glass(name, preferred=schott)
+    assert glass.name.rpartition("-")[2] in ("Schott1983", "SchottObsolete")
+    index = float(refractive_index(glass, torch.tensor(D_LINE_UM, dtype=torch.float64)))
+    assert index == pytest.approx(1 + code // 1000 / 1000, abs=6e-4)
+    assert abbe_number(glass) == pytest.approx(code % 1000 / 10, abs=0.17)
+
+
+def test_no_catalogue_of_former_glasses_doubles_another_of_its_maker() -> None:
+    catalogues = preferred_catalogues("schott")
+    assert [c.name for c in catalogues] == ["Schott", "Schott1983", "SchottObsolete"]
+    names = [trade_name_of(glass) for c in catalogues for glass in c.glasses]
+    assert len(names) == len(set(names))
+
+
+def test_preferred_catalogues_decide_in_their_order() -> None:
+    for makers, name in (("schott,hikari", "F2-Schott"), ("hikari,schott", "F2-Hikari")):
+        assert find_glass("F2", preferred=preferred_catalogues(makers)).name == name
+    assert preferred_catalogues("Nikon") == preferred_catalogues("hikari")
+    assert preferred_catalogues(None) == ()
+    with pytest.raises(ContractError, match=r"names some of schott, ohara.*got 'shcott'"):
+        preferred_catalogues("hikari,shcott")
+    with pytest.raises(ContractError, match="or choose by catalogue"):
+        find_glass("F2")
+
+
+def test_a_preferred_catalogue_does_not_come_before_that_of_the_user() -> None:
+    assert find_glass("F2", [MINE], preferred_catalogues("schott")).name == "F2-mine"

@@ -114,8 +114,9 @@ def test_glass_of_a_users_catalogue_needs_that_catalogue() -> None:
     assert parse_zmx(text, [MINE]).lens == lens
     with pytest.raises(ContractError, match=r"FOO.*glass"):
         parse_zmx(text, rule="names")
-    (note,) = parse_zmx(text).notes
-    assert "FOO is no glass of one catalogue: read by its numbers" in note
+    image, glass_note = parse_zmx(text).notes
+    assert "the image lies in model:" in image
+    assert "FOO is no glass of one catalogue: read by its numbers" in glass_note
 
 
 def test_what_the_format_cannot_hold_is_refused() -> None:

@@ -1,4 +1,5 @@
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -75,3 +76,54 @@ def test_existing_and_unknown_files_are_refused(camkit_command, tmp_path: Path, 
     assert outcome.code != 0
     assert "--overwrite" in outcome.err or "lens file ends in" in outcome.err
     assert not out.exists() or out.read_text() == "kept"
+
+
+def test_a_lens_goes_to_the_json_of_optiland_and_back(camkit_command, tmp_path: Path) -> None:
+    there, back = tmp_path / "duet.json", tmp_path / "duet.toml"
+    assert camkit_command("lens", "convert", "duet", "-o", there).code == 0
+    assert len(json.loads(there.read_text())["surface_group"]["surfaces"]) == 7
+    assert camkit_command("lens", "convert", there, "--out", back).code == 0
+    original = (PRESCRIPTIONS / "duet.toml").read_text()
+    surfaces = original.partition("[[surface]]")[2]
+    assert back.read_text().partition("[[surface]]")[2] == surfaces
+
+
+def test_the_sag_of_every_surface_goes_to_a_table(camkit_command, tmp_path: Path) -> None:
+    """A sphere of radius R: R - sqrt(R^2 - r^2), and the slope r / sqrt(R^2 - r^2)."""
+    source, out = tmp_path / "vendor.zmx", tmp_path / "sag.csv"
+    source.write_text(LA1131, encoding="latin-1")
+    outcome = camkit_command("lens", "convert", source, out)
+    assert outcome.code == 0
+    assert "no rim: the table ends where the paraxial beam does, surfaces 1 (" in outcome.err
+    head, *rows = out.read_text().splitlines()
+    assert head == "surface,radius_mm,height_um,slope"
+    table = [tuple(map(float, row.split(","))) for row in rows]
+    assert {row[0] for row in table} == {0, 1}
+    for number, radius, height, slope in table:
+        root = (25.75**2 - radius**2) ** 0.5
+        assert height == pytest.approx(1000 * (25.75 - root) if number == 0 else 0, abs=1e-3)
+        assert slope == pytest.approx(radius / root if number == 0 else 0, abs=1e-6)
+    assert max(row[1] for row in table) == 12.7
+
+
+def test_one_file_to_write_is_named(camkit_command, tmp_path: Path) -> None:
+    none = camkit_command("lens", "convert", "duet")
+    both = camkit_command("lens", "convert", "duet", tmp_path / "a.zmx", "-o", tmp_path / "b.zmx")
+    for outcome in (none, both):
+        assert outcome.code == ExitCode.USAGE
+        assert "name one file to write: OUT or --out" in outcome.err
+
+
+def test_a_catalogue_is_chosen_for_a_name_that_several_have(camkit_command, tmp_path: Path) -> None:
+    source, out = tmp_path / "my.toml", tmp_path / "out.toml"
+    text = (PRESCRIPTIONS / "duet.toml").read_text()
+    source.write_text(re.sub(r'glass = "(?!air)[^"]*"', 'glass = "F2"', text))
+    failed = camkit_command("lens", "convert", source, out)
+    assert "F2-Schott or F2-Hikari" in failed.err
+    assert "--catalogue" in failed.err
+    chosen = ("--catalogue", "hikari,schott")
+    assert camkit_command("lens", "convert", source, out, *chosen).code == 0
+    assert "F2-Hikari" in out.read_text()
+    wrong = camkit_command("lens", "convert", source, tmp_path / "x.zmx", "--catalogue", "shcott")
+    assert wrong.code == ExitCode.USAGE
+    assert "--catalogue names some of schott" in wrong.err
