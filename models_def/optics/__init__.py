@@ -4,6 +4,7 @@ In the order in which data flows:
 
 - `glass`: catalogues, refractive indices by strict name
 - `grooves`: what a surface may be cut into
+- `shape/`: odd, extended and Q aspheres, phases, tilted elements as stated
 - `prescription`: lenses as dataclasses, TOML files, fabrication errors
 - `lens_file`: lenses from and to files, TOML or .zmx
 - `tracing/`, `trace`: rays through surfaces, differentiable, with a fate for each ray
@@ -15,6 +16,7 @@ In the order in which data flows:
 - `spot`: where they land: chief rays, spots, relative illumination
 - `distortion`: the radial polynomial of eq. (6.10)
 - `psf`: rays splatted into kernels
+- `asymmetric/`: the same for a lens that is not round
 - `kernel_bank`: kernels per colour of the nominal lens and of fabricated copies, for training
 - `freezable_optics`: what freezing knows of any optics
 - `lens_optics`, `measured`, `optics_file`: a lens and a measured PSF as such, either by its file

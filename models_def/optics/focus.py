@@ -13,7 +13,7 @@ from torch import Tensor
 
 from camkit.errors import ContractError
 from camkit.models_def.optics.paraxial import paraxial_image
-from camkit.models_def.optics.prescription import Lens, with_focus_shift
+from camkit.models_def.optics.prescription import Lens, require_round, with_focus_shift
 from camkit.models_def.optics.pupil import half_disc, pupil_rays
 from camkit.models_def.optics.trace import Rays, surface_tensors, trace
 
@@ -39,6 +39,7 @@ def focus_shift_mm(lens: Lens, merit: FocusMerit) -> float:
         raise ContractError(f"the merit must be one of {', '.join(FOCUS_MERITS)}; got {merit}")
     if merit == "paraxial":
         return paraxial_image(lens).distance_mm - lens.surfaces[-1].thickness_mm
+    require_round(lens, f"focus by {merit}")
     slopes = torch.tan(torch.tensor(lens.field_angles_rad, dtype=torch.float64))
     waves = torch.tensor(lens.wavelengths_um, dtype=torch.float64)
     with torch.no_grad():

@@ -13,7 +13,9 @@ from torch import Tensor
 
 from camkit.caller import option_text
 from camkit.errors import ContractError, UnsupportedError
-from camkit.models_def.optics.tracing.profile import sag
+from camkit.models_def.optics.shape.polynomial import Polynomial
+from camkit.models_def.optics.tracing.sag import sag, sag_slope
+from camkit.models_def.optics.tracing.series import Series
 from camkit.units import UM_PER_MM, to_mm
 
 _STEP_MM: Final = 0.001
@@ -53,20 +55,30 @@ class Profile:
     Attributes:
         curvature_per_mm: See `prescription.Surface`.
         conic: The same.
-        even_asphere: The same.
+        polynomial: The same.
         rim_mm: Radius at which it ends.
     """
 
     curvature_per_mm: float
     conic: float
-    even_asphere: tuple[float, ...]
+    polynomial: Polynomial
     rim_mm: float
 
     def height_mm(self, radius_mm: Tensor) -> Tensor:
         """Return h at radii of any shape, float64; see `trace.sag`."""
-        numbers = (self.curvature_per_mm, self.conic, self.even_asphere)
-        c, k, terms = (torch.tensor(n, dtype=torch.float64) for n in numbers)
-        return sag(c, k, terms, radius_mm.to(torch.float64) ** 2)
+        return sag(*self._numbers(radius_mm))
+
+    def slope(self, radius_mm: Tensor) -> Tensor:
+        """Return dh/dr at radii of any shape, float64."""
+        return 2 * radius_mm.to(torch.float64) * sag_slope(*self._numbers(radius_mm))
+
+    def _numbers(
+        self, radius_mm: Tensor
+    ) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor, Series | None]:
+        part = self.polynomial
+        numbers = (self.curvature_per_mm, self.conic, part.even, part.odd)
+        c, k, even, odd = (torch.tensor(n, dtype=torch.float64) for n in numbers)
+        return c, k, even, radius_mm.to(torch.float64) ** 2, odd, part.series
 
 
 def grooved_mm(height_mm: Tensor, grooves: Grooves) -> Tensor:

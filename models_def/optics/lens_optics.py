@@ -10,9 +10,16 @@ import torch
 
 from camkit.errors import ContractError
 from camkit.models_def.optics.analysis.illumination import relative_illumination_at
+from camkit.models_def.optics.asymmetric.place_psf import trace_place_psf
+from camkit.models_def.optics.asymmetric.turning import round_part
 from camkit.models_def.optics.distortion import trace_distortion
 from camkit.models_def.optics.focus import focus_shift_mm
-from camkit.models_def.optics.freezable_optics import FieldLayout, FloatGrid, radial_layout
+from camkit.models_def.optics.freezable_optics import (
+    FieldLayout,
+    FloatGrid,
+    grid_layout,
+    radial_layout,
+)
 from camkit.models_def.optics.kernel_bank import focused_copies
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens, with_focus_shift
@@ -21,6 +28,9 @@ from camkit.radial import RadialDistortion
 from camkit.units import UM_PER_MM
 
 RAYS: Final = 4096
+GRID_COUNTS: Final = (7, 5)
+GRID_SHARES: Final = (0.83, 0.56)
+"""Half sides of the grid of a lens that is not round, of the corner's distance: a 3:2 sensor."""
 SPREAD_COPIES: Final = 64
 SPREADS: Final = 2.0
 SPREAD_SEED: Final = 7
@@ -29,7 +39,7 @@ _STEP_UM: Final = 5.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LensOptics:
-    """A lens of revolution; fulfils `camkit.models_def.optics.freezable_optics.Optics`.
+    """A lens; fulfils `camkit.models_def.optics.freezable_optics.Optics`.
 
     Distortion and illumination are those at the lens's own object distance.
 
@@ -72,8 +82,12 @@ class LensOptics:
         return
 
     def layout(self, corner_mm: float, fields: int) -> FieldLayout:
-        """Return heights from the axis to the corner, evenly spaced."""
-        return radial_layout(np.linspace(0.0, corner_mm, fields))
+        """Return heights from the axis to the corner, evenly spaced; a grid if it is not round."""
+        if self.lens.is_round:
+            return radial_layout(np.linspace(0.0, corner_mm, fields))
+        half = [corner_mm * share for share in GRID_SHARES]
+        columns, rows = (np.linspace(-h, h, n) for h, n in zip(half, GRID_COUNTS, strict=True))
+        return grid_layout(columns, rows)
 
     def kernels(
         self,
@@ -84,16 +98,24 @@ class LensOptics:
         side_px: int,
         pitch_um: float,
     ) -> TracedPsf:
-        """Trace the kernels at heights along +y; the sensor stays where the lens has it.
+        """Trace the kernels at heights along +y, or at the places of a grid.
+
+        The sensor stays where the lens has it.
 
         Raises:
-            ContractError: If the places do not lie along +y, or no light reaches a kernel.
+            ContractError: If a round lens is asked for other places, or no light reaches a kernel.
         """
+        lens = with_object_distance(self.lens, depth_mm)
+        if not lens.is_round:
+            places = list(zip(fields.x_mm.tolist(), fields.y_mm.tolist(), strict=True))
+            waves = torch.from_numpy(wavelengths_um)
+            with torch.no_grad():
+                return trace_place_psf(lens, places, waves, side_px, pitch_um, rays=self.rays)
         if fields.symmetry != "radial":
             raise ContractError("a lens of revolution is traced along +y; other places are turned")
         with torch.no_grad():
             return trace_psf(
-                with_object_distance(self.lens, depth_mm),
+                lens,
                 torch.from_numpy(fields.y_mm),
                 torch.from_numpy(wavelengths_um),
                 side_px,
@@ -102,13 +124,21 @@ class LensOptics:
             )
 
     def distortion(self, radius_mm: float, channels: int) -> RadialDistortion:
-        """Trace the distortion at the reference wavelength; see `trace_distortion`."""
-        return trace_distortion(self.lens, radius_mm, channels=channels)
+        """Trace the distortion at the reference wavelength; see `trace_distortion`.
+
+        Of a lens that is not round it is that of its round part: free phases left out, elements
+        centred. So is the illumination.
+        """
+        return trace_distortion(round_part(self.lens), radius_mm, channels=channels)
 
     def illumination(self, fields: FieldLayout) -> FloatGrid:
         """Trace the relative illumination; the first place is the axis."""
-        light = relative_illumination_at(self.lens, torch.from_numpy(fields.y_mm))
-        return np.asarray(light.numpy() / float(light[0]), dtype=np.float64)
+        heights = fields.y_mm
+        if fields.symmetry != "radial":
+            heights = np.concatenate([np.zeros(1), fields.heights_mm])
+        light = relative_illumination_at(round_part(self.lens), torch.from_numpy(heights))
+        shares = np.asarray(light.numpy() / float(light[0]), dtype=np.float64)
+        return shares[-fields.count :]
 
     def copies(self, count: int, seed: int) -> "tuple[LensOptics, ...]":
         """Return the nominal lens and fabricated copies, each focused when it was assembled."""

@@ -43,10 +43,38 @@ class Paraxial:
 
 
 def vertex_curvature(tensors: SurfaceTensors) -> Tensor:
-    """Return (surface, ...) vertex curvatures: c + 2 a_2."""
+    """Return (surface, ...) vertex curvatures: c + 2 a_2.
+
+    A term in r, a cone, has none: it is left out, and paraxial data are those of the rest.
+    """
     if tensors.even_asphere.shape[1] == 0:
         return tensors.curvature_per_mm
-    return tensors.curvature_per_mm + 2 * tensors.even_asphere[:, 0]
+    bend = 2 * tensors.even_asphere[:, 0]
+    if tensors.series:
+        scales = [1.0 if s is None else s.radius_mm**-2 for s in tensors.series]
+        bend = bend * bend.new_tensor(scales).reshape(-1, *[1] * (bend.ndim - 1))
+    return tensors.curvature_per_mm + bend
+
+
+def phase_power(tensors: SurfaceTensors) -> Tensor | None:
+    """Return (surface, ...) powers in 1/mm that phases add; None where no surface has any.
+
+    The power is -kappa d^2 Phi / dr^2 on the axis; of a free phase its mean over azimuths.
+    """
+    if tensors.phase is None or tensors.order_mm is None:
+        return None
+    rows = []
+    for i, form in enumerate(tensors.phases):
+        bend = torch.zeros_like(tensors.order_mm[i])
+        if form is not None:
+            if form.radial:
+                bend = bend + 2 * tensors.phase[i, 0]
+            for j, powers in enumerate(form.powers, start=form.radial):
+                if powers in {(2, 0), (0, 2)}:
+                    bend = bend + tensors.phase[i, j]
+            bend = bend / form.radius_mm**2
+        rows.append(-tensors.order_mm[i] * bend)
+    return torch.stack(torch.broadcast_tensors(*rows))  # type: ignore[no-untyped-call]
 
 
 def trace_paraxial(
@@ -54,12 +82,13 @@ def trace_paraxial(
 ) -> tuple[Tensor, Tensor]:
     """Trace y, u (slope dy/dz) through surfaces; y is given on the last one, u after it.
 
-    n' u' = n u - y c (n' - n), and y + t u between surfaces.
+    n' u' = n u - y (c (n' - n) + phase), and y + t u between surfaces.
     """
-    curvature = vertex_curvature(tensors)
+    curvature, phase = vertex_curvature(tensors), phase_power(tensors)
     for i in surfaces:
         before, after = tensors.index[i], tensors.index[i + 1]
-        slope = (before * slope - height * curvature[i] * (after - before)) / after
+        bent = before * slope - height * curvature[i] * (after - before)
+        slope = (bent if phase is None else bent - height * phase[i]) / after
         if i != surfaces[-1]:
             height = height + tensors.thickness_mm[i] * slope
     return height, slope

@@ -23,12 +23,17 @@ from camkit.models_def.optics.glass.catalogue import (
 from camkit.models_def.optics.glass.material import Glass
 from camkit.models_def.optics.glass.table import glass_table, parse_glass_table
 from camkit.models_def.optics.grooves import Grooves, Profile, check_grooves, groove_facts
+from camkit.models_def.optics.shape.phase import Phase, parse_phase, phase_lines
+from camkit.models_def.optics.shape.polynomial import Asphere, Polynomial
+from camkit.models_def.optics.shape.stance import Stance, parse_stance
 from camkit.models_def.toml_table import key_line, section
 from camkit.side_file import parse_toml, read_side_text
 from camkit.units import to_degrees, to_radians
 
 ApertureKind = Literal["f_number", "entrance_pupil_diameter_mm", "stop_semi_diameter_mm"]
-Vary = Literal["curvature", "conic", "thickness", "even_asphere"]
+Vary = Literal[
+    "curvature", "conic", "thickness", "even_asphere", "odd_asphere", "q_asphere", "phase"
+]
 VARY: Final[tuple[Vary, ...]] = get_args(Vary)
 APERTURE_KINDS: Final[tuple[ApertureKind, ...]] = get_args(ApertureKind)
 
@@ -43,6 +48,16 @@ class _SurfaceTable:
     semi_diameter_mm: float = math.inf
     conic: float = 0.0
     even_asphere: tuple[float, ...] = ()
+    odd_asphere: tuple[float, ...] = ()
+    q_bfs: tuple[float, ...] = ()
+    q_con: tuple[float, ...] = ()
+    normal_radius_mm: float | None = None
+    phase_radial_rad: tuple[float, ...] | None = None
+    phase_free_rad: dict[str, Any] | None = None
+    phase_radius_mm: float | None = None
+    phase_order: float | None = None
+    element_decentre_mm: tuple[float, ...] | None = None
+    element_tilt_deg: tuple[float, ...] | None = None
     vary: tuple[str, ...] = ()
     groove_depth_um: float | None = None
     groove_walls: bool | None = None
@@ -82,6 +97,12 @@ class Surface:
         semi_diameter_mm: Rays further out are vignetted; inf for no limit.
         conic: 0 sphere, -1 paraboloid.
         even_asphere: Coefficients of r^2, r^4, r^6, ... (mm^-1, mm^-3, ...).
+        odd_asphere: Coefficients of r, r^3, r^5, ... (1, mm^-2, ...).
+        q_bfs: Coefficients of Forbes' Q_bfs in mm, in place of both.
+        q_con: Coefficients of Forbes' Q_con in mm, in place of both.
+        normal_radius_mm: If stated, r is divided by it and coefficients are in mm.
+        phase: That it adds to light; None for none.
+        stance: Of the piece of glass that begins here; None where it stands centred.
         index_offset: Added to the index after the surface (fabrication error).
         material: The glass itself where it comes from a user's catalogue; its name is `glass`.
         grooves: That it is cut into; None for none. They need a finite semi-diameter.
@@ -95,6 +116,12 @@ class Surface:
     semi_diameter_mm: float = math.inf
     conic: float = 0.0
     even_asphere: tuple[float, ...] = ()
+    odd_asphere: tuple[float, ...] = ()
+    q_bfs: tuple[float, ...] = ()
+    q_con: tuple[float, ...] = ()
+    normal_radius_mm: float | None = None
+    phase: Phase | None = None
+    stance: Stance | None = None
     index_offset: float = 0.0
     material: Glass | None = None
     grooves: Grooves | None = None
@@ -107,6 +134,7 @@ class Surface:
         numbers = (self.curvature_per_mm, self.thickness_mm, self.conic, self.index_offset)
         if not all(map(math.isfinite, (*numbers, *self.even_asphere))):
             raise ContractError(f"a surface needs finite numbers; got {self}")
+        self.asphere.check(self.conic)
         if not self.semi_diameter_mm > 0:
             raise ContractError(f"semi_diameter_mm must be > 0; got {self.semi_diameter_mm}")
         if self.grooves is not None:
@@ -123,9 +151,25 @@ class Surface:
         return Profile(
             curvature_per_mm=self.curvature_per_mm,
             conic=self.conic,
-            even_asphere=self.even_asphere,
+            polynomial=self.polynomial,
             rim_mm=self.semi_diameter_mm,
         )
+
+    @property
+    def asphere(self) -> Asphere:
+        """Its polynomial part as stated."""
+        return Asphere(
+            even=self.even_asphere,
+            odd=self.odd_asphere,
+            q_bfs=self.q_bfs,
+            q_con=self.q_con,
+            normal_radius_mm=self.normal_radius_mm,
+        )
+
+    @property
+    def polynomial(self) -> Polynomial:
+        """Its polynomial part as the tracer has it."""
+        return self.asphere.polynomial()
 
     @property
     def radius_mm(self) -> float:
@@ -144,7 +188,7 @@ def _strict_name(name: str, material: Glass | None) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lens:
-    """A rotationally symmetric lens in front of a sensor.
+    """A lens in front of a sensor; round, unless a free phase or a stance says otherwise.
 
     Attributes:
         name: For people.
@@ -191,6 +235,7 @@ class Lens:
             raise ContractError(f"object_distance_mm must be > 0; got {self.object_distance_mm}")
         if not all(0 <= a < math.pi / 2 for a in self.field_angles_rad):
             raise ContractError("field angles must lie in 0..90 degrees")
+        _check_stances(self.surfaces, self.stop)
         waves = (*self.wavelengths_um, self.reference_wavelength_um)
         if not all(0.2 < w < 20 for w in waves):
             raise ContractError(f"wavelengths must lie in 0.2..20 um; got {waves}")
@@ -199,6 +244,45 @@ class Lens:
     def object_medium(self) -> Glass:
         """The glass in front of the first surface."""
         return self.object_material or find_glass(self.object_glass)
+
+    @property
+    def is_round(self) -> bool:
+        """True if it is the same at all azimuths."""
+        phases = (surface.phase for surface in self.surfaces)
+        skewed = any(surface.stance is not None for surface in self.surfaces)
+        return not skewed and all(phase is None or phase.is_round for phase in phases)
+
+
+def _check_stances(surfaces: Sequence[Surface], stop: int) -> None:
+    media = ["air", *(surface.glass for surface in surfaces)]
+    skewed = False
+    for i, surface in enumerate(surfaces):
+        if surface.stance is not None:
+            if media[i] != "air" or surface.glass == "air":
+                raise ContractError(
+                    f"surface {i} begins no piece of glass; a tilt or decentre stands at the first "
+                    "surface of the piece"
+                )
+            skewed = True
+        if skewed and i == stop:
+            raise ContractError(
+                f"the stop, surface {i}, lies on glass that is tilted or decentred; state the stop "
+                "as a surface of its own in air"
+            )
+        skewed = skewed and surface.glass != "air"
+
+
+def require_round(lens: Lens, what: str) -> None:
+    """Refuse a lens that is not round where only its fields along +y are looked at.
+
+    Raises:
+        UnsupportedError: Naming what makes it uneven.
+    """
+    for i, surface in enumerate(lens.surfaces):
+        if surface.stance is not None:
+            raise UnsupportedError(f"{what} needs a round lens; surface {i} is tilted or decentred")
+        if surface.phase is not None and not surface.phase.is_round:
+            raise UnsupportedError(f"{what} needs a round lens; surface {i} has a free phase")
 
 
 def grooves_of(lens: Lens) -> list[dict[str, Any]]:
@@ -387,8 +471,16 @@ def _surface_lines(surface: Surface) -> list[str]:
     ]
     if surface.conic:
         lines.append(f"conic = {surface.conic!r}")
-    if surface.even_asphere:
-        lines.append(key_line("even_asphere", surface.even_asphere))
+    rows = ("even_asphere", "odd_asphere", "q_bfs", "q_con")
+    lines += [key_line(key, getattr(surface, key)) for key in rows if getattr(surface, key)]
+    if surface.normal_radius_mm is not None:
+        lines.append(f"normal_radius_mm = {surface.normal_radius_mm!r}")
+    if surface.phase is not None:
+        lines += phase_lines(surface.phase)
+    if surface.stance is not None:
+        tilt = ", ".join(map(degrees_text, surface.stance.tilt_rad))
+        lines.append(key_line("element_decentre_mm", surface.stance.decentre_mm))
+        lines.append(f"element_tilt_deg = [{tilt}]")
     if surface.grooves is not None:
         lines += [key_line(key, value) for key, value in _groove_table(surface.grooves).items()]
     if surface.vary:
@@ -450,6 +542,17 @@ def _parse_surface(
             semi_diameter_mm=table.semi_diameter_mm,
             conic=table.conic,
             even_asphere=table.even_asphere,
+            odd_asphere=table.odd_asphere,
+            q_bfs=table.q_bfs,
+            q_con=table.q_con,
+            normal_radius_mm=table.normal_radius_mm,
+            phase=parse_phase(
+                table.phase_radial_rad,
+                table.phase_free_rad,
+                radius_mm=table.phase_radius_mm,
+                order=table.phase_order,
+            ),
+            stance=parse_stance(table.element_decentre_mm, table.element_tilt_deg),
             vary=cast("tuple[Vary, ...]", table.vary),
         )
         return replace(surface, grooves=_parse_grooves(table))

@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.prescription import Lens, require_round
 from camkit.models_def.optics.pupil import half_disc
 from camkit.models_def.optics.spot import Spots, slopes_for_heights, trace_spots
 from camkit.units import UM_PER_MM
@@ -115,7 +115,11 @@ def trace_psf(
     Returns:
         float64 kernels as they fall on the sensor, the centre pixel on the chief ray of the
         reference wavelength, rows increasing away from the axis (a point at +y).
+
+    Raises:
+        UnsupportedError: If the lens is not round; see `asymmetric.place_psf`.
     """
+    require_round(lens, "a PSF from half the pupil")
     samples = half_disc(rays)
     slopes = slopes_for_heights(lens, heights_mm)
     fields = max(1, _CHUNK_RAYS // (rays * len(wavelengths_um)))

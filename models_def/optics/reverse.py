@@ -12,6 +12,7 @@ from torch import Tensor
 
 from camkit.errors import ContractError
 from camkit.models_def.optics.trace import Rays, SurfaceTensors, trace
+from camkit.models_def.optics.tracing.frame import Pose
 
 
 def reverse(tensors: SurfaceTensors) -> SurfaceTensors:
@@ -33,7 +34,19 @@ def reverse(tensors: SurfaceTensors) -> SurfaceTensors:
             None if g is None else replace(g, solid_after=not g.solid_after)
             for g in tensors.grooves[::-1]
         ),
+        odd_asphere=None if tensors.odd_asphere is None else -tensors.odd_asphere.flip(0),
+        series=tensors.series[::-1],
+        phase=None if tensors.phase is None else tensors.phase.flip(0),
+        order_mm=None if tensors.order_mm is None else tensors.order_mm.flip(0),
+        phases=tensors.phases[::-1],
+        poses=tuple(p and _reversed_pose(p) for p in tensors.poses[::-1]),
     )
+
+
+def _reversed_pose(pose: Pose) -> Pose:
+    """Return a pose with z counted the other way."""
+    flip = torch.tensor([1.0, 1.0, -1.0]).to(pose.offset_mm)
+    return Pose(turn=pose.turn * flip[:, None] * flip, offset_mm=pose.offset_mm * flip)
 
 
 def launch_with_slopes(x_mm: Tensor, y_mm: Tensor, slope_x: Tensor, slope_y: Tensor) -> Rays:

@@ -6,6 +6,7 @@ from dataclasses import replace
 from camkit.errors import ContractError
 from camkit.models_def.optics.paraxial import paraxial_data, paraxial_image
 from camkit.models_def.optics.prescription import Lens, Surface
+from camkit.models_def.optics.shape.phase import Phase
 
 
 def scale_lens(lens: Lens, factor: float) -> Lens:
@@ -27,9 +28,11 @@ def scale_lens(lens: Lens, factor: float) -> Lens:
 
 
 def _scaled(surface: Surface, factor: float) -> Surface:
-    # a_j multiplies r^(2 j) and gives mm
-    terms = enumerate(surface.even_asphere, start=1)
-    grooves = surface.grooves
+    # a_j multiplies r^(2 j) and gives mm; normalised, it is in mm itself
+    normal = surface.normal_radius_mm
+    even, odd = enumerate(surface.even_asphere, start=1), enumerate(surface.odd_asphere)
+    grooves, phase, stance = surface.grooves, surface.phase, surface.stance
+    dx, dy = stance.decentre_mm if stance else (0.0, 0.0)
     return replace(
         surface,
         curvature_per_mm=surface.curvature_per_mm / factor,
@@ -42,7 +45,25 @@ def _scaled(surface: Surface, factor: float) -> Surface:
             depth_um=grooves.depth_um * factor,
             tool_radius_um=grooves.tool_radius_um * factor,
         ),
-        even_asphere=tuple(a * factor ** (1 - 2 * j) for j, a in terms),
+        even_asphere=tuple(a * factor ** (1 - 2 * j if normal is None else 1) for j, a in even),
+        odd_asphere=tuple(a * factor ** (-2 * j if normal is None else 1) for j, a in odd),
+        q_bfs=tuple(a * factor for a in surface.q_bfs),
+        q_con=tuple(a * factor for a in surface.q_con),
+        normal_radius_mm=None if normal is None else normal * factor,
+        phase=None if phase is None else _scaled_phase(phase, factor),
+        stance=None if stance is None else replace(stance, decentre_mm=(factor * dx, factor * dy)),
+    )
+
+
+def _scaled_phase(phase: Phase, factor: float) -> Phase:
+    """Return a phase over a larger radius whose slopes, and so the bends, stay."""
+    return replace(
+        phase,
+        radius_mm=phase.radius_mm * factor,
+        radial_rad=tuple(a * factor for a in phase.radial_rad),
+        free_rad=tuple(
+            replace(m, coefficient_rad=m.coefficient_rad * factor) for m in phase.free_rad
+        ),
     )
 
 

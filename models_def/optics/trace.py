@@ -6,6 +6,7 @@ whole lenses are traced together.
 """
 
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Self
@@ -16,12 +17,17 @@ from torch import Tensor
 from camkit.models_def.optics.glass.catalogue import AIR
 from camkit.models_def.optics.glass.dispersion import refractive_index
 from camkit.models_def.optics.prescription import Lens, Surface
+from camkit.models_def.optics.shape.phase import Phase
 from camkit.models_def.optics.tracing import kernel
 from camkit.models_def.optics.tracing.compilation import compiled_engine
+from camkit.models_def.optics.tracing.frame import Pose, from_surface, rotation, to_surface
 from camkit.models_def.optics.tracing.gradient import Eager, trace_tensors
 from camkit.models_def.optics.tracing.groove import Groove
 from camkit.models_def.optics.tracing.kernel import LensTensors, TraceSettings
-from camkit.models_def.optics.tracing.meeting import State
+from camkit.models_def.optics.tracing.meeting import MIN_COSINE, State
+from camkit.models_def.optics.tracing.phase_polynomial import PhaseForm
+from camkit.models_def.optics.tracing.sag import sag, sag_slope
+from camkit.models_def.optics.tracing.series import Series
 from camkit.units import to_mm
 
 
@@ -44,12 +50,18 @@ class SurfaceTensors:
     Attributes:
         curvature_per_mm: (surface, ...).
         conic: (surface, ...).
-        even_asphere: (surface, term, ...), coefficients of r^2, r^4, ...
+        even_asphere: (surface, term, ...), coefficients of r^2, r^4, ..., or as `series` says.
         thickness_mm: (surface, ...), after each surface; the last leads to the sensor.
         semi_diameter_mm: (surface, ...).
         index: (surface + 1, ...), before the first and after each surface.
         aspheric: Which surfaces have a polynomial part or grooves.
         grooves: Of each surface, None for none; empty where none has any.
+        odd_asphere: (surface, term, ...), as `series` says; None where no surface has any.
+        series: Of each surface, None for a plain even asphere; empty where all are.
+        phase: (surface, term, ...) in radians; None where no surface has any.
+        order_mm: (surface, ...), path per radian of phase; broadcasts as the index.
+        phases: Of each surface, None for none; empty where none has any.
+        poses: Of each surface by design, None where it stands centred; empty where all do.
     """
 
     curvature_per_mm: Tensor
@@ -60,6 +72,12 @@ class SurfaceTensors:
     index: Tensor
     aspheric: tuple[bool, ...]
     grooves: tuple[Groove | None, ...] = ()
+    odd_asphere: Tensor | None = None
+    series: tuple[Series | None, ...] = ()
+    phase: Tensor | None = None
+    order_mm: Tensor | None = None
+    phases: tuple[PhaseForm | None, ...] = ()
+    poses: tuple[Pose | None, ...] = ()
 
     def converted(self, target: torch.dtype | torch.device) -> Self:
         """Return the same lens in another type or on another device."""
@@ -71,7 +89,27 @@ class SurfaceTensors:
             thickness_mm=self.thickness_mm.to(target),
             semi_diameter_mm=self.semi_diameter_mm.to(target),
             index=self.index.to(target),
+            odd_asphere=None if self.odd_asphere is None else self.odd_asphere.to(target),
+            phase=None if self.phase is None else self.phase.to(target),
+            order_mm=None if self.order_mm is None else self.order_mm.to(target),
+            poses=tuple(p and Pose(p.turn.to(target), p.offset_mm.to(target)) for p in self.poses),
         )
+
+    def height(self, i: int, rho: Tensor) -> Tensor:
+        """Return the height in mm of surface i at rho = r^2; see `tracing.sag`."""
+        return sag(*self._shape(i, rho))
+
+    def slope(self, i: int, rho: Tensor) -> Tensor:
+        """Return dh/d rho of surface i at rho = r^2."""
+        return sag_slope(*self._shape(i, rho))
+
+    def _shape(
+        self, i: int, rho: Tensor
+    ) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor | None, Series | None]:
+        terms = self.even_asphere[i] if self.aspheric[i] else self.even_asphere[i][:0]
+        odd = None if self.odd_asphere is None else self.odd_asphere[i]
+        series = self.series[i] if self.series else None
+        return self.curvature_per_mm[i], self.conic[i], terms, rho, odd, series
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,8 +147,9 @@ def surface_tensors(lens: Lens, wavelengths_um: Tensor) -> SurfaceTensors:
         wavelengths_um: Any shape; the index has (surface + 1, *shape).
     """
     surfaces = lens.surfaces
-    terms = max(len(s.even_asphere) for s in surfaces)
-    padded = [[*s.even_asphere, *[0.0] * (terms - len(s.even_asphere))] for s in surfaces]
+    parts = [s.polynomial for s in surfaces]
+    phases = [s.phase for s in surfaces]
+    phased = any(phase is not None for phase in phases)
     waves = wavelengths_um.to(torch.float64)
     glass = [refractive_index(s.medium, waves) + s.index_offset for s in surfaces]
 
@@ -120,13 +159,55 @@ def surface_tensors(lens: Lens, wavelengths_um: Tensor) -> SurfaceTensors:
     return SurfaceTensors(
         curvature_per_mm=column([s.curvature_per_mm for s in surfaces]),
         conic=column([s.conic for s in surfaces]),
-        even_asphere=torch.tensor(padded, dtype=torch.float64).reshape(len(surfaces), terms),
+        even_asphere=padded([part.even for part in parts]),
         thickness_mm=column([s.thickness_mm for s in surfaces]),
         semi_diameter_mm=column([s.semi_diameter_mm for s in surfaces]),
         index=torch.stack([refractive_index(lens.object_medium, waves), *glass]),
-        aspheric=tuple(any(s.even_asphere) or s.grooves is not None for s in surfaces),
+        aspheric=tuple(_is_aspheric(s) for s in surfaces),
         grooves=tuple(_groove(s) for s in surfaces),
+        odd_asphere=padded([part.odd for part in parts]) if any(p.odd for p in parts) else None,
+        series=tuple(p.series for p in parts) if any(p.series for p in parts) else (),
+        phase=padded([p.coefficients if p else () for p in phases]) if phased else None,
+        order_mm=_orders_mm(phases, waves) if phased else None,
+        phases=tuple(p.form if p else None for p in phases) if phased else (),
+        poses=_poses(surfaces),
     )
+
+
+def _poses(surfaces: Sequence[Surface]) -> tuple[Pose | None, ...]:
+    """Return the poses of surfaces: those of an element turn about its front vertex."""
+    poses: list[Pose | None] = []
+    stance, depth_mm = None, 0.0
+    for surface in surfaces:
+        if surface.stance is not None:
+            stance, depth_mm = surface.stance, 0.0
+        if stance is None:
+            poses.append(None)
+        else:
+            turn = rotation(torch.tensor(stance.tilt_rad, dtype=torch.float64))
+            vertex = torch.tensor([0.0, 0.0, depth_mm], dtype=torch.float64)
+            shift = torch.tensor([*stance.decentre_mm, 0.0], dtype=torch.float64)
+            poses.append(Pose(turn=turn, offset_mm=turn @ vertex - vertex + shift))
+        depth_mm += surface.thickness_mm
+        stance = None if surface.glass == AIR.name else stance
+    return tuple(poses) if any(poses) else ()
+
+
+def padded(rows: Sequence[Sequence[float]]) -> Tensor:
+    """Return rows of coefficients as a tensor (row, term), float64, zeros behind."""
+    terms = max(len(row) for row in rows)
+    filled = [[*row, *[0.0] * (terms - len(row))] for row in rows]
+    return torch.tensor(filled, dtype=torch.float64).reshape(len(rows), terms)
+
+
+def _is_aspheric(surface: Surface) -> bool:
+    part = surface.polynomial
+    return part.series is not None or any(part.even) or surface.grooves is not None
+
+
+def _orders_mm(phases: Sequence[Phase | None], waves: Tensor) -> Tensor:
+    orders = torch.tensor([p.order_mm(1.0) if p else 0.0 for p in phases], dtype=torch.float64)
+    return orders.reshape(-1, *[1] * waves.ndim) * waves
 
 
 def _groove(surface: Surface) -> Groove | None:
@@ -172,7 +253,8 @@ def trace(
         tensors: The lens.
         rays: At the vertex plane of the first surface to be traced (any z is taken along).
         surfaces: Which surfaces, in order; all by default.
-        surface_rays: Receives the rays on each surface, after refraction, relative to its vertex.
+        surface_rays: Receives the rays on each surface, after refraction, relative to its vertex
+            (the nominal one of a surface that stands tilted or decentred).
         path: Whether `path_mm` of the result is the optical path: that of the given rays (or 0)
             plus the sum of index times way up to the final plane.
         compiled: Fuse the lens into one loop by `torch.compile`: worth its minute of compilation
@@ -184,6 +266,8 @@ def trace(
     order = surfaces if surfaces is not None else range(len(tensors.aspheric))
     if not order:
         return rays
+    if any(tensors.poses[order.start : order.stop]):
+        return _trace_posed(tensors, rays, order, surface_rays=surface_rays, path=path)
     result = _trace(tensors, rays, order, surface_rays=surface_rays, path=path, compiled=compiled)
     return replace(result, z=torch.zeros_like(result.z))
 
@@ -191,8 +275,51 @@ def trace(
 def refract(tensors: SurfaceTensors, rays: Rays, i: int) -> Rays:
     """Trace rays onto surface i, judge them, and bend them (Snell); they stay on it."""
     surface_rays: list[Rays] = []
-    _trace(tensors, rays, range(i, i + 1), surface_rays=surface_rays)
+    trace(tensors, rays, surfaces=range(i, i + 1), surface_rays=surface_rays)
     return surface_rays[0]
+
+
+def _trace_posed(
+    tensors: SurfaceTensors,
+    rays: Rays,
+    surfaces: range,
+    *,
+    surface_rays: list[Rays] | None,
+    path: bool,
+) -> Rays:
+    """Trace rays surface by surface, each in its own frame, between them in the nominal one."""
+    flush = replace(tensors, thickness_mm=torch.zeros_like(tensors.thickness_mm))
+    for i in surfaces:
+        pose = tensors.poses[i]
+        hit_rays: list[Rays] = []
+        here = rays if pose is None else _framed(rays, to_surface(pose, _state(rays)))
+        rays = _trace(flush, here, range(i, i + 1), surface_rays=hit_rays, path=path)
+        hits = hit_rays[0]
+        if pose is not None:
+            rays = _framed(rays, from_surface(pose, _state(rays)))
+            hits = _framed(hits, from_surface(pose, _state(hits)))
+        if surface_rays is not None:
+            surface_rays.append(hits)
+        rays = replace(rays, z=rays.z - tensors.thickness_mm[i])
+    way = -rays.z / rays.n
+    length = rays.path_mm
+    end = _state(rays)._replace(
+        x=rays.x + way * rays.l, y=rays.y + way * rays.m, z=torch.zeros_like(rays.z)
+    )
+    if length is not None and path:
+        length = length + tensors.index[surfaces.stop] * way
+    return replace(_framed(rays, end), path_mm=length)
+
+
+def _state(rays: Rays) -> State:
+    return State(rays.x, rays.y, rays.z, rays.l, rays.m, rays.n)
+
+
+def _framed(rays: Rays, state: State) -> Rays:
+    """Return rays in another frame, the lost ones at rest, those sent backwards lost."""
+    fate = torch.where((rays.fate == 0) & (state.n <= MIN_COSINE), kernel.MISSED, rays.fate)
+    fate = fate.to(torch.int8)
+    return replace(rays, **kernel.rest(state, fate, adaptive=True)._asdict(), fate=fate)
 
 
 def _trace(
@@ -209,7 +336,15 @@ def _trace(
         aspheric=tensors.aspheric[first:end],
         grooves=tensors.grooves[first:end] or (None,) * len(surfaces),
         path=path,
+        series=tensors.series[first:end],
+        phases=tensors.phases[first:end],
     )
+    like = tensors.curvature_per_mm[first:end]
+    none = like.new_zeros(len(like), 0)
+
+    def part(value: Tensor | None, otherwise: Tensor) -> Tensor:
+        return otherwise if value is None else value[first:end]
+
     lens = LensTensors(
         tensors.curvature_per_mm[first:end],
         tensors.conic[first:end],
@@ -217,6 +352,9 @@ def _trace(
         tensors.thickness_mm[first:end],
         tensors.semi_diameter_mm[first:end],
         tensors.index[first : end + 1],
+        part(tensors.odd_asphere, none),
+        part(tensors.phase, none),
+        part(tensors.order_mm, like.new_zeros(len(like))),
     )
     state = State(rays.x, rays.y, rays.z, rays.l, rays.m, rays.n)
     dtype = functools.reduce(torch.promote_types, (v.dtype for v in (*lens, *state)))

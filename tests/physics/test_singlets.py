@@ -10,7 +10,7 @@ from camkit.models_def.optics.analysis.first_order import ParaxialRay, ParaxialR
 from camkit.models_def.optics.analysis.seidel import seidel_of_rays
 from camkit.models_def.optics.paraxial import focal_lengths, trace_paraxial
 from camkit.models_def.optics.trace import Rays, SurfaceTensors, trace
-from camkit.models_def.optics.tracing.profile import sag, sag_slope
+from camkit.models_def.optics.tracing.sag import sag, sag_slope
 from tests.physics.printed_lenses import cooke_tensors, lens_tensors, rays_at
 
 EXACT_MM = 2e-13

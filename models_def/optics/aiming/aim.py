@@ -114,7 +114,7 @@ def _of_rays(tensors: SurfaceTensors, mask: Tensor) -> SurfaceTensors:
     """Return the lens as it is for some of its rays (ray,): those of a mask in their shape."""
 
     def pick(values: Tensor, lead: int) -> Tensor:
-        if values.ndim == lead:
+        if values.ndim <= lead:
             return values
         batch = values.shape[lead:]
         aligned = values.reshape(*values.shape[:lead], *[1] * (mask.ndim - len(batch)), *batch)
@@ -128,6 +128,9 @@ def _of_rays(tensors: SurfaceTensors, mask: Tensor) -> SurfaceTensors:
         thickness_mm=pick(tensors.thickness_mm, 1),
         semi_diameter_mm=pick(tensors.semi_diameter_mm, 1),
         index=pick(tensors.index, 1),
+        odd_asphere=None if tensors.odd_asphere is None else pick(tensors.odd_asphere, 2),
+        phase=None if tensors.phase is None else pick(tensors.phase, 2),
+        order_mm=None if tensors.order_mm is None else pick(tensors.order_mm, 1),
     )
 
 

@@ -16,7 +16,7 @@ from torch import Tensor
 
 from camkit.errors import ContractError
 from camkit.models_def.optics.kernel_bank import ChannelResponse, gaussian_response, wavelength_grid
-from camkit.models_def.optics.prescription import Lens, with_focus_shift
+from camkit.models_def.optics.prescription import Lens, require_round, with_focus_shift
 from camkit.models_def.optics.psf import spread_tents
 from camkit.models_def.optics.pupil import half_disc, pupil_rays
 from camkit.models_def.optics.spot import chief_heights, slopes_for_heights
@@ -86,6 +86,7 @@ class _Fans:
         Raises:
             ContractError: If a height cannot be reached.
         """
+        require_round(lens, "a transfer from half the pupil")
         slopes = slopes_for_heights(lens, torch.from_numpy(heights_mm))
         chief = chief_heights(lens, slopes)
         chief_slope = chief_heights(with_focus_shift(lens, 1.0), slopes) - chief

@@ -11,6 +11,7 @@ from typing import Final
 import torch
 from torch import Tensor
 
+from camkit.errors import ContractError
 from camkit.models_def.optics.analysis.first_order import ParaxialRays, paraxial_rays
 from camkit.models_def.optics.paraxial import vertex_curvature
 from camkit.models_def.optics.prescription import Lens
@@ -68,8 +69,12 @@ def seidel_sums(lens: Lens) -> Seidel:
     """Return the sums at the reference wavelength, for the largest field of the file.
 
     Raises:
-        ContractError: If the entrance pupil is at infinity.
+        ContractError: If the entrance pupil is at infinity, or a surface has odd terms, which have
+            no third order, or a phase.
     """
+    for i, surface in enumerate(lens.surfaces):
+        if any(surface.odd_asphere) or surface.phase is not None:
+            raise ContractError(f"not computed: surface {i} has odd aspheric terms or a phase")
     slope = float(torch.tan(torch.tensor(max(lens.field_angles_rad), dtype=torch.float64)))
     rays = paraxial_rays(lens, slope)
     waves = (min(lens.wavelengths_um), max(lens.wavelengths_um))
@@ -131,5 +136,19 @@ def _departure(tensors: SurfaceTensors) -> Tensor:
     c, k = tensors.curvature_per_mm, tensors.conic
     total = (1 + k) * c**3 / 8
     if tensors.even_asphere.shape[1] > 1:
-        total = total + tensors.even_asphere[:, 1]
+        total = total + _fourth(tensors)
     return total - vertex_curvature(tensors) ** 3 / 8
+
+
+def _fourth(tensors: SurfaceTensors) -> Tensor:
+    """Return the r^4 coefficient (surface,) of the polynomial parts."""
+    rows = []
+    for i, series in enumerate(tensors.series or [None] * len(tensors.aspheric)):
+        first, second = tensors.even_asphere[i, :2]
+        if series is not None:
+            second = second / series.radius_mm**4
+        if series is not None and series.over_root:
+            opening = (1 + tensors.conic[i]) * tensors.curvature_per_mm[i] ** 2
+            second = second + first / series.radius_mm**2 * opening / 2
+        rows.append(second)
+    return torch.stack(rows)

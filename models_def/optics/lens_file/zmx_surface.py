@@ -14,10 +14,9 @@ from camkit.models_def.optics.lens_file.zmx_glass import (
     read_model_glass,
 )
 from camkit.models_def.optics.lens_file.zmx_records import Record, Records, last
+from camkit.models_def.optics.lens_file.zmx_shape import READERS, read_shape
 from camkit.models_def.optics.prescription import Surface
 
-EVEN_TERMS: Final = 8
-_TYPES: Final = ("STANDARD", "EVENASPH")
 _FIXED: Final = (1, 2)
 """Stated, and picked up from another surface; 0 and 3 follow the rays."""
 _OBSTACLES: Final = ("SQAP", "SQOB", "ELAP", "ELOB", "USAP", "USOB", "OBSC", "SPID")
@@ -68,7 +67,7 @@ def read_surface(records: Records, context: SurfaceContext) -> Surface:
         material=own_glass(glass, context.order.user_catalogues),
         semi_diameter_mm=_semi_diameter(records, context.number) * scale,
         conic=_value(records, "CONI"),
-        even_asphere=_even_asphere(records, context),
+        **read_shape(records, scale),
     )
 
 
@@ -79,10 +78,10 @@ def refuse_unsupported(records: Records, number: int) -> None:
         UnsupportedError: If it is of another type, a mirror, tilted, or not round.
     """
     kind = last(records, "TYPE")
-    if kind is not None and (kind.words[:1] or ("nothing",))[0].upper() not in _TYPES:
+    if kind is not None and (kind.words[:1] or ("nothing",))[0].upper() not in READERS:
         raise UnsupportedError(
             f"line {kind.line}: surface {number} is of type {' '.join(kind.words)[:40]}; "
-            f"camkit reads {' and '.join(_TYPES)}"
+            f"camkit reads {', '.join(READERS)}"
         )
     glass = last(records, "GLAS")
     if glass is not None and glass.words[:1] == ("MIRROR",):
@@ -144,23 +143,3 @@ def _positive(record: Record, value: float) -> float:
     if not value > 0:
         raise DecodeError(f"line {record.line}: {record.key} must be > 0; got {value}")
     return value
-
-
-def _even_asphere(records: Records, context: SurfaceContext) -> tuple[float, ...]:
-    kind = last(records, "TYPE")
-    if kind is None or kind.words[0].upper() != "EVENASPH":
-        return ()
-    terms = [0.0] * EVEN_TERMS
-    for record in records.get("PARM", []):
-        order, value = record.number(0), record.number(1)
-        if order not in range(EVEN_TERMS + 1) or (order == 0 and value):
-            raise DecodeError(
-                f"line {record.line}: PARM of an even asphere is 1..{EVEN_TERMS}; "
-                f"got {record.words[0]}"
-            )
-        if order:
-            # the coefficient of r^(2 order) has the unit length^(1 - 2 order)
-            terms[int(order) - 1] = value / context.mm_per_unit ** (2 * int(order) - 1)
-    while terms and terms[-1] == 0:
-        terms.pop()
-    return tuple(terms)

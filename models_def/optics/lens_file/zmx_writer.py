@@ -15,7 +15,7 @@ from camkit.models_def.optics.lens_file.zmx_glass import (
     glass_order,
     glass_words,
 )
-from camkit.models_def.optics.lens_file.zmx_surface import EVEN_TERMS
+from camkit.models_def.optics.lens_file.zmx_shape import shape_lines
 from camkit.models_def.optics.prescription import Lens, Surface, degrees_text
 
 _BLOCK: Final = ("  HIDE 0 0 0 0 0 0 0 0 0 0", "  MIRR 2 0")
@@ -27,7 +27,7 @@ def write_zmx(lens: Lens, path: Path) -> None:
     """Write a lens as UTF-16 with byte order mark and Windows line ends, as its program does.
 
     Raises:
-        UnsupportedError: If a surface has grooves, or more aspheric terms than the format.
+        UnsupportedError: If a surface has grooves, or a shape that the format does not hold.
         ContractError: If the lens is a fabricated copy (index offsets are not written).
     """
     path.write_bytes(format_zmx(lens).replace("\n", "\r\n").encode("utf-16"))
@@ -150,14 +150,16 @@ def _surface_lines(lens: Lens, surface: Surface, position: int, order: GlassOrde
         raise UnsupportedError(
             f"surface {position} has grooves, which a .zmx file does not carry; write .toml"
         )
-    if len(surface.even_asphere) > EVEN_TERMS:
+    if surface.stance is not None:
         raise UnsupportedError(
-            f"surface {position} has {len(surface.even_asphere)} aspheric terms; "
-            f"a .zmx file holds {EVEN_TERMS} (to r^{2 * EVEN_TERMS})"
+            f"surface {position} begins an element that is tilted or decentred; write .toml"
         )
+    try:
+        kind, shape = shape_lines(surface)
+    except UnsupportedError as error:
+        raise UnsupportedError(f"surface {position} has {error}") from error
     is_user_glass = surface.material is not None
     glass, comment = _glass_lines(surface.medium, order, is_user_glass=is_user_glass)
-    kind = "EVENASPH" if surface.even_asphere else "STANDARD"
     lines = [
         f"SURF {position + 1}",
         *comment,
@@ -165,7 +167,7 @@ def _surface_lines(lens: Lens, surface: Surface, position: int, order: GlassOrde
         f"  TYPE {kind}",
         f'  CURV {surface.curvature_per_mm!r} 0 0 0 0 ""',
         *_BLOCK,
-        *(f"  PARM {i} {a!r}" for i, a in enumerate(surface.even_asphere, start=1)),
+        *shape,
         f"  DISZ {surface.thickness_mm!r}",
         *glass,
         *([f"  CONI {surface.conic!r}"] if surface.conic else []),

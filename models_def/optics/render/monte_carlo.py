@@ -20,7 +20,7 @@ References: Sun 2021, section 6.2.1 (optics simulation).
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, Final, Literal, cast, get_args
 
 import numpy as np
@@ -46,11 +46,9 @@ from camkit.models_def.optics.render.texture import Texture, look_up
 from camkit.models_def.optics.render.window import Window
 from camkit.models_def.optics.reverse import trace_to_scene
 from camkit.models_def.optics.trace import SurfaceTensors
-from camkit.models_def.optics.tracing.groove import Groove
 
 Illumination = Literal["kept", "divided"]
 ILLUMINATIONS: Final[tuple[Illumination, ...]] = get_args(Illumination)
-Shapes = tuple[tuple[bool, ...], tuple[Groove | None, ...]]
 _LEAST_LIGHT: Final = 1e-12
 
 
@@ -101,7 +99,7 @@ class _Job:
     window: Window
     sampling: Sampling
     beams: BeamTable
-    shapes: Shapes
+    lens: SurfaceTensors
 
     def chunks(self) -> Iterator[range]:
         """Yield the rows of each chunk."""
@@ -136,7 +134,7 @@ def render(
     beams = find_beams(optics, labels, window.radius_mm, waves)
     light = light_at(optics, labels, beams, torch.zeros(1))[0]
     tensors = optics.stopped(_wavelengths(response, settings)).converted(settings.dtype)
-    job = _Job(texture, optics, window, settings, beams, (tensors.aspheric, tensors.grooves))
+    job = _Job(texture, optics, window, settings, beams, tensors)
     numbers = (texture.values, labels.a, labels.b, light, *_fields(tensors))
     picture = _MeanOfPasses.apply(job, *numbers)  # type: ignore[no-untyped-call]
     return cast("Tensor", picture)
@@ -158,29 +156,20 @@ def _wavelengths(response: ChannelResponse, sampling: Sampling) -> Tensor:
 
 
 def _fields(tensors: SurfaceTensors) -> tuple[Tensor, ...]:
-    return (
-        tensors.curvature_per_mm,
-        tensors.conic,
-        tensors.even_asphere,
-        tensors.thickness_mm,
-        tensors.semi_diameter_mm,
-        tensors.index,
-    )
+    """Return the numbers of a lens that broadcast against rays."""
+    return tuple(getattr(tensors, name) for name in _names(tensors))
 
 
-def _lens(fields: list[Tensor], number: int, shapes: Shapes) -> SurfaceTensors:
+def _names(tensors: SurfaceTensors) -> list[str]:
+    return [f.name for f in fields(tensors) if isinstance(getattr(tensors, f.name), Tensor)]
+
+
+def _lens(values: list[Tensor], number: int, whole: SurfaceTensors) -> SurfaceTensors:
     """Return the lens at the wavelengths of a pass: the inverse of `_fields`."""
-    curvature, conic, even_asphere, thickness_mm, semi_diameter_mm, index = fields
-    return SurfaceTensors(
-        curvature_per_mm=curvature,
-        conic=conic,
-        even_asphere=even_asphere,
-        thickness_mm=thickness_mm,
-        semi_diameter_mm=semi_diameter_mm,
-        index=index[:, number],
-        aspheric=shapes[0],
-        grooves=shapes[1],
-    )
+    numbers: dict[str, Any] = dict(zip(_names(whole), values, strict=True))
+    for name in {"index", "order_mm"} & numbers.keys():
+        numbers[name] = numbers[name][:, number]
+    return replace(whole, **numbers)
 
 
 class _MeanOfPasses(torch.autograd.Function):
@@ -230,10 +219,10 @@ class _MeanOfPasses(torch.autograd.Function):
 
 def _rows(job: _Job, number: int, rows: range, numbers: tuple[Tensor, ...]) -> Tensor:
     """Render some rows in one pass: (3, rows, w)."""
-    values, a, b, light, *fields = numbers
+    values, a, b, light, *lens_numbers = numbers
     sampling, window = job.sampling, job.window
     labels = Labels(a=a, b=b, radius_mm=job.optics.stop_radius_mm)
-    lens = _lens(fields, number, job.shapes)
+    lens = _lens(lens_numbers, number, job.lens)
     place, label, radius = _draw(job, number, rows)
     start = rays_from(labels_of_type(labels, sampling.dtype), *place, *label)
     end = trace_to_scene(lens, start, job.optics.object_distance_mm)

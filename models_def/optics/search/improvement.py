@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 import torch
@@ -22,6 +22,7 @@ _LEAST_GLASS_MM: Final = 1.0
 _LEAST_AIR_MM: Final = 0.1
 _ASPHERE_TERMS: Final = 4
 _ASPHERE_SAG_MM: Final = 0.2
+_PHASE: Final = 500.0  # radians
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,30 +104,43 @@ def _variables(
         return [
             Variable(kind="thickness", surface=i, low=min(least, surface.thickness_mm), high=most)
         ]
-    return _asphere_variables(lens, surface, i)
+    if name == "phase":
+        coefficients = surface.phase.coefficients if surface.phase else ()
+        return _coefficient_variables(name, i, coefficients, _PHASE)
+    if name == "q_asphere":
+        return _coefficient_variables(name, i, surface.q_bfs or surface.q_con, _ASPHERE_SAG_MM)
+    return [] if surface.asphere.q_kind else _asphere_variables(lens, surface, i, name)
 
 
-def _asphere_variables(lens: Lens, surface: Surface, i: int) -> list[Variable]:
-    """Free r^4 and higher; the r^2 term is a curvature and stays."""
+def _asphere_variables(
+    lens: Lens, surface: Surface, i: int, name: Literal["even_asphere", "odd_asphere"]
+) -> list[Variable]:
+    """Free r^3 or r^4 and higher; the r^2 term is a curvature, a cone has none: they stay."""
     radius_mm = min(surface.semi_diameter_mm, paraxial_data(lens).entrance_pupil_diameter_mm)
+    radius_mm /= surface.normal_radius_mm or 1.0
+    coefficients = surface.even_asphere if name == "even_asphere" else surface.odd_asphere
+    first = 2 if name == "even_asphere" else 1
     variables = []
-    for term in range(1, max(_ASPHERE_TERMS, len(surface.even_asphere))):
-        coefficient = surface.even_asphere[term] if term < len(surface.even_asphere) else 0.0
-        reach = max(2 * abs(coefficient), _ASPHERE_SAG_MM / radius_mm ** (2 * term + 2))
-        variables.append(
-            Variable(
-                kind="even_asphere",
-                surface=i,
-                term=term,
-                low=coefficient - reach,
-                high=coefficient + reach,
-            )
-        )
+    for term in range(1, max(_ASPHERE_TERMS, len(coefficients))):
+        coefficient = coefficients[term] if term < len(coefficients) else 0.0
+        reach = max(2 * abs(coefficient), _ASPHERE_SAG_MM / radius_mm ** (2 * term + first))
+        variables.append(_variable_near(name, i, coefficient, reach, term=term))
     return variables
 
 
-def _variable_near(parameter: Parameter, i: int, value: float, reach: float) -> Variable:
-    return Variable(kind=parameter, surface=i, low=value - reach, high=value + reach)
+def _coefficient_variables(
+    name: Parameter, i: int, coefficients: Sequence[float], reach: float
+) -> list[Variable]:
+    return [
+        _variable_near(name, i, value, max(2 * abs(value), reach), term=term)
+        for term, value in enumerate(coefficients)
+    ]
+
+
+def _variable_near(
+    parameter: Parameter, i: int, value: float, reach: float, *, term: int = 0
+) -> Variable:
+    return Variable(kind=parameter, surface=i, term=term, low=value - reach, high=value + reach)
 
 
 def improve(

@@ -17,7 +17,6 @@ from torch import Tensor
 
 from camkit.errors import ContractError
 from camkit.models_def.optics.trace import Rays, SurfaceTensors
-from camkit.models_def.optics.tracing.profile import sag, sag_slope
 
 BARRIER: Final = 0.05
 _TINY: Final = 1e-6
@@ -75,8 +74,7 @@ def _margins(
     hit_y = torch.where(hits.valid, hits.y, y + near * incoming.m)
     rho = hit_x**2 + hit_y**2
     exists = 1 - (1 + k) * c**2 * rho
-    terms = tensors.even_asphere[i] if tensors.aspheric[i] else tensors.even_asphere[i][:0]
-    lean = 2 * sag_slope(c, k, terms, rho)
+    lean = 2 * tensors.slope(i, rho)
     facing = incoming.n - lean * (hit_x * incoming.l + hit_y * incoming.m)
     ratio = tensors.index[i] / tensors.index[i + 1]
     transmits = 1 - ratio**2 * (1 - facing**2 / (1 + lean**2 * rho))
@@ -122,5 +120,4 @@ def edge_gaps(tensors: SurfaceTensors, reaches: Sequence[Tensor]) -> Tensor:
 def _height(tensors: SurfaceTensors, i: int, rho: Tensor) -> Tensor:
     c, k = tensors.curvature_per_mm[i], tensors.conic[i]
     rim = _INNER_SHARE / ((1 + k) * c**2).clamp_min(_TINY)
-    terms = tensors.even_asphere[i] if tensors.aspheric[i] else tensors.even_asphere[i][:0]
-    return sag(c, k, terms, torch.minimum(rho, rim))
+    return tensors.height(i, torch.minimum(rho, rim))

@@ -13,7 +13,7 @@ import torch
 from numpy.typing import NDArray
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.prescription import Lens, require_round
 from camkit.models_def.optics.pupil import half_disc, pupil_rays
 from camkit.models_def.optics.trace import Fate, surface_tensors, trace
 from camkit.units import to_mm
@@ -79,6 +79,7 @@ def land_light(
     Raises:
         ContractError: If no light enters the stop.
     """
+    require_round(lens, "a landing from half the pupil")
     tensors = surface_tensors(lens, torch.tensor(wavelength_um, dtype=torch.float64))
     slope = torch.tensor([math.tan(field_angle_rad)], dtype=torch.float64)
     with torch.no_grad():

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from camkit.errors import ContractError
 from camkit.models_def.optics.grooves import grooved_mm, wall_radii_mm
 from camkit.models_def.optics.prescription import Surface
-from camkit.models_def.optics.tracing.profile import sag_slope
 from camkit.units import UM_PER_MM
 
 Array = NDArray[np.float64]
@@ -63,9 +62,7 @@ def sag_table(surface: Surface, step_um: float) -> SagTable:
     height = surface.profile.height_mm(radius)
     if surface.grooves is not None:
         height = grooved_mm(height, surface.grooves)
-    numbers = (surface.curvature_per_mm, surface.conic, surface.even_asphere)
-    c, k, terms = (torch.tensor(n, dtype=torch.float64) for n in numbers)
-    slope = 2 * radius * sag_slope(c, k, terms, radius**2)
+    slope = surface.profile.slope(radius)
     return SagTable(
         radius_mm=radius.numpy(),
         height_um=(height * UM_PER_MM).numpy(),

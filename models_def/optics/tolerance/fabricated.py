@@ -13,7 +13,7 @@ from camkit.models_def.optics.aiming.newton import newton_aim
 from camkit.models_def.optics.aiming.start import launch, with_open_apertures
 from camkit.models_def.optics.glass.dispersion import D_LINE_UM
 from camkit.models_def.optics.paraxial import trace_paraxial
-from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.prescription import Lens, require_round
 from camkit.models_def.optics.pupil import (
     PupilSamples,
     marked,
@@ -25,13 +25,14 @@ from camkit.models_def.optics.tolerance.deviation import Deviations, no_deviatio
 from camkit.models_def.optics.tolerance.elements import glass_elements
 from camkit.models_def.optics.tolerance.errors import Array, Compensator
 from camkit.models_def.optics.tolerance.misaligned_trace import meet, trace_misaligned
-from camkit.models_def.optics.tolerance.pose import Pose, poses
+from camkit.models_def.optics.tolerance.pose import poses
 from camkit.models_def.optics.trace import (
     Rays,
     SurfaceTensors,
     surface_tensors,
     without_walls,
 )
+from camkit.models_def.optics.tracing.frame import Pose
 
 # beams of copies start from those of the nominal lens, which are close: slopes are measured once
 _AIM_STEPS: Final = 4
@@ -130,6 +131,13 @@ def fabricated_tensors(
             None if groove is None else replace(groove, depth_mm=groove.depth_mm * float(s))
             for groove, s in zip(nominal.grooves, relief[0], strict=True)
         ),
+        odd_asphere=None
+        if nominal.odd_asphere is None
+        else nominal.odd_asphere[:, :, None, None, None, None] * deeper[:, None],
+        series=nominal.series,
+        phase=None if nominal.phase is None else nominal.phase[:, :, None, None, None, None],
+        order_mm=None if nominal.order_mm is None else nominal.order_mm[:, None, None, :, None],
+        phases=nominal.phases,
     )
 
 
@@ -148,6 +156,7 @@ def land(lens: Lens, deviations: Deviations, view: View, compensator: Compensato
     Raises:
         ContractError: If the chief ray of a copy is lost, or no ray arrives.
     """
+    require_round(lens, "a Monte-Carlo analysis of tolerances")
     if deviations.groove_depth.any() and deviations.copies > 1:
         alone = (deviations.of_copy(number) for number in range(deviations.copies))
         return _joined([land(lens, one, view, compensator) for one in alone])

@@ -8,10 +8,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import torch
-from torch import Tensor
 
-from camkit.models_def.optics.tolerance.pose import Pose
 from camkit.models_def.optics.trace import Fate, Rays, SurfaceTensors, refract
+from camkit.models_def.optics.tracing import frame
+from camkit.models_def.optics.tracing.frame import Pose
+from camkit.models_def.optics.tracing.meeting import State
 
 _MIN_COSINE = 1e-6
 
@@ -45,26 +46,16 @@ def trace_misaligned(
 
 def to_surface(pose: Pose, rays: Rays) -> Rays:
     """Return rays in the frame of the surface."""
-    dx, dy, dz = (rays.x, rays.y, rays.z)
-    ox, oy, oz = pose.offset_mm.unbind(-1)
-    turn = pose.turn.transpose(-1, -2)
-    x, y, z = _turned(turn, (dx - ox, dy - oy, dz - oz))
-    l, m, n = _turned(turn, (rays.l, rays.m, rays.n))  # noqa: E741
-    return replace(rays, x=x, y=y, z=z, l=l, m=m, n=n)
+    return replace(rays, **frame.to_surface(pose, _state(rays))._asdict())
 
 
 def from_surface(pose: Pose, rays: Rays) -> Rays:
     """Return rays in the frame of the nominal vertex."""
-    ox, oy, oz = pose.offset_mm.unbind(-1)
-    x, y, z = _turned(pose.turn, (rays.x, rays.y, rays.z))
-    l, m, n = _turned(pose.turn, (rays.l, rays.m, rays.n))  # noqa: E741
-    return replace(rays, x=x + ox, y=y + oy, z=z + oz, l=l, m=m, n=n)
+    return replace(rays, **frame.from_surface(pose, _state(rays))._asdict())
 
 
-def _turned(turn: Tensor, vector: tuple[Tensor, Tensor, Tensor]) -> list[Tensor]:
-    x, y, z = vector
-    rows = turn.unbind(-2)
-    return [r[..., 0] * x + r[..., 1] * y + r[..., 2] * z for r in rows]
+def _state(rays: Rays) -> State:
+    return State(rays.x, rays.y, rays.z, rays.l, rays.m, rays.n)
 
 
 def _to_plane(rays: Rays) -> Rays:

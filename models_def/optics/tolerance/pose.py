@@ -5,44 +5,11 @@ the piece's front vertex and shifted: p = R q + o, with q in the frame of the su
 frame of its nominal vertex.
 """
 
-from dataclasses import dataclass
-
 import torch
 from torch import Tensor
 
 from camkit.models_def.optics.tolerance.deviation import Deviations
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Pose:
-    """The pose of one surface.
-
-    Attributes:
-        turn: R, (..., 3, 3); the dimensions before broadcast against the rays.
-        offset_mm: o, (..., 3).
-    """
-
-    turn: Tensor
-    offset_mm: Tensor
-
-
-def rotation(vector_rad: Tensor) -> Tensor:
-    """Return the rotation (..., 3, 3) about (x, y, 0) by its length, right-handed (Rodrigues).
-
-    Args:
-        vector_rad: (..., 2).
-    """
-    x, y = vector_rad.unbind(-1)
-    angle = torch.hypot(x, y)
-    # sin(a) / a and (1 - cos(a)) / a^2, also at 0
-    first = torch.sinc(angle / torch.pi)
-    second = torch.sinc(angle / (2 * torch.pi)) ** 2 / 2
-    rows = [
-        [1 - second * y * y, second * x * y, first * y],
-        [second * x * y, 1 - second * x * x, -first * x],
-        [-first * y, first * x, 1 - second * (x * x + y * y)],
-    ]
-    return torch.stack([torch.stack(row, dim=-1) for row in rows], dim=-2)
+from camkit.models_def.optics.tracing.frame import Pose, rotation
 
 
 def poses(

@@ -2,7 +2,10 @@
 
 In the order in which data flows:
 
-- `profile`: height and slope of a surface
+- `profile`: height and slope of a conic and an even asphere; `series`: other polynomial parts
+- `sag`: both, of a surface of a prescription
+- `phase_polynomial`: a phase that a surface adds, and its slopes
+- `frame`: surfaces that are turned and shifted
 - `meeting`: where rays meet a surface, `groove`: one that is cut into grooves
 - `kernel`: rays through the surfaces of a lens, each with its fate
 - `adjoint`: the gradients, from where rays met the surfaces

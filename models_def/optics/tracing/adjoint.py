@@ -19,7 +19,19 @@ from torch import Tensor
 
 from camkit.models_def.optics.tracing.kernel import RayRecord, TraceSettings, rest
 from camkit.models_def.optics.tracing.meeting import Numbers, State
+from camkit.models_def.optics.tracing.phase_polynomial import (
+    PhaseForm,
+    phase_terms,
+    phase_turn,
+    phase_value,
+)
 from camkit.models_def.optics.tracing.profile import TINY, polynomial
+from camkit.models_def.optics.tracing.series import (
+    Series,
+    opening_slopes,
+    series_part,
+    term_slopes,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,6 +44,8 @@ class GradientNeeds:
     even_asphere: bool
     thickness: bool
     index: bool
+    odd_asphere: bool
+    phase: bool
 
 
 class Slopes(NamedTuple):
@@ -51,6 +65,8 @@ class Gradients(NamedTuple):
     even_asphere: list[list[Tensor]]
     thickness: list[Tensor]
     indices: list[Tensor]
+    odd_asphere: list[list[Tensor]]
+    phase: list[list[Tensor]]
 
 
 _WILD: Final = {torch.float32: 1e15, torch.float64: 1e100}
@@ -101,7 +117,8 @@ def pull_back(
         slopes: Of the loss by what the trace gave.
         gather: Sums a per-ray derivative to the shape of the number it belongs to.
     """
-    total = Gradients(launched, [], [], [], [], [torch.zeros_like(lens[-1].after)])
+    zero = torch.zeros_like(lens[-1].after)
+    total = Gradients(launched, [], [], [], [], [zero], [], [])
     g = rest(slopes.end, record.fate, adaptive=settings.adaptive, n=0.0)
     path = None if slopes.path is None else torch.where(record.fate == 0, slopes.path, 0.0)
     g = _leave_plane(needs, lens[-1], record.states[-1], g, path, total, gather)
@@ -115,7 +132,13 @@ def pull_back(
             last = record.states[i - 1]
             incoming = last._replace(z=last.z - lens[i - 1].gap)
         shape = _shape(p, hit, aspheric=settings.aspheric[i])
-        bent = _refraction(p, shape, incoming, hit, g, with_ratio=needs.index)
+        if p.phase is None:
+            bent = _refraction(p, shape, incoming, hit, g, with_ratio=needs.index)
+            if needs.phase:
+                total.phase.append([torch.zeros_like(v) for v in p.phase_terms])
+        else:
+            rays = (shape, incoming, hit)
+            bent, g = _phase_refraction(p, p.phase, needs, rays, g, path, total, gather)
         way = (hit.z - incoming.z) / incoming.n
         push = torch.addcmul(bent.x * incoming.l, bent.y, incoming.m)
         push = torch.addcmul(push, bent.z, incoming.n)
@@ -137,6 +160,8 @@ def pull_back(
         total.even_asphere[::-1],
         total.thickness[::-1],
         total.indices[::-1],
+        total.odd_asphere[::-1],
+        total.phase[::-1],
     )
 
 
@@ -214,7 +239,9 @@ def _shape(p: Numbers, hit: State, *, aspheric: bool) -> _Shape:
     root = (1 - rho * p.opening).clamp_min(TINY).sqrt() if aspheric else 1 - hit.z * p.kc
     inverse = torch.reciprocal(root)
     lean = inverse * p.c
-    if aspheric and p.slopes:
+    if p.series is not None:
+        lean = lean + series_part(p.series, p.terms, p.odd, (p.opening, inverse), rho).lean
+    elif aspheric and p.slopes:
         lean = lean + polynomial(p.slopes, rho)
     return _Shape(rho, root, inverse, lean, 1 + lean * lean * rho)
 
@@ -253,10 +280,92 @@ def _refraction(
     )
 
 
+def _phase_refraction(
+    p: Numbers,
+    form: PhaseForm,
+    needs: GradientNeeds,
+    rays: tuple[_Shape, State, State],
+    g: State,
+    path: Tensor | None,
+    total: Gradients,
+    gather: Gather,
+) -> tuple[_Bent, State]:
+    """Return the adjoint of refraction at a surface with a phase, and the slopes by w (`phase`).
+
+    With pull P = g.N / N.N and the direction d' behind: by w it is W = g - P (N.N / T) d', by N it
+    is bend g - P bend (N.N / T) w + P ((1 - w.w) / T - 2 bend) N.
+    """
+    shape, incoming, hit = rays
+    lean, length2 = shape.lean, shape.length2
+    phase = phase_value(form, p.phase_terms, hit.x, hit.y)
+    turn = phase_turn(form, p.phase_terms, hit.x, hit.y)
+    push = p.order / p.after
+    wx = torch.addcmul(incoming.l * p.ratio, push, phase.x)
+    wy = torch.addcmul(incoming.m * p.ratio, push, phase.y)
+    wz = incoming.n * p.ratio
+    facing = incoming.n - torch.addcmul(hit.x * incoming.l, hit.y, incoming.m) * lean
+    leaving = hit.n - torch.addcmul(hit.x * hit.l, hit.y, hit.m) * lean
+    bend = (leaving - wz + torch.addcmul(hit.x * wx, hit.y, wy) * lean) / length2
+    pull = (g.n - torch.addcmul(g.l * hit.x, g.m, hit.y) * lean) / length2
+    share = pull * length2 / leaving
+    by_w = State(g.x, g.y, g.z, g.l - share * hit.l, g.m - share * hit.m, g.n - share * hit.n)
+    rest2 = 1 - wx * wx - wy * wy - wz * wz
+    shear = pull * (rest2 / leaving - 2 * bend) * lean
+    normal_x = bend * (g.l - share * wx) - shear * hit.x
+    normal_y = bend * (g.m - share * wy) - shear * hit.y
+    slope_lean = -torch.addcmul(normal_x * hit.x, normal_y, hit.y)
+    twist = slope_lean * _lean_slope(p, shape) * 2
+    by_x, by_y = push * by_w.l, push * by_w.m  # by the slopes of the phase
+    x = g.x + twist * hit.x - lean * normal_x + by_x * turn.xx + by_y * turn.xy
+    y = g.y + twist * hit.y - lean * normal_y + by_x * turn.xy + by_y * turn.yy
+    if path is not None:
+        x, y = x + path * p.order * phase.x, y + path * p.order * phase.y
+    ratio = None
+    if needs.index:
+        ratio = by_w.l * incoming.l + by_w.m * incoming.m + by_w.n * incoming.n
+        strength = gather(by_x * phase.x + by_y * phase.y, p.after) / p.after
+        total.indices[-1] = total.indices[-1] - strength
+    if needs.phase:
+        _collect_phase(p, form, hit, (by_x, by_y, path), total, gather)
+    bent = _Bent(
+        x=x,
+        y=y,
+        z=g.z,
+        lean=slope_lean,
+        facing=facing,
+        slope_facing=torch.zeros_like(facing),
+        ratio=ratio,
+    )
+    return bent, by_w
+
+
+def _collect_phase(
+    p: Numbers,
+    form: PhaseForm,
+    hit: State,
+    slopes: tuple[Tensor, Tensor, Tensor | None],
+    total: Gradients,
+    gather: Gather,
+) -> None:
+    """Add the slopes by the coefficients of a phase, from those by its gradient and the path."""
+    by_x, by_y, path = slopes
+    sums = []
+    for row, term in zip(phase_terms(form, hit.x, hit.y), p.phase_terms, strict=False):
+        slope = by_x * row.x + by_y * row.y
+        slope = slope if path is None else slope + path * p.order * row.value
+        sums.append(gather(slope, term))
+    sums += [torch.zeros_like(v) for v in p.phase_terms[len(sums) :]]
+    total.phase.append(sums)
+
+
 def _lean_slope(p: Numbers, shape: _Shape) -> Tensor:
     """Return dq / d rho."""
     cube = shape.inverse * shape.inverse * shape.inverse
     slope = cube * (p.opening * p.c / 2)
+    if p.series is not None:
+        conic = (p.opening, shape.inverse)
+        twist = series_part(p.series, p.terms, p.odd, conic, shape.rho, twist=True).twist
+        return slope if twist is None else slope + twist
     bends = [a * j for j, a in enumerate(p.slopes)][1:]
     return slope + polynomial(bends, shape.rho) if bends else slope
 
@@ -302,11 +411,20 @@ def _collect(
     if needs.curvature or needs.conic:
         cube = bent.lean * inverse * inverse * inverse
         share = push * inverse / (1 + shape.root)
+        more = _opening_slope(p, shape, bent, push)
         if needs.curvature:
-            total.curvature.append(gather(torch.addcmul(cube, share, rho), p.c))
+            slope = torch.addcmul(cube, share, rho)
+            slope = slope if more is None else slope + more * (2 * p.kc)
+            total.curvature.append(gather(slope, p.c))
         if needs.conic:
             slope = (cube + share * rho / (1 + shape.root)) * rho * (p.c * p.c * p.c / 2)
+            slope = slope if more is None else slope + more * (p.c * p.c)
             total.conic.append(gather(slope, p.k))
+    if p.series is not None:
+        _collect_series(p, p.series, needs, shape, bent, push, total, gather)
+        return
+    if needs.odd_asphere:
+        total.odd_asphere.append([torch.zeros_like(v) for v in p.odd])
     if needs.even_asphere:
         row: list[Tensor] = []
         power = torch.ones_like(rho)
@@ -316,6 +434,37 @@ def _collect(
                 power = power * rho
             row.append(gather(slope, term) if aspheric else torch.zeros_like(term))
         total.even_asphere.append(row)
+
+
+def _opening_slope(p: Numbers, shape: _Shape, bent: _Bent, push: Tensor) -> Tensor | None:
+    """Return the slope by (1 + k) c^2 through a polynomial part that is divided by the root."""
+    if p.series is None or not p.series.over_root:
+        return None
+    by_opening = opening_slopes(p.series, p.terms, (p.opening, shape.inverse), shape.rho)
+    return push * by_opening.height + bent.lean * by_opening.lean
+
+
+def _collect_series(
+    p: Numbers,
+    series: Series,
+    needs: GradientNeeds,
+    shape: _Shape,
+    bent: _Bent,
+    push: Tensor,
+    total: Gradients,
+    gather: Gather,
+) -> None:
+    count, conic = (len(p.terms), len(p.odd)), (p.opening, shape.inverse)
+    even, odd = term_slopes(series, count, conic, shape.rho)
+    both = (
+        (needs.even_asphere, even, p.terms, total.even_asphere),
+        (needs.odd_asphere, odd, p.odd, total.odd_asphere),
+    )
+    for flag, rows, terms, lists in both:
+        if flag:
+            slopes = [push * row.height + bent.lean * row.lean for row in rows]
+            summed = [gather(s, v) for s, v in zip(slopes, terms, strict=False)]
+            lists.append([*summed, *(torch.zeros_like(v) for v in terms[len(rows) :])])
 
 
 def _collect_index(

@@ -36,6 +36,8 @@ _COMPILERS: Final = ("g++", "clang++", "c++", "cl")
 _RECOMPILATIONS: Final = 64
 _FORWARD_RAYS: Final = 131_072
 _BACKWARD_RAYS: Final = 32_768
+_PLAIN: Final = 6
+"""So many tensors has a lens of conics and even aspheres."""
 
 Loop = Callable[..., tuple[Tensor, ...]]
 
@@ -76,7 +78,7 @@ class Fused:
         for row in rows:
             values = [v[row.rays].flatten() for v in (*rays, fate)]
             with _patience():
-                parts.append(loop(row.lens, State(*values[:6]), values[6]))
+                parts.append(loop(_loop_inputs(settings, row.lens), State(*values[:6]), values[6]))
         end = [_joined(column, rows, fate.shape) for column in zip(*parts, strict=True)]
         if any(settings.aspheric) and bool((end[6] == NOT_CONVERGED).any()):
             return Eager().run(settings, lens, rays, fate)
@@ -94,7 +96,8 @@ class Fused:
         for row in _rows(lens, fate.shape):
             v = [value[row.rays].flatten() for value in columns]
             with _patience():
-                slopes = list(loop(row.lens, State(*v[:6]), v[6], State(*v[7:13]), *v[13:]))
+                lens_numbers = _loop_inputs(task.settings, row.lens)
+                slopes = list(loop(lens_numbers, State(*v[:6]), v[6], State(*v[7:13]), *v[13:]))
             for whole in of_rays if needs.rays else []:
                 whole[row.rays] = slopes.pop(0).reshape(whole[row.rays].shape)
             _add(needs, of_lens, row, [float(g.sum()) for g in slopes])
@@ -105,6 +108,8 @@ class Fused:
             [list(terms) for terms in of_lens.even_asphere],
             list(of_lens.thickness),
             list(of_lens.indices),
+            [list(terms) for terms in of_lens.odd_asphere],
+            [list(terms) for terms in of_lens.phase],
         )
 
 
@@ -145,8 +150,8 @@ def _rows(lens: LensTensors, shape: torch.Size) -> Iterator[_Row]:
 
 def _add(needs: GradientNeeds, total: LensTensors, row: _Row, sums: list[float]) -> None:
     """Add the sums over a row, in the order of `_columns`."""
-    *first, last = _flags(needs)
-    flags = (*first, False, last)
+    c, k, even, gap, index, odd, phase = _flags(needs)
+    flags = (c, k, even, gap, False, index, odd, phase, False)
     start = 0
     for value, place, flag in zip(total, row.places, flags, strict=True):
         if flag:
@@ -157,13 +162,28 @@ def _add(needs: GradientNeeds, total: LensTensors, row: _Row, sums: list[float])
 
 
 def _flags(needs: GradientNeeds) -> tuple[bool, ...]:
-    return (needs.curvature, needs.conic, needs.even_asphere, needs.thickness, needs.index)
+    first = (needs.curvature, needs.conic, needs.even_asphere, needs.thickness, needs.index)
+    return (*first, needs.odd_asphere, needs.phase)
+
+
+def _loop_inputs(settings: TraceSettings, lens: LensTensors) -> tuple[Tensor, ...]:
+    """Return the tensors that a loop reads: each one more is checked at every call."""
+    return tuple(lens) if settings.series or settings.phases else tuple(lens[:_PLAIN])
+
+
+def _whole(values: tuple[Tensor, ...]) -> LensTensors:
+    """Return all tensors of a lens, those that it does not use empty."""
+    if len(values) > _PLAIN:
+        return LensTensors(*values)
+    none = values[0].new_zeros(len(values[0]), 0)
+    return LensTensors(*values, none, none, none)  # type: ignore[call-arg]
 
 
 @functools.cache
 def _forward(settings: TraceSettings) -> Loop:
-    def fused(lens: LensTensors, rays: State, fate: Tensor) -> tuple[Tensor, ...]:
-        result = run(settings, numbers(lens), rays, fate)
+    def fused(values: tuple[Tensor, ...], rays: State, fate: Tensor) -> tuple[Tensor, ...]:
+        lens = _whole(values)
+        result = run(settings, numbers(lens, settings), rays, fate)
         path = () if result.path is None else (result.path,)
         return (*result.end, result.record.fate, *path)
 
@@ -173,9 +193,14 @@ def _forward(settings: TraceSettings) -> Loop:
 @functools.cache
 def _backward(settings: TraceSettings, needs: GradientNeeds) -> Loop:
     def fused(
-        lens: LensTensors, rays: State, fate: Tensor, end: State, path: Tensor | None = None
+        values: tuple[Tensor, ...],
+        rays: State,
+        fate: Tensor,
+        end: State,
+        path: Tensor | None = None,
     ) -> tuple[Tensor, ...]:
-        surfaces = numbers(lens)
+        lens = _whole(values)
+        surfaces = numbers(lens, settings)
         record = run(settings, surfaces, rays, fate).record
         slopes = Slopes(end, path, [None] * len(surfaces))
         still = rest(rays, fate, adaptive=False)
@@ -183,8 +208,12 @@ def _backward(settings: TraceSettings, needs: GradientNeeds) -> Loop:
         gradients = pull_back(
             settings, needs, surfaces, still, record, slopes, lambda value, _: value
         )
-        even = [term for row in gradients.even_asphere for term in row]
+        even, odd, phase = (
+            [term for row in rows for term in row]
+            for rows in (gradients.even_asphere, gradients.odd_asphere, gradients.phase)
+        )
         lists = [gradients.curvature, gradients.conic, even, gradients.thickness, gradients.indices]
+        lists += [odd, phase]
         needed_columns = [v for v, flag in zip(lists, _flags(needs), strict=True) if flag]
         return (*(gradients.rays or ()), *(v for column in needed_columns for v in column))
 

@@ -63,11 +63,11 @@ class Eager:
 
     def run(self, settings: TraceSettings, lens: LensTensors, rays: State, fate: Tensor) -> Result:
         """Trace a block."""
-        return run(settings, numbers(lens), rays, fate)
+        return run(settings, numbers(lens, settings), rays, fate)
 
     def pull(self, task: Task, lens: LensTensors, rays: State, fate: Tensor) -> Gradients:
         """Return the gradients of a block."""
-        surfaces = numbers(lens)
+        surfaces = numbers(lens, task.settings)
         record = task.record
         if record is None:
             record = run(task.settings, surfaces, rays, fate).record
@@ -168,7 +168,7 @@ def _part(
 
 
 # leading dimensions of lens tensors that are not the rays': surface, and term of the polynomial
-FIXED: Final = (1, 1, 2, 1, 1, 1)
+FIXED: Final = (1, 1, 2, 1, 1, 1, 2, 2, 1)
 
 
 class _Trace(torch.autograd.Function):
@@ -207,8 +207,8 @@ class _Trace(torch.autograd.Function):
     @staticmethod
     @once_differentiable
     def backward(ctx: Any, *slopes: Tensor | None) -> tuple[Tensor | None, ...]:
-        fate, *tensors = ctx.saved_tensors[:13]
-        saved = ctx.saved_tensors[13:]
+        fate, *tensors = ctx.saved_tensors[:16]
+        saved = ctx.saved_tensors[16:]
         rays, lens = State(*(v.expand(ctx.shape) for v in tensors[:6])), LensTensors(*tensors[6:])
         needs = ctx.needs_input_grad[2:]
         gradient_needs = GradientNeeds(
@@ -218,6 +218,8 @@ class _Trace(torch.autograd.Function):
             even_asphere=needs[8],
             thickness=needs[9],
             index=needs[11],
+            odd_asphere=needs[12],
+            phase=needs[13],
         )
         sums = [
             torch.zeros_like(v) if need else None for v, need in zip(lens, needs[6:], strict=True)
@@ -263,14 +265,19 @@ def _slopes(settings: TraceSettings, flat: Sequence[Tensor | None], like: Tensor
 
 
 def _add(sums: Sequence[Tensor | None], gradients: Gradients, block: _Block | None) -> None:
-    rows = [torch.stack(row) for row in gradients.even_asphere if row]
+    def rows(lists: list[list[Tensor]]) -> list[Tensor]:
+        return [torch.stack(row) for row in lists if row]
+
     columns = [
         gradients.curvature,
         gradients.conic,
-        rows,
+        rows(gradients.even_asphere),
         gradients.thickness,
         [],
         gradients.indices,
+        rows(gradients.odd_asphere),
+        rows(gradients.phase),
+        [],
     ]
     for total, values, fixed in zip(sums, columns, FIXED, strict=True):
         if total is not None and values:

@@ -23,7 +23,9 @@ from camkit.models_def.optics.tracing.meeting import (
     meet_conic,
     to_plane,
 )
+from camkit.models_def.optics.tracing.phase_polynomial import PhaseForm, phase_value
 from camkit.models_def.optics.tracing.profile import TINY
+from camkit.models_def.optics.tracing.series import Series
 
 MISSED: Final = 1
 TOTAL_REFLECTION: Final = 2
@@ -42,12 +44,16 @@ class TraceSettings:
         grooves: Of each surface; None for none.
         path: Whether the optical path is summed.
         adaptive: Whether Newton steps end when every ray has converged.
+        series: Of each surface; None for a plain even asphere. Empty where all are.
+        phases: Of each surface; None for none. Empty where none has any.
     """
 
     aspheric: tuple[bool, ...]
     grooves: tuple[Groove | None, ...]
     path: bool
     adaptive: bool = True
+    series: tuple[Series | None, ...] = ()
+    phases: tuple[PhaseForm | None, ...] = ()
 
 
 class LensTensors(NamedTuple):
@@ -59,9 +65,12 @@ class LensTensors(NamedTuple):
     thickness: Tensor
     semi_diameter: Tensor
     indices: Tensor
+    odd_asphere: Tensor
+    phase: Tensor
+    order: Tensor
 
 
-def numbers(lens: LensTensors) -> list[Numbers]:
+def numbers(lens: LensTensors, settings: TraceSettings) -> list[Numbers]:
     """Return the numbers of every surface, computed for all surfaces at once."""
     c, k = lens.curvature, lens.conic
     kc = c + k * c
@@ -76,9 +85,20 @@ def numbers(lens: LensTensors) -> list[Numbers]:
     tails = zip(*(v.unbind(0) for v in rest), strict=True)
     terms = [row.unbind(0) for row in lens.even_asphere.unbind(0)]
     bends = list(zip(*(v.unbind(0) for v in slopes), strict=True)) or [()] * len(terms)
-    return [
+    plain = [
         Numbers(*head, tuple(a), tuple(b), *tail)  # type: ignore[call-arg]
         for head, a, b, tail in zip(heads, terms, bends, tails, strict=True)
+    ]
+    if not settings.series and not settings.phases:
+        return plain
+    series = settings.series or (None,) * len(plain)
+    phases = settings.phases or (None,) * len(plain)
+    odds = [tuple(row.unbind(0)) for row in lens.odd_asphere.unbind(0)]
+    terms_rad = [tuple(row.unbind(0)) for row in lens.phase.unbind(0)]
+    added = zip(series, odds, phases, terms_rad, lens.order.unbind(0), strict=True)
+    return [
+        p._replace(series=shape, odd=odd, phase=phase, phase_terms=rad, order=order)
+        for p, (shape, odd, phase, rad, order) in zip(plain, added, strict=True)
     ]
 
 
@@ -118,6 +138,8 @@ def run(settings: TraceSettings, lens: Sequence[Numbers], rays: State, fate: Ten
         state, way, now = cross(p, state, fate, shape, adaptive=settings.adaptive)
         code, fate = code if now is fate else now.to(torch.int8), now
         path = None if path is None else path + p.before * way
+        if path is not None and p.phase is not None:
+            path = path + p.order * phase_value(p.phase, p.phase_terms, state.x, state.y).value
         states.append(state)
         fates.append(code)
         state = state._replace(z=state.z - p.gap)
@@ -157,23 +179,9 @@ def cross(
         hit = met.hit
     else:
         hit = meet_asphere(p, at, adaptive=adaptive) if aspheric else meet_conic(p, at)
-    # N.d and the length of N give the refracted direction ratio d + bend N (Snell)
-    square = torch.addcmul(hit.length2 * p.rest2, hit.facing2, p.ratio2)
-    root = torch.sqrt(square.clamp_min(TINY))
-    bend = (root - hit.facing * p.ratio) / hit.length2
-    turn = bend * hit.lean
-    lift = at.n * p.ratio
-    n = lift + bend if hit.normal_z is None else torch.addcmul(lift, bend, hit.normal_z)
-    bent = State(
-        x=hit.x,
-        y=hit.y,
-        z=hit.z,
-        l=torch.addcmul(at.l * p.ratio, turn, hit.x, value=-1),
-        m=torch.addcmul(at.m * p.ratio, turn, hit.y, value=-1),
-        n=n,
-    )
+    bent, square = _bend(p, at, hit)
     way = lead + hit.way
-    transmits, onward = Bound(square, TINY), Bound(n, MIN_COSINE)
+    transmits, onward = Bound(square, TINY), Bound(bent.n, MIN_COSINE)
     bounds = [*hit.exists, transmits, onward, *([hit.converged] if hit.converged else [])]
     losses = _GrooveLosses()
     if groove is not None and met is not None and met.wall is not None:
@@ -183,6 +191,36 @@ def cross(
         return rest(bent, fate, adaptive=True), way, fate
     fate = torch.where(fate == 0, _judge(p, hit, (transmits, onward), losses), fate)
     return rest(bent, fate, adaptive=adaptive), way, fate
+
+
+def _bend(p: Numbers, at: State, hit: Meeting) -> tuple[State, Tensor]:
+    """Refract rays where they met a surface; return them and the square of N.d' (> 0 if any)."""
+    # N.d and the length of N give the refracted direction ratio d + bend N (Snell)
+    along_x, along_y, lift = at.l * p.ratio, at.m * p.ratio, at.n * p.ratio
+    if p.phase is None:
+        square = torch.addcmul(hit.length2 * p.rest2, hit.facing2, p.ratio2)
+        facing = hit.facing * p.ratio
+    else:
+        phase = phase_value(p.phase, p.phase_terms, hit.x, hit.y)
+        push = p.order / p.after
+        along_x, along_y = along_x + push * phase.x, along_y + push * phase.y
+        turned = push * hit.lean * torch.addcmul(hit.x * phase.x, hit.y, phase.y)
+        facing = hit.facing * p.ratio - turned
+        rest2 = 1 - torch.addcmul(along_x * along_x, along_y, along_y) - lift * lift
+        square = torch.addcmul(hit.length2 * rest2, facing, facing)
+    root = torch.sqrt(square.clamp_min(TINY))
+    bend = (root - facing) / hit.length2
+    turn = bend * hit.lean
+    n = lift + bend if hit.normal_z is None else torch.addcmul(lift, bend, hit.normal_z)
+    bent = State(
+        x=hit.x,
+        y=hit.y,
+        z=hit.z,
+        l=torch.addcmul(along_x, turn, hit.x, value=-1),
+        m=torch.addcmul(along_y, turn, hit.y, value=-1),
+        n=n,
+    )
+    return bent, square
 
 
 class _GrooveLosses(NamedTuple):

@@ -10,17 +10,22 @@ from typing import Final, NamedTuple
 import torch
 from torch import Tensor
 
+from camkit.models_def.optics.tracing.phase_polynomial import PhaseForm
 from camkit.models_def.optics.tracing.profile import TINY, profile
+from camkit.models_def.optics.tracing.series import Series, series_part
 
 MIN_COSINE: Final = 1e-6
 MIN_SLOPE: Final = 1e-9
 MAX_NEWTON_STEPS: Final = 10
 FIXED_NEWTON_STEPS: Final = 3
 # beyond this a power series means nothing, and r^16 overflows in float32
-MAX_RHO_MM2: Final = 1e6
+MAX_RHO_MM2: Final = {torch.float32: 1e6, torch.float64: 1e12}
 # |gap| to stop at, and to accept, in mm: far below a wavelength; float32 rounds sags at 1e-6
 NEWTON_STOP_MM: Final = {torch.float32: 2e-6, torch.float64: 1e-12}
 NEWTON_TOLERANCE_MM: Final = {torch.float32: 5e-5, torch.float64: 1e-7}
+
+
+_NO_ORDER: Final = torch.zeros(())
 
 
 class State(NamedTuple):
@@ -52,6 +57,11 @@ class Numbers(NamedTuple):
     ratio: Tensor  # before / after
     ratio2: Tensor
     rest2: Tensor  # 1 - ratio^2
+    series: Series | None = None  # of a polynomial part that is no plain even one
+    odd: tuple[Tensor, ...] = ()
+    phase: PhaseForm | None = None
+    phase_terms: tuple[Tensor, ...] = ()
+    order: Tensor = _NO_ORDER  # mm of path per radian of phase
 
 
 def to_plane(state: State) -> tuple[State, Tensor]:
@@ -143,10 +153,15 @@ class Heights(NamedTuple):
 
 def heights(p: Numbers, rho: Tensor) -> Heights:
     """Return the profile of a surface; finite everywhere."""
-    near = rho.clamp_max(MAX_RHO_MM2)
+    near = rho.clamp_max(MAX_RHO_MM2[rho.dtype])
     square = 1 - near * p.opening
-    height, lean = profile(p.c, square.clamp_min(TINY).sqrt(), p.terms, p.slopes, near)
-    return Heights(height, lean, square)
+    root = square.clamp_min(TINY).sqrt()
+    if p.series is None:
+        height, lean = profile(p.c, root, p.terms, p.slopes, near)
+        return Heights(height, lean, square)
+    height, lean = profile(p.c, root, (), (), near)
+    part = series_part(p.series, p.terms, p.odd, (p.opening, 1 / root), near)
+    return Heights(height + part.height, lean + part.lean, square)
 
 
 def meet_asphere(p: Numbers, at: State, *, adaptive: bool, drop: Tensor | None = None) -> Meeting:
@@ -178,7 +193,7 @@ def meet_asphere(p: Numbers, at: State, *, adaptive: bool, drop: Tensor | None =
     length2 = 1 + lean * lean * rho
     facing2 = facing * facing
     cosine2 = facing2 / length2
-    inside = MAX_RHO_MM2 - rho
+    inside = MAX_RHO_MM2[rho.dtype] - rho
     exists = [Bound(square, TINY), Bound(inside, 0), Bound(facing, 0), Bound(cosine2, TINY)]
     return Meeting(
         x=x,

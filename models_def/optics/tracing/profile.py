@@ -8,7 +8,6 @@ that has no division by rho). (-q x, -q y, 1) is the normal.
 from collections.abc import Sequence
 from typing import Final
 
-import torch
 from torch import Tensor
 
 TINY: Final = 1e-12
@@ -38,26 +37,3 @@ def profile(
     if not terms:
         return height, slope
     return height + rho * polynomial(terms, rho), slope + polynomial(slopes, rho)
-
-
-def sag(curvature: Tensor, conic: Tensor, even_asphere: Tensor, rho: Tensor) -> Tensor:
-    """Return the height h(rho) of a surface, rho = r^2 in mm^2 (eq. 2.2, plus an r^2 term).
-
-    Where (1 + conic) c^2 rho > 1 there is no surface: the value is finite but meaningless.
-    """
-    return _profile(curvature, conic, even_asphere, rho)[0]
-
-
-def sag_slope(curvature: Tensor, conic: Tensor, even_asphere: Tensor, rho: Tensor) -> Tensor:
-    """Return dh/d rho (eq. 2.3, in the form c / (2 s), s the root, plus the polynomial)."""
-    return _profile(curvature, conic, even_asphere, rho)[1] / 2
-
-
-def _profile(
-    curvature: Tensor, conic: Tensor, even_asphere: Tensor, rho: Tensor
-) -> tuple[Tensor, Tensor]:
-    square = 1 - (1 + conic) * curvature**2 * rho
-    root = torch.sqrt(torch.where(square > TINY, square, 1.0))
-    terms = even_asphere.unbind(0)
-    slopes = [a * (2 * j) for j, a in enumerate(terms, start=1)]
-    return profile(curvature, root, terms, slopes, rho)

@@ -8,12 +8,7 @@ from camkit.errors import ContractError
 from camkit.models_def.optics.aiming.aim import aim
 from camkit.models_def.optics.aiming.start import launch
 from camkit.models_def.optics.prescription import Surface
-from camkit.models_def.optics.pupil import (
-    half_disc,
-    hexapolar,
-    pupil_rays,
-    with_fixed_stop,
-)
+from camkit.models_def.optics.pupil import half_disc, hexapolar, pupil_rays, with_fixed_stop
 from camkit.models_def.optics.trace import refract, surface_tensors, trace
 from tests.physics.reference_lenses import cooke_triplet
 

@@ -14,7 +14,7 @@ from camkit.models_def.optics.trace import (
     surface_tensors,
     trace,
 )
-from camkit.models_def.optics.tracing.profile import sag, sag_slope
+from camkit.models_def.optics.tracing.sag import sag, sag_slope
 
 ONE_SURFACE_TOLERANCE_MM = 1e-10
 

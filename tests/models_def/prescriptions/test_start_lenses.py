@@ -10,7 +10,7 @@ from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens, with_focus_shift
 from camkit.models_def.optics.pupil import half_disc
 from camkit.models_def.optics.spot import Spots, trace_spots
-from camkit.models_def.optics.tracing.profile import sag
+from camkit.models_def.optics.tracing.sag import sag
 from tools.start.recipe import read_recipe
 from tools.start.search import design
 

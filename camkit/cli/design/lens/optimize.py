@@ -28,8 +28,7 @@ def optimize(
     vary: Annotated[
         str | None,
         typer.Option(
-            help="Variables: curvature,conic,thickness,even_asphere; default: `vary` of each "
-            "surface."
+            help="Variables, such as curvature,conic,thickness; default: `vary` of each surface."
         ),
     ] = None,
     merit: Annotated[str, typer.Option(help="Merit function: rms, sum_abs or energy.")] = "sum_abs",

@@ -10,7 +10,8 @@ from camkit.models_def.optics.analysis.spots import launch_beams
 from camkit.models_def.optics.grooves import grooved_mm
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import PupilSamples
-from camkit.models_def.optics.trace import Rays, trace
+from camkit.models_def.optics.trace import Rays, surface_tensors, trace
+from camkit.models_def.optics.tracing.frame import Pose
 from camkit.report.figure import Figure, Panel, chart, field_color, new_figure
 from camkit.report.pages.lens.lens_facts import LensFacts
 from camkit.units import to_degrees
@@ -112,6 +113,7 @@ def _profile(lens: Lens, number: int, height_mm: float) -> tuple[Tensor, Tensor]
 
 
 def _draw_glass(panel: Panel, lens: Lens, heights: list[float], vertices: list[float]) -> None:
+    poses = surface_tensors(lens, torch.tensor(lens.reference_wavelength_um)).poses
     for i, surface in enumerate(lens.surfaces):
         solid = surface.glass != "air"
         fronts = [i, i + 1] if solid and i + 1 < len(lens.surfaces) else [i]
@@ -123,10 +125,21 @@ def _draw_glass(panel: Panel, lens: Lens, heights: list[float], vertices: list[f
             outline_z = torch.cat([z1, z1[-1:], z2[-1:], z2.flip(0), z2[:1], z1[:1]])
             rims = torch.tensor([high, high, -high, -high], dtype=torch.float64)
             outline_y = torch.cat([y1, rims[:2], y2.flip(0), rims[2:]])
+            if poses:
+                outline_z, outline_y = _stood(poses[i], outline_z, outline_y, vertices[i])
             panel.fill(outline_z, outline_y, color=_GLASS_COLOR, zorder=1)
             panel.plot(outline_z, outline_y, color="#446688", linewidth=0.8, zorder=2)
         elif i != lens.stop and (i == 0 or lens.surfaces[i - 1].glass == "air"):
             panel.plot(*edges[0], color="#446688", linewidth=0.8, zorder=2)
+
+
+def _stood(pose: Pose | None, z: Tensor, y: Tensor, vertex: float) -> tuple[Tensor, Tensor]:
+    """Return points of the meridional plane of an element where it stands, seen along x."""
+    if pose is None:
+        return z, y
+    points = torch.stack([torch.zeros_like(y), y, z - vertex]).to(pose.turn)
+    _, turned_y, turned_z = pose.turn @ points + pose.offset_mm[:, None]
+    return turned_z + vertex, turned_y
 
 
 def _draw_stop(panel: Panel, facts: LensFacts, heights: list[float], vertices: list[float]) -> None:

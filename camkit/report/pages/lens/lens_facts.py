@@ -209,6 +209,17 @@ def _warnings(lens: Lens, spots: Spots) -> list[str]:
         for i, surface in enumerate(lens.surfaces)
         if surface.glass != "air" and surface.thickness_mm <= 0
     ]
+    warnings += [
+        f"surface {i}: its term in r is a cone, which has no focal length; paraxial data are "
+        "those of the other terms"
+        for i, surface in enumerate(lens.surfaces)
+        if any(surface.odd_asphere[:1])
+    ]
+    if not lens.is_round:
+        warnings.append(
+            "the lens is not round: fields are those along +y, and relative illumination is that "
+            "of half the stop"
+        )
     for i, angle_rad in enumerate(lens.field_angles_rad):
         name = f"field {to_degrees(angle_rad):.4g} degrees"
         losses = [

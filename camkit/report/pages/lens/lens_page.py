@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from camkit.models_def.optics.analysis.seidel import SEIDEL_NAMES, Seidel
-from camkit.models_def.optics.prescription import grooves_of
+from camkit.models_def.optics.prescription import Surface, grooves_of
 from camkit.report.pages.lens.layout import draw_layout
 from camkit.report.pages.lens.lens_charts import (
     draw_colour,
@@ -143,11 +143,34 @@ def _prescription(facts: LensFacts) -> Table:
             surface.glass,
             _number(surface.semi_diameter_mm, 6),
             _number(surface.conic, 6) if surface.conic else "",
-            ", ".join(_number(a, 6) for a in surface.even_asphere),
+            _polynomial(surface),
         )
         for number, surface in enumerate(facts.lens.surfaces)
     ]
     return Table(header=_PRESCRIPTION, rows=rows)
+
+
+def _polynomial(surface: Surface) -> str:
+    """Return the polynomial part and the phase of a surface in words."""
+    part, phase = surface.asphere, surface.phase
+    radius, shift = part.normal_radius_mm, phase.radius_mm if phase else 0.0
+    rows = {
+        "": part.even,
+        "odd: ": part.odd,
+        "Q_bfs: ": part.q_bfs,
+        "Q_con: ": part.q_con,
+        f"phase (order {phase.order:g}, of r / {shift:g} mm), rad: " if phase else "-": (
+            phase.coefficients if phase else ()
+        ),
+    }
+    texts = [name + ", ".join(_number(a, 6) for a in row) for name, row in rows.items() if row]
+    if radius is not None:
+        texts.insert(0, f"of r / {radius:g} mm")
+    if surface.stance is not None:
+        decentre = " and ".join(f"{mm:g}" for mm in surface.stance.decentre_mm)
+        tilt = " and ".join(f"{to_degrees(rad):.4g}" for rad in surface.stance.tilt_rad)
+        texts.append(f"element decentred by {decentre} mm, tilted by {tilt} degrees (x and y)")
+    return "; ".join(texts)
 
 
 def _grooves(facts: LensFacts) -> Table | None:

@@ -133,3 +133,11 @@ def test_the_corner_of_a_fast_wide_lens_is_reached() -> None:
     assert float(chief_heights(lens, slope)[0]) == pytest.approx(21.63, abs=5e-3)
     back = slopes_for_heights(lens, torch.tensor([21.63], dtype=torch.float64))
     assert math.degrees(math.atan(float(back[0]))) == pytest.approx(42.34, abs=1e-2)
+
+
+def test_a_lens_in_metres_is_aimed_as_that_in_millimetres() -> None:
+    paths = [
+        chief_path(read_lens(data_path(f"reports/zmx_in_{unit}.zmx")))
+        for unit in ("metres", "millimetres")
+    ]
+    assert paths[0].angles_rad[-1] == pytest.approx(paths[1].angles_rad[-1], abs=1e-3)

@@ -1,6 +1,7 @@
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -12,6 +13,7 @@ from camkit.models_def.optics.glass.catalogue import find_glass
 from camkit.models_def.optics.lens_file.zmx_reader import parse_zmx, read_zmx
 from camkit.models_def.optics.lens_file.zmx_writer import format_zmx, write_zmx
 from camkit.models_def.optics.prescription import Lens, Surface, read_prescription
+from camkit.models_def.optics.shape.phase import Monomial, Phase
 
 PRESCRIPTIONS = Path(__file__).resolve().parents[4] / "models_def" / "prescriptions"
 MINE = parse_agf("NM FOO 2 0 1.6 50\nCD 1.4 0.01\nLD 0.3 2\n", "mine")
@@ -119,11 +121,58 @@ def test_glass_of_a_users_catalogue_needs_that_catalogue() -> None:
     assert "FOO is no glass of one catalogue: read by its numbers" in glass_note
 
 
+@pytest.mark.parametrize(
+    ("kind", "numbers"),
+    [
+        ("ODDASPHE", {"even_asphere": (1e-4, -2e-7), "odd_asphere": (0.01, 1e-5, 3e-7)}),
+        ("XASPHERE", {"even_asphere": (0.0, *[1e-9] * 9)}),
+        ("XASPHERE", {"even_asphere": (0.1, -0.2), "normal_radius_mm": 7.5}),
+        ("XOSPHERE", {"odd_asphere": (0.0, *[1e-9] * 5)}),
+        (
+            "XOSPHERE",
+            {"even_asphere": (0.1,), "odd_asphere": (0.0, 0.3), "normal_radius_mm": 7.5},
+        ),
+        (
+            "BINARY_2",
+            {
+                "even_asphere": (0.0, 1e-6),
+                "phase": Phase(radius_mm=6.0, radial_rad=(-80.0, 0.0, 4.0), order=-1.0),
+            },
+        ),
+    ],
+)
+def test_shapes_come_back_from_their_types(kind: str, numbers: dict[str, Any]) -> None:
+    surface = Surface(curvature_per_mm=0.02, thickness_mm=5, conic=-0.5, **numbers)
+    lens = Lens(name="x", surfaces=(surface,), stop=0, aperture_kind="f_number", aperture_value=4.0)
+    text = format_zmx(lens)
+    assert f"TYPE {kind}" in text
+    assert parse_zmx(text).lens == lens
+
+
+def test_q_con_goes_out_as_the_extended_asphere_that_it_is() -> None:
+    surface = Surface(
+        curvature_per_mm=0.02, thickness_mm=5, conic=-0.5, q_con=(0.1, -0.05), normal_radius_mm=8.0
+    )
+    lens = Lens(name="x", surfaces=(surface,), stop=0, aperture_kind="f_number", aperture_value=4.0)
+    (back,) = parse_zmx(format_zmx(lens)).lens.surfaces
+    assert back.even_asphere == surface.polynomial.even
+    assert back.normal_radius_mm == 8.0
+
+
 def test_what_the_format_cannot_hold_is_refused() -> None:
     lens = read_prescription(PRESCRIPTIONS / "duet.toml")
-    many = replace(lens.surfaces[0], even_asphere=(1e-9,) * 9)
-    with pytest.raises(UnsupportedError, match="9 aspheric terms"):
-        format_zmx(replace(lens, surfaces=(many,)))
+    front = lens.surfaces[0]
+    odd = replace(front, odd_asphere=(0.0, 1e-6))
+    best_fit = replace(front, conic=0.0, even_asphere=(), q_bfs=(1e-3,), normal_radius_mm=5.0)
+    phase = Phase(radius_mm=5.0, radial_rad=(-10.0,))
+    cubic = replace(phase, free_rad=(Monomial(p=3, q=0, coefficient_rad=20.0),))
+    for surface, message in (
+        (best_fit, "Q_bfs"),
+        (replace(front, phase=cubic), "free phase"),
+        (replace(odd, phase=phase), "no even one"),
+    ):
+        with pytest.raises(UnsupportedError, match=f"surface 0 has .*{message}"):
+            format_zmx(replace(lens, surfaces=(surface,)))
     off = replace(lens.surfaces[1], index_offset=1e-4)
     with pytest.raises(ContractError, match="nominal"):
         format_zmx(replace(lens, surfaces=(off,)))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from camkit.errors import ContractError
+from camkit.errors import ContractError, UnsupportedError
 from camkit.models_def.optics.aiming.start import launch
 from camkit.models_def.optics.glass.dispersion import C_LINE_UM, D_LINE_UM, F_LINE_UM
 from camkit.models_def.optics.grooves import Grooves
@@ -15,6 +15,8 @@ from camkit.models_def.optics.paraxial import paraxial_data, paraxial_image
 from camkit.models_def.optics.prescription import Lens, Surface
 from camkit.models_def.optics.psf import trace_psf
 from camkit.models_def.optics.pupil import PupilSamples, half_disc, with_fixed_stop
+from camkit.models_def.optics.shape.phase import Phase
+from camkit.models_def.optics.shape.stance import Stance
 from camkit.models_def.optics.spot import rms_radius, slopes_for_heights, trace_spots
 from camkit.models_def.optics.tolerance.deviation import Deviations, draw_deviations, no_deviations
 from camkit.models_def.optics.tolerance.elements import glass_elements
@@ -23,8 +25,8 @@ from camkit.models_def.optics.tolerance.fabricated import View, fabricated_tenso
 from camkit.models_def.optics.tolerance.landing import copy_kernels, spot_rms_mm, window_px
 from camkit.models_def.optics.tolerance.misaligned_trace import trace_misaligned
 from camkit.models_def.optics.tolerance.pose import poses
-from camkit.models_def.optics.trace import SurfaceTensors
-from camkit.models_def.optics.tracing.profile import sag
+from camkit.models_def.optics.trace import SurfaceTensors, surface_tensors
+from camkit.models_def.optics.tracing.sag import sag
 from tests.thin_factory import GLASS, index_at, perfect_lens
 
 PRESCRIPTIONS = Path(__file__).resolve().parents[4] / "models_def" / "prescriptions"
@@ -318,3 +320,34 @@ def test_paraxial_data_are_untouched_by_misalignment() -> None:
     found = land(COOKE, drawn, view_of(COOKE, [0.0], [0.0]), "paraxial")
     assert paraxial_data(COOKE).efl_mm > 0
     torch.testing.assert_close(found.refocus_mm, torch.zeros(3, dtype=torch.float64))
+
+
+def test_copy_without_errors_of_a_lens_of_every_shape_lands_like_it() -> None:
+    """Odd and Q terms, a radial phase; with errors of radius the phase stays."""
+    front, *rest = COOKE.surfaces
+    second, third, *rest = rest
+    surfaces = (
+        replace(front, odd_asphere=(0.0, 1e-6), even_asphere=(0.0, 1e-7)),
+        replace(second, q_con=(1e-3, -2e-4), normal_radius_mm=9.0),
+        replace(third, phase=Phase(radius_mm=8.0, radial_rad=(-40.0, 3.0))),
+        *rest,
+    )
+    lens = replace(COOKE, surfaces=surfaces)
+    view = view_of(lens, [0.0, 0.2], [0.0, 45.0])
+    landing = land(lens, no_deviations(lens), view, "none")
+    spots = trace_spots(with_fixed_stop(lens), view.slopes, view.wavelengths_um, view.samples)
+    torch.testing.assert_close(landing.rays.x[0], spots.x_mm, rtol=0, atol=1e-10)
+    torch.testing.assert_close(landing.rays.y[0], spots.y_mm, rtol=0, atol=1e-10)
+    drawn = draw_deviations(lens, Tolerances(), range(1), 5)
+    tensors = fabricated_tensors(lens, drawn, view.wavelengths_um)
+    nominal = surface_tensors(lens, view.wavelengths_um)
+    assert tensors.phase is not None
+    assert nominal.phase is not None
+    assert torch.equal(tensors.phase.flatten(), nominal.phase.flatten())
+
+
+def test_tolerances_of_an_uneven_lens_are_refused_by_name() -> None:
+    front = replace(COOKE.surfaces[0], stance=Stance(decentre_mm=(0.1, 0.0)))
+    lens = replace(COOKE, surfaces=(front, *COOKE.surfaces[1:]))
+    with pytest.raises(UnsupportedError, match="surface 0 is tilted or decentred"):
+        land(lens, no_deviations(lens), view_of(lens, [0.0], [0.0]), "none")

@@ -15,8 +15,9 @@ from camkit.models_def.optics.tolerance.deviation import Deviations, no_deviatio
 from camkit.models_def.optics.tolerance.elements import glass_elements
 from camkit.models_def.optics.tolerance.fabricated import fabricated_tensors
 from camkit.models_def.optics.tolerance.misaligned_trace import trace_misaligned
-from camkit.models_def.optics.tolerance.pose import Pose, poses, rotation
+from camkit.models_def.optics.tolerance.pose import poses
 from camkit.models_def.optics.trace import Fate, Rays, trace
+from camkit.models_def.optics.tracing.frame import Pose, rotation
 
 PRESCRIPTIONS = Path(__file__).resolve().parents[4] / "models_def" / "prescriptions"
 EXACT_MM = 1e-12

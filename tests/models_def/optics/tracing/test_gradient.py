@@ -12,7 +12,7 @@ from torch import Tensor
 
 from camkit.models_def.optics.trace import Fate, Rays, SurfaceTensors, trace
 from camkit.models_def.optics.tracing import gradient
-from camkit.models_def.optics.tracing.profile import sag, sag_slope
+from camkit.models_def.optics.tracing.sag import sag, sag_slope
 from tests.physics.printed_lenses import cooke_tensors, rays_at
 
 EQUAL = 1e-9
