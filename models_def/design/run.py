@@ -121,6 +121,7 @@ class DesignRun:
         return {
             "name": self.recipe.name,
             "steps": self.loop.step,
+            "psf_model": lens.pixels.regime,
             "begin_db": read_log(self.files.log)[0]["valid_db"],
             "best_db": self.loop.best_db,
             "seconds": round(self.files.spent_s, 1),

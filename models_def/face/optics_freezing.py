@@ -41,6 +41,7 @@ def freeze(
     stress_haze: FilePath | None = None,
     report: FilePath | None = None,
     quick: bool = False,
+    psf_model: str | None = None,
     overwrite: bool = False,
 ) -> dict[str, Any]:
     """Compute the PSF of a lens or a plate with as few samples as the loss allows (needs torch).
@@ -63,6 +64,8 @@ def freeze(
         report: Also write the facts to this file (.json), for `camkit.export.bundle`.
         quick: Whether fields, wavelengths and blocks are taken as they usually suit, without a
             search that measures what they cost.
+        psf_model: Of a lens: "rays" or "waves"; None for what the recipe says, or else for waves
+            where the blur is small against the Airy disc.
         overwrite: Whether files that exist are replaced.
 
     Returns:
@@ -85,7 +88,7 @@ def freeze(
             f"with {option_text('haze')}, {option_text('stress_out')} and "
             f"{option_text('stress_haze')} go together; else omit {option_text('stress_haze')}"
         )
-    sensor, bank = _camera_of(default_recipe() if recipe is None else Path(recipe))
+    sensor, bank, stated = _camera_of(default_recipe() if recipe is None else Path(recipe))
     source = read_optics(Path(optics))
     request = FreezeRequest(
         sensor=sensor,
@@ -98,6 +101,7 @@ def freeze(
         haze=haze is not None,
         stress=stress_out is not None,
         quick=quick,
+        psf_model=stated if psf_model is None else psf_model,
     )
     with one_torch_thread():
         freezing = freeze_optics(source, request)
@@ -143,12 +147,14 @@ def default_recipe() -> Path:
     return Path(str(resources.files("camkit.models_def.recipes"))) / DEFAULT_RECIPE
 
 
-def _camera_of(recipe: Path) -> tuple[ColorSensor, Wiener | None]:
-    """Return the sensor of a recipe, and its bank."""
+def _camera_of(recipe: Path) -> tuple[ColorSensor, Wiener | None, str]:
+    """Return the sensor of a recipe, its bank, and the PSF model that it states."""
+    from camkit.models_def.kinds.bayer.recipe import BayerRecipe
     from camkit.models_def.training.kind import read_recipe, training_kind
 
     plan = read_recipe(recipe)
     stages = training_kind(plan.kind).design(plan).stages
     if not isinstance(plan.sensor, ColorSensor):
         raise UnsupportedError(f"a {plan.sensor.type} sensor has no response to freeze a PSF for")
-    return plan.sensor, next((stage for stage in stages if isinstance(stage, Wiener)), None)
+    bank = next((stage for stage in stages if isinstance(stage, Wiener)), None)
+    return plan.sensor, bank, plan.lens.psf_model if isinstance(plan, BayerRecipe) else ""

@@ -99,6 +99,12 @@ def freeze(
             "--quick", help="Take 7 fields and 5 wavelengths without a search: a preview."
         ),
     ] = False,
+    psf_model: Annotated[
+        str | None,
+        typer.Option(
+            help="PSF of a lens: rays or waves; default: waves where its spot is that sharp."
+        ),
+    ] = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
@@ -120,6 +126,7 @@ def freeze(
             "--stress-haze": stress_haze,
             "--report": report,
             "--quick": quick or None,
+            "--psf-model": psf_model,
             "--limit-db": None if limit_db == LIMIT_DB else limit_db,
             "--energy": energy,
             "--max-side-px": max_side_px,
@@ -153,6 +160,7 @@ def freeze(
         stress_haze=stress_haze,
         report=report,
         quick=quick,
+        psf_model=psf_model,
         overwrite=overwrite,
     )
     print_report(facts, json_)
