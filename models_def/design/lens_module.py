@@ -156,8 +156,9 @@ def sharp_fields(problem: Problem, scaled: Tensor, pixels: Pixels) -> Tensor:
     shape = len(problem.depths_mm), len(problem.slopes)
     if pixels.regime == "rays":
         return torch.zeros(shape, dtype=torch.bool)
-    models = design_models(problem, scaled, pixels)
-    return torch.stack([model.ratio.amin(1) < RAYS_FROM for model in models])
+    alone = torch.eye(len(problem.wavelengths_um), dtype=torch.float64)
+    models = design_models(problem, scaled, replace(pixels, color_weights=alone))
+    return torch.stack([model.ratio.amax(1) < RAYS_FROM for model in models])
 
 
 def design_models(problem: Problem, scaled: Tensor, pixels: Pixels) -> list[PsfModel]:

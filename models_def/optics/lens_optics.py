@@ -9,8 +9,8 @@ import numpy as np
 import torch
 
 from camkit.bundle.sensor import ColorSensor
-from camkit.errors import ContractError
-from camkit.models_def.optics.analysis.model_psf import model_psf
+from camkit.errors import ContractError, UnsupportedError
+from camkit.models_def.optics.analysis.model_psf import WAVE_LIGHT, model_psf
 from camkit.models_def.optics.analysis.psf_model import PsfRegime, checked_regime, sensor_model
 from camkit.models_def.optics.distortion import trace_distortion
 from camkit.models_def.optics.focus import focus_shift_mm
@@ -18,14 +18,13 @@ from camkit.models_def.optics.freezable_optics import FieldLayout, FloatGrid, ra
 from camkit.models_def.optics.frozen import corner_height_mm
 from camkit.models_def.optics.kernel_bank import focused_copies
 from camkit.models_def.optics.paraxial import paraxial_data
-from camkit.models_def.optics.prescription import Lens, with_focus_shift
+from camkit.models_def.optics.prescription import Lens, grooves_of, with_focus_shift
 from camkit.models_def.optics.psf import TracedPsf, with_object_distance
 from camkit.models_def.optics.render.illumination import relative_illumination_at
 from camkit.radial import RadialDistortion
 from camkit.units import UM_PER_MM
 
 RAYS: Final = 4096
-WAVE_LIGHT: Final = 0.996
 SPREAD_COPIES: Final = 64
 SPREADS: Final = 2.0
 SPREAD_SEED: Final = 7
@@ -67,12 +66,20 @@ class LensOptics:
         return facts
 
     def by_rule(self, sensor: ColorSensor, *, regime: str = "") -> "LensOptics":
-        """Return the lens with the PSF model that it needs before a sensor, or a given one."""
+        """Return the lens with the PSF model that it needs before a sensor, or a given one.
+
+        Raises:
+            ContractError: If there is no such model.
+            UnsupportedError: If waves are wanted of a lens with grooves.
+        """
+        stated = checked_regime(regime)
+        if stated == "waves" and grooves_of(self.lens):
+            raise UnsupportedError("the light of grooves is no smooth wave; take rays")
         model = sensor_model(self.lens, corner_height_mm(sensor), *sensor.response_arrays())
         least = float(model.ratio.min())
         return replace(
             self,
-            regime=checked_regime(regime) or model.regime,
+            regime=stated or model.regime,
             blur_airy=least if math.isfinite(least) else None,
         )
 

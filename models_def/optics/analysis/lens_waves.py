@@ -1,7 +1,6 @@
 """The wave PSF of a lens on sensor pixels: what `psf.trace_psf` is for rays."""
 
 import math
-from collections.abc import Iterator
 from typing import Final
 
 import torch
@@ -36,7 +35,13 @@ _CHUNK_RAYS: Final = 200_000
 
 
 def wave_psf(
-    lens: Lens, slopes: Tensor, wavelengths_um: Tensor, size_px: int, pitch_um: float
+    lens: Lens,
+    slopes: Tensor,
+    wavelengths_um: Tensor,
+    size_px: int,
+    pitch_um: float,
+    *,
+    wanted: Tensor | None = None,
 ) -> TracedPsf:
     """Sum the PSFs of field slopes from waves, with the conventions of `psf.trace_psf`.
 
@@ -49,22 +54,42 @@ def wave_psf(
         wavelengths_um: (wavelength,).
         size_px: Odd kernel side.
         pitch_um: Sensor pitch.
+        wanted: (field, wavelength), which of them; all by default. The others are 0.
 
     Raises:
         ContractError: If the side is even, a field gets no light, or its blur needs too many rays.
     """
     fixed = with_fixed_stop(lens)
+    if wanted is None:
+        wanted = torch.ones(len(slopes), len(wavelengths_um), dtype=torch.bool)
     most = FIT_GRIDS[0].rings * FIT_GRIDS[0].arms // 2 * len(wavelengths_um)
+    fields = max(1, _CHUNK_RAYS // most)
     light = []
-    for some in torch.split(slopes, max(1, _CHUNK_RAYS // most)):
+    for some, mask in zip(torch.split(slopes, fields), torch.split(wanted, fields), strict=True):
         coarse, smooth = coarse_pupil(fixed, some, wavelengths_um)
         if smooth:
-            light.append(summed_light(coarse, size_px, pitch_um))
+            light.append(summed_light(coarse, size_px, pitch_um, mask))
         else:
-            waves = traced_waves(fixed, some, coarse, size_px, pitch_um)
-            flat = torch.stack([pixel_light(one, size_px, pitch_um) for one in waves])
-            light.append(flat.reshape(len(some), len(wavelengths_um), size_px, size_px))
+            light.append(_traced_light(fixed, some, coarse, (size_px, pitch_um), mask))
     return normalised(torch.cat(light))
+
+
+def _traced_light(
+    lens: Lens, slopes: Tensor, coarse: CoarsePupil, window: tuple[int, float], wanted: Tensor
+) -> Tensor:
+    """Return the light of `summed_light`, with all rays traced."""
+    rows = [
+        torch.stack(
+            [
+                pixel_light(traced_waves(lens, slope, coarse, (i, j), *window), *window)
+                if bool(wanted[i, j])
+                else slopes.new_zeros(window[0], window[0])
+                for j in range(len(coarse.wavelengths_um))
+            ]
+        )
+        for i, slope in enumerate(slopes)
+    ]
+    return torch.stack(rows)
 
 
 def coarse_pupil(lens: Lens, slopes: Tensor, wavelengths_um: Tensor) -> tuple[CoarsePupil, bool]:
@@ -103,41 +128,48 @@ def _traced_pupil(
         landings, path, centre[:, None, None], sphere_radius_mm(lens), beams.tensors.index[-1]
     )
     middle = chief_path_mm(lens, slopes, wavelengths_um, centre, "stop")
-    rims = [s.semi_diameter_mm for s in lens.surfaces]
+    rims = torch.tensor([s.semi_diameter_mm for s in lens.surfaces], dtype=torch.float64)
+    margins = rim_margins(surface_rays, rims)
+    passes = sphere.valid & (margins < 0).all(0)
     coarse = CoarsePupil(
         grid=grid,
         l=sphere.l,
         m=sphere.m,
         opd_um=torch.nan_to_num((middle - sphere.path) * UM_PER_MM),
         area=beams.area_mm2 / (math.pi * samples.weight),
-        margins=rim_margins(surface_rays, torch.tensor(rims, dtype=torch.float64)),
-        miss_mm=torch.where(sphere.valid, sphere.miss_mm, 0.0),
+        margins=margins,
+        miss_mm=torch.where(passes, sphere.miss_mm, 0.0),
         wavelengths_um=wavelengths_um,
     )
     return coarse, bool((sphere.valid & (beams.area_mm2 > 0)).all())
 
 
 def traced_waves(
-    lens: Lens, slopes: Tensor, coarse: CoarsePupil, size_px: int, pitch_um: float
-) -> Iterator[Waves]:
-    """Trace all rays of every field and wavelength, with none between them interpolated.
+    lens: Lens,
+    slope: Tensor,
+    coarse: CoarsePupil,
+    place: tuple[int, int],
+    size_px: int,
+    pitch_um: float,
+) -> Waves:
+    """Trace all rays of a field and wavelength, with none of them interpolated.
 
     Args:
         lens: With a fixed stop.
-        slopes: (field,).
-        coarse: Of the same fields; says how many rays the window needs.
+        slope: (), of the field.
+        coarse: With that field; says how many rays the window needs.
+        place: Numbers of field and wavelength in it.
         size_px: Odd kernel side.
         pitch_um: Sensor pitch.
     """
-    for i, slope in enumerate(slopes):
-        for j, wave_um in enumerate(coarse.wavelengths_um):
-            samples = half_quadrature(*quadrature_for(coarse, i, j, size_px, pitch_um))
-            front = trace_wavefront(lens, slope[None], wave_um[None], samples, "stop")
-            yield Waves(
-                l=front.l[0, 0],
-                m=front.m[0, 0],
-                opd_um=front.opd_um[0, 0],
-                amplitude=front.amplitude[0, 0],
-                flux=front.flux[0, 0],
-                wavelength_um=float(wave_um),
-            )
+    wave_um = coarse.wavelengths_um[place[1]]
+    samples = half_quadrature(*quadrature_for(coarse, *place, size_px, pitch_um))
+    front = trace_wavefront(lens, slope[None], wave_um[None], samples, "stop")
+    return Waves(
+        l=front.l[0, 0],
+        m=front.m[0, 0],
+        opd_um=front.opd_um[0, 0],
+        amplitude=front.amplitude[0, 0],
+        flux=front.flux[0, 0],
+        wavelength_um=float(wave_um),
+    )

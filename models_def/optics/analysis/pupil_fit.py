@@ -71,7 +71,7 @@ def slope_matrices(grid: FitGrid) -> tuple[Tensor, Tensor]:
     return _basis(samples, grid.degree, (1, 0)), _basis(samples, grid.degree, (0, 1))
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=2)
 def value_matrix(rings: int, arms: int, degree: int) -> Tensor:
     """Return the matrix (point, term) that takes coefficients to values on another quadrature."""
     return _basis(half_quadrature(rings, arms), degree)

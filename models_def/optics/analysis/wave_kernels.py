@@ -165,7 +165,9 @@ def quadrature_for(
     return reach_rings(reach_mm, float(coarse.wavelengths_um[j]), aperture, steps=True)
 
 
-def summed_light(coarse: CoarsePupil, size_px: int, pitch_um: float) -> Tensor:
+def summed_light(
+    coarse: CoarsePupil, size_px: int, pitch_um: float, wanted: Tensor | None = None
+) -> Tensor:
     """Return the light (field, wavelength, size, size) in the tents of pixels, of 1 that passes.
 
     With gradients the sums are computed again on the way back, so that memory does not grow with
@@ -175,6 +177,7 @@ def summed_light(coarse: CoarsePupil, size_px: int, pitch_um: float) -> Tensor:
         coarse: Its reference sphere is centred on the window.
         size_px: Odd kernel side.
         pitch_um: Sensor pitch.
+        wanted: (field, wavelength), what to sum, 0 else; all by default.
 
     Raises:
         ContractError: If the side is even, a field gets no light, or its blur is too wide.
@@ -187,6 +190,8 @@ def summed_light(coarse: CoarsePupil, size_px: int, pitch_um: float) -> Tensor:
         return pixel_light(waves_of(coarse, i, j, size_px, pitch_um), size_px, pitch_um)
 
     def kept(i: int, j: int) -> Tensor:
+        if wanted is not None and not bool(wanted[i, j]):
+            return coarse.opd_um.new_zeros(size_px, size_px)
         if not torch.is_grad_enabled():
             return light(i, j)
         again: Tensor = checkpoint(light, i, j, use_reentrant=False)
@@ -258,6 +263,7 @@ def _tents(size_px: int, steps: int) -> Tensor:
 
 
 def normalised(light: Tensor) -> TracedPsf:
-    """Return kernels that sum to 1, and their shares of the light."""
+    """Return kernels that sum to 1, and their shares of the light; 0 where there is none."""
     inside = light.sum((-2, -1))
-    return TracedPsf(kernels=light / inside[..., None, None], energy_kept=inside)
+    scale = torch.where(inside > 0, inside, 1.0)
+    return TracedPsf(kernels=light / scale[..., None, None], energy_kept=inside)
