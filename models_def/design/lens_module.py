@@ -11,7 +11,7 @@ from camkit.models_def.design.fabrication import Copy, made_with
 from camkit.models_def.design.lens import DesignLens
 from camkit.models_def.optics.analysis.first_order import airy_radius_mm
 from camkit.models_def.optics.analysis.model_psf import RAYS_FROM
-from camkit.models_def.optics.analysis.psf_model import PsfModel, psf_model
+from camkit.models_def.optics.analysis.psf_model import PsfModel, PsfRegime, psf_model
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.psf import with_object_distance
 from camkit.models_def.optics.search.least_squares import jacobian
@@ -71,6 +71,7 @@ class LensModule(DesignLens):
     """
 
     basis: Tensor
+    sharp: Tensor
 
     def __init__(
         self,
@@ -99,7 +100,8 @@ class LensModule(DesignLens):
             basis = torch.diag(torch.ones_like(begin) if units == "range" else inverse_span)
         self.register_buffer("basis", basis)
         self.moves = nn.Parameter(torch.zeros_like(begin))
-        self._sharp = sharp_fields(problem, begin, pixels)
+        # in checkpoints: a run that is resumed goes on with the fields that it began with
+        self.register_buffer("sharp", sharp_fields(problem, begin, pixels))
         self._wave_problem = wave_problem(problem)
 
     def scaled(self) -> Tensor:
@@ -138,13 +140,18 @@ class LensModule(DesignLens):
     ) -> Tensor:
         """Return the kernels (field, 3, k, k) by rays, those of sharp fields by waves if wanted."""
         rays = splat_batch(traced.landings, self.pixels)[0]
-        sharp = self._sharp[self.problem.depths_mm.index(distance_mm)]
+        sharp = self.sharp[self.problem.depths_mm.index(distance_mm)]
         if not bool(sharp.any()):
             return rays
         waves, summed = wave_batch(
             self._wave_problem, scaled, distance_mm, self.pixels, sharp, change
         )
         return torch.where(summed[:, None, None, None], waves, rays)
+
+    @property
+    def regime(self) -> PsfRegime:
+        """Whether kernels of any field are sums of waves."""
+        return "waves" if bool(self.sharp.any()) else "rays"
 
     def lens(self) -> Lens:
         """Return the present lens as a prescription."""

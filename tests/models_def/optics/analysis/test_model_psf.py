@@ -40,9 +40,8 @@ def test_sharp_kernels_are_those_of_waves_and_wide_ones_those_of_rays() -> None:
     found = model_psf(sharp, heights, GREEN, 15, 3.0, regime="waves", rays=500)
     waves = wave_psf(sharp, slopes_for_heights(sharp, heights), GREEN, 15, 3.0)
     assert torch.equal(found.kernels, waves.kernels)
-    assert (
-        float(psf_model(wide, torch.zeros(1, dtype=torch.float64), GREEN).ratio.min()) > RAYS_FROM
-    )
+    axis = torch.zeros(1, dtype=torch.float64)
+    assert float(psf_model(wide, axis, GREEN).ratio.min()) > RAYS_FROM
     found = model_psf(wide, heights, GREEN, 41, 6.0, regime="waves", rays=500)
     assert torch.equal(found.kernels, trace_psf(wide, heights, GREEN, 41, 6.0, rays=500).kernels)
 
@@ -112,7 +111,7 @@ def test_training_kernels_hold_the_light_of_waves() -> None:
     )
     by_rays, _ = colour_kernels(lens, response, np.array([0.0]), size_px=31, pitch_um=6.0, rays=400)
     assert 0.97 < energy < 1
-    assert float(kernels[0, 1].max()) < 0.9 * float(by_rays[0, 1].max())
+    assert np.abs(kernels - by_rays)[0, 1].sum() > 0.2
     assert kernels.sum((-2, -1)) == pytest.approx(1, abs=1e-5)
 
 
