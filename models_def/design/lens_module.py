@@ -11,7 +11,7 @@ from camkit.models_def.design.fabrication import Copy, made_with
 from camkit.models_def.design.lens import DesignLens
 from camkit.models_def.optics.analysis.first_order import airy_radius_mm
 from camkit.models_def.optics.analysis.model_psf import RAYS_FROM
-from camkit.models_def.optics.analysis.psf_model import PsfModel, PsfRegime, psf_model
+from camkit.models_def.optics.analysis.psf_model import PsfModel, psf_model
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.psf import with_object_distance
 from camkit.models_def.optics.search.least_squares import jacobian
@@ -147,11 +147,6 @@ class LensModule(DesignLens):
             self._wave_problem, scaled, distance_mm, self.pixels, sharp, change
         )
         return torch.where(summed[:, None, None, None], waves, rays)
-
-    @property
-    def regime(self) -> PsfRegime:
-        """Whether kernels of any field are sums of waves."""
-        return "waves" if bool(self.sharp.any()) else "rays"
 
     def lens(self) -> Lens:
         """Return the present lens as a prescription."""
