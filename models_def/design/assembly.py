@@ -94,8 +94,8 @@ def pixels_of(recipe: DesignRecipe, problem: Problem, begin: Tensor) -> Pixels:
         window_follows=recipe.camera is not None,
     )
     models = design_models(problem, begin, pixels)
-    found = "waves" if any(model.regime == "waves" for model in models) else "rays"
-    regime = checked_regime(recipe.optics.psf_model or found, "optics.psf_model")
+    needed_regime = "waves" if any(model.regime == "waves" for model in models) else "rays"
+    regime = checked_regime(recipe.optics.psf_model or needed_regime, "optics.psf_model")
     pixels = replace(pixels, regime=regime or "rays")
     if recipe.pixels.kernel_px:
         return pixels

@@ -88,7 +88,7 @@ def freeze(
             f"with {option_text('haze')}, {option_text('stress_out')} and "
             f"{option_text('stress_haze')} go together; else omit {option_text('stress_haze')}"
         )
-    sensor, bank, stated = _camera_of(default_recipe() if recipe is None else Path(recipe))
+    sensor, bank, recipe_model = _camera_of(default_recipe() if recipe is None else Path(recipe))
     source = read_optics(Path(optics))
     request = FreezeRequest(
         sensor=sensor,
@@ -101,7 +101,7 @@ def freeze(
         haze=haze is not None,
         stress=stress_out is not None,
         quick=quick,
-        psf_model=stated if psf_model is None else psf_model,
+        psf_model=recipe_model if psf_model is None else psf_model,
     )
     with one_torch_thread():
         freezing = freeze_optics(source, request)

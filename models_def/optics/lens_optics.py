@@ -72,14 +72,14 @@ class LensOptics:
             ContractError: If there is no such model.
             UnsupportedError: If waves are wanted of a lens with grooves.
         """
-        stated = checked_regime(regime)
-        if stated == "waves" and grooves_of(self.lens):
+        own_regime = checked_regime(regime)
+        if own_regime == "waves" and grooves_of(self.lens):
             raise UnsupportedError("the light of grooves is no smooth wave; take rays")
         model = sensor_model(self.lens, corner_height_mm(sensor), *sensor.response_arrays())
         least = float(model.ratio.min())
         return replace(
             self,
-            regime=stated or model.regime,
+            regime=own_regime or model.regime,
             blur_airy=least if math.isfinite(least) else None,
         )
 

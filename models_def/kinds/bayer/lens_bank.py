@@ -58,9 +58,9 @@ def build_lens_bank(recipe: BayerRecipe, lens: Lens, cache_folder: Path | None =
 
 def _regime(recipe: BayerRecipe, lens: Lens) -> PsfRegime:
     """Return the PSF model of a recipe's lens, the same as `freeze` takes."""
-    stated = checked_regime(recipe.lens.psf_model, "lens.psf_model")
+    regime = checked_regime(recipe.lens.psf_model, "lens.psf_model")
     response = recipe.sensor.response_arrays()
-    return stated or sensor_model(lens, corner_height_mm(recipe), *response).regime
+    return regime or sensor_model(lens, corner_height_mm(recipe), *response).regime
 
 
 def _trace(recipe: BayerRecipe, lens: Lens, regime: PsfRegime) -> PsfBank:

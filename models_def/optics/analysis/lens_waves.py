@@ -41,7 +41,7 @@ def wave_psf(
     size_px: int,
     pitch_um: float,
     *,
-    wanted: Tensor | None = None,
+    mask: Tensor | None = None,
 ) -> TracedPsf:
     """Sum the PSFs of field slopes from waves, with the conventions of `psf.trace_psf`.
 
@@ -54,35 +54,37 @@ def wave_psf(
         wavelengths_um: (wavelength,).
         size_px: Odd kernel side.
         pitch_um: Sensor pitch.
-        wanted: (field, wavelength), which of them; all by default. The others are 0.
+        mask: (field, wavelength), which of them; all by default. The others are 0.
 
     Raises:
         ContractError: If the side is even, a field gets no light, or its blur needs too many rays.
     """
     fixed = with_fixed_stop(lens)
-    if wanted is None:
-        wanted = torch.ones(len(slopes), len(wavelengths_um), dtype=torch.bool)
+    if mask is None:
+        mask = torch.ones(len(slopes), len(wavelengths_um), dtype=torch.bool)
     most = FIT_GRIDS[0].rings * FIT_GRIDS[0].arms // 2 * len(wavelengths_um)
     fields = max(1, _CHUNK_RAYS // most)
     light = []
-    for some, mask in zip(torch.split(slopes, fields), torch.split(wanted, fields), strict=True):
+    for some, field_mask in zip(
+        torch.split(slopes, fields), torch.split(mask, fields), strict=True
+    ):
         coarse, smooth = coarse_pupil(fixed, some, wavelengths_um)
         if smooth:
-            light.append(summed_light(coarse, size_px, pitch_um, mask))
+            light.append(summed_light(coarse, size_px, pitch_um, field_mask))
         else:
-            light.append(_traced_light(fixed, some, coarse, (size_px, pitch_um), mask))
+            light.append(_traced_light(fixed, some, coarse, (size_px, pitch_um), field_mask))
     return normalised(torch.cat(light))
 
 
 def _traced_light(
-    lens: Lens, slopes: Tensor, coarse: CoarsePupil, window: tuple[int, float], wanted: Tensor
+    lens: Lens, slopes: Tensor, coarse: CoarsePupil, window: tuple[int, float], mask: Tensor
 ) -> Tensor:
     """Return the light of `summed_light`, with all rays traced."""
     rows = [
         torch.stack(
             [
                 pixel_light(traced_waves(lens, slope, coarse, (i, j), *window), *window)
-                if bool(wanted[i, j])
+                if bool(mask[i, j])
                 else slopes.new_zeros(window[0], window[0])
                 for j in range(len(coarse.wavelengths_um))
             ]

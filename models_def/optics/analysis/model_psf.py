@@ -60,7 +60,7 @@ def model_psf(
     if not bool(is_sharp.any()):
         return by_rays(heights_mm)
     side_px = min(size_px, _window_px(model, is_sharp, light, pitch_um))
-    waves = wave_psf(lens, slopes, wavelengths_um, side_px, pitch_um, wanted=is_sharp)
+    waves = wave_psf(lens, slopes, wavelengths_um, side_px, pitch_um, mask=is_sharp)
     kernels = tf.pad(waves.kernels, ((size_px - side_px) // 2,) * 4)
     energy = waves.energy_kept
     blurred = ~is_sharp.all(1)

@@ -30,7 +30,7 @@ WAVE_BELOW: Final = 7.0
 """RMS blur over Airy radius from which the MTF by rays is right to 0.05; docs/results/lens.md."""
 FIELDS: Final = 7
 _BLUR_SAMPLING: Final = "gauss:6x16"
-_SEEN: Final = 1e-3
+_LEAST_RESPONSE: Final = 1e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,12 +111,12 @@ def sensor_model(
         ContractError: If no field reaches the corner.
     """
     # wavelengths that no colour sees may not even pass the glass
-    seen = response.max(0) > _SEEN * response.max()
-    shares = torch.from_numpy(response[:, seen])
+    is_visible = response.max(0) > _LEAST_RESPONSE * response.max()
+    shares = torch.from_numpy(response[:, is_visible])
     shares = shares / shares.sum(1, keepdim=True)
     heights = torch.linspace(0, corner_mm, FIELDS, dtype=torch.float64)
     slopes = slopes_for_heights(lens, heights)
-    return psf_model(lens, slopes, torch.from_numpy(wavelengths_um[seen]), shares)
+    return psf_model(lens, slopes, torch.from_numpy(wavelengths_um[is_visible]), shares)
 
 
 def checked_regime(value: str, name: str = "") -> PsfRegime | None:

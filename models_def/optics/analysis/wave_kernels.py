@@ -166,7 +166,7 @@ def quadrature_for(
 
 
 def summed_light(
-    coarse: CoarsePupil, size_px: int, pitch_um: float, wanted: Tensor | None = None
+    coarse: CoarsePupil, size_px: int, pitch_um: float, mask: Tensor | None = None
 ) -> Tensor:
     """Return the light (field, wavelength, size, size) in the tents of pixels, of 1 that passes.
 
@@ -177,7 +177,7 @@ def summed_light(
         coarse: Its reference sphere is centred on the window.
         size_px: Odd kernel side.
         pitch_um: Sensor pitch.
-        wanted: (field, wavelength), what to sum, 0 else; all by default.
+        mask: (field, wavelength), what to sum, 0 else; all by default.
 
     Raises:
         ContractError: If the side is even, a field gets no light, or its blur is too wide.
@@ -189,15 +189,15 @@ def summed_light(
     def light(i: int, j: int) -> Tensor:
         return pixel_light(waves_of(coarse, i, j, size_px, pitch_um), size_px, pitch_um)
 
-    def kept(i: int, j: int) -> Tensor:
-        if wanted is not None and not bool(wanted[i, j]):
+    def light_or_dark(i: int, j: int) -> Tensor:
+        if mask is not None and not bool(mask[i, j]):
             return coarse.opd_um.new_zeros(size_px, size_px)
         if not torch.is_grad_enabled():
             return light(i, j)
-        again: Tensor = checkpoint(light, i, j, use_reentrant=False)
-        return again
+        checkpointed: Tensor = checkpoint(light, i, j, use_reentrant=False)
+        return checkpointed
 
-    rows = [torch.stack([kept(i, j) for j in range(wavelengths)]) for i in range(fields)]
+    rows = [torch.stack([light_or_dark(i, j) for j in range(wavelengths)]) for i in range(fields)]
     return torch.stack(rows)
 
 
@@ -222,8 +222,8 @@ def pixel_light(waves: Waves, size_px: int, pitch_um: float) -> Tensor:
     for l_part, m_part, opd_part, amplitude in zip(*parts, strict=True):
         down = _angle((m_part * place_um[:, None] - opd_part) / waves.wavelength_um)
         across = _angle(l_part[:, None] * half_um / waves.wavelength_um)
-        left = torch.cat([torch.cos(down), torch.sin(down)]) * amplitude.to(torch.float32)
-        field = field + left @ torch.cos(across)
+        phasors = torch.cat([torch.cos(down), torch.sin(down)]) * amplitude.to(torch.float32)
+        field = field + phasors @ torch.cos(across)
     real, imaginary = field.to(torch.float64).chunk(2)
     quarter = 4 * (real**2 + imaginary**2)
     light = torch.cat([quarter[:, 1:].flip(-1), quarter], dim=-1)
@@ -252,11 +252,11 @@ def _tents(size_px: int, steps: int) -> Tensor:
     points can hold, where all light lies.
     """
     reach = steps * (size_px // 2 + _SPARE_PX)
-    apart = np.arange(reach + steps * (size_px // 2) + 1) / steps
-    nodes, weights = np.polynomial.legendre.leggauss(apart.size + 32)
+    distance = np.arange(reach + steps * (size_px // 2) + 1) / steps
+    nodes, weights = np.polynomial.legendre.leggauss(distance.size + 32)
     cycles = (nodes + 1) * steps / 4
     spectrum = np.sinc(cycles) ** 2 * weights * steps / 4
-    tent = 2 * np.cos(2 * np.pi * apart[:, None] * cycles) @ spectrum / steps
+    tent = 2 * np.cos(2 * np.pi * distance[:, None] * cycles) @ spectrum / steps
     pixel = steps * (np.arange(size_px) - size_px // 2)
     point = np.arange(-reach, reach + 1)
     return torch.from_numpy(tent[np.abs(point - pixel[:, None])])

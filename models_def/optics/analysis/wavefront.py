@@ -174,7 +174,7 @@ def sphere_radius_mm(lens: Lens) -> float:
 def to_sphere(
     landings: Rays, path: Tensor, centre_mm: Tensor, radius_mm: float, index: Tensor
 ) -> AtSphere:
-    """Carry rays from the sensor back to the reference sphere.
+    """Move rays from the sensor back to the reference sphere.
 
     Args:
         landings: On the sensor.
