@@ -114,6 +114,7 @@ def _of_lens(
     sensor = read_recipe(recipe).sensor
     if not isinstance(sensor, ColorSensor):
         raise UnsupportedError(f"a {sensor.type} sensor has no edges to measure a focus on")
+    lens = lens.by_rule(sensor)
     range_um = focus_range_um(lens, AUTO if focus_um is None else focus_um)
     grid = FreezeGrid(depths_mm=tuple(depths_mm), least_energy=LEAST_ENERGY)
     shifts_um = tuple(step * range_um for step in STEPS)

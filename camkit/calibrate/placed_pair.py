@@ -11,7 +11,6 @@ from camkit.calibrate.pair_scene import PairScene
 from camkit.calibrate.pair_words import PairWords
 from camkit.errors import ContractError
 from camkit.models_def.face.recipe_writing import with_fields_of
-from camkit.models_def.optics.analysis.pair_transfer import BlockPlaces, PairRays, trace_pair
 from camkit.models_def.optics.lens_file.lens_file import read_noted_lens
 from camkit.models_def.optics.lens_file.placing import (
     DISTANCE_ORIGINS,
@@ -21,6 +20,7 @@ from camkit.models_def.optics.lens_file.placing import (
 )
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.render.pair_transfer import BlockPlaces, PairRays, trace_pair
 from camkit.models_def.sensors.sensor_choice import choose_sensor
 from camkit.units import MM_PER_M, UM_PER_MM
 

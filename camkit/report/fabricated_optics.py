@@ -100,6 +100,7 @@ def lens_text(bundle: Bundle, prescription: Path | None) -> str:
 
 
 def _trace(bundle: Bundle, text: str, seed: int, depth_mm: float) -> FrozenOptics:
+    from camkit.models_def.optics.analysis.psf_model import checked_regime
     from camkit.models_def.optics.frozen import FreezeGrid, dense_grid, freeze
     from camkit.models_def.optics.kernel_bank import focused_copies
     from camkit.models_def.optics.lens_optics import LensOptics
@@ -132,5 +133,7 @@ def _trace(bundle: Bundle, text: str, seed: int, depth_mm: float) -> FrozenOptic
         max_side_px=_max_side_px(psf),
         least_energy=LEAST_ENERGY,
     )
-    traced = freeze(LensOptics(lens=copy), sensor, dense_grid(frozen_grid))
+    # bundles of before waves do not say it
+    regime = checked_regime(str(bundle.manifest.freeze.get("psf_model", "rays"))) or "rays"
+    traced = freeze(LensOptics(lens=copy, regime=regime), sensor, dense_grid(frozen_grid))
     return FrozenOptics(psf=traced.psf)

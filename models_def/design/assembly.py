@@ -11,13 +11,19 @@ from camkit.cfa import CFA_PATTERNS
 from camkit.errors import ContractError
 from camkit.models_def.design.descent import Descending, descended
 from camkit.models_def.design.design_recipe import DesignRecipe, OpticsRecipe
-from camkit.models_def.design.lens_module import WIDEST_PX, LensModule, fitting_window_px
+from camkit.models_def.design.lens_module import (
+    WIDEST_PX,
+    LensModule,
+    design_models,
+    fitting_window_px,
+)
 from camkit.models_def.design.loop import DesignLoop, DesignParts
 from camkit.models_def.design.sensor import Recorder
 from camkit.models_def.design.shipped_camera import Camera
 from camkit.models_def.design.starts import Starts, best_judged, best_starts
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.networks.catalog import build_network, check_patch
+from camkit.models_def.optics.analysis.psf_model import checked_regime
 from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.paraxial import paraxial_image
 from camkit.models_def.optics.prescription import Lens, with_focus_shift
@@ -87,6 +93,10 @@ def pixels_of(recipe: DesignRecipe, problem: Problem, begin: Tensor) -> Pixels:
         color_weights=weights / weights.sum(1, keepdim=True),
         window_follows=recipe.camera is not None,
     )
+    models = design_models(problem, begin, pixels)
+    needed_regime = "waves" if any(model.regime == "waves" for model in models) else "rays"
+    regime = checked_regime(recipe.optics.psf_model or needed_regime, "optics.psf_model")
+    pixels = replace(pixels, regime=regime or "rays")
     if recipe.pixels.kernel_px:
         return pixels
     return replace(pixels, kernel_px=fitting_window_px(problem, begin, pixels))

@@ -14,6 +14,7 @@ from camkit.models_def.design.loss import DesignLoss
 from camkit.models_def.design.shipped_camera import CameraChoice
 from camkit.models_def.design.starts import Starts
 from camkit.models_def.networks.catalog import NETWORK_NAMES
+from camkit.models_def.optics.analysis.psf_model import checked_regime
 from camkit.models_def.optics.prescription import FabricationErrors
 from camkit.models_def.optics.search.limits import Limits
 from camkit.models_def.optics.search.variables import Variable
@@ -49,6 +50,8 @@ class OpticsRecipe:
         units: Without whitening a move of 1 is the whole `range` of a number or 1 in its `own`
             unit (1/mm, mm, 1 for a conic), which is what the rates of the thesis are in.
         f_number: Of the lens; 0 for that of the prescription.
+        psf_model: "rays", "waves", or empty for waves where the lens at the start is that sharp;
+            see `camkit.models_def.optics.analysis.psf_model`.
     """
 
     half_field_deg: float
@@ -63,6 +66,7 @@ class OpticsRecipe:
     whiten: bool = True
     units: MoveUnits = "range"
     f_number: float = 0.0
+    psf_model: str = ""
 
     def __post_init__(self) -> None:
         if not 0 < self.half_field_deg < 80 or self.fields < 2 or self.pupil_rays < 1:
@@ -78,6 +82,7 @@ class OpticsRecipe:
                 f"focus_distance_mm must be one of object_distances_mm "
                 f"{list(self.object_distances_mm)} (or 0); got {self.focus_distance_mm}"
             )
+        checked_regime(self.psf_model, "optics.psf_model")
         if self.whiten and self.units != "range":
             raise ContractError("whitened moves have no units: set whiten = false or leave units")
 
@@ -250,6 +255,8 @@ def with_choices(
 def recipe_digest(recipe: DesignRecipe) -> str:
     """Return a hash of all that decides a run."""
     table = {name: value for name, value in asdict(recipe).items() if value is not None}
+    if not recipe.optics.psf_model:  # likewise from before there were waves
+        del table["optics"]["psf_model"]
     if not recipe.network.start:  # designs from before there were first weights can go on
         for key in ("start", "start_size"):
             del table["network"][key]

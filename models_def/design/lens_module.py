@@ -9,12 +9,25 @@ from torch import Tensor, nn
 from camkit.errors import ContractError
 from camkit.models_def.design.fabrication import Copy, made_with
 from camkit.models_def.design.lens import DesignLens
+from camkit.models_def.optics.analysis.first_order import airy_radius_mm
+from camkit.models_def.optics.analysis.model_psf import RAYS_FROM
+from camkit.models_def.optics.analysis.psf_model import PsfModel, psf_model
 from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.psf import with_object_distance
 from camkit.models_def.optics.search.least_squares import jacobian
-from camkit.models_def.optics.search.problem import Problem, limits_of, residuals, trace_batch
+from camkit.models_def.optics.search.problem import (
+    Change,
+    Problem,
+    Traced,
+    limits_of,
+    residuals,
+    trace_batch,
+)
 from camkit.models_def.optics.search.splat import Pixels, splat_batch
+from camkit.models_def.optics.search.wave_splat import wave_batch, wave_problem
 from camkit.models_def.optics.tolerance.landing import window_px
 from camkit.models_def.optics.trace import SurfaceTensors
+from camkit.units import UM_PER_MM
 
 MoveUnits = Literal["range", "own"]
 
@@ -22,6 +35,8 @@ WIDEST_PX: Final = 385
 _LOST_LIGHT: Final = 0.01
 _SPARE: Final = 1.25
 _LEAST_PX: Final = 33
+_AIRY_RADII: Final = 16.6
+"""Radius that holds 99 % of an Airy pattern."""
 _RIDGE: Final = 1e-3
 _AT_BOUND: Final = 1e-6
 
@@ -56,6 +71,7 @@ class LensModule(DesignLens):
     """
 
     basis: Tensor
+    sharp: Tensor
 
     def __init__(
         self,
@@ -84,6 +100,9 @@ class LensModule(DesignLens):
             basis = torch.diag(torch.ones_like(begin) if units == "range" else inverse_span)
         self.register_buffer("basis", basis)
         self.moves = nn.Parameter(torch.zeros_like(begin))
+        # in checkpoints: a run that is resumed goes on with the fields that it began with
+        self.register_buffer("sharp", sharp_fields(problem, begin, pixels))
+        self._wave_problem = wave_problem(problem)
 
     def scaled(self) -> Tensor:
         """Return the present lens (variable,), within its bounds."""
@@ -97,7 +116,7 @@ class LensModule(DesignLens):
         kernels, penalty = [], torch.zeros((), dtype=scaled.dtype)
         for distance_mm in problem.depths_mm:
             traced = trace_batch(problem, scaled, distance_mm)
-            kernels.append(splat_batch(traced.landings, self.pixels)[0])
+            kernels.append(self._kernels(traced, scaled, distance_mm))
             if distance_mm == problem.limited_mm:
                 penalty = limits_of(problem, traced, distance_mm).square().sum()
         return torch.stack(kernels), penalty
@@ -110,12 +129,50 @@ class LensModule(DesignLens):
         def change(tensors: SurfaceTensors, reference: SurfaceTensors) -> SurfaceTensors:
             return made_with(tensors, copy, reference=reference, object_distance_mm=focused_mm)
 
-        traced = (trace_batch(problem, scaled, mm, change) for mm in problem.depths_mm)
-        return torch.stack([splat_batch(batch.landings, self.pixels)[0] for batch in traced])
+        kernels = []
+        for distance_mm in problem.depths_mm:
+            traced = trace_batch(problem, scaled, distance_mm, change)
+            kernels.append(self._kernels(traced, scaled, distance_mm, change))
+        return torch.stack(kernels)
+
+    def _kernels(
+        self, traced: Traced, scaled: Tensor, distance_mm: float, change: Change | None = None
+    ) -> Tensor:
+        """Return the kernels (field, 3, k, k) by rays, those of sharp fields by waves if wanted."""
+        rays = splat_batch(traced.landings, self.pixels)[0]
+        sharp = self.sharp[self.problem.depths_mm.index(distance_mm)]
+        if not bool(sharp.any()):
+            return rays
+        waves, summed = wave_batch(
+            self._wave_problem, scaled, distance_mm, self.pixels, sharp, change
+        )
+        return torch.where(summed[:, None, None, None], waves, rays)
 
     def lens(self) -> Lens:
         """Return the present lens as a prescription."""
         return self.problem.free.lens_at(self.scaled().detach())
+
+
+def sharp_fields(problem: Problem, scaled: Tensor, pixels: Pixels) -> Tensor:
+    """Return which fields (depth, field) are summed from waves: those not too wide for them."""
+    shape = len(problem.depths_mm), len(problem.slopes)
+    if pixels.regime == "rays":
+        return torch.zeros(shape, dtype=torch.bool)
+    alone = torch.eye(len(problem.wavelengths_um), dtype=torch.float64)
+    models = design_models(problem, scaled, replace(pixels, color_weights=alone))
+    return torch.stack([model.ratio.amax(1) < RAYS_FROM for model in models])
+
+
+def design_models(problem: Problem, scaled: Tensor, pixels: Pixels) -> list[PsfModel]:
+    """Return the PSF model that a lens (variable,) needs at each depth of a problem."""
+    lens = problem.free.lens_at(scaled)
+    weights = pixels.color_weights.to(torch.float64)
+    return [
+        psf_model(
+            with_object_distance(lens, depth_mm), problem.slopes, problem.wavelengths_um, weights
+        )
+        for depth_mm in problem.depths_mm
+    ]
 
 
 def fitting_window_px(problem: Problem, scaled: Tensor, pixels: Pixels) -> int:
@@ -146,6 +203,10 @@ def fitting_window_px(problem: Problem, scaled: Tensor, pixels: Pixels) -> int:
             "light of its worst field; begin from a sharper lens (or [starts]), or set kernel_px"
         )
     least = 2 * round(_SPARE * window_px(kernels, _LOST_LIGHT) / 2) + 1
+    if pixels.regime == "waves":
+        longest_um = float(problem.wavelengths_um.max())
+        airy_mm = airy_radius_mm(problem.free.lens_at(scaled), longest_um)
+        least += 2 * round(_AIRY_RADII * airy_mm * UM_PER_MM / pixels.pitch_um)
     return min(max(least, _LEAST_PX), WIDEST_PX)
 
 

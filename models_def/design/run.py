@@ -78,7 +78,9 @@ class DesignRun:
         self.searched_s = self.files.stop() if searched else 0.0
         if self.files.resumes:
             table = self.files.read(recipe_digest(recipe), "steps", "lens_rate")
-            parts.lens.load_state_dict(table["lens"])
+            # a design from before there were waves goes on by rays
+            by_rays = {"sharp": torch.zeros_like(parts.lens.state_dict()["sharp"])}
+            parts.lens.load_state_dict(by_rays | table["lens"])
             self.loop.load(table)
 
     @property
@@ -121,6 +123,7 @@ class DesignRun:
         return {
             "name": self.recipe.name,
             "steps": self.loop.step,
+            "psf_model": "waves" if bool(lens.state_dict()["sharp"].any()) else "rays",
             "begin_db": read_log(self.files.log)[0]["valid_db"],
             "best_db": self.loop.best_db,
             "seconds": round(self.files.spent_s, 1),

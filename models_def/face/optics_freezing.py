@@ -43,6 +43,7 @@ def freeze(
     quick: bool = False,
     glass: Sequence[FilePath] = (),
     catalogue: str | None = None,
+    psf_model: str | None = None,
     overwrite: bool = False,
 ) -> dict[str, Any]:
     """Compute the PSF of a lens or a plate with as few samples as the loss allows (needs torch).
@@ -67,6 +68,8 @@ def freeze(
             search that measures what they cost.
         glass: Catalogues (.agf), and `names` or `numbers`; see `read_noted_lens`.
         catalogue: Catalogues of camkit that are asked first, such as schott,hikari.
+        psf_model: Of a lens: "rays" or "waves"; None for what the recipe says, or else for waves
+            where the blur is small against the Airy disc.
         overwrite: Whether files that exist are replaced.
 
     Returns:
@@ -89,7 +92,7 @@ def freeze(
             f"with {option_text('haze')}, {option_text('stress_out')} and "
             f"{option_text('stress_haze')} go together; else omit {option_text('stress_haze')}"
         )
-    sensor, bank = _camera_of(default_recipe() if recipe is None else Path(recipe))
+    sensor, bank, recipe_model = _camera_of(default_recipe() if recipe is None else Path(recipe))
     source = read_optics(Path(optics), tuple(map(str, glass)), catalogue)
     request = FreezeRequest(
         sensor=sensor,
@@ -102,6 +105,7 @@ def freeze(
         haze=haze is not None,
         stress=stress_out is not None,
         quick=quick,
+        psf_model=recipe_model if psf_model is None else psf_model,
     )
     with one_torch_thread():
         freezing = freeze_optics(source, request)
@@ -147,12 +151,14 @@ def default_recipe() -> Path:
     return Path(str(resources.files("camkit.models_def.recipes"))) / DEFAULT_RECIPE
 
 
-def _camera_of(recipe: Path) -> tuple[ColorSensor, Wiener | None]:
-    """Return the sensor of a recipe, and its bank."""
+def _camera_of(recipe: Path) -> tuple[ColorSensor, Wiener | None, str]:
+    """Return the sensor of a recipe, its bank, and the PSF model that it states."""
+    from camkit.models_def.kinds.bayer.recipe import BayerRecipe
     from camkit.models_def.training.kind import read_recipe, training_kind
 
     plan = read_recipe(recipe)
     stages = training_kind(plan.kind).design(plan).stages
     if not isinstance(plan.sensor, ColorSensor):
         raise UnsupportedError(f"a {plan.sensor.type} sensor has no response to freeze a PSF for")
-    return plan.sensor, next((stage for stage in stages if isinstance(stage, Wiener)), None)
+    bank = next((stage for stage in stages if isinstance(stage, Wiener)), None)
+    return plan.sensor, bank, plan.lens.psf_model if isinstance(plan, BayerRecipe) else ""

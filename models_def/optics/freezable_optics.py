@@ -77,7 +77,7 @@ class Optics(Protocol):
         ...
 
     @property
-    def facts(self) -> Mapping[str, float]:
+    def facts(self) -> Mapping[str, float | str]:
         """Further facts for the report of freezing, units in the names."""
         ...
 

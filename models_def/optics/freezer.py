@@ -7,6 +7,7 @@ Optics -> by samples, judged by the Wiener bank    a lens, measured kernels     
 """
 
 from dataclasses import dataclass, replace
+from typing import Final
 
 from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.sensor import ColorSensor
@@ -30,6 +31,12 @@ from camkit.models_def.optics.thin.hazy_freezing import freeze_hazy
 from camkit.progress import note, working
 from camkit.psf import depth_name
 
+LEAST_WAVE_ENERGY: Final = 0.97
+"""Share of the light that kernels of waves hold at least, where the largest side ends them: the
+rings of an Airy pattern hold 0.5 % beyond 40 wavelengths times F-number."""
+WAVE_SPARE: Final = 0.8
+"""Share of the light that kernels may lose, for which waves are summed."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FreezeRequest:
@@ -49,6 +56,7 @@ class FreezeRequest:
             rest is chosen then, but for the sensor.
         stress: Whether kernels off the design point are frozen too.
         quick: Whether nothing is searched: see `freeze_quickly`. A plate is frozen as ever.
+        psf_model: Of a lens: rays, waves, or empty for what `psf_model` finds.
     """
 
     sensor: ColorSensor
@@ -61,9 +69,10 @@ class FreezeRequest:
     haze: bool = False
     stress: bool = False
     quick: bool = False
+    psf_model: str = ""
 
     def __post_init__(self) -> None:
-        names = ("depths_mm", "limit_db", "energy", "max_side_px", "focus_um")
+        names = ("depths_mm", "limit_db", "energy", "max_side_px", "focus_um", "psf_model")
         options = [option_text(name) for name in names if getattr(self, name)]
         if self.haze and options:
             raise ContractError(f"{option_text('haze')} conflicts with {', '.join(options)}")
@@ -118,15 +127,24 @@ def freeze_optics(optics: Optics, request: FreezeRequest, *, tell: Tell = note) 
         raise UnsupportedError(
             f"only a lens is traced with its sensor moved; leave {option_text('focus_um')} out"
         )
+    base = FreezeGrid()
+    if isinstance(optics, LensOptics):
+        optics = _modelled(optics, request, tell)
+        if optics.regime == "waves":
+            base = replace(base, least_energy=LEAST_WAVE_ENERGY)
+    elif request.psf_model:
+        raise UnsupportedError(
+            f"only a lens is traced by rays or waves; leave {option_text('psf_model')} out"
+        )
     with working("freezing the optics"):
         if isinstance(optics, PlateOptics):
             grid = request.grid(WINDOW)
             frozen, facts = freeze_plate(optics, sensor=request.sensor, grid=grid, tell=tell)
         elif request.quick:
-            grid = request.grid(FreezeGrid())
+            grid = request.grid(base)
             frozen, facts = freeze_quickly(optics, sensor=request.sensor, grid=grid, tell=tell)
         else:
-            grid = request.grid(FreezeGrid())
+            grid = request.grid(base)
             frozen, facts = freeze_samples(
                 optics,
                 sensor=request.sensor,
@@ -140,6 +158,15 @@ def freeze_optics(optics: Optics, request: FreezeRequest, *, tell: Tell = note) 
     if request.stress:
         stress = FrozenOptics(psf=freeze_stress(optics, request.sensor, grid).psf)
     return Freezing(optics=frozen, facts=facts, stress=stress)
+
+
+def _modelled(lens: LensOptics, request: FreezeRequest, tell: Tell) -> LensOptics:
+    """Return the lens with the PSF model that it takes."""
+    modelled = lens.by_rule(request.sensor, regime=request.psf_model)
+    if request.energy is not None:
+        modelled = replace(modelled, light=1 - WAVE_SPARE * (1 - request.energy))
+    tell(f"{lens.name}: PSF by {modelled.regime}")
+    return modelled
 
 
 @working("freezing peaks and haze of the lens")

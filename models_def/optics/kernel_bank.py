@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from camkit.arrays import FloatArray
 from camkit.errors import ContractError
+from camkit.models_def.optics.analysis.model_psf import model_psf
+from camkit.models_def.optics.analysis.psf_model import PsfRegime
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import (
     FabricationErrors,
@@ -17,7 +19,6 @@ from camkit.models_def.optics.prescription import (
     perturb,
     with_focus_shift,
 )
-from camkit.models_def.optics.psf import trace_psf
 from camkit.models_def.optics.pupil import with_fixed_stop
 
 USUAL_EFL_MM: Final = 40.0
@@ -121,15 +122,17 @@ def colour_kernels(
     size_px: int,
     pitch_um: float,
     rays: int,
+    regime: PsfRegime = "rays",
 ) -> tuple[FloatArray, float]:
     """Return kernels (field, c, size, size) float32 and the least energy kept of a colour."""
     with torch.no_grad():
-        traced = trace_psf(
+        traced = model_psf(
             lens,
             torch.from_numpy(heights_mm),
             torch.from_numpy(response.wavelengths_um),
             size_px,
             pitch_um,
+            regime=regime,
             rays=rays,
         )
         # light that fell outside counts: a wavelength weighs what it puts into the window

@@ -8,8 +8,10 @@ from typing import Final
 import numpy as np
 import torch
 
-from camkit.errors import ContractError
-from camkit.models_def.optics.analysis.illumination import relative_illumination_at
+from camkit.bundle.sensor import ColorSensor
+from camkit.errors import ContractError, UnsupportedError
+from camkit.models_def.optics.analysis.model_psf import WAVE_LIGHT, model_psf
+from camkit.models_def.optics.analysis.psf_model import PsfRegime, checked_regime, sensor_model
 from camkit.models_def.optics.asymmetric.place_psf import trace_place_psf
 from camkit.models_def.optics.asymmetric.turning import round_part
 from camkit.models_def.optics.distortion import trace_distortion
@@ -20,10 +22,12 @@ from camkit.models_def.optics.freezable_optics import (
     grid_layout,
     radial_layout,
 )
+from camkit.models_def.optics.frozen import corner_height_mm
 from camkit.models_def.optics.kernel_bank import focused_copies
 from camkit.models_def.optics.paraxial import paraxial_data
-from camkit.models_def.optics.prescription import Lens, with_focus_shift
-from camkit.models_def.optics.psf import TracedPsf, trace_psf, with_object_distance
+from camkit.models_def.optics.prescription import Lens, grooves_of, with_focus_shift
+from camkit.models_def.optics.psf import TracedPsf, with_object_distance
+from camkit.models_def.optics.render.illumination import relative_illumination_at
 from camkit.radial import RadialDistortion
 from camkit.units import UM_PER_MM
 
@@ -46,10 +50,16 @@ class LensOptics:
     Attributes:
         lens: The prescription.
         rays: In half the pupil, per wavelength traced.
+        regime: Whether kernels are traced by rays or summed from waves.
+        blur_airy: Least blur over Airy radius, by which the rule decided; None where it did not.
+        light: Share of the light that waves are summed for, see `model_psf`.
     """
 
     lens: Lens
     rays: int = RAYS
+    regime: PsfRegime = "rays"
+    blur_airy: float | None = None
+    light: float = WAVE_LIGHT
 
     @property
     def name(self) -> str:
@@ -57,9 +67,31 @@ class LensOptics:
         return self.lens.name
 
     @property
-    def facts(self) -> Mapping[str, float]:
-        """The focal length."""
-        return {"efl_mm": paraxial_data(self.lens).efl_mm}
+    def facts(self) -> Mapping[str, float | str]:
+        """The focal length, the PSF model, and the blur by which it was chosen."""
+        facts: dict[str, float | str] = {"efl_mm": paraxial_data(self.lens).efl_mm}
+        facts["psf_model"] = self.regime
+        if self.blur_airy is not None:
+            facts["blur_airy"] = self.blur_airy
+        return facts
+
+    def by_rule(self, sensor: ColorSensor, *, regime: str = "") -> "LensOptics":
+        """Return the lens with the PSF model that it needs before a sensor, or a given one.
+
+        Raises:
+            ContractError: If there is no such model.
+            UnsupportedError: If waves are wanted of a lens with grooves.
+        """
+        own_regime = checked_regime(regime)
+        if own_regime == "waves" and grooves_of(self.lens):
+            raise UnsupportedError("the light of grooves is no smooth wave; take rays")
+        model = sensor_model(self.lens, corner_height_mm(sensor), *sensor.response_arrays())
+        least = float(model.ratio.min())
+        return replace(
+            self,
+            regime=own_regime or model.regime,
+            blur_airy=least if math.isfinite(least) else None,
+        )
 
     @property
     def depths_mm(self) -> tuple[float, ...]:
@@ -114,13 +146,15 @@ class LensOptics:
         if fields.symmetry != "radial":
             raise ContractError("a lens of revolution is traced along +y; other places are turned")
         with torch.no_grad():
-            return trace_psf(
+            return model_psf(
                 lens,
                 torch.from_numpy(fields.y_mm),
                 torch.from_numpy(wavelengths_um),
                 side_px,
                 pitch_um,
+                regime=self.regime,
                 rays=self.rays,
+                light=self.light,
             )
 
     def distortion(self, radius_mm: float, channels: int) -> RadialDistortion:

@@ -1,7 +1,7 @@
 """Geometric point spread functions, splatted differentiably onto sensor pixels.
 
-Geometric is right here: at F/4 the Airy radius is 2.7 um (half a pixel of 6 um), far below the
-aberrations of the lenses this is used for. Each ray is spread with a tent of one pixel to each
+Geometric is right where the blur is wide against the Airy disc; `analysis.psf_model` says where it
+is, `analysis.lens_waves` has the other PSF. Each ray is spread with a tent of one pixel to each
 side. A tent is two boxes: one integrates the light over the area of the sensor pixel, the other
 is the pixel of the sharp picture that the kernel is applied to. The gradient flows through the
 tent weights to the ray positions.

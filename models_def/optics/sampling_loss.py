@@ -139,6 +139,7 @@ def make_bench(
         depths_mm=depths,
         energy=1 - TRUE_LOSS * (1 - frozen.energy),
         max_side_px=min(frozen.max_side_px + LARGER_SIDE_PX, PATCH_PX - 1),
+        least_energy=frozen.energy if frozen.least_energy is None else frozen.least_energy,
     )
     nominal, *fabricated = (
         freeze_at(copy, sensor, true_grid, fields).psf for copy in optics.copies(copies + 1, seed)

@@ -102,6 +102,12 @@ def freeze(
     ] = False,
     glass: GlassFiles = None,
     catalogue: GlassCatalogues = None,
+    psf_model: Annotated[
+        str | None,
+        typer.Option(
+            help="PSF of a lens: rays or waves; default: waves where its spot is that sharp."
+        ),
+    ] = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
@@ -125,6 +131,7 @@ def freeze(
             "--quick": quick or None,
             "--glass": glass,
             "--catalogue": catalogue,
+            "--psf-model": psf_model,
             "--limit-db": None if limit_db == LIMIT_DB else limit_db,
             "--energy": energy,
             "--max-side-px": max_side_px,
@@ -160,6 +167,7 @@ def freeze(
         quick=quick,
         glass=tuple(glass or ()),
         catalogue=catalogue,
+        psf_model=psf_model,
         overwrite=overwrite,
     )
     print_report(facts, json_)

@@ -4,6 +4,7 @@ small kernels -> if they lose light: peaks and haze -> if it has no peak: wide k
 """
 
 import logging
+from dataclasses import replace
 from typing import Final
 
 from camkit.bundle.frozen_optics import FrozenOptics
@@ -11,6 +12,7 @@ from camkit.bundle.sensor import ColorSensor
 from camkit.errors import ContractError
 from camkit.models_def.optics.diffraction.pinhole import Pinhole
 from camkit.models_def.optics.freezable_optics import Optics
+from camkit.models_def.optics.freezer import LEAST_WAVE_ENERGY
 from camkit.models_def.optics.frozen import FreezeGrid, freeze
 from camkit.models_def.optics.lens_optics import LensOptics
 from camkit.models_def.optics.prescription import Lens
@@ -29,9 +31,10 @@ def freeze_lens(lens: Lens, sensor: ColorSensor) -> FrozenOptics:
     Raises:
         ContractError: If none does.
     """
-    optics = LensOptics(lens=lens)
+    optics = LensOptics(lens=lens).by_rule(sensor)
+    rings = LEAST_WAVE_ENERGY if optics.regime == "waves" else None
     try:
-        return _plain(optics, sensor, SMALL)
+        return _plain(optics, sensor, replace(SMALL, least_energy=rings))
     except ContractError as error:
         _log.info("%s: %s", lens.name, error)
     try:

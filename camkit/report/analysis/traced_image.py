@@ -14,10 +14,10 @@ import torch
 
 from camkit.bundle.sensor import ColorSensor
 from camkit.errors import ContractError
-from camkit.models_def.optics.analysis.illumination import relative_illumination_at
 from camkit.models_def.optics.frozen import corner_height_mm
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.render.illumination import relative_illumination_at
 from camkit.models_def.optics.thin.hazy_freezing import flat_light
 from camkit.models_def.optics.thin.middle import corner_angle_rad
 from camkit.models_def.optics.thin.peak import LandedLight, land_light, peak_height_px, share_within

@@ -13,7 +13,7 @@ from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.psf_bank import PsfBank, read_bank, write_bank
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.kinds.bayer.samples import corner_height_mm
-from camkit.models_def.optics.analysis.illumination import relative_illumination_at
+from camkit.models_def.optics.analysis.psf_model import PsfRegime, checked_regime, sensor_model
 from camkit.models_def.optics.kernel_bank import (
     ChannelResponse,
     colour_kernels,
@@ -21,6 +21,7 @@ from camkit.models_def.optics.kernel_bank import (
 )
 from camkit.models_def.optics.prescription import Lens, format_prescription
 from camkit.models_def.optics.psf import with_object_distance
+from camkit.models_def.optics.render.illumination import relative_illumination_at
 from camkit.progress import counted
 
 LEAST_ENERGY: Final = 0.97
@@ -40,19 +41,29 @@ def build_lens_bank(recipe: BayerRecipe, lens: Lens, cache_folder: Path | None =
         ContractError: If the light of the lens does not fit the kernels.
     """
     if cache_folder is None:
-        return _trace(recipe, lens)
+        return _trace(recipe, lens, _regime(recipe, lens))
     content = [format_prescription(lens), json.dumps(recipe.lens.to_json())]
     content += [recipe.sensor.model_dump_json(), str(TRACING)]
     content += ["depths apart"] if recipe.tells_depth else []
+    regime = _regime(recipe, lens)
+    # files of rays keep their names
+    content += [regime] if regime == "waves" else []
     name = hashlib.sha256("".join(content).encode()).hexdigest()[:16]
     cached = cache_folder / f"bank-{name}.npz"
     if not cached.exists():
         cache_folder.mkdir(parents=True, exist_ok=True)
-        write_bank(cached, _trace(recipe, lens))
+        write_bank(cached, _trace(recipe, lens, regime))
     return read_bank(cached)
 
 
-def _trace(recipe: BayerRecipe, lens: Lens) -> PsfBank:
+def _regime(recipe: BayerRecipe, lens: Lens) -> PsfRegime:
+    """Return the PSF model of a recipe's lens, the same as `freeze` takes."""
+    regime = checked_regime(recipe.lens.psf_model, "lens.psf_model")
+    response = recipe.sensor.response_arrays()
+    return regime or sensor_model(lens, corner_height_mm(recipe), *response).regime
+
+
+def _trace(recipe: BayerRecipe, lens: Lens, regime: PsfRegime) -> PsfBank:
     choices = recipe.lens
     heights = np.linspace(0.0, corner_height_mm(recipe), choices.fields)
     response = _response(recipe)
@@ -70,6 +81,7 @@ def _trace(recipe: BayerRecipe, lens: Lens) -> PsfBank:
             size_px=choices.kernel_px,
             pitch_um=recipe.sensor.pixel_pitch_um,
             rays=choices.rays,
+            regime=regime,
         )
         if energy < LEAST_ENERGY:
             raise ContractError(

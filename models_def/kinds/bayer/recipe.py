@@ -20,6 +20,7 @@ from camkit.calibration.measured import WAVELENGTHS_UM
 from camkit.calibration.psf_import.own_colours import narrow_response
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.scene_light import DisplayRecipe, WildRecipe
+from camkit.models_def.optics.analysis.psf_model import checked_regime
 from camkit.models_def.toml_table import Faults, section, table_digest, typed
 from camkit.models_def.training.pictures import DrawnShares
 from camkit.models_def.training.recipe import (
@@ -58,6 +59,8 @@ class LensRecipe:
             recipe.
         psf: In place of it: path of a measured PSF (.safetensors, of `camkit psf import`) relative
             to the recipe. `fields`, `kernel_px` and `rays` are those of the file then.
+        psf_model: Of a lens: "rays", "waves", or empty for waves where its spot is that sharp; see
+            `camkit.models_def.optics.analysis.psf_model`.
         uncertainty: Of a measured PSF: noise, shift in pixels and width of
             `camkit.psf.PsfUncertainty`; empty for that of the file.
         copies: Fabricated copies whose PSFs are trained on.
@@ -89,8 +92,12 @@ class LensRecipe:
     validation_copies: int = 1
     bank_in_focus: bool = False
     uncertainty: tuple[float, ...] = ()
+    psf_model: str = ""
 
     def __post_init__(self) -> None:
+        checked_regime(self.psf_model, "lens.psf_model")
+        if self.psf and self.psf_model:
+            raise ContractError("lens.psf_model needs a lens; a measured PSF is as it is")
         if bool(self.prescription) == bool(self.psf):
             raise ContractError(
                 'lens needs prescription = "..." (a lens) or psf = "..." (a measured PSF), one of '
@@ -127,7 +134,7 @@ class LensRecipe:
     def to_json(self) -> dict[str, Any]:
         """Return the values that decide the kernels, to name files by, without defaults."""
         usual = {"depths_mm": (), "validation_copies": 1, "bank_in_focus": False}
-        usual |= {"psf": "", "uncertainty": (), "wavelengths": WAVELENGTHS}
+        usual |= {"psf": "", "uncertainty": (), "wavelengths": WAVELENGTHS, "psf_model": ""}
         return {name: value for name, value in asdict(self).items() if value != usual.get(name)}
 
 

@@ -7,11 +7,13 @@ In the order in which data flows (every result states its pupil, see `camkit...o
 - `spots`: spot diagrams, their RMS and maximum, and how these converge with the sampling
 - `image_circle`: how far from the axis a lens images, and what its rims leave of its stop
 - `curves`: distortion, field curvature, axial and lateral colour
-- `illumination`: light of an even scene on the sensor, by rays traced back from it
 - `seidel`: third-order and chromatic sums by surface
 - `wavefront`: optical path differences at the exit pupil
 - `wave_psf`: the diffraction PSF summed from them
+- `pupil_fit`: few rays over the pupil, as polynomials
+- `wave_kernels`: the light of waves in the tents of pixels
+- `lens_waves`: the wave PSF of a lens, as `psf` is that of its rays
 - `mtf`: contrast from rays or from a PSF, and its diffraction limit
-- `pair_transfer`: the blur between two stops of a lens, block by block of a picture
-- `psf_model`: whether a lens needs waves, and why
+- `psf_model`: the one rule by which a lens takes rays or waves
+- `model_psf`: the PSF of a lens by the model that it takes
 """

@@ -25,6 +25,7 @@ MAX_WAVE_RAYS: Final = 100_000
 _CHUNK_RAYS: Final = 4096
 _SPARE_RINGS: Final = 10
 _SPARE_ARMS: Final = 16
+_STEPS: Final = 8
 
 
 def irradiance_per_mm2(wavefront: Wavefront, x_mm: Tensor, y_mm: Tensor) -> Tensor:
@@ -72,16 +73,37 @@ def pupil_for_reach(reach_mm: float, wavelength_um: float, aperture: float) -> P
     Raises:
         ContractError: If it would need more than `MAX_WAVE_RAYS` rays.
     """
+    return disc_quadrature(*reach_rings(reach_mm, wavelength_um, aperture))
+
+
+def reach_rings(
+    reach_mm: float, wavelength_um: float, aperture: float, *, steps: bool = False
+) -> tuple[int, int]:
+    """Return the rings and arms of that sampling.
+
+    Args:
+        reach_mm: Half the diagonal of the window plus the largest ray error.
+        wavelength_um: Of the light.
+        aperture: Sine of the half cone, NA.
+        steps: Round up in steps of a tenth, for rays that are interpolated; there may be twice as
+            many of them.
+
+    Raises:
+        ContractError: If it would need more than `MAX_WAVE_RAYS` rays.
+    """
+    most = 2 * MAX_WAVE_RAYS if steps else MAX_WAVE_RAYS
     phase = 2 * math.pi / to_mm(wavelength_um) * aperture * reach_mm
+    if steps:
+        phase = 2 ** (math.ceil(_STEPS * math.log2(max(phase, 1))) / _STEPS)
     rings = math.ceil(phase / math.pi) + _SPARE_RINGS
     # a wave exp(i phase cos) has harmonics up to its phase and a few more
     arms = 2 * math.ceil((phase + 6 * phase ** (1 / 3)) / 2) + _SPARE_ARMS
-    if rings * arms > MAX_WAVE_RAYS:
+    if rings * arms > most:
         raise ContractError(
             f"a wave PSF over {reach_mm * UM_PER_MM:.0f} um needs {rings * arms} rays, more than "
-            f"{MAX_WAVE_RAYS}; a blur of that size is geometric: use the geometric PSF"
+            f"{most}; a blur of that size is geometric: use the geometric PSF"
         )
-    return disc_quadrature(rings, arms)
+    return rings, arms
 
 
 def widest_aperture(wavefront: Wavefront) -> float:

@@ -58,7 +58,11 @@ class Wavefront:
 
 
 def path_lengths(
-    tensors: SurfaceTensors, rays: Rays, slope: Tensor, distance_mm: float
+    tensors: SurfaceTensors,
+    rays: Rays,
+    slope: Tensor,
+    distance_mm: float,
+    surface_rays: list[Rays] | None = None,
 ) -> tuple[Rays, Tensor]:
     """Trace rays to the sensor and return their optical path lengths in mm.
 
@@ -67,18 +71,19 @@ def path_lengths(
         rays: At the first vertex plane.
         slope: tan of their field angle.
         distance_mm: Of the object, inf allowed.
+        surface_rays: Receives the rays on each surface, see `trace`.
 
     Returns:
         The rays on the sensor, and their paths (n times length) since they left the object's
         wave through the first vertex.
     """
-    landings = trace(tensors, rays, path=True)
+    landings = trace(tensors, rays, path=True, surface_rays=surface_rays)
     if landings.path_mm is None:
         raise ContractError("the tracer gave no optical path")
-    return landings, tensors.index[0] * _path_before(rays, slope, distance_mm) + landings.path_mm
+    return landings, tensors.index[0] * path_before(rays, slope, distance_mm) + landings.path_mm
 
 
-def _path_before(rays: Rays, slope: Tensor, distance_mm: float) -> Tensor:
+def path_before(rays: Rays, slope: Tensor, distance_mm: float) -> Tensor:
     """Return the path of launch points beyond that of the first vertex, written without loss."""
     if math.isinf(distance_mm):
         return rays.x * rays.l + rays.y * rays.m + rays.z * rays.n
@@ -115,7 +120,7 @@ def trace_wavefront(
         for step in ((_DIFFERENCE_MM, 0.0), (0.0, _DIFFERENCE_MM))
     )
     spread = (right.l - here.l) * (upper.m - here.m) - (right.m - here.m) * (upper.l - here.l)
-    middle = _chief_path(lens, slopes, wavelengths_um, centre, definition)
+    middle = chief_path_mm(lens, slopes, wavelengths_um, centre, definition)
     opd = (middle - here.path) * UM_PER_MM
     # without a chief ray there is nothing to measure from
     alive = here.valid & torch.isfinite(opd)
@@ -135,7 +140,17 @@ def trace_wavefront(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _AtSphere:
+class AtSphere:
+    """Rays on the reference sphere.
+
+    Attributes:
+        l: Direction cosine in x from the sphere towards its centre.
+        m: The same in y.
+        path: Optical path up to the sphere in mm.
+        miss_mm: Distance from the centre at which rays land.
+        valid: Whether they reach the sensor.
+    """
+
     l: Tensor  # noqa: E741
     m: Tensor
     path: Tensor
@@ -143,31 +158,49 @@ class _AtSphere:
     valid: Tensor
 
 
-def _at_sphere(lens: Lens, beams: Beams, slopes: Tensor, centre_mm: Tensor) -> _AtSphere:
+def _at_sphere(lens: Lens, beams: Beams, slopes: Tensor, centre_mm: Tensor) -> AtSphere:
     """Trace beams and carry them from the sensor back to the reference sphere."""
     landings, path = path_lengths(
         beams.tensors, beams.rays, slopes[:, None, None], lens.object_distance_mm
     )
-    x, y = landings.x, landings.y - centre_mm[:, None, None]
+    middle, radius = centre_mm[:, None, None], sphere_radius_mm(lens)
+    return to_sphere(landings, path, middle, radius, beams.tensors.index[-1])
+
+
+def sphere_radius_mm(lens: Lens) -> float:
+    """Return the signed distance of the sensor from the paraxial exit pupil; inf is allowed."""
+    return lens.surfaces[-1].thickness_mm - paraxial_data(lens).exit_pupil_mm
+
+
+def to_sphere(
+    landings: Rays, path: Tensor, centre_mm: Tensor, radius_mm: float, index: Tensor
+) -> AtSphere:
+    """Move rays from the sensor back to the reference sphere.
+
+    Args:
+        landings: On the sensor.
+        path: Their optical paths in mm.
+        centre_mm: Height of the sphere's centre; broadcasts against the rays.
+        radius_mm: Of the sphere about the middle of the sensor, see `sphere_radius_mm`.
+        index: Of the medium before the sensor.
+    """
+    x, y = landings.x, landings.y - centre_mm
     ahead, square = x * landings.l + y * landings.m, x**2 + y**2
-    radius_mm = lens.surfaces[-1].thickness_mm - paraxial_data(lens).exit_pupil_mm
     if not math.isfinite(radius_mm):
         # the pupil is at infinity: directions are those of the rays
         excess, direction = ahead, (landings.l, landings.m)
     else:
-        radius = (
-            math.copysign(1.0, radius_mm) * torch.sqrt(radius_mm**2 + centre_mm**2)[:, None, None]
-        )
+        radius = math.copysign(1.0, radius_mm) * torch.sqrt(radius_mm**2 + centre_mm**2)
         bend = torch.sqrt((radius**2 + ahead**2 - square).clamp_min(1e-12))
         root = math.copysign(1.0, radius_mm) * bend
         # the way back to the sphere, less its radius, without the loss of a difference
         excess = ahead + (ahead**2 - square) / (root + radius)
         way = radius + excess
         direction = ((way * landings.l - x) / radius, (way * landings.m - y) / radius)
-    return _AtSphere(
+    return AtSphere(
         l=direction[0],
         m=direction[1],
-        path=path - beams.tensors.index[-1] * excess,
+        path=path - index * excess,
         miss_mm=torch.sqrt(square.detach()),
         valid=landings.valid,
     )
@@ -179,13 +212,14 @@ def _shifted(lens: Lens, beams: Beams, slopes: Tensor, dx: float, dy: float) -> 
     return replace(shifted, fate=rays.fate)
 
 
-def _chief_path(
+def chief_path_mm(
     lens: Lens,
     slopes: Tensor,
     wavelengths_um: Tensor,
     centre_mm: Tensor,
     definition: PupilDefinition,
 ) -> Tensor:
+    """Return the paths (field, wavelength, 1) of chief rays to the reference sphere."""
     beams = launch_near_chief(lens, slopes, wavelengths_um, pupil_centre(), definition)
     return _at_sphere(lens, beams, slopes, centre_mm).path
 

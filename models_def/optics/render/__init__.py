@@ -8,4 +8,6 @@
 - `monte_carlo`: (a) rays from pixels to the texture, averaged over passes
 - `texture_alignment`: the texture warped to the render, pixel to pixel
 - `psf_map`: (b) the aligned texture spread by PSFs over fields, colours and depths
+- `illumination`: light of an even scene on the sensor, by rays traced back from it
+- `pair_transfer`: the blur between two stops of a lens, block by block of a picture
 """

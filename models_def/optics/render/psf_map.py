@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from camkit.errors import ContractError
+from camkit.models_def.optics.analysis.psf_model import PsfRegime, sensor_model
 from camkit.models_def.optics.kernel_bank import ChannelResponse, colour_kernels
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.psf import with_object_distance
@@ -86,12 +87,18 @@ class MapGrid:
 
 
 def trace_map(lens: Lens, response: ChannelResponse, grid: MapGrid) -> PsfMap:
-    """Trace a map, the sensor unmoved between depths, without gradient."""
+    """Trace a map, the sensor unmoved between depths, without gradient.
+
+    By waves if the rule of `psf_model` finds them at one of the depths.
+    """
     weights = wavelength_weights(grid.wavelengths_um, response.wavelengths_um, response.response)
     coarse = replace(response, wavelengths_um=grid.wavelengths_um, response=weights)
     kernels, light = [], []
-    for depth_mm in grid.depths_mm:
-        lens_at = with_object_distance(lens, float(depth_mm))
+    corner_mm = float(grid.field_heights_mm[-1])
+    lenses = [with_object_distance(lens, float(depth_mm)) for depth_mm in grid.depths_mm]
+    models = [sensor_model(one, corner_mm, grid.wavelengths_um, weights) for one in lenses]
+    regime: PsfRegime = "waves" if any(m.regime == "waves" for m in models) else "rays"
+    for lens_at in lenses:
         traced, _ = colour_kernels(
             lens_at,
             coarse,
@@ -99,6 +106,7 @@ def trace_map(lens: Lens, response: ChannelResponse, grid: MapGrid) -> PsfMap:
             size_px=grid.kernel_px,
             pitch_um=grid.pitch_um,
             rays=grid.rays,
+            regime=regime,
         )
         kernels.append(torch.from_numpy(traced))
         light.append(_illumination(lens_at, grid))

@@ -98,7 +98,12 @@ class Traced:
 
 
 def trace_batch(
-    problem: Problem, scaled: Tensor, object_distance_mm: float, change: Change | None = None
+    problem: Problem,
+    scaled: Tensor,
+    object_distance_mm: float,
+    change: Change | None = None,
+    *,
+    path: bool = False,
 ) -> Traced:
     """Trace a batch (start, variable) from every field; gradients flow.
 
@@ -108,6 +113,7 @@ def trace_batch(
         object_distance_mm: Of the object.
         change: Takes the lenses at all wavelengths and at the reference one, and gives the former
             as they are to be traced; None traces them as they are.
+        path: Whether the landings carry optical paths.
     """
     free = problem.free
     reference_um = torch.tensor([free.lens.reference_wavelength_um], dtype=torch.float64)
@@ -124,7 +130,7 @@ def trace_batch(
         problem.vignetting,
     )
     surface_rays: list[Rays] = []
-    landings = trace(tensors, rays, surface_rays=surface_rays)
+    landings = trace(tensors, rays, surface_rays=surface_rays, path=path)
     return Traced(
         reference=reference,
         tensors=tensors,

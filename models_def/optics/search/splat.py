@@ -6,6 +6,7 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
+from camkit.models_def.optics.analysis.psf_model import PsfRegime
 from camkit.models_def.optics.psf import spread_tents
 from camkit.models_def.optics.search.beam_launch import LEAD
 from camkit.models_def.optics.trace import Rays
@@ -22,12 +23,14 @@ class Pixels:
         kernel_px: Window of a PSF, odd; light outside counts as lost.
         window_follows: Whether gradients know that the window follows the centroid. Without it a
             gradient counts a shift of the whole PSF, which never comes to pass.
+        regime: Whether kernels are splatted rays or sums of waves.
     """
 
     pitch_um: float
     color_weights: Tensor
     kernel_px: int = 65
     window_follows: bool = False
+    regime: PsfRegime = "rays"
 
     def __post_init__(self) -> None:
         if self.kernel_px < 9 or self.kernel_px % 2 == 0:

@@ -14,7 +14,6 @@ from camkit.models_def.optics.analysis.curves import (
     lateral_colour_mm,
     longitudinal_mm,
 )
-from camkit.models_def.optics.analysis.illumination import relative_illumination_of
 from camkit.models_def.optics.analysis.mtf import (
     Mtf,
     diffraction_limit,
@@ -29,6 +28,7 @@ from camkit.models_def.optics.analysis.wave_psf import (
     widest_aperture,
 )
 from camkit.models_def.optics.analysis.wavefront import trace_wavefront
+from camkit.models_def.optics.render.illumination import relative_illumination_of
 from camkit.report.figure import MARKS, Figure, Panel, chart, field_color, new_figure, wave_color
 from camkit.report.pages.lens.lens_facts import LensFacts
 from camkit.units import UM_PER_MM, to_degrees
@@ -129,7 +129,7 @@ def draw_mtf(facts: LensFacts) -> Figure:
     if len(facts.lens.field_angles_rad) > 1:
         panel.plot(cycles, last, color="#777777", label="limit, last field, tangential")
     panel.set(xlim=(0, float(cycles[-1])), ylim=(0, 1.02), xlabel="cycles/mm", ylabel="contrast")
-    words = {"wave": "diffraction PSF", "geometric": "rays times diffraction limit"}
+    words = {"waves": "diffraction PSF", "rays": "rays times diffraction limit"}
     panel.set_title(f"{words[regime]}, all wavelengths with equal weight", loc="left")
     panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
@@ -147,14 +147,14 @@ def trace_mtf(facts: LensFacts) -> tuple[Tensor, str, Mtf, Mtf]:
     top = min(MAX_CYCLES_PER_MM, cutoff)
     cycles = torch.linspace(0, top, _FREQUENCIES, dtype=torch.float64)
     limit = diffraction_limit(rim, cycles)
-    if facts.model.regime == "wave" and math.isfinite(cutoff):
+    if facts.model.regime == "waves" and math.isfinite(cutoff):
         try:
-            return cycles, "wave", _wave_mtf(facts, cycles, cutoff), limit
+            return cycles, "waves", _wave_mtf(facts, cycles, cutoff), limit
         except ContractError:
             pass  # too wide a blur at another field: rays times the limit serve all
     pupil = Pupil(definition=definition, sampling=_DENSE_SAMPLING)
     rays = geometric_mtf(spot_diagram(lens, facts.slopes, waves, pupil), cycles)
-    return cycles, "geometric", rays.times(limit), limit
+    return cycles, "rays", rays.times(limit), limit
 
 
 def _wave_mtf(facts: LensFacts, cycles: Tensor, cutoff: float) -> Mtf:

@@ -13,7 +13,6 @@ from camkit.errors import ContractError
 from camkit.models_def.optics.aiming.chief_path import chief_path
 from camkit.models_def.optics.analysis.curves import distortion
 from camkit.models_def.optics.analysis.first_order import airy_radius_mm
-from camkit.models_def.optics.analysis.illumination import relative_illumination_of
 from camkit.models_def.optics.analysis.psf_model import PsfModel, psf_model
 from camkit.models_def.optics.analysis.sampling import Pupil, disc_quadrature
 from camkit.models_def.optics.analysis.seidel import Seidel, seidel_sums
@@ -32,6 +31,7 @@ from camkit.models_def.optics.analysis.wavefront import trace_wavefront, wavefro
 from camkit.models_def.optics.paraxial import Paraxial, paraxial_data
 from camkit.models_def.optics.prescription import Lens, grooves_of
 from camkit.models_def.optics.pupil import real_stop_radius_mm
+from camkit.models_def.optics.render.illumination import relative_illumination_of
 from camkit.models_def.optics.spot import Spots
 from camkit.models_def.optics.trace import Fate, count_fates
 from camkit.units import to_degrees

@@ -17,7 +17,7 @@ def test_lens_with_wide_blur_is_traced_by_rays() -> None:
     slopes = field_slopes(lens)[[0, 4, 8]]
     waves = torch.tensor([0.54], dtype=torch.float64)
     found = psf_model(lens, slopes, waves)
-    assert found.regime == "geometric"
+    assert found.regime == "rays"
     assert "times the Airy radius" in found.reason
     assert float((found.blur_mm / found.airy_mm).min()) > 5
 
@@ -28,7 +28,7 @@ def test_sharp_lens_is_summed_from_waves() -> None:
     slopes = torch.zeros(1, dtype=torch.float64)
     waves = torch.tensor([0.78], dtype=torch.float64)
     found = psf_model(lens, slopes, waves)
-    assert found.regime == "wave"
+    assert found.regime == "waves"
     # 1.22 wavelength / (2 sin u) with sin u = 11.5 / f for a lens without coma
     assert float(found.airy_mm) == pytest.approx(1.21967 * 0.78e-3 * 50.0016 / 23, rel=0.05)
 
@@ -39,5 +39,5 @@ def test_lens_without_light_is_told_so() -> None:
     blocked = replace(lens, surfaces=(lens.surfaces[0], pinhole))
     far = torch.tensor([1.0], dtype=torch.float64)
     found = psf_model(blocked, far, torch.tensor([0.78], dtype=torch.float64))
-    assert found.regime == "geometric"
+    assert found.regime == "rays"
     assert "no ray" in found.reason

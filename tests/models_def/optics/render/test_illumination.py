@@ -8,15 +8,15 @@ import pytest
 import torch
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.analysis.illumination import (
-    relative_illumination_at,
-    relative_illumination_of,
-    sensor_light,
-)
 from camkit.models_def.optics.paraxial import with_paraxial_focus
 from camkit.models_def.optics.prescription import Lens, Surface, read_prescription
 from camkit.models_def.optics.psf import with_object_distance
 from camkit.models_def.optics.render.beam import find_beams, light_at, stop_labels
+from camkit.models_def.optics.render.illumination import (
+    relative_illumination_at,
+    relative_illumination_of,
+    sensor_light,
+)
 from camkit.models_def.optics.render.lens_view import lens_optics
 from tests.physics.reference_lenses import cooke_triplet
 
