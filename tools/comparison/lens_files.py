@@ -3,10 +3,11 @@
     python -m tools.comparison.lens_files FOLDER [FOLDER ...] [--optiland PYTHON] [--json OUT]
 
 Prints a row for every .zmx and .json: read, refused (and why), or read with fields that no chief
-ray reaches. Of a lens that is read it prints the focal length, the paraxial back focal length and
-the RMS spot on the axis. With `--optiland`, the interpreter of an environment that has optiland,
-each row has optiland's numbers for the file as camkit writes it in JSON (`json`), as camkit writes
-it in .zmx (`zmx`), and for the file itself by optiland's own reader (`own`).
+ray reaches. Of a lens that is read it prints the focal length, the paraxial back focal length, the
+RMS spot on the axis and where the chief ray of the last field lands. With `--optiland`, the
+interpreter of an environment that has optiland, each row has optiland's numbers for the file as
+camkit writes it in JSON (`json`), as camkit writes it in .zmx (`zmx`), and for the file itself by
+optiland's own reader (`own`).
 """
 
 import argparse
@@ -25,7 +26,7 @@ from camkit.models_def.optics.lens_file.lens_file import read_noted_lens, write_
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import hexapolar
-from camkit.models_def.optics.spot import rms_radius, trace_spots
+from camkit.models_def.optics.spot import chief_heights, rms_radius, trace_spots
 
 SUFFIXES: Final = (".zmx", ".json")
 CHIEF: Final = "chief ray"
@@ -45,6 +46,7 @@ class FileFacts:
         efl_mm: Focal length at the reference wavelength; None where there is no lens.
         bfl_mm: From the last vertex to the paraxial focus.
         spot_um: RMS radius about the centroid on the axis; None where no ray arrives.
+        chief_mm: Distance from the axis at which the chief ray of the last field lands.
     """
 
     file: str
@@ -53,6 +55,7 @@ class FileFacts:
     efl_mm: float | None = None
     bfl_mm: float | None = None
     spot_um: float | None = None
+    chief_mm: float | None = None
 
 
 def lens_paths(folders: list[Path]) -> list[Path]:
@@ -77,7 +80,7 @@ def measure_file(path: Path) -> tuple[FileFacts, Lens | None]:
     try:
         data = paraxial_data(lens)
         facts = replace(facts, efl_mm=data.efl_mm, bfl_mm=data.bfl_mm)
-        return replace(facts, spot_um=spot_um(lens)), lens
+        return replace(facts, spot_um=spot_um(lens), chief_mm=chief_mm(lens)), lens
     except CamkitError as error:
         return replace(facts, text=f"{facts.text}; not measured: {error}"), lens
 
@@ -89,6 +92,12 @@ def spot_um(lens: Lens) -> float:
     with torch.no_grad():
         spots = trace_spots(lens, axis, wave, hexapolar(RINGS), definition="paraxial")
     return 1000 * float(rms_radius(spots).flatten()[0])
+
+
+def chief_mm(lens: Lens) -> float:
+    """Return how far from the axis the chief ray of the last field lands, reference wavelength."""
+    slope = torch.tan(torch.tensor(lens.field_angles_rad[-1:], dtype=torch.float64))
+    return abs(float(chief_heights(lens, slope)[0]))
 
 
 def optiland_facts(paths: list[Path], python: Path) -> list[dict[str, Any]]:
@@ -134,12 +143,18 @@ def row_text(facts: FileFacts, others: dict[str, dict[str, Any]]) -> str:
         return f"{facts.file}: {facts.state}: {facts.text[:_WIDTH]}"
     spot = "none" if facts.spot_um is None else f"{facts.spot_um:.5g} um"
     text = f"{facts.file}: read; EFL {facts.efl_mm:.6g}, BFL {facts.bfl_mm:.6g} mm, spot {spot}"
+    text += f", chief {_number(facts.chief_mm)} mm"
     for way, other in others.items():
         if "error" in other:
             text += f"; {way}: {other['error'][:_WIDTH]}"
         else:
             text += f"; {way}: EFL {other['efl_mm']:.6g}, spot {other['spot_um']:.5g} um"
+            text += f", chief {_number(other['chief_mm'])} mm"
     return text
+
+
+def _number(value: float | None) -> str:
+    return "none" if value is None else f"{value:.7g}"
 
 
 def main() -> None:

@@ -4,7 +4,8 @@
 
 Prints a line of JSON for each file (.json by its own reader, .zmx by its reader of those): the
 focal length, the way from the last surface to the paraxial focus and the RMS spot about the
-centroid on the axis at the primary wavelength, hexapolar in RINGS rings, or the error.
+centroid on the axis at the primary wavelength, hexapolar in RINGS rings, and where the chief ray of
+the last field lands by robust ray aiming, or the error.
 """
 
 import json
@@ -31,7 +32,15 @@ def facts(path: str) -> dict[str, Any]:
     middle = place[:, alive].mean(1, keepdims=True)
     spot_mm = float(np.sqrt(((place[:, alive] - middle) ** 2).sum(0).mean()))
     efl_mm = float(np.ravel(optic.paraxial.f2())[0])
-    return {"efl_mm": efl_mm, "spot_um": 1000 * spot_mm, "rays": int(alive.sum())}
+    optic.set_ray_aiming("robust")
+    chief = optic.trace_generic(0, 1, 0, 0, wave)
+    chief_mm = abs(float(np.ravel(chief.y)[-1]))
+    return {
+        "efl_mm": efl_mm,
+        "spot_um": 1000 * spot_mm,
+        "rays": int(alive.sum()),
+        "chief_mm": chief_mm if np.isfinite(chief_mm) else None,
+    }
 
 
 def main() -> None:

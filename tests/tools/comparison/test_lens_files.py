@@ -55,5 +55,7 @@ def test_an_interpreter_without_optiland_costs_its_numbers_and_nothing_else(fold
 
 def test_numbers_of_another_program_stand_beside_camkit_s(folder: Path) -> None:
     facts, _ = measure_file(folder / "c.json")
-    text = row_text(facts, {"json": {"efl_mm": 50.25, "spot_um": 1.5, "rays": 127}})
-    assert text.endswith("; json: EFL 50.25, spot 1.5 um")
+    text = row_text(
+        facts, {"json": {"efl_mm": 50.25, "spot_um": 1.5, "rays": 127, "chief_mm": 9.5}}
+    )
+    assert text.endswith("; json: EFL 50.25, spot 1.5 um, chief 9.5 mm")
