@@ -17,10 +17,11 @@ from camkit.models_def.design.lens_module import (
     design_models,
     fitting_window_px,
 )
+from camkit.models_def.design.library import Start, library_start
 from camkit.models_def.design.loop import DesignLoop, DesignParts
 from camkit.models_def.design.sensor import Recorder
 from camkit.models_def.design.shipped_camera import Camera
-from camkit.models_def.design.starts import Starts, best_judged, best_starts
+from camkit.models_def.design.starts import Starts, best_judged, found_starts
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.networks.catalog import build_network, check_patch
 from camkit.models_def.optics.analysis.psf_model import checked_regime
@@ -159,6 +160,7 @@ def parts_of(
     folder: Path | None = None,
     pictures: Path | None = None,
     source: SceneSource | None = None,
+    start: str = "",
 ) -> DesignParts:
     """Return the parts of a loop; a lens that is to stay (`lens_rate` 0) is not searched for.
 
@@ -167,15 +169,22 @@ def parts_of(
         folder: Of the recipe, for relative paths.
         pictures: Folder of sharp pictures; None for procedural scenes alone.
         source: Of sharp patches, already open, in the place of `pictures`.
+        start: Name of the built-in lens that an earlier search of the library chose: the design
+            begins at it, without a search. Empty for the lens of the recipe.
     """
     problem = problem_of(recipe, find_lens(recipe.prescription, folder))
-    lenses = best_starts(problem, recipe.starts if recipe.schedule.lens_rate else Starts())
-    pixels = pixels_of(recipe, problem, lenses[0])
+    plan = recipe.starts if recipe.schedule.lens_rate else Starts()
+    shipped = [library_start(problem, start)] if start else []
+    starts = shipped or found_starts(problem, plan)
+    pixels = pixels_of(recipe, starts[0].problem, starts[0].scaled)
     source, camera = source or source_of(recipe, pictures), camera_of(recipe, folder)
 
-    def parts_at(begin: Tensor, network: nn.Module | None, *, whiten: bool) -> DesignParts:
+    def module(start: Start, scaled: Tensor, *, whiten: bool) -> LensModule:
+        return LensModule(start.problem, pixels, scaled, whiten=whiten, units=recipe.optics.units)
+
+    def parts_at(lens: LensModule, network: nn.Module | None) -> DesignParts:
         return DesignParts(
-            lens=LensModule(problem, pixels, begin, whiten=whiten, units=recipe.optics.units),
+            lens=lens,
             network=network,
             front=recipe.front,
             recorder=recorder_of(recipe),
@@ -185,22 +194,25 @@ def parts_of(
             camera=camera,
         )
 
-    def judge(scaled: Tensor) -> float:
-        loop = DesignLoop(parts_at(scaled, None, whiten=False), recipe.schedule)
+    def judge(start: Start) -> float:
+        parts = parts_at(module(start, start.scaled, whiten=False), None)
+        loop = DesignLoop(parts, recipe.schedule)
         loop.judge()
         return loop.best_merit
 
-    begin = best_judged(lenses, judge)
+    best = best_judged(starts, judge)
+    begin = best.scaled
     if recipe.descent and recipe.fabrication and camera and recipe.schedule.lens_rate:
         descending = Descending(
             descent=recipe.descent,
             camera=camera,
             fabrication=recipe.fabrication,
-            make=lambda scaled: LensModule(problem, pixels, scaled),
+            make=lambda scaled: LensModule(best.problem, pixels, scaled),
             seed=recipe.schedule.seed,
         )
         begin = descended(begin, descending)
-    return parts_at(begin, network_of(recipe), whiten=recipe.optics.whiten)
+    lens = module(best, begin, whiten=recipe.optics.whiten)
+    return replace(parts_at(lens, network_of(recipe)), start=best.name)
 
 
 def source_of(recipe: DesignRecipe, pictures: Path | None) -> SceneSource:

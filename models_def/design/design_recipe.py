@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final, Literal, TypeVar, get_args
 
+from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.models_def.design.expected import Descent
 from camkit.models_def.design.front import Front
@@ -235,19 +236,29 @@ def with_choices(
     prescription: str | None = None,
     seed: int | None = None,
     search: bool = True,
+    library: bool | None = None,
 ) -> DesignRecipe:
     """Return the recipe with a caller's choices; None keeps the value of the recipe.
 
-    Without `search` the design begins at the prescription itself.
+    Without `search` the design begins at the prescription itself; `library` says whether a search
+    begins at the built-in lenses too.
+
+    Raises:
+        ContractError: If the library is to be searched without a search.
     """
+    if library and not search:
+        raise ContractError(
+            f"{option_text('library')} is a search: leave out {option_text('no-search')}"
+        )
     changes = {"steps": steps, "lens_rate": lens_rate, "seed": seed}
     overrides = {key: value for key, value in changes.items() if value is not None}
     schedule = replace(recipe.schedule, **overrides)  # type: ignore[arg-type]
+    starts = recipe.starts if library is None else replace(recipe.starts, library=library)
     return replace(
         recipe,
         schedule=schedule,
         prescription=prescription or recipe.prescription,
-        starts=recipe.starts if search else Starts(),
+        starts=starts if search else Starts(),
         descent=recipe.descent if search else None,
     )
 
@@ -260,4 +271,7 @@ def recipe_digest(recipe: DesignRecipe) -> str:
     if not recipe.network.start:  # designs from before there were first weights can go on
         for key in ("start", "start_size"):
             del table["network"][key]
+    if not recipe.starts.library:  # nor was there a library
+        for key in ("library", "library_lenses", "elements"):
+            del table["starts"][key]
     return table_digest(table)

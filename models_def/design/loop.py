@@ -99,6 +99,7 @@ class DesignParts:
         fabrication: Errors of the copies that captures are made with; the filter knows the
             nominal lens. None makes them with the lens itself.
         camera: In the place of `recorder` and `front`, where colours are restored together.
+        start: Name of the built-in lens that a search of the library chose; empty for another.
     """
 
     lens: DesignLens
@@ -109,6 +110,7 @@ class DesignParts:
     source: SceneSource
     fabrication: FabricationErrors | None = None
     camera: Camera | None = None
+    start: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

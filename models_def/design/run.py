@@ -12,7 +12,7 @@ from torch import Tensor, nn
 
 from camkit.models_def.design.assembly import parts_of
 from camkit.models_def.design.design_recipe import DesignRecipe, recipe_digest
-from camkit.models_def.design.loop import DesignLoop, Progress
+from camkit.models_def.design.loop import DesignLoop, DesignParts, Progress
 from camkit.models_def.design.run_files import RunFiles, RunOptions
 from camkit.models_def.design.starts import Starts
 from camkit.models_def.optics.lens_file.lens_file import write_lens
@@ -70,14 +70,27 @@ class DesignRun:
         # with a window of its own a checkpoint holds all that a search would find again
         holds_lens = self.files.resumes and recipe.pixels.kernel_px > 0
         begin_recipe = replace(recipe, starts=Starts(), descent=None) if holds_lens else recipe
-        parts = parts_of(begin_recipe, folder=options.recipe_folder, pictures=options.pictures)
+        start = ""
+        if holds_lens and recipe.starts.library:
+            table = self.files.read(recipe_digest(recipe), "steps", "lens_rate", "library")
+            start = table["start"]
+
+        def parts_at(start: str, at: DesignRecipe = begin_recipe) -> DesignParts:
+            return parts_of(
+                at, folder=options.recipe_folder, pictures=options.pictures, start=start
+            )
+
+        parts = parts_at(start)
+        leader = _shared_start(parts.start)
+        if leader != parts.start:
+            parts = parts_at(leader, replace(recipe, starts=Starts(), descent=None))
         _share_lens(parts.lens)
         self.loop = DesignLoop(parts, recipe.schedule)
-        looked = begin_recipe.starts.count or begin_recipe.descent
+        looked = begin_recipe.starts.searches or begin_recipe.descent
         searched = bool(looked and recipe.schedule.lens_rate)
         self.searched_s = self.files.stop() if searched else 0.0
         if self.files.resumes:
-            table = self.files.read(recipe_digest(recipe), "steps", "lens_rate")
+            table = self.files.read(recipe_digest(recipe), "steps", "lens_rate", "library")
             # a design from before there were waves goes on by rays
             by_rays = {"sharp": torch.zeros_like(parts.lens.state_dict()["sharp"])}
             parts.lens.load_state_dict(by_rays | table["lens"])
@@ -110,7 +123,7 @@ class DesignRun:
             "lost_light": moment.lost_light,
             "valid_rays": float(valid_share(lens.problem, lens.scaled().detach()[None])),
         }
-        state = {"lens": lens.state_dict(), **self.loop.state()}
+        state = {"lens": lens.state_dict(), "start": self.loop.parts.start, **self.loop.state()}
         self.files.record(recipe_digest(self.recipe), state, entry)
 
     def finish(self) -> dict[str, Any]:
@@ -122,6 +135,7 @@ class DesignRun:
         write_lens(replace(best_lens, name=self.recipe.name, note=note), self.lens_file)
         return {
             "name": self.recipe.name,
+            "start": self.loop.parts.start or self.recipe.prescription,
             "steps": self.loop.step,
             "psf_model": "waves" if bool(lens.state_dict()["sharp"].any()) else "rays",
             "begin_db": read_log(self.files.log)[0]["valid_db"],
@@ -143,6 +157,15 @@ def _join_workers() -> None:
     """Join the process group that torchrun describes; without one there is a single process."""
     if int(os.environ.get("WORLD_SIZE", "1")) > 1 and not torch.distributed.is_initialized():
         torch.distributed.init_process_group("nccl" if torch.cuda.is_available() else "gloo")
+
+
+def _shared_start(name: str) -> str:
+    """Return the name of the start of the first process."""
+    if not torch.distributed.is_initialized():
+        return name
+    names = [name]
+    torch.distributed.broadcast_object_list(names, 0)
+    return names[0]
 
 
 def _share_lens(lens: nn.Module) -> None:

@@ -5,20 +5,26 @@ rays are lost. Damped least squares on spots costs a fraction of a second a star
 soft numbers alike, and keeps the limits. So several lenses near the given one, or from all over the
 bounds, are improved by it first. The best spots are not the best recovered picture, so the design's
 own front end may judge the lenses with the best spots; the winner goes into the loop.
+
+With `library` the search begins at the lenses that camkit ships as well (`library`).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
+from camkit.models_def.design.library import Start, library_of, rank_starts
 from camkit.models_def.optics.pupil import half_disc
-from camkit.models_def.optics.search.improvement import improve
+from camkit.models_def.optics.search.improvement import Improvement, improve
 from camkit.models_def.optics.search.problem import Problem
 from camkit.models_def.optics.search.spot_residuals import MERITS, Merit
+
+T = TypeVar("T")
 
 _PUPIL_RAYS = 24
 
@@ -38,6 +44,9 @@ class Starts:
         scout_steps: Steps of damped least squares for each.
         dls_steps: Further steps for the best quarter.
         seed: Of the draws.
+        library: Whether the search begins at the built-in lenses too, scaled to the recipe.
+        library_lenses: How many of them go on, those with the best spots; they share the count.
+        elements: Of these lenses, cemented ones counted one by one; 0 for any.
     """
 
     count: int = 0
@@ -49,9 +58,14 @@ class Starts:
     scout_steps: int = 5
     dls_steps: int = 20
     seed: int = 1
+    library: bool = False
+    library_lenses: int = 4
+    elements: int = 0
 
     def __post_init__(self) -> None:
         least = min(self.count, self.scout_steps, self.dls_steps, self.judged, self.core_um)
+        if self.library_lenses < 1 or self.elements < 0:
+            raise ContractError(f"starts needs library_lenses >= 1 and elements >= 0; got {self}")
         if least < 0 or not (0 <= self.spread <= 1 and 0 <= self.anywhere <= 1):
             raise ContractError(
                 f"starts needs counts >= 0, core_um >= 0, spread and anywhere in 0..1; got {self}"
@@ -65,8 +79,15 @@ class Starts:
             )
 
     @property
+    def searches(self) -> bool:
+        """Return whether more than the given lens is looked at."""
+        return self.library or self.count > 0
+
+    @property
     def ends(self) -> int:
         """Return the number of descents that are finished."""
+        if self.library:
+            return self.library_lenses * (max(1, self.count // self.library_lenses // 4) + 1)
         return max(1, self.count // 4) + 1 if self.count else 0
 
 
@@ -84,21 +105,7 @@ def best_starts(problem: Problem, starts: Starts) -> Tensor:
     begin = problem.free.scaled()
     if starts.count == 0:
         return begin[None]
-    search = improve(
-        replace(
-            problem,
-            samples=half_disc(_PUPIL_RAYS),
-            merit=starts.merit,
-            core_mm=starts.core_um / 1000 or problem.core_mm,
-        ),
-        begin,
-        starts=starts.count,
-        spread=starts.spread,
-        anywhere=starts.anywhere,
-        scout_steps=starts.scout_steps,
-        steps=starts.dls_steps,
-        seed=starts.seed,
-    )
+    search = _improved(_search_of(problem, starts), begin, starts, starts.count)
     if not np.isfinite(search.merit):
         raise ContractError(
             f"none of {starts.count} starts near {problem.free.lens.name} forms an image; give "
@@ -108,9 +115,75 @@ def best_starts(problem: Problem, starts: Starts) -> Tensor:
     return formed[:1] if not starts.judged else torch.cat([formed[: starts.judged], begin[None]])
 
 
-def best_judged(lenses: Tensor, judge: Callable[[Tensor], float]) -> Tensor:
-    """Return the lens (variable,) of (start, variable) with the best score of a judge."""
-    if len(lenses) == 1:
-        return lenses[0]
-    marks = [judge(scaled) for scaled in lenses]
-    return lenses[int(np.nanargmax(marks))]
+def _search_of(problem: Problem, starts: Starts) -> Problem:
+    """Return the problem with the rays and the merit of the search for a start."""
+    return replace(
+        problem,
+        samples=half_disc(_PUPIL_RAYS),
+        merit=starts.merit,
+        core_mm=starts.core_um / 1000 or problem.core_mm,
+    )
+
+
+def _improved(search: Problem, begin: Tensor, starts: Starts, count: int) -> Improvement:
+    return improve(
+        search,
+        begin,
+        starts=count,
+        spread=starts.spread,
+        anywhere=starts.anywhere,
+        scout_steps=starts.scout_steps,
+        steps=starts.dls_steps,
+        seed=starts.seed,
+    )
+
+
+def library_starts(
+    problem: Problem, starts: Starts, *, omit: Sequence[str] = ()
+) -> tuple[Start, ...]:
+    """Return the starts that a search of the library found, best spots first.
+
+    Args:
+        problem: Of the recipe; its lens is one of the library where it has the wanted elements.
+        starts: How many are kept, and improved as a given lens is. The best comes back; where the
+            recovery judges, so many, and the lens of the recipe.
+        omit: Names of built-in lenses that are not looked at.
+
+    Raises:
+        ContractError: If no lens can serve, or none has finite spots.
+    """
+    library = library_of(problem, starts.elements, omit=omit)
+    search = _search_of(problem, starts)
+    best = rank_starts(library.starts, search, starts.scout_steps)[: starts.library_lenses]
+    if not best:
+        reasons = "; ".join(f"{name} {reason}" for name, reason in library.left_out.items())
+        raise ContractError(
+            f"no built-in lens serves as a start ({reasons}); search from the lens of the recipe"
+        )
+    ends: list[Start] = []
+    for start in best:
+        one = replace(search, free=start.problem.free)
+        search_ends = _improved(one, start.scaled, starts, max(1, starts.count // len(best)))
+        ends += [
+            replace(start, scaled=scaled, merit=merit)
+            for scaled, merit in zip(search_ends.ends, search_ends.merits, strict=True)
+        ]
+    ends.sort(key=lambda start: start.merit)
+    origins = [start for start in library.starts if not start.name]
+    return tuple(ends[: starts.judged] + origins if starts.judged else ends[:1])
+
+
+def found_starts(problem: Problem, starts: Starts) -> tuple[Start, ...]:
+    """Return the starts of a design, best spots first: of the library, or near the given lens."""
+    if starts.library:
+        return library_starts(problem, starts)
+    lenses = best_starts(problem, starts)
+    return tuple(Start(name="", problem=problem, scaled=scaled) for scaled in lenses)
+
+
+def best_judged(starts: Sequence[T], judge: Callable[[T], float]) -> T:
+    """Return the start with the best score of a judge."""
+    if len(starts) == 1:
+        return starts[0]
+    marks = [judge(start) for start in starts]
+    return starts[int(np.nanargmax(marks))]

@@ -45,6 +45,13 @@ def design(
         bool,
         typer.Option(help="Search the recipe's \\[starts] first, or start at the lens itself."),
     ] = True,
+    library: Annotated[
+        bool | None,
+        typer.Option(
+            "--library/--no-library",
+            help="Search from built-in lenses, scaled to the recipe, too; default: the recipe's.",
+        ),
+    ] = None,
     seed: Annotated[
         int | None,
         typer.Option(
@@ -79,10 +86,12 @@ def design(
         prescription=prescription,
         seed=seed,
         search=search,
+        library=library,
     )
-    searches = plan.starts.count and plan.schedule.lens_rate and not resume
+    searches = plan.starts.searches and plan.schedule.lens_rate and not resume
     if searches:
-        say(f"trying {plan.starts.count} starts", err=True)
+        places = " and the built-in lenses" if plan.starts.library else ""
+        say(f"trying {plan.starts.count} starts{places}", err=True)
     with working("trying starts" if searches else "reading the lens"):
         run = DesignRun(
             plan,
@@ -103,6 +112,8 @@ def design(
         )
     if run.searched_s:
         say(f"starts tried in {run.searched_s:.0f} s", err=True)
+    if plan.starts.library:
+        say(f"begins at {run.loop.parts.start or plan.prescription}", err=True)
     total = plan.schedule.steps
     with working(f"designing {plan.name}", total, unit="steps", writes_lines=True) as task:
         task.begin(run.loop.step)

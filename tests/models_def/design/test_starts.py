@@ -98,7 +98,7 @@ def test_starts_from_anywhere_leave_the_neighbourhood_and_keep_their_order(
 
 
 def test_the_judge_decides_among_the_best_spots() -> None:
-    lenses = torch.tensor([[0.1], [0.9], [0.4]])
+    lenses = list(torch.tensor([[0.1], [0.9], [0.4]]))
     assert best_judged(lenses, lambda scaled: -abs(float(scaled[0]) - 0.5)) == 0.4
     marks = {0.1: float("nan"), 0.9: 1.0, 0.4: 2.0}
     assert best_judged(lenses, lambda scaled: marks[round(float(scaled[0]), 1)]) == 0.4

@@ -52,3 +52,18 @@ def test_resume_and_overwrite_exclude_each_other(camkit_command, tmp_path: Path)
     outcome = camkit_command("design", recipe, "--resume", "--overwrite")
     assert outcome.code == 2
     assert "one of them" in outcome.err
+
+
+def test_a_search_of_the_library_says_where_it_begins(camkit_command, tmp_path: Path) -> None:
+    recipe, out = tmp_path / "tiny.toml", tmp_path / "out"
+    search = "[starts]\nelements = 2\nscout_steps = 1\ndls_steps = 1\nlibrary_lenses = 2\n"
+    recipe.write_text(RECIPE + search)
+    command = ("design", recipe, "--out-dir", out, "--steps", "2", "--library", "--json")
+    outcome = camkit_command(*command)
+    assert outcome.code == 0, outcome.err
+    start = json.loads(outcome.out)["start"]
+    assert start in {"duet", "duet-joint", "aca254-050-a", "lfov-start", "lfov-joint"}
+    assert f"begins at {start}" in outcome.err
+    refused = camkit_command("design", recipe, "--library", "--no-search")
+    assert refused.code == 2
+    assert "--library is a search: leave out --no-search" in refused.err
