@@ -84,14 +84,14 @@ def slopes_for_heights(lens: Lens, heights_mm: Tensor) -> Tensor:
         try:
             step = torch.full((1,), _SLOPE_DIFFERENCE, dtype=torch.float64)
             scale = chief_heights(lens, step)[0] / _SLOPE_DIFFERENCE
-            found = _corrected_slopes(lens, heights_mm, heights_mm / scale)
+            slopes = _corrected_slopes(lens, heights_mm, heights_mm / scale)
         except ContractError:
-            found = None
-        if found is None:
-            found = _corrected_slopes(lens, heights_mm, _followed_slopes(lens, heights_mm))
-    if found is None:
+            slopes = None
+        if slopes is None:
+            slopes = _corrected_slopes(lens, heights_mm, _followed_slopes(lens, heights_mm))
+    if slopes is None:
         raise ContractError(f"no field reaches the sensor heights {heights_mm.tolist()} mm")
-    return found
+    return slopes
 
 
 def _corrected_slopes(lens: Lens, heights_mm: Tensor, slopes: Tensor) -> Tensor | None:

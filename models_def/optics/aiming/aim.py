@@ -36,17 +36,17 @@ def aim(lens: Lens, tensors: SurfaceTensors, target: tuple[Tensor, Tensor], slop
         slope: tan of the field angle.
     """
     blank = torch.zeros_like(target[0] + slope)
-    wanted, slope = (target[0] + blank, target[1] + blank), slope + blank
+    points, slope = (target[0] + blank, target[1] + blank), slope + blank
     plane = not bool(tensors.curvature_per_mm[0].any()) and not tensors.aspheric[0]
     if lens.stop == 0 and plane:
-        return Aim(x=wanted[0], y=wanted[1], weight=torch.ones_like(blank))
+        return Aim(x=points[0], y=points[1], weight=torch.ones_like(blank))
     tensors = with_open_apertures(tensors)
     with torch.no_grad():
         count = target[0].shape[-1]
         if target[0].ndim == 1 and count >= MANY:
             return _mapped(lens, tensors, target, slope)
-        begin = _paraxial_begin(lens, tensors, wanted, slope)
-        return _settled(lens, tensors, wanted, slope, begin, _STEPS)
+        begin = _paraxial_begin(lens, tensors, points, slope)
+        return _settled(lens, tensors, points, slope, begin, _STEPS)
 
 
 def _mapped(
@@ -55,9 +55,9 @@ def _mapped(
     """Aim a few rays of each beam, and all others from where those foretell."""
     few = few_rays(len(target[0]))
     some = slope[..., few]
-    wanted = (target[0][few] + 0 * some, target[1][few] + 0 * some)
-    begin = _paraxial_begin(lens, tensors, wanted, some)
-    aimed = _settled(lens, tensors, wanted, some, begin, _STEPS)
+    points = (target[0][few] + 0 * some, target[1][few] + 0 * some)
+    begin = _paraxial_begin(lens, tensors, points, some)
+    aimed = _settled(lens, tensors, points, some, begin, _STEPS)
     begin = foretold(_rays_at_stop(lens, tensors, slope), target, few, aimed)
     return _settled(lens, tensors, target, slope, begin, (1, *_STEPS))
 
@@ -65,7 +65,7 @@ def _mapped(
 def _settled(
     lens: Lens,
     tensors: SurfaceTensors,
-    wanted: tuple[Tensor, Tensor],
+    points: tuple[Tensor, Tensor],
     slope: Tensor,
     begin: tuple[Tensor, Tensor],
     steps: tuple[int, ...],
@@ -75,26 +75,28 @@ def _settled(
     Args:
         lens: The prescription.
         tensors: The lens, its rims open.
-        wanted: On the stop.
+        points: On the stop.
         slope: Of the fields.
         begin: Launch points.
         steps: Of Newton's method; what it does not settle goes on apart from the others, with the
             next number of steps, and in the end from the chief ray outwards.
     """
     at_stop, length_mm = _rays_at_stop(lens, tensors, slope), lens_length_mm(lens)
-    found = newton_aim(at_stop, wanted, begin, steps=steps[0], length_mm=length_mm)
-    lost = found.weight == 0
-    if not bool(lost.any()):
-        return found
-    few = _of_rays(tensors, lost)
-    goal = (wanted[0].expand(lost.shape)[lost], wanted[1].expand(lost.shape)[lost])
-    slopes = slope.expand(lost.shape)[lost]
+    aimed_rays = newton_aim(at_stop, points, begin, steps=steps[0], length_mm=length_mm)
+    is_lost = aimed_rays.weight == 0
+    if not bool(is_lost.any()):
+        return aimed_rays
+    few = _of_rays(tensors, is_lost)
+    goal = (points[0].expand(is_lost.shape)[is_lost], points[1].expand(is_lost.shape)[is_lost])
+    slopes = slope.expand(is_lost.shape)[is_lost]
     if len(steps) > 1:
-        again = _settled(lens, few, goal, slopes, (found.x[lost], found.y[lost]), steps[1:])
+        second = _settled(
+            lens, few, goal, slopes, (aimed_rays.x[is_lost], aimed_rays.y[is_lost]), steps[1:]
+        )
     else:
-        again = _staged(lens, few, goal, slopes)
-    pairs = ((found.x, again.x), (found.y, again.y), (found.weight, again.weight))
-    x, y, weight = (values.masked_scatter(lost, better) for values, better in pairs)
+        second = _staged(lens, few, goal, slopes)
+    pairs = ((aimed_rays.x, second.x), (aimed_rays.y, second.y), (aimed_rays.weight, second.weight))
+    x, y, weight = (values.masked_scatter(is_lost, better) for values, better in pairs)
     return Aim(x=x, y=y, weight=weight)
 
 
@@ -135,29 +137,29 @@ def _of_rays(tensors: SurfaceTensors, mask: Tensor) -> SurfaceTensors:
 
 
 def _staged(
-    lens: Lens, tensors: SurfaceTensors, wanted: tuple[Tensor, Tensor], slope: Tensor
+    lens: Lens, tensors: SurfaceTensors, points: tuple[Tensor, Tensor], slope: Tensor
 ) -> Aim:
-    """Aim from the chief ray outwards; each stage begins where the two before it foretell."""
+    """Aim from the chief ray outwards; each stage begins where the two last it foretell."""
     at_stop, length_mm = _rays_at_stop(lens, tensors, slope), lens_length_mm(lens)
     y = -chief_path(lens).lead_at(slope) * slope
-    here = before = (torch.zeros_like(y), y)
+    here = last = (torch.zeros_like(y), y)
     for stage in _STAGES:
-        ahead = (2 * here[0] - before[0], 2 * here[1] - before[1])
-        goal = (stage * wanted[0], stage * wanted[1])
-        found = newton_aim(at_stop, goal, ahead, length_mm=length_mm)
-        before, here = here, (found.x, found.y)
-    return found
+        ahead = (2 * here[0] - last[0], 2 * here[1] - last[1])
+        goal = (stage * points[0], stage * points[1])
+        aimed_rays = newton_aim(at_stop, goal, ahead, length_mm=length_mm)
+        last, here = here, (aimed_rays.x, aimed_rays.y)
+    return aimed_rays
 
 
 def _paraxial_begin(
-    lens: Lens, tensors: SurfaceTensors, wanted: tuple[Tensor, Tensor], slope: Tensor
+    lens: Lens, tensors: SurfaceTensors, points: tuple[Tensor, Tensor], slope: Tensor
 ) -> tuple[Tensor, Tensor]:
     """Return where rays to the paraxial images of points of the stop start."""
     place, scale = (
         torch.nan_to_num(v, nan=0.0, posinf=0.0, neginf=0.0)
         for v in entrance_pupil(tensors, lens.stop)
     )
-    x, y, distance_mm = scale * wanted[0], scale * wanted[1], lens.object_distance_mm
+    x, y, distance_mm = scale * points[0], scale * points[1], lens.object_distance_mm
     if math.isinf(distance_mm):
         return x, y - place * slope
     share, top = distance_mm / (distance_mm + place), -slope * distance_mm

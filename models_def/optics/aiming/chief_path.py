@@ -76,11 +76,11 @@ def _walk(lens: Lens, tensors: SurfaceTensors) -> ChiefPath:
     step = _FIRST_STEP_DEG
     while fields[-1][0] < WIDEST_DEG and step > _SMALLEST_STEP_DEG:
         angle = min(fields[-1][0] + step, WIDEST_DEG)
-        found = _corrected(lens, tensors, angle, _foretold(fields, angle))
-        if found is None:
+        chief = _corrected(lens, tensors, angle, _foretold(fields, angle))
+        if chief is None:
             step /= 2
             continue
-        fields.append((angle, *found))
+        fields.append((angle, *chief))
         step = min(step * _GROWTH, _LARGEST_STEP_DEG)
     angles, leads, heights = np.array(fields).T
     return ChiefPath(angles_rad=np.radians(angles), lead_mm=leads, heights_mm=heights)
@@ -95,7 +95,7 @@ def _paraxial_lead_mm(lens: Lens, tensors: SurfaceTensors) -> float:
 
 
 def _foretold(fields: list[tuple[float, float, float]], angle: float) -> float:
-    """Continue the lead, an even function of the angle, along its last two values."""
+    """Return the lead of an angle, of which it is an even function, from its last two values."""
     if len(fields) == 1:
         return fields[0][1]
     (first, near, _), (last, far, _) = fields[-2:]
@@ -111,10 +111,10 @@ def _corrected(
     slopes = torch.full((2,), slope, dtype=torch.float64)
     for _ in range(_CORRECTIONS):
         y = torch.tensor([-lead_mm * slope, -lead_mm * slope + step], dtype=torch.float64)
-        seen: list[Rays] = []
+        on_surfaces: list[Rays] = []
         start = launch(torch.zeros_like(y), y, slopes, lens.object_distance_mm)
-        end = trace(tensors, start, surface_rays=seen)
-        here, ahead = seen[lens.stop].y.tolist()
+        end = trace(tensors, start, surface_rays=on_surfaces)
+        here, ahead = on_surfaces[lens.stop].y.tolist()
         gain = (ahead - here) / step
         if not bool(end.valid.all()) or flat_map(gain):
             return None

@@ -47,15 +47,17 @@ def foretold(
     """
     radius_mm = torch.hypot(*target).amax()
     basis, along_x, along_y = _bases(target[0] / radius_mm, target[1] / radius_mm)
-    known, rows = (aimed.weight > 0).to(torch.float64), basis[few]
-    normal = torch.einsum("rt,...r,rs->...ts", rows, known, rows)
+    is_known, rows = (aimed.weight > 0).to(torch.float64), basis[few]
+    normal = torch.einsum("rt,...r,rs->...ts", rows, is_known, rows)
     normal = normal + _RIDGE * torch.eye(rows.shape[-1], dtype=torch.float64)
-    right = torch.einsum("rt,...r,...rc->...tc", rows, known, torch.stack([aimed.x, aimed.y], -1))
+    right = torch.einsum(
+        "rt,...r,...rc->...tc", rows, is_known, torch.stack([aimed.x, aimed.y], -1)
+    )
     terms = torch.linalg.solve(normal, right)
 
-    def values(of: Tensor) -> tuple[Tensor, Tensor]:
+    def values(polynomials: Tensor) -> tuple[Tensor, Tensor]:
         # one product of two matrices, many times as fast as one for each beam
-        flat = of @ terms.reshape(-1, *terms.shape[-2:]).transpose(0, 1).flatten(1)
+        flat = polynomials @ terms.reshape(-1, *terms.shape[-2:]).transpose(0, 1).flatten(1)
         beams = flat.T.reshape(*terms.shape[:-2], 2, -1)
         return beams[..., 0, :], beams[..., 1, :]
 

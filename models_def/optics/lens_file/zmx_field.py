@@ -85,24 +85,26 @@ def with_field_points(
     else:
         heights = sorted({math.hypot(x, y) * mm_per_unit for x, y in points})
         if kind == FieldType.REAL_IMAGE_HEIGHT:
-            heights, notes = _reached(lens, heights)
+            heights, notes = _heights_within(lens, heights)
         angles = set(_angles_of_heights(lens, kind, heights))
-    within = sorted(angle for angle in angles if angle < to_radians(WIDEST_DEG))
-    if len(within) < len(angles):
-        names = ", ".join(f"{to_degrees(angle):.4g}" for angle in sorted(angles - set(within)))
+    angles_within = sorted(angle for angle in angles if angle < to_radians(WIDEST_DEG))
+    if len(angles_within) < len(angles):
+        names = ", ".join(
+            f"{to_degrees(angle):.4g}" for angle in sorted(angles - set(angles_within))
+        )
         note = f"fields at {names} degrees are left out: camkit aims rays up to {WIDEST_DEG}"
         notes = (*notes, note)
-    return replace(lens, field_angles_rad=tuple(within or [0.0])), notes
+    return replace(lens, field_angles_rad=tuple(angles_within or [0.0])), notes
 
 
 def _reached(lens: Lens, heights_mm: list[float]) -> tuple[list[float], tuple[str, ...]]:
     """Return the image heights to which the lens can be aimed, and a note on the others."""
     path = chief_path(lens)
     widest_mm = float(path.heights_mm.max())
-    beyond = [height for height in heights_mm if height > widest_mm]
-    if not beyond:
+    heights_beyond = [height for height in heights_mm if height > widest_mm]
+    if not heights_beyond:
         return heights_mm, ()
-    names = ", ".join(f"{height:g} mm" for height in beyond)
+    names = ", ".join(f"{height:g} mm" for height in heights_beyond)
     note = f"fields at {names} are left out: the lens is aimed to {path.reach}"
     return [height for height in heights_mm if height <= widest_mm] or [0.0], (note,)
 

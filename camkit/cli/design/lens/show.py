@@ -54,7 +54,7 @@ def show(
     from camkit.report.pages.lens.lens_page import write_lens_page
     from camkit.report.pages.page import page_path
 
-    given = Pupil(definition=pupil or "stop", sampling=sampling)  # type: ignore[arg-type]
+    pupil_rays = Pupil(definition=pupil or "stop", sampling=sampling)  # type: ignore[arg-type]
     folder, name = out_dir if out_dir is not None or json_ else Path(), file.stem
     if folder is not None and folder.suffix.lower() == PAGE and not folder.is_dir():
         folder, name = folder.parent, folder.stem
@@ -62,7 +62,7 @@ def show(
         refuse_existing([page_path(folder, name)], overwrite=overwrite)
     lens, notes = read_noted_lens(file, glass or (), catalogue)
     with working(f"measuring {lens.name}"):
-        facts = analyse(lens, given if pupil else usual_pupil(lens, sampling), notes)
+        facts = analyse(lens, pupil_rays if pupil else usual_pupil(lens, sampling), notes)
     with working("drawing the page"):
         written = [] if folder is None else write_lens_page(facts, folder, name)
     if json_:
