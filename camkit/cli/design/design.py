@@ -61,7 +61,7 @@ def design(
     pictures: Annotated[
         int,
         typer.Option(
-            min=0, help="Draw lens, PSFs and a restored patch every N steps; 0 draws nothing."
+            min=0, help="Draw lens, PSFs and patches every N steps (at validations) and at the end."
         ),
     ] = 0,
     threads: Annotated[int, typer.Option(min=1, help="Number of torch threads.")] = 1,
@@ -114,17 +114,26 @@ def design(
         say(f"starts tried in {run.searched_s:.0f} s", err=True)
     if plan.starts.library:
         say(f"begins at {run.loop.parts.start or plan.prescription}", err=True)
-    total = plan.schedule.steps
+    total, drawn_step = plan.schedule.steps, run.loop.step
     with working(f"designing {plan.name}", total, unit="steps", writes_lines=True) as task:
         task.begin(run.loop.step)
         for moment in run.go():
             task.count(moment.step)
             say(_line(moment) + left_text(task), err=True)
-            if pictures and run.leads and moment.step % pictures == 0:
+            if pictures and run.leads and is_picture_due(moment.step, drawn_step, pictures, total):
                 _draw(run, moment)
+                drawn_step = moment.step
     if run.leads:
         report = run.finish()
         say(json.dumps(report) if json_ else _text(report))
+
+
+def is_picture_due(step: int, drawn_step: int, every: int, total: int) -> bool:
+    """Return whether a multiple of `every` lies beyond the last picture, or the run ends.
+
+    Moments come at validations, so a picture may come some steps late, but none is left out.
+    """
+    return step // every > drawn_step // every or step == total
 
 
 def _line(moment: "Progress") -> str:
@@ -139,7 +148,9 @@ def _line(moment: "Progress") -> str:
 def _draw(run: "DesignRun", moment: "Progress") -> None:
     from camkit.report.pages.lens.design_picture import draw_design
 
-    draw_design(run.view(), run.options.out_dir / f"{run.recipe.name}_{moment.step:06}.png")
+    path = run.options.out_dir / f"{run.recipe.name}_{moment.step:06}.png"
+    draw_design(run.view(), path)
+    say(str(path), err=True)
 
 
 def _text(report: dict[str, Any]) -> str:

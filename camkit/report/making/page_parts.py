@@ -57,4 +57,4 @@ def seconds_of(bundle: Bundle) -> dict[str, float]:
 
 def layout_of(path: Path) -> bytes:
     """Return the drawing of a lens as PNG."""
-    return to_png(draw_layout(analyse(read_lens(path), Pupil())))
+    return to_png(draw_layout(analyse(read_lens(path), Pupil(), image=False)))

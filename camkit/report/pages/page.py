@@ -261,6 +261,7 @@ def write_page(
     for chart, draw in charts.items():
         figure = draw()
         pictures[chart] = to_svg(figure)
+        figure.set_layout_engine("none")  # all has its place: finding it again takes as long
         files[folder / f"{name}-{chart}.svg"] = pictures[chart].encode()
         files[folder / f"{name}-{chart}.png"] = to_png(figure)
     whole = {page_path(folder, name): to_html(page(pictures)).encode(), **files}

@@ -139,7 +139,7 @@ def _of_rays(tensors: SurfaceTensors, mask: Tensor) -> SurfaceTensors:
 def _staged(
     lens: Lens, tensors: SurfaceTensors, points: tuple[Tensor, Tensor], slope: Tensor
 ) -> Aim:
-    """Aim from the chief ray outwards; each stage begins where the two last it foretell."""
+    """Aim from the chief ray outwards; each stage begins where the two before it foretell."""
     at_stop, length_mm = _rays_at_stop(lens, tensors, slope), lens_length_mm(lens)
     y = -chief_path(lens).lead_at(slope) * slope
     here = last = (torch.zeros_like(y), y)

@@ -13,6 +13,8 @@ In the order in which data flows (every result states its pupil, see `camkit...o
 - `pupil_fit`: few rays over the pupil, as polynomials
 - `wave_kernels`: the light of waves in the tents of pixels
 - `lens_waves`: the wave PSF of a lens, as `psf` is that of its rays
+- `point_image`: the diffraction image of a field: its light, Strehl ratio, encircled energy
+- `fans`: transverse aberrations and OPD along two lines through the pupil
 - `mtf`: contrast from rays or from a PSF, and its diffraction limit
 - `psf_model`: the one rule by which a lens takes rays or waves
 - `model_psf`: the PSF of a lens by the model that it takes

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from camkit.models_def.optics.aiming.start import with_open_apertures
-from camkit.models_def.optics.analysis.sampling import Pupil, sample_weights
+from camkit.models_def.optics.analysis.sampling import Pupil, pupil_samples, sample_weights
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import (
@@ -25,6 +25,7 @@ from camkit.models_def.optics.pupil import (
 )
 from camkit.models_def.optics.spot import Spots, rms_radius
 from camkit.models_def.optics.trace import (
+    Fate,
     Rays,
     SurfaceTensors,
     refract,
@@ -35,7 +36,7 @@ from camkit.models_def.optics.trace import (
 _EDGE_SLACK: Final = 1e-7
 CONVERGENCE_SAMPLINGS: Final = (
     *("hexapolar:3", "hexapolar:6", "hexapolar:12", "hexapolar:24"),
-    *("gauss:4x8", "gauss:8x16", "gauss:16x32"),
+    *("gauss:4x8", "gauss:8x16", "gauss:16x32", "fibonacci:2048", "fibonacci:8192"),
 )
 
 
@@ -205,10 +206,24 @@ class Convergence:
 def spot_convergence(lens: Lens, slopes: Tensor, definition: PupilDefinition) -> Convergence:
     """Trace the spots of the fields with coarse and fine samplings of the pupil."""
     wave = torch.tensor([lens.reference_wavelength_um], dtype=torch.float64)
-    pupils = [Pupil(definition=definition, sampling=name) for name in CONVERGENCE_SAMPLINGS]
-    rms = [rms_about_centroid(spot_diagram(lens, slopes, wave, pupil))[:, 0] for pupil in pupils]
-    return Convergence(
-        samplings=CONVERGENCE_SAMPLINGS,
-        rays=tuple(len(pupil.samples.x) for pupil in pupils),
-        rms_mm=torch.stack(rms),
-    )
+    pupils = [pupil_samples(name) for name in CONVERGENCE_SAMPLINGS]
+    counts = [len(samples.x) for samples in pupils]
+    # all are aimed at once, which takes as long as one of them
+    joint = PupilSamples(x=torch.cat([s.x for s in pupils]), y=torch.cat([s.y for s in pupils]))
+    beams = launch_beams(lens, slopes, wave, joint, definition)
+    landings = trace(beams.tensors, beams.rays)
+    places = (torch.split(values, counts, dim=-1) for values in (landings.x, landings.y))
+    fates = torch.split(landings.fate, counts, dim=-1)
+    rms = [
+        rms_about_centroid(
+            Spots(
+                x_mm=x,
+                y_mm=y,
+                weight=torch.where(fate == Fate.VALID, sample_weights(samples), 0.0),
+                chief_y_mm=torch.zeros_like(slopes),
+                fate=fate,
+            )
+        )[:, 0]
+        for x, y, fate, samples in zip(*places, fates, pupils, strict=True)
+    ]
+    return Convergence(samplings=CONVERGENCE_SAMPLINGS, rays=tuple(counts), rms_mm=torch.stack(rms))

@@ -97,7 +97,7 @@ def with_field_points(
     return replace(lens, field_angles_rad=tuple(angles_within or [0.0])), notes
 
 
-def _reached(lens: Lens, heights_mm: list[float]) -> tuple[list[float], tuple[str, ...]]:
+def _heights_within(lens: Lens, heights_mm: list[float]) -> tuple[list[float], tuple[str, ...]]:
     """Return the image heights to which the lens can be aimed, and a note on the others."""
     path = chief_path(lens)
     widest_mm = float(path.heights_mm.max())

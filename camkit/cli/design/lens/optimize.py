@@ -69,13 +69,14 @@ def optimize(
     )
     from camkit.models_def.optics.search.improvement import improve
     from camkit.models_def.optics.search.own_frame import in_own_frame, too_small_rims
+    from camkit.models_def.torch_threads import one_torch_thread
 
     ready_for_lens(out)
     lens, read_notes = read_noted_lens(source, glass or (), catalogue)
     problem = _problem(lens, vary, merit=merit, core_mm=core_um / 1000, rays=rays)
     begin = problem.free.scaled()
     problem = in_own_frame(problem, begin)
-    with working(f"improving {lens.name}"):
+    with one_torch_thread(), working(f"improving {lens.name}"):
         result = improve(problem, begin, starts=starts, spread=spread, steps=steps, seed=seed)
     better = problem.free.lens_at(result.scaled)
     write_lens(better, out)

@@ -23,12 +23,13 @@ def show(
         ),
     ] = None,
     sampling: Annotated[
-        str,
+        str | None,
         typer.Option(
             help="Pupil sampling: hexapolar:RINGS, gauss:RxA, radau:RxA, grid:SIDE or "
-            "fibonacci:RAYS."
+            "fibonacci:RAYS.",
+            show_default="the first that has converged",
         ),
-    ] = "hexapolar:6",
+    ] = None,
     out_dir: Annotated[
         Path | None,
         typer.Option(
@@ -41,30 +42,35 @@ def show(
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Draw and measure a lens: layout, spots, MTF, curves, Seidel sums (needs torch).
+    """Draw and measure a lens: layout, spots, fans, PSFs, MTF, curves, sums (needs torch).
 
     Without -o and --json NAME.html and its pictures are written to the current folder.
     """
     from camkit.cli.design.design_time import refuse_existing, require_torch
 
     require_torch("camkit lens show")
-    from camkit.models_def.optics.analysis.sampling import Pupil
+    from camkit.models_def.optics.analysis.sampling import DEFAULT_SAMPLING, Pupil
     from camkit.models_def.optics.lens_file.lens_file import read_noted_lens
-    from camkit.report.pages.lens.lens_facts import analyse, to_json, usual_pupil
+    from camkit.models_def.torch_threads import one_torch_thread
+    from camkit.report.pages.lens.lens_facts import analyse
+    from camkit.report.pages.lens.lens_json import to_json
     from camkit.report.pages.lens.lens_page import write_lens_page
+    from camkit.report.pages.lens.lens_pupil import choose_pupil
     from camkit.report.pages.page import page_path
 
-    pupil_rays = Pupil(definition=pupil or "stop", sampling=sampling)  # type: ignore[arg-type]
+    asked_pupil = Pupil(definition=pupil or "stop", sampling=sampling or DEFAULT_SAMPLING)  # type: ignore[arg-type]
     folder, name = out_dir if out_dir is not None or json_ else Path(), file.stem
     if folder is not None and folder.suffix.lower() == PAGE and not folder.is_dir():
         folder, name = folder.parent, folder.stem
     if folder is not None:
         refuse_existing([page_path(folder, name)], overwrite=overwrite)
     lens, notes = read_noted_lens(file, glass or (), catalogue)
-    with working(f"measuring {lens.name}"):
-        facts = analyse(lens, pupil_rays if pupil else usual_pupil(lens, sampling), notes)
-    with working("drawing the page"):
-        written = [] if folder is None else write_lens_page(facts, folder, name)
+    with one_torch_thread():
+        with working(f"measuring {lens.name}"):
+            choice = choose_pupil(lens, asked_pupil.definition if pupil else None, sampling)
+            facts = analyse(lens, choice, notes)
+        with working("drawing the page"):
+            written = [] if folder is None else write_lens_page(facts, folder, name)
     if json_:
         say(json.dumps(to_json(facts), allow_nan=False))
         return

@@ -32,7 +32,7 @@ def _draw_view(view: DesignView) -> Figure:
     rows = len(view.patches[0])
     figure = new_figure(10, 3.2 + 1.6 + 1.9 * len(_TITLES))
     grid = figure.add_gridspec(2 + len(_TITLES), 1, height_ratios=[3.2, 1.6, *[1.9] * len(_TITLES)])
-    draw_layout_on(figure.add_subplot(grid[0]), analyse(view.lens, Pupil()))
+    draw_layout_on(figure.add_subplot(grid[0]), analyse(view.lens, Pupil(), image=False))
     fields = view.kernels.shape[1]
     fields_shown = sorted({round(i * (fields - 1) / (_PSFS - 1)) for i in range(_PSFS)})
     cells = grid[1].subgridspec(1, len(fields_shown))

@@ -122,9 +122,10 @@ def _draw_glass(panel: Panel, lens: Lens, heights: list[float], vertices: list[f
         if len(edges) == 2:
             (z1, y1), (z2, y2) = edges
             high = max(float(y1[-1]), float(y2[-1]))
-            outline_z = torch.cat([z1, z1[-1:], z2[-1:], z2.flip(0), z2[:1], z1[:1]])
+            # round the glass and back to where it began
+            outline_z = torch.cat([z1, z1[-1:], z2[-1:], z2.flip(0), z2[:1], z1[:1], z1[:1]])
             rims = torch.tensor([high, high, -high, -high], dtype=torch.float64)
-            outline_y = torch.cat([y1, rims[:2], y2.flip(0), rims[2:]])
+            outline_y = torch.cat([y1, rims[:2], y2.flip(0), rims[2:], y1[:1]])
             if poses:
                 outline_z, outline_y = _stood(poses[i], outline_z, outline_y, vertices[i])
             panel.fill(outline_z, outline_y, color=_GLASS_COLOR, zorder=1)

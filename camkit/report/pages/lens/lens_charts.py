@@ -20,26 +20,23 @@ from camkit.models_def.optics.analysis.mtf import (
     geometric_mtf,
     mtf_of_psf,
 )
+from camkit.models_def.optics.analysis.point_image import RIM_SAMPLING
 from camkit.models_def.optics.analysis.sampling import Pupil, pupil_samples
 from camkit.models_def.optics.analysis.spots import spot_diagram
-from camkit.models_def.optics.analysis.wave_psf import (
-    irradiance_per_mm2,
-    pupil_for_reach,
-    widest_aperture,
-)
+from camkit.models_def.optics.analysis.wave_psf import widest_aperture
 from camkit.models_def.optics.analysis.wavefront import trace_wavefront
 from camkit.models_def.optics.render.illumination import relative_illumination_of
+from camkit.models_def.optics.spot import Spots
 from camkit.report.figure import MARKS, Figure, Panel, chart, field_color, new_figure, wave_color
+from camkit.report.pages.lens.left_out import left_out_text, say_left_out
 from camkit.report.pages.lens.lens_facts import LensFacts
 from camkit.units import UM_PER_MM, to_degrees
 
 COLUMNS = 5
 MAX_CYCLES_PER_MM: Final = 100.0
 _FREQUENCIES: Final = 101
-_RIM_SAMPLING: Final = "hexapolar:10"
+_MOST_DOTS: Final = 600
 _DENSE_SAMPLING: Final = "gauss:24x48"
-_WINDOW_AIRY: Final = 6.0
-_SAMPLES_PER_CUTOFF: Final = 3.0
 _POINTS: Final = 25
 _LIGHT_POINTS: Final = 13
 _OF_FIELD: Final = (
@@ -59,49 +56,61 @@ _SUMS: Final = {
 @chart
 def draw_spots(facts: LensFacts) -> Figure:
     """Draw the spots about the chief ray of the reference wavelength, with the Airy circle."""
-    fields = len(facts.lens.field_angles_rad)
-    columns = min(COLUMNS, max(fields, 1))
-    rows = math.ceil(fields / columns)
-    reach_um = float(torch.nan_to_num(facts.max_mm).max()) * UM_PER_MM
-    reach_um = 1.1 * max(reach_um, 1.5 * float(facts.airy_mm.max()) * UM_PER_MM, 1e-3)
+    numbers = facts.lit_fields()
+    columns = min(COLUMNS, max(len(numbers), 1))
+    rows = math.ceil(len(numbers) / columns)
+    largest = facts.max_mm[numbers]
+    reach_um = float(torch.nan_to_num(largest).max()) * UM_PER_MM if numbers else 0.0
+    airy_um = (
+        float(torch.where(torch.isfinite(facts.airy_mm), facts.airy_mm, 0.0).max()) * UM_PER_MM
+    )
+    reach_um = 1.1 * max(reach_um, 1.5 * airy_um, 1e-3)
     figure = new_figure(max(2.6 * columns, 5.2), 3.0 * rows + 0.5)
-    for i in range(fields):
-        panel = figure.add_subplot(rows, columns, i + 1)
-        _draw_spot(panel, facts, i, reach_um)
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=6)
+    spots = _drawn_spots(facts)
+    for place, i in enumerate(numbers):
+        panel = figure.add_subplot(rows, columns, place + 1)
+        _draw_spot(panel, facts, spots, i, reach_um)
+        panel.label_outer(remove_inner_ticks=True)
+    if numbers:
+        handles, labels = figure.axes[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper center", ncols=6)
+    say_left_out(figure, facts, "µm" if numbers else "")
     return figure
 
 
-def _draw_spot(panel: Panel, facts: LensFacts, field: int, reach_um: float) -> None:
+def _drawn_spots(facts: LensFacts) -> Spots:
+    """Return the spots that are drawn: those of the numbers, or fewer rays to their rim."""
+    if len(facts.pupil.samples.x) <= _MOST_DOTS:
+        return facts.spots
+    pupil = Pupil(definition=facts.pupil.definition, sampling=RIM_SAMPLING)
+    return spot_diagram(facts.lens, facts.slopes, facts.wavelengths_um, pupil)
+
+
+def _draw_spot(panel: Panel, facts: LensFacts, spots: Spots, field: int, reach_um: float) -> None:
     from matplotlib.patches import Circle
 
-    spots = facts.spots
     angle = to_degrees(facts.lens.field_angles_rad[field])
     for j, wave in enumerate(facts.lens.wavelengths_um):
         alive = spots.weight[field, j] > 0
         x = spots.x_mm[field, j][alive] * UM_PER_MM
         y = (spots.y_mm[field, j][alive] - spots.chief_y_mm[field]) * UM_PER_MM
         mark = MARKS[j % len(MARKS)]
-        size = 9 if len(x) < 400 else 3
-        panel.scatter(
+        panel.plot(
             x.detach(),
             y.detach(),
-            s=size,
-            marker=mark,
-            linewidths=0.6,
-            facecolors="none" if mark == "o" else wave_color(wave),
-            edgecolors=wave_color(wave) if mark in "os^d" else None,
+            mark,
+            markersize=3 if len(x) < 400 else 1.8,
+            markeredgewidth=0.6,
+            markerfacecolor="none",
+            color=wave_color(wave),
             label=f"{wave:.4g} µm",
         )
-    reference_um = facts.lens.reference_wavelength_um
-    nearest = min(
-        range(len(facts.lens.wavelengths_um)),
-        key=lambda j: abs(facts.lens.wavelengths_um[j] - reference_um),
-    )
+    nearest = facts.nearest_wavelength
     radius = float(facts.airy_mm[nearest]) * UM_PER_MM
     if math.isfinite(radius):
-        circle = Circle((0, 0), radius, fill=False, color="black", linewidth=0.8, label="Airy disc")
+        circle = Circle(
+            (0, 0), radius, fill=False, color="black", linewidth=0.8, label="Airy disc", zorder=3
+        )
         panel.add_patch(circle)
     rms = float(facts.rms_mm[field, nearest]) * UM_PER_MM
     text = "no light" if math.isnan(rms) else f"RMS {rms:.4g} µm"
@@ -110,36 +119,59 @@ def _draw_spot(panel: Panel, facts: LensFacts, field: int, reach_um: float) -> N
         xlim=(-reach_um, reach_um),
         ylim=(-reach_um, reach_um),
         aspect="equal",
-        xlabel="µm",
     )
 
 
 @chart
 def draw_mtf(facts: LensFacts) -> Figure:
-    """Draw contrast, by waves or by rays times the diffraction limit, as the lens needs."""
-    cycles, regime, mtf, limit = trace_mtf(facts)
+    """Draw contrast, by waves or by rays times the diffraction limit, as each field needs."""
+    numbers = facts.drawn_fields()
     figure = new_figure(9.5, 3.9)
     panel = figure.add_subplot()
-    for i in facts.drawn_fields():
-        color, label = field_color(i), f"{to_degrees(facts.lens.field_angles_rad[i]):.4g}°"
-        panel.plot(cycles, mtf.tangential[i], color=color, label=f"{label} tangential")
-        panel.plot(cycles, mtf.sagittal[i], "--", color=color, label=f"{label} sagittal")
-    first, last = limit.tangential[0], limit.tangential[-1]
-    panel.plot(cycles, first, color="black", linewidth=1.4, label="limit, first field")
-    if len(facts.lens.field_angles_rad) > 1:
-        panel.plot(cycles, last, color="#777777", label="limit, last field, tangential")
-    panel.set(xlim=(0, float(cycles[-1])), ylim=(0, 1.02), xlabel="cycles/mm", ylabel="contrast")
-    words = {"waves": "diffraction PSF", "rays": "rays times diffraction limit"}
-    panel.set_title(f"{words[regime]}, all wavelengths with equal weight", loc="left")
+    if numbers:
+        cycles, mtf, limit = trace_mtf(facts, numbers)
+        _draw_contrast(panel, facts, numbers, (cycles, mtf, limit))
+        panel.set(xlim=(0, float(cycles[-1])))
+    assert facts.image is not None
+    by_rays = [
+        f"{to_degrees(facts.lens.field_angles_rad[i]):.4g}°"
+        for i in numbers
+        if facts.image.images[i] is None
+    ]
+    how = "diffraction PSF" if len(by_rays) < len(numbers) else "rays times diffraction limit"
+    if by_rays and len(by_rays) < len(numbers):
+        how += f" (rays times limit: {', '.join(by_rays)})"
+    panel.set(ylim=(0, 1.02), ylabel="contrast")
+    panel.set_xlabel("\n".join(filter(None, ("cycles/mm", left_out_text(facts)))))
+    panel.set_title(f"{how}, all wavelengths with equal weight", loc="left")
     panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
 
 
-def trace_mtf(facts: LensFacts) -> tuple[Tensor, str, Mtf, Mtf]:
-    """Return frequencies in cycles/mm, the model used, the contrast and its diffraction limit."""
-    lens, waves = facts.lens, facts.wavelengths_um
-    definition = facts.pupil.definition
-    rim = trace_wavefront(lens, facts.slopes, waves, pupil_samples(_RIM_SAMPLING), definition)
+def _draw_contrast(
+    panel: Panel, facts: LensFacts, numbers: list[int], curves: tuple[Tensor, Mtf, Mtf]
+) -> None:
+    cycles, mtf, limit = curves
+    for row, i in enumerate(numbers):
+        color, label = field_color(i), f"{to_degrees(facts.lens.field_angles_rad[i]):.4g}°"
+        panel.plot(cycles, mtf.tangential[row], color=color, label=f"{label} tangential")
+        panel.plot(cycles, mtf.sagittal[row], "--", color=color, label=f"{label} sagittal")
+    first, last = limit.tangential[0], limit.tangential[-1]
+    panel.plot(cycles, first, color="black", linewidth=1.4, label="limit, first field")
+    if len(numbers) > 1:
+        panel.plot(cycles, last, color="#777777", label="limit, last field, tangential")
+
+
+def trace_mtf(facts: LensFacts, numbers: list[int]) -> tuple[Tensor, Mtf, Mtf]:
+    """Return frequencies in cycles/mm, the contrast of some lit fields and its diffraction limit.
+
+    A field whose image was summed by waves has the contrast of that; of others it is that of the
+    rays times the limit.
+    """
+    lens, waves, image = facts.lens, facts.wavelengths_um, facts.image
+    assert image is not None
+    slopes, definition = facts.slopes[numbers], facts.pupil.definition
+    rim = trace_wavefront(lens, slopes, waves, pupil_samples(RIM_SAMPLING), definition)
     try:
         cutoff = 2 * widest_aperture(rim) * UM_PER_MM / float(waves.min())
     except ContractError:
@@ -147,32 +179,19 @@ def trace_mtf(facts: LensFacts) -> tuple[Tensor, str, Mtf, Mtf]:
     top = min(MAX_CYCLES_PER_MM, cutoff)
     cycles = torch.linspace(0, top, _FREQUENCIES, dtype=torch.float64)
     limit = diffraction_limit(rim, cycles)
-    if facts.model.regime == "waves" and math.isfinite(cutoff):
-        try:
-            return cycles, "waves", _wave_mtf(facts, cycles, cutoff), limit
-        except ContractError:
-            pass  # too wide a blur at another field: rays times the limit serve all
     pupil = Pupil(definition=definition, sampling=_DENSE_SAMPLING)
-    rays = geometric_mtf(spot_diagram(lens, facts.slopes, waves, pupil), cycles)
-    return cycles, "rays", rays.times(limit), limit
-
-
-def _wave_mtf(facts: LensFacts, cycles: Tensor, cutoff: float) -> Mtf:
-    """Sum the diffraction PSF over a window of some Airy radii beyond the widest spot."""
-    lens, waves = facts.lens, facts.wavelengths_um
-    airy = float(facts.airy_mm.max())
-    spread = float(torch.nan_to_num(facts.max_mm).max())
-    half = spread + _WINDOW_AIRY * airy
-    shortest = float(waves.min())
-    aperture = cutoff * shortest / UM_PER_MM / 2
-    samples = pupil_for_reach(math.sqrt(2) * half, shortest, aperture)
-    side = 2 * math.ceil(half * cutoff * _SAMPLES_PER_CUTOFF / 2) + 1
-    place = torch.linspace(-half, half, side, dtype=torch.float64)
-    pitch_mm = float(place[1] - place[0])
-    wavefront = trace_wavefront(lens, facts.slopes, waves, samples, facts.pupil.definition)
-    light = irradiance_per_mm2(wavefront, place, place)
-    whole = torch.full(light.shape[:2], pitch_mm**-2, dtype=torch.float64)
-    return mtf_of_psf(light, pitch_mm * UM_PER_MM, cycles, whole)
+    rays = geometric_mtf(spot_diagram(lens, slopes, waves, pupil), cycles).times(limit)
+    tangential, sagittal = list(rays.tangential), list(rays.sagittal)
+    for row, field in enumerate(numbers):
+        image_here = image.images[field]
+        if image_here is None:
+            continue
+        whole = torch.full((1, len(waves)), image_here.pitch_mm**-2, dtype=torch.float64)
+        pitch_um = image_here.pitch_mm * UM_PER_MM
+        contrast = mtf_of_psf(image_here.light_per_mm2[None], pitch_um, cycles, whole)
+        tangential[row], sagittal[row] = contrast.tangential[0], contrast.sagittal[0]
+    both = Mtf(tangential=torch.stack(tangential), sagittal=torch.stack(sagittal))
+    return cycles, both, limit
 
 
 @chart
@@ -212,7 +231,7 @@ def _draw_light(panel: Panel, facts: LensFacts, largest_rad: float) -> None:
         light = relative_illumination_of(facts.lens, torch.tan(few), reference)[:, 0]
     except ContractError:
         light = torch.full_like(few, math.nan)
-    panel.plot(torch.rad2deg(few), light, color="#333333")
+    panel.plot(torch.rad2deg(few), light, color="#333333", label="lens")
     cos4 = torch.cos(few) ** 4
     panel.plot(torch.rad2deg(few), cos4, color="#999999", linestyle=":", label="cos$^4$")
     panel.set(

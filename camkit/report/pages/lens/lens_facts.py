@@ -1,9 +1,9 @@
-"""Everything that is computed about a lens, and its JSON."""
+"""Everything that is computed about a lens."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, TypeVar
+from typing import TypeVar
 
 import torch
 from torch import Tensor
@@ -12,6 +12,7 @@ from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.models_def.optics.aiming.chief_path import chief_path
 from camkit.models_def.optics.analysis.curves import distortion
+from camkit.models_def.optics.analysis.fans import Fans, trace_fans
 from camkit.models_def.optics.analysis.first_order import airy_radius_mm
 from camkit.models_def.optics.analysis.psf_model import PsfModel, psf_model
 from camkit.models_def.optics.analysis.sampling import Pupil, disc_quadrature
@@ -21,25 +22,27 @@ from camkit.models_def.optics.analysis.spots import (
     chief_landings,
     field_slopes,
     max_from_chief,
-    paraxial_pupil_misses,
     rms_about_centroid,
     rms_about_chief,
-    spot_convergence,
     spot_diagram,
 )
 from camkit.models_def.optics.analysis.wavefront import trace_wavefront, wavefront_rms_um
 from camkit.models_def.optics.paraxial import Paraxial, paraxial_data
-from camkit.models_def.optics.prescription import Lens, grooves_of
+from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import real_stop_radius_mm
 from camkit.models_def.optics.render.illumination import relative_illumination_of
 from camkit.models_def.optics.spot import Spots
 from camkit.models_def.optics.trace import Fate, count_fates
+from camkit.report.pages.lens.lens_image import LensImage, image_of
+from camkit.report.pages.lens.lens_pupil import (
+    PupilChoice,
+    given_pupil,
+    sampling_note,
+    wrong_pupil,
+)
 from camkit.units import to_degrees
 
 Fact = TypeVar("Fact")
-
-WRONG_PUPIL: Final = 0.2
-"""Shares of the stop's radius by which the paraxial pupil may miss its middle."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,7 +51,7 @@ class LensFacts:
 
     Attributes:
         lens: The prescription.
-        pupil: By which everything is traced.
+        choice: The pupil by which everything is traced, and why; RMS radii by sampling.
         paraxial: First-order data of the reference wavelength.
         real_stop_mm: Height of the real marginal ray at the stop; None if it is lost.
         airy_mm: (wavelength,).
@@ -61,13 +64,15 @@ class LensFacts:
         illumination: 1 on the axis.
         wavefront_um: RMS, mean and tilt taken out.
         seidel: None if it has none.
-        convergence: RMS radii with coarse and fine sampling.
         model: Which PSF the lens needs.
+        image: The image of a point over the field; None if it was not asked for.
+        fans: Two lines of rays through the pupil; None if they were not asked for.
+        reasons: Why a fact is missing, by the name of the fact.
         notes: What was left out of the file, what could not be computed and why, for people.
     """
 
     lens: Lens
-    pupil: Pupil
+    choice: PupilChoice
     paraxial: Paraxial
     real_stop_mm: float | None
     airy_mm: Tensor
@@ -80,9 +85,21 @@ class LensFacts:
     illumination: Tensor
     wavefront_um: Tensor
     seidel: Seidel | None
-    convergence: Convergence
     model: PsfModel
+    image: LensImage | None
+    fans: Fans | None
+    reasons: Mapping[str, str]
     notes: tuple[str, ...]
+
+    @property
+    def pupil(self) -> Pupil:
+        """Definition and sampling of the pupil."""
+        return self.choice.pupil
+
+    @property
+    def convergence(self) -> Convergence:
+        """RMS radii with coarse and fine sampling."""
+        return self.choice.convergence
 
     @property
     def slopes(self) -> Tensor:
@@ -95,16 +112,34 @@ class LensFacts:
         return torch.tensor(self.lens.wavelengths_um, dtype=torch.float64)
 
     @property
+    def nearest_wavelength(self) -> int:
+        """Number of the wavelength of the file next to the reference."""
+        return int((self.wavelengths_um - self.lens.reference_wavelength_um).abs().argmin())
+
+    @property
     def total_track_mm(self) -> float:
         """From the first vertex to the sensor."""
         return sum(surface.thickness_mm for surface in self.lens.surfaces)
 
+    def dark_reason(self, field: int) -> str:
+        """Return why charts leave a field out; empty if light of it arrives."""
+        if not bool(torch.isfinite(self.spots.chief_y_mm[field])):
+            return "the chief ray does not reach the sensor"
+        return "" if bool((self.spots.weight[field] > 0).any()) else "no ray reaches the sensor"
+
+    def lit_fields(self) -> list[int]:
+        """Return the fields from which light arrives, and which were aimed."""
+        return [i for i in range(len(self.lens.field_angles_rad)) if not self.dark_reason(i)]
+
     def drawn_fields(self, at_most: int = 5) -> list[int]:
-        """Return the fields that a crowded chart shows: the first, the last, and some between."""
-        count = len(self.lens.field_angles_rad)
-        if count <= at_most:
-            return list(range(count))
-        return [round(i * (count - 1) / (at_most - 1)) for i in range(at_most)]
+        """Return the fields that a crowded chart shows: the first, the last, and some between.
+
+        Fields without light are left out, see `dark_reason`.
+        """
+        lit = self.lit_fields()
+        if len(lit) <= at_most:
+            return lit
+        return [lit[round(i * (len(lit) - 1) / (at_most - 1))] for i in range(at_most)]
 
     def fates(self, field: int, wavelength: int) -> dict[str, int]:
         """Count the rays of a field and wavelength by what became of them."""
@@ -112,41 +147,20 @@ class LensFacts:
         return {fate.name.lower(): count for fate, count in counts.items()}
 
 
-def usual_pupil(lens: Lens, sampling: str) -> Pupil:
-    """Return the paraxial pupil, as other programs have it, or the real one where that is wrong.
-
-    Wrong is what misses the middle of the stop by more than `WRONG_PUPIL` at a field.
-    """
-    finite = math.isfinite(paraxial_data(lens).entrance_pupil_mm)
-    right = finite and not _wrong_pupil(lens)
-    return Pupil(definition="paraxial" if right else "stop", sampling=sampling)
-
-
-def _wrong_pupil(lens: Lens) -> list[str]:
-    """Return how far the paraxial pupil is off, a line for each field where it is wrong."""
-    return [
-        f"field {to_degrees(angle_rad):.4g} degrees: rays to the middle of the paraxial entrance "
-        + (
-            f"pupil miss that of the stop by {miss:.0%} of its radius"
-            if miss < math.inf
-            else "pupil are lost before the stop"
-        )
-        for angle_rad, miss in zip(
-            lens.field_angles_rad,
-            paraxial_pupil_misses(lens, field_slopes(lens)).tolist(),
-            strict=True,
-        )
-        if miss > WRONG_PUPIL
-    ]
-
-
-def analyse(lens: Lens, pupil: Pupil, notes_of_file: Sequence[str] = ()) -> LensFacts:
+def analyse(
+    lens: Lens,
+    choice: PupilChoice | Pupil,
+    notes_of_file: Sequence[str] = (),
+    *,
+    image: bool = True,
+) -> LensFacts:
     """Compute everything but the curves.
 
     Args:
         lens: With a field and a wavelength.
-        pupil: How it is filled; see `usual_pupil`.
+        choice: How the pupil is filled; see `choose_pupil`.
         notes_of_file: What the lens does not carry of the file it was read from.
+        image: Compute fans and images of points too, which takes the most time.
 
     Raises:
         ContractError: If the file has no field or wavelength, the stop no radius (definition
@@ -154,52 +168,67 @@ def analyse(lens: Lens, pupil: Pupil, notes_of_file: Sequence[str] = ()) -> Lens
     """
     if not lens.field_angles_rad or not lens.wavelengths_um:
         raise ContractError("a lens needs a field and a wavelength to be looked at; got none")
-    slopes, waves = field_slopes(lens), torch.tensor(lens.wavelengths_um, dtype=torch.float64)
-    notes = list(notes_of_file)
+    definition = (choice if isinstance(choice, Pupil) else choice.pupil).definition
     data = paraxial_data(lens)
-    if pupil.definition == "paraxial" and not math.isfinite(data.entrance_pupil_mm):
+    if definition == "paraxial" and not math.isfinite(data.entrance_pupil_mm):
         raise ContractError("the entrance pupil lies at infinity; use --pupil stop")
-    if pupil.definition == "paraxial":
-        notes += [f"{line}; use {option_text('pupil')} stop" for line in _wrong_pupil(lens)]
-    spots = spot_diagram(lens, slopes, waves, pupil)
+    if isinstance(choice, Pupil):
+        choice = given_pupil(lens, choice)
+    slopes, waves = field_slopes(lens), torch.tensor(lens.wavelengths_um, dtype=torch.float64)
+    notes, reasons = list(notes_of_file), Reasons()
+    if definition == "paraxial":
+        notes += [f"{line}; use {option_text('pupil')} stop" for line in wrong_pupil(lens)]
+    spots = spot_diagram(lens, slopes, waves, choice.pupil)
     nothing = torch.full((len(slopes), len(waves)), math.nan, dtype=torch.float64)
-    convergence = spot_convergence(lens, slopes, pupil.definition)
     samples = disc_quadrature(12, 24)
+    model = psf_model(lens, slopes, waves)
+    real_stop = reasons.find("the real stop radius", lambda: real_stop_radius_mm(lens), None)
+    illumination = reasons.find(
+        "relative illumination", lambda: relative_illumination_of(lens, slopes, waves), nothing
+    )
+    sums = reasons.find("third-order sums", lambda: seidel_sums(lens), None)
     return LensFacts(
         lens=lens,
-        pupil=pupil,
+        choice=choice,
         paraxial=data,
-        real_stop_mm=_try("the real stop radius", lambda: real_stop_radius_mm(lens), None, notes),
+        real_stop_mm=real_stop,
         airy_mm=torch.tensor([airy_radius_mm(lens, w) for w in lens.wavelengths_um]),
         spots=spots,
         rms_mm=rms_about_centroid(spots),
         rms_chief_mm=rms_about_chief(spots),
         max_mm=max_from_chief(spots),
-        chief_mm=chief_landings(lens, slopes, waves, pupil.definition),
-        distortion=distortion(lens, slopes, waves, pupil.definition),
-        illumination=_try(
-            "relative illumination",
-            lambda: relative_illumination_of(lens, slopes, waves),
-            nothing,
-            notes,
+        chief_mm=chief_landings(lens, slopes, waves, definition),
+        distortion=distortion(lens, slopes, waves, definition),
+        illumination=illumination,
+        wavefront_um=wavefront_rms_um(trace_wavefront(lens, slopes, waves, samples, definition)),
+        seidel=sums,
+        model=model,
+        image=image_of(lens, choice.pupil, spots, model) if image else None,
+        fans=trace_fans(lens, slopes, waves, definition) if image else None,
+        reasons=reasons.by_name,
+        notes=(
+            *notes,
+            *(f"{what}: {why}" for what, why in reasons.by_name.items()),
+            *_warnings(lens, spots),
+            *sampling_note(lens, choice),
         ),
-        wavefront_um=wavefront_rms_um(
-            trace_wavefront(lens, slopes, waves, samples, pupil.definition)
-        ),
-        seidel=_try("third-order sums", lambda: seidel_sums(lens), None, notes),
-        convergence=convergence,
-        model=psf_model(lens, slopes, waves),
-        notes=(*notes, *_warnings(lens, spots), *_sampling_note(pupil, convergence)),
     )
 
 
-def _try(what: str, compute: Callable[[], Fact], otherwise: Fact, notes: list[str]) -> Fact:
-    """Compute something, or say why not: a page is made for every lens."""
-    try:
-        return compute()
-    except ContractError as error:
-        notes.append(f"{what}: {error}")
-        return otherwise
+class Reasons:
+    """Reasons for missing facts, by their names: a page is made for every lens."""
+
+    def __init__(self) -> None:
+        """Start with none."""
+        self.by_name: dict[str, str] = {}
+
+    def find(self, what: str, compute: Callable[[], Fact], otherwise: Fact) -> Fact:
+        """Compute a fact, or record why it cannot be and return another."""
+        try:
+            return compute()
+        except ContractError as error:
+            self.by_name[what] = str(error)
+            return otherwise
 
 
 def _warnings(lens: Lens, spots: Spots) -> list[str]:
@@ -240,96 +269,3 @@ def _warnings(lens: Lens, spots: Spots) -> list[str]:
                 f"{name}: the chief ray does not reach the sensor; the lens is aimed to {reach}"
             )
     return warnings
-
-
-def _sampling_note(pupil: Pupil, convergence: Convergence) -> list[str]:
-    """Return how far the chosen sampling is from the converged RMS."""
-    if pupil.sampling not in convergence.samplings:
-        return []
-    mine = convergence.rms_mm[convergence.samplings.index(pupil.sampling)]
-    deviation = torch.nan_to_num(mine / convergence.rms_mm[-1] - 1, posinf=0.0)
-    worst = float(deviation[deviation.abs().argmax()])
-    if abs(worst) < 0.02:
-        return []
-    return [
-        f"with {pupil.sampling} the RMS radius of a field is off by {worst:+.0%} from the "
-        f"converged value; {convergence.samplings[-1]} has converged"
-    ]
-
-
-def to_json(facts: LensFacts) -> dict[str, Any]:
-    """Return the object that `camkit lens show --json` prints; None where there is no number."""
-    data, sums = facts.paraxial, facts.seidel
-    report = {
-        "name": facts.lens.name,
-        "efl_mm": data.efl_mm,
-        "bfl_mm": data.bfl_mm,
-        "ffl_mm": data.ffl_mm,
-        "f_number": data.f_number,
-        "total_track_mm": facts.total_track_mm,
-        "entrance_pupil_mm": data.entrance_pupil_mm,
-        "entrance_pupil_diameter_mm": data.entrance_pupil_diameter_mm,
-        "exit_pupil_mm": data.exit_pupil_mm,
-        "exit_pupil_diameter_mm": data.exit_pupil_diameter_mm,
-        "stop_radius_paraxial_mm": data.stop_semi_diameter_mm,
-        "stop_radius_real_mm": facts.real_stop_mm,
-        "reference_wavelength_um": facts.lens.reference_wavelength_um,
-        "seidel_mm": None if sums is None else sums.sums_mm.tolist(),
-        "third_order_transverse_mm": None if sums is None else sums.transverse_mm(),
-        "aimed_to_deg": to_degrees(float(chief_path(facts.lens).angles_rad[-1])),
-        "aimed_to_mm": float(chief_path(facts.lens).heights_mm[-1]),
-        "pupil": facts.pupil.definition,
-        "pupil_sampling": facts.pupil.sampling,
-        "psf_model": facts.model.regime,
-        "psf_model_reason": facts.model.reason,
-        "grooves": grooves_of(facts.lens),
-        "fields": [
-            _field(facts, i, j)
-            for i in range(len(facts.lens.field_angles_rad))
-            for j in range(len(facts.lens.wavelengths_um))
-        ],
-        "convergence": _convergence(facts),
-        "notes": list(facts.notes),
-    }
-    finite: dict[str, Any] = _finite(report)
-    return finite
-
-
-def _field(facts: LensFacts, i: int, j: int) -> dict[str, Any]:
-    def at(values: Tensor) -> float:
-        return float(values[i, j])
-
-    return {
-        "field_angle_deg": round(to_degrees(facts.lens.field_angles_rad[i]), 12),
-        "wavelength_um": facts.lens.wavelengths_um[j],
-        "spot_rms_mm": at(facts.rms_mm),
-        "spot_rms_chief_mm": at(facts.rms_chief_mm),
-        "spot_max_mm": at(facts.max_mm),
-        "airy_radius_mm": float(facts.airy_mm[j]),
-        "chief_height_mm": at(facts.chief_mm),
-        "distortion_percent": 100 * at(facts.distortion),
-        "relative_illumination": at(facts.illumination),
-        "wavefront_rms_um": at(facts.wavefront_um),
-        "rays": facts.fates(i, j),
-    }
-
-
-def _convergence(facts: LensFacts) -> list[dict[str, Any]]:
-    convergence = facts.convergence
-    return [
-        {"pupil_sampling": name, "rays": rays, "spot_rms_mm": rms}
-        for name, rays, rms in zip(
-            convergence.samplings, convergence.rays, convergence.rms_mm.tolist(), strict=True
-        )
-    ]
-
-
-def _finite(value: Any) -> Any:
-    """Return JSON values with None for what is no number: NaN and infinity are not JSON."""
-    if isinstance(value, dict):
-        return {name: _finite(inner) for name, inner in value.items()}
-    if isinstance(value, list):
-        return [_finite(inner) for inner in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

@@ -8,6 +8,8 @@ from typing import Final
 
 from camkit.models_def.optics.analysis.seidel import SEIDEL_NAMES, Seidel
 from camkit.models_def.optics.prescription import Surface, grooves_of
+from camkit.report.pages.lens.fan_charts import draw_opd_fans, draw_ray_fans
+from camkit.report.pages.lens.image_charts import draw_encircled, draw_psfs
 from camkit.report.pages.lens.layout import draw_layout
 from camkit.report.pages.lens.lens_charts import (
     draw_colour,
@@ -17,7 +19,8 @@ from camkit.report.pages.lens.lens_charts import (
     draw_spots,
 )
 from camkit.report.pages.lens.lens_facts import LensFacts
-from camkit.report.pages.page import Page, Part, Picture, Section, Table, Words, write_page
+from camkit.report.pages.lens.lens_image import SHARES
+from camkit.report.pages.page import Cell, Page, Part, Picture, Section, Table, Words, write_page
 from camkit.units import UM_PER_MM, to_degrees
 
 _PUPILS: Final = {
@@ -30,7 +33,11 @@ _PUPILS: Final = {
 _CHARTS: Final = {
     "layout": draw_layout,
     "spots": draw_spots,
+    "psf": draw_psfs,
+    "encircled": draw_encircled,
     "mtf": draw_mtf,
+    "rayfans": draw_ray_fans,
+    "opdfans": draw_opd_fans,
     "field": draw_field,
     "colour": draw_colour,
     "seidel": draw_seidel,
@@ -42,6 +49,15 @@ _CAPTIONS: Final = {
     "Airy disc. RMS about the centroid at the wavelength of the file next to the reference.",
     "field": "T tangential (solid), S sagittal (dashed) focus of close rays. Distortion against "
     "the paraxial chief ray on the sensor. Light is traced with every ray aimed at the stop.",
+    "psf": "The image of a point about the chief ray of the reference wavelength, all wavelengths "
+    "with equal weight, to one scale; brightness is the root of the light, each picture to its "
+    "own peak. Strehl ratio at the wavelength next to the reference. Of many fields, five.",
+    "encircled": "Light within circles about the centroid. By waves it is the share of all light "
+    "that passes the lens; by rays diffraction is left out. Of many fields, five.",
+    "rayfans": "Where rays land from the chief ray of the reference wavelength: y of a fan in the "
+    "meridional plane (tangential), x of a fan across it (sagittal). Gaps are lost rays.",
+    "opdfans": "Optical path difference against the chief ray of the wavelength, in its waves; "
+    "longer paths are negative.",
     "colour": "",
     "seidel": "S = 2|n'u'| times the transverse third-order aberration: negative S_I is "
     "undercorrected, negative S_V barrel distortion; Welford's sums are the negatives.",
@@ -55,7 +71,7 @@ _GROOVES: Final = (
 )
 _FIELDS: Final = (
     *("field", "µm", "RMS, µm", "RMS chief, µm", "max, µm", "Airy, µm", "OPD RMS, waves"),
-    *("distortion, %", "light", "rays lost"),
+    *("Strehl", "distortion, %", "light", "rays lost"),
 )
 _BY_SAMPLING: Final = (
     "RMS radius in µm about the centroid, reference wavelength, by sampling of the pupil:"
@@ -93,7 +109,10 @@ def lens_page(facts: LensFacts, pictures: Mapping[str, str]) -> Page:
         Section("First order", (_first_order(facts),)),
         Section("Prescription", (_prescription(facts), _grooves(facts))),
         Section("Spot diagrams", (*spots, f"PSF: {facts.model.reason}.")),
+        Section("Point images", (charts.get("psf"), charts.get("encircled"), _images(facts))),
         Section("MTF", (charts.get("mtf"),)),
+        Section("Ray fans", (charts.get("rayfans"),)),
+        Section("Optical path differences", (charts.get("opdfans"),)),
         Section("Field curvature, distortion, relative illumination", (charts.get("field"),)),
         Section("Longitudinal aberration and colour", (charts.get("colour"),)),
     ]
@@ -108,8 +127,10 @@ def _pupil_words(facts: LensFacts) -> str:
     radii = f"Stop radius {facts.paraxial.stop_semi_diameter_mm:.6g} mm by the paraxial marginal "
     radii += "ray" if real is None else f"ray, {real:.6g} mm by the real one"
     return (
-        f"Pupil {_PUPILS[facts.pupil.definition]}. Sampling {facts.pupil.sampling} "
-        f"({len(facts.pupil.samples.x)} rays per field and wavelength). {radii}."
+        f"Pupil {_PUPILS[facts.pupil.definition]}. Taken because: "
+        f"{facts.choice.definition_reason}. Sampling {facts.pupil.sampling} "
+        f"({len(facts.pupil.samples.x)} rays per field and wavelength). Taken because: "
+        f"{facts.choice.sampling_reason}. {radii}."
     )
 
 
@@ -188,8 +209,30 @@ def _grooves(facts: LensFacts) -> Table | None:
     return Table(header=_GROOVES, rows=rows) if rows else None
 
 
+def _images(facts: LensFacts) -> Table | None:
+    """Return the radii of encircled energy of every field, and why some have no waves."""
+    image = facts.image
+    if image is None:
+        return None
+    rows: list[tuple[str | Cell, ...]] = []
+    for i, angle_rad in enumerate(facts.lens.field_angles_rad):
+        dark = facts.dark_reason(i)
+        how = "" if dark else "rays" if image.images[i] is None else "waves"
+        radii = (math.nan if dark else image.radius_mm(i, share) for share in SHARES)
+        rows.append(
+            (
+                f"{to_degrees(angle_rad):.4g}°",
+                *(_number(radius * UM_PER_MM, 4) for radius in radii),
+                how,
+                Cell(text=dark or image.reasons[i], look="words"),
+            )
+        )
+    heads = (f"{share:.0%} of the light within, µm" for share in SHARES)
+    return Table(header=("field", *heads, "by", "why not by waves"), rows=rows)
+
+
 def _fields(facts: LensFacts) -> Table:
-    rows = []
+    rows, image = [], facts.image
     for i, angle_rad in enumerate(facts.lens.field_angles_rad):
         for j, wave in enumerate(facts.lens.wavelengths_um):
             losses = {name: n for name, n in facts.fates(i, j).items() if n and name != "valid"}
@@ -201,6 +244,7 @@ def _fields(facts: LensFacts) -> Table:
                     *(_number(float(v[i, j]) * UM_PER_MM, 5) for v in spots),
                     _number(float(facts.airy_mm[j]) * UM_PER_MM, 4),
                     _number(float(facts.wavefront_um[i, j]) / wave, 4),
+                    _number(math.nan if image is None else float(image.strehl[i, j]), 4),
                     _number(100 * float(facts.distortion[i, j]), 4),
                     _number(float(facts.illumination[i, j]), 4),
                     ", ".join(f"{n} {name.replace('_', ' ')}" for name, n in losses.items()) or "0",

@@ -1,6 +1,10 @@
 import json
 from pathlib import Path
 
+import pytest
+
+from camkit.cli.design.design import is_picture_due
+
 RECIPE = """
 name = "tiny"
 prescription = "duet"
@@ -67,3 +71,18 @@ def test_a_search_of_the_library_says_where_it_begins(camkit_command, tmp_path: 
     refused = camkit_command("design", recipe, "--library", "--no-search")
     assert refused.code == 2
     assert "--library is a search: leave out --no-search" in refused.err
+
+
+@pytest.mark.parametrize(
+    ("every", "expected"),
+    [(100, [100, 200, 300, 350]), (30, [100, 200, 300, 350]), (150, [200, 300, 350]), (900, [350])],
+)
+def test_pictures_come_at_the_validation_after_every_nth_step(
+    every: int, expected: list[int]
+) -> None:
+    drawn, last = [], 0
+    for step in (100, 200, 300, 350):
+        if is_picture_due(step, last, every, 350):
+            drawn.append(step)
+            last = step
+    assert drawn == expected

@@ -11,8 +11,10 @@ import pytest
 from camkit.models_def.optics.analysis.sampling import Pupil
 from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.prescription import Lens, Surface
-from camkit.report.pages.lens.lens_facts import analyse, to_json
+from camkit.report.pages.lens.lens_facts import analyse
+from camkit.report.pages.lens.lens_json import WHY, to_json
 from camkit.report.pages.lens.lens_page import write_lens_page
+from camkit.report.pages.lens.lens_pupil import CONVERGED, choose_pupil
 from tests.physics.reference_lenses import cooke_triplet
 
 KEYS = {
@@ -73,8 +75,69 @@ def test_field_that_loses_all_rays_is_null_in_valid_json_and_the_page_is_made(
     assert found["fields"][1]["spot_rms_mm"] is None
     assert found["fields"][1]["rays"]["valid"] == 0
     assert any("no ray reaches the sensor" in note for note in found["notes"])
-    page = write_lens_page(facts, tmp_path, "blocked")[0]
-    assert "no ray reaches the sensor" in page.read_text(encoding="utf-8")
+    assert "chief ray does not reach the sensor" in found["fields"][1][WHY]["spot_rms_mm"]
+    files = write_lens_page(facts, tmp_path, "blocked")
+    assert "no ray reaches the sensor" in files[0].read_text(encoding="utf-8")
+    charts = {
+        path.stem: path.read_text(encoding="utf-8") for path in files if path.suffix == ".svg"
+    }
+    for name in ("spots", "psf", "encircled", "mtf", "rayfans", "opdfans"):
+        assert "left out: 35° (the chief ray does not reach" in charts[f"blocked-{name}"]
+
+
+def _nulls(value: object, place: str = "") -> list[str]:
+    """Return the places of nulls that have no reason beside them."""
+    if isinstance(value, list):
+        return [hit for inner in value for hit in _nulls(inner, f"{place}[]")]
+    if not isinstance(value, dict):
+        return []
+    found = []
+    for name, inner in value.items():
+        none = inner is None or (isinstance(inner, list) and None in inner)
+        if none and not value.get(WHY, {}).get(name):
+            found.append(f"{place}.{name}")
+        found += _nulls(inner, f"{place}.{name}")
+    return found
+
+
+def test_every_null_has_a_reason_beside_it() -> None:
+    afocal = replace(_window(), object_distance_mm=math.inf)
+    for lens in (_blocked(), _window(), afocal):
+        found = to_json(analyse(lens, Pupil(definition="stop")))
+        assert "null" in json.dumps(found, allow_nan=False)
+        assert _nulls(found) == []
+
+
+@pytest.mark.parametrize("lens", [_cooke(0, 14, 20), find_lens("duet"), find_lens("double-gauss")])
+def test_usual_sampling_earns_no_note(lens: Lens) -> None:
+    chosen = choose_pupil(lens)
+    convergence = chosen.convergence
+    mine = convergence.rms_mm[convergence.samplings.index(chosen.pupil.sampling)]
+    assert float((mine / convergence.rms_mm[-1] - 1).abs().max()) <= CONVERGED
+    assert not any(chosen.pupil.sampling in note for note in analyse(lens, chosen).notes)
+
+
+def test_vignetted_fields_take_more_rays() -> None:
+    lens = replace(_blocked(), field_angles_rad=(0.0, math.radians(20)))
+    assert choose_pupil(_cooke(0, 20)).pupil.sampling == "gauss:8x16"
+    assert len(choose_pupil(lens).pupil.samples.x) > 128
+
+
+def test_pupil_that_was_taken_is_named_with_the_reason(tmp_path: Path) -> None:
+    found = to_json(analyse(_cooke(0), choose_pupil(_cooke(0))))
+    assert found["pupil"] == "paraxial"
+    assert "the usual one" in found["pupil_reason"]
+    asked = to_json(analyse(_cooke(0), choose_pupil(_cooke(0), "chief", "grid:20")))
+    assert (asked["pupil"], asked["pupil_sampling"]) == ("chief", "grid:20")
+    assert asked["pupil_reason"] == asked["pupil_sampling_reason"] == "it was asked for"
+
+
+def test_strehl_and_encircled_energy_stand_in_the_json() -> None:
+    found = to_json(analyse(_cooke(0, 20), Pupil(sampling="gauss:8x16")))
+    assert all(0 < field["strehl"] < 1 for field in found["fields"])
+    for row in found["encircled_energy"]:
+        assert row["by"] == "waves"
+        assert 0 < row["radius_50_mm"] < row["radius_80_mm"] < row["radius_90_mm"]
 
 
 def _window() -> Lens:
@@ -101,5 +164,5 @@ def test_planes_with_a_near_object_get_a_page_without_foreign_files(
     assert all(source.startswith("data:") for source in re.findall('src="([^"]*)', text))
     assert {path.suffix for path in files} == {".html", ".svg", ".png"}
     assert all(path.stat().st_size > 0 for path in files)
-    assert text.count("data:image/svg") == 6
+    assert text.count("data:image/svg") == 10
     json.dumps(to_json(facts), allow_nan=False)
