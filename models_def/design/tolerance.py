@@ -7,8 +7,8 @@ of the filter takes them to: no ringing from the border reaches the judged part,
 kernels.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,10 +19,12 @@ from torch import Tensor
 
 from camkit.errors import ContractError
 from camkit.models_def.design.front import Front
+from camkit.models_def.design.ranking import Offender, Ranked, rank_errors
 from camkit.models_def.design.sensor import Recorder, capture
 from camkit.models_def.optics.kernel_bank import gaussian_response
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import both_halves, half_disc
+from camkit.models_def.optics.tolerance.air_gap import with_adjusted_gap, with_chosen_gap
 from camkit.models_def.optics.tolerance.deviation import (
     Deviations,
     Single,
@@ -31,7 +33,7 @@ from camkit.models_def.optics.tolerance.deviation import (
     single_deviations,
 )
 from camkit.models_def.optics.tolerance.errors import ErrorClass, Tolerances
-from camkit.models_def.optics.tolerance.fabricated import View, land
+from camkit.models_def.optics.tolerance.fabricated import Landing, View, land
 from camkit.models_def.optics.tolerance.landing import copy_kernels, spot_rms_mm, window_px
 from camkit.models_def.sensors.tone import encode_srgb
 from camkit.models_def.training.pictures import open_source
@@ -47,7 +49,6 @@ _LARGEST_KERNEL_PX: Final = 127
 _LOST_SHARE: Final = 0.005
 _PROBES: Final = 4
 _BATCH: Final = 4
-_SPOT_RAYS: Final = 128
 _SCENES: Final = 4
 _SCENE_PX: Final = 512
 _VISIBLE_UM: Final = (0.36, 0.83)
@@ -99,13 +100,15 @@ class Measured:
     Attributes:
         psnr_db: (copy, field), of sRGB values after recovery, the mean over patches.
         spot_rms_mm: (copy, field), all wavelengths alike, about the centroid.
-        refocus_mm: (copy,), what the compensator did.
+        refocus_mm: (copy,), by how much the compensator moved the sensor away.
+        gap_mm: (copy,), by how much it made the air gap larger.
         energy_kept: Least share of light inside the kernel window.
     """
 
     psnr_db: Array
     spot_rms_mm: Array
     refocus_mm: Array
+    gap_mm: Array
     energy_kept: float
 
     @property
@@ -132,27 +135,19 @@ class ClassLoss:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Offender:
-    """One error at one limit: how much the RMS radius over all fields grows."""
-
-    single: Single
-    spot_growth_mm: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class ToleranceResult:
     """All results of a run.
 
     Attributes:
         lens: Nominal.
-        tolerances: What was drawn.
+        tolerances: What was drawn; a gap that assembly adjusts is named.
         run: How.
         fields: (share of the largest slope, azimuth in degrees).
         kernel_px: Window of the kernels.
         nominal: The lens as designed.
         copies: Fabricated copies.
         classes: The largest loss first.
-        offenders: Single errors, the largest growth first.
+        offenders: Single errors, the largest growth of spots first.
     """
 
     lens: Lens
@@ -164,6 +159,11 @@ class ToleranceResult:
     copies: Measured
     classes: tuple[ClassLoss, ...]
     offenders: tuple[Offender, ...]
+
+    @property
+    def ranking(self) -> tuple[Ranked, ...]:
+        """Single errors of every part, the largest loss of the recovered picture first."""
+        return rank_errors(self.offenders)
 
     def percentile_db(self, percent: float) -> float:
         """Return the PSNR that `percent` of the copies do not reach."""
@@ -192,19 +192,24 @@ def run_tolerance(
     classes = tolerances.active()
     parts = _batches(run.copies)
     limits = _batches(run.limit_copies)
-    total = run.copies + run.limit_copies * len(classes)
+    singles, single_errors = single_deviations(lens, tolerances)
+    total = run.copies + run.limit_copies * len(classes) + len(singles)
     done = 0
 
-    def measure(widths: Tolerances, numbers: list[range], *, at_limits: bool) -> Measured:
+    def measure_all(parts: Iterable[Deviations]) -> Measured:
         nonlocal done
         results = []
-        for some in numbers:
-            deviations = draw_deviations(lens, widths, some, run.seed, at_limits=at_limits)
+        for deviations in parts:
             results.append(judge.measure(deviations))
-            done += len(some)
+            done += deviations.copies
             if watch is not None:
                 watch(done, total)
         return _joined(results)
+
+    def measure(widths: Tolerances, numbers: list[range], *, at_limits: bool) -> Measured:
+        return measure_all(
+            draw_deviations(lens, widths, some, run.seed, at_limits=at_limits) for some in numbers
+        )
 
     nominal = judge.measure(no_deviations(lens))
     copies = measure(tolerances, parts, at_limits=False)
@@ -212,16 +217,18 @@ def run_tolerance(
         _class_loss(tolerances, one, nominal, measure(tolerances.only(one), limits, at_limits=True))
         for one in classes
     ]
+    single_parts = (single_errors.of_copies(some) for some in _batches(len(singles)))
+    alone = measure_all(single_parts) if singles else None
     return ToleranceResult(
         lens=lens,
-        tolerances=tolerances,
+        tolerances=judge.tolerances,
         run=run,
         fields=judge.fields,
         kernel_px=judge.kernels.shape[-1],
         nominal=nominal,
         copies=copies,
         classes=tuple(sorted(losses, key=lambda loss: -float(loss.loss_db.mean()))),
-        offenders=_offenders(judge),
+        offenders=() if alone is None else _offenders(singles, nominal, alone),
     )
 
 
@@ -240,7 +247,7 @@ class _Judge:
     normal: Tensor
 
     def measure(self, deviations: Deviations) -> Measured:
-        landing = land(self.lens, deviations, self.view, self.tolerances.compensator)
+        landing, gap_mm = _assembled(self.lens, self.tolerances, self.view, deviations)
         size = self.kernels.shape[-1]
         kernels, energy = copy_kernels(landing, self.color_weights, size, self.run.pitch_um)
         psnr = [self._psnr_db(of_copy.float()) for of_copy in kernels]
@@ -248,6 +255,7 @@ class _Judge:
             psnr_db=np.stack(psnr),
             spot_rms_mm=spot_rms_mm(landing).numpy(),
             refocus_mm=landing.refocus_mm.numpy(),
+            gap_mm=gap_mm.numpy(),
             energy_kept=float(energy.min()),
         )
 
@@ -275,6 +283,7 @@ def _judge(lens: Lens, tolerances: Tolerances, run: ToleranceRun) -> _Judge:
     edge_slope = np.tan(max(lens.field_angles_rad, default=0.0))
     fields = FIELDS if edge_slope > 0 else FIELDS[:1]
     view = _view(lens, fields, edge_slope, run.rays)
+    tolerances = with_chosen_gap(lens, tolerances, view)
     waves = view.wavelengths_um.numpy()
     is_visible = waves.min() > _VISIBLE_UM[0] and waves.max() < _VISIBLE_UM[1]
     colors = (
@@ -285,7 +294,7 @@ def _judge(lens: Lens, tolerances: Tolerances, run: ToleranceRun) -> _Judge:
     weights = torch.from_numpy(colors)
 
     def kernels(deviations: Deviations, size_px: int) -> Tensor:
-        landing = land(lens, deviations, view, tolerances.compensator)
+        landing, _ = _assembled(lens, tolerances, view, deviations)
         return copy_kernels(landing, weights, size_px, run.pitch_um)[0]
 
     probes = draw_deviations(lens, tolerances, range(_PROBES), run.seed)
@@ -318,6 +327,14 @@ def _judge(lens: Lens, tolerances: Tolerances, run: ToleranceRun) -> _Judge:
     )
 
 
+def _assembled(
+    lens: Lens, tolerances: Tolerances, view: View, deviations: Deviations
+) -> tuple[Landing, Tensor]:
+    """Return the light of copies as assembly leaves them, and what it did to their gap (copy,)."""
+    adjusted, gap_mm = with_adjusted_gap(lens, deviations, view, tolerances.compensator_gap)
+    return land(lens, adjusted, view, tolerances.compensator), gap_mm
+
+
 def _view(
     lens: Lens, fields: tuple[tuple[float, float], ...], edge_slope: float, rays: int
 ) -> View:
@@ -337,7 +354,7 @@ def _batches(count: int) -> list[range]:
 def _joined(parts: list[Measured]) -> Measured:
     arrays: dict[str, Any] = {
         name: np.concatenate([getattr(part, name) for part in parts])
-        for name in ("psnr_db", "spot_rms_mm", "refocus_mm")
+        for name in ("psnr_db", "spot_rms_mm", "refocus_mm", "gap_mm")
     }
     return Measured(**arrays, energy_kept=min(part.energy_kept for part in parts))
 
@@ -360,17 +377,11 @@ def _overall(spot_rms_mm: Array) -> Array:
     return np.asarray(np.sqrt((spot_rms_mm**2).mean(-1)))
 
 
-def _offenders(judge: _Judge) -> tuple[Offender, ...]:
-    """Rate every single error at both its limits, by spots of few rays."""
-    view = replace(judge.view, samples=both_halves(half_disc(_SPOT_RAYS // 2)))
-
-    def overall(deviations: Deviations) -> Array:
-        landing = land(judge.lens, deviations, view, judge.tolerances.compensator)
-        return _overall(spot_rms_mm(landing).numpy())
-
-    singles, deviations = single_deviations(judge.lens, judge.tolerances)
-    if not singles:
-        return ()
-    growth_mm = overall(deviations) - overall(no_deviations(judge.lens))
-    pairs = sorted(zip(growth_mm.tolist(), singles, strict=True), key=lambda pair: -pair[0])
-    return tuple(Offender(single=single, spot_growth_mm=mm) for mm, single in pairs)
+def _offenders(
+    singles: tuple[Single, ...], nominal: Measured, alone: Measured
+) -> tuple[Offender, ...]:
+    growth_mm = _overall(alone.spot_rms_mm) - _overall(nominal.spot_rms_mm)
+    loss_db = nominal.mean_db[0] - alone.mean_db
+    rows = zip(singles, loss_db.tolist(), growth_mm.tolist(), strict=True)
+    offenders = [Offender(single=s, loss_db=db, spot_growth_mm=mm) for s, db, mm in rows]
+    return tuple(sorted(offenders, key=lambda one: -one.spot_growth_mm))

@@ -24,6 +24,8 @@ KEYS: Final[dict[str, tuple[ErrorClass, float]]] = {
     "index": ("index", 1.0),
     "abbe_percent": ("abbe", 0.01),
     "conic": ("conic", 1.0),
+    "power_fringes": ("power", 1.0),
+    "irregularity_fringes": ("irregularity", 1.0),
     "groove_depth_percent": ("groove_depth", 0.01),
     "surface_decentre_mm": ("surface_decentre", 1.0),
     "surface_tilt_arcmin": ("surface_tilt", _ARCMIN),
@@ -31,10 +33,12 @@ KEYS: Final[dict[str, tuple[ErrorClass, float]]] = {
     "element_decentre_mm": ("element_decentre", 1.0),
     "element_tilt_arcmin": ("element_tilt", _ARCMIN),
     "element_tilt_deg": ("element_tilt", to_radians(1.0)),
+    "wedge_arcmin": ("wedge", _ARCMIN),
+    "wedge_deg": ("wedge", to_radians(1.0)),
     "focus_mm": ("focus", 1.0),
 }
-_UNIT_TEXTS: Final = {"percent": " %", "mm": " mm", "arcmin": "'"}
-_SETTINGS: Final = {"distribution", "compensator"}
+_UNIT_TEXTS: Final = {"percent": " %", "mm": " mm", "arcmin": "'", "fringes": " fringes"}
+_SETTINGS: Final = {"distribution", "compensator", "compensator_gap"}
 _ENTRY_KEYS: Final = {"half_width", "distribution"}
 
 
@@ -71,7 +75,14 @@ def parse_tolerances(table: object) -> Tolerances:
             raise ContractError(f"[{TABLE}]: {key} names {error_class} again; keep one of the two")
         classes.add(error_class)
         widths[error_class] = _width(key, table[key], unit, common)
-    return Tolerances(**widths, compensator=table.get("compensator", "paraxial"))
+    gap = table.get("compensator_gap")
+    if gap is not None and (isinstance(gap, bool) or not isinstance(gap, int)):
+        raise ContractError(
+            f"[{TABLE}]: compensator_gap must be the number of a surface; got {gap!r:.80}"
+        )
+    return Tolerances(
+        **widths, compensator=table.get("compensator", "paraxial"), compensator_gap=gap
+    )
 
 
 def _width(key: str, value: object, unit: float, common: Any) -> ErrorWidth:
@@ -93,4 +104,6 @@ def in_file_units(error_class: ErrorClass, value: float) -> str:
     key, unit = next(
         (key, unit) for key, (file_class, unit) in KEYS.items() if file_class == error_class
     )
-    return f"{value / unit:.4g}{_UNIT_TEXTS.get(key.rpartition('_')[2], '')}"
+    number = f"{value / unit:.4g}"
+    text = _UNIT_TEXTS.get(key.rpartition("_")[2], "")
+    return number + (text.removesuffix("s") if number in {"1", "-1"} else text)

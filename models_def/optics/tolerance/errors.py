@@ -13,18 +13,21 @@ from camkit.models_def.optics.prescription import FabricationErrors
 from camkit.units import to_radians
 
 Distribution = Literal["uniform", "normal"]
-Compensator = Literal["paraxial", "spot", "none"]
+Compensator = Literal["paraxial", "spot", "gap", "none"]
 ErrorClass = Literal[
     "radius",
     "thickness",
     "index",
     "abbe",
     "conic",
+    "power",
+    "irregularity",
     "groove_depth",
     "surface_decentre",
     "surface_tilt",
     "element_decentre",
     "element_tilt",
+    "wedge",
     "focus",
 ]
 DISTRIBUTIONS: Final[tuple[Distribution, ...]] = get_args(Distribution)
@@ -33,6 +36,7 @@ ERROR_CLASSES: Final[tuple[ErrorClass, ...]] = get_args(ErrorClass)
 
 NORMAL_SIGMAS: Final = 2.0  # a normal error is cut off at its half-width, at so many sigma
 MAX_TILT_RAD: Final = 0.5
+MAX_FRINGES: Final = 100.0
 _MAX_SHARE: Final = 0.5
 _BASE: Final = FabricationErrors()
 
@@ -87,7 +91,8 @@ class Tolerances:
     """Half-widths of every class of errors, and the compensator.
 
     Decentres and tilts are those of the pieces of glass (`element_`, about the front vertex) and
-    of each of their surfaces (`surface_`, about its own vertex).
+    of each of their surfaces (`surface_`, about its own vertex). A fringe is half a wavelength of
+    546.07 nm, as on drawings by ISO 10110-5: 0.273 um of surface height; see `figure`.
 
     Attributes:
         radius: Relative, of every curved surface.
@@ -95,15 +100,22 @@ class Tolerances:
         index: Of every glass.
         abbe: Relative, of the Abbe number of every glass, the index at the d line kept.
         conic: Of every surface of a glass.
+        power: Fringes by which the sagitta of every surface of a glass is off at its rim.
+        irregularity: Fringes from the highest to the lowest point of every surface of a glass,
+            its best sphere taken away: a saddle, which is what a cylinder leaves.
         groove_depth: Relative, of the relief of every surface with grooves: its heights are so
             many times too large, its walls stand where they should.
         surface_decentre: mm.
         surface_tilt: Radians.
         element_decentre: mm.
         element_tilt: Radians.
+        wedge: Radians, of every glass: its rear surface is turned against its front.
         focus: mm, of the distance to the sensor, after the compensator.
         compensator: What moves the sensor at assembly: to where it stood to the paraxial image
             in the design (decision 0004), to the smallest RMS spot in the same way, or nothing.
+            `gap` moves an air gap and the sensor so that rays land as in the design.
+        compensator_gap: Number of the surface in front of that gap; None for the gap that does
+            most for each mm.
     """
 
     radius: ErrorWidth = field(default=ErrorWidth(half_width=_BASE.radius_relative))
@@ -111,13 +123,17 @@ class Tolerances:
     index: ErrorWidth = field(default=ErrorWidth(half_width=_BASE.index))
     abbe: ErrorWidth = _NOTHING
     conic: ErrorWidth = _NOTHING
+    power: ErrorWidth = _NOTHING
+    irregularity: ErrorWidth = _NOTHING
     groove_depth: ErrorWidth = _NOTHING
     surface_decentre: ErrorWidth = _DECENTRE
     surface_tilt: ErrorWidth = _TILT
     element_decentre: ErrorWidth = _DECENTRE
     element_tilt: ErrorWidth = _TILT
+    wedge: ErrorWidth = _NOTHING
     focus: ErrorWidth = field(default=ErrorWidth(half_width=_BASE.focus_mm))
     compensator: Compensator = "paraxial"
+    compensator_gap: int | None = None
 
     def __post_init__(self) -> None:
         if self.compensator not in COMPENSATORS:
@@ -129,8 +145,17 @@ class Tolerances:
             raise ContractError(
                 f"radius, abbe and groove_depth errors must be at most 50 %; got {self}"
             )
-        if max(self.surface_tilt.half_width, self.element_tilt.half_width) > MAX_TILT_RAD:
+        tilts = self.surface_tilt, self.element_tilt, self.wedge
+        if max(tilt.half_width for tilt in tilts) > MAX_TILT_RAD:
             raise ContractError(f"tilts must be at most {MAX_TILT_RAD} rad; got {self}")
+        if max(self.power.half_width, self.irregularity.half_width) > MAX_FRINGES:
+            raise ContractError(
+                f"power and irregularity must be at most {MAX_FRINGES:g} fringes; got {self}"
+            )
+        if self.compensator_gap is not None and self.compensator != "gap":
+            raise ContractError(
+                f"compensator_gap needs the compensator gap; got {self.compensator!r}"
+            )
 
     def of(self, error_class: ErrorClass) -> ErrorWidth:
         """Return the width of a class."""

@@ -24,8 +24,15 @@ from camkit.models_def.optics.pupil import (
 from camkit.models_def.optics.tolerance.deviation import Deviations, no_deviations
 from camkit.models_def.optics.tolerance.elements import glass_elements
 from camkit.models_def.optics.tolerance.errors import Array, Compensator
+from camkit.models_def.optics.tolerance.figure import (
+    Figure,
+    aperture_radii_mm,
+    figures,
+    power_curvature,
+)
 from camkit.models_def.optics.tolerance.misaligned_trace import meet, trace_misaligned
 from camkit.models_def.optics.tolerance.pose import poses
+from camkit.models_def.optics.tolerance.refit import beam_of, displacement, least_shift
 from camkit.models_def.optics.trace import (
     Rays,
     SurfaceTensors,
@@ -119,6 +126,10 @@ def fabricated_tensors(
     deeper = column(relief)
     curvature = wide(nominal.curvature_per_mm) / (1 + column(deviations.radius))
     conic = wide(nominal.conic) + column(deviations.conic)
+    if deviations.power_fringes.any():
+        radii = wide(torch.tensor(aperture_radii_mm(lens), dtype=torch.float64))
+        fringe = power_curvature(wide(nominal.curvature_per_mm), wide(nominal.conic), radii)
+        curvature = curvature + column(deviations.power_fringes) * fringe
     return SurfaceTensors(
         curvature_per_mm=curvature * deeper,
         conic=torch.where(deeper == 1, conic, (1 + conic) / deeper**2 - 1),
@@ -151,7 +162,8 @@ def land(lens: Lens, deviations: Deviations, view: View, compensator: Compensato
         lens: Nominal.
         deviations: Of the copies.
         view: Fields, wavelengths, rays.
-        compensator: See `errors.Tolerances`.
+        compensator: See `errors.Tolerances`; of `gap` the move of the sensor alone, see
+            `air_gap` for the gap's.
 
     Raises:
         ContractError: If the chief ray of a copy is lost, or no ray arrives.
@@ -162,11 +174,11 @@ def land(lens: Lens, deviations: Deviations, view: View, compensator: Compensato
         return _joined([land(lens, one, view, compensator) for one in alone])
     fixed = with_fixed_stop(lens)
     with torch.no_grad():
-        rays, weight = _trace(fixed, deviations, view)
+        rays, weight = trace_copies(fixed, deviations, view)
         shift = _refocus(fixed, deviations, view, compensator, (rays, weight))
         wave = torch.tensor([lens.reference_wavelength_um], dtype=torch.float64)
         middle = replace(view, wavelengths_um=wave, samples=pupil_centre())
-        chief, alive = _trace(fixed, deviations, middle, walls=False)
+        chief, alive = trace_copies(fixed, deviations, middle, walls=False)
         if not bool((alive > 0).all()) or not bool((weight > 0).any(-1).all()):
             raise ContractError(
                 "the light of a Monte-Carlo sample is lost; use smaller errors or fields"
@@ -194,7 +206,7 @@ def _joined(parts: list[Landing]) -> Landing:
     )
 
 
-def _trace(
+def trace_copies(
     lens: Lens, deviations: Deviations, view: View, *, walls: bool = True
 ) -> tuple[Rays, Tensor]:
     """Return rays (copy, field, wave, ray) on the sensor before refocus, and their weights.
@@ -205,35 +217,36 @@ def _trace(
     tensors = tensors if walls else without_walls(tensors)
     thickness = tensors.thickness_mm[:, :, 0, 0, 0]
     stands = poses(deviations, glass_elements(lens), thickness, view.azimuths_rad)
+    shapes = figures(lens, deviations, view.azimuths_rad)
     nominal = surface_tensors(lens, view.wavelengths_um[:, None])
     slope = view.slopes[:, None, None].expand(-1, len(view.wavelengths_um), 1)
     rays, weight = pupil_rays(lens, nominal, view.samples, slope)
     if lens.stop > 0 or stands[0] is not None or lens.surfaces[0].curvature_per_mm:
-        rays, weight = _aimed(lens, (tensors, stands), view, (rays, slope))
+        rays, weight = _aimed(lens, (tensors, stands, shapes), view, (rays, slope))
     shape = (deviations.copies, *rays.x.shape[-3:])
     rays = Rays(
         **{k: getattr(rays, k).expand(shape).clone() for k in ("x", "y", "z", "l", "m", "n")},
         fate=rays.fate.expand(shape).clone(),
     )
-    landings = trace_misaligned(tensors, stands, rays)
+    landings = trace_misaligned(tensors, stands, rays, figures=shapes)
     return landings, torch.where(landings.valid, weight, 0.0)
 
 
 def _aimed(
     lens: Lens,
-    copies: tuple[SurfaceTensors, list[Pose | None]],
+    copies: tuple[SurfaceTensors, list[Pose | None], list[Figure | None]],
     view: View,
     start: tuple[Rays, Tensor],
 ) -> tuple[Rays, Tensor]:
     """Aim the nominal rays anew, at the stop of every copy."""
-    tensors, stands = copies
+    tensors, stands, shapes = copies
     opened = with_open_apertures(tensors)
     rays, slope = start
 
     def at_stop(x: Tensor, y: Tensor) -> Rays:
         launched = launch(x, y, slope, lens.object_distance_mm)
-        incoming = trace_misaligned(opened, stands, launched, end=lens.stop)
-        return meet(opened, stands[lens.stop], incoming, lens.stop)
+        incoming = trace_misaligned(opened, stands, launched, figures=shapes, end=lens.stop)
+        return meet(opened, stands[lens.stop], incoming, lens.stop, shapes[lens.stop])
 
     blank = torch.zeros_like(tensors.thickness_mm[0] + rays.x)
     radius = lens.aperture_value
@@ -260,7 +273,10 @@ def _refocus(
         return _image_mm(lens, deviations) - _image_mm(lens, nothing)
     # the focus error comes after the compensator, which must not see it
     error = torch.from_numpy(deviations.focus_mm)
-    return _spot_shift(*traced) + error - _spot_shift(*_trace(lens, nothing, view))
+    beam, nominal = beam_of(*traced), beam_of(*trace_copies(lens, nothing, view))
+    if compensator == "gap":
+        return least_shift(displacement(beam, nominal), beam) + error
+    return least_shift(beam.points, beam) + error - least_shift(nominal.points, nominal)
 
 
 def _image_mm(lens: Lens, deviations: Deviations) -> Tensor:
@@ -272,22 +288,6 @@ def _image_mm(lens: Lens, deviations: Deviations) -> Tensor:
     height, slope = (one, 0 * one) if distant else (lens.object_distance_mm * one, one)
     height, slope = trace_paraxial(tensors, height, slope, range(len(lens.surfaces)))
     return (-height / slope).reshape(-1)
-
-
-def _spot_shift(rays: Rays, weight: Tensor) -> Tensor:
-    """Minimise the mean square radius about the centroid of all wavelengths of a field.
-
-    sum w |p - mean p + s (t - mean t)|^2 over all rays, p the landing points, t their slopes.
-    """
-    total = weight.sum((2, 3), keepdim=True).clamp_min(1e-300)
-    share = weight / total
-
-    def centred(value: Tensor) -> Tensor:
-        return value - (share * value).sum((2, 3), keepdim=True)
-
-    tx, ty = centred(rays.l / rays.n), centred(rays.m / rays.n)
-    both = (share * (centred(rays.x) * tx + centred(rays.y) * ty)).sum((1, 2, 3))
-    return -both / (share * (tx**2 + ty**2)).sum((1, 2, 3))
 
 
 def _shifted(rays: Rays, shift_mm: Tensor) -> Rays:

@@ -1,4 +1,4 @@
-"""Rays through decentred and tilted surfaces.
+"""Rays through decentred, tilted and irregular surfaces.
 
 Each surface is met in its own frame by the step of `trace`; between surfaces rays are kept in the
 frame of the nominal vertices, on the nominal axis.
@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import torch
 
+from camkit.models_def.optics.tolerance.figure import Figure, refract_at_figure
 from camkit.models_def.optics.trace import Fate, Rays, SurfaceTensors, refract
 from camkit.models_def.optics.tracing import frame
 from camkit.models_def.optics.tracing.frame import Pose
@@ -17,13 +18,23 @@ from camkit.models_def.optics.tracing.meeting import State
 _MIN_COSINE = 1e-6
 
 
-def meet(tensors: SurfaceTensors, pose: Pose | None, rays: Rays, i: int) -> Rays:
+def meet(
+    tensors: SurfaceTensors, pose: Pose | None, rays: Rays, i: int, figure: Figure | None = None
+) -> Rays:
     """Trace rays onto surface i and refract them; return them in the frame of the surface."""
-    return refract(tensors, rays if pose is None else to_surface(pose, rays), i)
+    here = rays if pose is None else to_surface(pose, rays)
+    if figure is None:
+        return refract(tensors, here, i)
+    return refract_at_figure(figure, tensors, here, i)
 
 
 def trace_misaligned(
-    tensors: SurfaceTensors, poses: Sequence[Pose | None], rays: Rays, *, end: int | None = None
+    tensors: SurfaceTensors,
+    poses: Sequence[Pose | None],
+    rays: Rays,
+    *,
+    figures: Sequence[Figure | None] = (),
+    end: int | None = None,
 ) -> Rays:
     """Trace rays to the nominal plane after the last surface.
 
@@ -31,6 +42,7 @@ def trace_misaligned(
         tensors: The lens.
         poses: One for each surface; None where it stands as designed.
         rays: At the vertex plane of the first surface.
+        figures: One for each surface; none by default.
         end: Stop in front of this surface; behind the last one by default.
 
     Returns:
@@ -38,7 +50,7 @@ def trace_misaligned(
     """
     for i in range(len(poses) if end is None else end):
         pose = poses[i]
-        rays = meet(tensors, pose, rays, i)
+        rays = meet(tensors, pose, rays, i, figures[i] if figures else None)
         rays = rays if pose is None else from_surface(pose, rays)
         rays = _to_plane(replace(rays, z=rays.z - tensors.thickness_mm[i]))
     return rays

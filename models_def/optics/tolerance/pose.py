@@ -42,7 +42,7 @@ def poses(
         turned(torch.from_numpy(vectors))
         for vectors in (
             deviations.surface_decentre_mm,
-            deviations.surface_tilt_rad,
+            deviations.surface_turn_rad,
             deviations.element_decentre_mm,
             deviations.element_tilt_rad,
         )

@@ -75,7 +75,8 @@ def test_watch_is_told_every_batch() -> None:
     told: list[tuple[int, int]] = []
     only = Tolerances().only("element_tilt")
     run_tolerance(DUET, only, QUICK, lambda done, total: told.append((done, total)))
-    assert told == [(3, 4), (4, 4)]
+    # 3 samples, 1 of the class at its limit, 2 elements at 2 limits each
+    assert told == [(3, 8), (4, 8), (8, 8)]
 
 
 def test_a_lens_with_the_axis_alone_has_one_field() -> None:
@@ -90,12 +91,70 @@ def test_yield_and_percentiles_are_those_of_the_copies(found: ToleranceResult) -
         psnr_db=np.repeat(psnr, 2, axis=1),
         spot_rms_mm=psnr,
         refocus_mm=psnr[:, 0],
+        gap_mm=psnr[:, 0],
         energy_kept=1.0,
     )
     result = replace(found, copies=made)
     assert result.share_at_least(8.0) == 0.3
     assert result.share_at_least(11.0) == 0
     assert result.percentile_db(50) == 5.5
+
+
+def test_a_larger_error_loses_more_in_either_direction() -> None:
+    """Single errors of growing size: what is lost grows, and vanishes with them."""
+    losses = []
+    for scale in (1e-6, 1.0, 4.0):
+        widths = replace(
+            NOTHING,
+            irregularity=ErrorWidth(half_width=scale),
+            wedge=ErrorWidth(half_width=3e-4 * scale),
+        )
+        ranking = run_tolerance(DUET, widths, replace(QUICK, copies=1)).ranking
+        losses.append(
+            [
+                max(one.loss_db for one in ranking if one.single.error_class == error_class)
+                for error_class in ("irregularity", "wedge")
+            ]
+        )
+    np.testing.assert_allclose(losses[0], 0, atol=1e-4)
+    assert (np.diff(losses, axis=0) > 0.01).all()
+
+
+def test_single_errors_are_judged_by_the_picture_and_by_spots(found: ToleranceResult) -> None:
+    assert len(found.offenders) == 2 * len(found.ranking)
+    losses = [one.loss_db for one in found.ranking]
+    assert losses == sorted(losses, reverse=True)
+    assert {one.spot_place for one in found.ranking} == set(range(1, len(losses) + 1))
+    # the order by spots is another one
+    assert [one.spot_place for one in found.ranking] != list(range(1, len(losses) + 1))
+    assert losses[0] > 0.1
+
+
+def test_a_wedge_loses_what_a_tilt_of_the_rear_loses() -> None:
+    wide = ErrorWidth(half_width=1e-3)
+    wedge, tilt = (
+        run_tolerance(DUET, Tolerances(**{one: wide}).only(one), QUICK).offenders
+        for one in ("wedge", "surface_tilt")
+    )
+    by_rear = {(o.single.part, o.single.value): o.loss_db for o in tilt}
+    for one in wedge:
+        # the windows of both runs differ by a few pixels: their first samples do
+        rear = by_rear[one.single.part + 1, one.single.value]
+        assert one.loss_db == pytest.approx(rear, rel=5e-3)
+
+
+def test_the_gap_that_assembly_moves_is_named_and_lowers_the_loss() -> None:
+    errors = Tolerances().only("radius")
+    paraxial, gap = (
+        run_tolerance(DUET, replace(errors, compensator=one), QUICK) for one in ("paraxial", "gap")
+    )
+    assert paraxial.tolerances.compensator_gap is None
+    assert not paraxial.copies.gap_mm.any()
+    assert gap.tolerances.compensator_gap == 2
+    assert gap.copies.gap_mm.all()
+    assert not gap.nominal.gap_mm.any()
+    np.testing.assert_allclose(gap.nominal.psnr_db, paraxial.nominal.psnr_db, atol=1e-4)
+    assert gap.copies.mean_db.mean() > paraxial.copies.mean_db.mean()
 
 
 def test_senseless_runs_are_refused() -> None:

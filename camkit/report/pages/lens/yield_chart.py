@@ -1,4 +1,4 @@
-"""Tolerances for people: yield curve, classes of errors, table and JSON."""
+"""Tolerances for people: yield curve, classes of errors, worst single errors, table and JSON."""
 
 import json
 from pathlib import Path
@@ -6,9 +6,20 @@ from typing import Any, Final
 
 import numpy as np
 
-from camkit.models_def.design.tolerance import Measured, Offender, ToleranceResult
+from camkit.models_def.design.ranking import Offender, Ranked, rank_agreement
+from camkit.models_def.design.tolerance import Measured, ToleranceResult
+from camkit.models_def.optics.tolerance.deviation import Single
 from camkit.models_def.optics.tolerance.error_table import in_file_units
-from camkit.report.figure import Figure, Panel, chart, field_color, new_figure, to_png, to_svg
+from camkit.report.figure import (
+    TICK_PT,
+    Figure,
+    Panel,
+    chart,
+    field_color,
+    new_figure,
+    to_png,
+    to_svg,
+)
 from camkit.units import UM_PER_MM, to_degrees
 
 PERCENTS: Final = (10, 50, 90)
@@ -36,9 +47,9 @@ def write_tolerance(result: ToleranceResult, folder: Path, name: str) -> tuple[P
 
 @chart
 def draw_yield(result: ToleranceResult) -> Figure:
-    """Draw the yield over PSNR and RMS spot, and what each class costs alone."""
-    figure = new_figure(11, 3.9)
-    left, middle, right = figure.subplots(1, 3)
+    """Draw the yield over PSNR and RMS spot, what each class costs alone, and the worst errors."""
+    figure = new_figure(11, 7.8)
+    (left, middle), (right, last) = figure.subplots(2, 2)
     _draw_share(left, result)
     rms_um = _overall_um(result.copies)
     order = np.sort(rms_um)
@@ -46,6 +57,7 @@ def draw_yield(result: ToleranceResult) -> Figure:
     middle.axvline(_overall_um(result.nominal)[0], color="black", linewidth=0.8, linestyle="--")
     middle.set_xlabel("RMS spot over all fields, at most, µm")
     _draw_classes(right, result)
+    _draw_worst(last, result)
     for panel in (left, middle):
         panel.set(ylabel="share of copies, %", ylim=(0, 102))
     return figure
@@ -63,6 +75,10 @@ def _draw_share(panel: Panel, result: ToleranceResult) -> None:
         title=f"{result.lens.name}: {len(order)} copies", xlabel="PSNR after recovery, at least, dB"
     )
     panel.legend(loc="lower left")
+    # the same downwards is upwards
+    loss = panel.secondary_xaxis("top", functions=(lambda x: nominal - x, lambda x: nominal - x))
+    loss.set_xlabel("loss against the design, at most, dB")
+    loss.tick_params(labelsize=TICK_PT)
 
 
 def _draw_classes(panel: Panel, result: ToleranceResult) -> None:
@@ -82,6 +98,26 @@ def _draw_classes(panel: Panel, result: ToleranceResult) -> None:
     panel.grid(visible=False)
 
 
+def _draw_worst(panel: Panel, result: ToleranceResult) -> None:
+    worst = result.ranking[:_WORST][::-1]
+    names = [
+        f"{one.single.error_class.replace('_', ' ')}{_part(one.single, ' ')} "
+        f"{in_file_units(one.single.error_class, one.single.value)}"
+        for one in worst
+    ]
+    panel.barh(names, [one.loss_db for one in worst], color=field_color(0))
+    for place, one in enumerate(worst):
+        panel.text(max(one.loss_db, 0), place, f" {one.spot_place}", va="center", fontsize=7)
+    panel.axvline(0, color="black", linewidth=0.8)
+    panel.set_title("worst single errors: loss, dB (number: place by spots)")
+    panel.margins(x=0.08)
+    panel.grid(visible=False)
+
+
+def _part(single: Single, space: str = "") -> str:
+    return "" if single.part is None else f"{space}{single.part}"
+
+
 def _overall_um(measured: Measured) -> "np.ndarray[Any, np.dtype[np.float64]]":
     return np.asarray(np.sqrt((measured.spot_rms_mm**2).mean(1)) * UM_PER_MM)
 
@@ -95,6 +131,7 @@ def to_json(result: ToleranceResult) -> dict[str, Any]:
         "samples": run.copies,
         "seed": run.seed,
         "compensator": result.tolerances.compensator,
+        "compensator_gap": result.tolerances.compensator_gap,
         "pixel_pitch_um": run.pitch_um,
         "noise": run.noise,
         "kernel_px": result.kernel_px,
@@ -112,10 +149,8 @@ def to_json(result: ToleranceResult) -> dict[str, Any]:
         ],
         "nominal_spot_rms_mm": float(_overall_um(nominal)[0] / UM_PER_MM),
         "spot_rms_mm": sorted((_overall_um(copies) / UM_PER_MM).tolist()),
-        "refocus_mm": {
-            "min": float(copies.refocus_mm.min()),
-            "max": float(copies.refocus_mm.max()),
-        },
+        "refocus_mm": _range(copies.refocus_mm),
+        "gap_mm": _range(copies.gap_mm),
         "fields": [_field(result, i) for i in range(len(result.fields))],
         "sensitivity": [
             {
@@ -128,7 +163,13 @@ def to_json(result: ToleranceResult) -> dict[str, Any]:
             for c in result.classes
         ],
         "worst_offenders": [_offender(offender) for offender in result.offenders[:_WORST]],
+        "ranking": [_ranked(one) for one in result.ranking],
+        "rank_agreement": rank_agreement(result.ranking),
     }
+
+
+def _range(values: "np.ndarray[Any, np.dtype[np.float64]]") -> dict[str, float]:
+    return {"min": float(values.min()), "max": float(values.max())}
 
 
 def _field(result: ToleranceResult, number: int) -> dict[str, Any]:
@@ -145,14 +186,19 @@ def _field(result: ToleranceResult, number: int) -> dict[str, Any]:
     }
 
 
-def _offender(offender: Offender) -> dict[str, Any]:
+def _offender(offender: Offender | Ranked) -> dict[str, Any]:
     single = offender.single
     return {
         "class": single.error_class,
         "part": single.part,
         "error": in_file_units(single.error_class, single.value),
+        "loss_db": offender.loss_db,
         "spot_growth_mm": offender.spot_growth_mm,
     }
+
+
+def _ranked(one: Ranked) -> dict[str, Any]:
+    return {"place": one.loss_place, "place_by_spots": one.spot_place, **_offender(one)}
 
 
 def to_text(result: ToleranceResult) -> str:
@@ -166,7 +212,7 @@ def to_text(result: ToleranceResult) -> str:
     )
     lines = [
         f"{result.lens.name}: {result.run.copies} fabricated copies, refocused at assembly: "
-        f"{result.tolerances.compensator}",
+        f"{result.tolerances.compensator}{_gap_text(result)}",
         f"PSNR after recovery: {nominal:.2f} dB as designed; of the copies 10 % are below "
         f"{low:.2f}, half below {middle:.2f}, 90 % below {high:.2f} dB",
         f"of the design: {yields}",
@@ -180,11 +226,35 @@ def to_text(result: ToleranceResult) -> str:
         f"{c.loss_db.mean():8.2f} {c.loss_db.max():7.2f}"
         for c in result.classes
     ]
-    if result.offenders:
-        lines += ["", f"{'worst single errors':<19} {'part':>4} {'error':>10} {'RMS spot um':>12}"]
-    for offender in result.offenders[:_WORST]:
-        single, growth = offender.single, offender.spot_growth_mm * UM_PER_MM
-        part = "-" if single.part is None else str(single.part)
-        error = in_file_units(single.error_class, single.value)
-        lines.append(f"{single.error_class:<19} {part:>4} {error:>10} {growth:+12.3f}")
-    return "\n".join(lines)
+    return "\n".join([*lines, *_worst_lines(result)])
+
+
+def _worst_lines(result: ToleranceResult) -> list[str]:
+    """Return both orders of single errors: by loss each part once, by spots each limit."""
+    if not result.offenders:
+        return []
+    head = f"{'part':>4} {'error':>13} {'loss dB':>8} {'RMS spot um':>12}"
+    lines = ["", f"{'worst by loss':<19} {head} {'place by spots':>15}"]
+    lines += [f"{_row(one)} {one.spot_place:15d}" for one in result.ranking[:_WORST]]
+    lines += ["", f"{'worst single errors':<19} {head}"]
+    lines += [_row(one) for one in result.offenders[:_WORST]]
+    agreement = rank_agreement(result.ranking)
+    if agreement is not None:
+        lines += ["", f"order by loss against order by spots: {agreement:.2f} (Spearman, 1 = same)"]
+    return lines
+
+
+def _row(one: Offender | Ranked) -> str:
+    single = one.single
+    error = in_file_units(single.error_class, single.value)
+    return (
+        f"{single.error_class:<19} {_part(single) or '-':>4} {error:>13} {one.loss_db:8.3f} "
+        f"{one.spot_growth_mm * UM_PER_MM:+12.3f}"
+    )
+
+
+def _gap_text(result: ToleranceResult) -> str:
+    number, moves = result.tolerances.compensator_gap, result.copies.gap_mm
+    if number is None:
+        return ""
+    return f" after surface {number} ({moves.min():+.3f} to {moves.max():+.3f} mm)"

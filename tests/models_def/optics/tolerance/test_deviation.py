@@ -69,6 +69,42 @@ def test_depths_of_grooves_are_off_where_there_are_grooves_and_move_nothing_else
     assert arrays.of_copy(1).groove_depth.tolist() == [[0.0, 0.0, -0.02]]
 
 
+def test_figure_and_wedge_touch_polished_glass_alone_and_move_no_other_draw() -> None:
+    lens = perfect_lens(40.0, 6.0, grooves=Grooves(depth_um=110.0))
+    wide = replace(
+        Tolerances(),
+        power=ErrorWidth(half_width=3.0),
+        irregularity=ErrorWidth(half_width=1.0),
+        wedge=ErrorWidth(half_width=1e-3),
+    )
+    old, new = (draw_deviations(lens, given, range(20), 1) for given in (Tolerances(), wide))
+    # a stop, the front of a plate, and its grooved rear
+    assert new.power_fringes[:, 1].all()
+    assert not new.power_fringes[:, [0, 2]].any()
+    assert not new.irregularity_fringes[:, [0, 2]].any()
+    assert not new.wedge_rad[:, [0, 2]].any()
+    assert np.abs(new.power_fringes).max() <= 3
+    assert np.hypot(*new.irregularity_fringes.T).max() <= 1
+    assert np.hypot(*new.wedge_rad.T).max() <= 1e-3
+    np.testing.assert_array_equal(
+        new.surface_turn_rad[:, 2], old.surface_tilt_rad[:, 2] + new.wedge_rad[:, 1]
+    )
+    for field in fields(new):
+        if field.name not in {"power_fringes", "irregularity_fringes", "wedge_rad"}:
+            np.testing.assert_array_equal(getattr(new, field.name), getattr(old, field.name))
+    singles, arrays = single_deviations(lens, wide.only("irregularity"))
+    assert [(one.part, one.value) for one in singles] == [(1, 1.0), (1, -1.0)]
+    assert arrays.of_copy(1).irregularity_fringes[0].tolist() == [[0, 0], [-1, 0], [0, 0]]
+
+
+def test_glass_that_holds_the_sensor_has_no_wedge() -> None:
+    surfaces = (*DUET.surfaces[:-1], replace(DUET.surfaces[-1], glass="PMMA-Sultanova2009"))
+    wide = Tolerances(wedge=ErrorWidth(half_width=1e-3))
+    drawn = draw_deviations(replace(DUET, surfaces=surfaces), wide, range(3), 1)
+    assert not drawn.wedge_rad[:, -1].any()
+    assert drawn.wedge_rad[:, 3].any()
+
+
 def test_at_limits_every_error_has_its_full_size() -> None:
     drawn = draw_deviations(DUET, Tolerances(), range(8), 1, at_limits=True)
     np.testing.assert_allclose(np.abs(drawn.radius[:, 1:]), 0.002)

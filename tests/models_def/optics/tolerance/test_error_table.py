@@ -52,6 +52,10 @@ def test_file_without_the_table_has_none(tmp_path: Path) -> None:
         ({"index": 1.0, "distribution": "flat"}, "distribution"),
         ({"surface_tilt_deg": 1.0, "surface_tilt_arcmin": 1.0}, "again"),
         ({"compensator": 7}, "compensator"),
+        ({"compensator": "gap", "compensator_gap": 1.0}, "compensator_gap must be the number"),
+        ({"compensator_gap": 2}, "compensator_gap needs the compensator gap"),
+        ({"wedge_deg": 1.0, "wedge_arcmin": 1.0}, "again"),
+        ({"power_fringes": 1000}, "100 fringes"),
     ],
 )
 def test_wrong_table_is_refused_with_the_key(table: object, word: str) -> None:
@@ -71,3 +75,26 @@ def test_people_see_the_units_of_the_file() -> None:
     assert parse_tolerances({"groove_depth_percent": 1.0}).groove_depth.half_width == 0.01
     assert in_file_units("element_tilt", math.radians(-1 / 60)) == "-1'"
     assert in_file_units("index", 0.0005) == "0.0005"
+    assert in_file_units("wedge", math.radians(1 / 60)) == "1'"
+    assert in_file_units("irregularity", -0.5) == "-0.5 fringes"
+    assert [in_file_units("power", v) for v in (1.0, -1.0, 3.0)] == [
+        "1 fringe",
+        "-1 fringe",
+        "3 fringes",
+    ]
+
+
+def test_figure_wedge_and_gap_are_read() -> None:
+    found = parse_tolerances(
+        {
+            "power_fringes": 3,
+            "irregularity_fringes": 0.5,
+            "wedge_arcmin": 2,
+            "compensator": "gap",
+            "compensator_gap": 4,
+        }
+    )
+    assert found.active() == ("power", "irregularity", "wedge")
+    assert (found.power.half_width, found.irregularity.half_width) == (3, 0.5)
+    assert found.wedge.half_width == pytest.approx(math.radians(2 / 60))
+    assert (found.compensator, found.compensator_gap) == ("gap", 4)

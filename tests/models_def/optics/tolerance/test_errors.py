@@ -16,7 +16,8 @@ def test_defaults_are_those_of_training_plus_decentre_and_tilt() -> None:
     assert given.focus.half_width == base.focus_mm
     assert given.element_decentre.half_width == given.surface_decentre.half_width == 0.02
     assert np.rad2deg(given.element_tilt.half_width) == pytest.approx(1 / 60)
-    assert set(ERROR_CLASSES) - set(given.active()) == {"abbe", "conic", "groove_depth"}
+    none = {"abbe", "conic", "power", "irregularity", "groove_depth", "wedge"}
+    assert set(ERROR_CLASSES) - set(given.active()) == none
 
 
 def test_uniform_errors_fill_their_range_evenly() -> None:

@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from camkit.models_def.design.ranking import Offender
 from camkit.models_def.design.tolerance import (
     FIELDS,
     ClassLoss,
     Measured,
-    Offender,
     ToleranceResult,
     ToleranceRun,
 )
@@ -27,6 +27,7 @@ def measured(psnr_db: list[float]) -> Measured:
         psnr_db=np.repeat(column, len(FIELDS), axis=1),
         spot_rms_mm=np.full((len(psnr_db), len(FIELDS)), 0.01),
         refocus_mm=np.linspace(-0.1, 0.1, len(psnr_db)),
+        gap_mm=np.linspace(-0.05, 0.02, len(psnr_db)),
         energy_kept=0.99,
     )
 
@@ -51,7 +52,14 @@ def result() -> ToleranceResult:
         ),
         offenders=(
             Offender(
-                single=Single(error_class="focus", part=None, value=-0.02), spot_growth_mm=2e-3
+                single=Single(error_class="focus", part=None, value=-0.02),
+                loss_db=0.25,
+                spot_growth_mm=2e-3,
+            ),
+            Offender(
+                single=Single(error_class="irregularity", part=3, value=1.0),
+                loss_db=0.75,
+                spot_growth_mm=1e-3,
             ),
         ),
     )
@@ -72,6 +80,18 @@ def test_json_has_the_yield_in_plain_numbers(result: ToleranceResult) -> None:
         }
     ]
     assert found["worst_offenders"][0]["error"] == "-0.02 mm"
+    assert found["ranking"][0] == {
+        "place": 1,
+        "place_by_spots": 2,
+        "class": "irregularity",
+        "part": 3,
+        "error": "1 fringe",
+        "loss_db": 0.75,
+        "spot_growth_mm": 1e-3,
+    }
+    assert found["rank_agreement"] == pytest.approx(-1)
+    assert found["compensator_gap"] is None
+    assert found["gap_mm"] == {"min": -0.05, "max": 0.02}
     assert len(found["fields"]) == len(FIELDS)
     assert found["fields"][5]["field_angle_deg"] == pytest.approx(23.26)
     assert found["fields"][0]["field_angle_deg"] == 0
@@ -84,6 +104,12 @@ def test_text_says_what_to_tighten(result: ToleranceResult) -> None:
     assert "radius" in text
     assert "0.2 %" in text
     assert "+2.000" in text
+    assert text.index("worst by loss") < text.index("irregularity") < text.index("focus  ")
+    assert "-1.00 (Spearman" in text
+    assert "refocused at assembly: paraxial\n" in text
+    gap = Tolerances(compensator="gap", compensator_gap=2)
+    text = to_text(replace(result, tolerances=gap))
+    assert "assembly: gap after surface 2 (-0.050 to +0.020 mm)" in text
 
 
 def test_files_are_the_same_from_run_to_run(result: ToleranceResult, tmp_path: Path) -> None:
@@ -93,6 +119,7 @@ def test_files_are_the_same_from_run_to_run(result: ToleranceResult, tmp_path: P
     assert first[0].startswith(b"\x89PNG")
     assert b"surface" not in first[1]
     assert b"radius 0.2 %" in first[1]
+    assert b"irregularity 3 1 fringe" in first[1]
 
 
 def test_a_run_without_errors_is_drawn_too(result: ToleranceResult, tmp_path: Path) -> None:
