@@ -182,7 +182,7 @@ def test_freeze_writes_psf_stress_psf_and_report(camkit_command, tmp_path, monke
 
     monkeypatch.setattr(module, "freeze_samples", fake)
     monkeypatch.setattr(module, "freeze_stress", lambda *_: Frozen(psf=tiny_psf(), energy_kept=1.0))
-    monkeypatch.setattr(optics_file, "read_optics", lambda path: path)
+    monkeypatch.setattr(optics_file, "read_optics", lambda path, *_: path)
     folder = tmp_path / "new"
     outcome = camkit_command(
         *("freeze", "lens.toml", "-o", folder / "psf.safetensors"),
