@@ -32,15 +32,23 @@ def facts(path: str) -> dict[str, Any]:
     middle = place[:, alive].mean(1, keepdims=True)
     spot_mm = float(np.sqrt(((place[:, alive] - middle) ** 2).sum(0).mean()))
     efl_mm = float(np.ravel(optic.paraxial.f2())[0])
-    optic.set_ray_aiming("robust")
-    chief = optic.trace_generic(0, 1, 0, 0, wave)
-    chief_mm = abs(float(np.ravel(chief.y)[-1]))
     return {
         "efl_mm": efl_mm,
         "spot_um": 1000 * spot_mm,
         "rays": int(alive.sum()),
-        "chief_mm": chief_mm if np.isfinite(chief_mm) else None,
+        "chief_mm": chief_mm(optic),
     }
+
+
+def chief_mm(optic: Any) -> float | None:
+    """Return how far from the axis the chief ray of the last field lands; None if it is lost."""
+    try:
+        optic.set_ray_aiming("robust")
+        chief = optic.trace_generic(0, 1, 0, 0, optic.primary_wavelength)
+        height_mm = abs(float(np.ravel(chief.y)[-1]))
+    except Exception:  # noqa: BLE001 -- another program's errors are its own
+        return None
+    return height_mm if np.isfinite(height_mm) else None
 
 
 def main() -> None:
