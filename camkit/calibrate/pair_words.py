@@ -25,6 +25,7 @@ class PairWords:
         distance_from: What distances count from, if known: vertex, sensor or pupil.
         glass: Catalogues (.agf), and `names` or `numbers`; see `read_noted_lens`.
         catalogue: Catalogues of camkit that are asked first, such as schott,hikari.
+        configuration: State of a zoom or focusing lens, by name or number; None for the usual one.
     """
 
     focus_m: float
@@ -38,6 +39,7 @@ class PairWords:
     distance_from: str | None = None
     glass: Sequence[FilePath] = ()
     catalogue: str | None = None
+    configuration: str | int | None = None
 
     @property
     def planes_m(self) -> tuple[float, ...]:

@@ -53,7 +53,8 @@ def place_pair(path: Path, words: PairWords, object_m: float, scene: PairScene) 
     Raises:
         ContractError: If it can be focused from no origin, or the sharp stop is the wider one.
     """
-    design, notes = read_noted_lens(path, tuple(map(str, words.glass)), words.catalogue)
+    glass = tuple(map(str, words.glass))
+    design, notes = read_noted_lens(path, glass, words.catalogue, words.configuration)
     size = f"{scene.grid.width}x{scene.grid.height}@{scene.pitch_um:.6f}um:planes"
     design = with_fields_of(design, choose_sensor(size))
     origins = DISTANCE_ORIGINS if words.distance_from is None else (words.distance_from,)

@@ -47,6 +47,13 @@ GlassCatalogues = Annotated[
         help="Glass catalogues asked first for a name that several have, such as schott,hikari.",
     ),
 ]
+Configuration = Annotated[
+    str | None,
+    typer.Option(
+        "--configuration",
+        help="State of a zoom or focusing lens, by name or number; default: the file's.",
+    ),
+]
 
 
 def whole_pair(text: str, option: str) -> tuple[int, int]:

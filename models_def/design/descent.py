@@ -11,7 +11,7 @@ from camkit.models_def.design.expected import Descent, ExpectedError, even_mean
 from camkit.models_def.design.fabrication import draw_copy
 from camkit.models_def.design.lens import DesignLens
 from camkit.models_def.design.shipped_camera import Camera
-from camkit.models_def.optics.prescription import FabricationErrors
+from camkit.models_def.optics.tolerance.uniform_errors import FabricationErrors
 from camkit.progress import counted
 
 COPY_SEED: Final = 990_000

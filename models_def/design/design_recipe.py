@@ -16,9 +16,9 @@ from camkit.models_def.design.shipped_camera import CameraChoice
 from camkit.models_def.design.starts import Starts
 from camkit.models_def.networks.catalog import NETWORK_NAMES
 from camkit.models_def.optics.analysis.psf_model import checked_regime
-from camkit.models_def.optics.prescription import FabricationErrors
 from camkit.models_def.optics.search.limits import Limits
 from camkit.models_def.optics.search.variables import Variable
+from camkit.models_def.optics.tolerance.uniform_errors import FabricationErrors
 from camkit.models_def.toml_table import check_keys, faults_of, section, table_digest, typed
 from camkit.models_def.training.recipe import SceneRecipe
 from camkit.side_file import read_side_toml

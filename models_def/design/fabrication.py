@@ -12,7 +12,8 @@ import torch
 from numpy.typing import NDArray
 
 from camkit.models_def.optics.paraxial import image_distance
-from camkit.models_def.optics.prescription import FabricationErrors, Lens, perturb
+from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.tolerance.uniform_errors import FabricationErrors, perturb
 from camkit.models_def.optics.trace import SurfaceTensors
 
 Array = NDArray[np.float64]

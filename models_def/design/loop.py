@@ -27,7 +27,7 @@ from camkit.models_def.design.loss import DesignLoss, design_loss
 from camkit.models_def.design.sensor import Recorder, capture
 from camkit.models_def.design.shipped_camera import Camera, Knowledge
 from camkit.models_def.optics.paraxial import paraxial_data
-from camkit.models_def.optics.prescription import FabricationErrors
+from camkit.models_def.optics.tolerance.uniform_errors import FabricationErrors
 from camkit.models_def.sensors.tone import encode_srgb
 from camkit.models_def.training.pictures import SceneSource
 

@@ -43,6 +43,7 @@ def freeze(
     quick: bool = False,
     glass: Sequence[FilePath] = (),
     catalogue: str | None = None,
+    configuration: str | int | None = None,
     psf_model: str | None = None,
     overwrite: bool = False,
 ) -> dict[str, Any]:
@@ -68,6 +69,7 @@ def freeze(
             search that measures what they cost.
         glass: Catalogues (.agf), and `names` or `numbers`; see `read_noted_lens`.
         catalogue: Catalogues of camkit that are asked first, such as schott,hikari.
+        configuration: State of a zoom or focusing lens, by name or number; None for the usual one.
         psf_model: Of a lens: "rays" or "waves"; None for what the recipe says, or else for waves
             where the blur is small against the Airy disc.
         overwrite: Whether files that exist are replaced.
@@ -93,7 +95,7 @@ def freeze(
             f"{option_text('stress_haze')} go together; else omit {option_text('stress_haze')}"
         )
     sensor, bank, recipe_model = _camera_of(default_recipe() if recipe is None else Path(recipe))
-    source = read_optics(Path(optics), tuple(map(str, glass)), catalogue)
+    source = read_optics(Path(optics), tuple(map(str, glass)), catalogue, configuration)
     request = FreezeRequest(
         sensor=sensor,
         bank=bank,

@@ -22,7 +22,15 @@ if TYPE_CHECKING:
 
 LENS_SUFFIX: Final = "-lens.toml"
 PSF_SUFFIX: Final = "-psf.safetensors"
-OF_A_LENS: Final = ("f_number", "stop_radius_mm", "focus_m", "object_m", "defocus_mm", "glass")
+OF_A_LENS: Final = (
+    "f_number",
+    "stop_radius_mm",
+    "focus_m",
+    "object_m",
+    "defocus_mm",
+    "glass",
+    "configuration",
+)
 """Words that a measured PSF answers by itself."""
 FIELD_SHARES: Final = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Of the way to the corner of the sensor: what a lens is focused for."""
@@ -47,6 +55,7 @@ class CameraWords:
             `camkit calibrate distance` finds it.
         glass: Catalogues (.agf), and `names` or `numbers`; see `read_noted_lens`.
         catalogue: Catalogues of camkit that are asked first, such as schott,hikari.
+        configuration: State of a zoom or focusing lens, by name or number; None for the usual one.
     """
 
     sensor: str | None = None
@@ -60,6 +69,7 @@ class CameraWords:
     defocus_mm: float = 0.0
     glass: Sequence[FilePath] = ()
     catalogue: str | None = None
+    configuration: str | int | None = None
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -230,7 +240,8 @@ def _lens_camera(
         origin=camera.distance_from,  # type: ignore[arg-type]
         defocus_mm=camera.defocus_mm,
     )
-    design, notes = read_noted_lens(lens, tuple(map(str, camera.glass)), camera.catalogue)
+    glass = tuple(map(str, camera.glass))
+    design, notes = read_noted_lens(lens, glass, camera.catalogue, camera.configuration)
     if any(surface.grooves is not None for surface in design.surfaces):
         raise UnsupportedError(
             f"{lens.name} has grooves, which throw a haze over the picture: its camera has a "

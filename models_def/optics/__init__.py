@@ -5,6 +5,7 @@ In the order in which data flows:
 - `glass`: catalogues, refractive indices by strict name
 - `grooves`: what a surface may be cut into
 - `shape/`: odd, extended and Q aspheres, phases, tilted elements as stated
+- `configuration/`: focus positions and zoom states
 - `prescription`: lenses as dataclasses, TOML files, fabrication errors
 - `lens_file`: lenses from and to files, TOML or .zmx
 - `tracing/`, `trace`: rays through surfaces, differentiable, with a fate for each ray

@@ -13,7 +13,12 @@ from torch import Tensor
 
 from camkit.errors import ContractError
 from camkit.models_def.optics.paraxial import paraxial_image
-from camkit.models_def.optics.prescription import Lens, require_round, with_focus_shift
+from camkit.models_def.optics.prescription import (
+    Lens,
+    require_plain,
+    require_round,
+    with_focus_shift,
+)
 from camkit.models_def.optics.pupil import half_disc, pupil_rays
 from camkit.models_def.optics.trace import Rays, surface_tensors, trace
 
@@ -56,6 +61,7 @@ def focus_shift_mm(lens: Lens, merit: FocusMerit) -> float:
 
 def with_focus(lens: Lens, merit: FocusMerit) -> Lens:
     """Return the lens with its sensor at the best place; see `focus_shift_mm`."""
+    require_plain(lens, "the best focus")
     return with_focus_shift(lens, focus_shift_mm(lens, merit))
 
 

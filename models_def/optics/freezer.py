@@ -175,6 +175,8 @@ def _hazy(optics: Optics, request: FreezeRequest, tell: Tell) -> Freezing:
     if not isinstance(optics, LensOptics):
         raise UnsupportedError(f"{option_text('haze')} is for lenses only; leave it out")
     frozen, facts = freeze_hazy(optics.lens, request.sensor, tell=tell)
+    if optics.lens.state:
+        facts["configuration"] = optics.lens.state
     stress = None
     if request.stress:
         stress = freeze_distances(optics.lens, request.sensor, tell=tell)

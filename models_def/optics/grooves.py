@@ -155,3 +155,13 @@ def check_grooves(profile: Profile, grooves: Grooves) -> None:
             f"{2 * grooves.tool_radius_um:g} um wide; make groove_depth_um larger or "
             f"{option_text('tool_radius_um')} smaller"
         )
+
+
+def groove_table(grooves: Grooves) -> dict[str, float | bool]:
+    """Return the keys of grooves in a prescription; defaults are left out."""
+    table: dict[str, float | bool] = {"groove_depth_um": grooves.depth_um}
+    if not grooves.walls:
+        table["groove_walls"] = False
+    if grooves.tool_radius_um:
+        table["tool_radius_um"] = grooves.tool_radius_um
+    return table

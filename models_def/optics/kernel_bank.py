@@ -13,13 +13,9 @@ from camkit.errors import ContractError
 from camkit.models_def.optics.analysis.model_psf import model_psf
 from camkit.models_def.optics.analysis.psf_model import PsfRegime
 from camkit.models_def.optics.paraxial import paraxial_data
-from camkit.models_def.optics.prescription import (
-    FabricationErrors,
-    Lens,
-    perturb,
-    with_focus_shift,
-)
+from camkit.models_def.optics.prescription import Lens, with_focus_shift
 from camkit.models_def.optics.pupil import with_fixed_stop
+from camkit.models_def.optics.tolerance.uniform_errors import FabricationErrors, perturb
 
 USUAL_EFL_MM: Final = 40.0
 """Focal length from which errors of length grow no more."""

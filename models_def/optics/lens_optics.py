@@ -68,9 +68,11 @@ class LensOptics:
 
     @property
     def facts(self) -> Mapping[str, float | str]:
-        """The focal length, the PSF model, and the blur by which it was chosen."""
+        """The focal length, the configuration, the PSF model, and the blur that chose it."""
         facts: dict[str, float | str] = {"efl_mm": paraxial_data(self.lens).efl_mm}
         facts["psf_model"] = self.regime
+        if self.lens.state:
+            facts["configuration"] = self.lens.state
         if self.blur_airy is not None:
             facts["blur_airy"] = self.blur_airy
         return facts

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from camkit.caller import option_text
+from camkit.errors import ContractError
 from camkit.models_def.optics.diffraction.plate import is_plate, read_plate
 from camkit.models_def.optics.diffraction.plate_optics import PlateOptics
 from camkit.models_def.optics.freezable_optics import Optics
@@ -12,7 +14,10 @@ from camkit.models_def.optics.measured import MEASURED, read_measured
 
 
 def read_optics(
-    path: Path, glass: Sequence[Path | str] = (), catalogue: str | None = None
+    path: Path,
+    glass: Sequence[Path | str] = (),
+    catalogue: str | None = None,
+    configuration: str | int | None = None,
 ) -> Optics:
     """Read optics: .safetensors as a measured PSF, TOML with a table [bench] as a plate.
 
@@ -22,13 +27,20 @@ def read_optics(
         path: The file, or the name of a built-in lens or plate.
         glass: Of a lens, see `read_noted_lens`.
         catalogue: Of a lens, see `read_noted_lens`.
+        configuration: Of a lens, see `read_noted_lens`.
 
     Raises:
+        ContractError: If a configuration of other optics than a lens is chosen.
         BundleError: If a PSF is missing or damaged, or a bundle is.
         CamkitError: If a lens is wrong, see `read_lens`, or a plate, see `read_plate`.
     """
+    is_other = path.suffix.lower() == MEASURED or is_plate(path)
+    if is_other and configuration is not None:
+        raise ContractError(
+            f"{path.name} is no lens and has no states; leave {option_text('configuration')} out"
+        )
     if path.suffix.lower() == MEASURED:
         return read_measured(path)
-    if is_plate(path):
+    if is_other:
         return PlateOptics(plate=read_plate(path))
-    return LensOptics(lens=read_lens(path, glass, catalogue))
+    return LensOptics(lens=read_lens(path, glass, catalogue, configuration))

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.prescription import Lens, require_plain
 from camkit.models_def.optics.reverse import reverse
 from camkit.models_def.optics.trace import SurfaceTensors, surface_tensors
 
@@ -232,5 +232,6 @@ def paraxial_image(lens: Lens, wavelength_um: float | None = None) -> Image:
 
 def with_paraxial_focus(lens: Lens) -> Lens:
     """Return the lens with its sensor at the paraxial image of its object, reference wavelength."""
+    require_plain(lens, "the paraxial focus")
     last = replace(lens.surfaces[-1], thickness_mm=paraxial_image(lens).distance_mm)
     return replace(lens, surfaces=(*lens.surfaces[:-1], last))

@@ -10,9 +10,17 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, Literal, cast, get_args
 
-import numpy as np
-
+from camkit.caller import option_text
 from camkit.errors import ContractError, UnsupportedError
+from camkit.models_def.optics.configuration.configuration import (
+    Configuration,
+    check_configurations,
+)
+from camkit.models_def.optics.configuration.configuration_table import (
+    configuration_lines,
+    parse_configuration,
+)
+from camkit.models_def.optics.configuration.exact_text import degrees_text, radius_text
 from camkit.models_def.optics.glass.agf import read_agf
 from camkit.models_def.optics.glass.catalogue import (
     AIR,
@@ -22,13 +30,19 @@ from camkit.models_def.optics.glass.catalogue import (
 )
 from camkit.models_def.optics.glass.material import Glass
 from camkit.models_def.optics.glass.table import glass_table, parse_glass_table
-from camkit.models_def.optics.grooves import Grooves, Profile, check_grooves, groove_facts
+from camkit.models_def.optics.grooves import (
+    Grooves,
+    Profile,
+    check_grooves,
+    groove_facts,
+    groove_table,
+)
 from camkit.models_def.optics.shape.phase import Phase, parse_phase, phase_lines
 from camkit.models_def.optics.shape.polynomial import Asphere, Polynomial
-from camkit.models_def.optics.shape.stance import Stance, parse_stance
+from camkit.models_def.optics.shape.stance import Stance, check_stances, parse_stance
 from camkit.models_def.toml_table import key_line, section
 from camkit.side_file import parse_toml, read_side_text
-from camkit.units import to_degrees, to_radians
+from camkit.units import to_radians
 
 ApertureKind = Literal["f_number", "entrance_pupil_diameter_mm", "stop_semi_diameter_mm"]
 Vary = Literal[
@@ -83,6 +97,9 @@ class _LensTable:
     glass: list[dict[str, Any]] = field(default_factory=list)
     glass_catalogues: tuple[str, ...] = ()
     tolerance: dict[str, Any] | None = None
+    configuration: list[dict[str, Any]] = field(default_factory=list)
+    default_configuration: str = ""
+    state: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -203,6 +220,11 @@ class Lens:
         note: For people: where the design comes from.
         object_glass: Strict name of the medium between the object and the first surface.
         object_material: The glass itself where it comes from a user's catalogue.
+        configurations: Focus positions and zoom states; `lens_file.states.plain_lens` gives the
+            lens in one of them. All else sees the lens as its surfaces state it.
+        default_configuration: Name of the one that is taken where none is named; empty for the
+            first.
+        state: Name of the configuration that a lens without any was taken from; else empty.
     """
 
     name: str
@@ -217,6 +239,9 @@ class Lens:
     note: str = ""
     object_glass: str = AIR.name
     object_material: Glass | None = None
+    configurations: tuple[Configuration, ...] = ()
+    default_configuration: str = ""
+    state: str = ""
 
     def __post_init__(self) -> None:
         medium = _strict_name(self.object_glass, self.object_material)
@@ -235,7 +260,8 @@ class Lens:
             raise ContractError(f"object_distance_mm must be > 0; got {self.object_distance_mm}")
         if not all(0 <= a < math.pi / 2 for a in self.field_angles_rad):
             raise ContractError("field angles must lie in 0..90 degrees")
-        _check_stances(self.surfaces, self.stop)
+        check_stances([(s.stance, s.glass) for s in self.surfaces], self.stop)
+        check_configurations(self.configurations, len(self.surfaces), self.default_configuration)
         waves = (*self.wavelengths_um, self.reference_wavelength_um)
         if not all(0.2 < w < 20 for w in waves):
             raise ContractError(f"wavelengths must lie in 0.2..20 um; got {waves}")
@@ -251,25 +277,6 @@ class Lens:
         phases = (surface.phase for surface in self.surfaces)
         skewed = any(surface.stance is not None for surface in self.surfaces)
         return not skewed and all(phase is None or phase.is_round for phase in phases)
-
-
-def _check_stances(surfaces: Sequence[Surface], stop: int) -> None:
-    media = ["air", *(surface.glass for surface in surfaces)]
-    skewed = False
-    for i, surface in enumerate(surfaces):
-        if surface.stance is not None:
-            if media[i] != "air" or surface.glass == "air":
-                raise ContractError(
-                    f"surface {i} begins no piece of glass; a tilt or decentre stands at the first "
-                    "surface of the piece"
-                )
-            skewed = True
-        if skewed and i == stop:
-            raise ContractError(
-                f"the stop, surface {i}, lies on glass that is tilted or decentred; state the stop "
-                "as a surface of its own in air"
-            )
-        skewed = skewed and surface.glass != "air"
 
 
 def require_round(lens: Lens, what: str) -> None:
@@ -294,58 +301,30 @@ def grooves_of(lens: Lens) -> list[dict[str, Any]]:
     ]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FabricationErrors:
-    """Half-widths of uniform errors of a fabricated copy.
-
-    Attributes:
-        radius_relative: Of every curved surface.
-        thickness_mm: Of every gap and element, the last one (focus) excepted.
-        index: Of every glass.
-        focus_mm: Of the distance to the sensor.
-    """
-
-    radius_relative: float = 0.002
-    thickness_mm: float = 0.03
-    index: float = 0.0005
-    focus_mm: float = 0.02
-
-
 def with_focus_shift(lens: Lens, shift_mm: float) -> Lens:
-    """Return the lens with its sensor moved away from it by `shift_mm`."""
+    """Return the lens with its sensor moved away from it by `shift_mm`, in all configurations."""
     last = lens.surfaces[-1]
     back_surface = replace(last, thickness_mm=last.thickness_mm + shift_mm)
-    return replace(lens, surfaces=(*lens.surfaces[:-1], back_surface))
+    return replace(
+        lens,
+        surfaces=(*lens.surfaces[:-1], back_surface),
+        configurations=tuple(
+            state.shifted(len(lens.surfaces) - 1, shift_mm) for state in lens.configurations
+        ),
+    )
 
 
-def perturb(lens: Lens, errors: FabricationErrors, rng: np.random.Generator) -> Lens:
-    """Return a fabricated copy of a lens: every number off by a uniform error.
+def require_plain(lens: Lens, what: str) -> None:
+    """Refuse a lens with configurations where one lens alone is looked at.
 
-    An element keeps one index throughout. Lenses given by f-number should first be fixed by
-    `pupil.with_fixed_stop`, or the stop follows the focal length.
-
-    Args:
-        lens: The nominal lens.
-        errors: Half-widths.
-        rng: Draws, in a fixed order of surfaces.
+    Raises:
+        ContractError: Naming them.
     """
-    copies: list[Surface] = []
-    for i, surface in enumerate(lens.surfaces):
-        radius, thickness, index = rng.uniform(-1, 1, 3)
-        last = i == len(lens.surfaces) - 1
-        width_mm = errors.focus_mm if last else errors.thickness_mm
-        # a glass ends at the next surface, so one offset per surface is one per element
-        offset = 0.0 if surface.glass == "air" else float(index) * errors.index
-        copies.append(
-            replace(
-                surface,
-                curvature_per_mm=surface.curvature_per_mm
-                / (1 + float(radius) * errors.radius_relative),
-                thickness_mm=surface.thickness_mm + float(thickness) * width_mm,
-                index_offset=surface.index_offset + offset,
-            )
+    if lens.configurations:
+        names = ", ".join(state.name for state in lens.configurations)
+        raise ContractError(
+            f"{what} is for one configuration; choose by {option_text('configuration')} of {names}"
         )
-    return replace(lens, surfaces=tuple(copies))
 
 
 def read_prescription(
@@ -408,6 +387,12 @@ def parse_prescription(
         stop=table.stop,
         aperture_kind=kinds[0],
         aperture_value=apertures[kinds[0]],
+        configurations=tuple(
+            parse_configuration(f"configuration {i}", one)
+            for i, one in enumerate(table.configuration, start=1)
+        ),
+        default_configuration=table.default_configuration,
+        state=table.state,
         **{name: value for name, value in optional.items() if value is not None},
     )
 
@@ -449,11 +434,15 @@ def format_prescription(lens: Lens) -> str:
         f"wavelengths_um = [{', '.join(map(repr, lens.wavelengths_um))}]",
         f"reference_wavelength_um = {lens.reference_wavelength_um!r}",
     ]
+    for key in ("default_configuration", "state"):
+        lines += [key_line(key, getattr(lens, key))] if getattr(lens, key) else []
     materials = (lens.object_material, *(s.material for s in lens.surfaces))
     for glass in {m: None for m in materials if m is not None}:
         lines += ["", "[[glass]]", *(key_line(k, v) for k, v in glass_table(glass).items())]
     for surface in lens.surfaces:
         lines += ["", "[[surface]]", *_surface_lines(surface)]
+    for state in lens.configurations:
+        lines += ["", "[[configuration]]", *configuration_lines(state)]
     return "\n".join(lines) + "\n"
 
 
@@ -464,7 +453,7 @@ def _object_glass_lines(lens: Lens) -> list[str]:
 
 def _surface_lines(surface: Surface) -> list[str]:
     lines = [
-        f"radius_mm = {_radius_text(surface.curvature_per_mm)}",
+        f"radius_mm = {radius_text(surface.curvature_per_mm)}",
         f"thickness_mm = {surface.thickness_mm!r}",
         key_line("glass", surface.glass),
         f"semi_diameter_mm = {surface.semi_diameter_mm!r}",
@@ -482,46 +471,10 @@ def _surface_lines(surface: Surface) -> list[str]:
         lines.append(key_line("element_decentre_mm", surface.stance.decentre_mm))
         lines.append(f"element_tilt_deg = [{tilt}]")
     if surface.grooves is not None:
-        lines += [key_line(key, value) for key, value in _groove_table(surface.grooves).items()]
+        lines += [key_line(key, value) for key, value in groove_table(surface.grooves).items()]
     if surface.vary:
         lines.append(key_line("vary", surface.vary))
     return lines
-
-
-def _groove_table(grooves: Grooves) -> dict[str, float | bool]:
-    table: dict[str, float | bool] = {"groove_depth_um": grooves.depth_um}
-    if not grooves.walls:
-        table["groove_walls"] = False
-    if grooves.tool_radius_um:
-        table["tool_radius_um"] = grooves.tool_radius_um
-    return table
-
-
-def degrees_text(angle_rad: float) -> str:
-    """Return the shortest number of degrees that becomes this angle again, to the last bit."""
-    angle_deg = to_degrees(angle_rad)
-    neighbours = (angle_deg, math.nextafter(angle_deg, 0), math.nextafter(angle_deg, 90))
-    for digits in range(1, 18):
-        for value in neighbours:
-            rounded = float(f"{value:.{digits}g}")
-            if to_radians(rounded) == angle_rad:
-                return repr(rounded)
-    return repr(angle_deg)
-
-
-def _radius_text(curvature_per_mm: float) -> str:
-    """Return the shortest radius whose inverse is this curvature."""
-    if not curvature_per_mm:
-        return "inf"
-    radius_mm = 1 / curvature_per_mm
-    # 1 / (1 / r) may be a neighbour of r
-    neighbours = (radius_mm, math.nextafter(radius_mm, 0), math.nextafter(radius_mm, math.inf))
-    for digits in range(4, 18):
-        for value in neighbours:
-            rounded = float(f"{value:.{digits}g}")
-            if 1 / rounded == curvature_per_mm:
-                return repr(rounded)
-    return repr(radius_mm)
 
 
 def _parse_surface(

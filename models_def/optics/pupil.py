@@ -24,7 +24,7 @@ from camkit.models_def.optics.aiming.aim import aim
 from camkit.models_def.optics.aiming.newton import Aim
 from camkit.models_def.optics.aiming.start import launch, with_open_apertures
 from camkit.models_def.optics.paraxial import Paraxial, paraxial_data
-from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.prescription import Lens, require_plain
 from camkit.models_def.optics.trace import (
     Fate,
     Rays,
@@ -94,6 +94,7 @@ def pupil_centre() -> PupilSamples:
 
 def with_fixed_stop(lens: Lens) -> Lens:
     """Return the lens with its aperture stated as the stop's size, as metal keeps it."""
+    require_plain(lens, "a stop of fixed size")
     stop_mm = paraxial_data(lens).stop_semi_diameter_mm
     return replace(lens, aperture_kind="stop_semi_diameter_mm", aperture_value=stop_mm)
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from camkit.errors import ContractError
 from camkit.models_def.optics.paraxial import paraxial_data, paraxial_image
-from camkit.models_def.optics.prescription import Lens, Surface
+from camkit.models_def.optics.prescription import Lens, Surface, require_plain
 from camkit.models_def.optics.shape.phase import Phase
 
 
@@ -24,6 +24,7 @@ def scale_lens(lens: Lens, factor: float) -> Lens:
         surfaces=tuple(_scaled(surface, factor) for surface in lens.surfaces),
         aperture_value=lens.aperture_value * length,
         object_distance_mm=lens.object_distance_mm * factor,
+        configurations=tuple(state.scaled(factor) for state in lens.configurations),
     )
 
 
@@ -67,13 +68,18 @@ def _scaled_phase(phase: Phase, factor: float) -> Phase:
     )
 
 
-def scale_to_efl(lens: Lens, efl_mm: float) -> Lens:
+def scale_to_efl(lens: Lens, efl_mm: float, *, measured: Lens | None = None) -> Lens:
     """Return the lens scaled to a focal length at its reference wavelength.
+
+    Args:
+        lens: The prescription, scaled in all its configurations.
+        efl_mm: The focal length.
+        measured: The lens in the configuration that is to have it; None for the lens itself.
 
     Raises:
         ContractError: If the focal length is not finite or has the other sign.
     """
-    own_mm = paraxial_data(lens).efl_mm
+    own_mm = paraxial_data(measured or lens).efl_mm
     factor = efl_mm / own_mm
     if not (math.isfinite(factor) and factor > 0):
         raise ContractError(
@@ -93,7 +99,11 @@ def with_f_number(lens: Lens, f_number: float, *, working: bool = False) -> Lens
         f_number: EFL / entrance pupil diameter at the reference wavelength; or, if
             `working`, that of the paraxial image of its object (`paraxial.Image`).
         working: Which. They are the same for an object at infinity.
+
+    Raises:
+        ContractError: If the lens has configurations: each has a pupil of its own.
     """
+    require_plain(lens, "an F-number")
     if not (math.isfinite(f_number) and f_number > 0):
         raise ContractError(f"the F-number must be > 0; got {f_number}")
     data = paraxial_data(lens)

@@ -228,7 +228,7 @@ def test_optics_are_frozen_as_by_the_command(printed, monkeypatch: pytest.Monkey
         return FrozenOptics(psf=tiny_psf()), {"block_px": 512}
 
     monkeypatch.setattr(freezer, "freeze_samples", fake)
-    monkeypatch.setattr(optics_file, "read_optics", lambda path: path)
+    monkeypatch.setattr(optics_file, "read_optics", lambda path, *_: path)
     words = ("--depths-mm", "500,inf", "--max-side-px", 201, "--report", "c.json")
     facts = printed("freeze", "lens.toml", "-o", "c.safetensors", *words)
     options = {"depths_mm": (500, float("inf")), "max_side_px": 201, "report": "p.json"}

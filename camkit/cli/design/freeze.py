@@ -9,7 +9,7 @@ from typing import Annotated, Final
 
 import typer
 
-from camkit.cli.choices import Debug, GlassCatalogues, GlassFiles, Json, Overwrite
+from camkit.cli.choices import Configuration, Debug, GlassCatalogues, GlassFiles, Json, Overwrite
 from camkit.errors import ContractError
 
 LIMIT_DB: Final = 0.05
@@ -102,6 +102,7 @@ def freeze(
     ] = False,
     glass: GlassFiles = None,
     catalogue: GlassCatalogues = None,
+    configuration: Configuration = None,
     psf_model: Annotated[
         str | None,
         typer.Option(
@@ -131,6 +132,7 @@ def freeze(
             "--quick": quick or None,
             "--glass": glass,
             "--catalogue": catalogue,
+            "--configuration": configuration,
             "--psf-model": psf_model,
             "--limit-db": None if limit_db == LIMIT_DB else limit_db,
             "--energy": energy,
@@ -167,6 +169,7 @@ def freeze(
         quick=quick,
         glass=tuple(glass or ()),
         catalogue=catalogue,
+        configuration=configuration,
         psf_model=psf_model,
         overwrite=overwrite,
     )

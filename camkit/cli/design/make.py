@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from camkit.cli.choices import Debug, GlassCatalogues, GlassFiles, Json, Overwrite
+from camkit.cli.choices import Configuration, Debug, GlassCatalogues, GlassFiles, Json, Overwrite
 from camkit.cli.design.camera_options import (
     VERTEX,
     DefocusMm,
@@ -46,6 +46,7 @@ def make(
     defocus_mm: DefocusMm = 0.0,
     glass: GlassFiles = None,
     catalogue: GlassCatalogues = None,
+    configuration: Configuration = None,
     minutes: Annotated[
         float, typer.Option(help="CPU time in min for everything; 0 makes the filter alone.")
     ] = 15.0,
@@ -96,6 +97,7 @@ def make(
         defocus_mm=defocus_mm,
         glass=tuple(glass or ()),
         catalogue=catalogue,
+        configuration=configuration,
     )
     facts = make_camera(
         optics,

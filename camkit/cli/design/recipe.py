@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from camkit.cli.choices import Debug, GlassCatalogues, GlassFiles, Json, Overwrite
+from camkit.cli.choices import Configuration, Debug, GlassCatalogues, GlassFiles, Json, Overwrite
 from camkit.cli.design.camera_options import (
     VERTEX,
     DefocusMm,
@@ -45,6 +45,7 @@ def recipe(
     defocus_mm: DefocusMm = 0.0,
     glass: GlassFiles = None,
     catalogue: GlassCatalogues = None,
+    configuration: Configuration = None,
     name: Annotated[
         str | None, typer.Option(help="Name of the camera; default: that of the recipe.")
     ] = None,
@@ -67,6 +68,7 @@ def recipe(
         defocus_mm=defocus_mm,
         glass=tuple(glass or ()),
         catalogue=catalogue,
+        configuration=configuration,
     )
     facts = recipe_writing.recipe(lens, output, camera=camera, name=name, overwrite=overwrite)
     if json_:

@@ -5,6 +5,7 @@
 
 import logging
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -18,8 +19,13 @@ from camkit.models_def.optics.lens_file.json_table import read_json_table
 from camkit.models_def.optics.lens_file.optiland_reader import KEY as OPTILAND_KEY
 from camkit.models_def.optics.lens_file.optiland_reader import parse_optiland
 from camkit.models_def.optics.lens_file.optiland_writer import write_optiland
-from camkit.models_def.optics.lens_file.zmx_glass import GLASS_RULES
-from camkit.models_def.optics.lens_file.zmx_reader import read_zmx
+from camkit.models_def.optics.lens_file.states import (
+    configuration_name,
+    plain_lens,
+    usual_note,
+)
+from camkit.models_def.optics.lens_file.zmx_glass import GLASS_RULES, GlassRule
+from camkit.models_def.optics.lens_file.zmx_reader import ZmxLens, read_zmx
 from camkit.models_def.optics.lens_file.zmx_writer import write_zmx
 from camkit.models_def.optics.prescription import Lens, read_prescription, write_prescription
 
@@ -31,29 +37,38 @@ PRESCRIPTIONS: Final = Path(__file__).resolve().parents[2] / "prescriptions"
 _log = logging.getLogger(__name__)
 
 
-def read_lens(path: Path, glass: Sequence[Path | str] = (), catalogue: str | None = None) -> Lens:
+def read_lens(
+    path: Path,
+    glass: Sequence[Path | str] = (),
+    catalogue: str | None = None,
+    configuration: str | int | None = None,
+) -> Lens:
     """Read a lens; what of a file of another program is left out is logged as a warning.
 
     Args:
         path: .toml, .zmx or .json, in small or capital letters, or the name of a built-in lens.
         glass: See `read_noted_lens`.
         catalogue: See `read_noted_lens`.
+        configuration: See `read_noted_lens`.
 
     Raises:
         UnsupportedError: If the suffix is another, or a file holds what camkit lacks.
         ContractError: If the lens is wrong or a glass unknown.
         DecodeError: If a file is damaged.
     """
-    lens, notes = read_noted_lens(path, glass, catalogue)
+    lens, notes = read_noted_lens(path, glass, catalogue, configuration)
     for note in notes:
         _log.warning("%s: %s", path.name, note)
     return lens
 
 
 def read_noted_lens(
-    path: Path, glass: Sequence[Path | str] = (), catalogue: str | None = None
+    path: Path,
+    glass: Sequence[Path | str] = (),
+    catalogue: str | None = None,
+    configuration: str | int | None = None,
 ) -> tuple[Lens, tuple[str, ...]]:
-    """Read a lens and what of its file it does not carry, one line each; see `read_lens`.
+    """Read a lens in one configuration, and what of its file it does not carry, one line each.
 
     Args:
         path: As of `read_lens`.
@@ -61,21 +76,66 @@ def read_noted_lens(
             where a line of a .zmx file has both (`GlassRule`).
         catalogue: Catalogues of camkit that are asked first for a name that several have, in this
             order, with commas between them: schott,hikari.
+        configuration: Name of one, or its number from 1; None for the usual one, which is noted.
     """
-    path = _built_in(path)
-    rules = [rule for rule in GLASS_RULES if rule in map(str, glass)]
-    if len(rules) > 1:
-        raise ContractError(f"{option_text('glass')} takes one of {' and '.join(rules)}")
-    catalogues = [read_agf(Path(file)) for file in glass if str(file) not in GLASS_RULES]
-    preferred = preferred_catalogues(catalogue)
-    suffix = _suffix(path)
-    if suffix == ".toml":
-        return read_prescription(path, catalogues, preferred), ()
-    if suffix == ".json":
-        return _read_json(path, catalogues, preferred)
-    rule = rules[0] if rules else "nearest"
-    prescription = read_zmx(path, catalogues, rule, preferred)
-    return prescription.lens, prescription.notes
+    file = _LensFile.of(path, glass, catalogue)
+    if file.suffix == ".zmx":
+        prescription = file.read_zmx(choice=configuration, every=False)
+        return prescription.lens, prescription.notes
+    lens, notes = file.read()
+    if lens.configurations and configuration is None:
+        names = [state.name for state in lens.configurations]
+        notes = (*notes, usual_note(names, configuration_name(lens)))
+    return plain_lens(lens, configuration), notes
+
+
+def read_configured_lens(
+    path: Path, glass: Sequence[Path | str] = (), catalogue: str | None = None
+) -> tuple[Lens, tuple[str, ...]]:
+    """Read a lens with all its configurations, and notes; see `read_noted_lens`."""
+    file = _LensFile.of(path, glass, catalogue)
+    if file.suffix == ".zmx":
+        prescription = file.read_zmx(choice=None, every=True)
+        return prescription.lens, prescription.notes
+    return file.read()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _LensFile:
+    """A lens file and the glasses that are looked up for it."""
+
+    path: Path
+    suffix: str
+    catalogues: Sequence[GlassCatalogue]
+    preferred: Sequence[GlassCatalogue]
+    rule: GlassRule
+
+    @classmethod
+    def of(cls, path: Path, glass: Sequence[Path | str], catalogue: str | None) -> "_LensFile":
+        """Find a file; see `read_noted_lens`."""
+        path = _built_in(path)
+        rules = [rule for rule in GLASS_RULES if rule in map(str, glass)]
+        if len(rules) > 1:
+            raise ContractError(f"{option_text('glass')} takes one of {' and '.join(rules)}")
+        return cls(
+            path=path,
+            catalogues=[read_agf(Path(file)) for file in glass if str(file) not in GLASS_RULES],
+            preferred=preferred_catalogues(catalogue),
+            suffix=_suffix(path),
+            rule=rules[0] if rules else "nearest",
+        )
+
+    def read_zmx(self, *, choice: str | int | None, every: bool) -> ZmxLens:
+        """Read a .zmx file in one or every configuration."""
+        return read_zmx(
+            self.path, self.catalogues, self.rule, self.preferred, choice=choice, every=every
+        )
+
+    def read(self) -> tuple[Lens, tuple[str, ...]]:
+        """Read another file, with all its configurations."""
+        if self.suffix == ".toml":
+            return read_prescription(self.path, self.catalogues, self.preferred), ()
+        return _read_json(self.path, self.catalogues, self.preferred)
 
 
 def _read_json(

@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any, Final
 
 from camkit.errors import ContractError, UnsupportedError
+from camkit.models_def.optics.configuration.exact_text import degrees_text
 from camkit.models_def.optics.glass.catalogue import AIR
 from camkit.models_def.optics.lens_file.optiland_glass import COMMENT, glass_table
-from camkit.models_def.optics.prescription import Lens, Surface, degrees_text
+from camkit.models_def.optics.prescription import Lens, Surface, require_plain
 
 _APERTURES: Final = {
     "f_number": "imageFNO",
@@ -47,6 +48,7 @@ def optiland_table(lens: Lens) -> dict[str, Any]:
     """Return the JSON object of a lens; see `write_optiland`."""
     if any(surface.index_offset for surface in lens.surfaces):
         raise ContractError("a lens file holds no index offsets; write the nominal lens")
+    require_plain(lens, "optiland's JSON")
     waves = dict.fromkeys((*lens.wavelengths_um, lens.reference_wavelength_um))
     surfaces, z_mm = [_object_table(lens)], 0.0
     for i, surface in enumerate(lens.surfaces):

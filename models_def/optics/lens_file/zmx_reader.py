@@ -1,12 +1,12 @@
 """A .zmx file (its sequential, centred, refracting part) as a `Lens`."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
-from camkit.errors import ContractError, DecodeError, UnsupportedError
+from camkit.errors import CamkitError, ContractError, DecodeError, UnsupportedError
 from camkit.models_def.optics.glass.catalogue import (
     AIR,
     FORMER,
@@ -15,12 +15,14 @@ from camkit.models_def.optics.glass.catalogue import (
 )
 from camkit.models_def.optics.glass.encoding import read_text
 from camkit.models_def.optics.lens_file.placing import with_object_na
+from camkit.models_def.optics.lens_file.states import named_state, usual_note, with_states
 from camkit.models_def.optics.lens_file.zmx_collimator import without_collimator
 from camkit.models_def.optics.lens_file.zmx_completion import (
     APERTURES,
     completed,
     needs_focus,
 )
+from camkit.models_def.optics.lens_file.zmx_configurations import ZmxStates, split_states
 from camkit.models_def.optics.lens_file.zmx_field import with_fields
 from camkit.models_def.optics.lens_file.zmx_glass import (
     GlassOrder,
@@ -72,21 +74,28 @@ def read_zmx(
     catalogues: Sequence[GlassCatalogue] = (),
     rule: GlassRule = "nearest",
     preferred: Sequence[GlassCatalogue] = (),
+    *,
+    choice: str | int | None = None,
+    every: bool = False,
 ) -> ZmxLens:
-    """Read a lens from a .zmx file.
+    """Read a lens from a .zmx file, in one of its configurations.
 
     Args:
         path: UTF-16, UTF-8 or latin-1.
         catalogues: Of the user; asked for glasses before those of the GCAT line.
         rule: For glasses whose line states numbers beside the name.
         preferred: Catalogues of camkit that are asked before those of the GCAT line.
+        choice: Number of a configuration; None for the one that the file shows.
+        every: Whether all are read, as configurations of the lens.
 
     Raises:
         DecodeError: If the file is damaged; the message gives the line.
         UnsupportedError: If it holds what camkit does not trace; the message names it.
         ContractError: If a glass is unknown or the lens makes no sense.
     """
-    return parse_zmx(read_text(path), catalogues, rule, preferred, name=path.stem)
+    return parse_zmx(
+        read_text(path), catalogues, rule, preferred, name=path.stem, choice=choice, every=every
+    )
 
 
 def parse_zmx(
@@ -96,9 +105,54 @@ def parse_zmx(
     preferred: Sequence[GlassCatalogue] = (),
     *,
     name: str = "lens",
+    choice: str | int | None = None,
+    every: bool = False,
 ) -> ZmxLens:
     """Read a lens from the text of a .zmx file; see `read_zmx`."""
-    records, completion_notes = completed(parse_records(text))
+    records, states = split_states(parse_records(text))
+
+    def read(number: str) -> tuple[Lens, tuple[str, ...]]:
+        return _read(states.files.get(number, records), catalogues, rule, preferred, name)
+
+    if every and states.files:
+        return _with_states(states, read)
+    number = states.number(choice)
+    lens, notes = read(number)
+    if states.files:
+        lens = named_state(lens, number)
+        notes += () if choice is not None else (usual_note(list(states.files), number),)
+    return ZmxLens(lens=lens, notes=(*notes, *states.notes))
+
+
+def _with_states(states: ZmxStates, read: Callable[[str], tuple[Lens, tuple[str, ...]]]) -> ZmxLens:
+    """Return the lens in its current configuration, and all that can be read as states."""
+    lens, notes = read(states.current)
+    lenses = {states.current: lens}
+    notes += states.notes
+    for number in (n for n in states.files if n != states.current):
+        try:
+            other, remarks = read(number)
+        except CamkitError as error:
+            notes += (f"configuration {number} left out: {error}",)
+            continue
+        if (len(other.surfaces), other.stop) != (len(lens.surfaces), lens.stop):
+            notes += (f"configuration {number} left out: its stop or surfaces are others",)
+            continue
+        lenses[number] = other
+        notes += tuple(f"configuration {number}: {note}" for note in remarks if note not in notes)
+    ordered = {number: lenses[number] for number in states.files if number in lenses}
+    return ZmxLens(lens=with_states(lens, ordered, states.current), notes=notes)
+
+
+def _read(
+    records: ZmxRecords,
+    catalogues: Sequence[GlassCatalogue],
+    rule: GlassRule,
+    preferred: Sequence[GlassCatalogue],
+    name: str,
+) -> tuple[Lens, tuple[str, ...]]:
+    """Return the lens of a file without configurations, and notes."""
+    records, completion_notes = completed(records)
     records, collimator_notes = without_collimator(records)
     system = records.system
     mode = last(system, "MODE")
@@ -139,7 +193,7 @@ def parse_zmx(
     notes += _notes(records, surfaces)
     notes += _glass_notes(records, surfaces, order)
     lens, field_notes = with_fields(lens, system, scale)
-    return ZmxLens(lens=lens, notes=(*notes, *field_notes))
+    return lens, (*notes, *field_notes)
 
 
 def _mm_per_unit(record: Record | None) -> float:
@@ -306,9 +360,6 @@ def _notes(records: ZmxRecords, surfaces: tuple[Surface, ...]) -> tuple[str, ...
                 f"line {record.line}: vignetting factors {key} left out: only fixed "
                 "semi-diameters and apertures vignette"
             )
-    zoom = last(records.system, "MNUM")
-    if zoom is not None and zoom.number(0, 1.0) > 1:
-        notes.append(f"line {zoom.line}: {zoom.words[0]} configurations: the one shown is read")
     air = last(records.system, "ENVD")
     if (
         air is not None

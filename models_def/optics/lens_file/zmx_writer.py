@@ -2,12 +2,18 @@
 
 import itertools
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
 from camkit.errors import ContractError, UnsupportedError
 from camkit.models_def.optics.glass.catalogue import AIR, builtin_catalogues
 from camkit.models_def.optics.glass.material import Glass
+from camkit.models_def.optics.lens_file.states import configuration_name, plain_lens
+from camkit.models_def.optics.lens_file.zmx_configuration_writer import (
+    configuration_lines,
+    field_texts,
+)
 from camkit.models_def.optics.lens_file.zmx_glass import (
     MODEL_NAME,
     GlassOrder,
@@ -16,7 +22,7 @@ from camkit.models_def.optics.lens_file.zmx_glass import (
     glass_words,
 )
 from camkit.models_def.optics.lens_file.zmx_shape import shape_lines
-from camkit.models_def.optics.prescription import Lens, Surface, degrees_text
+from camkit.models_def.optics.prescription import Lens, Surface
 
 _BLOCK: Final = ("  HIDE 0 0 0 0 0 0 0 0 0 0", "  MIRR 2 0")
 _TABLE_SIZE: Final = 12
@@ -27,7 +33,8 @@ def write_zmx(lens: Lens, path: Path) -> None:
     """Write a lens as UTF-16 with byte order mark and Windows line ends, as its program does.
 
     Raises:
-        UnsupportedError: If a surface has grooves, or a shape that the format does not hold.
+        UnsupportedError: If a surface has grooves, or a shape that the format does not hold, or
+            its configurations differ in what the format does not hold.
         ContractError: If the lens is a fabricated copy (index offsets are not written).
     """
     path.write_bytes(format_zmx(lens).replace("\n", "\r\n").encode("utf-16"))
@@ -37,9 +44,17 @@ def format_zmx(lens: Lens) -> str:
     """Return the .zmx text of a lens; see `write_zmx`."""
     if any(surface.index_offset for surface in lens.surfaces):
         raise ContractError("a lens file holds no index offsets; write the nominal lens")
+    states = [replace(plain_lens(lens, s.name), name=lens.name) for s in lens.configurations]
+    usual = configuration_name(lens)
+    current = [state.name for state in lens.configurations].index(usual) if states else 0
+    lens, states = (states[current], states) if states else (lens, [lens])
+    by_height = all(math.isfinite(state.object_distance_mm) for state in states)
     names = _catalogue_names(lens)
     order = glass_order(names, ())
-    lines = [*_system_lines(lens, names), *_object_lines(lens, order)]
+    lines = [
+        *_system_lines(lens, names, field_texts(states)[current], by_height),
+        *_object_lines(lens, order),
+    ]
     for i, surface in enumerate(lens.surfaces):
         lines += _surface_lines(lens, surface, i, order)
     last = len(lens.surfaces) + 1
@@ -47,7 +62,8 @@ def format_zmx(lens: Lens) -> str:
     # other programs take the medium of the image from its own surface
     back = lens.surfaces[-1]
     lines += _glass_lines(back.medium, order, is_user_glass=back.material is not None)[0]
-    lines += ['  DIAM 0 0 0 0 1 ""', "TOL TOFF   0   0   0   0   0 0 0", "MNUM 1 1"]
+    lines += ['  DIAM 0 0 0 0 1 ""', "TOL TOFF   0   0   0   0   0 0 0"]
+    lines += configuration_lines(states, current)
     return "\n".join(lines) + "\n"
 
 
@@ -78,14 +94,14 @@ def _catalogue_names(lens: Lens) -> list[str]:
     return max(map(list, itertools.permutations(names)), key=model_free_count)
 
 
-def _system_lines(lens: Lens, catalogues: list[str]) -> list[str]:
+def _system_lines(
+    lens: Lens, catalogues: list[str], fields: list[str], by_height: bool
+) -> list[str]:
     words = {
         "f_number": f"FNUM {lens.aperture_value!r} 0",
         "entrance_pupil_diameter_mm": f"ENPD {lens.aperture_value!r}",
         "stop_semi_diameter_mm": "FLOA",
     }
-    near = math.isfinite(lens.object_distance_mm)
-    fields = [_height_text(lens, a) if near else degrees_text(a) for a in lens.field_angles_rad]
     count = max(_TABLE_SIZE, len(fields))
     zeros = " ".join(["0"] * count)
     waves = list(lens.wavelengths_um)
@@ -103,7 +119,7 @@ def _system_lines(lens: Lens, catalogues: list[str]) -> list[str]:
         "GFAC 0 0",
         *([f"GCAT {' '.join(catalogues)}"] if catalogues else []),
         "RAIM 0 0 1 1 0 0 0 0 0",
-        f"FTYP {1 if near else 0} 0 {len(fields)} {len(waves + extra)} 0 0 0",
+        f"FTYP {1 if by_height else 0} 0 {len(fields)} {len(waves + extra)} 0 0 0",
         f"XFLN {zeros}",
         f"YFLN {' '.join([*fields, *['0'] * (count - len(fields))])}",
         f"FWGN {' '.join(['1'] * count)}",
@@ -112,18 +128,6 @@ def _system_lines(lens: Lens, catalogues: list[str]) -> list[str]:
         *(f"WAVM {len(waves) + 1} {wave!r} 0" for wave in extra),
         f"PWAV {(waves + extra).index(lens.reference_wavelength_um) + 1}",
     ]
-
-
-def _height_text(lens: Lens, angle_rad: float) -> str:
-    """Return the object height that becomes this angle again."""
-    height_mm = math.tan(angle_rad) * lens.object_distance_mm
-    low = high = height_mm
-    for _ in range(8):
-        for value in (low, high):
-            if math.atan(value / lens.object_distance_mm) == angle_rad:
-                return repr(value)
-        low, high = math.nextafter(low, 0), math.nextafter(high, math.inf)
-    return repr(height_mm)
 
 
 def _object_lines(lens: Lens, order: GlassOrder) -> list[str]:

@@ -1,6 +1,7 @@
 """An element that stands tilted or decentred by design."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -58,3 +59,31 @@ def parse_stance(
         raise ContractError("element_decentre_mm and element_tilt_deg are lists of two numbers")
     (x, y), (a, b) = (pair or (0.0, 0.0) for pair in pairs)
     return Stance(decentre_mm=(x, y), tilt_rad=(to_radians(a), to_radians(b)))
+
+
+def check_stances(parts: Sequence[tuple[Stance | None, str]], stop: int) -> None:
+    """Refuse stances that begin no piece of glass, and a stop on glass that stands askew.
+
+    Args:
+        parts: Stance and glass after it of every surface.
+        stop: Number of the surface of the stop.
+
+    Raises:
+        ContractError: Naming the surface.
+    """
+    media = ["air", *(glass for _, glass in parts)]
+    skewed = False
+    for i, (stance, glass) in enumerate(parts):
+        if stance is not None:
+            if media[i] != "air" or glass == "air":
+                raise ContractError(
+                    f"surface {i} begins no piece of glass; a tilt or decentre stands at the first "
+                    "surface of the piece"
+                )
+            skewed = True
+        if skewed and i == stop:
+            raise ContractError(
+                f"the stop, surface {i}, lies on glass that is tilted or decentred; state the stop "
+                "as a surface of its own in air"
+            )
+        skewed = skewed and glass != "air"

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.prescription import FabricationErrors
+from camkit.models_def.optics.tolerance.uniform_errors import FabricationErrors
 from camkit.units import to_radians
 
 Distribution = Literal["uniform", "normal"]

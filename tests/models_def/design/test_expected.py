@@ -16,7 +16,7 @@ from camkit.models_def.design.lens import DesignLens
 from camkit.models_def.design.lens_module import LensModule
 from camkit.models_def.design.shipped_camera import Camera
 from camkit.models_def.optics.lens_file.lens_file import find_lens
-from camkit.models_def.optics.prescription import FabricationErrors
+from camkit.models_def.optics.tolerance.uniform_errors import FabricationErrors
 from camkit.models_def.sensors.wiener import to_otf
 from tests.models_def.design.test_shipped_camera import RECIPES, behind_the_bank, camera
 

@@ -13,8 +13,9 @@ from camkit.models_def.design.fabrication import Copy, draw_copy, made_with
 from camkit.models_def.design.loop import DesignLoop, DesignParts
 from camkit.models_def.design.starts import Starts
 from camkit.models_def.optics.paraxial import paraxial_data
-from camkit.models_def.optics.prescription import FabricationErrors, Lens
+from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.search.problem import trace_batch
+from camkit.models_def.optics.tolerance.uniform_errors import FabricationErrors
 
 RECIPE = Path(__file__).resolve().parents[3] / "models_def" / "recipes" / "duet_joint_lens.toml"
 ERRORS = FabricationErrors()

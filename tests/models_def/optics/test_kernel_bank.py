@@ -15,8 +15,9 @@ from camkit.models_def.optics.kernel_bank import (
     wavelength_grid,
 )
 from camkit.models_def.optics.paraxial import paraxial_data
-from camkit.models_def.optics.prescription import FabricationErrors, read_prescription
+from camkit.models_def.optics.prescription import read_prescription
 from camkit.models_def.optics.scaling import scale_to_efl
+from camkit.models_def.optics.tolerance.uniform_errors import FabricationErrors
 
 DUET = Path(__file__).resolve().parents[3] / "models_def" / "prescriptions" / "duet.toml"
 

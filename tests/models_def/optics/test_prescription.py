@@ -8,18 +8,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camkit.errors import ContractError
+from camkit.models_def.optics.configuration.exact_text import degrees_text
 from camkit.models_def.optics.prescription import (
-    FabricationErrors,
     Lens,
     Surface,
-    degrees_text,
     format_prescription,
     parse_prescription,
-    perturb,
     read_prescription,
     with_focus_shift,
     write_prescription,
 )
+from camkit.models_def.optics.tolerance.uniform_errors import FabricationErrors, perturb
 
 GOOD = """
 name = "one"

@@ -2,15 +2,18 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from camkit.cli.choices import Debug, GlassCatalogues, GlassFiles, Json, Overwrite
+from camkit.cli.choices import Configuration, Debug, GlassCatalogues, GlassFiles, Json, Overwrite
 from camkit.cli.say import say
 
 if TYPE_CHECKING:
     from camkit.models_def.optics.prescription import Lens
+
+STATEFUL: Final = (".toml", ".zmx")
+"""Formats that hold configurations."""
 
 
 def convert(
@@ -30,6 +33,7 @@ def convert(
     ] = None,
     glass: GlassFiles = None,
     catalogue: GlassCatalogues = None,
+    configuration: Configuration = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
@@ -37,6 +41,7 @@ def convert(
     """Write a lens in another format and report on stderr what is lost (needs torch).
 
     A finite object distance is scaled with the lens. A table (.csv) holds the sag of every surface.
+    All configurations go to .toml and .zmx, unless --configuration or --f-number takes one.
     """
     from camkit.cli.design.design_time import refuse_existing, require_torch
     from camkit.errors import ContractError
@@ -47,10 +52,12 @@ def convert(
     path = target or out or Path()
     refuse_existing([path], overwrite=overwrite)
     from camkit.models_def.optics.lens_file.lens_file import (
+        read_configured_lens,
         read_noted_lens,
         ready_for_lens,
         write_lens,
     )
+    from camkit.models_def.optics.lens_file.states import plain_lens
     from camkit.models_def.optics.scaling import scale_to_efl, with_f_number
     from camkit.models_def.optics.thin.lens_sag import write_lens_sag
 
@@ -59,14 +66,17 @@ def convert(
         path.parent.mkdir(parents=True, exist_ok=True)
     else:
         ready_for_lens(path)
-    lens, notes = read_noted_lens(source, glass or (), catalogue)
+    has_states = path.suffix.lower() in STATEFUL and configuration is None and f_number is None
+    files = source, glass or (), catalogue
+    lens, notes = (
+        read_configured_lens(*files) if has_states else read_noted_lens(*files, configuration)
+    )
     if efl_mm is not None:
-        lens = scale_to_efl(lens, efl_mm)
+        lens = scale_to_efl(lens, efl_mm, measured=plain_lens(lens))
     if f_number is not None:
         lens = with_f_number(lens, f_number)
         notes = (*notes, *_clipped(lens))
-    if path.suffix.lower() != ".toml" and any(surface.vary for surface in lens.surfaces):
-        notes = (*notes, "what `vary` names stays behind: OUT is all fixed")
+    notes = (*notes, *_left_behind(lens, path.suffix.lower()))
     if is_table:
         notes = (*notes, *write_lens_sag(lens, path))
     else:
@@ -74,10 +84,22 @@ def convert(
     for note in notes:
         say(f"{source.name}: {note}", err=True)
     if json_:
-        record = {"lens": lens.name, "surfaces": len(lens.surfaces), "out": str(path)}
+        record: dict[str, object] = {"lens": lens.name, "surfaces": len(lens.surfaces)}
+        record |= {"out": str(path), "configurations": [s.name for s in lens.configurations]}
         say(json.dumps({**record, "notes": list(notes)}))
     else:
         say(f"{path}: {lens.name}, {len(lens.surfaces)} surfaces")
+
+
+def _left_behind(lens: "Lens", suffix: str) -> list[str]:
+    """Return what of a lens a format does not hold."""
+    notes = []
+    if suffix == ".zmx" and lens.configurations:
+        names = ", ".join(state.name for state in lens.configurations)
+        notes.append(f"configurations are numbered in OUT, their names stay behind: {names}")
+    if suffix != ".toml" and any(surface.vary for surface in lens.surfaces):
+        notes.append("what `vary` names stays behind: OUT is all fixed")
+    return notes
 
 
 def _clipped(lens: "Lens") -> list[str]:

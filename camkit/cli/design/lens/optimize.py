@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from camkit.cli.choices import Debug, GlassCatalogues, GlassFiles, Json, Overwrite
+from camkit.cli.choices import Configuration, Debug, GlassCatalogues, GlassFiles, Json, Overwrite
 from camkit.cli.say import say
 from camkit.errors import ContractError
 from camkit.progress import working
@@ -53,6 +53,7 @@ def optimize(
     seed: Annotated[int, typer.Option(help="Random seed of the starting points.")] = 1,
     glass: GlassFiles = None,
     catalogue: GlassCatalogues = None,
+    configuration: Configuration = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
@@ -72,7 +73,7 @@ def optimize(
     from camkit.models_def.torch_threads import one_torch_thread
 
     ready_for_lens(out)
-    lens, read_notes = read_noted_lens(source, glass or (), catalogue)
+    lens, read_notes = read_noted_lens(source, glass or (), catalogue, configuration)
     problem = _problem(lens, vary, merit=merit, core_mm=core_um / 1000, rays=rays)
     begin = problem.free.scaled()
     problem = in_own_frame(problem, begin)

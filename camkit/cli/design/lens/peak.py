@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from camkit.cli.choices import Debug, GlassCatalogues, GlassFiles, Json
+from camkit.cli.choices import Configuration, Debug, GlassCatalogues, GlassFiles, Json
 from camkit.cli.say import say
 from camkit.progress import working
 
@@ -37,6 +37,7 @@ def peak(
     tool_radius_um: ToolRadiusUm = None,
     glass: GlassFiles = None,
     catalogue: GlassCatalogues = None,
+    configuration: Configuration = None,
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
@@ -53,7 +54,7 @@ def peak(
     from camkit.models_def.optics.lens_file.lens_file import read_noted_lens
     from camkit.models_def.optics.thin.report import to_text, with_tool
 
-    lens, notes = read_noted_lens(file, glass or (), catalogue)
+    lens, notes = read_noted_lens(file, glass or (), catalogue, configuration)
     if tool_radius_um is not None:
         lens = with_tool(lens, tool_radius_um)
     record = measured(lens, lens.field_angles_rad, pitch_um, waves=waves)

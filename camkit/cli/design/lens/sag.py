@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from camkit.cli.choices import Debug, GlassCatalogues, GlassFiles, Json, Overwrite
+from camkit.cli.choices import Configuration, Debug, GlassCatalogues, GlassFiles, Json, Overwrite
 from camkit.cli.say import say
 
 
@@ -23,6 +23,7 @@ def sag(
     step_um: Annotated[float, typer.Option(min=0.1, help="Step of the radius in um.")] = 10.0,
     glass: GlassFiles = None,
     catalogue: GlassCatalogues = None,
+    configuration: Configuration = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
@@ -39,7 +40,7 @@ def sag(
     from camkit.models_def.optics.lens_file.lens_file import read_noted_lens
     from camkit.models_def.optics.thin.sag_table import sag_table, write_sag_table
 
-    lens, notes = read_noted_lens(file, glass or (), catalogue)
+    lens, notes = read_noted_lens(file, glass or (), catalogue, configuration)
     if surface is None:
         cut = (n for n, face in enumerate(lens.surfaces) if face.grooves is not None)
         surface = next(cut, 0)

@@ -1,12 +1,13 @@
 """`camkit lens show`: a lens on one page."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Final
 
 import typer
 
-from camkit.cli.choices import Debug, GlassCatalogues, GlassFiles, Json, Overwrite
+from camkit.cli.choices import Configuration, Debug, GlassCatalogues, GlassFiles, Json, Overwrite
 from camkit.cli.say import say
 from camkit.progress import working
 
@@ -38,19 +39,23 @@ def show(
     ] = None,
     glass: GlassFiles = None,
     catalogue: GlassCatalogues = None,
+    configuration: Configuration = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
     """Draw and measure a lens: layout, spots, fans, PSFs, MTF, curves, sums (needs torch).
 
+    Of a lens with configurations one is shown, beside a table of all.
     Without -o and --json NAME.html and its pictures are written to the current folder.
     """
     from camkit.cli.design.design_time import refuse_existing, require_torch
 
     require_torch("camkit lens show")
     from camkit.models_def.optics.analysis.sampling import DEFAULT_SAMPLING, Pupil
-    from camkit.models_def.optics.lens_file.lens_file import read_noted_lens
+    from camkit.models_def.optics.analysis.state_facts import state_facts
+    from camkit.models_def.optics.lens_file.lens_file import read_configured_lens
+    from camkit.models_def.optics.lens_file.states import plain_lens
     from camkit.models_def.torch_threads import one_torch_thread
     from camkit.report.pages.lens.lens_facts import analyse
     from camkit.report.pages.lens.lens_json import to_json
@@ -64,11 +69,14 @@ def show(
         folder, name = folder.parent, folder.stem
     if folder is not None:
         refuse_existing([page_path(folder, name)], overwrite=overwrite)
-    lens, notes = read_noted_lens(file, glass or (), catalogue)
     with one_torch_thread():
+        with working(f"reading {file.name}"):
+            configured, notes = read_configured_lens(file, glass or (), catalogue)
+            lens = plain_lens(configured, configuration)
         with working(f"measuring {lens.name}"):
             choice = choose_pupil(lens, asked_pupil.definition if pupil else None, sampling)
             facts = analyse(lens, choice, notes)
+            facts = replace(facts, states=state_facts(configured))
         with working("drawing the page"):
             written = [] if folder is None else write_lens_page(facts, folder, name)
     if json_:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from camkit.cli.choices import Debug, GlassCatalogues, GlassFiles, Json, Overwrite
+from camkit.cli.choices import Configuration, Debug, GlassCatalogues, GlassFiles, Json, Overwrite
 from camkit.cli.say import say
 from camkit.errors import ContractError
 from camkit.progress import working
@@ -41,6 +41,7 @@ def tolerance(
     ] = None,
     glass: GlassFiles = None,
     catalogue: GlassCatalogues = None,
+    configuration: Configuration = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
@@ -63,7 +64,7 @@ def tolerance(
     folder = out_dir if out_dir is not None or json_ else Path()
     if folder is not None:
         refuse_existing(chart_paths(folder, file.stem), overwrite=overwrite)
-    lens, notes = read_noted_lens(file, glass or (), catalogue)
+    lens, notes = read_noted_lens(file, glass or (), catalogue, configuration)
     for note in notes:
         say(f"{file.name}: {note}", err=True)
     run = ToleranceRun(

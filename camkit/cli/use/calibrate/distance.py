@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from camkit.cli.choices import Debug, GlassCatalogues, GlassFiles, Json, Overwrite
+from camkit.cli.choices import Configuration, Debug, GlassCatalogues, GlassFiles, Json, Overwrite
 from camkit.cli.design.camera_options import FNumber, StopRadiusMm, distances_m
 from camkit.cli.use.calibrate.calibration_outputs import print_result
 
@@ -65,6 +65,7 @@ def distance(
     ] = None,
     glass: GlassFiles = None,
     catalogue: GlassCatalogues = None,
+    configuration: Configuration = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
@@ -89,6 +90,7 @@ def distance(
         distance_from=distance_from,
         glass=tuple(glass or ()),
         catalogue=catalogue,
+        configuration=configuration,
     )
     facts = lens_distance.distance(
         pictures,

@@ -26,6 +26,7 @@ from camkit.models_def.optics.analysis.spots import (
     rms_about_chief,
     spot_diagram,
 )
+from camkit.models_def.optics.analysis.state_facts import StateFacts
 from camkit.models_def.optics.analysis.wavefront import trace_wavefront, wavefront_rms_um
 from camkit.models_def.optics.paraxial import Paraxial, paraxial_data
 from camkit.models_def.optics.prescription import Lens
@@ -69,6 +70,7 @@ class LensFacts:
         fans: Two lines of rays through the pupil; None if they were not asked for.
         reasons: Why a fact is missing, by the name of the fact.
         notes: What was left out of the file, what could not be computed and why, for people.
+        states: The configurations of the file beside each other.
     """
 
     lens: Lens
@@ -90,6 +92,7 @@ class LensFacts:
     fans: Fans | None
     reasons: Mapping[str, str]
     notes: tuple[str, ...]
+    states: tuple[StateFacts, ...] = ()
 
     @property
     def pupil(self) -> Pupil:

@@ -66,6 +66,10 @@ _PRESCRIPTION: Final = (
     *("surface", "radius, mm", "thickness, mm", "glass", "semi-diameter, mm", "conic"),
     "r², r⁴, …",
 )
+_STATES: Final = (
+    *("configuration", "EFL, mm", "f-number", "object distance, mm", "widest field"),
+    *("RMS on the axis, µm", "RMS at the widest field, µm"),
+)
 _GROOVES: Final = (
     *("surface", "groove, µm", "walls", "narrowest, mm", "tool radius, µm", "grooves"),
 )
@@ -107,6 +111,7 @@ def lens_page(facts: LensFacts, pictures: Mapping[str, str]) -> Page:
     sections = [
         Section("Layout", (charts.get("layout"),)),
         Section("First order", (_first_order(facts),)),
+        *([Section("Configurations", (_states(facts),))] if facts.states else []),
         Section("Prescription", (_prescription(facts), _grooves(facts))),
         Section("Spot diagrams", (*spots, f"PSF: {facts.model.reason}.")),
         Section("Point images", (charts.get("psf"), charts.get("encircled"), _images(facts))),
@@ -153,6 +158,22 @@ def _first_order(facts: LensFacts) -> Table:
         ("exit pupil diameter, mm", data.exit_pupil_diameter_mm),
     ]
     return Table(rows=[(name, _number(value, 8)) for name, value in rows])
+
+
+def _states(facts: LensFacts) -> Table:
+    rows = [
+        (
+            f"{state.name} (default)" if state.is_usual else state.name,
+            _number(state.efl_mm, 6),
+            _number(state.f_number, 4),
+            _number(state.object_distance_mm, 6),
+            f"{to_degrees(state.widest_field_rad):.4g}°",
+            _number(state.axis_spot_mm * UM_PER_MM, 4),
+            _number(state.widest_spot_mm * UM_PER_MM, 4),
+        )
+        for state in facts.states
+    ]
+    return Table(header=_STATES, rows=rows)
 
 
 def _prescription(facts: LensFacts) -> Table:

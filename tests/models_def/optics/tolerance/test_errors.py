@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.prescription import FabricationErrors
 from camkit.models_def.optics.tolerance.errors import ERROR_CLASSES, ErrorWidth, Tolerances
+from camkit.models_def.optics.tolerance.uniform_errors import FabricationErrors
 
 DRAWS = (np.arange(200_000) + 0.5) / 200_000
 
