@@ -248,7 +248,7 @@ def with_choices(
     """
     if library and not search:
         raise ContractError(
-            f"{option_text('library')} is a search: leave out {option_text('no-search')}"
+            f"{option_text('library')} is a search, and {option_text('search')} is off"
         )
     changes = {"steps": steps, "lens_rate": lens_rate, "seed": seed}
     overrides = {key: value for key, value in changes.items() if value is not None}

@@ -303,15 +303,10 @@ def grooves_of(lens: Lens) -> list[dict[str, Any]]:
 
 def with_focus_shift(lens: Lens, shift_mm: float) -> Lens:
     """Return the lens with its sensor moved away from it by `shift_mm`, in all configurations."""
-    last = lens.surfaces[-1]
+    *others, last = lens.surfaces
     back_surface = replace(last, thickness_mm=last.thickness_mm + shift_mm)
-    return replace(
-        lens,
-        surfaces=(*lens.surfaces[:-1], back_surface),
-        configurations=tuple(
-            state.shifted(len(lens.surfaces) - 1, shift_mm) for state in lens.configurations
-        ),
-    )
+    states = tuple(state.shifted(len(others), shift_mm) for state in lens.configurations)
+    return replace(lens, surfaces=(*others, back_surface), configurations=states)
 
 
 def require_plain(lens: Lens, what: str) -> None:

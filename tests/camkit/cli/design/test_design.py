@@ -70,7 +70,7 @@ def test_a_search_of_the_library_says_where_it_begins(camkit_command, tmp_path: 
     assert f"begins at {start}" in outcome.err
     refused = camkit_command("design", recipe, "--library", "--no-search")
     assert refused.code == 2
-    assert "--library is a search: leave out --no-search" in refused.err
+    assert "--library is a search, and --search is off" in refused.err
 
 
 @pytest.mark.parametrize(
