@@ -14,7 +14,7 @@ from camkit.calibrate import PairWords
 from camkit.calibration.blur_pair.distance_facts import DistanceFacts
 from camkit.cli.app import run
 from camkit.errors import ContractError, DecodeError
-from camkit.models_def.optics.analysis import pair_transfer
+from camkit.models_def.optics.render import pair_transfer
 from camkit.runtime.signal.tone_curve import read_tone
 from tests.capture_factory import write_tiny_captures
 from tests.data_folder import ROOT, data_path

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from camkit.arrays import FloatArray
-from camkit.models_def.optics.analysis import pair_transfer
+from camkit.models_def.optics.render import pair_transfer
 from camkit.runtime.signal.halves import right_half
 from tests.pair_factory import LENS, WORDS, Truth, write_pair
 from tools.comparison import real_lens, real_lens_pages

@@ -89,7 +89,7 @@ def to_json(facts: LensFacts) -> dict[str, Any]:
         if facts.image is not None
     ]
     result["convergence"] = [_plain(row, why) for row in _convergence(facts)]
-    result["configurations"] = [state.to_json() for state in facts.states]
+    result["configurations"] = [_plain(state.to_json(), why) for state in facts.states]
     result["notes"] = list(facts.notes)
     return result
 
