@@ -283,7 +283,10 @@ def test_lens_show_states_the_pupil_that_decides_the_cooke_triplet_s_spots(
     """One lens, three answers at 20 degrees: 12.08, 12.29 and 16.32 um."""
     path = tmp_path / f"cooke{suffix}"
     write_lens(read_prescription(PRESCRIPTIONS / "cooke-triplet-f5.toml"), path)
-    assert run(["lens", "show", "--sampling", "hexapolar:6", str(path), "--json", "--pupil", pupil]) == ExitCode.DONE
+    assert (
+        run(["lens", "show", "--sampling", "hexapolar:6", str(path), "--json", "--pupil", pupil])
+        == ExitCode.DONE
+    )
     found = json.loads(capsys.readouterr().out)
     assert found["pupil"] == pupil
     assert found["efl_mm"] == pytest.approx(49.9997830714, abs=1e-9)
