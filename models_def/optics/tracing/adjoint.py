@@ -10,13 +10,18 @@ Refraction is d' = ratio d + bend N, bend = (T - ratio D) / N.N, with D = N.d an
 (ratio = n / n', T^2 = (1 - ratio^2) N.N + ratio^2 D^2).
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import torch
 from torch import Tensor
 
+from camkit.models_def.optics.tracing.gradient_parts import (
+    Gather,
+    GradientNeeds,
+    Gradients,
+    Slopes,
+)
 from camkit.models_def.optics.tracing.kernel import RayRecord, TraceSettings, rest
 from camkit.models_def.optics.tracing.meeting import Numbers, State
 from camkit.models_def.optics.tracing.phase_polynomial import (
@@ -33,46 +38,8 @@ from camkit.models_def.optics.tracing.series import (
     term_slopes,
 )
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GradientNeeds:
-    """The gradients that are asked for; semi-diameters have none."""
-
-    rays: bool
-    curvature: bool
-    conic: bool
-    even_asphere: bool
-    thickness: bool
-    index: bool
-    odd_asphere: bool
-    phase: bool
-
-
-class Slopes(NamedTuple):
-    """The values that flow back: derivatives of the loss by a result; None is zero."""
-
-    end: State
-    path: Tensor | None
-    states: list[State | None]
-
-
-class Gradients(NamedTuple):
-    """The gradients of rays and lens; a list has an entry per surface (indices: one more)."""
-
-    rays: State | None
-    curvature: list[Tensor]
-    conic: list[Tensor]
-    even_asphere: list[list[Tensor]]
-    thickness: list[Tensor]
-    indices: list[Tensor]
-    odd_asphere: list[list[Tensor]]
-    phase: list[list[Tensor]]
-
-
 _WILD: Final = {torch.float32: 1e15, torch.float64: 1e100}
 """The largest derivative by a place or direction that is still followed."""
-
-Gather = Callable[[Tensor, Tensor], Tensor]
 
 
 class _Shape(NamedTuple):

@@ -17,8 +17,9 @@ from typing import Final, NamedTuple
 import torch
 from torch import Tensor
 
-from camkit.models_def.optics.tracing.adjoint import GradientNeeds, Gradients, Slopes, pull_back
+from camkit.models_def.optics.tracing.adjoint import pull_back
 from camkit.models_def.optics.tracing.gradient import FIXED, Eager, Engine, Task
+from camkit.models_def.optics.tracing.gradient_parts import GradientNeeds, Gradients, Slopes
 from camkit.models_def.optics.tracing.kernel import (
     NOT_CONVERGED,
     LensTensors,

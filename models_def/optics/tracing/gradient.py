@@ -13,7 +13,8 @@ import torch
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
-from camkit.models_def.optics.tracing.adjoint import GradientNeeds, Gradients, Slopes, pull_back
+from camkit.models_def.optics.tracing.adjoint import pull_back
+from camkit.models_def.optics.tracing.gradient_parts import GradientNeeds, Gradients, Slopes
 from camkit.models_def.optics.tracing.kernel import (
     LensTensors,
     RayRecord,
