@@ -10,8 +10,7 @@ from camkit.errors import ContractError
 from camkit.models_def.design.fabrication import Copy, made_with
 from camkit.models_def.design.lens import DesignLens
 from camkit.models_def.optics.analysis.first_order import airy_radius_mm
-from camkit.models_def.optics.analysis.model_psf import RAYS_FROM
-from camkit.models_def.optics.analysis.psf_model import PsfModel, psf_model
+from camkit.models_def.optics.analysis.psf_model import WAVE_BELOW, PsfModel, psf_model
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.psf import with_object_distance
 from camkit.models_def.optics.search.least_squares import jacobian
@@ -160,7 +159,7 @@ def sharp_fields(problem: Problem, scaled: Tensor, pixels: Pixels) -> Tensor:
         return torch.zeros(shape, dtype=torch.bool)
     alone = torch.eye(len(problem.wavelengths_um), dtype=torch.float64)
     models = design_models(problem, scaled, replace(pixels, color_weights=alone))
-    return torch.stack([model.ratio.amax(1) < RAYS_FROM for model in models])
+    return torch.stack([model.ratio.amax(1) < WAVE_BELOW for model in models])
 
 
 def design_models(problem: Problem, scaled: Tensor, pixels: Pixels) -> list[PsfModel]:

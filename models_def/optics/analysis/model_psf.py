@@ -9,14 +9,17 @@ from torch import Tensor
 
 from camkit.models_def.optics.analysis.first_order import AIRY
 from camkit.models_def.optics.analysis.lens_waves import wave_psf
-from camkit.models_def.optics.analysis.psf_model import PsfModel, PsfRegime, psf_model
+from camkit.models_def.optics.analysis.psf_model import (
+    WAVE_BELOW,
+    PsfModel,
+    PsfRegime,
+    psf_model,
+)
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.psf import TracedPsf, trace_psf
 from camkit.models_def.optics.spot import slopes_for_heights
 from camkit.units import UM_PER_MM
 
-RAYS_FROM: Final = 12.0
-"""RMS blur of one wavelength over Airy radius from which it is traced by rays in any case."""
 WAVE_LIGHT: Final = 0.996
 _BLURS: Final = 2.0
 
@@ -34,8 +37,8 @@ def model_psf(
 ) -> TracedPsf:
     """Return the PSF at sensor heights and wavelengths; arguments as of `psf.trace_psf`.
 
-    A kernel whose blur is `RAYS_FROM` Airy radii or wider is traced by rays whatever the regime:
-    waves would take minutes and change nothing.
+    A kernel whose own blur is `WAVE_BELOW` Airy radii or wider is traced by rays whatever the
+    regime: waves would take minutes and change its MTF by less than 0.05.
 
     Args:
         lens: The prescription.
@@ -56,7 +59,7 @@ def model_psf(
         return by_rays(heights_mm)
     slopes = slopes_for_heights(lens, heights_mm)
     model = psf_model(lens, slopes, wavelengths_um)
-    is_sharp = model.ratio < RAYS_FROM
+    is_sharp = model.ratio < WAVE_BELOW
     if not bool(is_sharp.any()):
         return by_rays(heights_mm)
     side_px = min(size_px, _window_px(model, is_sharp, light, pitch_um))

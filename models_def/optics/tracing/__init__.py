@@ -8,7 +8,8 @@ In the order in which data flows:
 - `frame`: surfaces that are turned and shifted
 - `meeting`: where rays meet a surface, `groove`: one that is cut into grooves
 - `kernel`: rays through the surfaces of a lens, each with its fate
-- `gradient_parts`: what a gradient is asked for and gives; `adjoint`: the gradients, from where rays met the surfaces
+- `gradient_parts`: what a gradient is asked for and gives
+- `adjoint`: the gradients, from where rays met the surfaces
 - `gradient`: both as one node of the autograd graph, in blocks, with bounded memory
 - `compilation`: a whole lens fused into one loop
 """

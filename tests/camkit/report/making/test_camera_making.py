@@ -204,7 +204,6 @@ def test_a_grey_camera_has_its_filter_and_says_why(
 
 
 @pytest.mark.parametrize("kind", ["planes", "grey"])
-@pytest.mark.timeout(900)  # frozen by waves
 def test_a_camera_without_a_mosaic_is_made(kind: str, small: None, tmp_path: Path) -> None:
     out = tmp_path / "mine.camkit"
     words = CameraWords(sensor=f"{SENSOR}:{kind}", focus_m=float("inf"))

@@ -11,7 +11,7 @@ import torch
 from camkit.bundle.sensor import ColorSensor
 from camkit.errors import ContractError, UnsupportedError
 from camkit.models_def.optics.analysis.lens_waves import wave_psf
-from camkit.models_def.optics.analysis.model_psf import RAYS_FROM, model_psf
+from camkit.models_def.optics.analysis.model_psf import model_psf
 from camkit.models_def.optics.analysis.psf_model import WAVE_BELOW, checked_regime, psf_model
 from camkit.models_def.optics.kernel_bank import colour_kernels, gaussian_response, wavelength_grid
 from camkit.models_def.optics.lens_file.lens_file import find_lens
@@ -41,7 +41,7 @@ def test_sharp_kernels_are_those_of_waves_and_wide_ones_those_of_rays() -> None:
     waves = wave_psf(sharp, slopes_for_heights(sharp, heights), GREEN, 15, 3.0)
     assert torch.equal(found.kernels, waves.kernels)
     axis = torch.zeros(1, dtype=torch.float64)
-    assert float(psf_model(wide, axis, GREEN).ratio.min()) > RAYS_FROM
+    assert float(psf_model(wide, axis, GREEN).ratio.min()) > WAVE_BELOW
     found = model_psf(wide, heights, GREEN, 41, 6.0, regime="waves", rays=500)
     assert torch.equal(found.kernels, trace_psf(wide, heights, GREEN, 41, 6.0, rays=500).kernels)
 
