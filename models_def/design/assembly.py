@@ -94,10 +94,11 @@ def pixels_of(recipe: DesignRecipe, problem: Problem, begin: Tensor) -> Pixels:
         color_weights=weights / weights.sum(1, keepdim=True),
         window_follows=recipe.camera is not None,
     )
-    models = design_models(problem, begin, pixels)
-    needed_regime = "waves" if any(model.regime == "waves" for model in models) else "rays"
-    regime = checked_regime(recipe.optics.psf_model or needed_regime, "optics.psf_model")
-    pixels = replace(pixels, regime=regime or "rays")
+    regime = checked_regime(recipe.optics.psf_model, "optics.psf_model")
+    if regime is None:
+        models = design_models(problem, begin, pixels.color_weights)
+        regime = "waves" if any(model.regime == "waves" for model in models) else "rays"
+    pixels = replace(pixels, regime=regime)
     if recipe.pixels.kernel_px:
         return pixels
     return replace(pixels, kernel_px=fitting_window_px(problem, begin, pixels))

@@ -157,18 +157,22 @@ def sharp_fields(problem: Problem, scaled: Tensor, pixels: Pixels) -> Tensor:
     shape = len(problem.depths_mm), len(problem.slopes)
     if pixels.regime == "rays":
         return torch.zeros(shape, dtype=torch.bool)
-    alone = torch.eye(len(problem.wavelengths_um), dtype=torch.float64)
-    models = design_models(problem, scaled, replace(pixels, color_weights=alone))
+    models = design_models(problem, scaled)
     return torch.stack([model.ratio.amax(1) < WAVE_BELOW for model in models])
 
 
-def design_models(problem: Problem, scaled: Tensor, pixels: Pixels) -> list[PsfModel]:
-    """Return the PSF model that a lens (variable,) needs at each depth of a problem."""
+def design_models(problem: Problem, scaled: Tensor, shares: Tensor | None = None) -> list[PsfModel]:
+    """Return the PSF model that a lens (variable,) needs at each depth of a problem.
+
+    Args:
+        problem: Fields, wavelengths and depths.
+        scaled: The lens.
+        shares: (colour, wavelength), see `psf_model`.
+    """
     lens = problem.free.lens_at(scaled)
-    weights = pixels.color_weights.to(torch.float64)
     return [
         psf_model(
-            with_object_distance(lens, depth_mm), problem.slopes, problem.wavelengths_um, weights
+            with_object_distance(lens, depth_mm), problem.slopes, problem.wavelengths_um, shares
         )
         for depth_mm in problem.depths_mm
     ]

@@ -29,6 +29,7 @@ OF_A_LENS: Final = (
     "object_m",
     "defocus_mm",
     "glass",
+    "catalogue",
     "configuration",
 )
 """Words that a measured PSF answers by itself."""

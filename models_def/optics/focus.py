@@ -4,7 +4,6 @@ The last two are least squares with one solution, since rays are straight behind
 on a sensor moved by s is x + s l / n, and a path to a point on it grows linearly with s.
 """
 
-import math
 from dataclasses import replace
 from typing import Final, Literal, get_args
 
@@ -12,6 +11,7 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
+from camkit.models_def.optics.aiming.start import path_before
 from camkit.models_def.optics.paraxial import paraxial_image
 from camkit.models_def.optics.prescription import (
     Lens,
@@ -51,7 +51,8 @@ def focus_shift_mm(lens: Lens, merit: FocusMerit) -> float:
         tensors = surface_tensors(lens, waves[:, None])
         slope = slopes[:, None, None].expand(-1, len(waves), 1)
         rays, weight = pupil_rays(lens, tensors, half_disc(_RAYS), slope, definition="stop")
-        rays = replace(rays, path_mm=launch_path_mm(rays, lens.object_distance_mm))
+        before = path_before(rays, slope, lens.object_distance_mm, tensors.index[0])
+        rays = replace(rays, path_mm=before)
         landings = trace(tensors, rays, path=True)
         weight = torch.where(landings.valid, weight, 0.0)
         if not bool(weight.sum() > 0):
@@ -63,19 +64,6 @@ def with_focus(lens: Lens, merit: FocusMerit) -> Lens:
     """Return the lens with its sensor at the best place; see `focus_shift_mm`."""
     require_plain(lens, "the best focus")
     return with_focus_shift(lens, focus_shift_mm(lens, merit))
-
-
-def launch_path_mm(rays: Rays, object_distance_mm: float) -> Tensor:
-    """Return the path in air from the object point to launched rays, any constant left out.
-
-    Args:
-        rays: From `pupil.launch`.
-        object_distance_mm: Of the object plane; inf for a plane wave, whose path counts from the
-            wavefront through the first vertex.
-    """
-    if math.isinf(object_distance_mm):
-        return rays.x * rays.l + rays.y * rays.m + rays.z * rays.n
-    return (rays.z + object_distance_mm) / rays.n
 
 
 def _spot_shift(landings: Rays, weight: Tensor) -> float:

@@ -25,7 +25,7 @@ from camkit.models_def.optics.freezable_optics import (
 from camkit.models_def.optics.frozen import corner_height_mm
 from camkit.models_def.optics.kernel_bank import focused_copies
 from camkit.models_def.optics.paraxial import paraxial_data
-from camkit.models_def.optics.prescription import Lens, grooves_of, with_focus_shift
+from camkit.models_def.optics.prescription import Lens, grooves_of, require_round, with_focus_shift
 from camkit.models_def.optics.psf import TracedPsf, with_object_distance
 from camkit.models_def.optics.render.illumination import relative_illumination_at
 from camkit.radial import RadialDistortion
@@ -82,11 +82,13 @@ class LensOptics:
 
         Raises:
             ContractError: If there is no such model.
-            UnsupportedError: If waves are wanted of a lens with grooves.
+            UnsupportedError: If waves are wanted of a lens with grooves or of an unround one.
         """
         own_regime = checked_regime(regime)
         if own_regime == "waves" and grooves_of(self.lens):
             raise UnsupportedError("the light of grooves is no smooth wave; take rays")
+        if own_regime == "waves":
+            require_round(self.lens, "a sum of waves")
         model = sensor_model(self.lens, corner_height_mm(sensor), *sensor.response_arrays())
         least = float(model.ratio.min())
         return replace(

@@ -30,15 +30,15 @@ def read_optics(
         configuration: Of a lens, see `read_noted_lens`.
 
     Raises:
-        ContractError: If a configuration of other optics than a lens is chosen.
+        ContractError: If glasses or a configuration are given for other optics than a lens.
         BundleError: If a PSF is missing or damaged, or a bundle is.
         CamkitError: If a lens is wrong, see `read_lens`, or a plate, see `read_plate`.
     """
     is_other = path.suffix.lower() == MEASURED or is_plate(path)
-    if is_other and configuration is not None:
-        raise ContractError(
-            f"{path.name} is no lens and has no states; leave {option_text('configuration')} out"
-        )
+    words = {"glass": glass or None, "catalogue": catalogue, "configuration": configuration}
+    useless = [option_text(word) for word, value in words.items() if value is not None]
+    if is_other and useless:
+        raise ContractError(f"{path.name} is no lens; leave {', '.join(useless)} out")
     if path.suffix.lower() == MEASURED:
         return read_measured(path)
     if is_other:

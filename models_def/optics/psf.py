@@ -54,11 +54,23 @@ def splat(spots: Spots, size_px: int, pitch_um: float) -> TracedPsf:
     row = (spots.y_mm - spots.chief_y_mm[:, None, None]) * scale + centre
     kernels = spread_tents(row, column, spots.weight, size_px)
     kernels = kernels + kernels.flip(-1)
-    inside = kernels.sum((-2, -1))
+    return as_psf(kernels, 2 * spots.weight.sum(-1))
+
+
+def as_psf(light: Tensor, whole: Tensor) -> TracedPsf:
+    """Return kernels that sum to 1 of the light (..., size, size) that fell into windows.
+
+    Args:
+        light: In each pixel.
+        whole: (...), all light of a kernel, in the window or beside it.
+
+    Raises:
+        ContractError: If no light falls into a kernel.
+    """
+    inside = light.sum((-2, -1))
     if bool((inside <= 0).any()):
         raise ContractError("no light reaches a kernel; check stop, semi-diameters and focus")
-    energy = inside / (2 * spots.weight.sum(-1))
-    return TracedPsf(kernels=kernels / inside[..., None, None], energy_kept=energy)
+    return TracedPsf(kernels=light / inside[..., None, None], energy_kept=inside / whole)
 
 
 def spread_tents(row: Tensor, column: Tensor, weight: Tensor, size_px: int) -> Tensor:

@@ -110,15 +110,17 @@ def _corrected_slopes(lens: Lens, heights_mm: Tensor, slopes: Tensor) -> Tensor 
 def _followed_slopes(lens: Lens, heights_mm: Tensor) -> Tensor:
     """Return slopes near those of the heights, from the chief rays that `chief_path` found."""
     path = chief_path(lens)
-    widest_mm = path.heights_mm.max()
-    if float(heights_mm.abs().max()) > widest_mm:
+    rising = slice(path.outermost + 1)
+    reached_mm = np.abs(path.heights_mm[rising])
+    wanted_mm = float(heights_mm.abs().max())
+    if wanted_mm > reached_mm[-1]:
         raise ContractError(
-            f"{lens.name} is aimed to {path.reach}; the sensor's corner is at "
-            f"{float(heights_mm.abs().max()):.2f} mm: use a smaller sensor"
+            f"{lens.name} is aimed to {path.reach}; the sensor's corner is at {wanted_mm:.2f} mm: "
+            "use a smaller sensor"
         )
-    rising = slice(int(path.heights_mm.argmax()) + 1)
-    angles = np.interp(np.abs(heights_mm.numpy()), path.heights_mm[rising], path.angles_rad[rising])
-    return torch.from_numpy(np.tan(angles)) * torch.sign(heights_mm)
+    angles = np.interp(np.abs(heights_mm.numpy()), reached_mm, path.angles_rad[rising])
+    side = np.sign(path.heights_mm[path.outermost])
+    return torch.from_numpy(side * np.tan(angles)) * torch.sign(heights_mm)
 
 
 def trace_spots(

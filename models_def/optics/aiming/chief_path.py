@@ -51,9 +51,14 @@ class ChiefPath:
         return torch.from_numpy(np.interp(angles, self.angles_rad, self.lead_mm))
 
     @property
+    def outermost(self) -> int:
+        """Number of the field that lands farthest from the axis."""
+        return int(np.abs(self.heights_mm).argmax())
+
+    @property
     def reach(self) -> str:
         """The widest field, in words."""
-        degrees, height_mm = to_degrees(float(self.angles_rad[-1])), float(self.heights_mm[-1])
+        degrees, height_mm = to_degrees(float(self.angles_rad[-1])), abs(float(self.heights_mm[-1]))
         return f"{degrees:.1f} degrees = {height_mm:.2f} mm"
 
 

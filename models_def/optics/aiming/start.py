@@ -37,6 +37,24 @@ def launch(x: Tensor, y: Tensor, slope: Tensor, object_distance_mm: float) -> Ra
     )
 
 
+def path_before(rays: Rays, slope: Tensor, object_distance_mm: float, index: Tensor) -> Tensor:
+    """Return the optical path in mm of launch points beyond that of the first vertex.
+
+    Written without the loss of a difference of long ways.
+
+    Args:
+        rays: Of `launch`.
+        slope: tan of their field angle.
+        object_distance_mm: From the first vertex; inf for parallel rays.
+        index: Of the medium in front of the lens; broadcasts with the rays.
+    """
+    if math.isinf(object_distance_mm):
+        return index * (rays.x * rays.l + rays.y * rays.m + rays.z * rays.n)
+    vertex = object_distance_mm * torch.sqrt(1 + slope**2)
+    more = rays.x**2 + rays.y**2 + 2 * rays.y * slope * object_distance_mm
+    return index * more / (torch.sqrt(vertex**2 + more) + vertex)
+
+
 def with_open_apertures(tensors: SurfaceTensors) -> SurfaceTensors:
     """Return the lens without the limits of its surfaces: no rim and no wall of a groove."""
     tensors = without_walls(tensors)

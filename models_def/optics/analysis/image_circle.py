@@ -23,14 +23,13 @@ def image_radius_mm(lens: Lens) -> float:
     is the outermost one that the rims leave some light is found by halving.
     """
     path = chief_path(lens)
-    outermost = int(path.heights_mm.argmax())
-    low, high = 0.0, float(path.angles_rad[outermost])
+    low, high = 0.0, float(path.angles_rad[path.outermost])
     if _is_lit(lens, high):
-        return float(path.heights_mm[outermost])
+        return abs(float(path.heights_mm[path.outermost]))
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
         low, high = (middle, high) if _is_lit(lens, middle) else (low, middle)
-    return float(chief_heights(lens, torch.tensor([math.tan(low)], dtype=torch.float64))[0])
+    return abs(float(chief_heights(lens, torch.tensor([math.tan(low)], dtype=torch.float64))[0]))
 
 
 def _is_lit(lens: Lens, angle_rad: float) -> bool:

@@ -25,7 +25,7 @@ from camkit.models_def.optics.analysis.wavefront import (
     to_sphere,
     trace_wavefront,
 )
-from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.prescription import Lens, require_round
 from camkit.models_def.optics.psf import TracedPsf
 from camkit.models_def.optics.pupil import with_fixed_stop
 from camkit.models_def.optics.trace import Rays
@@ -58,22 +58,28 @@ def wave_psf(
 
     Raises:
         ContractError: If the side is even, a field gets no light, or its blur needs too many rays.
+        UnsupportedError: If the lens is not round.
     """
-    fixed = with_fixed_stop(lens)
+    require_round(lens, "a PSF from half the pupil")
     if mask is None:
         mask = torch.ones(len(slopes), len(wavelengths_um), dtype=torch.bool)
+    fixed, wanted = with_fixed_stop(lens), mask.any(1)
+    kernels = slopes.new_zeros(*mask.shape, size_px, size_px)
+    if not bool(wanted.any()):
+        return normalised(kernels)
     most = FIT_GRIDS[0].rings * FIT_GRIDS[0].arms // 2 * len(wavelengths_um)
     fields = max(1, _CHUNK_RAYS // most)
     light = []
     for some, field_mask in zip(
-        torch.split(slopes, fields), torch.split(mask, fields), strict=True
+        torch.split(slopes[wanted], fields), torch.split(mask[wanted], fields), strict=True
     ):
         coarse, smooth = coarse_pupil(fixed, some, wavelengths_um)
         if smooth:
             light.append(summed_light(coarse, size_px, pitch_um, field_mask))
         else:
             light.append(_traced_light(fixed, some, coarse, (size_px, pitch_um), field_mask))
-    return normalised(torch.cat(light))
+    kernels[wanted] = torch.cat(light)
+    return normalised(kernels)
 
 
 def _traced_light(

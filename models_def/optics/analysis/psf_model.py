@@ -78,6 +78,8 @@ def psf_model(
     if any(surface.grooves is not None for surface in lens.surfaces):
         reason = "rays: the light of grooves is no smooth wave"
         return replace(model, reason=reason)
+    if not lens.is_round:
+        return replace(model, reason="rays: waves are summed for round lenses")
     if not bool(torch.isfinite(ratio).any()):
         reason = "rays: no ray arrives at any field, so there is nothing to compare"
         return replace(model, reason=reason)

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.aiming.start import launch
+from camkit.models_def.optics.aiming.start import launch, path_before
 from camkit.models_def.optics.analysis.spots import (
     Beams,
     chief_landings,
@@ -80,16 +80,7 @@ def path_lengths(
     landings = trace(tensors, rays, path=True, surface_rays=surface_rays)
     if landings.path_mm is None:
         raise ContractError("the tracer gave no optical path")
-    return landings, tensors.index[0] * path_before(rays, slope, distance_mm) + landings.path_mm
-
-
-def path_before(rays: Rays, slope: Tensor, distance_mm: float) -> Tensor:
-    """Return the path of launch points beyond that of the first vertex, written without loss."""
-    if math.isinf(distance_mm):
-        return rays.x * rays.l + rays.y * rays.m + rays.z * rays.n
-    vertex = distance_mm * torch.sqrt(1 + slope**2)
-    more = rays.x**2 + rays.y**2 + 2 * rays.y * slope * distance_mm
-    return more / (torch.sqrt(vertex**2 + more) + vertex)
+    return landings, path_before(rays, slope, distance_mm, tensors.index[0]) + landings.path_mm
 
 
 def trace_wavefront(

@@ -9,7 +9,7 @@ from camkit.errors import ContractError
 from camkit.models_def.optics.asymmetric.places import fields_of_places
 from camkit.models_def.optics.asymmetric.turning import turned_back, turned_lens
 from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.psf import DEFAULT_RAYS, TracedPsf, spread_tents
+from camkit.models_def.optics.psf import DEFAULT_RAYS, TracedPsf, as_psf, spread_tents
 from camkit.models_def.optics.pupil import both_halves, half_disc
 from camkit.models_def.optics.spot import trace_spots
 from camkit.units import UM_PER_MM
@@ -54,10 +54,4 @@ def trace_place_psf(
         column, row = (x - x_mm) * scale + centre, (y - y_mm) * scale + centre
         kernels.append(spread_tents(row, column, spots.weight[0], size_px))
         energy.append(spots.weight[0].sum(-1))
-    light = torch.stack(kernels)
-    inside = light.sum((-2, -1))
-    if bool((inside <= 0).any()):
-        raise ContractError("no light reaches a kernel; check stop, semi-diameters and focus")
-    return TracedPsf(
-        kernels=light / inside[..., None, None], energy_kept=inside / torch.stack(energy)
-    )
+    return as_psf(torch.stack(kernels), torch.stack(energy))

@@ -3,9 +3,13 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 from camkit.caller import option_text
 from camkit.errors import ContractError
+
+BY_SURFACE: Final = ("thickness_mm", "semi_diameter_mm")
+"""What a state names surface by surface."""
 
 Sizes = tuple[tuple[int, float], ...]
 """(surface, mm), one entry for each surface that a state names, in their order."""
@@ -36,7 +40,7 @@ class Configuration:
     def __post_init__(self) -> None:
         if not self.name.strip():
             raise ContractError("a configuration needs a name; got an empty one")
-        for key in ("thickness_mm", "semi_diameter_mm"):
+        for key in BY_SURFACE:
             sizes = dict(getattr(self, key))
             if not all(map(math.isfinite, sizes.values())) and key == "thickness_mm":
                 raise ContractError(f"configuration {self.name}: gaps must be finite; got {sizes}")

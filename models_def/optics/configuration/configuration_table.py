@@ -4,13 +4,16 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.configuration.configuration import Configuration, Sizes
+from camkit.models_def.optics.configuration.configuration import (
+    BY_SURFACE,
+    Configuration,
+    Sizes,
+)
 from camkit.models_def.optics.configuration.exact_text import degrees_text
 from camkit.models_def.toml_table import key_line, section, typed
 from camkit.units import to_radians
 
 APERTURES: Final = ("f_number", "entrance_pupil_diameter_mm", "stop_semi_diameter_mm")
-_BY_SURFACE: Final = ("thickness_mm", "semi_diameter_mm")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +42,7 @@ def parse_configuration(where: str, table: Any) -> Configuration:
     if len(kinds) > 1:
         raise ContractError(f"{where}: give at most one of {', '.join(APERTURES)}; got {kinds}")
     angles = keys.field_angles_deg
-    thickness_mm, semi_diameter_mm = (_sizes(where, key, getattr(keys, key)) for key in _BY_SURFACE)
+    thickness_mm, semi_diameter_mm = (_sizes(where, key, getattr(keys, key)) for key in BY_SURFACE)
     return Configuration(
         name=keys.name,
         thickness_mm=thickness_mm,
@@ -63,7 +66,7 @@ def _sizes(where: str, key: str, table: dict[str, Any]) -> Sizes:
 def configuration_lines(state: Configuration) -> list[str]:
     """Return the lines of a state; `parse_configuration` gives it back to the last bit."""
     lines = [key_line("name", state.name)]
-    for key in _BY_SURFACE:
+    for key in BY_SURFACE:
         sizes = ", ".join(f"{surface} = {mm!r}" for surface, mm in getattr(state, key))
         lines += [f"{key} = {{ {sizes} }}"] if sizes else []
     if state.object_distance_mm is not None:

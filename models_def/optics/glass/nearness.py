@@ -33,10 +33,10 @@ def near_glasses(
         return math.hypot((numbers[0] - index_d) / INDEX_STEP, step)
 
     users_glasses = tuple((g, _numbers(g)) for c in catalogues for g in c.glasses)
-    ranked = sorted(
-        (distance(n), g.name, g) for g, n in (*users_glasses, *_makers_glasses()) if n[0]
-    )
-    return tuple(glass for steps, _, glass in ranked[:MOST] if steps <= FARTHEST)
+    # one of the user's stands for its namesake
+    pairs = {g.name: (g, n) for g, n in (*_makers_glasses(), *users_glasses) if n[0]}
+    ranked = sorted(pairs.values(), key=lambda pair: (distance(pair[1]), pair[0].name))
+    return tuple(glass for glass, n in ranked[:MOST] if distance(n) <= FARTHEST)
 
 
 def near_text(glasses: Sequence[Glass]) -> str:

@@ -32,6 +32,7 @@ from camkit.models_def.optics.lens_file.json_table import (
 from camkit.models_def.optics.lens_file.zmx_glass import GlassOrder, find_zmx_glass
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens, Surface
+from camkit.models_def.optics.shape.polynomial import without_last_zeros
 
 KEY: Final = "surfaces"
 """By which a file of DeepLens is known."""
@@ -103,10 +104,12 @@ def parse_deeplens(
     if abs(stored_mm - efl_mm) > _FOCAL_TOLERANCE * abs(efl_mm):
         notes.append(f"the file states a focal length of {stored_mm:.5g} mm: it is {efl_mm:.5g} mm")
     fields, corner_mm = _fields_of_sensor(plain, efl_mm)
-    notes.append(
-        "the wavelengths are the lines F, d and C; fields to the sensor's corner "
-        f"({corner_mm:.4g} mm) by the paraxial focal length"
+    fields_text = (
+        f"fields to the sensor's corner ({corner_mm:.4g} mm) by the paraxial focal length"
+        if corner_mm
+        else "it states no sensor: the axis is the only field"
     )
+    notes.append(f"the wavelengths are the lines F, d and C; {fields_text}")
     return replace(lens, field_angles_rad=fields), tuple(notes)
 
 
@@ -121,9 +124,7 @@ def _surface(block: Table, number: int, places: list[float], order: GlassOrder) 
     if not math.isfinite(gap_mm):
         raise DecodeError(f"{where} must have d_next, or d and d_sensor; got neither")
     is_flat = kind in (*_STOPS, "Plane")
-    terms = list(numbers_at(block, "ai", where)) if kind == "Aspheric" else []
-    while terms and terms[-1] == 0:
-        terms.pop()
+    terms = without_last_zeros(numbers_at(block, "ai", where) if kind == "Aspheric" else ())
     glass = AIR if kind in _STOPS else _glass(text_at(block, "mat2"), where, order)
     return Surface(
         curvature_per_mm=0.0 if is_flat else _curvature(block, where),
@@ -132,7 +133,7 @@ def _surface(block: Table, number: int, places: list[float], order: GlassOrder) 
         material=own_glass(glass, order.user_catalogues),
         semi_diameter_mm=number_at(block, "r", where, math.inf),
         conic=number_at(block, "k", where, 0.0) if kind == "Aspheric" else 0.0,
-        even_asphere=tuple(terms),
+        even_asphere=terms,
     )
 
 

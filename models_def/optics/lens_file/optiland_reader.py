@@ -21,6 +21,7 @@ from camkit.models_def.optics.lens_file.optiland_glass import read_glass_table
 from camkit.models_def.optics.lens_file.placing import with_object_na
 from camkit.models_def.optics.lens_file.zmx_field import FieldType, with_field_points
 from camkit.models_def.optics.prescription import ApertureKind, Lens, Surface
+from camkit.models_def.optics.shape.polynomial import without_last_zeros
 
 KEY: Final = "surface_group"
 """By which a file of optiland is known."""
@@ -163,9 +164,7 @@ def _surface(
     _refuse(block, number)
     where = f"surface {number}"
     geometry = table_at(block, "geometry", where)
-    terms = list(numbers_at(geometry, "coefficients", where))
-    while terms and terms[-1] == 0:
-        terms.pop()
+    terms = without_last_zeros(numbers_at(geometry, "coefficients", where))
     return Surface(
         curvature_per_mm=1 / _radius(block, where),
         thickness_mm=_thickness_mm(block, gap_mm, number),
@@ -173,7 +172,7 @@ def _surface(
         material=own_glass(glass, catalogues) or _file_glass(glass),
         semi_diameter_mm=_rim_mm(block, where),
         conic=number_at(geometry, "conic", where, 0.0),
-        even_asphere=tuple(terms),
+        even_asphere=terms,
     )
 
 

@@ -2,18 +2,17 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Final, cast
+from typing import cast
 
 from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.models_def.optics.configuration.configuration import (
+    BY_SURFACE,
     Configuration,
     Sizes,
     find_configuration,
 )
 from camkit.models_def.optics.prescription import ApertureKind, Lens, Surface
-
-_BY_SURFACE: Final = ("thickness_mm", "semi_diameter_mm")
 
 
 def plain_lens(lens: Lens, choice: str | int | None = None) -> Lens:
@@ -103,7 +102,7 @@ def with_states(lens: Lens, states: Mapping[str, Lens], usual: str = "") -> Lens
             if any(_size(one.surfaces[i], key) != _size(lens.surfaces[i], key) for one in lenses)
         ]
 
-    movable = {key: moving(key) for key in _BY_SURFACE}
+    movable = {key: moving(key) for key in BY_SURFACE}
     has_distance = differs(lambda one: one.object_distance_mm)
     has_aperture = differs(lambda one: (one.aperture_kind, one.aperture_value))
     has_fields = differs(lambda one: one.field_angles_rad)

@@ -172,7 +172,7 @@ def _read(
     stop = _stop(records)
     waves, reference = _wavelengths(system)
     title = last(system, "NAME")
-    kind, value = _aperture(records, stop, scale)
+    kind, value = _aperture(records, stop, scale, object_mm)
     lens = Lens(
         name=(title.text.strip() if title else "") or name,
         note="\n".join(record.text[2:] for record in system.get("NOTE", []) if record.text[2:]),
@@ -255,7 +255,9 @@ def _stop(records: ZmxRecords) -> int:
     return stops[0] - 1
 
 
-def _aperture(records: ZmxRecords, stop: int, scale: float) -> tuple[ApertureKind, float]:
+def _aperture(
+    records: ZmxRecords, stop: int, scale: float, object_mm: float
+) -> tuple[ApertureKind, float]:
     """Return the aperture; that of OBNA is put in later, when the entrance pupil is known."""
     apertures = [r for key in APERTURES if (r := last(records.system, key)) is not None]
     if len(apertures) != 1:
@@ -271,8 +273,7 @@ def _aperture(records: ZmxRecords, stop: int, scale: float) -> tuple[ApertureKin
         return "entrance_pupil_diameter_mm", record.number(0) * scale
     if record.key == "OBNA":
         return "entrance_pupil_diameter_mm", 1.0
-    near = last(records.surfaces[0], "DISZ")
-    if record.number(1, 0.0) != 0 and near is not None and near.words[:1] != ("INFINITY",):
+    if record.number(1, 0.0) != 0 and math.isfinite(object_mm):
         raise UnsupportedError(
             f"line {record.line}: a working f-number of a near object; give the entrance pupil"
         )

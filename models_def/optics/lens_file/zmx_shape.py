@@ -7,6 +7,7 @@ from camkit.errors import DecodeError, UnsupportedError
 from camkit.models_def.optics.lens_file.zmx_records import Record, Records, last
 from camkit.models_def.optics.prescription import Surface
 from camkit.models_def.optics.shape.phase import Phase
+from camkit.models_def.optics.shape.polynomial import without_last_zeros
 
 EVEN_TERMS: Final = 8
 MOST_EXTRA: Final = 240
@@ -42,15 +43,10 @@ def _parameters(records: Records, kind: str, first: int = 1) -> list[float]:
     return values[first:]
 
 
-def _trimmed(values: list[float]) -> tuple[float, ...]:
-    count = max((i for i, value in enumerate(values, start=1) if value), default=0)
-    return tuple(values[:count])
-
-
 def _powers(values: list[float], powers: range, mm_per_unit: float) -> tuple[float, ...]:
     """Return coefficients of r^p in mm; they have the unit length^(1 - p)."""
     pairs = zip(values, powers, strict=False)
-    return _trimmed([value / mm_per_unit ** (p - 1) for value, p in pairs])
+    return without_last_zeros([value / mm_per_unit ** (p - 1) for value, p in pairs])
 
 
 def _nothing(records: Records, mm_per_unit: float) -> Shape:  # noqa: ARG001
@@ -105,9 +101,9 @@ def _extended(records: Records, mm_per_unit: float, *, odd: bool) -> Shape:
             return _mixed(values, mm_per_unit)
         return {"even_asphere": _powers(values, range(2, 999, 2), mm_per_unit)}
     scaled = [value * mm_per_unit for value in values]
-    shape: Shape = {"even_asphere": _trimmed(scaled[1::2] if odd else scaled)}
+    shape: Shape = {"even_asphere": without_last_zeros(scaled[1::2] if odd else scaled)}
     if odd:
-        shape["odd_asphere"] = _trimmed(scaled[::2])
+        shape["odd_asphere"] = without_last_zeros(scaled[::2])
     if any(map(any, shape.values())):
         shape["normal_radius_mm"] = radius * mm_per_unit
     return shape
@@ -124,7 +120,9 @@ def _extended_odd(records: Records, mm_per_unit: float) -> Shape:
 def _binary(records: Records, mm_per_unit: float) -> Shape:
     order, *values = _parameters(records, "BINARY_2", first=0)
     _, radius, coefficients = _extra(records)
-    phase = Phase(radius_mm=radius * mm_per_unit, radial_rad=_trimmed(coefficients), order=order)
+    phase = Phase(
+        radius_mm=radius * mm_per_unit, radial_rad=without_last_zeros(coefficients), order=order
+    )
     shape: Shape = {"even_asphere": _powers(values, range(2, 99, 2), mm_per_unit)}
     return {**shape, "phase": phase} if phase.radial_rad else shape
 

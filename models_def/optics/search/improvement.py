@@ -105,8 +105,8 @@ def _variables(
             Variable(kind="thickness", surface=i, low=min(least, surface.thickness_mm), high=most)
         ]
     if name == "phase":
-        coefficients = surface.phase.coefficients if surface.phase else ()
-        return _coefficient_variables(name, i, coefficients, _PHASE)
+        radial = surface.phase.radial_rad if surface.phase else ()
+        return _coefficient_variables(name, i, radial, _PHASE)
     if name == "q_asphere":
         return _coefficient_variables(name, i, surface.q_bfs or surface.q_con, _ASPHERE_SAG_MM)
     return [] if surface.asphere.q_kind else _asphere_variables(lens, surface, i, name)

@@ -42,7 +42,7 @@ class Variable:
     Attributes:
         kind: curvature (1/mm), conic, thickness (mm, after the surface), even_asphere
             (coefficient of r^(2 term + 2)), odd_asphere (of r^(2 term + 1)), q_asphere (of Q
-            number term, in mm), phase (coefficient in radians, radial ones first), or defocus
+            number term, in mm), phase (radial coefficient in radians), or defocus
             (mm, of the sensor from where it rides).
         surface: Its surface; not used by defocus.
         term: Of a polynomial: 0 is its first coefficient.
@@ -101,12 +101,12 @@ class FreeLens:
     def _check_term(self, variable: Variable) -> None:
         surface = self.lens.surfaces[variable.surface]
         is_q = surface.asphere.q_kind is not None
-        coefficients = surface.phase.coefficients if surface.phase else ()
+        radial = surface.phase.radial_rad if surface.phase else ()
         fits = {
             "even_asphere": not is_q,
             "odd_asphere": not is_q,
             "q_asphere": is_q,
-            "phase": variable.term < len(coefficients),
+            "phase": variable.term < len(radial),
         }
         if not fits.get(variable.kind, True):
             raise ContractError(f"surface {variable.surface} has no such term; got {variable}")

@@ -11,10 +11,10 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.aiming.start import with_open_apertures
+from camkit.models_def.optics.aiming.start import path_before, with_open_apertures
 from camkit.models_def.optics.analysis.pupil_fit import FIT_GRIDS, half_quadrature
 from camkit.models_def.optics.analysis.wave_kernels import CoarsePupil, rim_margins, summed_light
-from camkit.models_def.optics.analysis.wavefront import path_before, to_sphere
+from camkit.models_def.optics.analysis.wavefront import to_sphere
 from camkit.models_def.optics.search.beam_launch import LEAD
 from camkit.models_def.optics.search.problem import Change, Problem, trace_batch
 from camkit.models_def.optics.search.splat import Pixels
@@ -61,7 +61,8 @@ def wave_batch(
     if landings.path_mm is None or weight is None:
         raise ContractError("waves need optical paths and the rays of wave_problem")
     slope = problem.slopes[:, None, None]
-    path = landings.path_mm + path_before(rays, slope, object_distance_mm)
+    before = path_before(rays, slope, object_distance_mm, traced.tensors.index[0])
+    path = landings.path_mm + before
     share = weight / weight.sum() / len(problem.wavelengths_um)
     middle = (landings.y[..., LEAD:] * share).sum((-2, -1), keepdim=True)
     if not pixels.window_follows:

@@ -1,6 +1,7 @@
 """The polynomial part of a surface as a prescription states it, and as the tracer has it."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
@@ -92,3 +93,9 @@ class Asphere:
 def q_tensor(kind: QKind, count: int) -> torch.Tensor:
     """Return `q_matrix` as a tensor, float64."""
     return torch.from_numpy(q_matrix(kind, count))
+
+
+def without_last_zeros(values: Sequence[float]) -> tuple[float, ...]:
+    """Return coefficients up to the last that is not 0."""
+    count = max((i for i, value in enumerate(values, start=1) if value), default=0)
+    return tuple(values[:count])

@@ -18,7 +18,7 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.aiming.start import launch
+from camkit.models_def.optics.aiming.start import launch, path_before
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import PupilSamples, pupil_rays
 from camkit.models_def.optics.trace import Rays, SurfaceTensors, surface_tensors, trace
@@ -128,7 +128,7 @@ def _waves(
     if landings.path_mm is None:
         raise ContractError("the tracer gave no optical path")
     # path from the object's wave through the first vertex
-    path = landings.path_mm + rays.x * rays.l + rays.y * rays.m
+    path = landings.path_mm + path_before(rays, slope, math.inf, tensors.index[0])
     flux = weight[near] * cell_mm2
     return _Waves(
         x=landings.x,

@@ -69,7 +69,7 @@ def image_of(lens: Lens, pupil: Pupil, spots: Spots, model: PsfModel) -> LensIma
     for i in range(len(slopes)):
         image, why = None, "" if lit[i] else "no light arrives at every wavelength"
         spread = float(torch.nan_to_num(reach[i]).max())
-        if lit[i] and not model.regime.startswith("wave"):
+        if lit[i] and model.regime != "waves":
             why = model.reason
         elif lit[i]:
             try:
