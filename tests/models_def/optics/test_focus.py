@@ -63,3 +63,11 @@ def test_a_near_object_focuses_behind_the_focal_point() -> None:
 def test_unknown_merits_are_refused() -> None:
     with pytest.raises(ContractError, match="merit"):
         focus_shift_mm(_lens(), "sharp")  # type: ignore[arg-type]
+
+
+def test_foci_in_a_denser_medium_meet_as_the_stop_closes() -> None:
+    """A path in front of the lens counts with its index, or a wavefront is bent."""
+    lens = replace(_lens(), object_distance_mm=400.0, object_glass="model:1.33,0")
+    focused = with_focus(replace(lens, aperture_value=0.5, field_angles_rad=(0.0,)), "paraxial")
+    for merit in ("spot", "wavefront"):
+        assert focus_shift_mm(focused, merit) == pytest.approx(0, abs=0.02)

@@ -134,3 +134,14 @@ def test_perfect_lens_has_the_airy_pattern_of_its_cone() -> None:
     line = kernel[50, 50:].numpy() / float(kernel[50, 50])
     assert float(np.interp(-0.5, -line, np.arange(51))) == pytest.approx(half_px, rel=0.03)
     assert math.isclose(float(kernel.sum()), 1, rel_tol=1e-9)
+
+
+def test_fields_without_waves_are_left_out_whatever_they_hold() -> None:
+    """A field so wide that no ray arrives costs nothing to the others."""
+    lens, waves_um = _cooke(), torch.tensor([0.5, 0.6], dtype=torch.float64)
+    mask = torch.tensor([[True, False], [False, False], [True, True]])
+    some = wave_psf(lens, _slopes(0.0, 75.0, 20.0), waves_um, 15, 1.5, mask=mask).kernels
+    whole = wave_psf(lens, _slopes(0.0, 20.0), waves_um, 15, 1.5).kernels
+    assert torch.equal(some[0, 0], whole[0, 0])
+    assert torch.equal(some[2], whole[1])
+    assert not bool(some[~mask].any())

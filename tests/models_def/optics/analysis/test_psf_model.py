@@ -4,9 +4,12 @@ from pathlib import Path
 import pytest
 import torch
 
+from camkit.errors import UnsupportedError
+from camkit.models_def.optics.analysis.lens_waves import wave_psf
 from camkit.models_def.optics.analysis.psf_model import psf_model
 from camkit.models_def.optics.analysis.spots import field_slopes
-from camkit.models_def.optics.prescription import read_prescription
+from camkit.models_def.optics.prescription import Surface, read_prescription
+from camkit.models_def.optics.shape.stance import Stance
 from tests.physics.reference_lenses import thorlabs_al2550
 
 DUET = Path(__file__).resolve().parents[4] / "models_def" / "prescriptions" / "duet.toml"
@@ -41,3 +44,16 @@ def test_lens_without_light_is_told_so() -> None:
     found = psf_model(blocked, far, torch.tensor([0.78], dtype=torch.float64))
     assert found.regime == "rays"
     assert "no ray" in found.reason
+
+
+def test_uneven_lens_goes_by_rays_and_refuses_waves() -> None:
+    """Waves are summed from half the pupil, whose other half is its mirror."""
+    lens, waves = thorlabs_al2550(), torch.tensor([0.78], dtype=torch.float64)
+    askew = Stance(decentre_mm=(0.1, 0.0), tilt_rad=(0.0, 0.0))
+    stop = Surface(curvature_per_mm=0.0, thickness_mm=1.0)
+    first = replace(lens.surfaces[0], stance=askew)
+    lens = replace(lens, surfaces=(stop, first, *lens.surfaces[1:]), stop=0)
+    found = psf_model(lens, torch.zeros(1, dtype=torch.float64), waves)
+    assert (found.regime, found.reason) == ("rays", "rays: waves are summed for round lenses")
+    with pytest.raises(UnsupportedError, match="surface 1"):
+        wave_psf(lens, torch.zeros(1, dtype=torch.float64), waves, 9, 2.0)

@@ -48,3 +48,11 @@ def test_glasses_of_the_user_are_among_them() -> None:
     (glass,) = near_glasses(1.7777, 77.0, [mine])
     assert glass.name == "FOO-mine"
     assert near_text([glass]) == "FOO-mine (1.77770, 77.00)"
+
+
+def test_a_glass_of_the_user_stands_for_its_namesake() -> None:
+    """Two glasses of one name and equal distance cannot be put in order by themselves."""
+    mine = parse_agf("NM N-BK7 2 0 1.5168 64.17\nCD 1.3 0.01\nLD 0.3 2\n", "Schott")
+    found = near_glasses(1.5168, 64.17, [mine])
+    assert found[0] is mine.glasses[0]
+    assert [glass.name for glass in found].count("N-BK7-Schott") == 1

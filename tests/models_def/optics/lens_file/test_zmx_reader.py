@@ -646,3 +646,11 @@ def test_patented_lenses_of_extended_aspheres_focus_as_optiland_has_it(
     zero, fate = torch.zeros_like(y), torch.zeros(3, dtype=torch.int8)
     end = trace(tensors, Rays(x=y / 2, y=y, z=zero, l=zero, m=zero, n=zero + 1, fate=fate))
     assert end.y.tolist() == pytest.approx(landings_mm, abs=5e-8)
+
+
+def test_a_working_f_number_is_known_of_a_far_object_however_far_is_written() -> None:
+    lens = parse_zmx(_changed(("ENPD 2.286E+1", "FNUM 4.5 1"))).lens
+    far = _changed(("ENPD 2.286E+1", "FNUM 4.5 1"), ("DISZ INFINITY", "DISZ 1E+10"))
+    assert parse_zmx(far).lens == lens
+    with pytest.raises(UnsupportedError, match="working f-number of a near object"):
+        parse_zmx(far.replace("DISZ 1E+10", "DISZ 400"))

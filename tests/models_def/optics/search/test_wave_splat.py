@@ -1,5 +1,6 @@
 """Wave PSFs in a design: their gradients, and those of the frozen lens."""
 
+import math
 from dataclasses import replace
 from typing import Final
 
@@ -10,6 +11,7 @@ from torch import Tensor
 from camkit.models_def.design.lens_module import LensModule
 from camkit.models_def.optics.analysis.lens_waves import wave_psf
 from camkit.models_def.optics.lens_file.lens_file import find_lens
+from camkit.models_def.optics.paraxial import with_paraxial_focus
 from camkit.models_def.optics.pupil import half_disc
 from camkit.models_def.optics.search.problem import Problem
 from camkit.models_def.optics.search.splat import Pixels
@@ -18,8 +20,13 @@ from camkit.models_def.optics.search.variables import FreeLens, Variable
 WEIGHTS: Final = torch.eye(3, dtype=torch.float64)
 
 
-def _module(regime: str = "waves", slope: float = 0.1) -> LensModule:
+def _module(
+    regime: str = "waves", slope: float = 0.1, object_distance_mm: float = math.inf, **medium: str
+) -> LensModule:
     lens = replace(find_lens("double-gauss"), aperture_kind="f_number", aperture_value=8.0)
+    if medium:
+        moved = replace(lens, object_distance_mm=object_distance_mm, **medium)
+        lens = with_paraxial_focus(moved)
     front = lens.surfaces[0].curvature_per_mm
     bend = Variable(kind="curvature", surface=0, low=front - 2e-4, high=front + 2e-4)
     problem = Problem(
@@ -69,3 +76,14 @@ def test_field_that_loses_rays_keeps_its_rays() -> None:
         kernels, _ = module()
     assert float(kernels[0, 0].sum()) > 2.8
     assert bool(torch.isfinite(kernels).all())
+
+
+def test_kernels_of_an_object_in_glass_are_those_that_are_frozen() -> None:
+    """The path in front of the lens counts with its index."""
+    module = _module(object_glass="model:1.1,0", object_distance_mm=1000.0)
+    with torch.no_grad():
+        kernels, _ = module()
+        problem = module.problem
+        frozen = wave_psf(module.lens(), problem.slopes[:1], problem.wavelengths_um, 21, 3.76)
+    light = frozen.kernels * frozen.energy_kept[..., None, None]
+    assert float((kernels[0, 0] - light[0]).abs().sum((-2, -1)).max()) < 5e-3

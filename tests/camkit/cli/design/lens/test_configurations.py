@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from camkit.caller import option_text
 from camkit.cli.exit_code import ExitCode
 from camkit.errors import ContractError
 from camkit.models_def.optics.lens_file.lens_file import read_configured_lens, read_lens
@@ -83,8 +84,15 @@ def test_frozen_optics_record_their_state(lens_file: Path) -> None:
     assert optics.facts["configuration"] == "near"
     assert optics.depths_mm == (2000.0,)
     assert "configuration" not in read_optics(Path("cooke-triplet")).facts
-    with pytest.raises(ContractError, match="is no lens and has no states"):
-        read_optics(Path("no.safetensors"), configuration=1)
+
+
+@pytest.mark.parametrize(
+    "words", [{"configuration": 1}, {"catalogue": "schott"}, {"glass": (Path("my.agf"),)}]
+)
+def test_optics_without_glass_refuse_what_is_of_a_lens(words) -> None:
+    message = f"is no lens; leave {option_text(next(iter(words)))} out"
+    with pytest.raises(ContractError, match=message):
+        read_optics(Path("no.safetensors"), **words)
 
 
 def test_a_recipe_is_of_one_state(camkit_command, lens_file: Path, tmp_path: Path) -> None:
