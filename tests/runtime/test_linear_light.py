@@ -53,6 +53,7 @@ def _signal(capture: Capture) -> np.ndarray:
 
 
 @example(level=1.0, is_flat=False, shot=1e-4, read_e=1.0, told="nothing", seed=122)
+@example(level=0.42, is_flat=False, shot=1e-3, read_e=7.0, told="ISO 100", seed=2)
 @given(
     level=st.floats(0.0, 1.0),
     is_flat=st.booleans(),
@@ -83,14 +84,16 @@ def test_a_picture_stays_within_what_the_capture_holds(
     picture = pipeline.start(replace(capture, **known)).fill()  # type: ignore[arg-type]
     signal = _signal(capture)
     assert np.isfinite(picture).all()
-    most = signal.max() + 0.02
-    least = -most
-    if picture.min() < least:
-        # a pattern sharper than the lens passes: what the bank gave the network fell as low
+    brightest = signal.max() + 0.02
+    least, most = -brightest, 4 * brightest
+    if picture.min() < least or picture.max() > most:
+        # a pattern sharper than the lens passes, or noise 20 times what the file tells of it:
+        # what the bank gave the network went as far
         bank = Pipeline(pipeline.bundle, replace(pipeline.options, method="wiener", size=None))
-        least = bank.start(replace(capture, **known)).fill().min()  # type: ignore[arg-type]
+        sharp = bank.start(replace(capture, **known)).fill()  # type: ignore[arg-type]
+        least, most = min(least, sharp.min()), max(most, sharp.max())
     assert least <= picture.min()
-    assert picture.max() <= 4 * most, "sharper than its capture, and no more than that"
+    assert picture.max() <= most, "sharper than its capture, and no more than that"
 
 
 @pytest.mark.parametrize("level", [0.0, 0.001, 0.01])
