@@ -51,8 +51,8 @@ def focus_shift_mm(lens: Lens, merit: FocusMerit) -> float:
         tensors = surface_tensors(lens, waves[:, None])
         slope = slopes[:, None, None].expand(-1, len(waves), 1)
         rays, weight = pupil_rays(lens, tensors, half_disc(_RAYS), slope, definition="stop")
-        before = path_before(rays, slope, lens.object_distance_mm, tensors.index[0])
-        rays = replace(rays, path_mm=before)
+        start_path = path_before(rays, slope, lens.object_distance_mm, tensors.index[0])
+        rays = replace(rays, path_mm=start_path)
         landings = trace(tensors, rays, path=True)
         weight = torch.where(landings.valid, weight, 0.0)
         if not bool(weight.sum() > 0):

@@ -63,22 +63,22 @@ def wave_psf(
     require_round(lens, "a PSF from half the pupil")
     if mask is None:
         mask = torch.ones(len(slopes), len(wavelengths_um), dtype=torch.bool)
-    fixed, wanted = with_fixed_stop(lens), mask.any(1)
+    fixed, lit = with_fixed_stop(lens), mask.any(1)
     kernels = slopes.new_zeros(*mask.shape, size_px, size_px)
-    if not bool(wanted.any()):
+    if not bool(lit.any()):
         return normalised(kernels)
     most = FIT_GRIDS[0].rings * FIT_GRIDS[0].arms // 2 * len(wavelengths_um)
     fields = max(1, _CHUNK_RAYS // most)
     light = []
     for some, field_mask in zip(
-        torch.split(slopes[wanted], fields), torch.split(mask[wanted], fields), strict=True
+        torch.split(slopes[lit], fields), torch.split(mask[lit], fields), strict=True
     ):
         coarse, smooth = coarse_pupil(fixed, some, wavelengths_um)
         if smooth:
             light.append(summed_light(coarse, size_px, pitch_um, field_mask))
         else:
             light.append(_traced_light(fixed, some, coarse, (size_px, pitch_um), field_mask))
-    kernels[wanted] = torch.cat(light)
+    kernels[lit] = torch.cat(light)
     return normalised(kernels)
 
 

@@ -7,13 +7,18 @@ once.
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
+import scipy.special
 import torch
 from torch import Tensor
 
 from camkit.models_def.optics.analysis.wavefront import Wavefront
 from camkit.models_def.optics.spot import Spots
 from camkit.units import UM_PER_MM
+
+_ROUND_WINDOW: Final = math.pi / 4 / math.sqrt(2)
+"""Radius of the disc outside which as much of the far rings lies as outside a square of side 1."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,16 +98,33 @@ def mtf_of_psf(
         pitch_um: Distance of its samples.
         cycles_per_mm: (frequency,), up to half a cycle per sample.
         energy: (field, wavelength), the light of the whole plane in units of the sum of `psf`,
-            which is all by default. Light outside the window, such as far diffraction rings, is
-            spread too thinly to count at any frequency but 0.
+            which is all by default. Light outside the window is taken for the far rings of
+            diffraction, which fall as the distance to the power of -3.
     """
     whole = psf.sum((-2, -1)) if energy is None else energy
     light = (psf / whole[..., None, None]).mean(1)
+    side = math.sqrt(light.shape[-1] * light.shape[-2]) * pitch_um / UM_PER_MM
+    far = _far_rings(2 * math.pi * cycles_per_mm * side * _ROUND_WINDOW)
+    missing = (1 - light.sum((-2, -1))).clamp_min(0.0)[:, None] * far
 
     def contrast(line: Tensor) -> Tensor:
-        place_mm = torch.arange(line.shape[-1], dtype=line.dtype) * pitch_um / UM_PER_MM
+        count = line.shape[-1]
+        place_mm = (torch.arange(count, dtype=line.dtype) - (count - 1) / 2) * pitch_um / UM_PER_MM
         turns = -2 * math.pi * cycles_per_mm[:, None] * place_mm
         waves = torch.polar(torch.ones_like(turns), turns) * line[:, None]
-        return torch.where(cycles_per_mm == 0, 1.0, torch.abs(waves.sum(-1)))
+        return torch.abs(waves.sum(-1) + missing)
 
     return Mtf(tangential=contrast(light.sum(-1)), sagittal=contrast(light.sum(-2)))
+
+
+def _far_rings(turn: Tensor) -> Tensor:
+    """Return the Hankel transform of light that falls as r^-3 from a radius R on, and is 1 in all.
+
+    The integral of J0(turn s) / s^2 from 1 on, by parts: J0 - turn (1 + J1 - integral of J0).
+
+    Args:
+        turn: 2 pi f R.
+    """
+    whole = torch.from_numpy(scipy.special.itj0y0(turn.numpy())[0])
+    rest = 1 + torch.special.bessel_j1(turn) - whole
+    return torch.special.bessel_j0(turn) - turn * rest

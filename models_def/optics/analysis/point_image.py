@@ -13,7 +13,7 @@ from torch import Tensor
 
 from camkit.errors import ContractError
 from camkit.models_def.optics.analysis.first_order import AIRY
-from camkit.models_def.optics.analysis.sampling import pupil_samples
+from camkit.models_def.optics.analysis.sampling import rim_samples
 from camkit.models_def.optics.analysis.wave_psf import (
     irradiance_per_mm2,
     pupil_for_reach,
@@ -25,8 +25,6 @@ from camkit.models_def.optics.pupil import PupilDefinition
 from camkit.models_def.optics.spot import Spots
 from camkit.units import UM_PER_MM
 
-RIM_SAMPLING: Final = "hexapolar:10"
-"""Rays that find the extent of a pupil."""
 _WINDOW_AIRY: Final = 6.0
 _SAMPLES_PER_CUTOFF: Final = 2.2
 _MOST_WORK: Final = 1.5e9
@@ -77,7 +75,7 @@ def trace_point_image(
     Raises:
         ContractError: If no ray arrives, or the blur is so wide that waves take too long.
     """
-    rim = trace_wavefront(lens, slope, wavelengths_um, pupil_samples(RIM_SAMPLING), definition)
+    rim = trace_wavefront(lens, slope, wavelengths_um, rim_samples(), definition)
     if not bool((rim.flux > 0).any(-1).all()):
         raise ContractError("no ray reaches the sensor")
     aperture = widest_aperture(rim)

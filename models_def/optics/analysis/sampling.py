@@ -23,6 +23,7 @@ from camkit.models_def.optics.pupil import (
 
 DEFAULT_SAMPLING: Final = "hexapolar:6"
 MAX_RAYS: Final = 1_000_000
+_RIM_RINGS: Final = 10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,6 +85,20 @@ def pupil_samples(name: str) -> PupilSamples:
     if (size**2 if kind == "grid" else size) > MAX_RAYS:
         raise ContractError(f"a pupil has at most {MAX_RAYS} rays; got {name!r}")
     return makers[kind][1](*counts)
+
+
+def rim_samples() -> PupilSamples:
+    """Return points that show how far light passes a pupil, to a hundred thousandth of it at best.
+
+    Along both axes they lie dense near the edge, which a stop's rounded size may close by a hair.
+    """
+    edge = np.concatenate(
+        [np.linspace(0, 1, 100, endpoint=False), 1 - np.geomspace(1e-5, 1e-2, 13)]
+    )
+    arm = torch.from_numpy(np.append(edge, 1.0))
+    zero, disc = torch.zeros_like(arm), hexapolar(_RIM_RINGS)
+    x = torch.cat([disc.x, arm, -arm, zero, zero])
+    return PupilSamples(x=x, y=torch.cat([disc.y, zero, zero, arm, -arm]))
 
 
 def _is_count(text: str) -> bool:

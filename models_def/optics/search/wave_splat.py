@@ -61,8 +61,8 @@ def wave_batch(
     if landings.path_mm is None or weight is None:
         raise ContractError("waves need optical paths and the rays of wave_problem")
     slope = problem.slopes[:, None, None]
-    before = path_before(rays, slope, object_distance_mm, traced.tensors.index[0])
-    path = landings.path_mm + before
+    start_path = path_before(rays, slope, object_distance_mm, traced.tensors.index[0])
+    path = landings.path_mm + start_path
     share = weight / weight.sum() / len(problem.wavelengths_um)
     middle = (landings.y[..., LEAD:] * share).sum((-2, -1), keepdim=True)
     if not pixels.window_follows:

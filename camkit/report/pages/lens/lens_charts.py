@@ -20,8 +20,7 @@ from camkit.models_def.optics.analysis.mtf import (
     geometric_mtf,
     mtf_of_psf,
 )
-from camkit.models_def.optics.analysis.point_image import RIM_SAMPLING
-from camkit.models_def.optics.analysis.sampling import Pupil, pupil_samples
+from camkit.models_def.optics.analysis.sampling import Pupil, rim_samples
 from camkit.models_def.optics.analysis.spots import spot_diagram
 from camkit.models_def.optics.analysis.wave_psf import widest_aperture
 from camkit.models_def.optics.analysis.wavefront import trace_wavefront
@@ -36,6 +35,7 @@ COLUMNS = 5
 MAX_CYCLES_PER_MM: Final = 100.0
 _FREQUENCIES: Final = 101
 _MOST_DOTS: Final = 600
+_DRAWN_SAMPLING: Final = "hexapolar:10"
 _DENSE_SAMPLING: Final = "gauss:24x48"
 _POINTS: Final = 25
 _LIGHT_POINTS: Final = 13
@@ -82,7 +82,7 @@ def _drawn_spots(facts: LensFacts) -> Spots:
     """Return the spots that are drawn: those of the numbers, or fewer rays to their rim."""
     if len(facts.pupil.samples.x) <= _MOST_DOTS:
         return facts.spots
-    pupil = Pupil(definition=facts.pupil.definition, sampling=RIM_SAMPLING)
+    pupil = Pupil(definition=facts.pupil.definition, sampling=_DRAWN_SAMPLING)
     return spot_diagram(facts.lens, facts.slopes, facts.wavelengths_um, pupil)
 
 
@@ -171,7 +171,7 @@ def trace_mtf(facts: LensFacts, numbers: list[int]) -> tuple[Tensor, Mtf, Mtf]:
     lens, waves, image = facts.lens, facts.wavelengths_um, facts.image
     assert image is not None
     slopes, definition = facts.slopes[numbers], facts.pupil.definition
-    rim = trace_wavefront(lens, slopes, waves, pupil_samples(RIM_SAMPLING), definition)
+    rim = trace_wavefront(lens, slopes, waves, rim_samples(), definition)
     try:
         cutoff = 2 * widest_aperture(rim) * UM_PER_MM / float(waves.min())
     except ContractError:

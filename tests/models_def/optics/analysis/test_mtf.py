@@ -13,10 +13,10 @@ from camkit.models_def.optics.analysis.mtf import (
     geometric_mtf,
     mtf_of_psf,
 )
-from camkit.models_def.optics.analysis.sampling import pupil_samples
+from camkit.models_def.optics.analysis.sampling import pupil_samples, rim_samples
 from camkit.models_def.optics.analysis.wavefront import trace_wavefront
 from camkit.models_def.optics.spot import Spots
-from tests.physics.reference_lenses import cooke_triplet
+from tests.physics.reference_lenses import cooke_triplet, thorlabs_al2550
 
 
 def _disc(radius_x_mm: float, radius_y_mm: float) -> Spots:
@@ -92,3 +92,20 @@ def test_diffraction_limit_on_the_axis_is_that_of_the_f_number_and_less_off_it()
     # tangential: the cone shrinks by the cosine of the chief ray, squared by the longer way
     assert bool((limit.tangential[1] < limit.sagittal[1]).all())
     assert bool((limit.sagittal[1] < limit.sagittal[0]).all())
+
+
+@pytest.mark.parametrize("open_share", [1.0, 0.999, 0.95, 0.7])
+def test_diffraction_limit_is_that_of_the_light_a_stop_lets_pass(open_share: float) -> None:
+    """Rims are rounded in files: one that is a hair smaller than the beam closes only a hair."""
+    lens = replace(thorlabs_al2550(), aperture_value=5.0)
+    rim_mm = lens.aperture_value / 2 * open_share
+    front = replace(lens.surfaces[0], semi_diameter_mm=rim_mm)
+    lens = replace(lens, surfaces=(front, *lens.surfaces[1:]))
+    waves = torch.tensor([0.78], dtype=torch.float64)
+    rim = trace_wavefront(lens, torch.zeros(1, dtype=torch.float64), waves, rim_samples())
+    cycles = torch.tensor([10.0, 40.0, 90.0], dtype=torch.float64)
+    sine = min(rim_mm, lens.aperture_value / 2) / 50.0016
+    expected = diffraction_mtf(cycles * 0.78e-3 / (2 * sine))
+    limit = diffraction_limit(rim, cycles)
+    assert limit.tangential[0].tolist() == pytest.approx(expected.tolist(), abs=4e-3)
+    assert limit.sagittal[0].tolist() == pytest.approx(expected.tolist(), abs=4e-3)

@@ -86,17 +86,17 @@ def test_strehl_of_defocus_and_spherical_aberration(
 
 def test_contrast_of_the_airy_pattern_is_the_diffraction_limit() -> None:
     """(2/pi)(acos v - v sqrt(1 - v^2)), from a window of +-12 wavelengths x f-number."""
-    share = torch.tensor([0, 0.1, 0.25, 0.5, 0.75], dtype=torch.float64)
+    share = torch.tensor([0, 0.1, 0.25, 0.5, 0.75, 0.01, 0.003], dtype=torch.float64)
     expected = torch.tensor(
         [1, 0.87288857, 0.68503764, 0.39100222, 0.14429361], dtype=torch.float64
     )
-    assert torch.allclose(diffraction_mtf(share), expected, rtol=0, atol=6e-9)
+    assert torch.allclose(diffraction_mtf(share)[:5], expected, rtol=0, atol=6e-9)
     place = _grid(12, 121)
     light = irradiance_per_mm2(_round_pupil(), place, place)
     pitch_mm = float(place[1] - place[0])
     whole = torch.full((1, 1), pitch_mm**-2, dtype=torch.float64)
     found = mtf_of_psf(light, pitch_mm * 1000, share / UNIT_MM, whole)
-    assert torch.allclose(found.tangential[0], diffraction_mtf(share), rtol=0, atol=6e-3)
+    assert torch.allclose(found.tangential[0], diffraction_mtf(share), rtol=0, atol=1.5e-3)
     assert torch.allclose(found.sagittal[0], found.tangential[0], rtol=0, atol=1e-12)
 
 
