@@ -29,10 +29,10 @@ class Ranked:
 
     Attributes:
         single: The error at the limit that loses more.
-        loss_db: The larger of both.
-        spot_growth_mm: The larger of both.
+        loss_db: There, the larger of both.
+        spot_growth_mm: There.
         loss_place: Its place by loss, from 1.
-        spot_place: Its place by spots, from 1.
+        spot_place: Its place by the larger growth of its limits, from 1.
     """
 
     single: Single
@@ -55,7 +55,7 @@ def rank_errors(offenders: tuple[Offender, ...]) -> tuple[Ranked, ...]:
         Ranked(
             single=worst[part].single,
             loss_db=worst[part].loss_db,
-            spot_growth_mm=growths[part],
+            spot_growth_mm=worst[part].spot_growth_mm,
             loss_place=place,
             spot_place=1 + spot_order.index(part),
         )
@@ -64,8 +64,8 @@ def rank_errors(offenders: tuple[Offender, ...]) -> tuple[Ranked, ...]:
 
 
 def rank_agreement(ranking: tuple[Ranked, ...]) -> float | None:
-    """Return Spearman's coefficient of both orders, 1 for the same; None of fewer than 2 errors."""
-    if len(ranking) < 2:
+    """Return Spearman's coefficient of both orders, 1 for the same; None of fewer than 3 errors."""
+    if len(ranking) < 3:
         return None
     places = [one.loss_place for one in ranking], [one.spot_place for one in ranking]
     return float(spearmanr(*places).statistic)

@@ -20,7 +20,7 @@ from camkit.models_def.optics.analysis.spots import (
 from camkit.models_def.optics.paraxial import focal_lengths
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import PupilDefinition, PupilSamples
-from camkit.models_def.optics.trace import Rays, trace
+from camkit.models_def.optics.trace import trace
 
 _CLOSE: Final = 1e-4
 
@@ -73,10 +73,14 @@ def distortion(
 ) -> Tensor:
     """Return chief height / ideal height - 1 (field, wavelength); 0 on the axis, NaN if lost.
 
+    Heights count from where the axis lands, which an uneven lens shifts.
+
     The ideal height is the paraxial one of the reference wavelength where the sensor stands (see
     `ideal_heights`), so lateral colour shows as a difference between wavelengths.
     """
-    heights = chief_landings(lens, slopes, wavelengths_um, definition)
+    from_axis = torch.cat([slopes.new_zeros(1), slopes])
+    heights = chief_landings(lens, from_axis, wavelengths_um, definition)
+    heights = heights[1:] - torch.nan_to_num(heights[:1])
     ideal = ideal_heights(lens, slopes)[:, None]
     off_axis = torch.abs(slopes[:, None]) > 0
     share = heights / torch.where(off_axis, ideal, 1.0) - 1
@@ -108,7 +112,9 @@ def _paraxial_foci(lens: Lens, wavelengths_um: Tensor) -> Tensor:
 
 
 def longitudinal_mm(lens: Lens, pupil: Tensor, wavelengths_um: Tensor) -> Tensor:
-    """Return the crossings (wavelength, pupil) of axial rays, from the sensor; NaN if lost.
+    """Return where axial rays cross the axis (wavelength, pupil), from the sensor; NaN if lost.
+
+    The axis is the ray through the middle of the pupil, which an uneven lens bends.
 
     Args:
         lens: The prescription.
@@ -116,11 +122,10 @@ def longitudinal_mm(lens: Lens, pupil: Tensor, wavelengths_um: Tensor) -> Tensor
         wavelengths_um: (wavelength,).
     """
     axis = torch.zeros(1, dtype=torch.float64)
-    samples = PupilSamples(x=torch.zeros_like(pupil), y=pupil)
+    heights = torch.cat([axis, pupil])
+    samples = PupilSamples(x=torch.zeros_like(heights), y=heights)
     beams = launch_beams(lens, axis, wavelengths_um, samples, "paraxial")
     landings = trace(beams.tensors, beams.rays)
-    return torch.where(landings.valid, _crossing(landings), math.nan)[0]
-
-
-def _crossing(rays: Rays) -> Tensor:
-    return -rays.y * rays.n / rays.m
+    lean, y = landings.m / landings.n, landings.y
+    crossing = -(y[..., 1:] - y[..., :1]) / (lean[..., 1:] - lean[..., :1])
+    return torch.where(landings.valid[..., 1:], crossing, math.nan)[0]

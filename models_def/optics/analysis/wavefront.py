@@ -26,6 +26,7 @@ from camkit.models_def.optics.pupil import PupilDefinition, PupilSamples, pupil_
 from camkit.models_def.optics.trace import Rays, SurfaceTensors, trace
 from camkit.units import UM_PER_MM
 
+_NO_SPHERE_MM2: Final = 1e-12
 _DIFFERENCE_MM: Final = 1e-4
 
 
@@ -177,12 +178,16 @@ def to_sphere(
     """
     x, y = landings.x, landings.y - centre_mm
     ahead, square = x * landings.l + y * landings.m, x**2 + y**2
+    valid = landings.valid
     if not math.isfinite(radius_mm):
         # the pupil is at infinity: directions are those of the rays
         excess, direction = ahead, (landings.l, landings.m)
     else:
         radius = math.copysign(1.0, radius_mm) * torch.sqrt(radius_mm**2 + centre_mm**2)
-        bend = torch.sqrt((radius**2 + ahead**2 - square).clamp_min(1e-12))
+        rest = radius**2 + ahead**2 - square
+        # a sensor in the exit pupil: the sphere is too small for its rays
+        valid = valid & (rest > _NO_SPHERE_MM2)
+        bend = torch.sqrt(rest.clamp_min(_NO_SPHERE_MM2))
         root = math.copysign(1.0, radius_mm) * bend
         # the way back to the sphere, less its radius, without the loss of a difference
         excess = ahead + (ahead**2 - square) / (root + radius)
@@ -193,7 +198,7 @@ def to_sphere(
         m=direction[1],
         path=path - index * excess,
         miss_mm=torch.sqrt(square.detach()),
-        valid=landings.valid,
+        valid=valid,
     )
 
 

@@ -29,7 +29,7 @@ _WHOLE_LENS: Final = {
     "exit_pupil_diameter_mm": "the exit pupil lies at infinity: the lens is telecentric behind",
     "narrowest_mm": "the surface has no whole groove",
     "spot_rms_mm": "no ray of the field reaches the sensor",
-    "wavefront_rms_um": "fewer than four rays reach the sensor",
+    "wavefront_rms_um": "fewer than four rays reach the sensor and come from its exit pupil",
 }
 _FACTS: Final = {
     "stop_radius_real_mm": "the real stop radius",

@@ -233,7 +233,7 @@ def _worst_lines(result: ToleranceResult) -> list[str]:
     """Return both orders of single errors: by loss each part once, by spots each limit."""
     if not result.offenders:
         return []
-    head = f"{'part':>4} {'error':>13} {'loss dB':>8} {'RMS spot um':>12}"
+    head = f"{'part':>4} {'error':>13} {'loss dB':>8} {'spot grows um':>13}"
     lines = ["", f"{'worst by loss':<19} {head} {'place by spots':>15}"]
     lines += [f"{_row(one)} {one.spot_place:15d}" for one in result.ranking[:_WORST]]
     lines += ["", f"{'worst single errors':<19} {head}"]
@@ -249,7 +249,7 @@ def _row(one: Offender | Ranked) -> str:
     error = in_file_units(single.error_class, single.value)
     return (
         f"{single.error_class:<19} {_part(single) or '-':>4} {error:>13} {one.loss_db:8.3f} "
-        f"{one.spot_growth_mm * UM_PER_MM:+12.3f}"
+        f"{one.spot_growth_mm * UM_PER_MM:+13.3f}"
     )
 
 

@@ -17,6 +17,7 @@ from camkit.models_def.optics.analysis.curves import (
 from camkit.models_def.optics.analysis.spots import field_slopes
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens, Surface, read_prescription
+from camkit.models_def.optics.shape.stance import Stance
 from camkit.models_def.optics.spot import chief_heights
 from tests.physics.reference_lenses import cooke_triplet, thorlabs_al2550
 
@@ -107,3 +108,24 @@ def test_axial_colour_of_a_near_object_follows_its_image() -> None:
     assert torch.allclose(
         axial_colour_mm(near, waves), axial_colour_mm(far, waves), rtol=0, atol=2e-4
     )
+
+
+def test_curves_of_an_uneven_lens_count_from_where_its_axis_lands() -> None:
+    """A tilted plate shifts the whole picture, which is neither distortion nor a focus."""
+    lens = cooke_triplet()
+    tilt = Stance(decentre_mm=(0.0, 0.0), tilt_rad=(math.radians(5.0), 0.0))
+    plate = (
+        Surface(curvature_per_mm=0.0, thickness_mm=2.0, glass="N-BK7-Schott", stance=tilt),
+        Surface(curvature_per_mm=0.0, thickness_mm=3.0),
+    )
+    waves = torch.tensor([0.55], dtype=torch.float64)
+    slopes = torch.tensor([0.0, 0.002, 0.02, 0.1], dtype=torch.float64)
+    zone = torch.tensor([0.01, 0.5, 1.0], dtype=torch.float64)
+    last = lens.surfaces[-1].thickness_mm
+    plate_behind = (plate[0], replace(plate[1], thickness_mm=last - 7.0 + 2 * (1 - 1 / 1.5185)))
+    near = replace(lens.surfaces[-1], thickness_mm=5.0)
+    behind = replace(lens, surfaces=(*lens.surfaces[:-1], near, *plate_behind))
+    plain_share = distortion(lens, slopes, waves, "stop")
+    plain_mm = longitudinal_mm(lens, zone, waves)
+    assert torch.allclose(distortion(behind, slopes, waves, "stop"), plain_share, atol=3e-3)
+    assert torch.allclose(longitudinal_mm(behind, zone, waves), plain_mm, atol=0.05)

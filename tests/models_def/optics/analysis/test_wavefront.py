@@ -108,3 +108,12 @@ def test_lost_rays_carry_no_light() -> None:
     assert bool(lost.any())
     assert bool((wavefront.amplitude[lost] == 0).all())
     assert bool(torch.isfinite(wavefront.opd_um).all())
+
+
+def test_a_sensor_in_the_exit_pupil_has_no_wavefront() -> None:
+    """No sphere about a point of it holds the rays that start there."""
+    lens = replace(_hyperbolic(), stop=1)
+    last = replace(lens.surfaces[-1], thickness_mm=1e-6)
+    at_stop = replace(lens, surfaces=(lens.surfaces[0], last))
+    found = trace_wavefront(at_stop, _waves(0.0), _waves(0.5875618), disc_quadrature(3, 6))
+    assert math.isnan(float(wavefront_rms_um(found)))
