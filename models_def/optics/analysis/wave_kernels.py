@@ -17,6 +17,7 @@ from typing import Final
 import numpy as np
 import torch
 from torch import Tensor
+from torch.nn.functional import pad
 from torch.utils.checkpoint import checkpoint
 
 from camkit.errors import ContractError
@@ -33,6 +34,8 @@ from camkit.models_def.optics.trace import Rays
 from camkit.units import UM_PER_MM
 
 _SPARE_PX: Final = 2
+_SIDES: Final = (1.0, 0.8, 0.6, 0.45, 0.35, 0.25)
+"""Shares of a window that are tried in turn."""
 _SLACK: Final = 1.02
 _CHUNK_RAYS: Final = 2048
 _FIT_ERROR_WAVES: Final = 0.001
@@ -165,6 +168,25 @@ def quadrature_for(
     return reach_rings(reach_mm, float(coarse.wavelengths_um[j]), aperture, steps=True)
 
 
+def wave_side_px(coarse: CoarsePupil, i: int, j: int, size_px: int, pitch_um: float) -> int:
+    """Return the odd side of the window that waves can be summed in, at most `size_px`.
+
+    A window may be too wide for the rays that its edge needs where its light is not: beyond the
+    side there is next to none. 0 if the blur itself, the rays of field i and wavelength j, is.
+    """
+    least = 2 * float(coarse.miss_mm[i, j].max()) * UM_PER_MM / pitch_um
+    for share in _SIDES:
+        side = int(size_px * share) // 2 * 2 + 1
+        if side < least:
+            break
+        try:
+            quadrature_for(coarse, i, j, side, pitch_um)
+        except ContractError:
+            continue
+        return side
+    return 0
+
+
 def summed_light(
     coarse: CoarsePupil, size_px: int, pitch_um: float, mask: Tensor | None = None
 ) -> Tensor:
@@ -187,7 +209,9 @@ def summed_light(
     fields, wavelengths = coarse.opd_um.shape[:2]
 
     def light(i: int, j: int) -> Tensor:
-        return pixel_light(waves_of(coarse, i, j, size_px, pitch_um), size_px, pitch_um)
+        side = wave_side_px(coarse, i, j, size_px, pitch_um) or size_px
+        inner = pixel_light(waves_of(coarse, i, j, side, pitch_um), side, pitch_um)
+        return pad(inner, 4 * ((size_px - side) // 2,))
 
     def light_or_dark(i: int, j: int) -> Tensor:
         if mask is not None and not bool(mask[i, j]):

@@ -13,7 +13,12 @@ from torch import Tensor
 from camkit.errors import ContractError
 from camkit.models_def.optics.aiming.start import path_before, with_open_apertures
 from camkit.models_def.optics.analysis.pupil_fit import FIT_GRIDS, half_quadrature
-from camkit.models_def.optics.analysis.wave_kernels import CoarsePupil, rim_margins, summed_light
+from camkit.models_def.optics.analysis.wave_kernels import (
+    CoarsePupil,
+    rim_margins,
+    summed_light,
+    wave_side_px,
+)
 from camkit.models_def.optics.analysis.wavefront import to_sphere
 from camkit.models_def.optics.search.beam_launch import LEAD
 from camkit.models_def.optics.search.problem import Change, Problem, trace_batch
@@ -39,7 +44,7 @@ def wave_batch(
 ) -> tuple[Tensor, Tensor]:
     """Return kernels (field, colour, k, k) of a lens by waves, and the fields that have them.
 
-    A field that loses a ray on its way, or is not wanted, has none: its kernels are 0.
+    A field that loses a ray, has too wide a blur, or is not wanted, has none: its kernels are 0.
 
     Args:
         problem: Of `wave_problem`.
@@ -81,9 +86,13 @@ def wave_batch(
         miss_mm=_pupil(sphere.miss_mm),
         wavelengths_um=problem.wavelengths_um,
     )
-    kernels = torch.zeros(len(alive), 3, pixels.kernel_px, pixels.kernel_px, dtype=torch.float64)
+    side, pitch_um = pixels.kernel_px, pixels.pitch_um
+    for i in torch.nonzero(alive).flatten().tolist():
+        waves = range(len(problem.wavelengths_um))
+        alive[i] = all(wave_side_px(coarse, i, j, side, pitch_um) for j in waves)
+    kernels = torch.zeros(len(alive), 3, side, side, dtype=torch.float64)
     if bool(alive.any()):
-        light = summed_light(_of_fields(coarse, alive), pixels.kernel_px, pixels.pitch_um)
+        light = summed_light(_of_fields(coarse, alive), side, pitch_um)
         colours = torch.einsum("cw,fwyx->fcyx", pixels.color_weights.to(light.dtype), light)
         kernels = kernels.index_put((alive,), colours)
     return kernels, alive
