@@ -1,6 +1,7 @@
 """The sag of every surface of a lens in one table."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -24,7 +25,7 @@ def write_lens_sag(lens: Lens, path: Path) -> tuple[str, ...]:
         path: The file.
 
     Returns:
-        Notes on surfaces that have no rim.
+        Notes on surfaces that have no rim, and on what is no height.
 
     Raises:
         ContractError: If a surface ends before its rim.
@@ -41,7 +42,23 @@ def write_lens_sag(lens: Lens, path: Path) -> tuple[str, ...]:
         rows = zip(table.radius_mm, table.height_um, table.slope, strict=True)
         lines += [f"{number},{r:.6f},{h:.5f},{s:.8f}" for r, h, s in rows]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    notes = not_in_profiles(lens, range(len(lens.surfaces)))
     if not without_rim:
-        return ()
+        return notes
     surfaces = ", ".join(without_rim)
-    return (f"no rim: the table ends where the paraxial beam does, surfaces {surfaces}",)
+    return (*notes, f"no rim: the table ends where the paraxial beam does, surfaces {surfaces}")
+
+
+def not_in_profiles(lens: Lens, numbers: Iterable[int]) -> tuple[str, ...]:
+    """Return what profiles of surfaces do not hold: phases, and how the glass stands."""
+    faces = [(str(i), lens.surfaces[i]) for i in numbers]
+    phases = ", ".join(i for i, face in faces if face.phase is not None)
+    stances = ", ".join(i for i, face in faces if face.stance is not None)
+    notes = []
+    if phases:
+        notes.append(f"the phase of surface {phases} is no height: the table is of the glass below")
+    if stances:
+        notes.append(
+            f"tilt and decentre of surface {stances} stay behind: each profile stands by itself"
+        )
+    return tuple(notes)

@@ -38,6 +38,7 @@ def sag(
     refuse_existing([out], overwrite=overwrite)
     from camkit.errors import ContractError
     from camkit.models_def.optics.lens_file.lens_file import read_noted_lens
+    from camkit.models_def.optics.thin.lens_sag import not_in_profiles
     from camkit.models_def.optics.thin.sag_table import sag_table, write_sag_table
 
     lens, notes = read_noted_lens(file, glass or (), catalogue, configuration)
@@ -49,7 +50,7 @@ def sag(
     table = sag_table(lens.surfaces[surface], step_um)
     out.parent.mkdir(parents=True, exist_ok=True)
     write_sag_table(table, out)
-    for note in notes:
+    for note in (*notes, *not_in_profiles(lens, [surface])):
         say(f"{file.name}: {note}", err=True)
     low, high = float(table.height_um.min()), float(table.height_um.max())
     steepest_deg = math.degrees(math.atan(float(abs(table.slope).max())))

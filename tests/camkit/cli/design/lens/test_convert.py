@@ -106,6 +106,23 @@ def test_the_sag_of_every_surface_goes_to_a_table(camkit_command, tmp_path: Path
     assert max(row[1] for row in table) == 12.7
 
 
+def test_tables_say_what_is_no_height(camkit_command, tmp_path: Path) -> None:
+    source, out = tmp_path / "my.toml", tmp_path / "sag.csv"
+    face = "[[surface]]\nradius_mm = inf\nthickness_mm = 4.0\nsemi_diameter_mm = 6.0\n"
+    phase = "phase_radius_mm = 6.0\nphase_radial_rad = [-40.0]\n"
+    tilt = 'glass = "N-BK7-Schott"\nelement_tilt_deg = [5.0, 0.0]\n'
+    source.write_text(f'name = "x"\nstop = 0\nf_number = 8.0\n{face}{phase}{face}{tilt}{face}')
+    told = ("the phase of surface 0 is no height", "tilt and decentre of surface 1 stay behind")
+    whole = camkit_command("lens", "convert", source, out)
+    assert whole.code == 0, whole.err
+    assert all(text in whole.err for text in told)
+    for number, text in enumerate(told):
+        alone = camkit_command(
+            "lens", "sag", source, "--surface", number, "-o", tmp_path / f"{number}.csv"
+        )
+        assert [other in alone.err for other in told] == [other == text for other in told]
+
+
 def test_one_file_to_write_is_named(camkit_command, tmp_path: Path) -> None:
     none = camkit_command("lens", "convert", "duet")
     both = camkit_command("lens", "convert", "duet", tmp_path / "a.zmx", "-o", tmp_path / "b.zmx")
