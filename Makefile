@@ -5,7 +5,7 @@ DEV := .venv-dev
 RUNTIME_STAMP := $(VENV)/.runtime-installed
 DEV_STAMP := $(DEV)/.dev-installed
 FUZZ_SECONDS ?= 600
-SOURCES := camkit runtime export models_def tests tools setup.py
+SOURCES := camkit runtime export models_def tests tools examples/fastapi setup.py
 # else every process that a test starts compiles the product anew
 export PYTHONDONTWRITEBYTECODE =
 

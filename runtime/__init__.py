@@ -18,6 +18,7 @@
     pipeline, development, batch       one capture in memory, its files, many captures
     capture_result, write_options      what became of a capture; how its files are written
     merging/                           brackets to one picture
+    device/                            a provider proves itself before the first picture
     proof/                             a bundle proves itself
     twin/                              the digital twin: a scene becomes a RAW file
     face/                              parts of the public face

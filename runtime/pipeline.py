@@ -110,11 +110,46 @@ class Pipeline:
         return _reopened, (origin, self.options, self.kind)
 
     def network(self, role: str, size: str) -> NetworkEngine:
-        """Return the network of a role and size, made when first asked for.
+        """Return the network of a role and size, made and proved when first asked for.
 
         Raises:
             ContractError: If there is no bundle, or it lacks the size.
+            ParityError: If the provider does not compute the networks of the size as the bundle
+                says; see `proof`.
         """
+        engine = self._engine_for(role, size)
+        self.proof(size)
+        return engine
+
+    def proof(self, size: str | None = None) -> Mapping[str, Any] | None:
+        """Return what the provider has proved on this machine, as sidecars keep it.
+
+        Whatever is not onnxruntime on the CPU computes the golden cases, a picture whole and in
+        tiles, and the networks beside the CPU's, once a process, before it computes captures.
+
+        Args:
+            size: Of the networks; None for the size that is ready.
+
+        Returns:
+            Plain JSON values: `device`, `library`, `verdict`, `note` and every comparison;
+            None on the CPU, and where no network will run.
+
+        Raises:
+            ParityError: If it does not compute what the bundle says.
+        """
+        size = size or self.size
+        if self.bundle is None or self.options.provider == "cpu" or size is None:
+            return None
+        # imported late: the CPU proves nothing
+        from camkit.runtime.device.device_proof import device_proof
+
+        proof = device_proof(
+            self.bundle, size, self._engine_for, self.options, threads=self.threads
+        )
+        return proof.to_json()
+
+    def _engine_for(self, role: str, size: str) -> NetworkEngine:
+        """Return the network of a role and size, made when first asked for."""
         if self.bundle is None:
             raise ContractError("without a bundle there is no network")
         with self._lock:
@@ -204,6 +239,7 @@ class Pipeline:
             bundle=self.bundle,
             options=self.options,
             networks=self.network,
+            proof=self.proof,
             speed=self.speed,
             threads=self.threads,
             usual_stages=tuple(self.part.stages),

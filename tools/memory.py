@@ -167,10 +167,10 @@ class PssWatch:
 
     def _sample(self) -> None:
         while not self._stopped.wait(POLL_S):
-            self._peak = max(self._peak, sum(map(_pss_mb, _tree(self._pid))))
+            self._peak = max(self._peak, sum(map(pss_mb, process_tree(self._pid))))
 
 
-def _tree(pid: int) -> Iterator[int]:
+def process_tree(pid: int) -> Iterator[int]:
     """Return a process and its descendants."""
     yield pid
     try:
@@ -179,10 +179,11 @@ def _tree(pid: int) -> Iterator[int]:
     except OSError:
         return
     for word in " ".join(texts).split():
-        yield from _tree(int(word))
+        yield from process_tree(int(word))
 
 
-def _pss_mb(pid: int) -> float:
+def pss_mb(pid: int) -> float:
+    """Return the PSS of a process in MB; 0 for one that has ended."""
     try:
         text = Path(f"/proc/{pid}/smaps_rollup").read_text()
     except OSError:

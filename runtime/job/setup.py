@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Any, Final
 
 from camkit.bundle.golden import IMAGE
 from camkit.bundle.reader import Bundle
@@ -32,6 +32,10 @@ DEVELOPED: Final[Mapping[str, str]] = {IMAGE: DEVELOPMENT[-1].gives[0]}
 """Its products: name -> plane."""
 
 
+def _no_proof(_: str) -> None:
+    return None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setup:
     """The setup that all captures of a pipeline share.
@@ -42,6 +46,7 @@ class Setup:
         networks: Gives the network of a role and size.
         speed: Gives how fast this machine is with the networks of some sizes.
         threads: Threads to compute with.
+        proof: Gives what the provider has proved with the networks of a size; None for nothing.
         usual_stages: What is done to a capture without a bundle.
         usual_products: Its products then: name -> plane.
     """
@@ -51,6 +56,7 @@ class Setup:
     networks: Callable[[str, str], NetworkEngine]
     speed: Callable[[Sequence[str]], Speed]
     threads: int
+    proof: Callable[[str], Mapping[str, Any] | None] = _no_proof
     usual_stages: tuple[StageEntry, ...] = DEVELOPMENT
     usual_products: Mapping[str, str] = field(default_factory=lambda: DEVELOPED)
 

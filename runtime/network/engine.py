@@ -18,7 +18,8 @@ from camkit.arrays import FloatArray
 from camkit.errors import BundleError, ContractError, UnsupportedError
 from camkit.runtime.cancel import Cancel, Cancelled, watched
 from camkit.runtime.machine.memory import mapped_arrays
-from camkit.runtime.network.openvino_session import OpenvinoSession, has_openvino
+from camkit.runtime.machine.processor import processor_fact
+from camkit.runtime.network.openvino_session import OpenvinoSession, has_openvino, openvino_facts
 from camkit.runtime.network.segment import Segment
 
 _IMPORTED_BEFORE = "onnxruntime" in sys.modules and "ORT_DISABLE_TELEMETRY" not in os.environ
@@ -107,6 +108,20 @@ def usable_providers() -> tuple[str, ...]:
 def _built_in() -> tuple[str, ...]:
     built = providers()
     return tuple(name for name, full in PROVIDER_NAMES.items() if full in built)
+
+
+def device_and_library(provider: str) -> tuple[str, str]:
+    """Return what a provider computes on, and the library with its version, for people."""
+    if provider == OPENVINO:
+        return openvino_facts()
+    library = f"onnxruntime {ort.__version__}"
+    if provider == "cpu":
+        return processor_fact("model name") or "CPU", library
+    listed: list[Any] = getattr(ort, "get_ep_devices", list)()
+    devices = [one.device for one in listed if one.ep_name == PROVIDER_NAMES[provider]]
+    if not devices:
+        return "device 0", library
+    return f"{devices[0].vendor} device {devices[0].device_id:#06x}", library
 
 
 class NetworkEngine:
@@ -422,7 +437,7 @@ def _chosen_providers(provider: str) -> list[str | tuple[str, dict[str, str]]]:
     usable = _built_in()
     if provider not in usable:
         raise UnsupportedError(
-            f"the installed onnxruntime computes on {', '.join(usable)}; got {provider!r}: "
+            f"this installation computes on {', '.join(usable_providers())}; got {provider!r}: "
             "install an onnxruntime built with it, or use one of these"
         )
     names = [name for name in (provider, *_FALLBACKS.get(provider, ())) if name in usable]

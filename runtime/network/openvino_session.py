@@ -38,6 +38,12 @@ def has_openvino() -> bool:
     return util.find_spec("openvino") is not None
 
 
+def openvino_facts() -> tuple[str, str]:
+    """Return the processor as openvino names it, and openvino with its version."""
+    name = _core().get_property("CPU", "FULL_DEVICE_NAME")
+    return str(name).strip(), f"openvino {_openvino().__version__.split('-')[0]}"
+
+
 def missing_bfloat16() -> str | None:
     """Return what this machine lacks for bfloat16, for people; None if it lacks nothing."""
     if not has_openvino():

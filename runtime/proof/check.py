@@ -24,10 +24,10 @@ from camkit.bundle.reader import Bundle, open_bundle, read_container_manifest
 from camkit.errors import CamkitError, ContractError, one_line
 from camkit.progress import working
 from camkit.psf import depth_name
+from camkit.runtime.device.case_results import GoldenRun
 from camkit.runtime.kind import part_of
 from camkit.runtime.network.graph import COST_RTOL, check_graph
 from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES
-from camkit.runtime.proof.golden_run import GoldenRun
 from camkit.runtime.proof.laws.proof import BrokenLawsError, prove_laws
 from camkit.runtime.proof.layers import prove_golden, prove_range, prove_tiling
 from camkit.runtime.stage_finder import check_stages

@@ -1,7 +1,5 @@
 """A golden case run through the whole pipeline, for export and for `camkit check`."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from camkit.bundle.golden import GoldenArrays
@@ -10,8 +8,6 @@ from camkit.bundle.reader import Bundle
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
-
-GoldenRun = Callable[[Bundle, GoldenCase, GoldenArrays, str | None], Reconstruction]
 
 
 def case_work(

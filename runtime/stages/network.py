@@ -232,6 +232,11 @@ class _NetworkStage:
         one = len(bundle.manifest.networks) == 1
         log.record["tiles"] = tiles[entry.role] if one else tiles
         log.record["network"] = {"provider": job.options.provider, "dtype": job.options.dtype}
+        proofs = {size: proof for size in work.sizes() if (proof := job.setup.proof(size))}
+        if proofs:
+            log.record["network"]["proof"] = proofs
+            notes = {proof["note"] for proof in proofs.values()} - {None, *log.notes}
+            log.notes.extend(sorted(notes))
 
     def _run(self, engine: NetworkEngine, trim: Callable[[], None]) -> Run:
         """Return the run of a network on windows of which it takes the first channels."""

@@ -95,6 +95,7 @@ def plan_lines(facts: dict[str, Any]) -> list[str]:
     if "network" in facts.get("plan", {}):
         network = facts["plan"]["network"]
         lines.append(f"  network: {network['dtype']} on {network['provider']}")
+        lines.extend(f"  proved: {p['verdict']}" for p in network.get("proof", {}).values())
     for decision in facts["decisions"]:
         saving = decision["saving_s"] or 0.0
         lines.append(f"  {decision['what']}: {decision['choice']} ({decision['reason']})")

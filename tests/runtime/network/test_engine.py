@@ -6,6 +6,7 @@ import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import onnx
@@ -220,6 +221,15 @@ def test_providers_that_are_not_built_in_are_refused_with_those_that_are(
     monkeypatch.setattr(engine_module, "providers", lambda: ("CPUExecutionProvider",))
     with pytest.raises(UnsupportedError, match="computes on cpu; got 'cuda'"):
         NetworkEngine(small_network(), threads=1, provider="cuda")
+
+
+def test_a_card_is_named_as_onnxruntime_lists_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    card = SimpleNamespace(vendor="NVIDIA", device_id=0x2335)
+    listed = [SimpleNamespace(ep_name="CUDAExecutionProvider", device=card)]
+    monkeypatch.setattr(engine_module.ort, "get_ep_devices", lambda: listed, raising=False)
+    library = f"onnxruntime {engine_module.ort.__version__}"
+    assert engine_module.device_and_library("cuda") == ("NVIDIA device 0x2335", library)
+    assert engine_module.device_and_library("tensorrt") == ("device 0", library)
 
 
 def test_a_provider_that_does_not_start_is_an_error_and_no_silent_cpu(

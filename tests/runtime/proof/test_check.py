@@ -297,7 +297,7 @@ def test_network_that_sees_all_is_not_promised_to_tile(tmp_path: Path) -> None:
 
 def test_tiled_and_whole_that_differ_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # A halo one stride too short, as a wrong walk would give it.
-    from camkit.runtime.proof import layers as proofs
+    from camkit.runtime.device import tile_windows as proofs
 
     real = proofs.lay_windows
 
@@ -329,11 +329,11 @@ def test_a_network_that_is_exact_with_large_tiles_alone_fails(
 
 @pytest.mark.parametrize(("stride", "tiles"), [(1, (1, 41, 64)), (16, (16, 48, 64))])
 def test_tiles_lie_on_every_phase_of_the_lattice(stride: int, tiles: tuple[int, ...]) -> None:
-    from camkit.runtime.proof.layers import _tiles_px
+    from camkit.runtime.device.tile_windows import tiles_px
 
-    assert _tiles_px(stride) == tiles
+    assert tiles_px(stride) == tiles
     for any_stride in range(1, 257):
-        sides = _tiles_px(any_stride)
+        sides = tiles_px(any_stride)
         assert len(set(sides)) == 3
         assert any_stride in sides
         assert not any(side % any_stride for side in sides)
