@@ -340,7 +340,7 @@ def _windows(bundle: Bundle, cases: Cases) -> dict[tuple[str, str], list[FloatAr
 
 def _members(parts: Parts, camera: _Camera) -> dict[str, bytes]:
     members = camera.optics.members | _stress_members(parts, camera.optics)
-    return members | designed_members(parts, camera.designed, camera.optics.psf)
+    return members | designed_members(parts, camera.designed, camera.optics)
 
 
 def _stress_members(parts: Parts, optics: FrozenOptics) -> dict[str, bytes]:

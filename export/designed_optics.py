@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 import torch
 
+from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.reader import PLATE, PRESCRIPTION
 from camkit.calibration.psf_import.kernel_resampling import window
 from camkit.caller import command_text, option_text
@@ -23,7 +24,8 @@ from camkit.models_def.optics.diffraction.plate import (
 )
 from camkit.models_def.optics.diffraction.wave import PixelGrid
 from camkit.models_def.optics.distortion import check_distortion
-from camkit.models_def.optics.lens_file.lens_file import read_lens
+from camkit.models_def.optics.lens_file.lens_file import read_configured_lens, read_lens
+from camkit.models_def.optics.lens_file.states import plain_lens
 from camkit.models_def.optics.prescription import Lens, format_prescription, parse_prescription
 from camkit.models_def.optics.thin.hazy_freezing import check_peaks
 from camkit.models_def.training.checkpoint import Checkpoint
@@ -37,7 +39,7 @@ more from each other, and by 0.008 at most from what was computed of them."""
 
 
 def designed_members(
-    parts: Parts, designed: Mapping[str, bytes], psf: FrozenPsf
+    parts: Parts, designed: Mapping[str, bytes], optics: FrozenOptics
 ) -> dict[str, bytes]:
     """Return the lens or the plate of a camera as members of its bundle: name -> content.
 
@@ -46,13 +48,14 @@ def designed_members(
     Args:
         parts: What the caller names.
         designed: The optics of the checkpoints, or of the recipe; see `designed_of`.
-        psf: Frozen.
+        optics: Frozen.
 
     Raises:
-        ContractError: If there are a lens and a plate, or the PSF was not frozen from them.
+        ContractError: If there are a lens and a plate, or the PSF was not frozen from them, or the
+            lens lacks one of its configurations.
         CamkitError: If a lens is wrong, see `read_lens`.
     """
-    lens, plate = _lens_of(parts, designed), _plate_of(parts, designed)
+    lens, plate = _lens_of(parts, designed, optics), _plate_of(parts, designed)
     if lens is not None and plate is not None:
         raise ContractError(
             f"a bundle holds a lens or a plate; here are the lens {lens.name} and the plate "
@@ -62,10 +65,11 @@ def designed_members(
     # written afresh: the bundle carries the user's glasses and is TOML, whatever came in
     if lens is not None:
         check = check_distortion if parts.haze is None else check_peaks
-        check(lens, psf, psf_file)
+        for one, psf in _looked_at(lens, optics):
+            check(one, psf, psf_file)
         return {PRESCRIPTION: format_prescription(lens).encode()}
     if plate is not None:
-        _check_plate(plate, psf, psf_file)
+        _check_plate(plate, optics.psf, psf_file)
         return plate_members(plate)
     return {}
 
@@ -87,8 +91,23 @@ def designed_of(checkpoints: Iterable[Checkpoint]) -> Mapping[str, bytes]:
     return distinct[0] if distinct else {}
 
 
-def _lens_of(parts: Parts, designed: Mapping[str, bytes]) -> Lens | None:
+def _looked_at(lens: Lens, optics: FrozenOptics) -> list[tuple[Lens, FrozenPsf]]:
+    """Return the lens in every configuration of the optics, beside the kernels of each."""
+    if not optics.states:
+        return [(lens, optics.psf)]
+    names = {state.name for state in lens.configurations}
+    if missing := [state.name for state in optics.states if state.name not in names]:
+        raise ContractError(
+            f"the PSF holds the configurations {', '.join(missing)}, which the lens {lens.name} "
+            f"lacks; name its file by {option_text('prescription')}"
+        )
+    return [(plain_lens(lens, state.name), state.psf) for state in optics.states]
+
+
+def _lens_of(parts: Parts, designed: Mapping[str, bytes], optics: FrozenOptics) -> Lens | None:
     if parts.prescription is not None:
+        if optics.states:
+            return read_configured_lens(parts.prescription)[0]
         return read_lens(parts.prescription)
     return parse_prescription(designed[PRESCRIPTION].decode()) if PRESCRIPTION in designed else None
 

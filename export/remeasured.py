@@ -125,6 +125,10 @@ def remeasured(
         raise DecodeError(
             f"the optics of {name} write streaks; only {option_text('noise')} can be put into it"
         )
+    if optics.type == "lens_states" and measured != Measured(noise=measured.noise):
+        raise DecodeError(
+            f"{name} has several configurations; only {option_text('noise')} can be put into it"
+        )
     hazy = optics.type == "hazy_psf"
     if hazy and measured.psf is not None:
         raise DecodeError(

@@ -47,6 +47,8 @@ class Options:
             quality.
         depth_m: Object distance whose kernels the bank uses, where the bundle knows several (its
             PSF must reach it); None for the mean kernel over the depths.
+        configuration: State of a zoom or focusing lens, by name or number from 1, where the bundle
+            knows several; None for its first.
         method: Way of one of the bundle's stages: net (the network), a classical method alone, or
             develop (no restoration); None for the best that the bundle has.
         mode: Tiling: exact (bits of the whole picture), fast (smaller halo), whole (one window).
@@ -90,6 +92,7 @@ class Options:
     max_seconds: float | None = None
     max_error_db: float | None = None
     depth_m: float | None = None
+    configuration: str | int | None = None
     method: str | None = None
     mode: Mode = "exact"
     demosaic: DemosaicMethod | None = None

@@ -76,6 +76,8 @@ class Pipeline:
                 machine.
             ContractError: If the bundle lacks what was asked for, or an option means nothing to it.
         """
+        if bundle is not None and options.configuration is not None:
+            bundle = bundle.with_configuration(options.configuration)
         self.bundle = bundle
         self.options = options
         self.threads = available_threads(options.threads)

@@ -9,6 +9,7 @@
     light_bound                    the bound on the light that a network may move
     psf_file, streak_file          the safetensors members: optics,
     haze_file                      the haze of these,
+    states                         several states of a lens in one file,
     golden, haze_golden            cases that prove a bundle
     strict_json                    JSON that every reader understands alike
     local_headers, container       the zip: names, sizes, refusals

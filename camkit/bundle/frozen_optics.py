@@ -1,6 +1,6 @@
 """Optics as their files hold them, kernels or streaks, and the kernels that both give.
 
-psf.safetensors [+ haze.safetensors] | streaks.safetensors
+psf.safetensors [+ haze.safetensors, or of several states] | streaks.safetensors
     -> FrozenOptics -> entry of the manifest, members, kernels
 """
 
@@ -11,8 +11,17 @@ from typing import Final
 import numpy as np
 
 from camkit.bundle.haze_file import haze_to_bytes
-from camkit.bundle.optics import HAZE, PSF, STREAKS, FrozenPsfOptics, HazyPsfOptics, StreakEntry
+from camkit.bundle.optics import (
+    HAZE,
+    PSF,
+    STREAKS,
+    FrozenPsfOptics,
+    HazyPsfOptics,
+    StatesEntry,
+    StreakEntry,
+)
 from camkit.bundle.psf_file import (
+    STATES,
     UNCERTAINTY,
     psf_from_tensors,
     psf_to_bytes,
@@ -20,6 +29,8 @@ from camkit.bundle.psf_file import (
     read_psf,
     read_tensors,
 )
+from camkit.bundle.states.lens_state import LensState, check_states, find_name
+from camkit.bundle.states.state_tensors import states_from_tensors, states_to_bytes
 from camkit.bundle.streak_file import streaks_from_tensors, streaks_to_bytes
 from camkit.errors import ContractError
 from camkit.haze import Haze
@@ -39,22 +50,46 @@ class FrozenOptics:
         psf: Their kernels, each of sum 1.
         streaks: Core, arms and haze; None for optics that are known by kernels alone.
         haze: What lies beside the kernels, which are a core then; None where they are all.
+        states: Of a lens with several configurations, all; the kernels are those of one.
+        state: Name of that one; empty where there are none.
     """
 
     psf: FrozenPsf
     streaks: StreakOptics | None = None
     haze: Haze | None = None
+    states: tuple[LensState, ...] = ()
+    state: str = ""
 
     def __post_init__(self) -> None:
         """Refuse parts that do not belong together.
 
         Raises:
-            ContractError: If the haze is not of the samples of the kernels, or lies beside streaks.
+            ContractError: If the haze is not of the samples of the kernels, or lies beside streaks,
+                or states do not fit each other.
         """
+        if self.states:
+            check_states(self.states)
+            if self.streaks is not None or self.haze is not None:
+                raise ContractError("optics with several configurations have no streaks or haze")
+            if self.lens_state.psf is not self.psf:
+                raise ContractError(f"the kernels are not those of configuration {self.state}")
         if self.haze is not None:
             if self.streaks is not None:
                 raise ContractError("streaks have a haze of their own; leave the other out")
             self.haze.check_beside(self.psf)
+
+    @property
+    def lens_state(self) -> LensState:
+        """The state of a lens with several whose kernels these are."""
+        return next(state for state in self.states if state.name == self.state)
+
+    def with_state(self, choice: str | int | None) -> "FrozenOptics":
+        """Return the optics in one of their states, the first where none is named.
+
+        Raises:
+            ContractError: If there is no such state.
+        """
+        return optics_of_states(self.states, choice)
 
     @property
     def member_name(self) -> str:
@@ -66,6 +101,8 @@ class FrozenOptics:
         """Return the name and the bytes of their member."""
         if self.streaks is not None:
             return self.member_name, streaks_to_bytes(self.streaks)
+        if self.states:
+            return self.member_name, states_to_bytes(self.states)
         return self.member_name, psf_to_bytes(self.psf)
 
     @property
@@ -74,12 +111,27 @@ class FrozenOptics:
         added = {} if self.haze is None else {HAZE: haze_to_bytes(self.haze)}
         return dict([self.member]) | added
 
-    def entry(self, object_distance_mm: float) -> FrozenPsfOptics | HazyPsfOptics | StreakEntry:
-        """Return the manifest's entry of these optics; the distance may be inf."""
+    def entry(
+        self, object_distance_mm: float
+    ) -> FrozenPsfOptics | HazyPsfOptics | StatesEntry | StreakEntry:
+        """Return the manifest's entry of these optics.
+
+        Args:
+            object_distance_mm: Distance of focus, may be inf; that of states is their own.
+        """
         pitch_um = self.psf.pixel_pitch_um
+        if self.states:
+            object_distance_mm = self.states[0].object_distance_mm
         focus_mm = None if np.isinf(object_distance_mm) else object_distance_mm
         if self.streaks is not None:
             return StreakEntry(pixel_pitch_um=pitch_um, object_distance_mm=focus_mm)
+        if self.states:
+            return StatesEntry(
+                configurations=tuple(state.name for state in self.states),
+                pixel_pitch_um=pitch_um,
+                symmetry=self.psf.symmetry,
+                object_distance_mm=focus_mm,
+            )
         if self.haze is not None:
             return HazyPsfOptics(
                 pixel_pitch_um=pitch_um,
@@ -92,8 +144,26 @@ class FrozenOptics:
         )
 
 
+def optics_of_states(
+    states: tuple[LensState, ...], choice: str | int | None = None
+) -> FrozenOptics:
+    """Return the optics of a lens with several configurations, in one of them.
+
+    Args:
+        states: At least one.
+        choice: Name or number from 1; None for the first.
+
+    Raises:
+        ContractError: If there is no such state, or they do not fit each other.
+    """
+    check_states(states)
+    psfs = {state.name: state.psf for state in states}
+    name = find_name(list(psfs), "", choice)
+    return FrozenOptics(psf=psfs[name], states=states, state=name)
+
+
 def optics_from_bytes(data: bytes, *, what: str, channels: int) -> FrozenOptics:
-    """Decode frozen optics, whichever of the two the file holds.
+    """Decode frozen optics, whichever of the three the file holds.
 
     Args:
         data: A whole safetensors file.
@@ -101,12 +171,14 @@ def optics_from_bytes(data: bytes, *, what: str, channels: int) -> FrozenOptics:
         channels: Of the sensor.
 
     Raises:
-        BundleError: If it is damaged, or neither.
+        BundleError: If it is damaged, or none of them.
     """
     tensors = read_tensors(data, what=what)
     if PROFILES in tensors:
         streaks = streaks_from_tensors(tensors, what=what)
         return FrozenOptics(psf=psf_of_streaks(streaks, channels), streaks=streaks)
+    if STATES in tensors:
+        return optics_of_states(states_from_tensors(tensors, what=what))
     return FrozenOptics(psf=psf_from_tensors(tensors, what=what))
 
 

@@ -2,6 +2,7 @@
 
 Optics = FrozenPsfOptics    kernels, psf.safetensors        (psf_file.py)
        | HazyPsfOptics      core kernels, psf.safetensors, and haze, haze.safetensors (haze_file.py)
+       | StatesEntry        kernels of several states of a lens, psf.safetensors (states/)
        | StreakEntry        core, arms and haze, streaks.safetensors    (streak_file.py)
        | LensProfile        distortion and illumination alone, in the manifest
 """
@@ -13,6 +14,7 @@ import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from camkit.bundle.entry import Entry, NonNegative, Positive, Since
+from camkit.bundle.states.lens_state import MOST_STATES
 from camkit.errors import ContractError
 from camkit.haze import LEAST_CELL_PX, MOST_CELL_PX
 from camkit.psf import Symmetry
@@ -59,6 +61,26 @@ class HazyPsfOptics(Entry):
     haze_member: Literal["haze.safetensors"] = HAZE
     pixel_pitch_um: Positive
     cell_px: Annotated[int, Field(ge=LEAST_CELL_PX, le=MOST_CELL_PX, multiple_of=2)]
+    symmetry: Symmetry = "radial"
+    object_distance_mm: Positive | None = None
+
+
+class StatesEntry(Entry):
+    """Optics known by a frozen PSF for each of several configurations (format 2.12).
+
+    Attributes:
+        member: The file of all; see camkit/bundle/states/state_tensors.py.
+        configurations: Their names; the first is taken where none is named.
+        pixel_pitch_um: Pitch of the samples of all kernels.
+        symmetry: Of all; see `FrozenPsfOptics`.
+        object_distance_mm: Distance of focus of the first; None for infinity.
+    """
+
+    since: ClassVar = Since((2, 12), "the optics have several configurations")
+    type: Literal["lens_states"] = "lens_states"
+    member: Literal["psf.safetensors"] = PSF
+    configurations: Annotated[tuple[str, ...], Field(min_length=1, max_length=MOST_STATES)]
+    pixel_pitch_um: Positive
     symmetry: Symmetry = "radial"
     object_distance_mm: Positive | None = None
 
@@ -171,6 +193,7 @@ def _type_of(value: Any) -> Any:
 Optics = Annotated[
     Annotated[FrozenPsfOptics, Tag("frozen_psf")]
     | Annotated[HazyPsfOptics, Tag("hazy_psf")]
+    | Annotated[StatesEntry, Tag("lens_states")]
     | Annotated[StreakEntry, Tag("streaks")]
     | Annotated[LensProfile, Tag("lens_profile")],
     Discriminator(_type_of),

@@ -7,7 +7,8 @@ The file holds seven tensors and no metadata, so that the same PSF always gives 
 grid its positions, `grid_x_mm` and `grid_y_mm`. Kernels of a moved sensor (format 2.5) add
 `focus_kernels` (float32) and `focus_um`; even powers of the distortion (format 2.6) add
 `distortion_even_coefficients` (channel, 3). A file of `camkit psf import` adds `uncertainty` (3,):
-noise, shift in pixels and width of `camkit.psf.PsfUncertainty`; bundles hold none.
+noise, shift in pixels and width of `camkit.psf.PsfUncertainty`; bundles hold none. A file of a lens
+with several configurations (format 2.12) holds such tensors for each: `states/state_tensors.py`.
 """
 
 from collections.abc import Mapping
@@ -20,6 +21,7 @@ from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from camkit.bundle.strict_json import read_json
+from camkit.caller import option_text
 from camkit.errors import BundleError, ContractError
 from camkit.psf import FrozenPsf, PsfUncertainty, Symmetry
 from camkit.radial import RadialDistortion
@@ -36,6 +38,8 @@ _ADDED: Final = {"radial": (), "uniform": (_SYMMETRY,), "grid": (_SYMMETRY, *_GR
 """What a PSF of each symmetry holds besides."""
 _EVEN: Final = "distortion_even_coefficients"
 _FOCUS: Final = ("focus_um", "focus_kernels")
+STATES: Final = "configurations"
+"""The tensor that files of several states of a lens alone have."""
 UNCERTAINTY: Final = "uncertainty"
 """The tensor that files of measured PSFs alone have."""
 _SIDES: Final = ("field", "depth", "wavelength", "h", "w")
@@ -85,6 +89,15 @@ def psf_to_bytes(psf: FrozenPsf, uncertainty: PsfUncertainty | None = None) -> b
         psf: The PSF.
         uncertainty: Of a measured one, for training; a bundle holds none.
     """
+    tensors = psf_tensors(psf)
+    if uncertainty is not None:
+        numbers = (uncertainty.noise, uncertainty.shift_px, uncertainty.width)
+        tensors[UNCERTAINTY] = np.array(numbers, dtype=np.float64)
+    return save(tensors)
+
+
+def psf_tensors(psf: FrozenPsf) -> dict[str, NDArray[Any]]:
+    """Return the tensors of a frozen PSF by name, each contiguous."""
     tensors: dict[str, NDArray[Any]] = {
         "kernels": np.ascontiguousarray(psf.kernels),
         "field_heights_mm": np.asarray(psf.field_heights_mm, dtype=np.float64),
@@ -109,10 +122,7 @@ def psf_to_bytes(psf: FrozenPsf, uncertainty: PsfUncertainty | None = None) -> b
     if psf.focus_um is not None and psf.focus_kernels is not None:
         tensors[_FOCUS[0]] = np.asarray(psf.focus_um, dtype=np.float64)
         tensors[_FOCUS[1]] = psf.focus_kernels
-    if uncertainty is not None:
-        numbers = (uncertainty.noise, uncertainty.shift_px, uncertainty.width)
-        tensors[UNCERTAINTY] = np.array(numbers, dtype=np.float64)
-    return save({name: np.ascontiguousarray(array) for name, array in tensors.items()})
+    return {name: np.ascontiguousarray(array) for name, array in tensors.items()}
 
 
 def psf_from_bytes(data: bytes, *, what: str = "psf.safetensors") -> FrozenPsf:
@@ -134,6 +144,11 @@ def psf_from_bytes(data: bytes, *, what: str = "psf.safetensors") -> FrozenPsf:
 
 def psf_from_tensors(tensors: Mapping[str, NDArray[Any]], *, what: str) -> FrozenPsf:
     """Check the tensors of a file and return the frozen PSF; see `psf_from_bytes`."""
+    if STATES in tensors:
+        raise BundleError(
+            f"{what} holds several configurations of a lens, and one is taken here; freeze it "
+            f"with {option_text('configuration')}"
+        )
     symmetry = _read_symmetry(tensors, what)
     _check_tensors(tensors, symmetry, what)
     try:

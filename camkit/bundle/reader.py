@@ -22,6 +22,7 @@ from camkit.bundle.container import (
     container_from_bytes,
     read_container,
 )
+from camkit.bundle.entry import Entry
 from camkit.bundle.facts import NetworkFacts
 from camkit.bundle.frozen_optics import FrozenOptics, optics_from_bytes
 from camkit.bundle.haze_file import haze_from_bytes
@@ -39,9 +40,11 @@ from camkit.bundle.optics import (
     FrozenPsfOptics,
     HazyPsfOptics,
     LensProfile,
+    StatesEntry,
     StreakEntry,
 )
 from camkit.bundle.psf_file import psf_from_bytes
+from camkit.caller import option_text
 from camkit.errors import BundleError, ContractError
 from camkit.haze import Haze
 from camkit.psf import FrozenPsf
@@ -111,6 +114,40 @@ class Bundle:
         return self.frozen_optics.psf
 
     @property
+    def configurations(self) -> tuple[str, ...]:
+        """The names of the states of a zoom or focusing lens; none where it has one state."""
+        optics = self.manifest.optics
+        return optics.configurations if isinstance(optics, StatesEntry) else ()
+
+    @property
+    def configuration(self) -> str:
+        """The name of the state whose kernels are in use; empty where the lens has one state."""
+        return "" if self._optics is None else self._optics.state
+
+    def freeze_fact(self, name: str) -> int | float | str | None:
+        """Return what the report of freezing says, of the state in use; None where nothing."""
+        prefix = f"{self.configuration}." if self.configuration else ""
+        return self.manifest.freeze.get(prefix + name)
+
+    def with_configuration(self, choice: str | int | None) -> "Bundle":
+        """Return the bundle with its lens in one state.
+
+        Args:
+            choice: Name, or number from 1; None for the first.
+
+        Raises:
+            ContractError: If there is no such state.
+        """
+        if self.configurations:
+            return replace(self, _optics=self.frozen_optics.with_state(choice))
+        if choice is not None:
+            raise ContractError(
+                f"the lens of {self.path.name} has one configuration; leave "
+                f"{option_text('configuration')} out"
+            )
+        return self
+
+    @property
     def distortion(self) -> RadialDistortion:
         """The distortion of the optics.
 
@@ -167,6 +204,8 @@ class Bundle:
         focus_mm = (optics and optics.object_distance_mm) or math.inf
         if isinstance(optics, LensProfile):
             return focus_mm
+        if self.configuration:
+            focus_mm = self.frozen_optics.lens_state.object_distance_mm
         depths_mm = self.psf.depths_mm
         return float(min(max(focus_mm, depths_mm[0]), depths_mm[-1]))
 
@@ -307,6 +346,7 @@ def _optics_of(
     optics = optics_from_bytes(data, what=entry.member, channels=channels)
     if optics.member_name != entry.member:
         raise BundleError(f"{entry.member} holds optics of another type than the manifest states")
+    _check_states(optics, entry)
     _check_psf(optics.psf, entry, channels)
     if optics.psf.focus_um is not None:
         what = f"{entry.member} holds kernels of a moved sensor"
@@ -315,6 +355,18 @@ def _optics_of(
         what = f"{entry.member} holds even powers of distortion"
         _need_version(manifest, PROFILE_VERSION, what)
     return optics if not isinstance(entry, HazyPsfOptics) else _hazy(container, manifest, optics)
+
+
+def _check_states(optics: FrozenOptics, entry: Entry) -> None:
+    """Refuse other states, or another order, than the manifest states."""
+    names = tuple(state.name for state in optics.states)
+    listed_names = entry.configurations if isinstance(entry, StatesEntry) else ()
+    if names != listed_names:
+        ours, theirs = (", ".join(some) or "none" for some in (names, listed_names))
+        raise BundleError(
+            f"{PSF} holds the configurations {ours}, the manifest says {theirs}; export the bundle "
+            "again"
+        )
 
 
 def _hazy(container: Container, manifest: Manifest, optics: FrozenOptics) -> FrozenOptics:
@@ -406,7 +458,9 @@ def _checked_member(container: Container, name: str, member: Member) -> bytes:
 
 
 def _check_psf(
-    psf: FrozenPsf, entry: FrozenPsfOptics | HazyPsfOptics | StreakEntry, channels: int
+    psf: FrozenPsf,
+    entry: FrozenPsfOptics | HazyPsfOptics | StatesEntry | StreakEntry,
+    channels: int,
 ) -> None:
     """Check the PSF against the statements of the manifest."""
     if abs(psf.pixel_pitch_um - entry.pixel_pitch_um) > _PITCH_RTOL * entry.pixel_pitch_um:

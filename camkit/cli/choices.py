@@ -33,6 +33,13 @@ DepthM = Annotated[
         help="Object distance in m ('inf' for infinity), for bundles with several distances."
     ),
 ]
+FrozenState = Annotated[
+    str | None,
+    typer.Option(
+        "--configuration",
+        help="State of a zoom or focusing lens, by name or number; default: the bundle's first.",
+    ),
+]
 GlassFiles = Annotated[
     list[Path] | None,
     typer.Option(
@@ -54,6 +61,12 @@ Configuration = Annotated[
         help="State of a zoom or focusing lens, by name or number; default: the file's.",
     ),
 ]
+
+
+def several_states(text: str | None) -> str | tuple[str, ...] | None:
+    """Return the names of configurations in a text A,B; one word as it is."""
+    names = () if text is None else tuple(name.strip() for name in text.split(","))
+    return names if len(names) > 1 else text
 
 
 def whole_pair(text: str, option: str) -> tuple[int, int]:

@@ -62,6 +62,7 @@ def fabricated_optics(
     depth_mm = bundle.reference_depth_mm if depth_mm is None else depth_mm
     shape = bundle.psf.kernels.shape
     content = [text, bundle.manifest.sensor.model_dump_json(), repr((shape[:3], seed))]
+    content += [bundle.configuration] if bundle.configuration else []
     content.append(repr((_max_side_px(bundle.psf), ENERGY, [depth_mm])))
     if bundle.manifest.has_haze:
         content.append(repr(bundle.haze.cell_px))
@@ -103,6 +104,7 @@ def _trace(bundle: Bundle, text: str, seed: int, depth_mm: float) -> FrozenOptic
     from camkit.models_def.optics.analysis.psf_model import checked_regime
     from camkit.models_def.optics.frozen import FreezeGrid, dense_grid, freeze
     from camkit.models_def.optics.kernel_bank import focused_copies
+    from camkit.models_def.optics.lens_file.states import plain_lens
     from camkit.models_def.optics.lens_optics import LensOptics
     from camkit.models_def.optics.prescription import parse_prescription
     from camkit.models_def.optics.thin.hazy_freezing import (
@@ -113,7 +115,8 @@ def _trace(bundle: Bundle, text: str, seed: int, depth_mm: float) -> FrozenOptic
     )
 
     sensor = light_sensor(bundle.manifest)
-    _, copy = focused_copies(parse_prescription(text), 2, seed)
+    lens = plain_lens(parse_prescription(text), bundle.configuration or None)
+    _, copy = focused_copies(lens, 2, seed)
     psf = bundle.psf
     if bundle.manifest.has_haze:
         fields, _, waves, side_px, _ = psf.kernels.shape
@@ -134,6 +137,6 @@ def _trace(bundle: Bundle, text: str, seed: int, depth_mm: float) -> FrozenOptic
         least_energy=LEAST_ENERGY,
     )
     # bundles of before waves do not say it
-    regime = checked_regime(str(bundle.manifest.freeze.get("psf_model", "rays"))) or "rays"
+    regime = checked_regime(str(bundle.freeze_fact("psf_model") or "rays")) or "rays"
     traced = freeze(LensOptics(lens=copy, regime=regime), sensor, dense_grid(frozen_grid))
     return FrozenOptics(psf=traced.psf)

@@ -8,6 +8,7 @@
 - `starts`: where a design begins: the best of many starts
 - `lens`: what a loop asks of its lens
 - `lens_module`: the lens as a torch module: free numbers, kernels over fields and depths
+- `states_module`: the lens with several configurations, each looked at like one more depth
 - `front`: what stands between sensor and network
 - `sensor`: sharp patches blurred and recorded
 - `loss`: eq. (6.15) and (6.16) of the thesis, and the loss of a recovered picture

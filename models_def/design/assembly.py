@@ -11,6 +11,7 @@ from camkit.cfa import CFA_PATTERNS
 from camkit.errors import ContractError
 from camkit.models_def.design.descent import Descending, descended
 from camkit.models_def.design.design_recipe import DesignRecipe, OpticsRecipe
+from camkit.models_def.design.lens import DesignLens
 from camkit.models_def.design.lens_module import (
     WIDEST_PX,
     LensModule,
@@ -22,13 +23,17 @@ from camkit.models_def.design.loop import DesignLoop, DesignParts
 from camkit.models_def.design.sensor import Recorder
 from camkit.models_def.design.shipped_camera import Camera
 from camkit.models_def.design.starts import Starts, best_judged, found_starts
+from camkit.models_def.design.states_module import StatesModule
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.networks.catalog import build_network, check_patch
 from camkit.models_def.optics.analysis.psf_model import checked_regime
 from camkit.models_def.optics.lens_file.lens_file import find_lens
-from camkit.models_def.optics.paraxial import paraxial_image
+from camkit.models_def.optics.lens_file.states import plain_lens
+from camkit.models_def.optics.optics_file import ALL, state_names
+from camkit.models_def.optics.paraxial import paraxial_data, paraxial_image
 from camkit.models_def.optics.prescription import Lens, with_focus_shift
 from camkit.models_def.optics.pupil import half_disc
+from camkit.models_def.optics.search.joint_states import JointProblem, JointVariable, joint_of
 from camkit.models_def.optics.search.problem import Problem
 from camkit.models_def.optics.search.splat import Pixels
 from camkit.models_def.optics.search.variables import FreeLens
@@ -58,9 +63,32 @@ def problem_of(recipe: DesignRecipe, lens: Lens) -> Problem:
         efl_mm=optics.efl_mm or None,
         rides=optics.rides,
     )
+    return _problem_at(recipe, free, field_slopes(optics))
+
+
+def joint_problem_of(recipe: DesignRecipe, lens: Lens) -> JointProblem:
+    """Return the problem of a recipe with several configurations of a lens.
+
+    Raises:
+        ContractError: If the lens lacks one of them, or a variable is of none.
+    """
+    choice = recipe.optics.configurations
+    names = state_names(lens, ALL if choice == (ALL,) else choice)
+    slopes = field_slopes(recipe.optics)
+    first_mm = paraxial_data(plain_lens(lens, names[0])).efl_mm
+
+    def problem_at(free: FreeLens) -> Problem:
+        return _problem_at(recipe, free, slopes * (first_mm / paraxial_data(free.lens).efl_mm))
+
+    shared = [JointVariable(variable=v) for v in recipe.variables]
+    return joint_of(lens, names, [*shared, *recipe.state_variables], problem_at)
+
+
+def _problem_at(recipe: DesignRecipe, free: FreeLens, slopes: Tensor) -> Problem:
+    optics = recipe.optics
     return Problem(
         free=free,
-        slopes=field_slopes(optics),
+        slopes=slopes,
         wavelengths_um=torch.tensor(recipe.pixels.wavelengths_um, dtype=torch.float64),
         object_distances_mm=optics.object_distances_mm,
         samples=half_disc(optics.pupil_rays),
@@ -85,8 +113,13 @@ def field_slopes(optics: OpticsRecipe) -> Tensor:
     return slopes
 
 
-def pixels_of(recipe: DesignRecipe, problem: Problem, begin: Tensor) -> Pixels:
-    """Return the pixels and colours of a recipe, with a window that fits the lens at `begin`."""
+def pixels_of(recipe: DesignRecipe, *views: tuple[Problem, Tensor]) -> Pixels:
+    """Return the pixels and colours of a recipe, with a window that fits a lens.
+
+    Args:
+        recipe: The design.
+        views: The lens at the start in each of its states: the problem, and (variable,).
+    """
     weights = torch.tensor(recipe.pixels.color_weights, dtype=torch.float64)
     pixels = Pixels(
         pitch_um=recipe.pixels.pitch_um,
@@ -96,12 +129,17 @@ def pixels_of(recipe: DesignRecipe, problem: Problem, begin: Tensor) -> Pixels:
     )
     regime = checked_regime(recipe.optics.psf_model, "optics.psf_model")
     if regime is None:
-        models = design_models(problem, begin, pixels.color_weights)
+        models = [
+            model
+            for problem, begin in views
+            for model in design_models(problem, begin, pixels.color_weights)
+        ]
         regime = "waves" if any(model.regime == "waves" for model in models) else "rays"
     pixels = replace(pixels, regime=regime)
     if recipe.pixels.kernel_px:
         return pixels
-    return replace(pixels, kernel_px=fitting_window_px(problem, begin, pixels))
+    windows = [fitting_window_px(problem, begin, pixels) for problem, begin in views]
+    return replace(pixels, kernel_px=max(windows))
 
 
 def recorder_of(recipe: DesignRecipe) -> Recorder:
@@ -173,17 +211,9 @@ def parts_of(
         start: Name of the built-in lens that an earlier search of the library chose: the design
             begins at it, without a search. Empty for the lens of the recipe.
     """
-    problem = problem_of(recipe, find_lens(recipe.prescription, folder))
-    plan = recipe.starts if recipe.schedule.lens_rate else Starts()
-    shipped = [library_start(problem, start)] if start else []
-    starts = shipped or found_starts(problem, plan)
-    pixels = pixels_of(recipe, starts[0].problem, starts[0].scaled)
     source, camera = source or source_of(recipe, pictures), camera_of(recipe, folder)
 
-    def module(start: Start, scaled: Tensor, *, whiten: bool) -> LensModule:
-        return LensModule(start.problem, pixels, scaled, whiten=whiten, units=recipe.optics.units)
-
-    def parts_at(lens: LensModule, network: nn.Module | None) -> DesignParts:
+    def parts_at(lens: DesignLens, network: nn.Module | None) -> DesignParts:
         return DesignParts(
             lens=lens,
             network=network,
@@ -194,6 +224,18 @@ def parts_of(
             source=source,
             camera=camera,
         )
+
+    if recipe.optics.configurations:
+        states = find_lens(recipe.prescription, folder, with_states=True)
+        return parts_at(_states_module(recipe, states), network_of(recipe))
+    problem = problem_of(recipe, find_lens(recipe.prescription, folder))
+    plan = recipe.starts if recipe.schedule.lens_rate else Starts()
+    shipped = [library_start(problem, start)] if start else []
+    starts = shipped or found_starts(problem, plan)
+    pixels = pixels_of(recipe, (starts[0].problem, starts[0].scaled))
+
+    def module(start: Start, scaled: Tensor, *, whiten: bool) -> LensModule:
+        return LensModule(start.problem, pixels, scaled, whiten=whiten, units=recipe.optics.units)
 
     def judge(start: Start) -> float:
         parts = parts_at(module(start, start.scaled, whiten=False), None)
@@ -214,6 +256,15 @@ def parts_of(
         begin = descended(begin, descending)
     lens = module(best, begin, whiten=recipe.optics.whiten)
     return replace(parts_at(lens, network_of(recipe)), start=best.name)
+
+
+def _states_module(recipe: DesignRecipe, lens: Lens) -> StatesModule:
+    """Return the lens of a recipe with several configurations, as it begins."""
+    joint = joint_problem_of(recipe, lens)
+    begin = joint.scaled()
+    pixels = pixels_of(recipe, *((term.problem, begin[term.places]) for term in joint.terms))
+    optics = recipe.optics
+    return StatesModule(joint, pixels, begin, whiten=optics.whiten, units=optics.units)
 
 
 def source_of(recipe: DesignRecipe, pictures: Path | None) -> SceneSource:

@@ -16,6 +16,7 @@ from camkit.models_def.design.shipped_camera import CameraChoice
 from camkit.models_def.design.starts import Starts
 from camkit.models_def.networks.catalog import NETWORK_NAMES
 from camkit.models_def.optics.analysis.psf_model import checked_regime
+from camkit.models_def.optics.search.joint_states import JointVariable
 from camkit.models_def.optics.search.limits import Limits
 from camkit.models_def.optics.search.variables import Variable
 from camkit.models_def.optics.tolerance.uniform_errors import FabricationErrors
@@ -51,6 +52,8 @@ class OpticsRecipe:
         units: Without whitening a move of 1 is the whole `range` of a number or 1 in its `own`
             unit (1/mm, mm, 1 for a conic), which is what the rates of the thesis are in.
         f_number: Of the lens; 0 for that of the prescription.
+        configurations: Names of the states of the lens that count, or "all"; empty for one state.
+            Fields are then those of the first, and the same image heights of the others.
         psf_model: "rays", "waves", or empty for waves where the lens at the start is that sharp;
             see `camkit.models_def.optics.analysis.psf_model`.
     """
@@ -67,6 +70,7 @@ class OpticsRecipe:
     whiten: bool = True
     units: MoveUnits = "range"
     f_number: float = 0.0
+    configurations: tuple[str, ...] = ()
     psf_model: str = ""
 
     def __post_init__(self) -> None:
@@ -84,6 +88,12 @@ class OpticsRecipe:
                 f"{list(self.object_distances_mm)} (or 0); got {self.focus_distance_mm}"
             )
         checked_regime(self.psf_model, "optics.psf_model")
+        alone = ("rides", "efl_mm", "object_distances_mm", "f_number")
+        if self.configurations and any(names := [n for n in alone if getattr(self, n)]):
+            raise ContractError(
+                f"optics.configurations takes focal lengths, distances and apertures of the lens, "
+                f"and a sensor at rest: leave {', '.join(names)} out, with rides = false"
+            )
         if self.whiten and self.units != "range":
             raise ContractError("whitened moves have no units: set whiten = false or leave units")
 
@@ -152,6 +162,7 @@ class DesignRecipe:
         name: Of the camera.
         prescription: Name of a built-in prescription or path of a lens file.
         variables: What of the lens is free.
+        state_variables: Gaps that are free in one configuration each.
         starts: How many lenses near it are tried first.
         fabrication: Errors of the copies that captures are made with; None for the lens itself.
         camera: Whose bank stands in front, where `front` restores colours together.
@@ -173,6 +184,7 @@ class DesignRecipe:
     fabrication: FabricationErrors | None = None
     camera: CameraChoice | None = None
     descent: Descent | None = None
+    state_variables: tuple[JointVariable, ...] = ()
 
 
 def read_design(path: Path) -> DesignRecipe:
@@ -195,11 +207,13 @@ def to_design(table: Mapping[str, Any]) -> DesignRecipe:
     free = table["vary"]
     if not isinstance(free, list):
         raise ContractError("what varies must be written as [[vary]] tables")
+    variables = [_variable(f"vary[{i}]", one) for i, one in enumerate(free)]
     network = {"config": {}, **dict(table.get("network", {}))}
     recipe = DesignRecipe(
         name=typed("name", table["name"], str),
         prescription=typed("prescription", table["prescription"], str),
-        variables=tuple(section(f"vary[{i}]", Variable, v) for i, v in enumerate(free)),
+        variables=tuple(v.variable for v in variables if not v.state),
+        state_variables=tuple(v for v in variables if v.state),
         optics=section("optics", OpticsRecipe, table["optics"]),
         limits=section("limits", Limits, table.get("limits", {})),
         pixels=section("pixels", PixelRecipe, table["pixels"]),
@@ -217,11 +231,33 @@ def to_design(table: Mapping[str, Any]) -> DesignRecipe:
         raise ContractError("the front 'together' and a table [camera] belong together")
     if recipe.descent is not None and (recipe.camera is None or recipe.fabrication is None):
         raise ContractError("a table [descent] needs [camera] and [fabrication]")
+    _check_states(recipe)
     if recipe.starts.judged and not recipe.pixels.kernel_px:
         raise ContractError("judged starts need one window for all: set pixels.kernel_px")
     if recipe.starts.judged and recipe.loss.needs_network and recipe.front.kind == "none":
         raise ContractError("judged starts need a front that recovers: set front.kind")
     return recipe
+
+
+def _variable(where: str, table: Any) -> JointVariable:
+    """Read a free number, and the configuration that it is of, if any."""
+    if not isinstance(table, Mapping) or "configuration" not in table:
+        return JointVariable(variable=section(where, Variable, table))
+    state = typed(f"{where}.configuration", table["configuration"], str)
+    rest = {key: value for key, value in table.items() if key != "configuration"}
+    return JointVariable(variable=section(where, Variable, rest), state=state)
+
+
+def _check_states(recipe: DesignRecipe) -> None:
+    """Refuse what does not go with several configurations, or without."""
+    if not recipe.optics.configurations:
+        if recipe.state_variables:
+            raise ContractError("vary.configuration needs optics.configurations")
+        return
+    if recipe.starts.searches or recipe.starts.library or recipe.descent is not None:
+        raise ContractError("several configurations begin at the lens: leave starts, descent out")
+    if not recipe.front.depth_known:
+        raise ContractError("several configurations are known to the filter: set depth_known")
 
 
 def _optional(name: str, kind: type[T], table: Mapping[str, Any]) -> T | None:
@@ -268,6 +304,10 @@ def recipe_digest(recipe: DesignRecipe) -> str:
     table = {name: value for name, value in asdict(recipe).items() if value is not None}
     if not recipe.optics.psf_model:  # likewise from before there were waves
         del table["optics"]["psf_model"]
+    if recipe.limits.max_steepness == Limits().max_steepness:  # it could not be chosen
+        del table["limits"]["max_steepness"]
+    if not recipe.optics.configurations:  # nor configurations
+        del table["optics"]["configurations"], table["state_variables"]
     if not recipe.network.start:  # designs from before there were first weights can go on
         for key in ("start", "start_size"):
             del table["network"][key]

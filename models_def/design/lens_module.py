@@ -13,7 +13,8 @@ from camkit.models_def.optics.analysis.first_order import airy_radius_mm
 from camkit.models_def.optics.analysis.psf_model import WAVE_BELOW, PsfModel, psf_model
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.psf import with_object_distance
-from camkit.models_def.optics.search.least_squares import jacobian
+from camkit.models_def.optics.search.finish import finished
+from camkit.models_def.optics.search.least_squares import Residuals, jacobian
 from camkit.models_def.optics.search.problem import (
     Change,
     Problem,
@@ -57,6 +58,68 @@ class _Bounded(torch.autograd.Function):
         return torch.where(outward, 0.0, slope)
 
 
+def bounded(free: Tensor) -> Tensor:
+    """Return numbers within 0..1; those beyond still feel what leads back."""
+    inside: Tensor = _Bounded.apply(free)  # type: ignore[no-untyped-call]
+    return inside
+
+
+class LensKernels:
+    """The kernels of a lens with free numbers before a sensor."""
+
+    def __init__(self, problem: Problem, pixels: Pixels) -> None:
+        """Prepare what does not depend on the lens."""
+        self.problem, self.pixels = problem, pixels
+        self._wave_problem = wave_problem(problem)
+
+    def nominal(self, scaled: Tensor, sharp: Tensor) -> tuple[Tensor, Tensor]:
+        """Return kernels (depth, field, 3, k, k) and the penalty of the limits (a scalar).
+
+        Args:
+            scaled: (variable,); gradients flow.
+            sharp: (depth, field), which are summed from waves.
+        """
+        batch, problem = scaled[None], self.problem
+        kernels, penalty = [], torch.zeros((), dtype=scaled.dtype)
+        for depth, distance_mm in enumerate(problem.depths_mm):
+            traced = trace_batch(problem, batch, distance_mm)
+            kernels.append(self._at(traced, batch, distance_mm, sharp[depth]))
+            if distance_mm == problem.limited_mm:
+                penalty = limits_of(problem, traced, distance_mm).square().sum()
+        return torch.stack(kernels), penalty
+
+    def fabricated(self, scaled: Tensor, sharp: Tensor, copy: Copy) -> Tensor:
+        """Return the kernels of a copy, see `nominal`."""
+        batch, problem = scaled[None], self.problem
+        focused_mm = problem.free.lens.object_distance_mm
+
+        def change(tensors: SurfaceTensors, reference: SurfaceTensors) -> SurfaceTensors:
+            return made_with(tensors, copy, reference=reference, object_distance_mm=focused_mm)
+
+        kernels = []
+        for depth, distance_mm in enumerate(problem.depths_mm):
+            traced = trace_batch(problem, batch, distance_mm, change)
+            kernels.append(self._at(traced, batch, distance_mm, sharp[depth], change))
+        return torch.stack(kernels)
+
+    def _at(
+        self,
+        traced: Traced,
+        batch: Tensor,
+        distance_mm: float,
+        sharp: Tensor,
+        change: Change | None = None,
+    ) -> Tensor:
+        """Return the kernels (field, 3, k, k) by rays, those of sharp fields by waves if wanted."""
+        rays = splat_batch(traced.landings, self.pixels)[0]
+        if not bool(sharp.any()):
+            return rays
+        waves, summed = wave_batch(
+            self._wave_problem, batch, distance_mm, self.pixels, sharp, change
+        )
+        return torch.where(summed[:, None, None, None], waves, rays)
+
+
 class LensModule(DesignLens):
     """A lens with free numbers.
 
@@ -91,61 +154,33 @@ class LensModule(DesignLens):
             raise ContractError("a joint design needs at least one free number of the lens")
         self.problem, self.pixels = problem, pixels
         self.register_buffer("begin", begin.clone())
-        if whiten:
-            basis = whitening(problem, begin)
-        else:
-            span = problem.free.high - problem.free.low
-            inverse_span = torch.where(span > 0, 1 / span.clamp_min(1e-300), 0.0)
-            basis = torch.diag(torch.ones_like(begin) if units == "range" else inverse_span)
+        span = problem.free.high - problem.free.low
+        basis = whitening(problem, begin) if whiten else unit_basis(span, units)
         self.register_buffer("basis", basis)
         self.moves = nn.Parameter(torch.zeros_like(begin))
         # in checkpoints: a run that is resumed goes on with the fields that it began with
         self.register_buffer("sharp", sharp_fields(problem, begin, pixels))
-        self._wave_problem = wave_problem(problem)
+        self._kernels = LensKernels(problem, pixels)
 
     def scaled(self) -> Tensor:
         """Return the present lens (variable,), within its bounds."""
-        bounded: Tensor = _Bounded.apply(self.begin + self.basis @ self.moves)  # type: ignore[no-untyped-call]
-        return bounded
+        return bounded(self.begin + self.basis @ self.moves)
 
     def forward(self) -> tuple[Tensor, Tensor]:
         """Return kernels (depth, field, 3, k, k) and the penalty of the limits (a scalar)."""
-        scaled = self.scaled()[None]
-        problem = self.problem
-        kernels, penalty = [], torch.zeros((), dtype=scaled.dtype)
-        for distance_mm in problem.depths_mm:
-            traced = trace_batch(problem, scaled, distance_mm)
-            kernels.append(self._kernels(traced, scaled, distance_mm))
-            if distance_mm == problem.limited_mm:
-                penalty = limits_of(problem, traced, distance_mm).square().sum()
-        return torch.stack(kernels), penalty
+        return self._kernels.nominal(self.scaled(), self.sharp)
 
     def made_kernels(self, copy: Copy) -> Tensor:
         """Return the kernels (depth, field, 3, k, k) of a copy of the present lens."""
-        scaled, problem = self.scaled()[None], self.problem
-        focused_mm = problem.free.lens.object_distance_mm
+        return self._kernels.fabricated(self.scaled(), self.sharp, copy)
 
-        def change(tensors: SurfaceTensors, reference: SurfaceTensors) -> SurfaceTensors:
-            return made_with(tensors, copy, reference=reference, object_distance_mm=focused_mm)
+    def views(self) -> list[tuple[Problem, Tensor]]:
+        """Return the one problem and its variables."""
+        return [(self.problem, self.scaled())]
 
-        kernels = []
-        for distance_mm in problem.depths_mm:
-            traced = trace_batch(problem, scaled, distance_mm, change)
-            kernels.append(self._kernels(traced, scaled, distance_mm, change))
-        return torch.stack(kernels)
-
-    def _kernels(
-        self, traced: Traced, scaled: Tensor, distance_mm: float, change: Change | None = None
-    ) -> Tensor:
-        """Return the kernels (field, 3, k, k) by rays, those of sharp fields by waves if wanted."""
-        rays = splat_batch(traced.landings, self.pixels)[0]
-        sharp = self.sharp[self.problem.depths_mm.index(distance_mm)]
-        if not bool(sharp.any()):
-            return rays
-        waves, summed = wave_batch(
-            self._wave_problem, scaled, distance_mm, self.pixels, sharp, change
-        )
-        return torch.where(summed[:, None, None, None], waves, rays)
+    def finished(self) -> Lens:
+        """Return the present lens with rims that pass its light."""
+        return finished(self.problem, self.scaled().detach())
 
     def lens(self) -> Lens:
         """Return the present lens as a prescription."""
@@ -213,6 +248,12 @@ def fitting_window_px(problem: Problem, scaled: Tensor, pixels: Pixels) -> int:
     return min(max(least, _LEAST_PX), WIDEST_PX)
 
 
+def unit_basis(span: Tensor, units: MoveUnits) -> Tensor:
+    """Return the basis (variable, variable) of moves in ranges, or in units of their own."""
+    inverse_span = torch.where(span > 0, 1 / span.clamp_min(1e-300), 0.0)
+    return torch.diag(torch.ones_like(span) if units == "range" else inverse_span)
+
+
 def whitening(problem: Problem, scaled: Tensor) -> Tensor:
     """Return the basis (variable, variable) in which all moves change the spots alike.
 
@@ -221,9 +262,14 @@ def whitening(problem: Problem, scaled: Tensor) -> Tensor:
     of its own: mixed with others, it would be cut off where they move on without it.
     """
     rms = replace(problem, merit="rms")
+    return whitened(lambda variables: residuals(rms, variables), scaled, problem.core_mm)
+
+
+def whitened(rms: Residuals, scaled: Tensor, core_mm: float) -> Tensor:
+    """Return the basis of `whitening` by RMS residuals."""
     with torch.no_grad():
-        _, slope = jacobian(lambda variables: residuals(rms, variables), scaled[None])
-    normal = slope[0].T @ slope[0] / problem.core_mm**2
+        _, slope = jacobian(rms, scaled[None])
+    normal = slope[0].T @ slope[0] / core_mm**2
     inside = ((scaled > _AT_BOUND) & (scaled < 1 - _AT_BOUND)).to(normal.dtype)
     at_bound = 1 - torch.outer(inside, inside)
     normal = torch.where((at_bound > 0) & ~torch.eye(len(scaled), dtype=torch.bool), 0.0, normal)

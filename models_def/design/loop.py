@@ -301,8 +301,9 @@ class DesignLoop:
         inner = schedule.patch_px + 2 * parts.front.margin_px
         side = inner + kernel_px - 1
         crops = np.stack([parts.source.draw_crop(rng, side) for _ in range(count)])
-        depths = len(parts.lens.problem.object_distances_mm) or 1
-        normal = rng.standard_normal((depths, count, 3, inner, inner), dtype=np.float32)
+        normal = rng.standard_normal(
+            (parts.lens.depth_count, count, 3, inner, inner), dtype=np.float32
+        )
         numbers = rng.permutation(np.arange(count) + rng.integers(fields)) % fields
         iso = rng.random(count if parts.camera is not None else 0)
         return Batch(

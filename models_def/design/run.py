@@ -12,12 +12,13 @@ from torch import Tensor, nn
 
 from camkit.models_def.design.assembly import parts_of
 from camkit.models_def.design.design_recipe import DesignRecipe, recipe_digest
+from camkit.models_def.design.lens import DesignLens
 from camkit.models_def.design.loop import DesignLoop, DesignParts, Progress
 from camkit.models_def.design.run_files import RunFiles, RunOptions
 from camkit.models_def.design.starts import Starts
 from camkit.models_def.optics.lens_file.lens_file import write_lens
+from camkit.models_def.optics.lens_file.states import plain_lens
 from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.search.finish import finished
 from camkit.models_def.optics.search.problem import valid_share
 from camkit.models_def.training.log import read_log
 
@@ -121,7 +122,7 @@ class DesignRun:
             "valid_db": moment.valid_db,
             "best_db": moment.best_db,
             "lost_light": moment.lost_light,
-            "valid_rays": float(valid_share(lens.problem, lens.scaled().detach()[None])),
+            "valid_rays": _valid_rays(lens),
         }
         state = {"lens": lens.state_dict(), "start": self.loop.parts.start, **self.loop.state()}
         self.files.record(recipe_digest(self.recipe), state, entry)
@@ -130,7 +131,7 @@ class DesignRun:
         """Restore the best lens, write it, and return a report on the run."""
         self.loop.take_best()
         lens = self.loop.parts.lens
-        best_lens = finished(lens.problem, lens.scaled().detach())
+        best_lens = lens.finished()
         note = f"camkit design, recipe {self.recipe.name}, from {best_lens.name}"
         write_lens(replace(best_lens, name=self.recipe.name, note=note), self.lens_file)
         return {
@@ -150,7 +151,14 @@ class DesignRun:
     def view(self) -> DesignView:
         """Return the present lens, its kernels and a few fixed patches behind it."""
         kernels, patches = self.loop.look()
-        return DesignView(lens=self.loop.parts.lens.lens(), kernels=kernels, patches=patches)
+        lens = plain_lens(self.loop.parts.lens.lens())
+        return DesignView(lens=lens, kernels=kernels, patches=patches)
+
+
+def _valid_rays(lens: DesignLens) -> float:
+    """Return the share of rays that reach the sensor, over fields, colours, depths and states."""
+    shares = [valid_share(problem, scaled.detach()[None]) for problem, scaled in lens.views()]
+    return float(torch.stack(shares).mean())
 
 
 def _join_workers() -> None:

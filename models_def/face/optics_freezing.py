@@ -11,7 +11,7 @@ import numpy as np
 from camkit.bundle.frozen_optics import write_optics_files
 from camkit.bundle.sensor import ColorSensor
 from camkit.bundle.stages import Wiener
-from camkit.caller import command_text, option_text
+from camkit.caller import command_text, option_list, option_text
 from camkit.errors import ContractError, UnsupportedError
 from camkit.field_types import checked
 from camkit.models_def.face.torch_need import require_torch
@@ -44,6 +44,7 @@ def freeze(
     glass: Sequence[FilePath] = (),
     catalogue: str | None = None,
     configuration: str | int | None = None,
+    configurations: str | Sequence[str | int] | None = None,
     psf_model: str | None = None,
     overwrite: bool = False,
 ) -> dict[str, Any]:
@@ -70,6 +71,8 @@ def freeze(
         glass: Catalogues (.agf), and `names` or `numbers`; see `read_noted_lens`.
         catalogue: Catalogues of camkit that are asked first, such as schott,hikari.
         configuration: State of a zoom or focusing lens, by name or number; None for the usual one.
+        configurations: Several states in one file, "all" or names; the first is the one that is
+            taken where none is named. None for one state.
         psf_model: Of a lens: "rays" or "waves"; None for what the recipe says, or else for waves
             where the blur is small against the Airy disc.
         overwrite: Whether files that exist are replaced.
@@ -85,8 +88,9 @@ def freeze(
     haze_path, stress_path, stress_haze_path, report_path = map(optional_path, extra)
     refuse_existing(map(optional_path, (out, *extra)), overwrite=overwrite)
     require_torch(command_text("freeze"))
+    from camkit.models_def.face.state_freezing import freeze_states
     from camkit.models_def.optics.freezer import FreezeRequest, freeze_optics
-    from camkit.models_def.optics.optics_file import read_optics
+    from camkit.models_def.optics.optics_file import read_optics, read_states
     from camkit.models_def.torch_threads import one_torch_thread
 
     if (stress_haze is None) != (haze is None or stress_out is None):
@@ -95,22 +99,32 @@ def freeze(
             f"{option_text('stress_haze')} go together; else omit {option_text('stress_haze')}"
         )
     sensor, bank, recipe_model = _camera_of(default_recipe() if recipe is None else Path(recipe))
-    source = read_optics(Path(optics), tuple(map(str, glass)), catalogue, configuration)
-    request = FreezeRequest(
-        sensor=sensor,
-        bank=bank,
-        depths_mm=tuple(depths_mm),
-        limit_db=limit_db,
-        energy=energy,
-        max_side_px=max_side_px,
-        focus_um=focus_range_um(source, focus_um),
-        haze=haze is not None,
-        stress=stress_out is not None,
-        quick=quick,
-        psf_model=recipe_model if psf_model is None else psf_model,
-    )
+
+    def request_of(source: "Optics") -> FreezeRequest:
+        return FreezeRequest(
+            sensor=sensor,
+            bank=bank,
+            depths_mm=tuple(depths_mm),
+            limit_db=limit_db,
+            energy=energy,
+            max_side_px=max_side_px,
+            focus_um=focus_range_um(source, focus_um),
+            haze=haze is not None,
+            stress=stress_out is not None,
+            quick=quick,
+            psf_model=recipe_model if psf_model is None else psf_model,
+        )
+
+    file, glasses = Path(optics), tuple(map(str, glass))
     with one_torch_thread():
-        freezing = freeze_optics(source, request)
+        if configurations is None:
+            source = read_optics(file, glasses, catalogue, configuration)
+            freezing = freeze_optics(source, request_of(source))
+        else:
+            alone = {"configuration": configuration, "haze": haze, "stress_out": stress_out}
+            _refuse_beside_states([name for name, value in alone.items() if value is not None])
+            states = read_states(file, glasses, catalogue, configurations)
+            freezing = freeze_states(states, request_of)
     write_optics_files(freezing.optics, Path(out), haze_path)
     if stress_path is not None and freezing.stress is not None:
         write_optics_files(freezing.stress, stress_path, stress_haze_path)
@@ -118,6 +132,15 @@ def freeze(
         report_path.parent.mkdir(parents=True, exist_ok=True)
         report_path.write_text(json.dumps(freezing.facts, indent=2) + "\n", encoding="utf-8")
     return dict(freezing.facts)
+
+
+def _refuse_beside_states(names: list[str]) -> None:
+    """Refuse what one configuration alone is frozen with."""
+    if names:
+        raise ContractError(
+            f"{option_list(names)} does not apply with {option_text('configurations')}: freeze "
+            f"one by {option_text('configuration')}"
+        )
 
 
 def focus_range_um(optics: "Optics", focus_um: float | str | None) -> float:

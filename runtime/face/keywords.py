@@ -43,6 +43,7 @@ class LoadKeywords(KindKeywords, total=False):
     max_seconds: float | None
     max_error_db: float | None
     depth_m: float | None
+    configuration: str | int | None
     method: str | None
     mode: Mode
     demosaic: DemosaicMethod | None

@@ -78,6 +78,7 @@ def simulate(
     bits: int | None = None,
     plate: bool = True,
     depth_m: float | None = None,
+    configuration: str | int | None = None,
     unit: Unit | FilePath | None = None,
     size_px: tuple[int, int] | None = None,
     truth: FilePath | None = None,
@@ -102,6 +103,7 @@ def simulate(
         bits: Bits of the AD converter, 8 to 16; None for the levels of the sensor.
         plate: False for the bare lens of a camera that has a plate.
         depth_m: Object distance; None for the focus.
+        configuration: State of a zoom or focusing lens, by name or number; None for the first.
         unit: Camera body whose focus is simulated, or its TOML.
         size_px: (width, height) of the scene, cut from a picture; None for the sensor or the
             whole picture.
@@ -119,7 +121,7 @@ def simulate(
         )
     file, truth_file = optional_path(out), optional_path(truth)
     refuse_existing([file, truth_file], overwrite=overwrite)
-    opened = open_bundle(find_bundle(str(bundle)))
+    opened = open_bundle(find_bundle(str(bundle))).with_configuration(configuration)
     part, sensor = part_of(opened.manifest), opened.manifest.sensor
     _check_suffix(file, part)
     if part.simulation is not None:

@@ -23,8 +23,10 @@ GENERAL: Final = frozenset({"max_mem_bytes", "threads", "method"})
 ON_A_SENSOR: Final = frozenset({"assume", "origin_px"})
 """What means something wherever the size of the sensor is known."""
 WITH_A_BUNDLE: Final = frozenset({"force_bundle"})
+WITH_STATES: Final = frozenset({"configuration"})
+"""What means something where the lens has several configurations."""
 ALWAYS: Final = frozenset({"unit", "tone", "halves"})
-OF_CAPTURE: Final = ON_A_SENSOR | WITH_A_BUNDLE | ALWAYS
+OF_CAPTURE: Final = ON_A_SENSOR | WITH_A_BUNDLE | WITH_STATES | ALWAYS
 """What may be said of how a photograph was taken."""
 
 
@@ -97,7 +99,7 @@ def _of_capture(bundle: Bundle | None) -> frozenset[str]:
         return ALWAYS
     if bundle.manifest.sensor.extent is None:
         return ALWAYS | WITH_A_BUNDLE
-    return OF_CAPTURE
+    return OF_CAPTURE if bundle.configurations else OF_CAPTURE - WITH_STATES
 
 
 def check_idle(bundle: Bundle | None, options: Options) -> None:

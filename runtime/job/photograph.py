@@ -10,6 +10,7 @@ from typing import Final
 from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import BayerSensor
 from camkit.bundle.stages import StageEntry
+from camkit.bundle.states.lens_state import usual_note
 from camkit.caller import option_text
 from camkit.cfa import CfaPattern, shifted_cfa
 from camkit.errors import ContractError
@@ -168,6 +169,10 @@ def _first_notes(job: Job) -> list[str]:
     manifest = bundle.manifest
     notes = notes_behind(capture, bundle.haze) if manifest.has_haze else list(capture.notes)
     notes += _camera_notes(capture, bundle, job.options)
+    if bundle.configuration:
+        job.log.record["configuration"] = bundle.configuration
+        if job.options.configuration is None:
+            notes.append(usual_note(bundle.configurations, bundle.configuration))
     inputs = manifest.sensor.inputs
     if capture.contract not in inputs:
         raise ContractError(

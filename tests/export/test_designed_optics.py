@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import torch
 
+from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.reader import PLATE, PLATE_HEIGHTS, PRESCRIPTION
 from camkit.errors import ContractError
 from camkit.export.designed_optics import (
@@ -82,7 +83,7 @@ def _checkpoint(designed: Mapping[str, bytes]) -> Checkpoint:
 
 
 def _members(parts: Parts, checkpoints: list[Checkpoint], psf: FrozenPsf) -> dict[str, bytes]:
-    return designed_members(parts, designed_of(checkpoints), psf)
+    return designed_members(parts, designed_of(checkpoints), FrozenOptics(psf=psf))
 
 
 @pytest.fixture(scope="module")

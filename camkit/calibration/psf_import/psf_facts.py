@@ -4,6 +4,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from camkit.bundle.states.lens_state import LensState
 from camkit.calibration.psf_import.kernel_stack import FloatGrid
 from camkit.psf import FrozenPsf, PsfUncertainty, depth_name
 from camkit.units import UM_PER_MM
@@ -65,6 +66,17 @@ def sigmas_px(psf: FrozenPsf) -> FloatGrid:
         places = np.arange(profile.shape[-1])
         variance += profile @ places**2 - (profile @ places) ** 2
     return np.sqrt(np.maximum(variance / 2, 0.0))
+
+
+def state_facts(state: LensState) -> dict[str, Any]:
+    """Return what a file of several states holds of one, plain JSON values."""
+    focus_mm = state.object_distance_mm
+    return {
+        "efl_mm": round(state.efl_mm, 4),
+        "f_number": round(state.f_number, 4),
+        "object_distance_mm": focus_mm if np.isfinite(focus_mm) else None,
+        **psf_facts(state.psf, None),
+    }
 
 
 def psf_facts(psf: FrozenPsf, uncertainty: PsfUncertainty | None) -> dict[str, Any]:

@@ -104,7 +104,9 @@ def design(
                 overwrite=overwrite,
             ),
         )
-    for variable, value in run.loop.parts.lens.problem.free.outside():
+    views = run.loop.parts.lens.views()
+    outside = [pair for problem, _ in views for pair in problem.free.outside()]
+    for variable, value in dict.fromkeys(outside):  # shared ones come with every configuration
         say(
             f"{variable.kind} of surface {variable.surface}: the given lens has {value:.6g}, "
             f"outside its bounds {variable.low:g} .. {variable.high:g}: it begins at the bound",

@@ -9,7 +9,15 @@ from typing import Annotated, Final
 
 import typer
 
-from camkit.cli.choices import Configuration, Debug, GlassCatalogues, GlassFiles, Json, Overwrite
+from camkit.cli.choices import (
+    Configuration,
+    Debug,
+    GlassCatalogues,
+    GlassFiles,
+    Json,
+    Overwrite,
+    several_states,
+)
 from camkit.errors import ContractError
 
 LIMIT_DB: Final = 0.05
@@ -103,6 +111,13 @@ def freeze(
     glass: GlassFiles = None,
     catalogue: GlassCatalogues = None,
     configuration: Configuration = None,
+    configurations: Annotated[
+        str | None,
+        typer.Option(
+            help="States of a lens in one file: all, or NAME,NAME; the first is usual; default: "
+            "one."
+        ),
+    ] = None,
     psf_model: Annotated[
         str | None,
         typer.Option(
@@ -133,6 +148,7 @@ def freeze(
             "--glass": glass,
             "--catalogue": catalogue,
             "--configuration": configuration,
+            "--configurations": configurations,
             "--psf-model": psf_model,
             "--limit-db": None if limit_db == LIMIT_DB else limit_db,
             "--energy": energy,
@@ -170,6 +186,7 @@ def freeze(
         glass=tuple(glass or ()),
         catalogue=catalogue,
         configuration=configuration,
+        configurations=several_states(configurations),
         psf_model=psf_model,
         overwrite=overwrite,
     )

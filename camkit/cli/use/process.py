@@ -5,7 +5,15 @@ from typing import Annotated
 
 import typer
 
-from camkit.cli.choices import Debug, DepthM, MaxErrorDb, MaxSeconds, Quality, whole_pair
+from camkit.cli.choices import (
+    Debug,
+    DepthM,
+    FrozenState,
+    MaxErrorDb,
+    MaxSeconds,
+    Quality,
+    whole_pair,
+)
 from camkit.cli.exit_code import ExitCode
 from camkit.cli.say import say
 from camkit.cli.use.decoding_ahead import decoding_ahead
@@ -115,6 +123,7 @@ def process(
         typer.Option(help="ISO for the bundle's noise model; default: the file's."),
     ] = None,
     depth_m: DepthM = None,
+    configuration: FrozenState = None,
     method: Annotated[
         str | None,
         typer.Option(
@@ -220,6 +229,7 @@ def process(
         max_seconds=max_seconds,
         max_error_db=max_error_db,
         depth_m=depth_m,
+        configuration=configuration,
         method=method,
         mode=mode,  # type: ignore[arg-type]
         demosaic=demosaic,  # type: ignore[arg-type]

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from camkit.cli.choices import Debug, DepthM, Json, Overwrite, whole_pair
+from camkit.cli.choices import Debug, DepthM, FrozenState, Json, Overwrite, whole_pair
 from camkit.cli.say import say
 from camkit.units import MM_PER_M
 
@@ -62,6 +62,7 @@ def simulate(
         typer.Option("--no-plate", help="Simulate the bare lens of a camera that has a plate."),
     ] = False,
     depth_m: DepthM = None,
+    configuration: FrozenState = None,
     unit: Annotated[
         Path | None, typer.Option(help="Measured camera body (.toml) whose focus is simulated.")
     ] = None,
@@ -102,6 +103,7 @@ def simulate(
         bits=bits,
         plate=not no_plate,
         depth_m=depth_m,
+        configuration=configuration,
         unit=unit,
         size_px=None if size_px is None else whole_pair(size_px, "--size-px"),
         truth=truth,

@@ -237,6 +237,8 @@ def _manifest_name(name: str) -> str:
 
 def _efl_mm(bundle: Bundle) -> float | None:
     """Return the focal length of the lens that a bundle carries; None without one, or torch."""
+    if bundle.configuration:
+        return bundle.frozen_optics.lens_state.efl_mm
     if PRESCRIPTION not in bundle.names or util.find_spec("torch") is None:
         return None
     from camkit.models_def.optics.paraxial import paraxial_data

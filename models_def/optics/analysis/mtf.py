@@ -104,8 +104,8 @@ def mtf_of_psf(
     whole = psf.sum((-2, -1)) if energy is None else energy
     light = (psf / whole[..., None, None]).mean(1)
     side = math.sqrt(light.shape[-1] * light.shape[-2]) * pitch_um / UM_PER_MM
-    far = _far_rings(2 * math.pi * cycles_per_mm * side * _ROUND_WINDOW)
-    missing = (1 - light.sum((-2, -1))).clamp_min(0.0)[:, None] * far
+    outer = _far_rings(2 * math.pi * cycles_per_mm * side * _ROUND_WINDOW)
+    missing = (1 - light.sum((-2, -1))).clamp_min(0.0)[:, None] * outer
 
     def contrast(line: Tensor) -> Tensor:
         count = line.shape[-1]
@@ -126,5 +126,6 @@ def _far_rings(turn: Tensor) -> Tensor:
         turn: 2 pi f R.
     """
     whole = torch.from_numpy(scipy.special.itj0y0(turn.numpy())[0])
-    rest = 1 + torch.special.bessel_j1(turn) - whole
-    return torch.special.bessel_j0(turn) - turn * rest
+    bessel_0, bessel_1 = torch.special.bessel_j0(turn), torch.special.bessel_j1(turn)
+    rings: Tensor = bessel_0 - turn * (1 + bessel_1 - whole)
+    return rings

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from camkit.caller import option_text
+from camkit.bundle.states.lens_state import find_name
 from camkit.errors import ContractError
 
 BY_SURFACE: Final = ("thickness_mm", "semi_diameter_mm")
@@ -107,18 +107,10 @@ def find_configuration(
     Args:
         states: Of one lens, at least one.
         usual: Name of the state that is taken where none is named; empty for the first.
-        choice: Name, or number from 1; a name that is a number comes first. None for the usual.
+        choice: See `find_name`.
 
     Raises:
         ContractError: If there is no such state; the message names all.
     """
     by_name = {state.name: state for state in states}
-    by_number = {str(number): state for number, state in enumerate(states, start=1)}
-    key = str(choice) if choice is not None else usual or states[0].name
-    state = by_name.get(key, by_number.get(key))
-    if state is None:
-        raise ContractError(
-            f"{option_text('configuration')} is one of {', '.join(by_name)}, or a number "
-            f"1..{len(states)}; got {key!r}"
-        )
-    return state
+    return by_name[find_name(list(by_name), usual, choice)]

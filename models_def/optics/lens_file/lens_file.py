@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from camkit.bundle.states.lens_state import usual_note
 from camkit.caller import option_text
 from camkit.errors import CamkitError, ContractError, DecodeError, UnsupportedError
 from camkit.models_def.optics.glass.agf import read_agf
@@ -22,7 +23,6 @@ from camkit.models_def.optics.lens_file.optiland_writer import write_optiland
 from camkit.models_def.optics.lens_file.states import (
     configuration_name,
     plain_lens,
-    usual_note,
 )
 from camkit.models_def.optics.lens_file.zmx_glass import GLASS_RULES, GlassRule
 from camkit.models_def.optics.lens_file.zmx_reader import ZmxLens, read_zmx
@@ -175,26 +175,28 @@ def built_in_lenses() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in PRESCRIPTIONS.glob("*.toml")))
 
 
-def find_lens(name: str, folder: Path | None = None) -> Lens:
+def find_lens(name: str, folder: Path | None = None, *, with_states: bool = False) -> Lens:
     """Return the lens that a recipe names: a built-in one, or that of a file.
 
     Args:
         name: Name of a built-in lens, or path (.toml, .zmx or .json) relative to
             `folder`.
         folder: Of the recipe; None for the working directory.
+        with_states: Whether it comes with all its configurations, and not in the usual one.
 
     Raises:
         ContractError: If there is neither, or the lens is wrong.
     """
     if name in built_in_lenses():
-        return read_lens(PRESCRIPTIONS / f"{name}.toml")
-    path = (folder or Path()) / name
+        path = PRESCRIPTIONS / f"{name}.toml"
+    else:
+        path = (folder or Path()) / name
     if not path.is_file():
         names = ", ".join(built_in_lenses())
         raise ContractError(
             f"no lens {name!r}: give a path (.toml, .zmx, .json), or one of {names}"
         )
-    return read_lens(path)
+    return read_configured_lens(path)[0] if with_states else read_lens(path)
 
 
 def _built_in(path: Path) -> Path:

@@ -1,6 +1,6 @@
 """A lens with configurations, and the lens in one of them."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import cast
 
@@ -41,14 +41,6 @@ def plain_lens(lens: Lens, choice: str | int | None = None) -> Lens:
 def named_state(lens: Lens, state: str) -> Lens:
     """Return a lens that says the state that it is in, in its name too."""
     return replace(lens, name=f"{lens.name} (configuration {state})", state=state)
-
-
-def usual_note(names: Sequence[str], usual: str) -> str:
-    """Return a note on the state that was taken without being named."""
-    return (
-        f"{len(names)} configurations ({', '.join(names)}): {usual} is taken; choose by "
-        f"{option_text('configuration')}"
-    )
 
 
 def configuration_name(lens: Lens, choice: str | int | None = None) -> str:

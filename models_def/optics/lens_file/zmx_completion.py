@@ -11,7 +11,9 @@ from typing import Final
 from camkit.models_def.optics.glass.dispersion import C_LINE_UM, D_LINE_UM, F_LINE_UM
 from camkit.models_def.optics.lens_file.zmx_records import Record, Records, ZmxRecords, last
 
-APERTURES: Final = ("ENPD", "FNUM", "FLOA", "OBNA")
+SIZED_APERTURES: Final = ("ENPD", "FNUM", "OBNA")
+"""Those whose size stands in their line; FLOA takes that of the stop."""
+APERTURES: Final = (*SIZED_APERTURES, "FLOA")
 WAVELENGTHS: Final = ("WAVM", "WAVE", "WAVL")
 _ASSUMED_LINE: Final = 0
 _SYSTEM: Final = (*APERTURES, *WAVELENGTHS, "FTYP")

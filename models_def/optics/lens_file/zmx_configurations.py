@@ -10,12 +10,12 @@ from typing import Final
 
 from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError, UnsupportedError
+from camkit.models_def.optics.lens_file.zmx_completion import SIZED_APERTURES
 from camkit.models_def.optics.lens_file.zmx_records import Record, Records, ZmxRecords, last
 
 MAX_STATES: Final = 100
 _SURFACE_KEYS: Final = {"THIC": "DISZ", "SDIA": "DIAM"}
 _FIELD_KEYS: Final = {"XFIE": ("XFLN", "XFLD"), "YFIE": ("YFLN", "YFLD")}
-_APERTURES: Final = ("ENPD", "FNUM", "OBNA")
 _ELSEWHERE: Final = "WAVE"
 """A line of old files too, where it stands before MNUM."""
 
@@ -100,7 +100,7 @@ def _without_operands(records: ZmxRecords, line: int) -> tuple[ZmxRecords, list[
 
 def _is_carried(records: ZmxRecords, record: Record) -> bool:
     if record.key == "APER":
-        return any(key in records.system for key in _APERTURES)
+        return any(key in records.system for key in SIZED_APERTURES)
     return record.key in _SURFACE_KEYS or record.key in _FIELD_KEYS
 
 
@@ -131,7 +131,7 @@ def _changed(records: ZmxRecords, record: Record) -> ZmxRecords:
         blocks[number] = _with_value(blocks[number], _SURFACE_KEYS[record.key], 0, record)
         return replace(records, surfaces=tuple(blocks))
     if record.key == "APER":
-        key = next(_present(records.system, _APERTURES))
+        key = next(_present(records.system, SIZED_APERTURES))
         return replace(records, system=_with_value(records.system, key, 0, record))
     kinds = _FIELD_KEYS[record.key]
     key = next(_present(records.system, kinds), kinds[0])

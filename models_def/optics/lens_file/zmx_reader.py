@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
+from camkit.bundle.states.lens_state import usual_note
 from camkit.errors import CamkitError, ContractError, DecodeError, UnsupportedError
 from camkit.models_def.optics.glass.catalogue import (
     AIR,
@@ -15,7 +16,7 @@ from camkit.models_def.optics.glass.catalogue import (
 )
 from camkit.models_def.optics.glass.encoding import read_text
 from camkit.models_def.optics.lens_file.placing import with_object_na
-from camkit.models_def.optics.lens_file.states import named_state, usual_note, with_states
+from camkit.models_def.optics.lens_file.states import named_state, with_states
 from camkit.models_def.optics.lens_file.zmx_collimator import without_collimator
 from camkit.models_def.optics.lens_file.zmx_completion import (
     APERTURES,

@@ -10,5 +10,6 @@
 - `finish`: a found lens made into a prescription
 - `splat`: PSFs of a batch in the colours of a sensor
 - `improvement`: a given lens made better
+- `joint_states`: several configurations of a lens as one problem
 - `own_frame`: its vignetting, and limits no stricter than it keeps
 """

@@ -7,10 +7,23 @@ import torch
 from torch import Tensor
 
 from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.search.joint_states import JointProblem
 from camkit.models_def.optics.search.problem import Problem, trace_batch
 
 _CLEARANCE_MM: Final = 0.5
 _RIM_RAYS: Final = 41
+
+
+def finished_states(joint: JointProblem, scaled: Tensor) -> Lens:
+    """Return a found lens with its configurations; its rims pass the light of all that count."""
+    lens = joint.lens_at(scaled)
+    ends = [finished(term.problem, scaled[term.places]).surfaces for term in joint.terms]
+    rims_mm = [max(s.semi_diameter_mm for s in of_states) for of_states in zip(*ends, strict=True)]
+    surfaces = tuple(
+        replace(surface, semi_diameter_mm=rim_mm)
+        for surface, rim_mm in zip(lens.surfaces, rims_mm, strict=True)
+    )
+    return replace(lens, surfaces=surfaces)
 
 
 def finished(problem: Problem, scaled: Tensor) -> Lens:

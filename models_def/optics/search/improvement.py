@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final, Literal, NoReturn
 
 import numpy as np
 import torch
@@ -60,18 +60,23 @@ def free_lens(lens: Lens, vary: Sequence[Sequence[Vary]]) -> FreeLens:
         ContractError: If nothing is free, or a name is unknown.
     """
     if len(vary) != len(lens.surfaces) or not any(vary):
-        raise ContractError(
-            "nothing of the lens is free: name numbers by `vary` of a surface, or "
-            f"{option_text('vary')} {','.join(VARY)}"
-        )
+        refuse_nothing_free()
     solved = _solved_surface(lens, vary)
     variables: list[Variable] = []
     for i, (surface, names) in enumerate(zip(lens.surfaces, vary, strict=True)):
         for name in names:
-            variables += _variables(lens, surface, i, name, solved=solved)
+            variables += surface_variables(lens, surface, i, name, solved=solved)
     variables.append(Variable(kind="defocus", low=-FOCUS_REACH_MM, high=FOCUS_REACH_MM))
     efl_mm = None if solved is None else paraxial_data(lens).efl_mm
     return FreeLens(lens=lens, variables=tuple(variables), solved=solved, efl_mm=efl_mm)
+
+
+def refuse_nothing_free() -> NoReturn:
+    """Refuse a search without variables."""
+    raise ContractError(
+        "nothing of the lens is free: name numbers by `vary` of a surface, or "
+        f"{option_text('vary')} {','.join(VARY)}"
+    )
 
 
 def refracting_surfaces(lens: Lens) -> tuple[int, ...]:
@@ -85,9 +90,18 @@ def _solved_surface(lens: Lens, vary: Sequence[Sequence[Vary]]) -> int | None:
     return free[-1] if free else None
 
 
-def _variables(
+def surface_variables(
     lens: Lens, surface: Surface, i: int, name: Vary, *, solved: int | None
 ) -> list[Variable]:
+    """Return the variables of a surface that a name of `vary` frees, with bounds.
+
+    Args:
+        lens: As it is.
+        surface: Of it.
+        i: Its number; the gap of the last one is none of them.
+        name: What is free.
+        solved: The surface whose curvature is solved for.
+    """
     if name == "curvature":
         if i == solved:
             return []
@@ -99,17 +113,22 @@ def _variables(
     if name == "thickness":
         if i == len(lens.surfaces) - 1:
             return []
-        least = _LEAST_AIR_MM if surface.glass == "air" else _LEAST_GLASS_MM
-        most = max(2 * surface.thickness_mm, surface.thickness_mm + 5)
-        return [
-            Variable(kind="thickness", surface=i, low=min(least, surface.thickness_mm), high=most)
-        ]
+        return [gap_variable(lens, i)]
     if name == "phase":
         radial = surface.phase.radial_rad if surface.phase else ()
         return _coefficient_variables(name, i, radial, _PHASE)
     if name == "q_asphere":
         return _coefficient_variables(name, i, surface.q_bfs or surface.q_con, _ASPHERE_SAG_MM)
     return [] if surface.asphere.q_kind else _asphere_variables(lens, surface, i, name)
+
+
+def gap_variable(lens: Lens, i: int) -> Variable:
+    """Return the gap behind a surface as a variable: up to twice, at least 5 mm more."""
+    surface = lens.surfaces[i]
+    gap_mm = surface.thickness_mm
+    least = _LEAST_AIR_MM if surface.glass == "air" else _LEAST_GLASS_MM
+    most = max(2 * gap_mm, gap_mm + 5)
+    return Variable(kind="thickness", surface=i, low=min(least, gap_mm), high=most)
 
 
 def _asphere_variables(

@@ -14,7 +14,6 @@ from camkit.models_def.optics.trace import Rays, SurfaceTensors
 
 _PENALTY_PER_MM: Final = 3.0
 _SOFT: Final = 1e-3
-_STEEPEST: Final = 0.8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,6 +26,7 @@ class Limits:
         min_air_mm: Least edge distance of two elements.
         min_bfl_mm: Least distance of the sensor from the last vertex.
         max_curvature_per_mm: Of the solved surface, which has no bounds of its own.
+        max_steepness: Of a surface: its curvature times the height of the beam on it.
     """
 
     distortion: float = math.inf
@@ -34,6 +34,7 @@ class Limits:
     min_air_mm: float = 0.1
     min_bfl_mm: float = 0.0
     max_curvature_per_mm: float = 0.08
+    max_steepness: float = 0.8
 
     def __post_init__(self) -> None:
         if not (self.distortion > 0 and self.max_curvature_per_mm > 0):
@@ -65,9 +66,7 @@ def limit_residuals(
     least = [edge if real[i] and real[i + 1] else -math.inf for i, edge in enumerate(least)]
     edges = edge_gaps(tensors, rho)[..., 0, 0, 0]
     thin = torch.relu(torch.tensor(least, dtype=gaps.dtype)[:, None] - edges)
-    # the root behind a floor: its slope is finite though all living rays may lie on the axis
-    reach = torch.stack(rho)[..., 0, 0, 0].clamp_min(1e-12).sqrt()
-    steep = torch.relu(torch.abs(curvature * reach) - _STEEPEST)
+    steep = torch.relu(steepness(curvature, rho) - limits.max_steepness)
     short = torch.relu(limits.min_bfl_mm - gaps[-1])[None]
     rows = [thin, steep, short]
     if solved is not None:
@@ -75,6 +74,18 @@ def limit_residuals(
             torch.relu(torch.abs(curvature[solved]) - limits.max_curvature_per_mm)[None] * 10
         )
     return torch.cat([row.T for row in rows], dim=1) * _PENALTY_PER_MM
+
+
+def steepness(curvature: Tensor, rho: list[Tensor]) -> Tensor:
+    """Return |curvature| times the height of the beam (surface, start).
+
+    Args:
+        curvature: (surface, start).
+        rho: On every surface, see `reach_rho`.
+    """
+    # the root behind a floor: its slope is finite though all living rays may lie on the axis
+    reach = torch.stack(rho)[..., 0, 0, 0].clamp_min(1e-12).sqrt()
+    return torch.abs(curvature * reach)
 
 
 def ray_residuals(tensors: SurfaceTensors, launched: Rays, surface_rays: Sequence[Rays]) -> Tensor:

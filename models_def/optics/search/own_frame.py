@@ -13,6 +13,7 @@ import torch
 from torch import Tensor
 
 from camkit.models_def.optics.pupil import PupilSamples
+from camkit.models_def.optics.search.limits import steepness
 from camkit.models_def.optics.search.penalty import edge_gaps, reach_rho
 from camkit.models_def.optics.search.problem import Problem, trace_batch
 
@@ -27,6 +28,8 @@ def in_own_frame(problem: Problem, scaled: Tensor) -> Problem:
         traced = trace_batch(framed, scaled[None], framed.limited_mm)
         rho = [reach_rho(rays, traced.tensors.thickness_mm[0]) for rays in traced.surface_rays]
         edges = edge_gaps(traced.tensors, rho)[..., 0, 0, 0].amin(1).tolist()
+        curvature = traced.tensors.curvature_per_mm[..., 0, 0, 0]
+        steepest = float(steepness(curvature, rho).max())
         back_mm = float(traced.tensors.thickness_mm[-1].min())
     lens, limits = problem.free.lens, problem.limits
     glass = [surface.glass != "air" for surface in lens.surfaces]
@@ -42,6 +45,7 @@ def in_own_frame(problem: Problem, scaled: Tensor) -> Problem:
             min_edge_mm=min([limits.min_edge_mm, *inside]),
             min_air_mm=min([limits.min_air_mm, *gaps_mm]),
             min_bfl_mm=min(limits.min_bfl_mm, back_mm),
+            max_steepness=max(limits.max_steepness, steepest),
         ),
     )
 

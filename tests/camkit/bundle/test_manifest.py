@@ -53,7 +53,7 @@ def test_manifest_is_frozen() -> None:
     ("version", "message"),
     [
         ("1.1", r"format 1.1, a newer minor version .*\(1.0\); update .* reads format 1.1"),
-        ("2.12", r"format 2.12, a newer minor .*\(2.11\); update .* reads format 2.12"),
+        ("2.13", r"format 2.13, a newer minor .*\(2.12\); update .* reads format 2.13"),
         ("3.0", "format 3.0, a newer major version .* written by camkit 0.1.0"),
         ("0.9", "never was a format 0.9"),
         ("one", "must read like 2.0"),

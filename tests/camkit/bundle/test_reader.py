@@ -264,7 +264,7 @@ def test_huge_manifest_is_refused() -> None:
     _refuse(_zip(_contents() | {"manifest.json": noise}), "manifest.json is larger")
 
 
-@pytest.mark.parametrize("version", ["1.1", "2.12", "3.0"])
+@pytest.mark.parametrize("version", ["1.1", "2.13", "3.0"])
 def test_newer_format_is_refused_naming_the_version_needed(version: str) -> None:
     data = _with_manifest(lambda document: document.update(format_version=version))
     _refuse(data, f"update to a camkit that reads format {version}")

@@ -19,6 +19,7 @@ from camkit.runtime.unit import Unit
 from tests.bundle_factory import tiny_manifest, tiny_members, tiny_stages, write_tiny_bundle
 from tests.deep_bundle import write_deep_bundle
 from tests.planes_bundle import planes_sensor, write_planes_bundle
+from tests.states_bundle import two_states, write_states_bundle
 
 CHANGED: dict[str, Any] = {
     "size": "M",
@@ -51,6 +52,7 @@ CHANGED: dict[str, Any] = {
     "tone": Tone(name="srgb"),
     "halves": ("_l", "_r"),
     "unit": None,
+    "configuration": "wide",
 }
 """Every option away from its default; a unit is tested by itself."""
 FREE = {"max_mem_bytes", "threads", "method"}
@@ -93,13 +95,16 @@ def test_every_option_is_in_the_list_of_this_test() -> None:
     # those that kinds bring are tested with a kind that brings some (test_maker.py)
     assert set(CHANGED) == {field.name for field in dataclasses.fields(Options)} - {"of_kind"}
     claimed = set.union(*OF_STAGE.values())
-    others = {"assume", "force_bundle", "origin_px", "unit"}
+    others = {"assume", "force_bundle", "origin_px", "unit", "configuration"}
     assert set(CHANGED) == claimed | FREE | OF_FILES | others
 
 
 @pytest.mark.parametrize("name", CHANGED)
-def test_a_camera_of_every_stage_knows_every_option(tiny: Bundle, name: str) -> None:
-    check_choices(tiny, Options(**{name: CHANGED[name]}))
+def test_a_camera_of_every_stage_knows_every_option(
+    tiny: Bundle, tmp_path: Path, name: str
+) -> None:
+    bundle = write_states_bundle(tmp_path) if name == "configuration" else tiny
+    check_choices(bundle, Options(**{name: CHANGED[name]}))
 
 
 @pytest.mark.parametrize("name", sorted(set(CHANGED) - {"unit"}))
@@ -131,10 +136,11 @@ def test_each_option_that_means_nothing_without_a_bundle_is_refused_by_name(name
 def test_a_camera_without_a_stage_refuses_its_options_and_no_other(
     left_out: list[str], tmp_path: Path
 ) -> None:
-    members, changes = tiny_members(), {}
+    members = tiny_members() | two_states().members
+    changes: dict[str, Any] = {"optics": two_states().entry(np.inf), "format_version": "2.12"}
     if "network" in left_out:
         del members["network_m.onnx"]
-        changes = {"networks": {}}
+        changes["networks"] = {}
     path = tmp_path / "less.camkit"
     write_bundle(path, tiny_manifest(stages=tiny_stages(*left_out), **changes), members)
     bundle = open_bundle(path)

@@ -61,6 +61,14 @@ class LensAtRest(DesignLens):
         """Refuse: a lens at rest is judged as it was traced."""
         raise ContractError(f"a lens at rest has no copies; got {copy}")
 
+    def views(self) -> list[tuple[Problem, Tensor]]:
+        """Return the one problem, without variables."""
+        return [(self.problem, self.begin)]
+
+    def finished(self) -> Lens:
+        """Return the lens as it is."""
+        return self.lens()
+
     def lens(self) -> Lens:
         """Return the lens as a prescription."""
         return self.problem.free.lens

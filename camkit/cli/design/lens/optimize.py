@@ -1,21 +1,41 @@
 """`camkit lens optimize`: a lens made better on spots."""
 
 import json
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from camkit.cli.choices import Configuration, Debug, GlassCatalogues, GlassFiles, Json, Overwrite
+from camkit.cli.choices import (
+    Configuration,
+    Debug,
+    GlassCatalogues,
+    GlassFiles,
+    Json,
+    Overwrite,
+    several_states,
+)
 from camkit.cli.say import say
 from camkit.errors import ContractError
 from camkit.progress import working
 
 if TYPE_CHECKING:
+    from torch import Tensor
+
     from camkit.models_def.optics.prescription import Lens
+    from camkit.models_def.optics.search.improvement import Improvement
+    from camkit.models_def.optics.search.least_squares import Residuals
     from camkit.models_def.optics.search.problem import Problem
+    from camkit.models_def.optics.search.variables import FreeLens
+
+    _Outcome = tuple[Lens, dict[str, Any], list[str]]
+    """The better lens, facts of the search, and notes on rims that are too small."""
 
 RINGS: Final = 12
+GAPS: Final = "gaps"
+"""The word of `--vary` for the gaps that configurations name."""
 
 
 def optimize(
@@ -28,7 +48,7 @@ def optimize(
     vary: Annotated[
         str | None,
         typer.Option(
-            help="Variables, such as curvature,conic,thickness; default: `vary` of each surface."
+            help="Variables, such as curvature,thickness, or gaps; default: `vary` of each surface."
         ),
     ] = None,
     merit: Annotated[str, typer.Option(help="Merit function: rms, sum_abs or energy.")] = "sum_abs",
@@ -54,6 +74,16 @@ def optimize(
     glass: GlassFiles = None,
     catalogue: GlassCatalogues = None,
     configuration: Configuration = None,
+    configurations: Annotated[
+        str | None,
+        typer.Option(
+            help="States of a lens that count together: all, or NAME,NAME; default: one alone."
+        ),
+    ] = None,
+    weights: Annotated[
+        str | None,
+        typer.Option(help="With --configurations: weight of each, such as 2,1; default: equal."),
+    ] = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
@@ -64,72 +94,174 @@ def optimize(
     require_torch("camkit lens optimize")
     refuse_existing([out], overwrite=overwrite)
     from camkit.models_def.optics.lens_file.lens_file import (
+        read_configured_lens,
         read_noted_lens,
         ready_for_lens,
         write_lens,
     )
-    from camkit.models_def.optics.search.improvement import improve
-    from camkit.models_def.optics.search.own_frame import in_own_frame, too_small_rims
     from camkit.models_def.torch_threads import one_torch_thread
 
     ready_for_lens(out)
-    lens, read_notes = read_noted_lens(source, glass or (), catalogue, configuration)
-    problem = _problem(lens, vary, merit=merit, core_mm=core_um / 1000, rays=rays)
-    begin = problem.free.scaled()
-    problem = in_own_frame(problem, begin)
+    improve = partial(_improve, starts=starts, spread=spread, steps=steps, seed=seed)
+    problem_of = partial(_problem, merit=merit, core_mm=core_um / 1000, rays=rays)
+    files = (source, glass or (), catalogue)
+    if configurations is None:
+        if weights is not None:
+            raise ContractError("--weights belongs to --configurations")
+        lens, notes = read_noted_lens(*files, configuration)
+        search = partial(_alone, lens, vary, problem_of, improve)
+    else:
+        _check_joint(out, configuration)
+        lens, notes = read_configured_lens(*files)
+        choice = several_states(configurations) or "", weights
+        search = partial(_together, lens, vary, choice, problem_of, improve)
     with one_torch_thread(), working(f"improving {lens.name}"):
-        result = improve(problem, begin, starts=starts, spread=spread, steps=steps, seed=seed)
-    better = problem.free.lens_at(result.scaled)
+        better, facts, small_rims = search()
     write_lens(better, out)
-    notes = [
-        *read_notes,
-        *(
-            f"surface {surface}: the beam needs {reach_mm:.3f} mm, the rim of {rim_mm:.3f} mm stays"
-            for surface, reach_mm, rim_mm in too_small_rims(problem, result.scaled)
-        ),
-    ]
-    report = {
-        "lens": lens.name,
-        "out": str(out),
-        "merit": merit,
-        "merit_before": result.merit_before,
-        "merit_after": result.merit,
-        "variables": len(problem.free.variables),
-        "evaluations": result.evaluations,
-        "spot_rms_mm_before": _spots(lens),
-        "spot_rms_mm_after": _spots(better),
-        "notes": notes,
-    }
-    for note in notes:
+    report = {"lens": lens.name, "out": str(out), "merit": merit, **facts}
+    report["notes"] = [*notes, *small_rims]
+    for note in report["notes"]:
         say(f"{source.name}: {note}", err=True)
     say(json.dumps(report) if json_ else _text(report))
 
 
-def _problem(lens: "Lens", vary: str | None, *, merit: str, core_mm: float, rays: int) -> "Problem":
+def _check_joint(out: Path, configuration: str | None) -> None:
+    """Refuse what does not go with several configurations."""
+    from camkit.cli.design.lens.convert import STATEFUL
+
+    if configuration is not None:
+        raise ContractError("--configurations takes several; leave --configuration out")
+    if out.suffix.lower() not in STATEFUL:
+        raise ContractError(f"{' and '.join(STATEFUL)} hold several configurations; got {out.name}")
+
+
+def _alone(
+    lens: "Lens",
+    vary: str | None,
+    problem_of: "Callable[[FreeLens], Problem]",
+    improve: "Callable[[Residuals | Problem, Tensor], Improvement]",
+) -> "_Outcome":
+    """Improve a lens in one state."""
+    from camkit.models_def.optics.search.improvement import free_lens
+    from camkit.models_def.optics.search.own_frame import in_own_frame
+
+    free, moves = _free(lens, vary)
+    if moves:
+        raise ContractError("--vary gaps are those of --configurations; name thickness")
+    problem = problem_of(free_lens(lens, free))
+    begin = problem.free.scaled()
+    problem = in_own_frame(problem, begin)
+    result = improve(problem, begin)
+    better = problem.free.lens_at(result.scaled)
+    facts = _merits(result, len(problem.free.variables))
+    facts |= {"spot_rms_mm_before": _spots(lens), "spot_rms_mm_after": _spots(better)}
+    return better, facts, _small_rims(problem, result.scaled)
+
+
+def _together(
+    lens: "Lens",
+    vary: str | None,
+    choice: tuple[str | tuple[str, ...], str | None],
+    problem_of: "Callable[[FreeLens], Problem]",
+    improve: "Callable[[Residuals | Problem, Tensor], Improvement]",
+) -> "_Outcome":
+    """Improve a lens in several configurations at once."""
+    from camkit.models_def.optics.lens_file.states import plain_lens
+    from camkit.models_def.optics.optics_file import state_names
+    from camkit.models_def.optics.search.joint_states import joint_problem
+
+    words, weights = choice
+    free, moves = _free(lens, vary)
+    joint = joint_problem(
+        lens,
+        state_names(lens, words),
+        free,
+        problem_of,
+        moves=moves,
+        weights=() if weights is None else _numbers(weights),
+    ).in_own_frame()
+    result = improve(joint.residuals, joint.scaled())
+    better = joint.lens_at(result.scaled)
+    states, small_rims = {}, []
+    for term in joint.terms:
+        before, after = (plain_lens(one, term.name) for one in (lens, better))
+        states[term.name] = {
+            "weight": term.weight,
+            "efl_mm_before": term.efl_mm,
+            "efl_mm_after": _efl_mm(after),
+            "spot_rms_mm_before": _spots(before),
+            "spot_rms_mm_after": _spots(after),
+        }
+        rims = _small_rims(term.problem, result.scaled[term.places])
+        small_rims += [f"{term.name}: {line}" for line in rims]
+    facts = _merits(result, len(joint.variables)) | {"configurations": states}
+    return better, facts, small_rims
+
+
+def _merits(result: "Improvement", variables: int) -> dict[str, Any]:
+    return {
+        "merit_before": result.merit_before,
+        "merit_after": result.merit,
+        "variables": variables,
+        "evaluations": result.evaluations,
+    }
+
+
+def _small_rims(problem: "Problem", scaled: "Tensor") -> list[str]:
+    from camkit.models_def.optics.search.own_frame import too_small_rims
+
+    return [
+        f"surface {surface}: the beam needs {reach_mm:.3f} mm, the rim of {rim_mm:.3f} mm stays"
+        for surface, reach_mm, rim_mm in too_small_rims(problem, scaled)
+    ]
+
+
+def _improve(merit: "Residuals | Problem", begin: "Tensor", **options: Any) -> "Improvement":
+    from camkit.models_def.optics.search.improvement import improve
+
+    return improve(merit, begin, **options)
+
+
+def _free(lens: "Lens", vary: str | None) -> tuple[list[Any], bool]:
+    """Return what is free of each surface, and whether moving gaps are too."""
+    from camkit.models_def.optics.prescription import VARY
+    from camkit.models_def.optics.search.improvement import refracting_surfaces
+
+    if vary is None:
+        return [surface.vary for surface in lens.surfaces], False
+    words = tuple(name.strip() for name in vary.split(",") if name.strip())
+    names = tuple(word for word in words if word != GAPS)
+    if not set(names) <= set(VARY):
+        raise ContractError(f"--vary names some of {', '.join((*VARY, GAPS))}; got {vary!r}")
+    refracting = refracting_surfaces(lens)
+    free = [names if i in refracting else () for i in range(len(lens.surfaces))]
+    return free, GAPS in words
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise ContractError(f"--weights takes numbers A,B; got {text!r}") from None
+
+
+def _problem(free: "FreeLens", *, merit: str, core_mm: float, rays: int) -> "Problem":
     import torch
 
-    from camkit.models_def.optics.prescription import VARY
     from camkit.models_def.optics.pupil import half_disc
-    from camkit.models_def.optics.search.improvement import free_lens, refracting_surfaces
     from camkit.models_def.optics.search.limits import Limits
     from camkit.models_def.optics.search.problem import Problem
     from camkit.models_def.optics.search.spot_residuals import MERITS
 
     if merit not in MERITS:
         raise ContractError(f"--merit is one of {', '.join(MERITS)}; got {merit!r}")
-    free: list[Any] = [surface.vary for surface in lens.surfaces]
-    if vary is not None:
-        names = tuple(name.strip() for name in vary.split(",") if name.strip())
-        if not set(names) <= set(VARY):
-            raise ContractError(f"--vary names some of {', '.join(VARY)}; got {vary!r}")
-        refracting = refracting_surfaces(lens)
-        free = [names if i in refracting else () for i in range(len(lens.surfaces))]
+    lens = free.lens
     waves = lens.wavelengths_um
     if len(waves) % 2 == 0:
         waves = tuple(sorted((*waves, lens.reference_wavelength_um)))
     angles = torch.tensor(sorted({0.0, *lens.field_angles_rad}), dtype=torch.float64)
     return Problem(
-        free=free_lens(lens, free),
+        free=free,
         slopes=torch.tan(angles),
         wavelengths_um=torch.tensor(waves, dtype=torch.float64),
         samples=half_disc(rays),
@@ -137,6 +269,12 @@ def _problem(lens: "Lens", vary: str | None, *, merit: str, core_mm: float, rays
         core_mm=core_mm,
         limits=Limits(min_bfl_mm=1.0, max_curvature_per_mm=1.0),
     )
+
+
+def _efl_mm(lens: "Lens") -> float:
+    from camkit.models_def.optics.paraxial import paraxial_data
+
+    return float(paraxial_data(lens).efl_mm)
 
 
 def _spots(lens: "Lens") -> list[float]:
@@ -155,12 +293,16 @@ def _spots(lens: "Lens") -> list[float]:
 
 
 def _text(report: dict[str, Any]) -> str:
-    before, after = report["spot_rms_mm_before"], report["spot_rms_mm_after"]
-    fields = ", ".join(
-        f"{1000 * a:.1f} -> {1000 * b:.1f}" for a, b in zip(before, after, strict=True)
-    )
-    return (
+    lines = [
         f"{report['lens']}: merit {report['merit_before']:.4g} -> {report['merit_after']:.4g} "
         f"({report['merit']}, {report['variables']} variables, {report['evaluations']} lenses "
-        f"traced)\nRMS spots of the fields in um: {fields}\n{report['out']}"
-    )
+        "traced)"
+    ]
+    for name, state in report.get("configurations", {"": report}).items():
+        before, after = state["spot_rms_mm_before"], state["spot_rms_mm_after"]
+        fields = ", ".join(
+            f"{1000 * a:.1f} -> {1000 * b:.1f}" for a, b in zip(before, after, strict=True)
+        )
+        efl = f"{name}: EFL {state['efl_mm_after']:.4g} mm. " if name else ""
+        lines.append(f"{efl}RMS spots of the fields in um: {fields}")
+    return "\n".join([*lines, report["out"]])

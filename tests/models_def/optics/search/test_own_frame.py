@@ -93,3 +93,12 @@ def test_a_rim_that_the_beam_outgrows_is_named() -> None:
     (_, reach_mm, rim_mm), *_ = too_small_rims(problem, begin)
     assert reach_mm > rim_mm == 6.0
     assert too_small_rims(in_own_frame(problem, begin), begin) == []
+
+
+def test_a_steep_lens_pays_nothing_for_what_it_is() -> None:
+    problem = problem_of(triplet(), limits=Limits(max_steepness=0.1, max_curvature_per_mm=1.0))
+    begin = problem.free.scaled()
+    for each, expected in ((problem, False), (in_own_frame(problem, begin), True)):
+        traced = trace_batch(each, begin[None], math.inf)
+        paid = float(limits_of(each, traced, math.inf).square().sum())
+        assert (paid < 1e-20) is expected

@@ -38,11 +38,49 @@ def test_what_varies_may_stand_in_the_file(camkit_command, tmp_path: Path) -> No
     assert after.surfaces[2].curvature_per_mm == before.surfaces[2].curvature_per_mm
 
 
+def test_focus_positions_are_sought_together(camkit_command, tmp_path: Path) -> None:
+    """At 2 m the image of a thin lens lies f^2 / (s - f) = 1.28 mm farther away."""
+    source, out = tmp_path / "focusing.toml", tmp_path / "better.toml"
+    text = (PRESCRIPTIONS / "cooke-triplet.toml").read_text()
+    states = (("far", ""), ("near", "object_distance_mm = 2000.0\n"))
+    text += "".join(
+        f'[[configuration]]\nname = "{name}"\nfield_angles_deg = [0]\n'
+        f"thickness_mm = {{ 5 = 42.5 }}\n{line}"
+        for name, line in states
+    )
+    source.write_text(text)
+    command = ("lens", "optimize", source, "-o", out, "--vary", "gaps", "--configurations", "all")
+    short = ("--starts", "1", "--steps", "6", "--rays", "6", "--merit", "rms")
+    outcome = camkit_command(*command, *short, "--weights", "1,2", "--json")
+    assert outcome.code == 0, outcome.err
+    report = json.loads(outcome.out)
+    assert report["variables"] == 2
+    found = report["configurations"]
+    assert [found[name]["weight"] for name in ("far", "near")] == pytest.approx([1 / 3, 2 / 3])
+    assert found["near"]["spot_rms_mm_after"][0] < 0.3 * found["near"]["spot_rms_mm_before"][0]
+    far, near = (read_lens(out, configuration=name) for name in ("far", "near"))
+    moved_mm = near.surfaces[5].thickness_mm - far.surfaces[5].thickness_mm
+    assert moved_mm == pytest.approx(1.28, abs=0.05)
+    again = camkit_command(*command, *short, "--steps", "1", "--overwrite")
+    assert "far: EFL 50 mm" in again.out
+    for options, message in (
+        (("--configuration", "far"), "leave --configuration out"),
+        (("--weights", "1"), "one for each of far, near"),
+        (("--weights", "1,x"), "takes numbers"),
+        (("-o", tmp_path / "x.json"), "hold several configurations"),
+    ):
+        refused = camkit_command(*command, *options, "--overwrite")
+        assert (refused.code, message in refused.err) == (2, True), refused.err
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         ((), "nothing of the lens is free"),
         (("--vary", "colour"), "--vary names some of"),
+        (("--vary", "gaps"), "gaps are those of --configurations"),
+        (("--vary", "conic", "--weights", "1"), "belongs to --configurations"),
+        (("--vary", "gaps", "--configurations", "all"), "has no configurations"),
         (("--vary", "conic", "--merit", "beauty"), "--merit is one of"),
     ],
 )
