@@ -14,6 +14,7 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
+from camkit.models_def.optics.aiming.field import slope_of
 from camkit.models_def.optics.lens_file.lens_file import built_in_lenses, find_lens
 from camkit.models_def.optics.paraxial import focal_lengths, paraxial_data, with_paraxial_focus
 from camkit.models_def.optics.prescription import Lens
@@ -139,7 +140,7 @@ def _misfit(problem: Problem, lens: Lens, elements: int) -> str:
     shaped = any(surface.conic or any(surface.even_asphere) for surface in lens.surfaces)
     if shaped and not any(variable.kind in _SHAPES for variable in problem.free.variables):
         return "is aspheric, where no conic and no aspheric term is free"
-    widest, corner = math.tan(lens.field_angles_rad[-1]), float(problem.slopes[-1])
+    widest, corner = slope_of(lens.field_angles_rad[-1]), float(problem.slopes[-1])
     if widest < _NEAR_SHARE * corner:
         return f"is made for {math.degrees(math.atan(widest)):.3g} degrees of half field"
     return ""

@@ -21,6 +21,7 @@ from camkit.errors import ContractError
 from camkit.models_def.design.front import Front
 from camkit.models_def.design.ranking import Offender, Ranked, rank_errors
 from camkit.models_def.design.sensor import Recorder, capture
+from camkit.models_def.optics.aiming.field import widest_tangent
 from camkit.models_def.optics.kernel_bank import gaussian_response
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import both_halves, half_disc
@@ -280,7 +281,7 @@ class _Judge:
 
 def _judge(lens: Lens, tolerances: Tolerances, run: ToleranceRun) -> _Judge:
     """Fix fields and patches; the window of the kernels holds the nominal and the first copies."""
-    edge_slope = np.tan(max(lens.field_angles_rad, default=0.0))
+    edge_slope = widest_tangent(lens.field_angles_rad, "tolerancing")
     fields = FIELDS if edge_slope > 0 else FIELDS[:1]
     view = _view(lens, fields, edge_slope, run.rays)
     tolerances = with_chosen_gap(lens, tolerances, view)

@@ -3,12 +3,14 @@
 from typing import Final
 
 from camkit.errors import ContractError
+from camkit.models_def.optics.aiming.chief_path import chief_path
 from camkit.models_def.optics.analysis.image_circle import image_radius_mm, open_share
 from camkit.models_def.optics.lens_file.placing import PlacedLens
 from camkit.models_def.optics.paraxial import paraxial_data
-from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.prescription import TANGENT_DEG, Lens
 from camkit.models_def.optics.psf import with_object_distance
 from camkit.models_def.sensors.sensor_choice import SensorChoice
+from camkit.units import to_radians
 
 SAME_APERTURE: Final = 0.99
 """F-number over F-number, or share of light, from which on they count as the same."""
@@ -32,11 +34,17 @@ def check_image_circle(use: PlacedLens, sensor: SensorChoice, name: str) -> None
         if radius_mm < corner_mm:
             share = radius_mm / corner_mm
             sides = (int(share * sensor.table[key]) for key in ("width_px", "height_px"))
+            end = f" at {TANGENT_DEG} degrees, where cameras end" if _is_wider(lens) else ""
             raise ContractError(
-                f"{name} images up to {radius_mm:.4g} mm from its axis, but the corner of the "
+                f"{name} images up to {radius_mm:.4g} mm from its axis{end}, but the corner of the "
                 f"sensor lies at {corner_mm:.4g} mm: take a smaller sensor (the lens covers about "
                 f"{'x'.join(map(str, sides))} px of this one), or another lens"
             )
+
+
+def _is_wider(lens: Lens) -> bool:
+    """Return whether the lens sees farther round than a camera can carry."""
+    return bool(chief_path(lens).angles_rad[-1] > to_radians(TANGENT_DEG))
 
 
 def aperture_notes(design: Lens, stopped: Lens) -> tuple[str, ...]:

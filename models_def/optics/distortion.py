@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from camkit.errors import ContractError
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.spot import slopes_for_heights
+from camkit.models_def.optics.spot import tangents_for_heights
 from camkit.psf import FrozenPsf
 from camkit.radial import RadialDistortion
 from camkit.runtime.geometry.distortion import distort_points, reference_channel
@@ -48,7 +48,7 @@ def fit_distortion(
 
 def ideal_heights(lens: Lens, heights_mm: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return EFL tan(field angle) in mm of the fields that land at sensor heights."""
-    slopes = slopes_for_heights(lens, torch.from_numpy(heights_mm))
+    slopes = tangents_for_heights(lens, torch.from_numpy(heights_mm), "distortion")
     return paraxial_data(lens).efl_mm * slopes.numpy()
 
 

@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
+from camkit.models_def.optics.aiming.field import field_slope
 from camkit.models_def.optics.aiming.start import path_before
 from camkit.models_def.optics.paraxial import paraxial_image
 from camkit.models_def.optics.prescription import (
@@ -45,7 +46,7 @@ def focus_shift_mm(lens: Lens, merit: FocusMerit) -> float:
     if merit == "paraxial":
         return paraxial_image(lens).distance_mm - lens.surfaces[-1].thickness_mm
     require_round(lens, f"focus by {merit}")
-    slopes = torch.tan(torch.tensor(lens.field_angles_rad, dtype=torch.float64))
+    slopes = field_slope(torch.tensor(lens.field_angles_rad, dtype=torch.float64))
     waves = torch.tensor(lens.wavelengths_um, dtype=torch.float64)
     with torch.no_grad():
         tensors = surface_tensors(lens, waves[:, None])

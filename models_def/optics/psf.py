@@ -7,6 +7,7 @@ is the pixel of the sharp picture that the kernel is applied to. The gradient fl
 tent weights to the ray positions.
 """
 
+import math
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -14,10 +15,10 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.prescription import Lens, require_round
+from camkit.models_def.optics.prescription import TANGENT_DEG, Lens, require_round
 from camkit.models_def.optics.pupil import half_disc
 from camkit.models_def.optics.spot import Spots, slopes_for_heights, trace_spots
-from camkit.units import UM_PER_MM
+from camkit.units import UM_PER_MM, to_radians
 
 DEFAULT_RAYS: Final = 8192
 _CHUNK_RAYS: Final = 400_000
@@ -147,7 +148,10 @@ def trace_psf(
 
 def with_object_distance(lens: Lens, distance_mm: float) -> Lens:
     """Return the lens looking at another object distance, the sensor unmoved."""
-    return replace(lens, object_distance_mm=distance_mm)
+    fields = lens.field_angles_rad
+    if math.isfinite(distance_mm):  # no near object lies beside the lens
+        fields = tuple(angle for angle in fields if angle <= to_radians(TANGENT_DEG))
+    return replace(lens, object_distance_mm=distance_mm, field_angles_rad=fields)
 
 
 def energy_diameter(spots: Spots, share: float = 0.95) -> Tensor:

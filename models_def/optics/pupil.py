@@ -21,6 +21,7 @@ from torch import Tensor
 
 from camkit.errors import ContractError
 from camkit.models_def.optics.aiming.aim import aim
+from camkit.models_def.optics.aiming.field import lead_factor
 from camkit.models_def.optics.aiming.newton import Aim
 from camkit.models_def.optics.aiming.start import launch, with_open_apertures
 from camkit.models_def.optics.paraxial import Paraxial, paraxial_data
@@ -151,12 +152,12 @@ def pupil_rays(
         lens: The prescription (stop, aperture, object distance).
         tensors: Its tensors; batch dimensions broadcast with slope, the last being rays.
         samples: Of the unit disc, (rays,).
-        slope: tan of the field angle, (..., 1).
+        slope: tan of the field angle (`field_slope`), (..., 1).
         definition: See the module.
         stop_radius_mm: For the definition `stop`; that of the paraxial marginal ray by default.
 
     Returns:
-        Rays (..., rays) at the first vertex plane, and the areas of their beams there in equal
+        Rays (..., rays) where `launch` starts them, and the areas of their beams there in equal
         units, of the same shape; rays that cannot be aimed have weight 0 and fate MISSED.
     """
     data = paraxial_data(lens)
@@ -169,7 +170,7 @@ def pupil_rays(
         scale = _vertex_scale(lens, data)
         radius = data.entrance_pupil_diameter_mm / 2 * scale
         x = samples.x * radius + torch.zeros_like(slope)
-        middle = -data.entrance_pupil_mm * scale * slope
+        middle = -data.entrance_pupil_mm * scale * lead_factor(slope)
         weight = torch.ones_like(x) * share
         if definition == "chief":
             centre = PupilSamples(x=torch.zeros_like(samples.x[:1]), y=torch.zeros_like(x[..., :1]))

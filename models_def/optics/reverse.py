@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.trace import Rays, SurfaceTensors, trace
+from camkit.models_def.optics.trace import Rays, SurfaceTensors, refract, trace
 from camkit.models_def.optics.tracing.frame import Pose
 
 
@@ -71,6 +71,7 @@ def trace_to_scene(
     *,
     path: bool = False,
     compiled: bool = False,
+    steep: bool = False,
 ) -> Rays:
     """Trace rays from the sensor to the scene.
 
@@ -80,10 +81,11 @@ def trace_to_scene(
         object_distance_mm: From the first vertex to the plane of the scene; inf for none.
         path: See `trace`.
         compiled: See `trace`.
+        steep: Let rays leave across the axis and backwards: of a distant scene, uncompiled.
 
     Returns:
         Rays on the plane of the scene; for a distant one on the vertex plane of the first
-        surface, where only their directions count.
+        surface (steep ones on that surface), where only their directions count.
     """
     if not object_distance_mm >= 0:
         raise ContractError(f"object_distance_mm must be >= 0; got {object_distance_mm}")
@@ -92,4 +94,8 @@ def trace_to_scene(
     last = torch.full_like(lens.thickness_mm[-1:], beyond_mm)
     lens = replace(lens, thickness_mm=torch.cat([lens.thickness_mm[:-1], last]))
     shifted = replace(rays, z=rays.z - tensors.thickness_mm[-1])
-    return trace(lens, shifted, path=path, compiled=compiled)
+    if not steep:
+        return trace(lens, shifted, path=path, compiled=compiled)
+    front = len(lens.aspheric) - 1
+    inside = trace(lens, shifted, surfaces=range(front), path=path)
+    return refract(lens, replace(inside, steep=True), front)

@@ -9,17 +9,22 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.aiming.chief_path import WIDEST_DEG, chief_path
+from camkit.models_def.optics.aiming.chief_path import chief_path
+from camkit.models_def.optics.aiming.field import (
+    STEEPEST,
+    field_angle,
+    field_slope,
+    is_steep,
+)
 from camkit.models_def.optics.aiming.start import with_open_apertures
-from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.prescription import TANGENT_DEG, Lens
 from camkit.models_def.optics.pupil import PupilDefinition, PupilSamples, pupil_centre, pupil_rays
 from camkit.models_def.optics.trace import surface_tensors, trace
-from camkit.units import to_radians
+from camkit.units import to_degrees
 
 _SLOPE_STEPS: Final = 12
 _SLOPE_TOLERANCE_MM: Final = 1e-9
 _SLOPE_DIFFERENCE: Final = 1e-6
-_STEEPEST: Final = math.tan(to_radians(WIDEST_DEG))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,7 +66,7 @@ def chief_heights(lens: Lens, slopes: Tensor, wavelength_um: float | None = None
     rays, _ = pupil_rays(lens, tensors, pupil_centre(), slopes[:, None])
     landings = trace(tensors, rays)
     if not bool(landings.valid.all()):
-        lost_slopes = torch.rad2deg(torch.atan(slopes[~landings.valid[:, 0]])).tolist()
+        lost_slopes = torch.rad2deg(field_angle(slopes[~landings.valid[:, 0]])).tolist()
         angles = ", ".join(dict.fromkeys(f"{angle:.1f}" for angle in lost_slopes))
         raise ContractError(
             f"the chief ray is lost at {angles} degrees: {lens.name} is aimed to "
@@ -88,13 +93,38 @@ def slopes_for_heights(lens: Lens, heights_mm: Tensor) -> Tensor:
         except ContractError:
             slopes = None
         if slopes is None:
-            slopes = _corrected_slopes(lens, heights_mm, _followed_slopes(lens, heights_mm))
+            begin = _followed_slopes(lens, heights_mm)
+            slopes = _corrected_slopes(lens, heights_mm, begin, math.inf)
     if slopes is None:
         raise ContractError(f"no field reaches the sensor heights {heights_mm.tolist()} mm")
     return slopes
 
 
-def _corrected_slopes(lens: Lens, heights_mm: Tensor, slopes: Tensor) -> Tensor | None:
+def tangents_for_heights(lens: Lens, heights_mm: Tensor, what: str) -> Tensor:
+    """Return tan of the field angles (field,) whose reference chief ray lands at given heights.
+
+    Args:
+        lens: The prescription.
+        heights_mm: (field,).
+        what: What needs the tangent, for the message.
+
+    Raises:
+        ContractError: If a height cannot be reached, or not below 89.5 degrees.
+    """
+    slopes = slopes_for_heights(lens, heights_mm)
+    if bool(is_steep(slopes).any()):
+        widest_deg = to_degrees(float(field_angle(slopes).abs().max()))
+        edge_mm = abs(float(chief_heights(lens, slopes.new_tensor([STEEPEST]))[0]))
+        raise ContractError(
+            f"{what} carries fields as tangents, to {TANGENT_DEG} degrees = {edge_mm:.2f} mm; the "
+            f"sensor's corner is at {widest_deg:.1f} degrees: use a smaller sensor"
+        )
+    return slopes
+
+
+def _corrected_slopes(
+    lens: Lens, heights_mm: Tensor, slopes: Tensor, steepest: float = STEEPEST
+) -> Tensor | None:
     """Return slopes that land at the heights by Newton's method; None if that does not settle."""
     for _ in range(_SLOPE_STEPS):
         both = chief_heights(lens, torch.cat([slopes, slopes + _SLOPE_DIFFERENCE]))
@@ -102,7 +132,7 @@ def _corrected_slopes(lens: Lens, heights_mm: Tensor, slopes: Tensor) -> Tensor 
         missed_by = heights_mm - here
         if bool((torch.abs(missed_by) < _SLOPE_TOLERANCE_MM).all()):
             # what Newton finds at grazing angles is no field of the lens
-            return slopes if bool((slopes.abs() < _STEEPEST).all()) else None
+            return slopes if bool((slopes.abs() < steepest).all()) else None
         slopes = slopes + missed_by * _SLOPE_DIFFERENCE / (ahead - here)
     return None
 
@@ -119,8 +149,8 @@ def _followed_slopes(lens: Lens, heights_mm: Tensor) -> Tensor:
             "use a smaller sensor"
         )
     angles = np.interp(np.abs(heights_mm.numpy()), reached_mm, path.angles_rad[rising])
-    side = np.sign(path.heights_mm[path.outermost])
-    return torch.from_numpy(side * np.tan(angles)) * torch.sign(heights_mm)
+    side = float(np.sign(path.heights_mm[path.outermost]))
+    return side * field_slope(torch.from_numpy(angles)) * torch.sign(heights_mm)
 
 
 def trace_spots(

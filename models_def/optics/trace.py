@@ -28,6 +28,7 @@ from camkit.models_def.optics.tracing.meeting import MIN_COSINE, State
 from camkit.models_def.optics.tracing.phase_polynomial import PhaseForm
 from camkit.models_def.optics.tracing.sag import sag, sag_slope
 from camkit.models_def.optics.tracing.series import Series
+from camkit.models_def.optics.tracing.steep import STEEP_COSINE, SteepSurface, cross_steep
 from camkit.units import to_mm
 
 
@@ -118,10 +119,11 @@ class Rays:
 
     Attributes:
         x, y, z: Position.
-        l, m, n: Direction cosines, n > 0.
+        l, m, n: Direction cosines, n > 0 except of steep rays.
         fate: int8, see `Fate`. A ray that is not valid rests on the axis with finite values and
             zero gradients.
         path_mm: Optical path, if asked for; of lost rays it means nothing.
+        steep: Whether some may run across the axis or backwards, before the first surface.
     """
 
     x: Tensor
@@ -132,6 +134,7 @@ class Rays:
     n: Tensor
     fate: Tensor
     path_mm: Tensor | None = None
+    steep: bool = False
 
     @property
     def valid(self) -> Tensor:
@@ -266,6 +269,8 @@ def trace(
     order = surfaces if surfaces is not None else range(len(tensors.aspheric))
     if not order:
         return rays
+    if rays.steep:
+        return _trace_steep(tensors, rays, order, surface_rays=surface_rays, path=path)
     if any(tensors.poses[order.start : order.stop]):
         return _trace_posed(tensors, rays, order, surface_rays=surface_rays, path=path)
     result = _trace(tensors, rays, order, surface_rays=surface_rays, path=path, compiled=compiled)
@@ -277,6 +282,52 @@ def refract(tensors: SurfaceTensors, rays: Rays, i: int) -> Rays:
     surface_rays: list[Rays] = []
     trace(tensors, rays, surfaces=range(i, i + 1), surface_rays=surface_rays)
     return surface_rays[0]
+
+
+def _trace_steep(
+    tensors: SurfaceTensors,
+    rays: Rays,
+    surfaces: range,
+    *,
+    surface_rays: list[Rays] | None,
+    path: bool,
+) -> Rays:
+    """Trace steep rays through the first surface by `tracing.steep`, then as all others."""
+    i = surfaces.start
+    state, fate, length = cross_steep(
+        _steep_surface(tensors, i), _state(rays), rays.fate, rays.path_mm if path else None
+    )
+    met = Rays(**state._asdict(), fate=fate, path_mm=length if path else None)
+    if surface_rays is not None:
+        surface_rays.append(met)
+    z = met.z - tensors.thickness_mm[i]
+    onward = replace(met, z=z, steep=bool((met.n < STEEP_COSINE).any()))
+    if surfaces[1:]:
+        return trace(tensors, onward, surfaces=surfaces[1:], surface_rays=surface_rays, path=path)
+    fates = torch.where((fate == 0) & (met.n <= MIN_COSINE), kernel.MISSED, fate).to(torch.int8)
+    still = kernel.rest(_state(onward), fates, adaptive=True)
+    way = -still.z / still.n
+    end = still._replace(
+        x=still.x + way * still.l, y=still.y + way * still.m, z=torch.zeros_like(still.z)
+    )
+    if met.path_mm is not None:
+        length = met.path_mm + tensors.index[i + 1] * way
+    return Rays(**end._asdict(), fate=fates, path_mm=length if path else None)
+
+
+def _steep_surface(tensors: SurfaceTensors, i: int) -> SteepSurface:
+    """Return a surface for steep rays; one with grooves, a phase or a tilt has no rim for them."""
+    special = (parts[i] for parts in (tensors.grooves, tensors.phases, tensors.poses) if parts)
+    reach = tensors.semi_diameter_mm[i]
+    return SteepSurface(
+        curvature=tensors.curvature_per_mm[i],
+        conic=tensors.conic[i],
+        profile=lambda rho: (tensors.height(i, rho), tensors.slope(i, rho)),
+        aspheric=tensors.aspheric[i],
+        reach_mm=torch.zeros_like(reach) if any(special) else reach,
+        before=tensors.index[i],
+        after=tensors.index[i + 1],
+    )
 
 
 def _trace_posed(

@@ -22,6 +22,7 @@ from typing import Any, Final
 import torch
 
 from camkit.errors import CamkitError
+from camkit.models_def.optics.aiming.field import field_slope
 from camkit.models_def.optics.lens_file.lens_file import read_noted_lens, write_lens
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
@@ -96,7 +97,7 @@ def spot_um(lens: Lens) -> float:
 
 def chief_mm(lens: Lens) -> float:
     """Return how far from the axis the chief ray of the last field lands, reference wavelength."""
-    slope = torch.tan(torch.tensor(lens.field_angles_rad[-1:], dtype=torch.float64))
+    slope = field_slope(torch.tensor(lens.field_angles_rad[-1:], dtype=torch.float64))
     return abs(float(chief_heights(lens, slope)[0]))
 
 

@@ -15,6 +15,7 @@ import torch
 from torch import Tensor
 
 from camkit.models_def.optics.aiming.chief_path import chief_path, lens_length_mm
+from camkit.models_def.optics.aiming.field import is_steep, lead_factor
 from camkit.models_def.optics.aiming.newton import Aim, newton_aim
 from camkit.models_def.optics.aiming.pupil_map import MANY, few_rays, foretold
 from camkit.models_def.optics.aiming.start import launch, with_open_apertures
@@ -33,12 +34,12 @@ def aim(lens: Lens, tensors: SurfaceTensors, target: tuple[Tensor, Tensor], slop
         lens: The prescription: its stop and its object distance.
         tensors: The lens at the wavelengths of the rays.
         target: Wanted points x and y on the stop in mm; they broadcast with slope.
-        slope: tan of the field angle.
+        slope: tan of the field angle (`field.field_slope`).
     """
     blank = torch.zeros_like(target[0] + slope)
     points, slope = (target[0] + blank, target[1] + blank), slope + blank
     plane = not bool(tensors.curvature_per_mm[0].any()) and not tensors.aspheric[0]
-    if lens.stop == 0 and plane:
+    if lens.stop == 0 and plane and not bool(is_steep(slope).any()):
         return Aim(x=points[0], y=points[1], weight=torch.ones_like(blank))
     tensors = with_open_apertures(tensors)
     with torch.no_grad():
@@ -141,7 +142,7 @@ def _staged(
 ) -> Aim:
     """Aim from the chief ray outwards; each stage begins where the two before it foretell."""
     at_stop, length_mm = _rays_at_stop(lens, tensors, slope), lens_length_mm(lens)
-    y = -chief_path(lens).lead_at(slope) * slope
+    y = -chief_path(lens).lead_at(slope) * lead_factor(slope)
     here = last = (torch.zeros_like(y), y)
     for stage in _STAGES:
         ahead = (2 * here[0] - last[0], 2 * here[1] - last[1])
@@ -161,6 +162,6 @@ def _paraxial_begin(
     )
     x, y, distance_mm = scale * points[0], scale * points[1], lens.object_distance_mm
     if math.isinf(distance_mm):
-        return x, y - place * slope
+        return x, y - place * lead_factor(slope)
     share, top = distance_mm / (distance_mm + place), -slope * distance_mm
     return x * share, top + (y - top) * share

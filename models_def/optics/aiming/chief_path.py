@@ -1,7 +1,8 @@
 """Chief rays from the axis out to the widest field that a lens takes in.
 
-The chief ray of a field meets the vertex plane of the first surface at y = -lead tan(angle); for a
-distant object the lead is the depth of the entrance pupil. In wide-angle lenses it moves by more
+The chief ray of a field meets the vertex plane of the first surface at y = -lead tan(angle), and
+one beyond 89.5 degrees starts at -lead sin(angle) (`field`); for a distant object the lead is the
+depth of the entrance pupil. In wide-angle lenses it moves by more
 than a focal length over the field, and no ray aimed at the paraxial pupil reaches the stop. So the
 field is widened step by step: each chief ray starts where those before it foretell, and a step
 that loses it is halved. Where steps end, the lens ends.
@@ -16,14 +17,18 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from camkit.models_def.optics.aiming.field import (
+    field_angle,
+    lead_factor,
+    slope_of,
+)
 from camkit.models_def.optics.aiming.newton import AIM_TOLERANCE, DIFFERENCE, flat_map
 from camkit.models_def.optics.aiming.start import launch, with_open_apertures
 from camkit.models_def.optics.paraxial import entrance_pupil
-from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.prescription import TANGENT_DEG, WIDEST_DEG, Lens
 from camkit.models_def.optics.trace import Rays, SurfaceTensors, surface_tensors, trace
 from camkit.units import to_degrees, to_radians
 
-WIDEST_DEG: Final = 89.5
 _FIRST_STEP_DEG: Final = 2.0
 _LARGEST_STEP_DEG: Final = 6.0
 _SMALLEST_STEP_DEG: Final = 0.02
@@ -47,7 +52,7 @@ class ChiefPath:
 
     def lead_at(self, slope: torch.Tensor) -> torch.Tensor:
         """Return the lead in mm of field slopes of any shape."""
-        angles = torch.atan(torch.abs(slope.detach())).numpy()
+        angles = field_angle(torch.abs(slope.detach())).numpy()
         return torch.from_numpy(np.interp(angles, self.angles_rad, self.lead_mm))
 
     @property
@@ -60,6 +65,11 @@ class ChiefPath:
         """The widest field, in words."""
         degrees, height_mm = to_degrees(float(self.angles_rad[-1])), abs(float(self.heights_mm[-1]))
         return f"{degrees:.1f} degrees = {height_mm:.2f} mm"
+
+
+def widest_deg(object_distance_mm: float) -> float:
+    """Return the widest field that is tried: one of a near object lies in front of the lens."""
+    return WIDEST_DEG if math.isinf(object_distance_mm) else TANGENT_DEG
 
 
 def lens_length_mm(lens: Lens) -> float:
@@ -79,8 +89,10 @@ def chief_path(lens: Lens) -> ChiefPath:
 def _walk(lens: Lens, tensors: SurfaceTensors) -> ChiefPath:
     fields = [(0.0, _paraxial_lead_mm(lens, tensors), 0.0)]
     step = _FIRST_STEP_DEG
-    while fields[-1][0] < WIDEST_DEG and step > _SMALLEST_STEP_DEG:
-        angle = min(fields[-1][0] + step, WIDEST_DEG)
+    widest = widest_deg(lens.object_distance_mm)
+    while fields[-1][0] < widest and step > _SMALLEST_STEP_DEG:
+        here = fields[-1][0]
+        angle = min(here + step, TANGENT_DEG if here < TANGENT_DEG else widest)
         chief = _corrected(lens, tensors, angle, _foretold(fields, angle))
         if chief is None:
             step /= 2
@@ -111,11 +123,12 @@ def _corrected(
     lens: Lens, tensors: SurfaceTensors, angle_deg: float, lead_mm: float
 ) -> tuple[float, float] | None:
     """Return lead and sensor height of the chief ray of a field, by Newton; None if it is lost."""
-    length_mm, slope = lens_length_mm(lens), math.tan(to_radians(angle_deg))
+    length_mm, slope = lens_length_mm(lens), slope_of(to_radians(angle_deg))
     step = DIFFERENCE * length_mm
     slopes = torch.full((2,), slope, dtype=torch.float64)
+    factor = float(lead_factor(slopes)[0])
     for _ in range(_CORRECTIONS):
-        y = torch.tensor([-lead_mm * slope, -lead_mm * slope + step], dtype=torch.float64)
+        y = torch.tensor([-lead_mm * factor, -lead_mm * factor + step], dtype=torch.float64)
         on_surfaces: list[Rays] = []
         start = launch(torch.zeros_like(y), y, slopes, lens.object_distance_mm)
         end = trace(tensors, start, surface_rays=on_surfaces)
@@ -125,5 +138,5 @@ def _corrected(
             return None
         if abs(here) < AIM_TOLERANCE * length_mm:
             return lead_mm, float(end.y[0])
-        lead_mm += here / gain / slope
+        lead_mm += here / gain / factor
     return None

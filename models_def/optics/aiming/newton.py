@@ -21,7 +21,7 @@ class Aim:
     """The launch points of rays that pass wanted points of the stop.
 
     Attributes:
-        x: Launch points in mm in the vertex plane of the first surface.
+        x: Launch points in mm, see `start.launch`.
         y: The same.
         weight: Beam area per stop area; 0 where no launch point was found.
     """

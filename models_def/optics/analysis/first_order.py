@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
+from camkit.models_def.optics.aiming.field import is_steep
 from camkit.models_def.optics.aiming.start import launch, with_open_apertures
 from camkit.models_def.optics.paraxial import paraxial_data, trace_paraxial
 from camkit.models_def.optics.prescription import Lens
@@ -102,10 +103,12 @@ def ideal_heights(lens: Lens, slopes: Tensor) -> Tensor:
     """Return the heights (field,) in mm of the paraxial chief rays on the sensor where it stands.
 
     For a distant object and a sensor in the paraxial focus this is EFL tan(angle); out of focus
-    it is scaled as the chief ray is, so that defocus is not taken for distortion.
+    it is scaled as the chief ray is, so that defocus is not taken for distortion. NaN for steep
+    fields, which no plane images.
     """
     chief = paraxial_rays(lens, 1.0).chief
-    return slopes * (chief.height_mm[-1] + lens.surfaces[-1].thickness_mm * chief.slope[-1])
+    tangents = torch.where(is_steep(slopes), torch.nan, slopes)
+    return tangents * (chief.height_mm[-1] + lens.surfaces[-1].thickness_mm * chief.slope[-1])
 
 
 def airy_radius_mm(lens: Lens, wavelength_um: float | None = None) -> float:

@@ -20,7 +20,7 @@ from camkit.models_def.optics.analysis.sampling import Pupil
 from camkit.models_def.optics.analysis.spots import rms_about_centroid, spot_diagram
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import with_fixed_stop
-from camkit.models_def.optics.spot import Spots, slopes_for_heights
+from camkit.models_def.optics.spot import Spots, tangents_for_heights
 from camkit.units import UM_PER_MM
 
 PsfRegime = Literal["rays", "waves"]
@@ -117,7 +117,7 @@ def sensor_model(
     shares = torch.from_numpy(response[:, is_visible])
     shares = shares / shares.sum(1, keepdim=True)
     heights = torch.linspace(0, corner_mm, FIELDS, dtype=torch.float64)
-    slopes = slopes_for_heights(lens, heights)
+    slopes = tangents_for_heights(lens, heights, "a PSF over the sensor")
     return psf_model(lens, slopes, torch.from_numpy(wavelengths_um[is_visible]), shares)
 
 

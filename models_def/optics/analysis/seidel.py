@@ -12,9 +12,10 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
+from camkit.models_def.optics.aiming.field import STEEPEST, field_slope
 from camkit.models_def.optics.analysis.first_order import ParaxialRays, paraxial_rays
 from camkit.models_def.optics.paraxial import vertex_curvature
-from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.prescription import TANGENT_DEG, Lens
 from camkit.models_def.optics.trace import SurfaceTensors
 
 SEIDEL_NAMES: Final = ("S_I", "S_II", "S_III", "S_IV", "S_V")
@@ -69,13 +70,16 @@ def seidel_sums(lens: Lens) -> Seidel:
     """Return the sums at the reference wavelength, for the largest field of the file.
 
     Raises:
-        ContractError: If the entrance pupil is at infinity, or a surface has odd terms, which have
-            no third order, or a phase.
+        ContractError: If the entrance pupil is at infinity, a surface has odd terms, which have
+            no third order, or a phase, or a field lies beyond 89.5 degrees.
     """
     for i, surface in enumerate(lens.surfaces):
         if any(surface.odd_asphere) or surface.phase is not None:
             raise ContractError(f"not computed: surface {i} has odd aspheric terms or a phase")
-    slope = float(torch.tan(torch.tensor(max(lens.field_angles_rad), dtype=torch.float64)))
+    widest = torch.tensor(max(lens.field_angles_rad), dtype=torch.float64)
+    slope = float(field_slope(widest))
+    if slope > STEEPEST:
+        raise ContractError(f"not computed: they belong to fields below {TANGENT_DEG} degrees")
     rays = paraxial_rays(lens, slope)
     waves = (min(lens.wavelengths_um), max(lens.wavelengths_um))
     short, long = (paraxial_rays(lens, slope, wave).tensors.index for wave in waves)

@@ -11,6 +11,7 @@ from typing import Final
 import torch
 from torch import Tensor
 
+from camkit.models_def.optics.aiming.field import field_slope
 from camkit.models_def.optics.aiming.start import with_open_apertures
 from camkit.models_def.optics.analysis.sampling import Pupil, pupil_samples, sample_weights
 from camkit.models_def.optics.paraxial import paraxial_data
@@ -41,8 +42,8 @@ CONVERGENCE_SAMPLINGS: Final = (
 
 
 def field_slopes(lens: Lens) -> Tensor:
-    """Return tan of the field angles (field,) of the file."""
-    return torch.tan(torch.tensor(lens.field_angles_rad, dtype=torch.float64))
+    """Return the slopes (field,) of the field angles of the file."""
+    return field_slope(torch.tensor(lens.field_angles_rad, dtype=torch.float64))
 
 
 def analysis_tensors(lens: Lens, wavelengths_um: Tensor) -> SurfaceTensors:

@@ -7,6 +7,7 @@ from typing import Any, Final
 import torch
 
 from camkit.errors import ContractError
+from camkit.models_def.optics.aiming.field import field_slope
 from camkit.models_def.optics.analysis.sampling import Pupil
 from camkit.models_def.optics.analysis.spots import rms_about_centroid, spot_diagram
 from camkit.models_def.optics.lens_file.states import configuration_name, plain_lens
@@ -68,7 +69,7 @@ def _facts(lens: Lens, name: str, *, is_usual: bool) -> StateFacts:
     data = paraxial_data(lens)
     wave = torch.tensor([lens.reference_wavelength_um], dtype=torch.float64)
     widest_rad = max(lens.field_angles_rad)
-    slopes = torch.tan(torch.tensor([0.0, widest_rad], dtype=torch.float64))
+    slopes = field_slope(torch.tensor([0.0, widest_rad], dtype=torch.float64))
     try:
         with torch.no_grad():
             axis_mm, edge_mm = rms_about_centroid(spot_diagram(lens, slopes, wave, _PUPIL))[:, 0]

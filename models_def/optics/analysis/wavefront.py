@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.aiming.start import launch, path_before
+from camkit.models_def.optics.aiming.start import launch, launch_points, path_before
 from camkit.models_def.optics.analysis.spots import (
     Beams,
     chief_landings,
@@ -204,7 +204,9 @@ def to_sphere(
 
 def _shifted(lens: Lens, beams: Beams, slopes: Tensor, dx: float, dy: float) -> Rays:
     rays = beams.rays
-    shifted = launch(rays.x + dx, rays.y + dy, slopes[:, None, None], lens.object_distance_mm)
+    slope = slopes[:, None, None]
+    x, y = launch_points(rays, slope)
+    shifted = launch(x + dx, y + dy, slope, lens.object_distance_mm)
     return replace(shifted, fate=rays.fate)
 
 

@@ -11,7 +11,7 @@ from camkit.errors import ContractError
 from camkit.models_def.optics.asymmetric.turning import round_part, turned_back, turned_lens
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import pupil_centre, pupil_rays
-from camkit.models_def.optics.spot import slopes_for_heights
+from camkit.models_def.optics.spot import tangents_for_heights
 from camkit.models_def.optics.trace import surface_tensors, trace
 
 _STEPS: Final = 12
@@ -41,7 +41,7 @@ def fields_of_places(lens: Lens, places_mm: tuple[tuple[float, float], ...]) -> 
     """
     heights = torch.tensor([math.hypot(*place) for place in places_mm], dtype=torch.float64)
     with torch.no_grad():
-        slopes = slopes_for_heights(round_part(lens), heights)
+        slopes = tangents_for_heights(round_part(lens), heights, "a lens that is not round")
         shares = torch.where(heights > 0, slopes / heights, 0.0).tolist()
         return tuple(_field(lens, *at) for at in zip(places_mm, shares, strict=True))
 

@@ -12,7 +12,8 @@ from enum import IntEnum
 import torch
 
 from camkit.errors import UnsupportedError
-from camkit.models_def.optics.aiming.chief_path import WIDEST_DEG, chief_path
+from camkit.models_def.optics.aiming.chief_path import chief_path, widest_deg
+from camkit.models_def.optics.aiming.field import field_angle
 from camkit.models_def.optics.lens_file.zmx_records import Records, last
 from camkit.models_def.optics.paraxial import paraxial_data, trace_paraxial
 from camkit.models_def.optics.prescription import Lens
@@ -81,18 +82,20 @@ def with_field_points(
     if kind == FieldType.ANGLE and math.isinf(lens.object_distance_mm):
         angles = {math.fabs(to_radians(y)) if x == 0 else _skew_angle(x, y) for x, y in points}
     elif kind == FieldType.ANGLE:
-        angles = {_angle_from_vertex(lens, _skew_angle(x, y)) for x, y in points}
+        at_pupil = {_skew_angle(x, y) for x, y in points}
+        angles = {_angle_from_vertex(lens, a) if a < math.pi / 2 else a for a in at_pupil}
     else:
         heights = sorted({math.hypot(x, y) * mm_per_unit for x, y in points})
         if kind == FieldType.REAL_IMAGE_HEIGHT:
             heights, notes = _heights_within(lens, heights)
         angles = set(_angles_of_heights(lens, kind, heights))
-    angles_within = sorted(angle for angle in angles if angle < to_radians(WIDEST_DEG))
+    widest = widest_deg(lens.object_distance_mm)
+    angles_within = sorted(angle for angle in angles if angle < to_radians(widest))
     if len(angles_within) < len(angles):
         names = ", ".join(
             f"{to_degrees(angle):.4g}" for angle in sorted(angles - set(angles_within))
         )
-        note = f"fields at {names} degrees are left out: camkit aims rays up to {WIDEST_DEG}"
+        note = f"fields at {names} degrees are left out: camkit aims rays up to {widest:g}"
         notes = (*notes, note)
     return replace(lens, field_angles_rad=tuple(angles_within or [0.0])), notes
 
@@ -123,6 +126,8 @@ def _points(system: Records) -> list[tuple[float, float]]:
 
 
 def _skew_angle(x_deg: float, y_deg: float) -> float:
+    if not y_deg:
+        return math.fabs(to_radians(x_deg))
     return math.atan(math.hypot(math.tan(to_radians(x_deg)), math.tan(to_radians(y_deg))))
 
 
@@ -137,7 +142,7 @@ def _angles_of_heights(lens: Lens, field_type: FieldType, heights_mm: list[float
     near = math.isfinite(lens.object_distance_mm)
     if field_type == FieldType.REAL_IMAGE_HEIGHT:
         slopes = slopes_for_heights(lens, torch.tensor(heights_mm, dtype=torch.float64))
-        return [math.atan(abs(slope)) for slope in slopes.tolist()]
+        return field_angle(slopes.abs()).tolist()
     if field_type == FieldType.OBJECT_HEIGHT:
         if not near:
             raise UnsupportedError("object heights need an object at a finite distance")

@@ -11,6 +11,7 @@ from dataclasses import replace
 import torch
 from torch import Tensor
 
+from camkit.models_def.optics.aiming.field import is_steep
 from camkit.models_def.optics.aiming.newton import newton_aim
 from camkit.models_def.optics.aiming.start import with_open_apertures
 from camkit.models_def.optics.analysis.spots import analysis_tensors, chief_landings
@@ -42,7 +43,8 @@ def relative_illumination_of(
     """
     heights = chief_landings(lens, slopes, wavelengths_um, "stop")
     axis = torch.zeros_like(heights[:1])
-    light = sensor_light(lens, torch.cat([axis, heights]), wavelengths_um, rays)
+    steep = bool(is_steep(slopes).any())
+    light = sensor_light(lens, torch.cat([axis, heights]), wavelengths_um, rays, steep=steep)
     return light[1:] / light[:1]
 
 
@@ -58,7 +60,12 @@ def relative_illumination_at(lens: Lens, heights_mm: Tensor, rays: int = 1024) -
 
 
 def sensor_light(
-    lens: Lens, heights_mm: Tensor, wavelengths_um: Tensor, rays: int = 1024
+    lens: Lens,
+    heights_mm: Tensor,
+    wavelengths_um: Tensor,
+    rays: int = 1024,
+    *,
+    steep: bool = False,
 ) -> Tensor:
     """Return the irradiance (point, wavelength) of a scene of radiance 1; NaN where the height is.
 
@@ -70,6 +77,7 @@ def sensor_light(
         heights_mm: (point, wavelength), of points of the sensor.
         wavelengths_um: (wavelength,).
         rays: In half the stop, which the other half mirrors.
+        steep: Whether light comes from fields beyond 89.5 degrees too.
     """
     finite = torch.isfinite(heights_mm)
     place = torch.where(finite, heights_mm, 0.0)[..., None]
@@ -89,7 +97,7 @@ def sensor_light(
     with torch.no_grad():
         aimed = newton_aim(at_stop, (x, y), (x + 0 * place, y + 0 * place))
         start = rays_from(labels, 0 * place, place, aimed.x * to_label, aimed.y * to_label)
-        end = trace_to_scene(tensors, start, lens.object_distance_mm)
+        end = trace_to_scene(tensors, start, lens.object_distance_mm, steep=steep)
         share = (light_of(start, end) * aimed.weight).mean(-1)
         light = labels.area * (radius_mm * to_label) ** 2 * share
     return torch.where(finite, light, torch.nan)

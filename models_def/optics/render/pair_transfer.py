@@ -19,7 +19,7 @@ from camkit.models_def.optics.kernel_bank import ChannelResponse, gaussian_respo
 from camkit.models_def.optics.prescription import Lens, require_round, with_focus_shift
 from camkit.models_def.optics.psf import spread_tents
 from camkit.models_def.optics.pupil import half_disc, pupil_rays
-from camkit.models_def.optics.spot import chief_heights, slopes_for_heights
+from camkit.models_def.optics.spot import chief_heights, tangents_for_heights
 from camkit.models_def.optics.trace import surface_tensors, trace
 from camkit.units import UM_PER_MM
 
@@ -87,7 +87,7 @@ class _Fans:
             ContractError: If a height cannot be reached.
         """
         require_round(lens, "a transfer from half the pupil")
-        slopes = slopes_for_heights(lens, torch.from_numpy(heights_mm))
+        slopes = tangents_for_heights(lens, torch.from_numpy(heights_mm), "a traced picture")
         chief = chief_heights(lens, slopes)
         chief_slope = chief_heights(with_focus_shift(lens, 1.0), slopes) - chief
         tensors = surface_tensors(lens, torch.from_numpy(wavelengths_um)[:, None])

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
-from typing import Final
+from typing import Any, Final
 
 import torch
 from torch import Tensor
@@ -199,9 +199,10 @@ def _joined(parts: list[Landing]) -> Landing:
     def cat(values: Iterable[Tensor]) -> Tensor:
         return torch.cat(list(values))
 
-    names = [f.name for f in fields(Rays) if f.name != "path_mm"]
+    names = [f.name for f in fields(Rays) if f.name not in {"path_mm", "steep"}]
+    columns: dict[str, Any] = {n: cat(getattr(p.rays, n) for p in parts) for n in names}
     return Landing(
-        rays=Rays(**{name: cat(getattr(p.rays, name) for p in parts) for name in names}),
+        rays=Rays(**columns),
         **{f.name: cat(getattr(p, f.name) for p in parts) for f in fields(Landing)[1:]},
     )
 

@@ -15,11 +15,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Final
+from typing import Any, Final
 
 import torch
 from torch import Tensor
 
+from camkit.models_def.optics.aiming.field import widest_tangent
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import hexapolar, pupil_rays, with_fixed_stop
 from camkit.models_def.optics.tolerance.deviation import Deviations
@@ -71,7 +72,7 @@ def aperture_radii_mm(lens: Lens) -> tuple[float, ...]:
         return tuple(radii)
     fixed = with_fixed_stop(lens)
     tensors = surface_tensors(fixed, torch.tensor([lens.reference_wavelength_um]))
-    edge = math.tan(max(lens.field_angles_rad, default=0.0))
+    edge = widest_tangent(lens.field_angles_rad, "tolerancing")
     slopes = torch.tensor([0.0, edge], dtype=torch.float64)[:, None, None]
     surface_rays: list[Rays] = []
     with torch.no_grad():
@@ -160,9 +161,10 @@ def refract_at_figure(figure: Figure, tensors: SurfaceTensors, rays: Rays, i: in
     }
     reflects = hits.valid & (square <= 0)
     keep = hits.valid & ~reflects
+    columns: dict[str, Any] = {k: torch.where(keep, v, getattr(hits, k)) for k, v in bent.items()}
     return replace(
         hits,
-        **{k: torch.where(keep, v, getattr(hits, k)) for k, v in bent.items()},
+        **columns,
         fate=torch.where(reflects, int(Fate.TOTAL_REFLECTION), hits.fate).to(torch.int8),
     )
 

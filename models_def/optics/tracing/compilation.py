@@ -2,7 +2,8 @@
 
 The loop keeps a ray in registers through all surfaces, and the backward loop traces it again
 instead of reading it from memory. Both are compiled on first use for a layout of surfaces (which
-are aspheric, how many terms, which gradients); numbers of the lens and of rays may change.
+are aspheric, how many terms, which gradients) and kept between processes (`stored_loop`); numbers
+of the lens and of rays may change.
 """
 
 import contextlib
@@ -10,7 +11,7 @@ import functools
 import itertools
 import logging
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Final, NamedTuple
 
@@ -31,27 +32,41 @@ from camkit.models_def.optics.tracing.kernel import (
     run,
 )
 from camkit.models_def.optics.tracing.meeting import State
+from camkit.models_def.optics.tracing.stored_loop import (
+    Layout,
+    Loop,
+    StoredLoop,
+    layout_of,
+    stored_path,
+)
 
 _LOG = logging.getLogger(__name__)
 _COMPILERS: Final = ("g++", "clang++", "c++", "cl")
-_RECOMPILATIONS: Final = 64
 _FORWARD_RAYS: Final = 131_072
 _BACKWARD_RAYS: Final = 32_768
 _PLAIN: Final = 6
 """So many tensors has a lens of conics and even aspheres."""
 
-Loop = Callable[..., tuple[Tensor, ...]]
-
 
 @functools.cache
 def compiler_fault() -> str | None:
-    """Return why nothing can be compiled here, after one trial; None if it can."""
-    if not any(map(shutil.which, _COMPILERS)):
+    """Return why nothing can be compiled here, after one trial; None if it can.
+
+    A trial that succeeds is remembered by an empty file beside the stored loops.
+    """
+    compilers = [path for path in map(shutil.which, _COMPILERS) if path]
+    if not compilers:
         return f"no C++ compiler found (looked for {', '.join(_COMPILERS)})"
+    done = stored_path(tuple(compilers), "works")
+    if done.exists():
+        return None
     try:
         torch.compile(lambda x: x * 2 + 1, fullgraph=True)(torch.ones(8))
     except (RuntimeError, OSError, ImportError) as error:
         return f"torch.compile failed: {error}"
+    with contextlib.suppress(OSError):
+        done.parent.mkdir(parents=True, exist_ok=True)
+        done.touch()
     return None
 
 
@@ -73,13 +88,13 @@ class Fused:
 
     def run(self, settings: TraceSettings, lens: LensTensors, rays: State, fate: Tensor) -> Result:
         """Trace a block; the plain way if three Newton steps are not enough for some ray."""
-        loop = _forward(replace(settings, adaptive=False))
         parts = []
         rows = [*_rows(lens, fate.shape)]
         for row in rows:
-            values = [v[row.rays].flatten() for v in (*rays, fate)]
-            with _patience():
-                parts.append(loop(_loop_inputs(settings, row.lens), State(*values[:6]), values[6]))
+            values = _columns(v[row.rays].flatten() for v in (*rays, fate))
+            lens_numbers = _columns(_loop_inputs(settings, row.lens))
+            loop = _forward(replace(settings, adaptive=False), layout_of(lens_numbers))
+            parts.append(loop(*lens_numbers, *values))
         end = [_joined(column, rows, fate.shape) for column in zip(*parts, strict=True)]
         if any(settings.aspheric) and bool((end[6] == NOT_CONVERGED).any()):
             return Eager().run(settings, lens, rays, fate)
@@ -90,15 +105,15 @@ class Fused:
         if task.record is not None:
             return Eager().pull(task, lens, rays, fate)
         needs, path = task.needs, task.slopes.path
-        loop = _backward(replace(task.settings, adaptive=False), needs)
         columns = (*rays, fate, *task.slopes.end, *([] if path is None else [path]))
         of_rays = [torch.empty_like(rays.x, memory_format=torch.contiguous_format) for _ in rays]
         of_lens = LensTensors(*(torch.zeros_like(v) for v in lens))
         for row in _rows(lens, fate.shape):
-            v = [value[row.rays].flatten() for value in columns]
-            with _patience():
-                lens_numbers = _loop_inputs(task.settings, row.lens)
-                slopes = list(loop(lens_numbers, State(*v[:6]), v[6], State(*v[7:13]), *v[13:]))
+            values = _columns(value[row.rays].flatten() for value in columns)
+            lens_numbers = _columns(_loop_inputs(task.settings, row.lens))
+            settings = replace(task.settings, adaptive=False, path=path is not None)
+            loop = _backward(settings, needs, layout_of(lens_numbers))
+            slopes = list(loop(*lens_numbers, *values))
             for whole in of_rays if needs.rays else []:
                 whole[row.rays] = slopes.pop(0).reshape(whole[row.rays].shape)
             _add(needs, of_lens, row, [float(g.sum()) for g in slopes])
@@ -180,27 +195,29 @@ def _whole(values: tuple[Tensor, ...]) -> LensTensors:
     return LensTensors(*values, none, none, none)  # type: ignore[call-arg]
 
 
+def _columns(values: Iterable[Tensor]) -> list[Tensor]:
+    """Return tensors as a loop takes them: their strides and gradients are no part of it."""
+    return [value.detach().contiguous() for value in values]
+
+
 @functools.cache
-def _forward(settings: TraceSettings) -> Loop:
-    def fused(values: tuple[Tensor, ...], rays: State, fate: Tensor) -> tuple[Tensor, ...]:
-        lens = _whole(values)
-        result = run(settings, numbers(lens, settings), rays, fate)
+def _forward(settings: TraceSettings, layout: Layout) -> Loop:
+    def fused(*columns: Tensor) -> tuple[Tensor, ...]:
+        lens = _whole(columns[:-7])
+        result = run(settings, numbers(lens, settings), State(*columns[-7:-1]), columns[-1])
         path = () if result.path is None else (result.path,)
         return (*result.end, result.record.fate, *path)
 
-    return torch.compile(fused, fullgraph=True, dynamic=True)
+    return StoredLoop(fused, ("forward", settings, layout))
 
 
 @functools.cache
-def _backward(settings: TraceSettings, needs: GradientNeeds) -> Loop:
-    def fused(
-        values: tuple[Tensor, ...],
-        rays: State,
-        fate: Tensor,
-        end: State,
-        path: Tensor | None = None,
-    ) -> tuple[Tensor, ...]:
-        lens = _whole(values)
+def _backward(settings: TraceSettings, needs: GradientNeeds, layout: Layout) -> Loop:
+    def fused(*columns: Tensor) -> tuple[Tensor, ...]:
+        path = columns[-1] if settings.path else None
+        of_rays = columns[-14:-1] if settings.path else columns[-13:]
+        lens = _whole(columns[: -14 if settings.path else -13])
+        rays, fate, end = State(*of_rays[:6]), of_rays[6], State(*of_rays[7:])
         surfaces = numbers(lens, settings)
         record = run(settings, surfaces, rays, fate).record
         slopes = Slopes(end, path, [None] * len(surfaces))
@@ -218,14 +235,4 @@ def _backward(settings: TraceSettings, needs: GradientNeeds) -> Loop:
         needed_columns = [v for v, flag in zip(lists, _flags(needs), strict=True) if flag]
         return (*(gradients.rays or ()), *(v for column in needed_columns for v in column))
 
-    return torch.compile(fused, fullgraph=True, dynamic=True)
-
-
-@contextlib.contextmanager
-def _patience() -> Iterator[None]:
-    """Allow as many layouts of lenses as a session may use."""
-    # imported here: it takes a second that a plain trace need not wait for
-    from torch._dynamo import config
-
-    with config.patch(recompile_limit=_RECOMPILATIONS), torch.no_grad():
-        yield
+    return StoredLoop(fused, ("backward", settings, needs, layout))

@@ -98,7 +98,7 @@ def test_files_round_trip(tmp_path: Path) -> None:
         (("f_number = 4.0", ""), "exactly one of"),
         (("f_number = 4.0", "f_number = 4.0\nstop_semi_diameter_mm = 3.0"), "exactly one of"),
         (("[0.5]", "[500.0]"), "wavelengths"),
-        (("[0.0, 10.0]", "[95.0]"), "field angles"),
+        (("[0.0, 10.0]", "[145.0]"), "field angles"),
         (("object_distance_mm = inf", "object_distance_mm = -5"), "object_distance_mm"),
         (
             ("even_asphere = [0.0, 1e-6]", "even_asphere = 1"),

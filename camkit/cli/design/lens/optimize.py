@@ -248,6 +248,7 @@ def _numbers(text: str) -> tuple[float, ...]:
 def _problem(free: "FreeLens", *, merit: str, core_mm: float, rays: int) -> "Problem":
     import torch
 
+    from camkit.models_def.optics.aiming.field import widest_tangent
     from camkit.models_def.optics.pupil import half_disc
     from camkit.models_def.optics.search.limits import Limits
     from camkit.models_def.optics.search.problem import Problem
@@ -259,6 +260,7 @@ def _problem(free: "FreeLens", *, merit: str, core_mm: float, rays: int) -> "Pro
     waves = lens.wavelengths_um
     if len(waves) % 2 == 0:
         waves = tuple(sorted((*waves, lens.reference_wavelength_um)))
+    widest_tangent(lens.field_angles_rad, "optimisation")
     angles = torch.tensor(sorted({0.0, *lens.field_angles_rad}), dtype=torch.float64)
     return Problem(
         free=free,

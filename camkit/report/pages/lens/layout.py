@@ -82,6 +82,11 @@ def _ray_paths(facts: LensFacts, field: int) -> tuple[Tensor, Tensor]:
         z.append(torch.where(rays.valid, rays.z + place, math.nan)[0, 0])
         y.append(torch.where(rays.valid, rays.y, math.nan)[0, 0])
     lead = -_LEAD * (vertices[-1] - vertices[0])
+    if beams.rays.steep:
+        # back along each ray from where it meets the first surface
+        z.insert(0, z[0] + lead * beams.rays.n[0, 0])
+        y.insert(0, y[0] + lead * beams.rays.m[0, 0])
+        return torch.stack(z), torch.stack(y)
     lean = (beams.rays.m / beams.rays.n)[0, 0]
     start = torch.full_like(z[0], min(lead, float(torch.nan_to_num(z[0]).min()) + lead))
     z.insert(0, start)

@@ -7,6 +7,7 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
+from camkit.models_def.optics.aiming.field import field_slope
 from camkit.models_def.optics.analysis.curves import (
     axial_colour_mm,
     distortion,
@@ -210,13 +211,14 @@ def draw_field(facts: LensFacts) -> Figure:
     # not the axis itself, where distortion is no number
     angles = torch.linspace(largest / 100, largest, _POINTS, dtype=torch.float64)
     degrees = torch.rad2deg(angles)
-    foci = field_curvature(lens, torch.tan(angles), facts.wavelengths_um, facts.pupil.definition)
-    share = distortion(lens, torch.tan(angles), facts.wavelengths_um, facts.pupil.definition)
+    foci = field_curvature(lens, field_slope(angles), facts.wavelengths_um, facts.pupil.definition)
+    share = distortion(lens, field_slope(angles), facts.wavelengths_um, facts.pupil.definition)
     for j, wave in enumerate(lens.wavelengths_um):
         color, name = wave_color(wave), f"{wave:.4g} µm"
         left.plot(foci.tangential_mm[:, j], degrees, color=color, label=f"{name} T")
         left.plot(foci.sagittal_mm[:, j], degrees, color=color, linestyle="--", label=f"{name} S")
         middle.plot(100 * share[:, j], degrees, color=color, label=name)
+    middle.set_ylim(left.get_ylim())
     for panel in (left, middle):
         panel.axvline(0, color="black", linewidth=0.8)
         panel.legend()
@@ -228,11 +230,11 @@ def _draw_light(panel: Panel, facts: LensFacts, largest_rad: float) -> None:
     reference = torch.tensor([facts.lens.reference_wavelength_um], dtype=torch.float64)
     few = torch.linspace(0, largest_rad, _LIGHT_POINTS, dtype=torch.float64)
     try:
-        light = relative_illumination_of(facts.lens, torch.tan(few), reference)[:, 0]
+        light = relative_illumination_of(facts.lens, field_slope(few), reference)[:, 0]
     except ContractError:
         light = torch.full_like(few, math.nan)
     panel.plot(torch.rad2deg(few), light, color="#333333", label="lens")
-    cos4 = torch.cos(few) ** 4
+    cos4 = torch.cos(few).clamp_min(0) ** 4
     panel.plot(torch.rad2deg(few), cos4, color="#999999", linestyle=":", label="cos$^4$")
     panel.set(
         ylim=(0, max(1.05, float(torch.nan_to_num(light).max()) * 1.05)),
@@ -250,8 +252,8 @@ def draw_colour(facts: LensFacts) -> Figure:
     left, middle, right = figure.subplots(1, 3)
     zone = torch.linspace(0.02, 1, _POINTS, dtype=torch.float64)
     cross = longitudinal_mm(lens, zone, waves)
-    slopes = torch.tan(torch.linspace(0, max(lens.field_angles_rad), _POINTS, dtype=torch.float64))
-    degrees = torch.rad2deg(torch.atan(slopes))
+    angles = torch.linspace(0, max(lens.field_angles_rad), _POINTS, dtype=torch.float64)
+    slopes, degrees = field_slope(angles), torch.rad2deg(angles)
     lateral_um = lateral_colour_mm(lens, slopes, waves, facts.pupil.definition) * UM_PER_MM
     for j, wave in enumerate(lens.wavelengths_um):
         color, label = wave_color(wave), f"{wave:.4g} µm"

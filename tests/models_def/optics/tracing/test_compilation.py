@@ -85,6 +85,8 @@ def test_without_a_compiler_the_plain_trace_runs_and_says_so(
 
 
 @pytest.mark.slow
+# torch itself uses what it deprecates
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
 @pytest.mark.parametrize("r4", [0.0, 1e-7])
 def test_compiled_trace_equals_the_plain_one(r4: float) -> None:
     lens = cooke_tensors(torch.float32, conic=-0.1, r4=r4)
