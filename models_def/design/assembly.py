@@ -1,6 +1,7 @@
 """A recipe turned into the parts of a loop."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +11,7 @@ from torch import Tensor, nn
 from camkit.cfa import CFA_PATTERNS
 from camkit.errors import ContractError
 from camkit.models_def.design.descent import Descending, descended
-from camkit.models_def.design.design_recipe import DesignRecipe, OpticsRecipe
+from camkit.models_def.design.design_recipe import DesignRecipe, OpticsRecipe, PhaseRecipe
 from camkit.models_def.design.lens import DesignLens
 from camkit.models_def.design.lens_module import (
     WIDEST_PX,
@@ -46,6 +47,7 @@ from camkit.units import to_radians
 def problem_of(recipe: DesignRecipe, lens: Lens) -> Problem:
     """Return the fields, wavelengths and depths of a recipe, and what is free of a lens."""
     optics = recipe.optics
+    lens = with_phases(lens, recipe.phases)
     if optics.object_distances_mm:
         lens = refocused(lens, optics.focus_distance_mm or optics.object_distances_mm[0])
     if optics.f_number:
@@ -89,6 +91,7 @@ def _problem_at(recipe: DesignRecipe, free: FreeLens, slopes: Tensor) -> Problem
     return Problem(
         free=free,
         slopes=slopes,
+        azimuths_rad=field_azimuths(optics),
         wavelengths_um=torch.tensor(recipe.pixels.wavelengths_um, dtype=torch.float64),
         object_distances_mm=optics.object_distances_mm,
         samples=half_disc(optics.pupil_rays),
@@ -106,11 +109,40 @@ def refocused(lens: Lens, distance_mm: float) -> Lens:
 
 
 def field_slopes(optics: OpticsRecipe) -> Tensor:
-    """Return the fields (field,) as slopes, spaced as the recipe says."""
+    """Return the fields (field,) as slopes, spaced as the recipe says.
+
+    With azimuths each slope but that of the axis stands once for each of them.
+    """
     edge_slope = math.tan(to_radians(optics.half_field_deg))
     steps = torch.linspace(0, 1, optics.fields, dtype=torch.float64)
     slopes: Tensor = edge_slope * (steps.sqrt() if optics.spacing == "area" else steps)
-    return slopes
+    times = max(1, len(optics.azimuths_deg))
+    return torch.cat([slopes[:1], slopes[1:].repeat_interleave(times)])
+
+
+def field_azimuths(optics: OpticsRecipe) -> Tensor | None:
+    """Return the azimuths (field,) of the fields in radians; None where all lie along +y."""
+    if not optics.azimuths_deg:
+        return None
+    azimuths = torch.deg2rad(torch.tensor(optics.azimuths_deg, dtype=torch.float64))
+    return torch.cat([azimuths.new_zeros(1), azimuths.repeat(optics.fields - 1)])
+
+
+def with_phases(lens: Lens, phases: Sequence[PhaseRecipe]) -> Lens:
+    """Return the lens with the phases that a recipe adds to its surfaces.
+
+    Raises:
+        ContractError: If there is no such surface, or it has a phase already.
+    """
+    surfaces = list(lens.surfaces)
+    for added in phases:
+        if not 0 <= added.surface < len(surfaces) or surfaces[added.surface].phase is not None:
+            raise ContractError(
+                f"a [[phase]] needs a surface 0..{len(surfaces) - 1} without a phase; got "
+                f"{added.surface}"
+            )
+        surfaces[added.surface] = replace(surfaces[added.surface], phase=added.phase)
+    return replace(lens, surfaces=tuple(surfaces))
 
 
 def pixels_of(recipe: DesignRecipe, *views: tuple[Problem, Tensor]) -> Pixels:
@@ -128,6 +160,8 @@ def pixels_of(recipe: DesignRecipe, *views: tuple[Problem, Tensor]) -> Pixels:
         window_follows=recipe.camera is not None,
     )
     regime = checked_regime(recipe.optics.psf_model, "optics.psf_model")
+    if any(problem.whole_pupil for problem, _ in views):
+        regime = "rays"
     if regime is None:
         models = [
             model

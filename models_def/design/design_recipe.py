@@ -1,12 +1,12 @@
 """A joint design as TOML: which lens, what of it is free, what it looks at, what recovers it."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, Literal, TypeVar, get_args
 
 from camkit.caller import option_text
-from camkit.errors import ContractError
+from camkit.errors import ContractError, UnsupportedError
 from camkit.models_def.design.expected import Descent
 from camkit.models_def.design.front import Front
 from camkit.models_def.design.lens_module import MoveUnits
@@ -19,6 +19,7 @@ from camkit.models_def.optics.analysis.psf_model import checked_regime
 from camkit.models_def.optics.search.joint_states import JointVariable
 from camkit.models_def.optics.search.limits import Limits
 from camkit.models_def.optics.search.variables import Variable
+from camkit.models_def.optics.shape.phase import Phase, parse_monomials
 from camkit.models_def.optics.tolerance.uniform_errors import FabricationErrors
 from camkit.models_def.toml_table import check_keys, faults_of, section, table_digest, typed
 from camkit.models_def.training.recipe import SceneRecipe
@@ -29,8 +30,10 @@ Spacing = Literal["height", "area"]
 
 _KEYS: Final = {
     *("name", "prescription", "vary", "optics", "limits", "pixels", "front", "network", "loss"),
-    *("schedule", "data", "starts", "fabrication", "camera", "descent"),
+    *("schedule", "data", "starts", "fabrication", "camera", "descent", "phase"),
 }
+
+_LATER_KEYS: Final = (("optics", "psf_model"), ("optics", "azimuths_deg"), ("starts", "depth_mm"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,6 +57,9 @@ class OpticsRecipe:
         f_number: Of the lens; 0 for that of the prescription.
         configurations: Names of the states of the lens that count, or "all"; empty for one state.
             Fields are then those of the first, and the same image heights of the others.
+        azimuths_deg: Of the images of the fields, from +y towards +x: each but the axis is looked
+            at from all of them, by rays through the whole pupil, as a lens that is not round
+            needs. Empty for +y alone.
         psf_model: "rays", "waves", or empty for waves where the lens at the start is that sharp;
             see `camkit.models_def.optics.analysis.psf_model`.
     """
@@ -71,6 +77,7 @@ class OpticsRecipe:
     units: MoveUnits = "range"
     f_number: float = 0.0
     configurations: tuple[str, ...] = ()
+    azimuths_deg: tuple[float, ...] = ()
     psf_model: str = ""
 
     def __post_init__(self) -> None:
@@ -87,7 +94,8 @@ class OpticsRecipe:
                 f"focus_distance_mm must be one of object_distances_mm "
                 f"{list(self.object_distances_mm)} (or 0); got {self.focus_distance_mm}"
             )
-        checked_regime(self.psf_model, "optics.psf_model")
+        if checked_regime(self.psf_model, "optics.psf_model") == "waves" and self.azimuths_deg:
+            raise UnsupportedError("waves are summed along +y: leave out azimuths_deg or psf_model")
         alone = ("rides", "efl_mm", "object_distances_mm", "f_number")
         if self.configurations and any(names := [n for n in alone if getattr(self, n)]):
             raise ContractError(
@@ -96,6 +104,39 @@ class OpticsRecipe:
             )
         if self.whiten and self.units != "range":
             raise ContractError("whitened moves have no units: set whiten = false or leave units")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PhaseRecipe:
+    """A phase plate or diffractive surface that the lens at the start has besides.
+
+    Attributes:
+        surface: That it lies on.
+        radius_mm: To which r, x and y are normalised.
+        radial_rad: Coefficients of (r / radius)^2, (r / radius)^4, ...
+        free_rad: Coefficients by the name of a term in x and y, such as x3.
+        order: Of diffraction.
+    """
+
+    surface: int
+    radius_mm: float
+    radial_rad: tuple[float, ...] = ()
+    free_rad: Mapping[str, float] = field(default_factory=dict)
+    order: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not self.phase.coefficients:
+            raise ContractError("a [[phase]] needs radial_rad or free_rad")
+
+    @property
+    def phase(self) -> Phase:
+        """The phase of the surface."""
+        return Phase(
+            radius_mm=self.radius_mm,
+            radial_rad=self.radial_rad,
+            free_rad=parse_monomials(self.free_rad),
+            order=self.order,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -163,6 +204,7 @@ class DesignRecipe:
         prescription: Name of a built-in prescription or path of a lens file.
         variables: What of the lens is free.
         state_variables: Gaps that are free in one configuration each.
+        phases: That the lens at the start has besides.
         starts: How many lenses near it are tried first.
         fabrication: Errors of the copies that captures are made with; None for the lens itself.
         camera: Whose bank stands in front, where `front` restores colours together.
@@ -185,6 +227,7 @@ class DesignRecipe:
     camera: CameraChoice | None = None
     descent: Descent | None = None
     state_variables: tuple[JointVariable, ...] = ()
+    phases: tuple[PhaseRecipe, ...] = ()
 
 
 def read_design(path: Path) -> DesignRecipe:
@@ -204,9 +247,11 @@ def to_design(table: Mapping[str, Any]) -> DesignRecipe:
     for key in ("name", "prescription", "vary", "optics", "pixels"):
         if key not in table:
             raise ContractError(f"design recipe lacks {key}")
-    free = table["vary"]
+    free, phases = table["vary"], table.get("phase", [])
     if not isinstance(free, list):
         raise ContractError("what varies must be written as [[vary]] tables")
+    if not isinstance(phases, list):
+        raise ContractError("added phases must be written as [[phase]] tables")
     variables = [_variable(f"vary[{i}]", one) for i, one in enumerate(free)]
     network = {"config": {}, **dict(table.get("network", {}))}
     recipe = DesignRecipe(
@@ -214,6 +259,7 @@ def to_design(table: Mapping[str, Any]) -> DesignRecipe:
         prescription=typed("prescription", table["prescription"], str),
         variables=tuple(v.variable for v in variables if not v.state),
         state_variables=tuple(v for v in variables if v.state),
+        phases=tuple(section(f"phase[{i}]", PhaseRecipe, p) for i, p in enumerate(phases)),
         optics=section("optics", OpticsRecipe, table["optics"]),
         limits=section("limits", Limits, table.get("limits", {})),
         pixels=section("pixels", PixelRecipe, table["pixels"]),
@@ -256,6 +302,8 @@ def _check_states(recipe: DesignRecipe) -> None:
         return
     if recipe.starts.searches or recipe.starts.library or recipe.descent is not None:
         raise ContractError("several configurations begin at the lens: leave starts, descent out")
+    if recipe.phases or recipe.optics.azimuths_deg:
+        raise UnsupportedError("several configurations take no [[phase]] and no azimuths_deg yet")
     if not recipe.front.depth_known:
         raise ContractError("several configurations are known to the filter: set depth_known")
 
@@ -302,13 +350,16 @@ def with_choices(
 def recipe_digest(recipe: DesignRecipe) -> str:
     """Return a hash of all that decides a run."""
     table = {name: value for name, value in asdict(recipe).items() if value is not None}
-    if not recipe.optics.psf_model:  # likewise from before there were waves
-        del table["optics"]["psf_model"]
+    for part, key in _LATER_KEYS:  # designs from before there were waves, plates, ... can go on
+        if not table[part][key]:
+            del table[part][key]
+    if not recipe.phases:
+        del table["phases"]
     if recipe.limits.max_steepness == Limits().max_steepness:  # it could not be chosen
         del table["limits"]["max_steepness"]
     if not recipe.optics.configurations:  # nor configurations
         del table["optics"]["configurations"], table["state_variables"]
-    if not recipe.network.start:  # designs from before there were first weights can go on
+    if not recipe.network.start:  # nor first weights
         for key in ("start", "start_size"):
             del table["network"][key]
     if not recipe.starts.library:  # nor was there a library

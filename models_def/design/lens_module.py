@@ -111,7 +111,8 @@ class LensKernels:
         change: Change | None = None,
     ) -> Tensor:
         """Return the kernels (field, 3, k, k) by rays, those of sharp fields by waves if wanted."""
-        rays = splat_batch(traced.landings, self.pixels)[0]
+        whole_pupil = self.problem.whole_pupil
+        rays = splat_batch(traced.landings, self.pixels, whole_pupil=whole_pupil)[0]
         if not bool(sharp.any()):
             return rays
         waves, summed = wave_batch(
@@ -230,7 +231,11 @@ def fitting_window_px(problem: Problem, scaled: Tensor, pixels: Pixels) -> int:
     with torch.no_grad():
         kernels = torch.stack(
             [
-                splat_batch(trace_batch(problem, scaled[None], depth_mm).landings, wide)[0]
+                splat_batch(
+                    trace_batch(problem, scaled[None], depth_mm).landings,
+                    wide,
+                    whole_pupil=problem.whole_pupil,
+                )[0]
                 for depth_mm in problem.depths_mm
             ]
         )

@@ -23,6 +23,7 @@ from camkit.models_def.optics.pupil import half_disc
 from camkit.models_def.optics.search.improvement import Improvement, improve
 from camkit.models_def.optics.search.problem import Problem
 from camkit.models_def.optics.search.spot_residuals import MERITS, Merit
+from camkit.models_def.optics.search.variables import FreeLens
 
 T = TypeVar("T")
 
@@ -44,6 +45,8 @@ class Starts:
         scout_steps: Steps of damped least squares for each.
         dls_steps: Further steps for the best quarter.
         seed: Of the draws.
+        depth_mm: The search looks at this depth alone, at the lens without phases: a plate blurs
+            for all depths what is sharp at one. 0: it looks at what the design looks at.
         library: Whether the search begins at the built-in lenses too, scaled to the recipe.
         library_lenses: How many of them go on, those with the best spots; they share the count.
         elements: Of these lenses, cemented ones counted one by one; 0 for any.
@@ -58,17 +61,20 @@ class Starts:
     scout_steps: int = 5
     dls_steps: int = 20
     seed: int = 1
+    depth_mm: float = 0.0
     library: bool = False
     library_lenses: int = 4
     elements: int = 0
 
     def __post_init__(self) -> None:
-        least = min(self.count, self.scout_steps, self.dls_steps, self.judged, self.core_um)
+        counts = (self.count, self.scout_steps, self.dls_steps, self.judged)
+        least = min(*counts, self.core_um, self.depth_mm)
         if self.library_lenses < 1 or self.elements < 0:
             raise ContractError(f"starts needs library_lenses >= 1 and elements >= 0; got {self}")
         if least < 0 or not (0 <= self.spread <= 1 and 0 <= self.anywhere <= 1):
             raise ContractError(
-                f"starts needs counts >= 0, core_um >= 0, spread and anywhere in 0..1; got {self}"
+                "starts needs counts >= 0, core_um and depth_mm >= 0, spread and anywhere in 0..1; "
+                f"got {self}"
             )
         if self.merit not in MERITS:
             raise ContractError(f"starts.merit is one of {', '.join(MERITS)}; got {self.merit!r}")
@@ -105,14 +111,27 @@ def best_starts(problem: Problem, starts: Starts) -> Tensor:
     begin = problem.free.scaled()
     if starts.count == 0:
         return begin[None]
-    search = _improved(_search_of(problem, starts), begin, starts, starts.count)
+    looked, is_sought = _search_of(problem, starts), torch.ones(len(begin), dtype=torch.bool)
+    if starts.depth_mm:
+        free = _without_phases(problem.free)
+        looked = replace(looked, free=free)
+        is_sought = torch.tensor([v in free.variables for v in problem.free.variables])
+    search = _improved(looked, begin[is_sought], starts, starts.count)
     if not np.isfinite(search.merit):
         raise ContractError(
             f"none of {starts.count} starts near {problem.free.lens.name} forms an image; give "
             "another lens to start from, or tighter bounds"
         )
-    formed = search.ends[np.isfinite(search.merits)]
+    ends = search.ends[np.isfinite(search.merits)]
+    formed = begin.repeat(len(ends), 1)
+    formed[:, is_sought] = ends
     return formed[:1] if not starts.judged else torch.cat([formed[: starts.judged], begin[None]])
+
+
+def _without_phases(free: FreeLens) -> FreeLens:
+    surfaces = tuple(replace(surface, phase=None) for surface in free.lens.surfaces)
+    variables = tuple(v for v in free.variables if v.kind != "phase")
+    return replace(free, lens=replace(free.lens, surfaces=surfaces), variables=variables)
 
 
 def _search_of(problem: Problem, starts: Starts) -> Problem:
@@ -122,6 +141,7 @@ def _search_of(problem: Problem, starts: Starts) -> Problem:
         samples=half_disc(_PUPIL_RAYS),
         merit=starts.merit,
         core_mm=starts.core_um / 1000 or problem.core_mm,
+        object_distances_mm=(starts.depth_mm,) if starts.depth_mm else problem.object_distances_mm,
     )
 
 
@@ -150,8 +170,10 @@ def library_starts(
         omit: Names of built-in lenses that are not looked at.
 
     Raises:
-        ContractError: If no lens can serve, or none has finite spots.
+        ContractError: If no lens can serve, none has finite spots, or the recipe adds a phase.
     """
+    if any(surface.phase for surface in problem.free.lens.surfaces):
+        raise ContractError("the library has no lens with a phase: search without starts.library")
     library = library_of(problem, starts.elements, omit=omit)
     search = _search_of(problem, starts)
     best = rank_starts(library.starts, search, starts.scout_steps)[: starts.library_lenses]

@@ -284,8 +284,13 @@ class Lens:
         return not skewed and all(phase is None or phase.is_round for phase in phases)
 
 
-def require_round(lens: Lens, what: str) -> None:
+def require_round(lens: Lens, what: str, *, allow_phases: bool = False) -> None:
     """Refuse a lens that is not round where only its fields along +y are looked at.
+
+    Args:
+        lens: The prescription.
+        what: That needs it round, for the message.
+        allow_phases: Whether a free phase may stand in it.
 
     Raises:
         UnsupportedError: Naming what makes it uneven.
@@ -293,7 +298,7 @@ def require_round(lens: Lens, what: str) -> None:
     for i, surface in enumerate(lens.surfaces):
         if surface.stance is not None:
             raise UnsupportedError(f"{what} needs a round lens; surface {i} is tilted or decentred")
-        if surface.phase is not None and not surface.phase.is_round:
+        if not (allow_phases or surface.phase is None or surface.phase.is_round):
             raise UnsupportedError(f"{what} needs a round lens; surface {i} has a free phase")
 
 

@@ -37,13 +37,14 @@ class TracedPsf:
     energy_kept: Tensor
 
 
-def splat(spots: Spots, size_px: int, pitch_um: float) -> TracedPsf:
+def splat(spots: Spots, size_px: int, pitch_um: float, *, whole_pupil: bool = False) -> TracedPsf:
     """Convert half-pupil spots (mirrored at x = 0) to kernels centred on the chief ray.
 
     Args:
         spots: Rays with x >= 0 in the pupil.
         size_px: Odd kernel side.
         pitch_um: Sensor pitch.
+        whole_pupil: Whether the rays are those of both halves, which nothing mirrors.
 
     Raises:
         ContractError: If the side is even, or no light falls into a kernel.
@@ -53,9 +54,10 @@ def splat(spots: Spots, size_px: int, pitch_um: float) -> TracedPsf:
     scale, centre = UM_PER_MM / pitch_um, (size_px - 1) / 2
     column = spots.x_mm * scale + centre
     row = (spots.y_mm - spots.chief_y_mm[:, None, None]) * scale + centre
-    kernels = spread_tents(row, column, spots.weight, size_px)
-    kernels = kernels + kernels.flip(-1)
-    return as_psf(kernels, 2 * spots.weight.sum(-1))
+    light = spread_tents(row, column, spots.weight, size_px)
+    if whole_pupil:
+        return as_psf(light, spots.weight.sum(-1))
+    return as_psf(light + light.flip(-1), 2 * spots.weight.sum(-1))
 
 
 def as_psf(light: Tensor, whole: Tensor) -> TracedPsf:

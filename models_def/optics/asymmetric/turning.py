@@ -1,8 +1,8 @@
 """A lens turned about its axis, and its round part."""
 
-import math
 from dataclasses import replace
 
+import torch
 from torch import Tensor
 
 from camkit.models_def.optics.prescription import Lens, Surface
@@ -39,7 +39,8 @@ def _round_part(surface: Surface) -> Surface:
     return replace(surface, stance=None, phase=phase)
 
 
-def turned_back(x: Tensor, y: Tensor, azimuth_rad: float) -> tuple[Tensor, Tensor]:
-    """Return points of the turned lens on the sensor as it lies."""
-    cos, sin = math.cos(azimuth_rad), math.sin(azimuth_rad)
+def turned_back(x: Tensor, y: Tensor, azimuth_rad: float | Tensor) -> tuple[Tensor, Tensor]:
+    """Return points of the turned lens on the sensor as it lies; azimuths broadcast with them."""
+    azimuth = torch.as_tensor(azimuth_rad, dtype=torch.float64)
+    cos, sin = torch.cos(azimuth), torch.sin(azimuth)
     return cos * x + sin * y, cos * y - sin * x

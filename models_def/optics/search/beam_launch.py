@@ -5,12 +5,14 @@ stop passes is measured afterwards (`pupil`, definition `stop`).
 """
 
 import math
+from dataclasses import replace
 from typing import Final
 
 import torch
 from torch import Tensor
 
 from camkit.models_def.optics.aiming.start import launch
+from camkit.models_def.optics.asymmetric.turning import turned_back
 from camkit.models_def.optics.paraxial import entrance_pupil, focal_lengths
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import PupilSamples
@@ -43,6 +45,7 @@ def launch_beam(
     samples: PupilSamples,
     object_distance_mm: float,
     vignetting: Tensor | None = None,
+    azimuths_rad: Tensor | None = None,
 ) -> Rays:
     """Start rays at the first vertex plane: (start, field, 1, LEAD + ray).
 
@@ -58,6 +61,7 @@ def launch_beam(
         object_distance_mm: From the first vertex; inf allowed.
         vignetting: (field, 3), what of the pupil a field fills: its middle's y, and its extent
             along y and x, in radii of the pupil; None for the whole pupil. The chief ray stays.
+        azimuths_rad: (field,), of the images of the fields, from +y towards +x; None for +y.
     """
     place, magnification = entrance_pupil(reference, lens.stop)
     radius = pupil_radius_mm(lens, reference, magnification)
@@ -71,10 +75,22 @@ def launch_beam(
     px, py = radius * unit_x, radius * unit_y
     slope = slopes[:, None, None]
     if math.isinf(object_distance_mm):
-        return launch(px, py - place * slope, slope, object_distance_mm)
+        rays = launch(px, py - place * slope, slope, object_distance_mm)
+        return _turned(rays, azimuths_rad)
     share = object_distance_mm / (object_distance_mm + place)
     top = -slope * object_distance_mm
-    return launch(px * share, top + (py - top) * share, slope, object_distance_mm)
+    rays = launch(px * share, top + (py - top) * share, slope, object_distance_mm)
+    return _turned(rays, azimuths_rad)
+
+
+def _turned(rays: Rays, azimuths_rad: Tensor | None) -> Rays:
+    """Return rays (..., field, wave, ray) of fields along +y, each turned to its azimuth."""
+    if azimuths_rad is None:
+        return rays
+    azimuths = azimuths_rad[:, None, None]
+    x, y = turned_back(rays.x, rays.y, azimuths)
+    along_x, along_y = turned_back(rays.l, rays.m, azimuths)
+    return replace(rays, x=x, y=y, l=along_x, m=along_y)
 
 
 def leading(rays: Rays) -> Rays:

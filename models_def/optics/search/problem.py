@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 import torch
 from torch import Tensor
 
-from camkit.errors import ContractError
+from camkit.errors import ContractError, UnsupportedError
+from camkit.models_def.optics.asymmetric.turning import turned_back
 from camkit.models_def.optics.paraxial import trace_paraxial
-from camkit.models_def.optics.pupil import PupilSamples, half_disc
+from camkit.models_def.optics.pupil import PupilSamples, both_halves, half_disc
 from camkit.models_def.optics.search.beam_launch import LEAD, launch_beam, leading
 from camkit.models_def.optics.search.limits import (
     Limits,
@@ -34,7 +35,7 @@ class Problem:
         wavelengths_um: (wave,), an odd number; the middle one judges distortion.
         object_distances_mm: Depths that count alike; empty for that of the lens. The sensor stays
             where the lens's own object distance puts it.
-        samples: Of half the unit disc.
+        samples: Of half the unit disc; with azimuths the other half is traced too.
         merit: Which merit of spots.
         core_mm: Its s.
         limits: What a lens must not be, seen from the depth that the sensor is focused on where
@@ -42,6 +43,8 @@ class Problem:
         merit_fields: How many fields, from the axis, the merit counts; 0 for all. The others only
             must pass their rays.
         vignetting: (field, 3), see `launch_beam`; None for whole pupils.
+        azimuths_rad: (field,), of the images, from +y towards +x, as a lens that is not round
+            needs them; None for +y, where half the pupil is enough.
     """
 
     free: FreeLens
@@ -54,6 +57,7 @@ class Problem:
     limits: Limits = field(default_factory=Limits)
     merit_fields: int = 0
     vignetting: Tensor | None = None
+    azimuths_rad: Tensor | None = None
 
     def __post_init__(self) -> None:
         if self.merit not in MERITS:
@@ -62,6 +66,20 @@ class Problem:
             raise ContractError("a problem needs an odd number of wavelengths")
         if not (self.core_mm > 0 and len(self.slopes) > 0 and float(self.slopes[0]) == 0):
             raise ContractError("a problem needs a core > 0 and fields that start at the axis")
+        if self.azimuths_rad is None and not self.free.is_round:
+            raise UnsupportedError(
+                "half the pupil and fields along +y need a round lens, and this one has a free "
+                "phase: `camkit design` takes fields at optics.azimuths_deg"
+            )
+        if self.azimuths_rad is not None and self.azimuths_rad.shape != self.slopes.shape:
+            raise ContractError(
+                f"{len(self.slopes)} fields need as many azimuths; got {len(self.azimuths_rad)}"
+            )
+
+    @property
+    def whole_pupil(self) -> bool:
+        """Return whether both halves of the pupil are traced."""
+        return self.azimuths_rad is not None
 
     @property
     def depths_mm(self) -> tuple[float, ...]:
@@ -86,7 +104,7 @@ class Traced:
         reference: The lenses at the reference wavelength.
         tensors: The lenses at all wavelengths.
         launched: The rays before the first surface, (start, field, 1, LEAD + ray).
-        landings: (start, field, wave, LEAD + ray) on the sensor, see `beam`.
+        landings: (start, field, wave, LEAD + ray) on the sensor as it lies, see `beam`.
         surface_rays: The same on every surface.
     """
 
@@ -125,9 +143,10 @@ def trace_batch(
         free.lens,
         reference,
         problem.slopes,
-        problem.samples,
+        both_halves(problem.samples) if problem.whole_pupil else problem.samples,
         object_distance_mm,
         problem.vignetting,
+        problem.azimuths_rad,
     )
     surface_rays: list[Rays] = []
     landings = trace(tensors, rays, surface_rays=surface_rays, path=path)
@@ -156,7 +175,11 @@ def residuals(problem: Problem, scaled: Tensor) -> Tensor:
     for distance_mm in problem.depths_mm:
         traced = trace_batch(problem, scaled, distance_mm)
         spots = spot_residuals(
-            traced.landings, problem.core_mm, problem.merit, fields=problem.merit_fields
+            traced.landings,
+            problem.core_mm,
+            problem.merit,
+            fields=problem.merit_fields,
+            whole_pupil=problem.whole_pupil,
         )
         parts.append(spots / math.sqrt(len(problem.depths_mm)))
         if distance_mm == problem.limited_mm:
@@ -183,10 +206,18 @@ def limits_of(problem: Problem, traced: Traced, distance_mm: float) -> Tensor:
     ]
     if math.isfinite(limits.distortion) and len(problem.slopes) > 1:
         middle = len(problem.wavelengths_um) // 2
-        chief = traced.landings.y[:, 1:, middle, 0]
+        chief = _radial(problem, traced.landings)[:, 1:, middle]
         ideal = problem.slopes[1:] * _image_scale_mm(traced.reference, distance_mm)
         parts.append(distortion_residuals(limits, chief, ideal))
     return torch.cat(parts, dim=1)
+
+
+def _radial(problem: Problem, landings: Rays) -> Tensor:
+    """Return how far along its azimuth each chief ray lands (start, field, wave)."""
+    x, y = landings.x[..., 0], landings.y[..., 0]
+    return (
+        y if problem.azimuths_rad is None else turned_back(x, y, -problem.azimuths_rad[:, None])[1]
+    )
 
 
 def _image_scale_mm(reference: SurfaceTensors, object_distance_mm: float) -> Tensor:

@@ -39,19 +39,29 @@ class Pixels:
             raise ContractError(f"pitch_um must be > 0; got {self.pitch_um}")
 
 
-def splat_batch(landings: Rays, pixels: Pixels) -> Tensor:
+def splat_batch(landings: Rays, pixels: Pixels, *, whole_pupil: bool = False) -> Tensor:
     """Return kernels (start, field, colour, k, k) about the centroid of all colours.
 
     They sum to the share of the light that falls into the window.
+
+    Args:
+        landings: (start, field, wave, LEAD + ray) on the sensor, see `beam`.
+        pixels: The sensor.
+        whole_pupil: Whether both halves were traced; half of it is mirrored at x = 0.
     """
     size, scale = pixels.kernel_px, UM_PER_MM / pixels.pitch_um
     alive = landings.valid[..., LEAD:].to(landings.x.dtype)
     x, y = landings.x[..., LEAD:] * scale, landings.y[..., LEAD:] * scale
     total = alive.sum((-2, -1), keepdim=True).clamp_min(1)
     middle = (y * alive).sum((-2, -1), keepdim=True) / total
+    middle_x = (x * alive).sum((-2, -1), keepdim=True) / total if whole_pupil else 0 * middle
     if not pixels.window_follows:
-        middle = middle.detach()
-    row, column = y - middle + (size - 1) / 2, x + (size - 1) / 2
-    half = spread_tents(row, column, alive / alive.shape[-1] / 2, size)
-    both = half + half.flip(-1)
+        middle, middle_x = middle.detach(), middle_x.detach()
+    row, column = y - middle + (size - 1) / 2, x - middle_x + (size - 1) / 2
+    share = alive / alive.shape[-1]
+    if whole_pupil:
+        both = spread_tents(row, column, share, size)
+    else:
+        half = spread_tents(row, column, share / 2, size)
+        both = half + half.flip(-1)
     return torch.einsum("cw,sfwyx->sfcyx", pixels.color_weights.to(both.dtype), both)

@@ -23,7 +23,12 @@ _LOST_RAY: Final = 1.0
 
 
 def spot_residuals(
-    landings: Rays, core_mm: float, merit: Merit = "sum_abs", *, fields: int = 0
+    landings: Rays,
+    core_mm: float,
+    merit: Merit = "sum_abs",
+    *,
+    fields: int = 0,
+    whole_pupil: bool = False,
 ) -> Tensor:
     """Return residuals (start, residual) in mm (sqrt(mm) for `sum_abs`).
 
@@ -33,16 +38,18 @@ def spot_residuals(
         core_mm: s.
         merit: Which.
         fields: How many fields, from the axis, count; 0 for all. Of the others only lost rays do.
+        whole_pupil: Whether both halves were traced, and the centroid may lie anywhere.
     """
     alive = landings.valid[..., LEAD:].to(landings.x.dtype)
     x, y = landings.x[..., LEAD:], landings.y[..., LEAD:]
     count = alive.sum((-2, -1), keepdim=True).clamp_min(1)
     dy = y - (y * alive).sum((-2, -1), keepdim=True) / count
-    scale = _scale(x**2 + dy**2, core_mm, merit) * alive
+    dx = x - (x * alive).sum((-2, -1), keepdim=True) / count if whole_pupil else x
+    scale = _scale(dx**2 + dy**2, core_mm, merit) * alive
     counted = fields or scale.shape[1]
     scale = scale * (torch.arange(scale.shape[1]) < counted)[:, None, None]
     penalty = (1 - alive) * _LOST_RAY
-    pairs = torch.stack([x * scale + penalty, dy * scale], dim=-1)
+    pairs = torch.stack([dx * scale + penalty, dy * scale], dim=-1)
     each = pairs[0, :counted].numel() // 2
     residuals: Tensor = pairs.flatten(1) / each**0.5
     return residuals

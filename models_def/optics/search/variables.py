@@ -42,8 +42,8 @@ class Variable:
     Attributes:
         kind: curvature (1/mm), conic, thickness (mm, after the surface), even_asphere
             (coefficient of r^(2 term + 2)), odd_asphere (of r^(2 term + 1)), q_asphere (of Q
-            number term, in mm), phase (radial coefficient in radians), or defocus
-            (mm, of the sensor from where it rides).
+            number term, in mm), phase (coefficient in radians: radial ones, then those in x and
+            y), or defocus (mm, of the sensor from where it rides).
         surface: Its surface; not used by defocus.
         term: Of a polynomial: 0 is its first coefficient.
         low: Lower bound.
@@ -82,7 +82,7 @@ class FreeLens:
     rides: bool = True
 
     def __post_init__(self) -> None:
-        require_round(self.lens, "an optimisation")
+        require_round(self.lens, "an optimisation", allow_phases=True)
         count, places = len(self.lens.surfaces), set()
         for variable in self.variables:
             place = (variable.kind, variable.surface, variable.term)
@@ -101,15 +101,23 @@ class FreeLens:
     def _check_term(self, variable: Variable) -> None:
         surface = self.lens.surfaces[variable.surface]
         is_q = surface.asphere.q_kind is not None
-        radial = surface.phase.radial_rad if surface.phase else ()
+        phase_terms = surface.phase.coefficients if surface.phase else ()
         fits = {
             "even_asphere": not is_q,
             "odd_asphere": not is_q,
             "q_asphere": is_q,
-            "phase": variable.term < len(radial),
+            "phase": variable.term < len(phase_terms),
         }
         if not fits.get(variable.kind, True):
             raise ContractError(f"surface {variable.surface} has no such term; got {variable}")
+
+    @property
+    def is_round(self) -> bool:
+        """Return whether the lens is round and stays so: no phase in x and y, free or not."""
+        phases = [surface.phase for surface in self.lens.surfaces]
+        radial = [len(phase.radial_rad) if phase else 0 for phase in phases]
+        free = (v for v in self.variables if v.kind == "phase")
+        return self.lens.is_round and all(v.term < radial[v.surface] for v in free)
 
     @property
     def low(self) -> Tensor:

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 import torch
 
-from camkit.errors import ContractError
+from camkit.errors import ContractError, UnsupportedError
 from camkit.models_def.design.assembly import parts_of, problem_of
 from camkit.models_def.design.design_recipe import (
     read_design,
@@ -24,7 +24,11 @@ RECIPES = Path(__file__).resolve().parents[3] / "models_def" / "recipes"
 
 
 @pytest.mark.parametrize(
-    "name", ["duet_joint_lens", "duet_bank_lens", "lfov", "lfov_joint", "edof", "edof_joint"]
+    "name",
+    [
+        *("duet_joint_lens", "duet_bank_lens", "duet_hybrid_lens", "trio_cubic_lens"),
+        *("lfov", "lfov_joint", "edof", "edof_joint"),
+    ],
 )
 def test_recipes_that_are_shipped_take_steps(name: str) -> None:
     recipe = read_design(RECIPES / f"{name}.toml")
@@ -46,6 +50,25 @@ def test_recipes_that_are_shipped_take_steps(name: str) -> None:
     (moment,) = loop.run()
     assert math.isfinite(moment.loss)
     assert bool(parts.lens.moves.detach().all())
+
+
+@pytest.mark.parametrize(
+    ("optics", "phase", "message"),
+    [
+        ({"azimuths_deg": [0.0], "psf_model": "waves"}, {}, "waves are summed along"),
+        ({}, {}, r"need a round lens.*optics\.azimuths_deg"),
+        ({"azimuths_deg": [0.0]}, {"surface": 9}, r"needs a surface 0\.\.4 without a phase"),
+        ({"azimuths_deg": [0.0]}, {"free_rad": {"z3": 1.0}}, "named x3, y, x2y"),
+        ({"azimuths_deg": [0.0]}, {"free_rad": {}}, "needs radial_rad or free_rad"),
+    ],
+)
+def test_a_plate_that_a_design_cannot_take_is_refused(
+    optics: dict[str, Any], phase: dict[str, Any], message: str, table: dict[str, Any]
+) -> None:
+    table["optics"] |= optics
+    table["phase"] = [{"surface": 0, "radius_mm": 6.25, "free_rad": {"x3": 40.0}} | phase]
+    with pytest.raises((ContractError, UnsupportedError), match=message):
+        problem_of(to_design(table), find_lens("duet"))
 
 
 def test_the_sensor_stands_where_the_chosen_depth_is_sharp(table: dict[str, Any]) -> None:

@@ -51,6 +51,29 @@ def test_without_a_search_a_design_begins_at_its_lens(recipe: DesignRecipe) -> N
     assert torch.equal(lens.begin, lens.problem.free.scaled())
 
 
+def test_a_search_at_one_depth_finds_the_lens_that_a_plate_then_blurs(
+    table: dict[str, Any],
+) -> None:
+    """The plate stays as the recipe adds it, its coefficients where they began."""
+    plate = {"surface": 0, "radius_mm": 6.25, "free_rad": {"x3": 40.0, "y3": 40.0}}
+    free = [{"kind": "phase", "surface": 0, "term": i, "low": 0.0, "high": 80.0} for i in (0, 1)]
+    table |= {"phase": [plate], "vary": [free[0], *table["vary"], free[1]]}
+    table["optics"] |= {"object_distances_mm": [1000.0, 2000.0], "azimuths_deg": [0.0, 180.0]}
+    table["starts"] = {"count": 4, "dls_steps": 10, "depth_mm": 1500.0}
+    lens = parts_of(to_design(table)).lens
+    plain = lens.problem.free.scaled()
+    assert lens.begin[[0, -1]].tolist() == [0.5, 0.5]
+    sharp = replace(lens.problem, object_distances_mm=(1500.0,))
+    bare = [_without_plate(sharp, scaled) for scaled in (lens.begin, plain)]
+    assert bare[0] < 0.9 * bare[1]
+
+
+def _without_plate(problem: Problem, scaled: torch.Tensor) -> float:
+    at = scaled.clone()
+    at[[0, -1]] = 0.0
+    return merit(problem, at)
+
+
 def test_a_recipe_that_asks_for_starts_begins_at_the_best_of_them(table: dict[str, Any]) -> None:
     plain = parts_of(to_design(table)).lens
     table["starts"] = {"count": 4, "dls_steps": 10}

@@ -14,10 +14,11 @@ from torch import Tensor, nn
 from camkit.errors import ContractError
 from camkit.models_def.design.fabrication import Copy
 from camkit.models_def.design.lens import DesignLens
+from camkit.models_def.optics.asymmetric.turning import turned_back, turned_lens
 from camkit.models_def.optics.focus import FocusMerit, with_focus
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.psf import energy_diameter, splat, with_object_distance
-from camkit.models_def.optics.pupil import half_disc
+from camkit.models_def.optics.pupil import both_halves, half_disc
 from camkit.models_def.optics.scaling import with_f_number
 from camkit.models_def.optics.search.problem import Problem
 from camkit.models_def.optics.search.splat import Pixels
@@ -135,7 +136,10 @@ def trace_at_rest(problem: Problem, pixels: Pixels) -> FieldLight:
         pixels: Pitch, colours and window.
     """
     light = [
-        [_field(spots, pixels) for spots in _field_spots(problem, depth_mm)]
+        [
+            _field(spots, pixels, whole_pupil=problem.whole_pupil)
+            for spots in _field_spots(problem, depth_mm)
+        ]
         for depth_mm in problem.depths_mm
     ]
 
@@ -147,29 +151,40 @@ def trace_at_rest(problem: Problem, pixels: Pixels) -> FieldLight:
 
 def _field_spots(problem: Problem, depth_mm: float) -> list[Spots | None]:
     """Return spots (1, wave, ray) about the centroid of all rays; None without light."""
-    lens = with_object_distance(problem.free.lens, depth_mm)
+    lens, azimuths = with_object_distance(problem.free.lens, depth_mm), problem.azimuths_rad
+    samples = problem.samples if azimuths is None else both_halves(problem.samples)
     fields: list[Spots | None] = []
-    for slope in problem.slopes:
+    for i, slope in enumerate(problem.slopes):
+        azimuth_rad = 0.0 if azimuths is None else float(azimuths[i])
         try:
-            spots = trace_spots(lens, slope[None], problem.wavelengths_um, problem.samples)
+            turned = turned_lens(lens, azimuth_rad)
+            spots = trace_spots(turned, slope[None], problem.wavelengths_um, samples)
         except ContractError:
             # not even the chief ray arrives: this field is beyond the lens
             fields.append(None)
             continue
         alive = bool((spots.weight.sum(-1) > 0).all())
-        middle = (spots.weight * spots.y_mm).sum((1, 2)) / spots.weight.sum((1, 2))
+        if azimuths is not None:
+            x_mm, y_mm = turned_back(spots.x_mm, spots.y_mm, azimuth_rad)
+            spots = replace(spots, x_mm=x_mm - _mean(spots, x_mm)[:, None, None], y_mm=y_mm)
+        middle = _mean(spots, spots.y_mm)
         fields.append(replace(spots, chief_y_mm=middle) if alive else None)
     return fields
 
 
-def _field(spots: Spots | None, pixels: Pixels) -> tuple[Tensor, ...]:
+def _mean(spots: Spots, places_mm: Tensor) -> Tensor:
+    """Return the mean (field,) of places of all rays."""
+    return (spots.weight * places_mm).sum((1, 2)) / spots.weight.sum((1, 2))
+
+
+def _field(spots: Spots | None, pixels: Pixels, *, whole_pupil: bool) -> tuple[Tensor, ...]:
     """Return kernel (3, k, k), share inside, share arriving and RMS radius of one field."""
     size = pixels.kernel_px
     even = torch.full((3, size, size), 1 / size**2, dtype=torch.float64)
     none = torch.zeros((), dtype=torch.float64)
     if spots is None:
         return even, none, none, torch.full_like(none, math.nan)
-    traced = splat(spots, size, pixels.pitch_um)
+    traced = splat(spots, size, pixels.pitch_um, whole_pupil=whole_pupil)
     energy = pixels.color_weights * traced.energy_kept
     kernel = torch.einsum("cw,wyx->cyx", energy, traced.kernels[0])
     share_inside = energy.sum(1)[:, None, None]
@@ -189,12 +204,12 @@ def at_rest(
         lens: As it works.
         problem: Its own lens and samples are not used.
         pixels: Pitch, colours and window.
-        rays: In half the stop.
+        rays: In half the stop; with azimuths in all of it.
     """
     problem_at_rest = replace(
         problem,
         free=FreeLens(lens=lens, variables=(), rides=False),
-        samples=half_disc(rays),
+        samples=half_disc(rays // 2 if problem.whole_pupil else rays),
     )
     light = trace_at_rest(problem_at_rest, pixels)
     return LensAtRest(problem_at_rest, pixels, light.kernels.float()), light

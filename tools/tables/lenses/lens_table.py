@@ -25,10 +25,12 @@ import torch
 from torch import Tensor, nn
 
 from camkit.errors import ContractError
-from camkit.models_def.design.assembly import field_slopes, network_of, recorder_of
+from camkit.models_def.design.assembly import field_azimuths, field_slopes, network_of, recorder_of
 from camkit.models_def.design.design_recipe import DesignRecipe, NetworkChoice, read_design
+from camkit.models_def.design.front import Front
 from camkit.models_def.design.loop import DesignLoop, DesignParts, DesignSchedule
 from camkit.models_def.design.loss import DesignLoss
+from camkit.models_def.optics.analysis.curves import axial_colour_mm
 from camkit.models_def.optics.lens_file.lens_file import find_lens, write_lens
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.search.problem import Problem
@@ -36,13 +38,15 @@ from camkit.models_def.optics.search.splat import Pixels
 from camkit.models_def.optics.search.variables import FreeLens
 from camkit.models_def.training.losses import ssim
 from camkit.models_def.training.pictures import SceneSource, open_source
-from camkit.units import to_degrees
+from camkit.units import UM_PER_MM, to_degrees
 from tools.tables.journal import Entry, digest
+from tools.tables.lenses.depth_likeness import depth_mtf, likeness
 from tools.tables.lenses.lens_at_rest import FieldLight, at_rest, at_work, window_of
 from tools.tables.lenses.lens_page import lens_table, mean_and_spread
 from tools.tables.runner import Record, Request, Table
 
 DIGITS: Final = 5
+_FIT_PATCHES: Final = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,6 +62,7 @@ class Conditions:
     patches: int
     data: Path | None
     fresh: Path | None
+    signal_to_noise: tuple[float, ...] = ()
 
     def digest(self, *more: Any) -> str:
         """Return a hash of all that decides a measurement."""
@@ -167,6 +172,7 @@ def conditions_of(arguments: Namespace) -> Conditions:
         patches=arguments.patches,
         data=arguments.data,
         fresh=arguments.fresh,
+        signal_to_noise=tuple(arguments.signal_to_noise or ()),
     )
 
 
@@ -208,6 +214,7 @@ def parts(
         slopes=field_slopes(recipe.optics),
         wavelengths_um=torch.tensor(recipe.pixels.wavelengths_um, dtype=torch.float64),
         object_distances_mm=conditions.depths_mm,
+        azimuths_rad=field_azimuths(recipe.optics),
     )
     if not widest:
         pixels = replace(pixels, kernel_px=window_of(problem, pixels, conditions.largest_px))
@@ -232,19 +239,50 @@ def fresh_source(plan: Conditions) -> SceneSource:
 def captured(lens: Lens, conditions: Conditions) -> Entry:
     """Measure captures, and what the front alone makes of them."""
     judged, light = parts(lens, conditions, fresh_source(conditions), Captures(), widest=True)
-    fitting, _ = parts(lens, conditions, judged.source, None, widest=False)
+    problem, pixels = judged.lens.problem, judged.lens.pixels
     entry = {
-        "window_px": fitting.lens.pixels.kernel_px,
+        "window_px": window_of(problem, pixels, conditions.largest_px),
+        "axial_colour_um": (UM_PER_MM * axial_colour_mm(lens, problem.wavelengths_um)).tolist(),
+        "likeness": likeness(light.kernels).tolist(),
+        "mtf": depth_mtf(light.kernels, pixels.pitch_um).tolist(),
         "held": light.share_inside.tolist(),
         "arriving": light.arriving.tolist(),
         "rms_um": (1000 * light.rms_mm.nan_to_num(-1e-3)).tolist(),
         "capture": scores(judged, conditions.recipe.schedule, conditions.patches),
     }
-    if conditions.recipe.front.kind != "none":
-        entry["front"] = scores(
-            replace(judged, network=None), conditions.recipe.schedule, conditions.patches
-        )
+    front = conditions.recipe.front
+    if front.kind == "none":
+        return entry
+    if conditions.signal_to_noise:
+        front = fitted_front(judged, conditions)
+        entry["signal_to_noise"] = front.signal_to_noise
+    alone = replace(judged, network=None, front=front)
+    entry["front"] = scores(alone, conditions.recipe.schedule, conditions.patches)
     return entry
+
+
+def fitted_front(judged: DesignParts, conditions: Conditions) -> Front:
+    """Return the filter with the signal-to-noise ratio that is best on the training pictures."""
+    source = training_source(conditions)
+
+    def mean_db(front: Front) -> float:
+        trial = replace(judged, network=None, front=front, source=source)
+        return float(np.mean(scores(trial, conditions.recipe.schedule, _FIT_PATCHES)["db"]))
+
+    front = conditions.recipe.front
+    trials = (replace(front, signal_to_noise=value) for value in conditions.signal_to_noise)
+    return max(trials, key=mean_db)
+
+
+def training_source(conditions: Conditions) -> SceneSource:
+    """Open the pictures that networks are trained on, and filters fitted."""
+    data = conditions.recipe.data
+    return open_source(
+        conditions.data,
+        picture_share=data.picture_share,
+        scenes=data.procedural_scenes,
+        scene_px=data.scene_px,
+    )
 
 
 def recovered(lens: Lens, conditions: Conditions, seed: int) -> Entry:
@@ -253,12 +291,7 @@ def recovered(lens: Lens, conditions: Conditions, seed: int) -> Entry:
     network = network_of(recipe)
     if network is None:
         raise ContractError("the recipe has no network: give --network")
-    source = open_source(
-        conditions.data,
-        picture_share=recipe.data.picture_share,
-        scenes=recipe.data.procedural_scenes,
-        scene_px=recipe.data.scene_px,
-    )
+    source = training_source(conditions)
     trained, _ = parts(lens, conditions, source, network, widest=False)
     loop = DesignLoop(trained, recipe.schedule)
     for moment in loop.run():
@@ -297,6 +330,9 @@ def scores(judged: DesignParts, schedule: DesignSchedule, patches: int) -> Entry
 
 def row(name: str, entry: Entry) -> str:
     """Return the line of a lens for people."""
+    if not entry["recovered"]:
+        alone = f", front alone {np.mean(entry['front']['db']):.2f} dB" if "front" in entry else ""
+        return f"{name:20} capture {np.mean(entry['capture']['db']):.2f} dB{alone}"
     db, spread = mean_and_spread(entry["recovered"], "db")
     alike, _ = mean_and_spread(entry["recovered"], "ssim")
     return (
@@ -312,7 +348,7 @@ def _options(measure: ArgumentParser) -> None:
     more("--data", type=Path, help="pictures to train on")
     more("--fresh", type=Path, help="pictures to judge on")
     more("--steps", type=int, help="of every network; the recipe's by default")
-    more("--seeds", type=int, default=3)
+    more("--seeds", type=int, default=3, help="networks of each lens; 0: the front alone")
     more("--network", help="name in the catalogue, in place of the recipe's")
     more("--front", choices=("none", "wiener"), help="in place of the recipe's")
     more(
@@ -320,6 +356,13 @@ def _options(measure: ArgumentParser) -> None:
         type=int,
         help="recorded around a patch for the filter, in place of the recipe's; half of the "
         "largest window serves every lens",
+    )
+    more(
+        "--signal-to-noise",
+        type=float,
+        nargs="+",
+        help="of the front that is judged alone, in place of the recipe's: of several the best "
+        "for each lens on --data",
     )
     more("--depths-mm", help="such as 500,700,1000,1500")
     more("--object-mm", type=float, default=1000.0)

@@ -2,11 +2,14 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from camkit.models_def.optics.lens_file.lens_file import find_lens, write_lens
+from camkit.models_def.optics.shape.phase import Monomial, Phase
 from tools.tables.runner import JOURNAL
 
 Command = Callable[..., str]
@@ -72,6 +75,30 @@ def test_table_has_every_lens_and_depth_and_a_second_run_measures_nothing(
     assert again == report
     assert "duet: seed 1" not in quiet
     assert (tmp_path / "runs" / JOURNAL).read_text(encoding="utf-8") == journal
+
+
+def test_a_front_alone_is_judged_at_azimuths_with_the_filter_that_suits_each_lens(
+    measured: Callable[..., tuple[dict[str, Any], str]], tmp_path: Path
+) -> None:
+    plate = find_lens("duet")
+    terms = (Monomial(p=3, q=0, coefficient_rad=40.0), Monomial(p=0, q=3, coefficient_rad=40.0))
+    front = replace(plate.surfaces[0], phase=Phase(radius_mm=6.25, free_rad=terms))
+    write_lens(replace(plate, surfaces=(front, *plate.surfaces[1:])), tmp_path / "plate.toml")
+    recipe = tmp_path / "strip.toml"
+    sides = "fields = 2\nazimuths_deg = [0.0, 180.0]"
+    recipe.write_text(RECIPE.replace("fields = 2", sides), encoding="utf-8")
+    words = ("--lens", "duet", tmp_path / "plate.toml", "--front", "wiener", "--seeds", 0)
+    depths = ("--depths-mm", "800,1000", "--signal-to-noise", 0.01, 30.0)
+    report, said = measured(*words, *depths)
+    duet, cubic = report["lenses"]["duet"], report["lenses"]["plate"]
+    assert report["field_angles_deg"] == [0.0, 20.0, 20.0]
+    assert {duet["signal_to_noise"], cubic["signal_to_noise"]} <= {0.01, 30.0}
+    assert [len(fields) for fields in cubic["front"]["db"]] == [3, 3]
+    # a round lens is the same at both azimuths
+    assert duet["rms_um"][0][1] == pytest.approx(duet["rms_um"][0][2], rel=1e-3)
+    assert min(cubic["likeness"]) > min(duet["likeness"])
+    assert "| lens | 800 mm | 1000 mm | spread |" in said
+    assert "Axial colour" in said
 
 
 def test_two_lenses_of_one_name_are_refused(
