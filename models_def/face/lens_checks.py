@@ -5,9 +5,10 @@ from typing import Final
 from camkit.errors import ContractError
 from camkit.models_def.optics.aiming.chief_path import chief_path
 from camkit.models_def.optics.analysis.image_circle import image_radius_mm, open_share
+from camkit.models_def.optics.configuration.field_limits import TANGENT_DEG
 from camkit.models_def.optics.lens_file.placing import PlacedLens
 from camkit.models_def.optics.paraxial import paraxial_data
-from camkit.models_def.optics.prescription import TANGENT_DEG, Lens
+from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.psf import with_object_distance
 from camkit.models_def.sensors.sensor_choice import SensorChoice
 from camkit.units import to_radians

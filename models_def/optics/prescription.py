@@ -21,6 +21,7 @@ from camkit.models_def.optics.configuration.configuration_table import (
     parse_configuration,
 )
 from camkit.models_def.optics.configuration.exact_text import degrees_text, radius_text
+from camkit.models_def.optics.configuration.field_limits import check_fields
 from camkit.models_def.optics.glass.agf import read_agf
 from camkit.models_def.optics.glass.catalogue import (
     AIR,
@@ -50,10 +51,6 @@ Vary = Literal[
 ]
 VARY: Final[tuple[Vary, ...]] = get_args(Vary)
 APERTURE_KINDS: Final[tuple[ApertureKind, ...]] = get_args(ApertureKind)
-WIDEST_DEG: Final = 140.0
-"""The widest field of a distant object."""
-TANGENT_DEG: Final = 89.5
-"""The widest of a near one: up to here fields are tangents (`aiming.field`)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -262,9 +259,7 @@ class Lens:
             raise ContractError(f"{self.aperture_kind} must be > 0; got {self.aperture_value}")
         if not self.object_distance_mm > 0:
             raise ContractError(f"object_distance_mm must be > 0; got {self.object_distance_mm}")
-        widest_deg = WIDEST_DEG if math.isinf(self.object_distance_mm) else TANGENT_DEG
-        if not all(0 <= a <= to_radians(widest_deg) for a in self.field_angles_rad):
-            raise ContractError(f"field angles must lie in 0..{widest_deg:g} degrees")
+        check_fields(self.field_angles_rad, self.object_distance_mm)
         check_stances([(s.stance, s.glass) for s in self.surfaces], self.stop)
         check_configurations(self.configurations, len(self.surfaces), self.default_configuration)
         waves = (*self.wavelengths_um, self.reference_wavelength_um)

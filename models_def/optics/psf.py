@@ -15,7 +15,8 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.prescription import TANGENT_DEG, Lens, require_round
+from camkit.models_def.optics.configuration.field_limits import TANGENT_DEG
+from camkit.models_def.optics.prescription import Lens, require_round
 from camkit.models_def.optics.pupil import half_disc
 from camkit.models_def.optics.spot import Spots, slopes_for_heights, trace_spots
 from camkit.units import UM_PER_MM, to_radians

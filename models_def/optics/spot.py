@@ -10,14 +10,10 @@ from torch import Tensor
 
 from camkit.errors import ContractError
 from camkit.models_def.optics.aiming.chief_path import chief_path
-from camkit.models_def.optics.aiming.field import (
-    STEEPEST,
-    field_angle,
-    field_slope,
-    is_steep,
-)
+from camkit.models_def.optics.aiming.field import STEEPEST, field_angle, field_slope, is_steep
 from camkit.models_def.optics.aiming.start import with_open_apertures
-from camkit.models_def.optics.prescription import TANGENT_DEG, Lens
+from camkit.models_def.optics.configuration.field_limits import TANGENT_DEG
+from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import PupilDefinition, PupilSamples, pupil_centre, pupil_rays
 from camkit.models_def.optics.trace import surface_tensors, trace
 from camkit.units import to_degrees

@@ -17,15 +17,12 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from camkit.models_def.optics.aiming.field import (
-    field_angle,
-    lead_factor,
-    slope_of,
-)
+from camkit.models_def.optics.aiming.field import field_angle, lead_factor, slope_of
 from camkit.models_def.optics.aiming.newton import AIM_TOLERANCE, DIFFERENCE, flat_map
 from camkit.models_def.optics.aiming.start import launch, with_open_apertures
+from camkit.models_def.optics.configuration.field_limits import TANGENT_DEG, widest_deg
 from camkit.models_def.optics.paraxial import entrance_pupil
-from camkit.models_def.optics.prescription import TANGENT_DEG, WIDEST_DEG, Lens
+from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.trace import Rays, SurfaceTensors, surface_tensors, trace
 from camkit.units import to_degrees, to_radians
 
@@ -65,11 +62,6 @@ class ChiefPath:
         """The widest field, in words."""
         degrees, height_mm = to_degrees(float(self.angles_rad[-1])), abs(float(self.heights_mm[-1]))
         return f"{degrees:.1f} degrees = {height_mm:.2f} mm"
-
-
-def widest_deg(object_distance_mm: float) -> float:
-    """Return the widest field that is tried: one of a near object lies in front of the lens."""
-    return WIDEST_DEG if math.isinf(object_distance_mm) else TANGENT_DEG
 
 
 def lens_length_mm(lens: Lens) -> float:

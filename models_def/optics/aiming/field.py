@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.prescription import TANGENT_DEG
+from camkit.models_def.optics.configuration.field_limits import TANGENT_DEG
 from camkit.units import to_degrees, to_radians
 
 _EDGE_RAD: Final = to_radians(TANGENT_DEG)

@@ -8,7 +8,8 @@ import torch
 from camkit.errors import ContractError
 from camkit.models_def.optics.aiming.chief_path import chief_path
 from camkit.models_def.optics.aiming.field import slope_of
-from camkit.models_def.optics.prescription import TANGENT_DEG, Lens
+from camkit.models_def.optics.configuration.field_limits import TANGENT_DEG
+from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import half_disc
 from camkit.models_def.optics.spot import chief_heights, trace_spots
 from camkit.models_def.optics.trace import Fate

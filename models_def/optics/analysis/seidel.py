@@ -14,8 +14,9 @@ from torch import Tensor
 from camkit.errors import ContractError
 from camkit.models_def.optics.aiming.field import STEEPEST, field_slope
 from camkit.models_def.optics.analysis.first_order import ParaxialRays, paraxial_rays
+from camkit.models_def.optics.configuration.field_limits import TANGENT_DEG
 from camkit.models_def.optics.paraxial import vertex_curvature
-from camkit.models_def.optics.prescription import TANGENT_DEG, Lens
+from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.trace import SurfaceTensors
 
 SEIDEL_NAMES: Final = ("S_I", "S_II", "S_III", "S_IV", "S_V")

@@ -12,8 +12,9 @@ from enum import IntEnum
 import torch
 
 from camkit.errors import UnsupportedError
-from camkit.models_def.optics.aiming.chief_path import chief_path, widest_deg
+from camkit.models_def.optics.aiming.chief_path import chief_path
 from camkit.models_def.optics.aiming.field import field_angle
+from camkit.models_def.optics.configuration.field_limits import widest_deg
 from camkit.models_def.optics.lens_file.zmx_records import Records, last
 from camkit.models_def.optics.paraxial import paraxial_data, trace_paraxial
 from camkit.models_def.optics.prescription import Lens
