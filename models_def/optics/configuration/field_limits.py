@@ -1,4 +1,4 @@
-"""How wide a field may be: up to 140 degrees of a distant object, 89.5 of a near one."""
+"""Limits of field angles: 140 degrees for a distant object, 89.5 for a near one."""
 
 import math
 from collections.abc import Sequence
