@@ -31,7 +31,7 @@ MANIFEST: Final = "portable.json"
 TABLES: Final = "portable.safetensors"
 TILE_HALOS: Final = 12
 """Of a side of a tile, where a reader chooses none: with fewer more is computed twice, with more the
-planes leave the cache (docs/portable.md)."""
+planes leave the cache."""
 
 
 def write_portable(
