@@ -7,22 +7,23 @@ With `--floor SHARE` pictures of photons have no black where light was counted; 
 `--light-spread SHARE` the light that networks behind a bank move is bounded by so much of the
 contrast between cells, and none darkens what is nearly white; with `--limited` undistortion leaves
 no rings around lamps; with `--streaks-from-samples` streaks are taken from the mosaic, and no
-network darkens a lamp; with `--psf FILE` the same lens has a PSF of other depths (`camkit freeze
---depths-mm`). The laws of its pictures are measured and stated. The result proves itself before it
-gets its name.
+network darkens a lamp; with `--portable` clipped lights are explained in whole blocks and places of
+undistortion are in fixed point, as readers in other languages do; with `--psf FILE` the same lens
+has a PSF of other depths (`camkit freeze --depths-mm`). The laws of its pictures are measured and
+stated. The result proves itself before it gets its name.
 """
 
 import argparse
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from camkit.bundle.golden import golden_from_bytes, golden_to_bytes
 from camkit.bundle.light_bound import LightBound
-from camkit.bundle.manifest import LIGHT_VERSION, Manifest
+from camkit.bundle.manifest import LIGHT_VERSION, Manifest, format_of
 from camkit.bundle.optics import PSF
 from camkit.bundle.psf_file import psf_to_bytes, read_psf
 from camkit.bundle.reader import CARD, GOLDEN, open_bundle
@@ -45,16 +46,16 @@ from camkit.runtime.plan.bounded_networks import ENFORCE, bounded_stages
 from camkit.runtime.proof.laws.proof import measure_laws, with_laws
 
 Change = tuple[type[Stage], dict[str, Any]]
+PORTABLE: Final = ((Wiener, {"whole_blocks": True}), (Undistort, {"places": "fixed"}))
+"""The rules that readers in other languages follow too."""
 
 
 def repack(
     old: Path,
     new: Path,
     *,
-    clip_reach_px: int | None = None,
-    floor: float | None = None,
+    changes: Sequence[Change] = (),
     light_spread: float | None = None,
-    limited: bool = False,
     from_samples: bool = False,
     psf: Path | None = None,
 ) -> int:
@@ -63,10 +64,8 @@ def repack(
     Args:
         old: The bundle.
         new: The file to write.
-        clip_reach_px: Of the Wiener bank; None leaves it as it is.
-        floor: Of pictures of photons; None leaves it as it is.
+        changes: Numbers of stages, of each by its type.
         light_spread: Of the bound on networks behind a bank; None leaves it as it is.
-        limited: Limit the overshoot of undistortion.
         from_samples: Whether streaks of lights are taken from the samples of the mosaic.
         psf: PSF that the same lens was frozen into anew; None leaves the old one.
 
@@ -83,7 +82,7 @@ def repack(
     manifest = bundle.manifest.model_copy(update={"format_version": ".".join(map(str, newest))})
     with tempfile.TemporaryDirectory() as folder:
         trial = Path(folder) / "trial.camkit"
-        changes = _simple_changes(clip_reach_px, floor, limited=limited)
+        changes = list(changes)
         if light_spread is not None:  # with the mask that a bound needs
             manifest = manifest.model_copy(update={"stages": bounded_stages(manifest, ENFORCE)})
             changes.append((Network, {"light": LightBound(spread=light_spread, keeps_bright=True)}))
@@ -93,6 +92,8 @@ def repack(
             members[PSF] = psf_to_bytes(_psf_of_same_lens(psf, bundle.psf))
         if changes or psf is not None:
             manifest = _changed(manifest, changes)
+            version = format_of(None, [manifest], least=newest)
+            manifest = manifest.model_copy(update={"format_version": version})
             changed = write_bundle(trial, manifest, members)
             golden = golden_from_bytes(members[GOLDEN])
             cases = {case.name: (case, golden[case.name]) for case in manifest.golden}
@@ -106,17 +107,17 @@ def repack(
     return new.stat().st_size
 
 
-def _simple_changes(
-    clip_reach_px: int | None, floor: float | None, *, limited: bool
-) -> list[Change]:
+def _simple_changes(arguments: argparse.Namespace) -> list[Change]:
     """Return the changes that set one number of one stage."""
     changes: list[Change] = []
-    if clip_reach_px is not None:
-        changes.append((Wiener, {"clip_reach_px": clip_reach_px}))
-    if floor is not None:
-        changes.append((SuperResolve, {"floor": floor}))
-    if limited:
+    if arguments.clip_reach_px is not None:
+        changes.append((Wiener, {"clip_reach_px": arguments.clip_reach_px}))
+    if arguments.floor is not None:
+        changes.append((SuperResolve, {"floor": arguments.floor}))
+    if arguments.limited:
         changes.append((Undistort, {"overshoot": "limited"}))
+    if arguments.portable:
+        changes += PORTABLE
     return changes
 
 
@@ -172,16 +173,15 @@ def main() -> None:
     parser.add_argument("--light-spread", type=float)
     parser.add_argument("--limited", action="store_true")
     parser.add_argument("--streaks-from-samples", action="store_true")
+    parser.add_argument("--portable", action="store_true")
     parser.add_argument("--psf", type=Path)
     arguments = parser.parse_args()
     before = arguments.old.stat().st_size
     after = repack(
         arguments.old,
         arguments.out,
-        clip_reach_px=arguments.clip_reach_px,
-        floor=arguments.floor,
+        changes=_simple_changes(arguments),
         light_spread=arguments.light_spread,
-        limited=arguments.limited,
         from_samples=arguments.streaks_from_samples,
         psf=arguments.psf,
     )

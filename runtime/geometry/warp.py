@@ -5,19 +5,20 @@ capture's centre: nothing moves on a whole sensor, and a crop far off the axis s
 
 cv2.remap rounds positions to 1/32 px and holds them in 16 bits, so sides end at 32766 px. Maps
 are computed on an 8 px lattice that is fixed to the picture and enlarged linearly, so the bands
-do not depend on their height.
+do not depend on their height. Places in fixed point round the nodes to 1/256 px first; then all
+sums are exact, and no reader of the bundle rounds a place to another 1/32 px.
 """
 
 from collections.abc import Callable, Iterator
 from functools import partial
-from typing import Final
+from typing import Any, Final
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from camkit.arrays import FloatArray
-from camkit.bundle.stages.undistort import Interpolation, Overshoot
+from camkit.bundle.stages.undistort import Interpolation, Overshoot, Places
 from camkit.errors import ContractError, UnsupportedError
 from camkit.radial import RadialDistortion
 from camkit.runtime.cancel import check_wish
@@ -36,6 +37,9 @@ FloatGrid = NDArray[np.float64]
 Resample = Callable[[FloatArray, Maps], FloatArray]
 
 LATTICE_PX: Final = 8
+NODE_STEPS: Final = 256
+PLACE_STEPS: Final = 32
+"""Of a pixel, in fixed point: of nodes, and of places between them (those of cv2's maps)."""
 BAND_ROWS: Final = 256
 LANCZOS_REACH_PX: Final = 4
 MAX_SIDE_PX: Final = 32766
@@ -50,6 +54,7 @@ def undistort_bands(
     threads: int = 1,
     interpolation: Interpolation = "lanczos",
     overshoot: Overshoot = "kept",
+    places: Places = "float",
 ) -> Iterator[FloatArray]:
     """Undistort a capture, band by band; what lies outside it repeats its edge.
 
@@ -62,6 +67,7 @@ def undistort_bands(
         interpolation: Between pixels.
         overshoot: Whether values at rims of light above white, and below black, are kept or limited
             to the range of their samples; see `resampled_limited`.
+        places: Arithmetic of the places, see the head of the module.
 
     Yields:
         (c, rows, w) float32 in ideal geometry, from top to bottom.
@@ -70,7 +76,7 @@ def undistort_bands(
         ContractError: If sizes disagree or the distortion folds on the sensor.
         UnsupportedError: If a side is too long for cv2.remap.
     """
-    warp = Warp(distortion, window, to_sensor=False)
+    warp = Warp(distortion, window, to_sensor=False, places=places)
     resample = partial(
         resampled_limited if overshoot == "limited" else resampled, interpolation=interpolation
     )
@@ -119,6 +125,7 @@ class Warp:
         *,
         to_sensor: bool,
         margin_px: int = 0,
+        places: Places = "float",
     ) -> None:
         check_distortion(distortion, window.corner_radius_mm)
         if max(window.size_px) + 2 * margin_px > MAX_SIDE_PX:
@@ -130,6 +137,7 @@ class Warp:
         self.distortion = distortion
         self._to_sensor = to_sensor
         self._margin_px = margin_px
+        self._places = places
         centre = window.centre_mm
         middle = reference_channel(distortion)
         self._shift_mm = undistort_points(centre, distortion, channel=middle) - centre
@@ -170,14 +178,47 @@ class Warp:
 
     def maps(self, channel: int, top: int, bottom: int) -> Maps:
         """Return cv2's fixed-point maps of output rows top..bottom (top on the lattice)."""
-        nodes = self.lattice(channel, top, bottom).astype(np.float32)
-        width = self.window.size_px[0] + 2 * self._margin_px
-        # cv2.resize places node i in the middle of its cell, as the lattice does.
-        size = (nodes.shape[1] * LATTICE_PX, nodes.shape[0] * LATTICE_PX)
-        dense = cv2.resize(nodes, size, interpolation=cv2.INTER_LINEAR)
-        dense = dense[LATTICE_PX : LATTICE_PX + bottom - top, LATTICE_PX : LATTICE_PX + width]
+        nodes = self.lattice(channel, top, bottom)
+        rows, columns = bottom - top, self.window.size_px[0] + 2 * self._margin_px
+        if self._places == "fixed":
+            return _fixed_maps(nodes, top, (rows, columns))
+        dense = _dense(nodes.astype(np.float32), (rows, columns))
         whole, fraction = cv2.convertMaps(dense, None, cv2.CV_16SC2)
         return whole, fraction
+
+
+def _dense(nodes: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
+    """Return (rows, columns, 2), linear between the nodes around them."""
+    # cv2.resize places node i in the middle of its cell, as the lattice does.
+    sides = (nodes.shape[1] * LATTICE_PX, nodes.shape[0] * LATTICE_PX)
+    dense = cv2.resize(nodes, sides, interpolation=cv2.INTER_LINEAR)
+    inside: NDArray[Any] = dense[LATTICE_PX:, LATTICE_PX:][: size[0], : size[1]]
+    return inside
+
+
+def _fixed_maps(nodes: FloatGrid, top: int, size: tuple[int, int]) -> Maps:
+    """Return cv2's maps of (rows, columns) pixels from row `top` on, in fixed point.
+
+    How far a place lies from its pixel is interpolated, less what all have in common: a number
+    small enough for single precision to be exact.
+    """
+    steps = np.floor(nodes * NODE_STEPS + 0.5)
+    middle = (LATTICE_PX - 1) / 2
+    for axis, first in ((0, 0), (1, top // LATTICE_PX)):
+        cells = np.arange(first - 1, first - 1 + nodes.shape[1 - axis]) * LATTICE_PX + middle
+        steps[..., axis] -= (cells if axis == 0 else cells[:, None]) * NODE_STEPS
+    common = np.rint(steps.mean(axis=(0, 1)) / NODE_STEPS)
+    steps -= common * NODE_STEPS
+    is_exact = np.abs(steps).max() * LATTICE_PX * LATTICE_PX * 4 < 2**24
+    moves = _dense(steps.astype(np.float32 if is_exact else np.float64), size)
+    moves = moves * moves.dtype.type(PLACE_STEPS / NODE_STEPS)
+    moves += moves.dtype.type(0.5)
+    parts = np.floor(moves, out=moves).astype(np.int32 if not is_exact else np.int16)
+    whole = (parts >> 5).astype(np.int16)
+    whole[..., 0] += (np.arange(size[1]) + int(common[0])).astype(np.int16)
+    whole[..., 1] += (np.arange(top, top + size[0]) + int(common[1])).astype(np.int16)[:, None]
+    parts &= PLACE_STEPS - 1
+    return whole, (parts[..., 1] * PLACE_STEPS + parts[..., 0]).astype(np.uint16)
 
 
 def _warp_bands(
