@@ -232,13 +232,17 @@ using Value = std::shared_ptr<OrtValue>;  // a place's values are shared with th
 using Values = std::map<std::string, Value, std::less<>>;
 using Shape = std::vector<std::int64_t>;
 
+// Later libraries keep the API of earlier ones: headers and library may be of different versions.
+constexpr std::uint32_t api_version = 17;
+static_assert(api_version <= ORT_API_VERSION, "the headers of onnxruntime are too old");
+
 class Engine {
  public:
   explicit Engine(int threads)
-      : api(OrtGetApiBase()->GetApi(ORT_API_VERSION)),
+      : api(OrtGetApiBase()->GetApi(api_version)),
         env_(nullptr, nullptr), options_(nullptr, nullptr), memory_(nullptr, nullptr) {
-    check(api, std::string("onnxruntime ") + OrtGetApiBase()->GetVersionString() +
-                   " is older than its headers, of API " + std::to_string(ORT_API_VERSION));
+    check(api, std::string("onnxruntime ") + OrtGetApiBase()->GetVersionString() + " is too old; 1." +
+                   std::to_string(api_version) + " or newer is needed");
     check(threads >= 1, "threads must be 1 or more");
     OrtEnv* env = nullptr;
     ok(api->CreateEnv(ORT_LOGGING_LEVEL_WARNING, "camkit", &env));
