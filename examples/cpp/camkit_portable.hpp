@@ -5,7 +5,7 @@
 //     camkit::Picture picture = camera.develop({samples, 1500, 1000, 400, {2.0f, 1.0f, 1.6f}});
 //
 // A camera holds its sessions, and what its filter knows of places, for all captures. Everything
-// that goes wrong is a camkit::Error. Several threads may call develop() of one camera at once.
+// that goes wrong is a camkit::Error (but std::bad_alloc). Several threads may call develop() of one camera at once.
 #pragma once
 
 #include <onnxruntime_c_api.h>
@@ -19,8 +19,6 @@
 #include <fstream>
 #include <functional>
 #include <initializer_list>
-#include <iterator>
-#include <limits>
 #include <locale>
 #include <map>
 #include <memory>
@@ -30,6 +28,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -75,10 +74,12 @@ inline void check(bool holds, const std::string& message) {
 }
 
 inline std::string read_file(const std::filesystem::path& path) {
+  std::error_code none;
   std::ifstream file(path, std::ios::binary);
-  std::string data{std::istreambuf_iterator<char>(file), {}};
-  check(file && !file.bad(), "cannot read " + path.string());
-  return data;
+  check(file && !std::filesystem::is_directory(path, none), "cannot read " + path.string());
+  std::ostringstream data;
+  data << file.rdbuf();
+  return data.str();
 }
 
 // ---- JSON: what portable.json and the head of a safetensors file need.
@@ -127,14 +128,15 @@ class JsonParser {
   explicit JsonParser(std::string_view text) : text_(text) {}
   Json document() {
     Json json = value(0);
-    check(next() == '\0', fault());
+    next();
+    check(at_ == text_.size(), fault());
     return json;
   }
 
  private:
   std::string fault() const { return "damaged JSON at byte " + std::to_string(at_); }
   char next() {  // the next character that is no space; 0 at the end
-    while (at_ < text_.size() && std::strchr(" \t\r\n", text_[at_])) ++at_;
+    at_ = std::min(text_.find_first_not_of(" \t\r\n", at_), text_.size());
     return at_ < text_.size() ? text_[at_] : '\0';
   }
   bool skip(std::string_view word) {
@@ -287,7 +289,7 @@ class Engine {
   Value tensor(const Container& data) const {
     return tensor(data, {std::int64_t(data.size())});
   }
-  // The float32 data of a tensor and how many they are.
+  // The float32 values of a tensor, and their number.
   std::pair<const float*, std::size_t> floats(const Value& value) const {
     OrtTensorTypeAndShapeInfo* raw = nullptr;
     ok(api->GetTensorTypeAndShape(value.get(), &raw));
@@ -300,11 +302,6 @@ class Engine {
     void* data = nullptr;
     ok(api->GetTensorMutableData(value.get(), &data));
     return {static_cast<const float*>(data), count};
-  }
-  const float* floats(const Value& value, std::size_t count) const {
-    const auto [data, got] = floats(value);
-    check(got == count, "a graph gave " + std::to_string(got) + " values, not " + std::to_string(count));
-    return data;
   }
   const OrtApi* const api;
 
@@ -336,11 +333,15 @@ inline std::map<std::string, Table> read_safetensors(const std::filesystem::path
   for (std::size_t i = 0; i < json.keys.size(); ++i) {
     if (json.keys[i] == "__metadata__") continue;
     Table& table = tables[json.keys[i]];
-    std::int64_t count = 1;
-    for (const Json& side : json.items[i]["shape"].list()) table.shape.push_back(side.integer()), count *= side.integer();
+    double count = 1;
+    for (const Json& side : json.items[i]["shape"].list()) {
+      check(side.integer() >= 0, path.string() + " is damaged");
+      table.shape.push_back(side.integer());
+      count *= side.integer();
+    }
     check(json.items[i]["dtype"].text() == "F32", "table " + json.keys[i] + " is not float32");
     const auto [first, last] = json.items[i]["data_offsets"].pair();
-    check(first >= 0 && last <= double(body.size()) && last - first == 4.0 * double(count), path.string() + " is damaged");
+    check(first >= 0 && last <= double(body.size()) && last - first == 4 * count, path.string() + " is damaged");
     table.data.resize(std::size_t(count));
     std::memcpy(table.data.data(), body.data() + std::size_t(first), table.data.size() * sizeof(float));
   }
@@ -394,7 +395,8 @@ struct Tile {
 inline std::pair<std::vector<Tile>, int> tiles(int size, int most, int halo, int stride) {
   check(stride > 0 && halo >= 0 && most > 2 * halo, "tiles are no larger than their halos");
   const int step = most - 2 * halo, count = std::max(1, (size - 2 * halo + step - 1) / step);
-  const int cells = count * stride, side = (size + (count - 1) * 2 * halo + cells - 1) / cells * stride;
+  const std::int64_t cells = std::int64_t(count) * stride, sum = size + (count - 1) * std::int64_t(2) * halo;
+  const int side = int((sum + cells - 1) / cells * stride);
   std::vector<Tile> all{{0, 0, size}};
   for (int i = 1; i < count; ++i) {
     const int first = std::min(i * (side - 2 * halo), size - side);
@@ -570,7 +572,7 @@ class Camera {
     const int block = bank["block_px"].integer(), margin = bank["margin_px"].integer();
     const int overlap = bank["overlap_px"].integer(), border = bank["border_px"].integer();
     const bool mirrors = bank["mirrors"].truth(), lights = bank["lights"].truth();
-    detail::check(block > overlap && overlap > 0 && block < (1 << 14), "the manifest's blocks are damaged");
+    detail::check(block > overlap && overlap > 0 && margin >= 0 && block < (1 << 12) && margin < block, "the manifest's blocks are damaged");
     const detail::Json& within = bank["mosaic_within_mm"];
     const auto rows = detail::spans(capture.height, block, overlap, border);
     const auto columns = detail::spans(capture.width, block, overlap, border);
@@ -628,7 +630,7 @@ class Camera {
     values["phase"] = engine_.tensor(phase);
     const bool lit = lights && most >= known.clip;
     const Values made = run(graph + (lit ? "_lights" : ""), values);
-    const float* out = engine_.floats(output(made), 6 * std::size_t(block) * std::size_t(block));
+    const float* out = floats(made, "out", 6 * std::size_t(block) * std::size_t(block));
     const int left = std::max(one.x->first, 0), right = std::min(one.x->first + block, capture.width);
     const int top = std::max(one.y->first, 0), bottom = std::min(one.y->first + block, capture.height);
     for (int c = 0; c < 6; ++c)
@@ -643,10 +645,12 @@ class Camera {
       }
   }
 
-  static const detail::Value& output(const Values& made) {
-    const auto found = made.find("out");
-    detail::check(found != made.end(), "a graph has no output named out");
-    return found->second;
+  const float* floats(const Values& made, const char* name, std::size_t count) const {
+    const auto found = made.find(name);
+    detail::check(found != made.end(), std::string("a graph has no output ") + name);
+    const auto [data, got] = engine_.floats(found->second);
+    detail::check(got == count, "a graph gave " + std::to_string(got) + " values, not " + std::to_string(count));
+    return data;
   }
 
   // Returns how much of what the network adds is kept beside clipped samples, (1, h, w).
@@ -655,7 +659,7 @@ class Camera {
     std::transform(capture.samples, capture.samples + mask.data.size(), mask.data.begin(),
                    [&known](std::uint16_t sample) { return float(sample) >= known.clip ? 1.0f : 0.0f; });
     const Values made = run("kept", {{"clipped", engine_.tensor(mask.data, {1, 1, mask.height, mask.width})}});
-    const float* out = engine_.floats(output(made), mask.data.size());
+    const float* out = floats(made, "out", mask.data.size());
     std::copy_n(out, mask.data.size(), mask.data.begin());
     return mask;
   }
@@ -678,7 +682,7 @@ class Camera {
   Picture clean(const Picture& planes, const Picture& kept, const Known& known, const Tell& tell) const {
     const int halo = (*network_)["halo_px"].integer(), stride = (*network_)["stride_px"].integer();
     const int most = about_["tile_px"].integer();
-    detail::check(stride > 0, "the manifest's tiles are damaged");
+    detail::check(stride > 0 && stride < (1 << 12), "the manifest's tiles are damaged");
     const auto whole = [stride](int size) { return (size + stride - 1) / stride * stride; };
     const auto [rows, h] = detail::tiles(whole(planes.height), most, halo, stride);
     const auto [columns, w] = detail::tiles(whole(planes.width), most, halo, stride);
@@ -694,7 +698,7 @@ class Camera {
         values["kept"] = engine_.tensor(share, {1, 1, h, w});
         values["origin_mm"] = engine_.tensor(origin);
         const Values made = run((*network_)["graph"].text(), values);
-        const float* out = engine_.floats(output(made), 3 * std::size_t(h) * std::size_t(w));
+        const float* out = floats(made, "out", 3 * std::size_t(h) * std::size_t(w));
         const int right = std::min(x.to, even.width);
         for (int c = 0; c < 3; ++c)
           for (int i = y.from; i < std::min(y.to, even.height); ++i) {
@@ -711,7 +715,7 @@ class Camera {
   Picture straighten(const Picture& even, const Known& known, const Tell& tell) const {
     const int side = about_["warp_px"].integer();
     const float white = float(about_["warp_white"].number()), floor = float(about_["warp_floor"].number());
-    detail::check(side > 0 && side < (1 << 14), "the manifest's tiles are damaged");
+    detail::check(side > 0 && side < (1 << 12), "the manifest's tiles are damaged");
     const std::array<int, 2> size{even.width, even.height};
     const Place middle{(even.width - 1) / 2.0, (even.height - 1) / 2.0};
     Picture straight(3, even.height, even.width);
@@ -722,8 +726,8 @@ class Camera {
         Values values = run("places", {{"target_px", engine_.tensor(target)},
                                        {"axis_px", engine_.tensor(known.axis)},
                                        {"middle_px", engine_.tensor(middle)}});
-        const float* least = engine_.floats(values["least"], 2);
-        const float* most = engine_.floats(values["most"], 2);
+        const float* least = floats(values, "least", 2);
+        const float* most = floats(values, "most", 2);
         std::array<int, 2> first{}, last{};
         std::array<float, 2> first_px{};
         for (std::size_t i = 0; i < 2; ++i) {
@@ -739,8 +743,8 @@ class Camera {
         Values made;  // rims of lamps cost time: only where light is above white, or falls below black
         const bool plain = *std::max_element(box.begin(), box.end()) <= white;
         if (plain) made = run("warp", values);
-        if (!plain || engine_.floats(made["least"], 1)[0] < floor) made = run("warp_limited", values);
-        const float* out = engine_.floats(output(made), 3 * std::size_t(side) * std::size_t(side));
+        if (!plain || floats(made, "least", 1)[0] < floor) made = run("warp_limited", values);
+        const float* out = floats(made, "out", 3 * std::size_t(side) * std::size_t(side));
         for (int c = 0; c < 3; ++c)
           for (int i = 0; i < std::min(side, even.height - y); ++i)
             std::copy_n(out + (std::size_t(c) * std::size_t(side) + std::size_t(i)) * std::size_t(side),
