@@ -234,6 +234,15 @@ using Value = std::shared_ptr<OrtValue>;  // a place's values are shared with th
 using Values = std::map<std::string, Value, std::less<>>;
 using Shape = std::vector<std::int64_t>;
 
+template <class T>
+constexpr ONNXTensorElementDataType type_of = ONNX_TENSOR_ELEMENT_DATA_TYPE_UNDEFINED;
+template <>
+inline constexpr ONNXTensorElementDataType type_of<float> = ONNX_TENSOR_ELEMENT_DATA_TYPE_FLOAT;
+template <>
+inline constexpr ONNXTensorElementDataType type_of<double> = ONNX_TENSOR_ELEMENT_DATA_TYPE_DOUBLE;
+template <>
+inline constexpr ONNXTensorElementDataType type_of<std::int64_t> = ONNX_TENSOR_ELEMENT_DATA_TYPE_INT64;
+
 // Later libraries keep the API of earlier ones: headers and library may be of different versions.
 constexpr std::uint32_t api_version = 17;
 static_assert(api_version <= ORT_API_VERSION, "the headers of onnxruntime are too old");
@@ -272,13 +281,9 @@ class Engine {
   // A view: the data must outlive it.
   template <class T>
   Value tensor(const T* data, std::size_t count, const Shape& shape) const {
-    constexpr auto type = std::is_same_v<T, float>    ? ONNX_TENSOR_ELEMENT_DATA_TYPE_FLOAT
-                          : std::is_same_v<T, double> ? ONNX_TENSOR_ELEMENT_DATA_TYPE_DOUBLE
-                                                      : ONNX_TENSOR_ELEMENT_DATA_TYPE_INT64;
-    static_assert(std::is_same_v<T, float> || std::is_same_v<T, double> || std::is_same_v<T, std::int64_t>);
     OrtValue* made = nullptr;  // onnxruntime writes to no input
     ok(api->CreateTensorWithDataAsOrtValue(memory_.get(), const_cast<T*>(data), count * sizeof(T),
-                                           shape.data(), shape.size(), type, &made));
+                                           shape.data(), shape.size(), type_of<T>, &made));
     return hold(made);
   }
   template <class Container>
@@ -289,8 +294,9 @@ class Engine {
   Value tensor(const Container& data) const {
     return tensor(data, {std::int64_t(data.size())});
   }
-  // The float32 values of a tensor, and their number.
-  std::pair<const float*, std::size_t> floats(const Value& value) const {
+  // The values of a tensor, and their number.
+  template <class T>
+  std::pair<const T*, std::size_t> data(const Value& value) const {
     OrtTensorTypeAndShapeInfo* raw = nullptr;
     ok(api->GetTensorTypeAndShape(value.get(), &raw));
     const Handle<OrtTensorTypeAndShapeInfo> info(raw, api->ReleaseTensorTypeAndShapeInfo);
@@ -298,10 +304,10 @@ class Engine {
     std::size_t count = 0;
     ok(api->GetTensorElementType(raw, &type));
     ok(api->GetTensorShapeElementCount(raw, &count));
-    check(type == ONNX_TENSOR_ELEMENT_DATA_TYPE_FLOAT, "a graph gave another type than float32");
-    void* data = nullptr;
-    ok(api->GetTensorMutableData(value.get(), &data));
-    return {static_cast<const float*>(data), count};
+    check(type == type_of<T>, "a graph gave values of another type");
+    void* values = nullptr;
+    ok(api->GetTensorMutableData(value.get(), &values));
+    return {static_cast<const T*>(values), count};
   }
   const OrtApi* const api;
 
@@ -348,44 +354,6 @@ inline std::map<std::string, Table> read_safetensors(const std::filesystem::path
   return tables;
 }
 
-// ---- Loops.
-
-// A block along one axis: its first sample, its window (0 outside the picture), its middle.
-struct Span {
-  int first = 0;
-  std::vector<float> window{};
-  double middle = 0;
-};
-
-inline std::vector<Span> spans(int size, int block, int overlap, int border) {
-  const int step = block - overlap;
-  const int count = std::max(1, (size + 2 * border - overlap + step - 1) / step);
-  const int before = count * step + overlap - size;
-  const int start = -(before >= 0 ? before / 2 : (before - 1) / 2);
-  const auto rise = [overlap](int i) {
-    const double t = (i + 0.5 - overlap / 4.0) / (overlap / 2.0);
-    const double s = std::sin(1.5707963267948966 * std::clamp(t, 0.0, 1.0));
-    return s * s;
-  };
-  std::vector<Span> all;
-  for (int i = 0; i < count; ++i) {
-    Span span{start + i * step, std::vector<float>(std::size_t(block)), 0};
-    int low = block, high = 0;
-    for (int k = 0; k < block; ++k) {
-      double window = 1;
-      if (i > 0 && k < overlap) window *= rise(k);
-      if (i < count - 1 && k >= block - overlap) window *= rise(block - 1 - k);
-      const bool inside = span.first + k >= 0 && span.first + k < size;
-      const float value = inside ? float(window) : 0.0f;
-      span.window[std::size_t(k)] = value;
-      if (value != 0) low = std::min(low, k), high = k;
-    }
-    span.middle = span.first + (low + high) / 2.0;
-    all.push_back(std::move(span));
-  }
-  return all;
-}
-
 // A tile along one axis: its first pixel, and the first and the last but one that is kept.
 struct Tile {
   int first, from, to;
@@ -406,18 +374,6 @@ inline std::pair<std::vector<Tile>, int> tiles(int size, int most, int halo, int
   return {all, side};
 }
 
-// The samples of a block with its margin along one axis, mirrored about the outermost ones.
-inline std::vector<int> fold(int first, int block, int margin, int size, bool flip) {
-  const int period = std::max(2 * (size - 1), 1);
-  std::vector<int> at;
-  for (int i = first - margin; i < first + block + margin; ++i) {
-    const int k = ((i % period) + period) % period;
-    at.push_back(size > 1 ? std::min(k, period - k) : 0);
-  }
-  if (flip) std::reverse(at.begin(), at.end());
-  return at;
-}
-
 }  // namespace detail
 
 class Camera {
@@ -432,18 +388,10 @@ class Camera {
     for (const std::string& size : networks.keys) known += " " + size;
     network_ = networks.find(options_.size);
     check(network_, "the camera has no network of size " + options_.size + "; it has" + known);
-    const Json& sensor = about_["sensor"];
-    pitch_mm_ = sensor["pitch_mm"].number();
-    red_ = int(std::min(sensor["cfa"].text().find('R'), std::size_t(4)));
-    check(red_ < 4, "the sensor has no red samples");
     tables_ = read_safetensors(folder / about_["tables"].text());
-    const Json& graphs = about_["graphs"];
-    for (std::size_t i = 0; i < graphs.keys.size(); ++i) {
-      const std::string& name = graphs.keys[i];
-      const auto runs_it = [&name](const Json& one) { return one["graph"].text() == name; };
-      const bool other = std::any_of(networks.items.begin(), networks.items.end(), runs_it);
-      if (!other || runs_it(*network_)) load(folder, name, graphs.items[i]);
-    }
+    std::vector<std::string> names = about_["common"].texts();
+    names.push_back((*network_)["graph"].text());
+    for (const std::string& name : names) load(folder, name, about_["graphs"][name]);
   }
 
   // Returns linear Rec.709, (3, height, width), not clipped; without the warp the camera's colours.
@@ -454,7 +402,18 @@ class Camera {
     check(std::isfinite(capture.iso) && capture.iso > 0, "iso must be above 0");
     for (const float gain : capture.white_balance)
       check(std::isfinite(gain) && gain > 0, "gains of the white balance must be above 0");
-    const Known known = known_of(capture);
+    const detail::Json& sensor = about_["sensor"];
+    const auto [black, white] =
+        capture.levels.value_or(Point{sensor["black_level"].number(), sensor["white_level"].number()});
+    check(black < white, "the white level must be above the black level");
+    const Point axis = sensor["axis_px"].pair();
+    const double clip = std::ceil(black + sensor["clip_share"].number() * (white - black));
+    const std::array<double, 1> iso{capture.iso};
+    const std::array<float, 3> levels{float(black), float(white), float(clip)};
+    Known known{{axis[0] - capture.origin_px[0], axis[1] - capture.origin_px[1]}, float(clip), {}};
+    known.values = run("noise", {{"iso", engine_.tensor(iso)}});
+    known.values["levels"] = engine_.tensor(levels);
+    known.values["gains"] = engine_.tensor(capture.white_balance);
     const auto tell = [&progress](double first, double last) {
       return [&progress, first, last](double share) {
         check(!progress || progress(first + (last - first) * share), "stopped by the caller");
@@ -467,15 +426,16 @@ class Camera {
 
  private:
   using Values = detail::Values;
-  using Place = std::array<double, 2>;  // x, y from the axis in mm
-  struct Block {
-    const detail::Span *y, *x;
-    bool down, across;  // mirrored
-  };
-  struct Known {  // of a capture; the values are views of the numbers
-    Place axis;
+  using Point = std::array<double, 2>;  // x, y
+  using Place = std::array<float, 2>;   // x, y in mm from the axis, the far sides mirrored
+  struct Known {                        // what all graphs of a capture are given, as views
+    Point axis;
     float clip;
-    std::array<float, 3> levels, gains, shot, read_variance;
+    Values values;
+  };
+  struct Spans {  // the blocks along one axis
+    std::vector<std::int64_t> first_px, turn, phase, index;
+    std::vector<float> place_mm, window;
   };
 
   void load(const std::filesystem::path& folder, const std::string& name, const detail::Json& json) {
@@ -510,43 +470,37 @@ class Camera {
     return results;
   }
 
-  Values values_of(const Known& known) const {
-    return {{"levels", engine_.tensor(known.levels)},
-            {"gains", engine_.tensor(known.gains)},
-            {"shot", engine_.tensor(known.shot)},
-            {"read_variance", engine_.tensor(known.read_variance)}};
+  template <class T>
+  std::vector<T> copy(const Values& made, const std::string& name) const {
+    const auto found = made.find(name);
+    detail::check(found != made.end(), "a graph has no output " + name);
+    const auto [data, count] = engine_.data<T>(found->second);
+    return {data, data + count};
   }
 
-  Known known_of(const Capture& capture) const {
-    const detail::Json& sensor = about_["sensor"];
-    const double of_black = sensor["black_level"].number(), of_white = sensor["white_level"].number();
-    const auto [black, white] = capture.levels.value_or(Place{of_black, of_white});
-    detail::check(black < white, "the white level must be above the black level");
-    const double clip = std::ceil(black + sensor["clip_share"].number() * (white - black));
-    const Place axis = sensor["axis_px"].pair();
-    Known known{{axis[0] - capture.origin_px[0], axis[1] - capture.origin_px[1]},
-                float(clip), {float(black), float(white), float(clip)}, capture.white_balance, {}, {}};
-    // Noise: ln gain and read noise lie on lines of ln ISO between the entries.
-    const std::vector<detail::Json>& table = sensor["noise"].list();
-    detail::check(!table.empty(), "the sensor has no noise");
-    const auto log_iso = [&table](std::size_t i) { return std::log(table[i]["iso"].number()); };
-    const double last = log_iso(table.size() - 1), wanted = std::log(capture.iso);
-    const double inside = std::min(std::max(wanted, log_iso(0)), last);
-    const auto at = [&](auto&& of) {
-      std::size_t i = 0;
-      while (i + 1 < table.size() && log_iso(i + 1) <= inside) ++i;
-      if (i + 1 == table.size() || log_iso(i) == inside) return of(table[i]);
-      const double slope = (of(table[i + 1]) - of(table[i])) / (log_iso(i + 1) - log_iso(i));
-      return slope * (inside - log_iso(i)) + of(table[i]);
-    };
-    using detail::Json;
-    const double log_gain = at([](const Json& one) { return std::log(one["gain_e_per_dn"].number()); });
-    const double gain = std::exp(log_gain - std::max(wanted - last, 0.0));
-    const double shot = 1 / (gain * (of_white - of_black));
-    const double read = at([](const Json& one) { return one["read_noise_e"].number(); }) * shot;
-    known.shot.fill(float(shot));
-    known.read_variance.fill(float(read * read));
-    return known;
+  const float* floats(const Values& made, const std::string& name, std::size_t count) const {
+    const auto found = made.find(name);
+    detail::check(found != made.end(), "a graph has no output " + name);
+    const auto [data, got] = engine_.data<float>(found->second);
+    detail::check(got == count, "a graph gave " + std::to_string(got) + " values, not " + std::to_string(count));
+    return data;
+  }
+
+  Spans spans(int size, double axis, int red, int block, int margin) const {
+    const std::array<std::int64_t, 1> size_px{size}, red_px{red};
+    const std::array<double, 1> axis_px{axis};
+    const Values made = run("spans", {{"size_px", engine_.tensor(size_px)},
+                                      {"axis_px", engine_.tensor(axis_px)},
+                                      {"red", engine_.tensor(red_px)}});
+    Spans all{copy<std::int64_t>(made, "first_px"), copy<std::int64_t>(made, "turn"),
+              copy<std::int64_t>(made, "phase"),    copy<std::int64_t>(made, "index"),
+              copy<float>(made, "place_mm"),        copy<float>(made, "window")};
+    const std::size_t n = all.first_px.size(), side = std::size_t(block);
+    const bool whole = all.turn.size() == n && all.phase.size() == n && all.place_mm.size() == n &&
+                       all.window.size() == n * side && all.index.size() == n * (side + 2 * std::size_t(margin));
+    const auto outside = [size](std::int64_t i) { return i < 0 || i >= size; };
+    detail::check(whole && std::none_of(all.index.begin(), all.index.end(), outside), "the graph spans is damaged");
+    return all;
   }
 
   // Returns what the filter of a place needs, from the cache where it is there.
@@ -556,101 +510,91 @@ class Camera {
       const std::lock_guard<std::mutex> lock(mutex_);
       if (const auto found = places_.find(key); found != places_.end()) return found->second;
     }
-    const std::array<float, 2> given{float(place_mm[0]), float(place_mm[1])};
-    Values values = run(graph, {{"place_mm", engine_.tensor(given)}});
+    Values values = run(graph, {{"place_mm", engine_.tensor(place_mm)}});
     std::size_t bytes = 0;
-    for (const auto& [name, value] : values) bytes += engine_.floats(value).second * sizeof(float);
+    for (const auto& [name, value] : values) bytes += engine_.data<float>(value).second * sizeof(float);
     const std::lock_guard<std::mutex> lock(mutex_);
     if (cached_bytes_ + bytes <= options_.cache_bytes && places_.emplace(key, values).second) cached_bytes_ += bytes;
     return values;
   }
 
-  // Returns demosaicked and restored planes, (6, h, w): place after place, mirrored ones are one.
+  // Returns demosaicked and restored planes, (6, h, w): blocks, windowed and added, place by place.
   template <class Tell>
   Picture restore(const Capture& capture, const Known& known, const Tell& tell) const {
-    const detail::Json& bank = about_["bank"];
+    const detail::Json &bank = about_["bank"], &within = bank["mosaic_within_mm"];
     const int block = bank["block_px"].integer(), margin = bank["margin_px"].integer();
-    const int overlap = bank["overlap_px"].integer(), border = bank["border_px"].integer();
-    const bool mirrors = bank["mirrors"].truth(), lights = bank["lights"].truth();
-    detail::check(block > overlap && overlap > 0 && margin >= 0 && block < (1 << 12) && margin < block, "the manifest's blocks are damaged");
-    const detail::Json& within = bank["mosaic_within_mm"];
-    const auto rows = detail::spans(capture.height, block, overlap, border);
-    const auto columns = detail::spans(capture.width, block, overlap, border);
-    std::vector<std::pair<Place, std::vector<Block>>> places;
-    std::map<Place, std::size_t> index;
-    const auto rounded = [](double mm) { return std::nearbyint(mm * 1e9) / 1e9; };
-    for (const detail::Span& y : rows)
-      for (const detail::Span& x : columns) {
-        const double x_mm = (x.middle - known.axis[0]) * pitch_mm_, y_mm = (y.middle - known.axis[1]) * pitch_mm_;
-        const bool across = mirrors && x_mm < 0, down = mirrors && y_mm < 0;
-        const Place at{rounded(across ? -x_mm : x_mm), rounded(down ? -y_mm : y_mm)};
-        const auto [found, is_new] = index.emplace(at, places.size());
-        if (is_new) places.emplace_back(at, std::vector<Block>{});
-        places[found->second].second.push_back({&y, &x, down, across});
+    const bool lights = bank["lights"].truth();
+    detail::check(margin >= 0 && margin < block && block < (1 << 12), "the manifest's blocks are damaged");
+    const Point red = about_["sensor"]["red_px"].pair();
+    const Spans down = spans(capture.height, known.axis[1], int(red[1]), block, margin);
+    const Spans across = spans(capture.width, known.axis[0], int(red[0]), block, margin);
+    std::vector<std::pair<Place, std::vector<std::array<std::size_t, 2>>>> places;
+    std::map<Place, std::size_t> numbers;
+    for (std::size_t i = 0; i < down.turn.size(); ++i)
+      for (std::size_t j = 0; j < across.turn.size(); ++j) {
+        const Place at{across.place_mm[j], down.place_mm[i]};
+        const auto [found, is_new] = numbers.emplace(at, places.size());
+        if (is_new) places.push_back({at, {}});
+        places[found->second].second.push_back({i, j});
       }
     Picture total(6, capture.height, capture.width);
-    const Values fixed = values_of(known);
     double done = 0;
     for (const auto& [at, blocks] : places) {
-      const bool near = within.kind == detail::Json::Kind::number && std::hypot(at[0], at[1]) <= within.number();
-      const std::string kind = near ? "_mosaic" : "";
+      const bool is_near = within.kind == detail::Json::Kind::number && std::hypot(double(at[0]), double(at[1])) <= within.number();
+      const std::string kind = is_near ? "_mosaic" : "";
       Values values = place("place" + kind, at);
-      values.insert(fixed.begin(), fixed.end());
-      for (const Block& one : blocks) {
-        add_block(capture, known, one, {block, margin}, values, "block" + kind, lights, total);
-        tell(++done / double(rows.size() * columns.size()));
+      values.insert(known.values.begin(), known.values.end());
+      for (const auto& [i, j] : blocks) {
+        std::vector<float> mosaic = cut(capture, down, across, i, j, block + 2 * margin);
+        const bool lit = lights && clips(mosaic, block, margin, known.clip);
+        const std::array<std::int64_t, 1> phase{2 * down.phase[i] + across.phase[j]};
+        values["mosaic"] = engine_.tensor(mosaic, {block + 2 * margin, block + 2 * margin});
+        values["phase"] = engine_.tensor(phase);
+        values["window_y"] = engine_.tensor(&down.window[i * std::size_t(block)], std::size_t(block), {block});
+        values["window_x"] = engine_.tensor(&across.window[j * std::size_t(block)], std::size_t(block), {block});
+        const Values made = run("block" + kind + (lit ? "_lights" : ""), values);
+        add(floats(made, "out", 6 * std::size_t(block) * std::size_t(block)), block, down, across, i, j, total);
+        tell(++done / double(down.turn.size() * across.turn.size()));
       }
     }
     return total;
   }
 
-  void add_block(const Capture& capture, const Known& known, const Block& one, std::array<int, 2> sides,
-                 Values& values, const std::string& graph, bool lights, Picture& total) const {
-    const auto [block, margin] = sides;
-    const int side = block + 2 * margin;
-    const std::vector<int> ys = detail::fold(one.y->first, block, margin, capture.height, one.down);
-    const std::vector<int> xs = detail::fold(one.x->first, block, margin, capture.width, one.across);
+  static std::vector<float> cut(const Capture& capture, const Spans& down, const Spans& across, std::size_t i,
+                                std::size_t j, int side) {
+    const std::int64_t *y = &down.index[i * std::size_t(side)], *x = &across.index[j * std::size_t(side)];
     std::vector<float> mosaic(std::size_t(side) * std::size_t(side));
-    float most = 0;
-    for (int i = 0; i < side; ++i) {
-      const std::uint16_t* samples = capture.samples + std::size_t(ys[std::size_t(i)]) * std::size_t(capture.width);
-      float* row = mosaic.data() + std::size_t(i) * std::size_t(side);
-      for (int k = 0; k < side; ++k) row[k] = samples[xs[std::size_t(k)]];
-      if (i >= margin && i < side - margin) most = std::max(most, *std::max_element(row + margin, row + side - margin));
+    float* to = mosaic.data();
+    for (int row = 0; row < side; ++row) {
+      const std::uint16_t* from = capture.samples + y[row] * capture.width;
+      for (int column = 0; column < side; ++column) *to++ = from[x[column]];
     }
-    const auto turned = [](const std::vector<float>& window, bool flip) {
-      return flip ? std::vector<float>(window.rbegin(), window.rend()) : window;
-    };
-    const std::vector<float> wy = turned(one.y->window, one.down), wx = turned(one.x->window, one.across);
-    const int phase_y = (red_ / 2 - one.y->first - one.down) & 1, phase_x = (red_ % 2 - one.x->first - one.across) & 1;
-    const std::array<std::int64_t, 1> phase{2 * phase_y + phase_x};
-    values["mosaic"] = engine_.tensor(mosaic, {side, side});
-    values["window_y"] = engine_.tensor(wy);
-    values["window_x"] = engine_.tensor(wx);
-    values["phase"] = engine_.tensor(phase);
-    const bool lit = lights && most >= known.clip;
-    const Values made = run(graph + (lit ? "_lights" : ""), values);
-    const float* out = floats(made, "out", 6 * std::size_t(block) * std::size_t(block));
-    const int left = std::max(one.x->first, 0), right = std::min(one.x->first + block, capture.width);
-    const int top = std::max(one.y->first, 0), bottom = std::min(one.y->first + block, capture.height);
-    for (int c = 0; c < 6; ++c)
-      for (int y = top; y < bottom; ++y) {
-        const int i = one.down ? block - 1 - (y - one.y->first) : y - one.y->first;
-        const float* row = out + (std::size_t(c) * std::size_t(block) + std::size_t(i)) * std::size_t(block);
-        float* sum = total.row(c, y);
-        if (one.across)
-          for (int x = left; x < right; ++x) sum[x] += row[block - 1 - (x - one.x->first)];
-        else
-          for (int x = left; x < right; ++x) sum[x] += row[x - one.x->first];
-      }
+    return mosaic;
   }
 
-  const float* floats(const Values& made, const char* name, std::size_t count) const {
-    const auto found = made.find(name);
-    detail::check(found != made.end(), std::string("a graph has no output ") + name);
-    const auto [data, got] = engine_.floats(found->second);
-    detail::check(got == count, "a graph gave " + std::to_string(got) + " values, not " + std::to_string(count));
-    return data;
+  static bool clips(const std::vector<float>& mosaic, int block, int margin, float clip) {
+    for (int row = margin; row < block + margin; ++row) {
+      const float* first = mosaic.data() + row * (block + 2 * margin) + margin;
+      if (*std::max_element(first, first + block) >= clip) return true;
+    }
+    return false;
+  }
+
+  static void add(const float* out, int block, const Spans& down, const Spans& across, std::size_t i, std::size_t j,
+                  Picture& total) {
+    const int y = int(down.first_px[i]), x = int(across.first_px[j]);
+    const int top = std::max(y, 0), bottom = std::min(y + block, total.height);
+    const int left = std::max(x, 0), right = std::min(x + block, total.width);
+    for (int c = 0; c < 6; ++c)
+      for (int row = top; row < bottom; ++row) {
+        const int of = down.turn[i] < 0 ? block - 1 - (row - y) : row - y;
+        const float* from = out + (std::size_t(c) * std::size_t(block) + std::size_t(of)) * std::size_t(block);
+        float* to = total.row(c, row);
+        if (across.turn[j] < 0)
+          for (int column = left; column < right; ++column) to[column] += from[block - 1 - (column - x)];
+        else
+          for (int column = left; column < right; ++column) to[column] += from[column - x];
+      }
   }
 
   // Returns how much of what the network adds is kept beside clipped samples, (1, h, w).
@@ -687,13 +631,14 @@ class Camera {
     const auto [rows, h] = detail::tiles(whole(planes.height), most, halo, stride);
     const auto [columns, w] = detail::tiles(whole(planes.width), most, halo, stride);
     Picture even(3, planes.height, planes.width);
-    Values values = values_of(known);
+    const double pitch_mm = about_["sensor"]["pitch_mm"].number();
+    Values values = known.values;
     double done = 0;
     for (const detail::Tile& y : rows)
       for (const detail::Tile& x : columns) {
         const std::vector<float> box = cut(planes, y.first, x.first, h, w), share = cut(kept, y.first, x.first, h, w);
-        const std::array<float, 2> origin{float((x.first - known.axis[0]) * pitch_mm_),
-                                          float((y.first - known.axis[1]) * pitch_mm_)};
+        const std::array<float, 2> origin{float((x.first - known.axis[0]) * pitch_mm),
+                                          float((y.first - known.axis[1]) * pitch_mm)};
         values["planes"] = engine_.tensor(box, {1, 6, h, w});
         values["kept"] = engine_.tensor(share, {1, 1, h, w});
         values["origin_mm"] = engine_.tensor(origin);
@@ -717,12 +662,12 @@ class Camera {
     const float white = float(about_["warp_white"].number()), floor = float(about_["warp_floor"].number());
     detail::check(side > 0 && side < (1 << 12), "the manifest's tiles are damaged");
     const std::array<int, 2> size{even.width, even.height};
-    const Place middle{(even.width - 1) / 2.0, (even.height - 1) / 2.0};
+    const Point middle{(even.width - 1) / 2.0, (even.height - 1) / 2.0};
     Picture straight(3, even.height, even.width);
     for (int y = 0; y < even.height; y += side)
       for (int x = 0; x < even.width; x += side) {
         const std::array<int, 2> at{x, y};
-        const Place target{double(x), double(y)};
+        const Point target{double(x), double(y)};
         Values values = run("places", {{"target_px", engine_.tensor(target)},
                                        {"axis_px", engine_.tensor(known.axis)},
                                        {"middle_px", engine_.tensor(middle)}});
@@ -759,8 +704,6 @@ class Camera {
   detail::Engine engine_;
   detail::Json about_;
   const detail::Json* network_ = nullptr;  // of about_
-  double pitch_mm_ = 0;
-  int red_ = 0;  // 2 row + column of red in the cell at the sensor's first sample
   std::map<std::string, detail::Table> tables_;
   std::map<std::string, detail::Graph> graphs_;
   mutable std::mutex mutex_;  // of what is below: sessions may run in several threads
