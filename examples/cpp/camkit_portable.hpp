@@ -258,6 +258,7 @@ class Engine {
     OrtEnv* env = nullptr;
     ok(api->CreateEnv(ORT_LOGGING_LEVEL_WARNING, "camkit", &env));
     env_ = {env, api->ReleaseEnv};
+    ok(api->DisableTelemetryEvents(env));  // builds for Windows send some
     OrtSessionOptions* options = nullptr;
     ok(api->CreateSessionOptions(&options));
     options_ = {options, api->ReleaseSessionOptions};
