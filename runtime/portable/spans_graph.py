@@ -4,16 +4,13 @@
 is that of `camkit.bundle.sensor`.
 """
 
-from typing import Final
-
 import numpy as np
+from numpy.typing import NDArray
 
 from camkit.runtime.bank.blocks import BORDER_SHARE, lay_spans
 from camkit.runtime.portable.demosaic_taps import MARGIN_PX
 from camkit.runtime.portable.facts import CameraFacts
 from camkit.runtime.portable.graph_builder import GraphBuilder, Value
-
-_COLUMN: Final = np.array([1], np.int64)
 
 
 def spans_graph(facts: CameraFacts) -> GraphBuilder:
@@ -28,46 +25,45 @@ def spans_graph(facts: CameraFacts) -> GraphBuilder:
     start = (count * step + overlap - size) / 2
     number = graph.node("Range", _whole(graph, 0), count.shaped(), _whole(graph, 1))
     first = number * step - start
-    # the window of a block between two others says how much of a border counts for nothing
+    rise = _rise(side, overlap)
+    idle = int(np.flatnonzero(rise)[0])  # samples of a shared border that count for nothing
+    has_neighbours = number > 0, number < count - 1
+    low = (first + has_neighbours[0].cast("int64") * idle).at_least(0)
+    high = (first + (side - 1) - has_neighbours[1].cast("int64") * idle).at_most(size - 1)
+    place = ((low + high).cast("float64") * 0.5 - axis) * facts.pitch_mm
+    is_mirrored = place < (0.0 if facts.kernels.turns else -np.inf)
+    mirrored = is_mirrored.cast("int64")
+    turn = 1 - mirrored * 2
+    samples = np.arange(-MARGIN_PX, side + MARGIN_PX)
+    at = _column(first) + _column(mirrored) * (side - 1) + _column(turn) * samples
+    period = (size * 2 - 2).at_least(1)
+    remainder = graph.node("Mod", at, period)
+    inner = at.part(1, MARGIN_PX, side + MARGIN_PX)
+    window = graph.node("And", inner > -1, inner < size).cast("float32")
+    for has, edge in zip(has_neighbours, (rise, rise[::-1]), strict=True):
+        turned = graph.node("Where", _column(is_mirrored), edge[::-1], edge)
+        window = window * graph.node("Where", _column(has), turned, np.ones(1, np.float32))
+    place = graph.node("Where", is_mirrored, place * -1.0, place).cast("float32")
+    graph.output("first_px", first, ("n",))
+    graph.output("turn", turn, ("n",))
+    graph.output("phase", graph.node("Mod", red - first - mirrored, 2), ("n",))
+    graph.output("place_mm", place, ("n",))
+    graph.output("index", remainder.at_most(period - remainder), ("n", side + 2 * MARGIN_PX))
+    graph.output("window", window, ("n", side))
+    return graph
+
+
+def _rise(side: int, overlap: int) -> NDArray[np.float32]:
+    """Return the window of a block with a neighbour before it, and none behind."""
     middle = lay_spans(3 * side, side, overlap)[1]
     rise = np.zeros(side, np.float32)
     rise[middle.inner] = middle.weights
-    idle = middle.inner.start
     rise[side // 2 :] = 1
-    has_before, has_behind = number > 0, number < count - 1
-    low = (first + has_before.cast("int64") * idle).at_least(0)
-    high = (first + (side - 1) - has_behind.cast("int64") * idle).at_most(size - 1)
-    place = ((low + high).cast("float64") * 0.5 - axis) * facts.pitch_mm
-    is_far = place < (0.0 if facts.kernels.turns else -np.inf)
-    far = is_far.cast("int64")
-    turn = 1 - far * 2
-    columns = [graph.node("Unsqueeze", one, _COLUMN) for one in (first, far, turn)]
-    place = graph.node("Where", is_far, place * -1.0, place).cast("float32")
-    samples = np.arange(-MARGIN_PX, side + MARGIN_PX)
-    at = columns[0] + columns[1] * (side - 1) + columns[2] * samples
-    period = (size * 2 - 2).at_least(1)
-    folded = graph.node("Mod", at, period)
-    index = folded.at_most(period - folded)
-    inner = at.part(1, MARGIN_PX, side + MARGIN_PX)
-    inside = graph.node("And", inner > -1, inner < size).cast("float32")
-    far_column = graph.node("Unsqueeze", is_far, _COLUMN)
-    rises = [
-        graph.node("Where", far_column, a, b) for a, b in ((rise[::-1], rise), (rise, rise[::-1]))
-    ]
-    window = inside
-    for has, edge in zip((has_before, has_behind), rises, strict=True):
-        share = graph.node(
-            "Where", graph.node("Unsqueeze", has, _COLUMN), edge, np.ones(1, np.float32)
-        )
-        window = window * share
-    phase = graph.node("Mod", red - first - far, 2)
-    graph.output("first_px", first, ("n",))
-    graph.output("turn", turn, ("n",))
-    graph.output("phase", phase, ("n",))
-    graph.output("place_mm", place, ("n",))
-    graph.output("index", index, ("n", side + 2 * MARGIN_PX))
-    graph.output("window", window, ("n", side))
-    return graph
+    return rise
+
+
+def _column(line: Value) -> Value:
+    return line.graph.node("Unsqueeze", line, np.array([1], np.int64))
 
 
 def _whole(graph: GraphBuilder, number: int) -> Value:
