@@ -5,7 +5,8 @@
 //     camkit::Picture picture = camera.develop({samples, 1500, 1000, 400, {2.0f, 1.0f, 1.6f}});
 //
 // A camera holds its sessions, and what its filter knows of places, for all captures. Everything
-// that goes wrong is a camkit::Error (but std::bad_alloc). Several threads may call develop() of one camera at once.
+// that goes wrong is a camkit::Error (but std::bad_alloc). Several threads may call develop() of one
+// camera at once. Set ORT_DISABLE_TELEMETRY=1 before the first camera, or onnxruntime keeps records.
 #pragma once
 
 #include <onnxruntime_c_api.h>
@@ -258,7 +259,7 @@ class Engine {
     OrtEnv* env = nullptr;
     ok(api->CreateEnv(ORT_LOGGING_LEVEL_WARNING, "camkit", &env));
     env_ = {env, api->ReleaseEnv};
-    ok(api->DisableTelemetryEvents(env));  // builds for Windows send some
+    ok(api->DisableTelemetryEvents(env));
     OrtSessionOptions* options = nullptr;
     ok(api->CreateSessionOptions(&options));
     options_ = {options, api->ReleaseSessionOptions};
@@ -527,8 +528,9 @@ class Camera {
     const bool lights = bank["lights"].truth();
     detail::check(margin >= 0 && margin < block && block < (1 << 12), "the manifest's blocks are damaged");
     const Point red = about_["sensor"]["red_px"].pair();
-    const Spans down = spans(capture.height, known.axis[1], int(red[1]), block, margin);
-    const Spans across = spans(capture.width, known.axis[0], int(red[0]), block, margin);
+    const auto [x, y] = capture.origin_px;  // an odd one begins with another colour
+    const Spans down = spans(capture.height, known.axis[1], (int(red[1]) + y) & 1, block, margin);
+    const Spans across = spans(capture.width, known.axis[0], (int(red[0]) + x) & 1, block, margin);
     std::vector<std::pair<Place, std::vector<std::array<std::size_t, 2>>>> places;
     std::map<Place, std::size_t> numbers;
     for (std::size_t i = 0; i < down.turn.size(); ++i)

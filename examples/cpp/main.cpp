@@ -2,6 +2,7 @@
 #include "camkit_portable.hpp"
 
 #include <cstdio>
+#include <cstdlib>
 #include <ctime>
 #include <iostream>
 
@@ -142,6 +143,11 @@ void develop(const std::vector<std::string>& words) {
 }  // namespace
 
 int main(int count, char** words) try {
+#ifdef _WIN32
+  _putenv_s("ORT_DISABLE_TELEMETRY", "1");
+#else
+  setenv("ORT_DISABLE_TELEMETRY", "1", 0);
+#endif
   develop({words + 1, words + count});
   return 0;
 } catch (const std::exception& error) {
