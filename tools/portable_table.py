@@ -2,9 +2,9 @@
 
 Each bundle is written as graphs (`camkit portable`) and run by `examples/python` on its golden
 captures, beside camkit: decibels (peak 1.0) behind the bank, before undistortion and at the end,
-and the largest difference from the stored result beside what its case allows. Times are CPU seconds of
-one thread: of each graph the median of some calls, and of a whole capture both interleaved, with
-`--repeat N` tiles of a simulated capture of 1500x1000 along each side.
+and the largest difference from the stored result beside what its case allows. Times are CPU
+seconds of one thread: of each graph the median of some calls, and of a whole capture both
+interleaved, with `--repeat N` tiles of a simulated capture of 1500x1000 along each side.
 """
 
 import argparse
