@@ -34,9 +34,9 @@ class PortableCamera:
         """Return demosaicked and restored planes, (6, h, w): blocks, windowed and added, place by place."""
         side, m, within = (self.bank[name] for name in ("block_px", "margin_px", "mosaic_within_mm"))
         planes, places = np.zeros((6, *np.add(mosaic.shape, 2 * side)), np.float32), {}
-        sizes = zip(mosaic.shape, axis[::-1], self.sensor["red_px"][::-1])
-        down, across = (self.run("spans", {"size_px": np.array([n]), "axis_px": np.array([at]), "red": np.array([red])})
-                        for n, at, red in sizes)
+        red = np.add(self.sensor["red_px"], axis - self.sensor["axis_px"]).astype(int) % 2
+        down, across = (self.run("spans", {"size_px": np.array([n]), "axis_px": np.array([at]), "red": np.array([r])})
+                        for n, at, r in zip(mosaic.shape, axis[::-1], red[::-1]))
         for i, j in np.ndindex(len(down["turn"]), len(across["turn"])):
             places.setdefault((across["place_mm"][j], down["place_mm"][i]), []).append((i, j))
         for place, blocks in places.items():

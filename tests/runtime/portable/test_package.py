@@ -70,12 +70,12 @@ def _camkit(bundle: Bundle, capture: np.ndarray, case: GoldenCase, **options: An
 
 
 def _cases(bundle: Bundle) -> dict[str, tuple[GoldenCase, np.ndarray]]:
-    """Return golden captures, and one with lamps around the axis whose sides are no multiples."""
+    """Return golden captures, and one of lamps near the axis, its sides and its origin odd."""
     golden = golden_from_bytes(bundle.member(GOLDEN))
     cases = {case.name: (case, golden[case.name].capture) for case in bundle.manifest.golden}
     saturated, capture = cases["saturated"]
-    odd = saturated.model_copy(update={"origin_px": (2910, 1910)})
-    return cases | {"lamps_on_the_axis": (odd, np.ascontiguousarray(capture[:186, :190]))}
+    odd = saturated.model_copy(update={"origin_px": (2911, 1911)})
+    return cases | {"lamps_on_the_axis": (odd, np.ascontiguousarray(capture[1:187, 1:191]))}
 
 
 @pytest.mark.parametrize("name", ["typical", "saturated", "very_dark", "lamps_on_the_axis"])
