@@ -1,0 +1,293 @@
+/**
+ * The chain of a portable camera around its graphs, as docs/portable.md states it:
+ *
+ *   mosaic -> blocks (place, block) -> planes -> tiles (tile_S) -> even light -> places, warp -> picture
+ */
+import type { Camera, Values } from "./camera.js";
+import type { Capture } from "./capture.js";
+import { check } from "./error.js";
+
+export interface Developed {
+  /** Three planes of linear Rec.709: the picture, and the capture without the restoration. */
+  light: Float32Array;
+  before: Float32Array;
+  width: number;
+  height: number;
+  orientation: number;
+}
+
+export interface Choices {
+  /** Size of the network. */
+  size: string;
+  /** Called with what is done and the share of all work; what it throws ends the work. */
+  progress?: (step: string, share: number) => void;
+}
+
+/** Share of the time that each step takes, for the progress alone. */
+const SHARES = { blocks: 0.6, tiles: 0.3, warp: 0.1 };
+
+interface Span {
+  first: number;
+  window: Float32Array;
+  /** Middle of what the window lets through. */
+  middle: number;
+}
+
+interface Axis {
+  span: Span;
+  size: number;
+  red: number;
+  flip: boolean;
+}
+
+/** Develop a capture that states its ISO and white balance. */
+export async function develop(camera: Camera, capture: Capture, choices: Choices): Promise<Developed> {
+  const { sensor, networks } = camera.about;
+  const { width, height, samples, whiteBalance: gains, iso } = capture;
+  check(networks[choices.size], `The camera has no network of size ${choices.size}, only ${Object.keys(networks).join(", ")}.`);
+  check(gains && gains.every((gain) => gain > 0 && Number.isFinite(gain)), "The gains of red and blue are numbers above 0.");
+  check(capture.noise || (iso && iso > 0 && Number.isFinite(iso)), "The ISO is a number above 0.");
+  const white = capture.white ?? sensor.white_level;
+  const blacks = capture.black ?? Array<number>(4).fill(sensor.black_level);
+  const black = blacks[0]!;
+  check(Math.max(...blacks) < white, `Black (${Math.max(...blacks)}) must lie below white (${white}).`);
+  const clip = Math.ceil(black + sensor.clip_share * (white - black));
+  const origin = capture.origin ?? [0, 1].map((i) => 2 * Math.floor((sensor.size_px[i]! - [width, height][i]!) / 4));
+  const axis = sensor.axis_px.map((at, i) => at - origin[i]!) as [number, number];
+  const [shot, read] = capture.noise ? [capture.noise.shot, capture.noise.readVariance] : camera.noiseAt(iso!).map((n) => [n, n, n]);
+  const known: Values = {
+    levels: camera.tensor([black, white, clip]),
+    gains: camera.tensor(gains),
+    shot: camera.tensor(shot!),
+    read_variance: camera.tensor(read!),
+  };
+  const mosaic = Float32Array.from(samples);
+  if (blacks.some((n) => n !== black)) {
+    for (let i = 0; i < mosaic.length; i++) mosaic[i]! += black - blacks[2 * (Math.floor(i / width) & 1) + ((i % width) & 1)]!;
+  }
+  const progress = choices.progress ?? (() => undefined);
+  const planes = await restore(camera, { mosaic, width, height, cfa: capture.cfa ?? sensor.cfa, clip, axis }, known, progress);
+  const clipped = mosaic.map((sample) => (sample >= clip ? 1 : 0));
+  const even = await clean(camera, choices.size, { planes, clipped, width, height, axis }, known, progress);
+  const before = planes.subarray(0, 3 * width * height).map((light) => Math.min(light, 1));
+  const [light, plain] = await straighten(camera, [even, before], width, height, axis, progress);
+  return { light: light!, before: plain!, width, height, orientation: capture.orientation };
+}
+
+/** Blocks along an axis, and their windows, 0 outside the picture. */
+function spans(size: number, block: number, overlap: number, border: number): Span[] {
+  const step = block - overlap;
+  const count = Math.max(1, Math.ceil((size + 2 * border - overlap) / step));
+  const start = -Math.floor((count * step + overlap - size) / 2);
+  const rise = (i: number) => Math.sin((Math.PI / 2) * Math.min(Math.max((i + 0.5 - overlap / 4) / (overlap / 2), 0), 1)) ** 2;
+  return Array.from({ length: count }, (_, n) => {
+    const first = start + n * step;
+    const window = new Float32Array(block);
+    for (let i = Math.max(0, -first); i < Math.min(block, size - first); i++) {
+      const up = n > 0 && i < overlap ? rise(i) : 1;
+      const down = n < count - 1 && i >= block - overlap ? rise(block - 1 - i) : 1;
+      window[i] = up * down;
+    }
+    const live = (weight: number) => weight !== 0;
+    return { first, window, middle: first + (window.findIndex(live) + window.findLastIndex(live)) / 2 };
+  });
+}
+
+/** Rows of a block with its margin, mirrored about the outermost ones of the picture. */
+function fold({ span, size, flip }: Axis, block: number, margin: number): Int32Array {
+  const period = Math.max(2 * (size - 1), 1);
+  const rows = Int32Array.from({ length: block + 2 * margin }, (_, i) => {
+    const at = (((span.first - margin + i) % period) + period) % period;
+    return Math.min(at, period - at);
+  });
+  return flip ? rows.reverse() : rows;
+}
+
+interface Mosaic {
+  mosaic: Float32Array;
+  width: number;
+  height: number;
+  cfa: string;
+  clip: number;
+  axis: [number, number];
+}
+
+/** Demosaicked and restored planes, six of them: blocks by place, mirrored places as one. */
+async function restore(camera: Camera, capture: Mosaic, known: Values, progress: NonNullable<Choices["progress"]>): Promise<Float32Array> {
+  const { bank, sensor } = camera.about;
+  const { mosaic, width, height, cfa, clip, axis } = capture;
+  const { block_px: block, margin_px: margin } = bank;
+  const red = cfa.indexOf("R");
+  const places = new Map<string, { place: [number, number]; blocks: [Axis, Axis][] }>();
+  const across = spans(width, block, bank.overlap_px, bank.border_px);
+  const down = spans(height, block, bank.overlap_px, bank.border_px);
+  for (const rows of down) {
+    for (const columns of across) {
+      const place = [(columns.middle - axis[0]) * sensor.pitch_mm, (rows.middle - axis[1]) * sensor.pitch_mm];
+      const flips = place.map((at) => bank.mirrors && at < 0);
+      const [x, y] = place.map((at, i) => Math.round((flips[i] ? -at : at) * 1e9) / 1e9) as [number, number];
+      const entry = places.get(`${x} ${y}`) ?? { place: [x, y], blocks: [] };
+      places.set(`${x} ${y}`, entry);
+      entry.blocks.push([
+        { span: rows, size: height, red: red >> 1, flip: flips[1]! },
+        { span: columns, size: width, red: red & 1, flip: flips[0]! },
+      ]);
+    }
+  }
+  const total = new Float32Array(6 * width * height);
+  const side = block + 2 * margin;
+  const samples = new Float32Array(side * side);
+  let done = 0;
+  for (const { place, blocks } of places.values()) {
+    const kind = bank.mosaic_within_mm !== null && Math.hypot(...place) <= bank.mosaic_within_mm ? "_mosaic" : "";
+    const here = { ...known, ...(await camera.run(`place${kind}`, { place_mm: camera.tensor(place) })) };
+    for (const axes of blocks) {
+      progress("Restoring blocks", (SHARES.blocks * done++) / (down.length * across.length));
+      const [rows, columns] = axes.map((one) => fold(one, block, margin)) as [Int32Array, Int32Array];
+      let lit = false;
+      for (let i = 0, at = 0; i < side; i++) {
+        const row = rows[i]! * width;
+        for (let j = 0; j < side; j++, at++) {
+          const sample = mosaic[row + columns[j]!]!;
+          samples[at] = sample;
+          lit ||= sample >= clip && i >= margin && j >= margin && i < side - margin && j < side - margin;
+        }
+      }
+      const [phaseY, phaseX] = axes.map(({ span, flip, red: at }) => Math.abs(at - span.first - Number(flip)) % 2) as [number, number];
+      const [windowY, windowX] = axes.map(({ span, flip }) => camera.tensor(flip ? span.window.slice().reverse() : span.window));
+      const { out } = await camera.run(`block${kind}${bank.lights && lit ? "_lights" : ""}`, {
+        ...here,
+        mosaic: camera.tensor(samples, [side, side]),
+        phase: camera.whole(2 * phaseY + phaseX),
+        window_y: windowY!,
+        window_x: windowX!,
+      });
+      add(total, width, height, out!.data as Float32Array, block, axes);
+    }
+  }
+  return total;
+}
+
+/** Add a block to the planes, turned back if it was mirrored. */
+function add(total: Float32Array, width: number, height: number, out: Float32Array, block: number, [rows, columns]: [Axis, Axis]): void {
+  const [top, left] = [rows.span.first, columns.span.first];
+  const [y0, y1] = [Math.max(top, 0), Math.min(top + block, height)];
+  const [x0, x1] = [Math.max(left, 0), Math.min(left + block, width)];
+  const step = columns.flip ? -1 : 1;
+  for (let plane = 0; plane < 6; plane++) {
+    for (let y = y0; y < y1; y++) {
+      const row = plane * block + (rows.flip ? block - 1 - (y - top) : y - top);
+      let from = row * block + (columns.flip ? block - 1 - (x0 - left) : x0 - left);
+      let to = (plane * height + y) * width + x0;
+      for (let x = x0; x < x1; x++, to++, from += step) total[to]! += out[from]!;
+    }
+  }
+}
+
+/** Tiles along an axis: first pixel, and first and last of those that are kept. */
+function tiles(size: number, side: number, halo: number): [number, number, number][] {
+  const count = side >= size ? 1 : Math.ceil((size - 2 * halo) / (side - 2 * halo));
+  const firsts = Array.from({ length: count }, (_, i) => Math.min(i * (side - 2 * halo), size - Math.min(side, size)));
+  return firsts.map((first, i) => [first, i ? first + halo : 0, i + 1 < count ? firsts[i + 1]! + halo : size]);
+}
+
+interface Restored {
+  planes: Float32Array;
+  clipped: Float32Array;
+  width: number;
+  height: number;
+  axis: [number, number];
+}
+
+/** Three planes of light of the camera's colours, clean and even. */
+async function clean(camera: Camera, size: string, restored: Restored, known: Values, progress: NonNullable<Choices["progress"]>): Promise<Float32Array> {
+  const { graph, halo_px: halo, stride_px: stride } = camera.about.networks[size]!;
+  const { tile_px: side, sensor } = camera.about;
+  const { planes, clipped, width, height, axis } = restored;
+  const [wide, high] = [width, height].map((n) => Math.ceil(n / stride) * stride) as [number, number];
+  const [tall, broad] = [Math.min(side, high), Math.min(side, wide)];
+  const even = new Float32Array(3 * width * height);
+  /** A tile of some planes, whose border repeats. */
+  const cut = (from: Float32Array, count: number, x: number, y: number) => {
+    const out = new Float32Array(count * tall * broad);
+    for (let i = 0; i < count * tall; i++) {
+      const row = (Math.floor(i / tall) * height + Math.min(y + (i % tall), height - 1)) * width;
+      const inside = Math.min(broad, width - x);
+      out.set(from.subarray(row + x, row + x + inside), i * broad);
+      out.fill(from[row + width - 1]!, i * broad + inside, (i + 1) * broad);
+    }
+    return camera.tensor(out, [1, count, tall, broad]);
+  };
+  const across = tiles(wide, side, halo);
+  const down = tiles(high, side, halo);
+  let done = 0;
+  for (const [y, top, bottom] of down) {
+    for (const [x, left, right] of across) {
+      progress("Removing noise", SHARES.blocks + (SHARES.tiles * done++) / (across.length * down.length));
+      const origin = camera.tensor([(x - axis[0]) * sensor.pitch_mm, (y - axis[1]) * sensor.pitch_mm]);
+      const { out } = await camera.run(graph, { ...known, planes: cut(planes, 6, x, y), clipped: cut(clipped, 1, x, y), origin_mm: origin });
+      const light = out!.data as Float32Array;
+      for (let plane = 0; plane < 3; plane++) {
+        for (let row = top; row < Math.min(bottom, height); row++) {
+          const from = (plane * tall + row - y) * broad - x;
+          even.set(light.subarray(from + left, from + Math.min(right, width)), (plane * height + row) * width + left);
+        }
+      }
+    }
+  }
+  return even;
+}
+
+/** Pictures in linear Rec.709 without distortion, all with the same places. */
+async function straighten(camera: Camera, pictures: Float32Array[], width: number, height: number, axis: [number, number], progress: NonNullable<Choices["progress"]>): Promise<Float32Array[]> {
+  const side = camera.about.warp_px;
+  const outs = pictures.map((one) => new Float32Array(one.length));
+  const [across, down] = [Math.ceil(width / side), Math.ceil(height / side)];
+  for (let tile = 0; tile < across * down; tile++) {
+    progress("Straightening", 1 - SHARES.warp * (1 - tile / (across * down)));
+    const [x, y] = [(tile % across) * side, Math.floor(tile / across) * side];
+    const [right, bottom] = [Math.min(x + side, width), Math.min(y + side, height)];
+    const { places } = await camera.run("places", {
+      target_px: camera.exact(x, y),
+      axis_px: camera.exact(...axis),
+      middle_px: camera.exact((width - 1) / 2, (height - 1) / 2),
+    });
+    const box = sourceBox(places!.data as Float32Array, side, [x, y, right, bottom], width, height);
+    const [x0, y0, x1, y1] = box;
+    for (const [i, from] of pictures.entries()) {
+      const part = new Float32Array(3 * (y1 - y0) * (x1 - x0));
+      for (let row = 0, at = 0; row < 3 * (y1 - y0); row++, at += x1 - x0) {
+        const start = (Math.floor(row / (y1 - y0)) * height + y0 + (row % (y1 - y0))) * width;
+        part.set(from.subarray(start + x0, start + x1), at);
+      }
+      const { out } = await camera.run("warp", { planes: camera.tensor(part, [1, 3, y1 - y0, x1 - x0]), places: places!, first_px: camera.tensor([x0 - x, y0 - y]) });
+      const light = out!.data as Float32Array;
+      for (let plane = 0; plane < 3; plane++) {
+        for (let row = y; row < bottom; row++) {
+          const at = (plane * side + row - y) * side;
+          outs[i]!.set(light.subarray(at, at + right - x), (plane * height + row) * width + x);
+        }
+      }
+    }
+  }
+  return outs;
+}
+
+/** First and last pixel of the capture that the used places of a tile need: x0, y0, x1, y1. */
+function sourceBox(places: Float32Array, side: number, [x, y, right, bottom]: [number, number, number, number], width: number, height: number): [number, number, number, number] {
+  const low = [Infinity, Infinity];
+  const high = [-Infinity, -Infinity];
+  for (let map = 0; map < places.length; map += 2 * side * side) {
+    for (let row = 0; row < bottom - y; row++) {
+      for (let i = 2 * row * side; i < 2 * (row * side + right - x); i++) {
+        const at = places[map + i]!;
+        if (at < low[i & 1]!) low[i & 1] = at;
+        if (at > high[i & 1]!) high[i & 1] = at;
+      }
+    }
+  }
+  const [first, size] = [[x, y], [width, height]];
+  const starts = [0, 1].map((i) => Math.min(Math.max(Math.floor(low[i]!) - 1 + first[i]!, 0), size[i]! - 1)) as [number, number];
+  const ends = [0, 1].map((i) => Math.max(Math.min(Math.floor(high[i]!) + 3 + first[i]!, size[i]!), starts[i]! + 1)) as [number, number];
+  return [...starts, ...ends];
+}
