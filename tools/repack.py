@@ -7,7 +7,8 @@ With `--floor SHARE` pictures of photons have no black where light was counted; 
 `--light-spread SHARE` the light that networks behind a bank move is bounded by so much of the
 contrast between cells, and none darkens what is nearly white; with `--limited` undistortion leaves
 no rings around lamps; with `--streaks-from-samples` streaks are taken from the mosaic, and no
-network darkens a lamp; with `--psf FILE` the same lens has a PSF of other depths (`camkit freeze
+network darkens a lamp; with `--portable` clipped lights are explained in whole blocks and places of
+undistortion are in fixed point, as readers in other languages do; with `--psf FILE` the same lens has a PSF of other depths (`camkit freeze
 --depths-mm`). The laws of its pictures are measured and stated. The result proves itself before it
 gets its name.
 """
@@ -22,7 +23,7 @@ import numpy as np
 
 from camkit.bundle.golden import golden_from_bytes, golden_to_bytes
 from camkit.bundle.light_bound import LightBound
-from camkit.bundle.manifest import LIGHT_VERSION, Manifest
+from camkit.bundle.manifest import LIGHT_VERSION, Manifest, format_of
 from camkit.bundle.optics import PSF
 from camkit.bundle.psf_file import psf_to_bytes, read_psf
 from camkit.bundle.reader import CARD, GOLDEN, open_bundle
@@ -56,6 +57,7 @@ def repack(
     light_spread: float | None = None,
     limited: bool = False,
     from_samples: bool = False,
+    portable: bool = False,
     psf: Path | None = None,
 ) -> int:
     """Write one bundle anew; give its bytes.
@@ -68,6 +70,7 @@ def repack(
         light_spread: Of the bound on networks behind a bank; None leaves it as it is.
         limited: Limit the overshoot of undistortion.
         from_samples: Whether streaks of lights are taken from the samples of the mosaic.
+        portable: Whether lights and places follow rules that other readers can follow.
         psf: PSF that the same lens was frozen into anew; None leaves the old one.
 
     Raises:
@@ -84,6 +87,8 @@ def repack(
     with tempfile.TemporaryDirectory() as folder:
         trial = Path(folder) / "trial.camkit"
         changes = _simple_changes(clip_reach_px, floor, limited=limited)
+        if portable:
+            changes += [(Wiener, {"whole_blocks": True}), (Undistort, {"places": "fixed"})]
         if light_spread is not None:  # with the mask that a bound needs
             manifest = manifest.model_copy(update={"stages": bounded_stages(manifest, ENFORCE)})
             changes.append((Network, {"light": LightBound(spread=light_spread, keeps_bright=True)}))
@@ -93,6 +98,8 @@ def repack(
             members[PSF] = psf_to_bytes(_psf_of_same_lens(psf, bundle.psf))
         if changes or psf is not None:
             manifest = _changed(manifest, changes)
+            version = format_of(None, [manifest], least=newest)
+            manifest = manifest.model_copy(update={"format_version": version})
             changed = write_bundle(trial, manifest, members)
             golden = golden_from_bytes(members[GOLDEN])
             cases = {case.name: (case, golden[case.name]) for case in manifest.golden}
@@ -172,6 +179,7 @@ def main() -> None:
     parser.add_argument("--light-spread", type=float)
     parser.add_argument("--limited", action="store_true")
     parser.add_argument("--streaks-from-samples", action="store_true")
+    parser.add_argument("--portable", action="store_true")
     parser.add_argument("--psf", type=Path)
     arguments = parser.parse_args()
     before = arguments.old.stat().st_size
@@ -183,6 +191,7 @@ def main() -> None:
         light_spread=arguments.light_spread,
         limited=arguments.limited,
         from_samples=arguments.streaks_from_samples,
+        portable=arguments.portable,
         psf=arguments.psf,
     )
     print(f"{arguments.out}: {after} bytes, before {before}")

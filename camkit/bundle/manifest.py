@@ -41,7 +41,7 @@ from camkit.bundle.upgrade import UpgradeError, upgrade
 from camkit.errors import BundleError, UnsupportedError
 from camkit.psf import FrozenPsf
 
-FORMAT_VERSION: Final = (2, 11)
+FORMAT_VERSION: Final = (2, 12)
 TOGETHER_VERSION: Final = (2, 4)
 """From here on a bank may restore colours together, and half of a kernel fits its windows."""
 FOCUS_VERSION: Final = (2, 5)

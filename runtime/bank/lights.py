@@ -200,7 +200,8 @@ def fitted_px(settings: Wiener, kernel_px: int | None) -> int | None:
     """Return the side of the kernel to choose windows by; None where whole blocks are explained."""
     reach_px = settings.clip_reach_px
     most_px = RULES[settings.clip_windows].most_reach_px
-    return None if reach_px is None or reach_px > most_px else kernel_px
+    whole = settings.whole_blocks or reach_px is None or reach_px > most_px
+    return None if whole else kernel_px
 
 
 def nearness(clipped: Mask, reach_px: int | None) -> FloatArray:

@@ -5,7 +5,8 @@ capture's centre: nothing moves on a whole sensor, and a crop far off the axis s
 
 cv2.remap rounds positions to 1/32 px and holds them in 16 bits, so sides end at 32766 px. Maps
 are computed on an 8 px lattice that is fixed to the picture and enlarged linearly, so the bands
-do not depend on their height.
+do not depend on their height. Places in fixed point round the nodes to 1/256 px first; then all
+sums are exact, and no reader of the bundle rounds a place to another 1/32 px.
 """
 
 from collections.abc import Callable, Iterator
@@ -17,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.arrays import FloatArray
-from camkit.bundle.stages.undistort import Interpolation, Overshoot
+from camkit.bundle.stages.undistort import Interpolation, Overshoot, Places
 from camkit.errors import ContractError, UnsupportedError
 from camkit.radial import RadialDistortion
 from camkit.runtime.cancel import check_wish
@@ -36,6 +37,9 @@ FloatGrid = NDArray[np.float64]
 Resample = Callable[[FloatArray, Maps], FloatArray]
 
 LATTICE_PX: Final = 8
+NODE_STEPS: Final = 256
+PLACE_STEPS: Final = 32
+"""Of a pixel, in fixed point: of nodes, and of places between them (those of cv2's maps)."""
 BAND_ROWS: Final = 256
 LANCZOS_REACH_PX: Final = 4
 MAX_SIDE_PX: Final = 32766
@@ -50,6 +54,7 @@ def undistort_bands(
     threads: int = 1,
     interpolation: Interpolation = "lanczos",
     overshoot: Overshoot = "kept",
+    places: Places = "float",
 ) -> Iterator[FloatArray]:
     """Undistort a capture, band by band; what lies outside it repeats its edge.
 
@@ -62,6 +67,7 @@ def undistort_bands(
         interpolation: Between pixels.
         overshoot: Whether values at rims of light above white, and below black, are kept or limited
             to the range of their samples; see `resampled_limited`.
+        places: Arithmetic of the places, see the head of the module.
 
     Yields:
         (c, rows, w) float32 in ideal geometry, from top to bottom.
@@ -70,7 +76,7 @@ def undistort_bands(
         ContractError: If sizes disagree or the distortion folds on the sensor.
         UnsupportedError: If a side is too long for cv2.remap.
     """
-    warp = Warp(distortion, window, to_sensor=False)
+    warp = Warp(distortion, window, to_sensor=False, places=places)
     resample = partial(
         resampled_limited if overshoot == "limited" else resampled, interpolation=interpolation
     )
@@ -119,6 +125,7 @@ class Warp:
         *,
         to_sensor: bool,
         margin_px: int = 0,
+        places: Places = "float",
     ) -> None:
         check_distortion(distortion, window.corner_radius_mm)
         if max(window.size_px) + 2 * margin_px > MAX_SIDE_PX:
@@ -130,6 +137,7 @@ class Warp:
         self.distortion = distortion
         self._to_sensor = to_sensor
         self._margin_px = margin_px
+        self._places = places
         centre = window.centre_mm
         middle = reference_channel(distortion)
         self._shift_mm = undistort_points(centre, distortion, channel=middle) - centre
@@ -170,14 +178,26 @@ class Warp:
 
     def maps(self, channel: int, top: int, bottom: int) -> Maps:
         """Return cv2's fixed-point maps of output rows top..bottom (top on the lattice)."""
-        nodes = self.lattice(channel, top, bottom).astype(np.float32)
+        nodes = self.lattice(channel, top, bottom)
+        fixed = self._places == "fixed"
+        nodes = np.floor(nodes * NODE_STEPS + 0.5) if fixed else nodes.astype(np.float32)
         width = self.window.size_px[0] + 2 * self._margin_px
         # cv2.resize places node i in the middle of its cell, as the lattice does.
         size = (nodes.shape[1] * LATTICE_PX, nodes.shape[0] * LATTICE_PX)
         dense = cv2.resize(nodes, size, interpolation=cv2.INTER_LINEAR)
         dense = dense[LATTICE_PX : LATTICE_PX + bottom - top, LATTICE_PX : LATTICE_PX + width]
+        if fixed:
+            return _fixed_maps(dense)
         whole, fraction = cv2.convertMaps(dense, None, cv2.CV_16SC2)
         return whole, fraction
+
+
+def _fixed_maps(places: FloatGrid) -> Maps:
+    """Return cv2's maps of (h, w, 2) places in steps of nodes, rounded upwards from the middle."""
+    steps = np.floor(places * (PLACE_STEPS / NODE_STEPS) + 0.5).astype(np.int32)
+    whole = (steps >> 5).astype(np.int16)
+    x, y = (steps[..., axis] & (PLACE_STEPS - 1) for axis in (0, 1))
+    return whole, (y * PLACE_STEPS + x).astype(np.uint16)
 
 
 def _warp_bands(

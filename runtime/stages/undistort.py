@@ -41,6 +41,7 @@ def prepare(entry: Undistort, job: Job) -> StageWork:
             threads=job.threads,
             interpolation=entry.interpolation,
             overshoot=entry.overshoot,
+            places=entry.places,
         )
         plane = job.known_bundle.manifest.planes[entry.gives[0]]
         return (replace(light.with_bands(bands), plane=plane),)

@@ -8,6 +8,7 @@ from camkit.bundle.plane import Plane
 from camkit.bundle.sensor import MOSAIC
 from camkit.bundle.stages.entry import (
     BOUNDED,
+    PORTABLE,
     JoinError,
     Parts,
     StageEntry,
@@ -17,6 +18,7 @@ from camkit.bundle.stages.entry import (
 
 Interpolation = Literal["lanczos", "cubic"]
 Overshoot = Literal["limited", "kept"]
+Places = Literal["float", "fixed"]
 
 
 class Undistort(StageEntry):
@@ -28,6 +30,9 @@ class Undistort(StageEntry):
         overshoot: limited: at the rim of light above white, and where it falls below -0.02, a value
             stays within the range of the samples that it is interpolated from (format 2.8); kept:
             nowhere, as before.
+        places: Where pixels come from, on nodes every 8 px and linear between them. fixed: nodes
+            rounded to 1/256 px and places to 1/32 px, which leaves no rounding to chance: any
+            reader finds the same (format 2.12). float: in single precision, as before.
     """
 
     type: Literal["undistort"] = "undistort"
@@ -35,6 +40,7 @@ class Undistort(StageEntry):
     gives: tuple[Word, ...] = ("straight",)
     interpolation: Interpolation = "lanczos"
     overshoot: Annotated[Overshoot, BOUNDED] = "kept"
+    places: Annotated[Places, PORTABLE] = "float"
 
     def join(self, planes: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Return the plane in ideal geometry."""

@@ -9,6 +9,7 @@ from camkit.bundle.entry import NonNegative, Positive, Since, Word
 from camkit.bundle.plane import Plane
 from camkit.bundle.sensor import RGB
 from camkit.bundle.stages.entry import (
+    PORTABLE,
     JoinError,
     Parts,
     StageEntry,
@@ -39,6 +40,8 @@ class Wiener(StageEntry):
         clip_windows: Which windows re-estimate clipped pixels where few of a block clip: such as
             hold half of a kernel's side, or the whole of it (format 2.8; bundles of formats before
             2.4 have the latter, later ones the former).
+        whole_blocks: Whether there are no such windows: a block with clipped pixels is re-estimated
+            as a whole, as other readers do (format 2.12).
         together: How the colours are restored together (format 2.4); None for each alone.
         mosaic: Where the colours are restored from the samples of the mosaic, with the numbers of
             `together`, and not from demosaicked planes (format 2.10); None for nowhere.
@@ -58,6 +61,7 @@ class Wiener(StageEntry):
     clip_reach_px: Annotated[int, Field(ge=2, le=1024)] | None = None
     clip_power: Annotated[float, Field(ge=1.0, lt=3.0)] = 1.0
     clip_windows: Literal["half_kernel", "whole_kernel"] = "half_kernel"
+    whole_blocks: Annotated[bool, PORTABLE] = False
     together: Together | None = None
     mosaic: Annotated[
         Mosaic | None, Since((2, 10), "a bank works from the samples of the mosaic")

@@ -1,0 +1,1 @@
+"""A camera as graphs that other programs run: builder, spectra, place, block, tile, warp, package."""

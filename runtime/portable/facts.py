@@ -1,0 +1,132 @@
+"""The facts of a camera that its graphs are made of; cameras without such graphs are refused."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.bundle.manifest import Manifest
+from camkit.bundle.reader import Bundle
+from camkit.bundle.sensor import BayerSensor
+from camkit.bundle.stages import Network, Undistort, Wiener
+from camkit.bundle.stages.together import Together
+from camkit.errors import UnsupportedError
+from camkit.runtime.bank.blocks import UNCUT_PX
+from camkit.runtime.bank.psf import FieldKernels, color_kernels
+from camkit.runtime.portable.spectra import BlockShape
+
+STAGES: Final = (
+    *("linearise", "repair", "white_balance", "demosaic", "wiener", "network"),
+    *("raise_clipped", "illumination", "undistort", "color"),
+)
+"""The stages that the graphs stand for, in this order; repair and what reads a file stay outside."""
+BLOCK_STEP_PX: Final = 8
+"""Sides of blocks are multiples of it: four phases, whose means have a spectrum of even length."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraFacts:
+    """A camera whose chain can be compiled.
+
+    Attributes:
+        bundle: Of the camera.
+        sensor: Of the bundle.
+        bank: Its stage.
+        network: Likewise.
+        warp: Likewise.
+        together: Numbers of the bank.
+        kernels: (field, c, h, w) of the fields, and where these lie.
+        shape: Of the blocks.
+    """
+
+    bundle: Bundle
+    sensor: BayerSensor
+    bank: Wiener
+    network: Network
+    warp: Undistort
+    together: Together
+    kernels: FieldKernels
+    shape: BlockShape
+
+    @property
+    def pitch_mm(self) -> float:
+        """Return the distance of pixels."""
+        return self.sensor.known_extent.pixel_pitch_um / 1000
+
+    @property
+    def axis_px(self) -> tuple[float, float]:
+        """Return (x, y) on the sensor where the optical axis meets it."""
+        extent = self.sensor.known_extent
+        middle = (extent.width_px - 1) / 2, (extent.height_px - 1) / 2
+        return extent.optical_centre_px or middle
+
+    @property
+    def least_noise(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return shot noise and read variance of the lowest ISO, (3,) each, before gains."""
+        noise = self.sensor.noise_at(min(one.iso for one in self.sensor.noise))
+        return np.array(noise.shot), np.array(noise.read_variance)
+
+
+def facts_of(bundle: Bundle) -> CameraFacts:
+    """Return the facts of a camera.
+
+    Raises:
+        UnsupportedError: If something of its chain has no graph; the message names it.
+    """
+    manifest = bundle.manifest
+    if reason := _missing(manifest):
+        raise UnsupportedError(
+            f"{manifest.name} cannot be made portable: {reason}; the graphs are for Bayer cameras "
+            "with a bank, a network and no haze"
+        )
+    sensor = manifest.sensor
+    stages = {stage.type: stage for stage in manifest.stages}
+    bank, network, warp = stages["wiener"], stages["network"], stages["undistort"]
+    assert isinstance(sensor, BayerSensor)
+    assert isinstance(bank, Wiener)
+    assert isinstance(network, Network)
+    assert isinstance(warp, Undistort)
+    assert bank.together is not None
+    return CameraFacts(
+        bundle=bundle,
+        sensor=sensor,
+        bank=bank,
+        network=network,
+        warp=warp,
+        together=bank.together,
+        kernels=color_kernels(bundle.psf, *sensor.response_arrays()),
+        shape=BlockShape(bank.block_px),
+    )
+
+
+def _missing(manifest: Manifest) -> str | None:
+    """Return what of a camera has no graph; None if all has one."""
+    if manifest.kind != "bayer" or not isinstance(manifest.sensor, BayerSensor):
+        return f"its kind is {manifest.kind}"
+    stages = {stage.type: stage for stage in manifest.stages}
+    if (types := tuple(stages)) != STAGES:
+        other = [name for name in types if name not in STAGES]
+        lacking = [name for name in STAGES if name not in types]
+        return f"stage {other[0]} has no graph" if other else f"it has no stage {lacking[0]}"
+    bank, network, warp = stages["wiener"], stages["network"], stages["undistort"]
+    assert isinstance(bank, Wiener)
+    assert isinstance(network, Network)
+    assert isinstance(warp, Undistort)
+    optics = manifest.optics
+    reasons = {
+        "its bank restores every colour alone": bank.together is None,
+        "its bank finds the distance of the scene": bank.depth != "mean",
+        "its bank explains lights without a reach": bank.clip_reach_px is None,
+        f"its blocks are no multiple of {BLOCK_STEP_PX} px": bank.block_px % BLOCK_STEP_PX != 0,
+        f"its blocks are larger than {UNCUT_PX} px": bank.block_px > UNCUT_PX,
+        "its kernels lie on a grid": optics is None or getattr(optics, "symmetry", "") == "grid",
+        "its network takes numbers of its own": network.transform != "stabilise",
+        "its network runs near lights only": network.lights_px is not None,
+        "its network keeps lamps white": network.keeps_white,
+        "its warp is not cubic with limited overshoot": (
+            warp.interpolation != "cubic" or warp.overshoot != "limited"
+        ),
+        "its demosaic is not fast": getattr(stages["demosaic"], "method", "") != "fast",
+    }
+    return next((reason for reason, applies in reasons.items() if applies), None)

@@ -1,0 +1,140 @@
+"""A camera as ONNX graphs in a folder: what another program needs to run it, and nothing of camkit.
+
+    bundle -> facts -> graphs + portable.safetensors + portable.json
+
+`docs/portable.md` is the contract; `examples/` holds readers.
+"""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from safetensors.numpy import save
+
+from camkit.bundle.reader import Bundle
+from camkit.errors import ContractError
+from camkit.runtime.bank.blocks import BORDER_SHARE
+from camkit.runtime.capture import SATURATION_SHARE
+from camkit.runtime.portable.block import block_graph
+from camkit.runtime.portable.demosaic_taps import MARGIN_PX
+from camkit.runtime.portable.facts import CameraFacts, facts_of
+from camkit.runtime.portable.graph_builder import GraphBuilder, shared_tables
+from camkit.runtime.portable.place import place_graph
+from camkit.runtime.portable.tile import tile_graph
+from camkit.runtime.portable.warp import TILE_PX, places_graph, warp_graph
+
+PORTABLE_VERSION: Final = 1
+MANIFEST: Final = "portable.json"
+TABLES: Final = "portable.safetensors"
+TILE_SIDE_PX: Final = 1024
+"""Of a tile that the network sees, where a reader chooses none: 5 MB of planes per 100 kB."""
+
+
+def write_portable(
+    bundle: Bundle, folder: Path, sizes: tuple[str, ...] | None = None
+) -> Mapping[str, int]:
+    """Write a camera as graphs, tables and a manifest into a new or empty folder.
+
+    Args:
+        bundle: Of the camera.
+        folder: Made if it does not exist.
+        sizes: Of the network; None for all that the bundle holds.
+
+    Returns:
+        Bytes of every file by its name.
+
+    Raises:
+        UnsupportedError: If the camera has no such graphs; the message names why.
+        ContractError: If a size is unknown, or the folder holds something.
+    """
+    facts = facts_of(bundle)
+    known = bundle.manifest.sizes
+    chosen = known if sizes is None else sizes
+    if unknown := [size for size in chosen if size not in known]:
+        raise ContractError(f"{bundle.manifest.name} has no size {unknown[0]}; got {known}")
+    if folder.exists() and any(folder.iterdir()):
+        raise ContractError(f"{folder} must be empty or not exist")
+    graphs = _graphs(facts, chosen)
+    files = {f"{graph.name}.onnx": graph.to_bytes() for graph in graphs}
+    files[TABLES] = save({name: values for name, values in shared_tables(graphs).items()})
+    document = portable_manifest(facts, graphs, chosen)
+    files[MANIFEST] = (json.dumps(document, indent=1) + "\n").encode()
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, data in files.items():
+        (folder / name).write_bytes(data)
+    return {name: len(data) for name, data in files.items()}
+
+
+def _graphs(facts: CameraFacts, sizes: tuple[str, ...]) -> list[GraphBuilder]:
+    kinds = (False, True) if facts.bank.mosaic is not None else (False,)
+    places = [place_graph(facts, mosaic=mosaic) for mosaic in kinds]
+    lights = (False, True) if facts.bank.clip_iterations else (False,)
+    blocks = [
+        block_graph(facts, mosaic=mosaic, lights=lit) for mosaic in kinds for lit in lights
+    ]
+    tiles = [tile_graph(facts, size) for size in sizes]
+    return [*places, *blocks, *tiles, places_graph(facts), warp_graph(facts)]
+
+
+def portable_manifest(
+    facts: CameraFacts, graphs: list[GraphBuilder], sizes: tuple[str, ...]
+) -> dict[str, Any]:
+    """Return the numbers of `portable.json`."""
+    manifest, sensor, bank = facts.bundle.manifest, facts.sensor, facts.bank
+    extent = sensor.known_extent
+    networks = {}
+    for size in sizes:
+        one = facts.bundle.network_facts(facts.network.role, size)
+        reach = one.reach_px + facts.network.extra_reach_px
+        stride = one.stride_px
+        networks[size] = {
+            "graph": f"tile_{size}",
+            "halo_px": -(-reach // stride) * stride,
+            "stride_px": stride,
+        }
+    return {
+        "portable_version": PORTABLE_VERSION,
+        "camera": {
+            "name": manifest.name,
+            "version": manifest.version,
+            "licence": manifest.licence,
+            "bundle_sha256": facts.bundle.sha256,
+        },
+        "sensor": {
+            "size_px": [extent.width_px, extent.height_px],
+            "pitch_mm": facts.pitch_mm,
+            "axis_px": list(facts.axis_px),
+            "cfa": sensor.cfa,
+            "black_level": sensor.black_level,
+            "white_level": sensor.white_level,
+            "clip_share": SATURATION_SHARE,
+            "noise": [one.model_dump(mode="json") for one in sensor.noise],
+        },
+        "bank": {
+            "block_px": bank.block_px,
+            "overlap_px": bank.overlap_px,
+            "border_px": int(bank.overlap_px * BORDER_SHARE),
+            "margin_px": MARGIN_PX,
+            "mirrors": facts.kernels.turns,
+            "mosaic_within_mm": None if bank.mosaic is None else bank.mosaic.within_mm,
+            "lights": bank.clip_iterations > 0,
+        },
+        "networks": networks,
+        "tile_px": TILE_SIDE_PX,
+        "warp_px": TILE_PX,
+        "agrees": {
+            "lights": bank.whole_blocks,
+            "places": facts.warp.places == "fixed",
+        },
+        "tables": TABLES,
+        "graphs": {
+            graph.name: {
+                "file": f"{graph.name}.onnx",
+                "inputs": graph.inputs,
+                "tables": list(graph.tables),
+                "outputs": graph.outputs,
+            }
+            for graph in graphs
+        },
+    }

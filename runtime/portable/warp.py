@@ -1,0 +1,143 @@
+"""The graphs of the warp: places of output pixels in the capture, and pixels from there.
+
+`places` computes in float64 what `camkit.runtime.geometry.warp` does for bundles whose places are
+in fixed point: nodes every 8 px in 1/256 px, linear between them, rounded to 1/32 px. The sums are
+exact, so every reader finds the same places. `warp` takes the samples of a box of the capture to
+such places: cubic, limited at rims of lamps, and in linear Rec.709.
+"""
+
+from typing import Final
+
+import numpy as np
+
+from camkit.runtime.color import rec709_of_planes
+from camkit.runtime.geometry.distortion import reference_channel
+from camkit.runtime.geometry.resampling import FLOOR, WHITE
+from camkit.runtime.geometry.warp import LATTICE_PX, NODE_STEPS, PLACE_STEPS
+from camkit.runtime.portable.facts import CameraFacts
+from camkit.runtime.portable.graph_builder import GraphBuilder, Value
+
+TILE_PX: Final = 512
+NEWTON_STEPS: Final = 12
+BORDER_PX: Final = 3
+"""Of repeated samples around a box: as far as the samples of a place beyond its border lie."""
+
+
+def map_count(facts: CameraFacts) -> int:
+    """Return 1 where all colours share their distortion, else their number."""
+    coefficients = facts.bundle.distortion.coefficients
+    even = facts.bundle.distortion.even_coefficients
+    same = (coefficients == coefficients[0]).all() and (even is None or (even == even[0]).all())
+    return 1 if same else len(coefficients)
+
+
+def places_graph(facts: CameraFacts) -> GraphBuilder:
+    """Return the graph of the places of a tile, from its first pixel on."""
+    graph = GraphBuilder("places")
+    target = graph.input("target_px", (2,), "float64")
+    axis = graph.input("axis_px", (2,), "float64")
+    middle = graph.input("middle_px", (2,), "float64")
+    distortion = facts.bundle.distortion
+    unit = facts.pitch_mm / distortion.radius_mm
+    centre = (middle - axis) * unit
+    shift = _shift(centre, distortion.row(reference_channel(distortion)))
+    cells = TILE_PX // LATTICE_PX
+    steps = np.arange(-1, cells + 1) * float(LATTICE_PX) + (LATTICE_PX - 1) / 2
+    along = (target - axis).shaped(2, 1) + steps[None]
+    x, y = along.parts(0, 2)
+    shift_x, shift_y = shift.shaped(2, 1).parts(0, 2)
+    x, y = x * unit + shift_x, (y * unit + shift_y).shaped(-1, 1)
+    square = x * x + y * y
+    maps = []
+    for channel in range(map_count(facts)):
+        growth = _growth(distortion.row(channel), square)
+        first = target - axis
+        first_x, first_y = first.parts(0, 2)
+        column = growth * x * (1 / unit) - first_x
+        row = growth * y * (1 / unit) - first_y
+        maps.append(graph.joined([part.shaped(1, 1, cells + 2, cells + 2) for part in (column, row)], 1))
+    nodes = graph.joined(maps, axis=0)
+    nodes = (nodes * float(NODE_STEPS) + 0.5).floor()
+    down = _dense(graph, nodes, cells)
+    dense = _dense(graph, down.turned(0, 1, 3, 2), cells).turned(0, 1, 3, 2)
+    places = (dense * (PLACE_STEPS / NODE_STEPS) + 0.5).floor() * (1 / PLACE_STEPS)
+    out = places.turned(0, 2, 3, 1).cast("float32")
+    graph.output("places", out, (map_count(facts), TILE_PX, TILE_PX, 2))
+    return graph
+
+
+def _dense(graph: GraphBuilder, nodes: Value, cells: int) -> Value:
+    """Return (maps, 2, 8 cells, w) of (maps, 2, cells + 2, w), linear between nodes."""
+    k = np.arange(LATTICE_PX)
+    before = np.maximum((LATTICE_PX - 1) / 2 - k, 0) / LATTICE_PX
+    behind = before[::-1]
+    weights = np.zeros((cells, LATTICE_PX, cells + 2))
+    for cell in range(cells):
+        weights[cell, :, cell] = before
+        weights[cell, :, cell + 1] = 1 - before - behind
+        weights[cell, :, cell + 2] = behind
+    return weights.reshape(-1, cells + 2) @ nodes
+
+
+def _growth(c: np.ndarray, square: Value) -> Value:
+    growth = ((square * c[3] + c[2]) * square + c[1]) * square + c[0]
+    if len(c) > 4:
+        even = ((square * c[6] + c[5]) * square + c[4]) * square.sqrt()
+        growth = growth + even
+    return growth
+
+
+def _shift(centre: Value, c: np.ndarray) -> Value:
+    """Return (2,): how far the middle moves, in units of the distortion; Newton's method."""
+    distorted = (centre * centre).sum(0).sqrt()
+    radius = distorted * (1 / c[0])
+    for _ in range(NEWTON_STEPS):
+        square = radius * radius
+        growth = _growth(c, square)
+        slope = ((square * (7 * c[3]) + 5 * c[2]) * square + 3 * c[1]) * square + c[0]
+        if len(c) > 4:
+            more = ((square * (6 * c[6]) + 4 * c[5]) * square + 2 * c[4]) * radius
+            slope = slope + more
+        radius = radius - (radius * growth - distorted) / slope
+    return centre * ((radius + 1e-30) / (distorted + 1e-30 * c[0]) - 1.0)
+
+
+def warp_graph(facts: CameraFacts) -> GraphBuilder:
+    """Return the graph that takes samples of a box to places."""
+    graph = GraphBuilder("warp")
+    maps = map_count(facts)
+    planes = graph.input("planes", (1, 3, "h", "w"))
+    places = graph.input("places", (maps, TILE_PX, TILE_PX, 2))
+    first = graph.input("first_px", (2,))
+    if maps > 1:
+        planes = planes.turned(1, 0, 2, 3)
+    at = places - first
+    values = _sampled(graph, planes, at, "bicubic")
+    pads = np.array([0, 0, BORDER_PX, BORDER_PX] * 2, np.int64)
+    wide = graph.node("Pad", planes, pads, mode="edge")
+    whole = at.floor() + (BORDER_PX - 1.0)
+
+    def most(samples: Value) -> Value:
+        pooled = graph.node("MaxPool", samples, kernel_shape=[4, 4])
+        return _sampled(graph, pooled, whole, "nearest")
+
+    high, low = most(wide), most(wide * -1.0) * -1.0
+    over, under = graph.node("Greater", high, WHITE), graph.node("LessOrEqual", low, WHITE)
+    rim = graph.node("And", over, under)
+    limited = graph.node("Or", rim, graph.node("Less", values, FLOOR))
+    values = graph.node("Where", limited, values.at_least(low).at_most(high), values)
+    values.kind = "float32"
+    matrix = rec709_of_planes(np.array(facts.sensor.color_matrix))
+    color = matrix @ values.shaped(3, TILE_PX * TILE_PX)
+    graph.output("out", color.shaped(3, TILE_PX, TILE_PX), (3, TILE_PX, TILE_PX))
+    return graph
+
+
+def _sampled(graph: GraphBuilder, planes: Value, at: Value, mode: str) -> Value:
+    """Return planes at pixel places; beyond the border its samples repeat."""
+    sides = graph.node("Shape", planes).taken(np.array([3, 2]), 0)
+    sides = graph.node("Cast", sides, to=1)
+    grid = (at * 2.0 + 1.0) / sides - 1.0
+    return graph.node(
+        "GridSample", planes, grid, mode=mode, padding_mode="border", align_corners=0
+    )
