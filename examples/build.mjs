@@ -1,4 +1,4 @@
-// Build node/dist/develop.mjs, and browser/dist/index.html: one file that needs nothing beside it.
+// Build the programs in node/dist, and browser/dist/index.html: one file that needs nothing beside it.
 import { build } from "esbuild";
 import { mkdir, readFile, writeFile } from "node:fs/promises";
 import { fileURLToPath } from "node:url";
@@ -29,7 +29,10 @@ const [page, markup, style] = await Promise.all([
   build({ ...usual, entryPoints: ["browser/page.ts"], format: "iife", platform: "browser", plugins: [made] }),
   readFile("browser/page.html", "utf8"),
   readFile("browser/style.css", "utf8"),
-  build({ ...usual, minify: false, write: true, entryPoints: ["node/develop.ts"], outfile: "node/dist/develop.mjs", format: "esm", platform: "node", packages: "external" }),
+  build({
+    ...usual, minify: false, write: true, entryPoints: ["node/develop.ts", "node/read.ts"], outdir: "node/dist",
+    outExtension: { ".js": ".mjs" }, format: "esm", platform: "node", packages: "external",
+  }),
 ]);
 const script = page.outputFiles[0].text.replaceAll("</script", "<\\/script");
 const whole = markup.replace("{{style}}", () => style).replace("{{script}}", () => script);

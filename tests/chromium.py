@@ -23,16 +23,23 @@ class BrowserError(Exception):
 
 
 class Page:
-    """One page of a browser."""
+    """One page of a browser.
+
+    Attributes:
+        console: What the page complained of.
+        requests: Addresses that it asked for, in order.
+    """
 
     def __init__(self, commands: int, answers: int) -> None:
         self._commands, self._answers = commands, answers
         self._held, self._number, self._session = b"", 0, ""
+        self._loaded = False
         self.console: list[str] = []
+        self.requests: list[str] = []
         target = self.call("Target.createTarget", url="about:blank")["targetId"]
         attached = self.call("Target.attachToTarget", targetId=target, flatten=True)
         self._session = attached["sessionId"]
-        for domain in ("Page", "Runtime", "DOM", "Network"):
+        for domain in ("Page", "Runtime", "DOM", "Network", "Log"):
             self.call(f"{domain}.enable")
 
     def call(self, method: str, **parameters: Any) -> dict[str, Any]:
@@ -66,23 +73,27 @@ class Page:
             self.console.append(json.dumps(facts["exceptionDetails"])[:500])
         elif method == "Runtime.consoleAPICalled" and facts["type"] in {"error", "warning"}:
             self.console.append(" ".join(str(one.get("value")) for one in facts["args"])[:500])
+        elif method == "Log.entryAdded" and facts["entry"]["level"] == "error":
+            self.console.append(facts["entry"]["text"])
         elif method == "Network.requestWillBeSent":
             self.requests.append(facts["request"]["url"])
-
-    @property
-    def requests(self) -> list[str]:
-        """Return the addresses that were asked for, in order."""
-        return self.__dict__.setdefault("_requests", [])
+        elif method == "Page.loadEventFired":
+            self._loaded = True
 
     def open(self, url: str, *, size: tuple[int, int] = (1280, 900), dark: bool = False) -> None:
-        """Open an address in a window of some size."""
+        """Open an address in a window of some size, and wait until it is loaded."""
         self.call(
             "Emulation.setDeviceMetricsOverride",
             width=size[0], height=size[1], deviceScaleFactor=1, mobile=size[0] < 500,
         )  # fmt: skip
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
         self.call("Emulation.setEmulatedMedia", features=[scheme])
-        self.call("Page.navigate", url=url)
+        self._loaded = False
+        made = self.call("Page.navigate", url=url)
+        if "errorText" in made:
+            raise BrowserError(f"{url}: {made['errorText']}")
+        while not self._loaded:
+            self._message()
 
     def value(self, script: str) -> Any:
         """Return the value of an expression, a promise's once it is kept."""

@@ -41,16 +41,17 @@ export type Order =
   | { kind: "start"; wasm: ArrayBuffer; glue: string; threads: number }
   | { kind: "files"; files: { name: string; bytes: ArrayBuffer }[] }
   | { kind: "develop"; settings: Settings }
-  | { kind: "save"; bits: 8 | 16 }
+  | { kind: "show"; stops: number }
+  | { kind: "save"; bits: 8 | 16; stops: number }
   | { kind: "light" };
 
 export type Answer =
   | { kind: "ready"; threads: number }
-  | { kind: "camera"; facts: CameraFacts }
+  | { kind: "camera"; facts: CameraFacts; files: string[] }
   | { kind: "photo"; facts: PhotoFacts }
   | { kind: "progress"; step: string; share: number }
-  | { kind: "before"; pixels: Pixels }
-  | { kind: "after"; pixels: Pixels; seconds: number }
+  | { kind: "done"; seconds: number }
+  | { kind: "shown"; before: Pixels; after: Pixels }
   | { kind: "saved"; png: ArrayBuffer; bits: 8 | 16 }
   | { kind: "light"; light: Float32Array; width: number; height: number }
   | { kind: "error"; message: string };

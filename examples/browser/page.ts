@@ -28,12 +28,15 @@ const after = element("after", "canvas");
 const line = element("line", "div");
 const split = element("split", "input");
 const zoom = element("zoom", "button");
+const stops = element("stops", "input");
 const news = element("news", "p");
 const problem = element("error", "p");
 
 let worker: Worker | undefined;
 let wasm: ArrayBuffer | undefined;
-let given: { name: string; bytes: ArrayBuffer }[] = []; // for a new worker, after a cancel
+/** Files that were given, and the names of those in use: a new worker needs them after a cancel. */
+const given = new Map<string, ArrayBuffer>();
+const used = { camera: [] as string[], photo: [] as string[] };
 let camera: CameraFacts | undefined;
 let photo: PhotoFacts | undefined;
 let started = 0;
@@ -59,7 +62,8 @@ async function startWorker(): Promise<void> {
   worker.onmessage = ({ data }: MessageEvent<Answer>) => hear(data);
   worker.onerror = (event) => fail(`Something went wrong: ${event.message}`);
   send({ kind: "start", wasm, glue, threads });
-  if (given.length) send({ kind: "files", files: given });
+  const names = [...used.camera, ...used.photo];
+  if (names.length) send({ kind: "files", files: names.map((name) => ({ name, bytes: given.get(name)! })) });
 }
 
 function fail(message: string): void {
@@ -82,21 +86,27 @@ function hear(message: Answer): void {
       break;
     case "camera":
       camera = message.facts;
+      used.camera = message.files;
       showGiven();
       break;
     case "photo":
       photo = message.facts;
+      used.photo = [photo.name];
       showGiven();
       break;
     case "progress":
       showProgress(message.step, message.share);
       break;
-    case "before":
-      paint(before, message.pixels);
+    case "done":
+      rest();
+      news.textContent = `Done in ${message.seconds.toFixed(1)} s.`;
+      send({ kind: "show", stops: stops.valueAsNumber });
       break;
-    case "after":
-      paint(after, message.pixels);
-      showResult(message.seconds);
+    case "shown":
+      paint(before, message.before);
+      paint(after, message.after);
+      element("result", "section").hidden = false;
+      place();
       break;
     case "saved":
       download(new Blob([message.png], { type: "image/png" }), message.bits);
@@ -110,8 +120,8 @@ function hear(message: Answer): void {
 }
 
 function showGiven(): void {
-  const cameraText = element("camera", "dd" as "div");
-  const photoText = element("photo", "dd" as "div");
+  const cameraText = element("camera", "dd");
+  const photoText = element("photo", "dd");
   if (camera) cameraText.textContent = `${camera.name} ${camera.version}, sensor of ${camera.sensor.join(" x ")} px`;
   if (photo) photoText.textContent = [photo.name, `${photo.width} x ${photo.height} px`, photo.camera, photo.iso && `ISO ${photo.iso}`, ...photo.notes].filter(Boolean).join(", ");
   cameraText.classList.toggle("dim", !camera);
@@ -120,8 +130,8 @@ function showGiven(): void {
   if (!camera || !photo) return;
   size.replaceChildren(...camera.sizes.map((name) => new Option(`${name}${name === "S" ? ", fast" : name === "M" ? ", better" : ""}`, name)));
   iso.value = photo.iso ? String(photo.iso) : "";
-  red.value = photo.whiteBalance ? String(photo.whiteBalance[0]) : "";
-  blue.value = photo.whiteBalance ? String(photo.whiteBalance[2]) : "";
+  red.value = rounded(photo.whiteBalance?.[0]);
+  blue.value = rounded(photo.whiteBalance?.[2]);
   left.value = String(photo.origin?.[0] ?? Math.max(0, 2 * Math.floor((camera.sensor[0] - photo.width) / 4)));
   top.value = String(photo.origin?.[1] ?? Math.max(0, 2 * Math.floor((camera.sensor[1] - photo.height) / 4)));
   const stranger = photo.bundle !== camera.name && photo.camera ? `This photograph names the camera ${photo.bundle ?? photo.camera}, not ${camera.name}: the picture may be worse than the photograph.` : "";
@@ -135,20 +145,17 @@ function showProgress(step: string, share: number): void {
   element("doing", "p").textContent = `${step}: ${Math.floor(100 * share)} %, ${Math.floor(seconds)} s so far${rest}`;
 }
 
-function showResult(seconds: number): void {
-  rest();
-  element("result", "section").hidden = false;
-  news.textContent = `Done in ${seconds.toFixed(1)} s.`;
-  place();
-}
-
 function paint(canvas: HTMLCanvasElement, { rgba, width, height }: Pixels): void {
   [canvas.width, canvas.height] = [width, height];
   canvas.getContext("2d")?.putImageData(new ImageData(rgba, width, height), 0, 0);
 }
 
-/** Put the line between before and after where the slider says, on what is seen of the picture. */
+/** Lay the pictures out, and the line between before and after where the slider says. */
 function place(): void {
+  const fit = stage.classList.contains("fit");
+  const room = stage.parentElement!.clientWidth;
+  const scale = fit ? Math.min(1, room / after.width, (0.8 * innerHeight) / after.height) : 1 / devicePixelRatio;
+  for (const canvas of [before, after]) canvas.style.width = `${after.width * scale}px`;
   const seen = Math.min(stage.clientWidth, after.clientWidth);
   const at = (stage.scrollWidth > stage.clientWidth ? stage.scrollLeft : 0) + (Number(split.value) / 100) * seen;
   after.style.clipPath = `inset(0 0 0 ${at}px)`;
@@ -170,7 +177,8 @@ async function take(list: File[]): Promise<void> {
   if (!list.length) return;
   news.textContent = "Reading the files.";
   const taken = await Promise.all(list.map(async (file) => ({ name: file.name, bytes: await file.arrayBuffer() })));
-  given = [...given.filter(({ name }) => !taken.some((one) => one.name === name)), ...taken];
+  for (const name of given.keys()) if (![...used.camera, ...used.photo].includes(name)) given.delete(name);
+  for (const { name, bytes } of taken) given.set(name, bytes);
   news.textContent = "";
   send({ kind: "files", files: taken });
 }
@@ -187,11 +195,20 @@ async function dropped(transfer: DataTransfer): Promise<File[]> {
   return found;
 }
 
+function rounded(gain: number | undefined): string {
+  return gain === undefined ? "" : String(Number(gain.toFixed(4)));
+}
+
+/** A gain that a person typed, or that of the file in full where it still stands there. */
+function gain(input: HTMLInputElement, stated: number | undefined): number {
+  return stated !== undefined && input.value === rounded(stated) ? stated : input.valueAsNumber;
+}
+
 function settings(): Settings {
   return {
     size: size.value,
     iso: iso.valueAsNumber,
-    whiteBalance: [red.valueAsNumber, 1, blue.valueAsNumber],
+    whiteBalance: [gain(red, photo?.whiteBalance?.[0]), 1, gain(blue, photo?.whiteBalance?.[2])],
     origin: [left.valueAsNumber, top.valueAsNumber],
   };
 }
@@ -230,7 +247,7 @@ for (const bits of [8, 16] as const) {
   saveButtons[bits].addEventListener("click", () => {
     for (const button of Object.values(saveButtons)) button.disabled = true;
     news.textContent = "Writing the PNG.";
-    send({ kind: "save", bits });
+    send({ kind: "save", bits, stops: stops.valueAsNumber });
   });
 }
 zoom.addEventListener("click", () => {
@@ -239,6 +256,10 @@ zoom.addEventListener("click", () => {
   zoom.setAttribute("aria-pressed", String(!fit));
   place();
 });
+stops.addEventListener("input", () => {
+  element("stated", "output").textContent = `${stops.valueAsNumber > 0 ? "+" : ""}${stops.value} EV`;
+});
+stops.addEventListener("change", () => send({ kind: "show", stops: stops.valueAsNumber }));
 split.addEventListener("input", place);
 stage.addEventListener("scroll", place);
 addEventListener("resize", place);

@@ -27,17 +27,26 @@ function start(order: Extract<Order, { kind: "start" }>): void {
 }
 
 async function take(files: { name: string; bytes: ArrayBuffer }[]): Promise<void> {
+  const isMember = ({ name }: { name: string }) => /\.(zip|json|onnx|safetensors)$/i.test(name);
+  const photos = files.filter((file) => !isMember(file));
+  const errors: unknown[] = []; // one file that cannot be used does not stop the others
+  for (const { name, bytes } of photos) await takePhoto(name, new Uint8Array(bytes)).catch((error: unknown) => errors.push(error));
+  const members = files.filter(isMember);
+  if (members.length) await takeCamera(members).catch((error: unknown) => errors.push(error));
+  if (errors.length) throw errors[0];
+}
+
+async function takeCamera(files: { name: string; bytes: ArrayBuffer }[]): Promise<void> {
   const members = new Map<string, Uint8Array>();
   for (const file of files) {
     const bytes = new Uint8Array(file.bytes);
     if (isZip(bytes)) for (const [name, content] of await readZip(bytes)) members.set(name, content);
-    else if (/\.(json|onnx|safetensors)$/i.test(file.name)) members.set(file.name, bytes);
-    else await takePhoto(file.name, bytes);
+    else members.set(file.name, bytes);
   }
-  if (!members.size) return;
   camera = Camera.open(members, ort);
   const { camera: named, networks, sensor } = camera.about;
-  answer({ kind: "camera", facts: { name: named.name, version: named.version, sizes: Object.keys(networks), sensor: sensor.size_px } });
+  const facts = { name: named.name, version: named.version, sizes: Object.keys(networks), sensor: sensor.size_px };
+  answer({ kind: "camera", facts, files: files.map(({ name }) => name) });
 }
 
 async function takePhoto(name: string, bytes: Uint8Array): Promise<void> {
@@ -51,8 +60,8 @@ async function takePhoto(name: string, bytes: Uint8Array): Promise<void> {
   answer({ kind: "photo", facts: { ...facts, name } });
 }
 
-function pixels(light: Float32Array, of: Developed): Pixels {
-  const { rgb, width, height } = picture(light, of.width, of.height, of.orientation, 8);
+function pixels(light: Float32Array, of: Developed, stops: number): Pixels {
+  const { rgb, width, height } = picture(light, of, 8, stops);
   const rgba = new Uint8ClampedArray(4 * width * height).fill(255);
   for (let i = 0, j = 0; j < rgb.length; i += 4, j += 3) [rgba[i], rgba[i + 1], rgba[i + 2]] = [rgb[j]!, rgb[j + 1]!, rgb[j + 2]!];
   return { rgba, width, height };
@@ -67,18 +76,20 @@ async function work(settings: Settings): Promise<void> {
     size: settings.size,
     progress: (step, share) => answer({ kind: "progress", step, share }),
   });
-  const seconds = (performance.now() - started) / 1000;
-  const before = pixels(made.before, made);
-  answer({ kind: "before", pixels: before }, [before.rgba.buffer]);
-  const after = pixels(made.light, made);
-  answer({ kind: "after", pixels: after, seconds }, [after.rgba.buffer]);
+  answer({ kind: "done", seconds: (performance.now() - started) / 1000 });
 }
 
-async function save(bits: 8 | 16): Promise<void> {
+function show(stops: number): void {
   check(made, "Develop a photograph first.");
-  const { light, width, height, orientation } = made;
-  const { rgb, width: wide, height: high } = bits === 8 ? picture(light, width, height, orientation, 8) : picture(light, width, height, orientation, 16);
-  const png = (await writePng(rgb, wide, high)).buffer as ArrayBuffer;
+  const before = pixels(made.before, made, stops);
+  const after = pixels(made.light, made, stops);
+  answer({ kind: "shown", before, after }, [before.rgba.buffer, after.rgba.buffer]);
+}
+
+async function save(bits: 8 | 16, stops: number): Promise<void> {
+  check(made, "Develop a photograph first.");
+  const { rgb, width, height } = picture(made.light, made, bits, stops);
+  const png = (await writePng(rgb, width, height)).buffer as ArrayBuffer;
   answer({ kind: "saved", png, bits }, [png]);
 }
 
@@ -87,7 +98,8 @@ async function obey(order: Order): Promise<void> {
     case "start": return start(order);
     case "files": return take(order.files);
     case "develop": return work(order.settings);
-    case "save": return save(order.bits);
+    case "show": return show(order.stops);
+    case "save": return save(order.bits, order.stops);
     case "light":
       check(made, "Develop a photograph first.");
       return answer({ kind: "light", light: made.light, width: made.width, height: made.height });

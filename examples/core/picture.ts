@@ -13,10 +13,16 @@ function srgb(light: number): number {
   return light <= 0.0031308 ? 12.92 * light : 1.055 * light ** (1 / 2.4) - 0.055;
 }
 
-/** Return the picture of three planes of linear Rec.709 light, for EXIF orientation 1 to 8. */
-export function picture(light: Float32Array, width: number, height: number, orientation: number, bits: 8): Picture<Uint8Array>;
-export function picture(light: Float32Array, width: number, height: number, orientation: number, bits: 16): Picture<Uint16Array>;
-export function picture(light: Float32Array, width: number, height: number, orientation: number, bits: 8 | 16): Picture<Uint8Array | Uint16Array> {
+export interface Held {
+  width: number;
+  height: number;
+  /** EXIF orientation, 1 to 8. */
+  orientation: number;
+}
+
+/** Return the picture of three planes of linear Rec.709 light, brighter by some stops. */
+export function picture(light: Float32Array, { width, height, orientation }: Held, bits: 8 | 16, stops = 0): Picture<Uint8Array | Uint16Array> {
+  const factor = 2 ** stops;
   const pixels = width * height;
   const rgb = bits === 8 ? new Uint8Array(3 * pixels) : new Uint16Array(3 * pixels);
   const top = 2 ** bits - 1;
@@ -32,7 +38,7 @@ export function picture(light: Float32Array, width: number, height: number, orie
       const v = swapped ? x : y;
       const from = (mirrorY ? height - 1 - v : v) * width + (mirrorX ? width - 1 - u : u);
       for (let c = 0; c < 3; c++) {
-        const value = light[c * pixels + from]!;
+        const value = factor * light[c * pixels + from]!;
         rgb[at + c] = table ? table[value >= 1 ? 65535 : value > 0 ? Math.floor(value * 65536) : 0]! : Math.round(top * srgb(value));
       }
     }

@@ -69,9 +69,7 @@ export async function develop(camera: Camera, capture: Capture, choices: Choices
   const planes = await restore(camera, { mosaic, width, height, cfa: capture.cfa ?? sensor.cfa, clip, axis }, known, progress);
   const clipped = mosaic.map((sample) => (sample >= clip ? 1 : 0));
   const even = await clean(camera, choices.size, { planes, clipped, width, height, axis }, known, progress);
-  const before = planes.subarray(0, 3 * width * height).map((light) => Math.min(light, 1));
-  const [light, plain] = await straighten(camera, [even, before], width, height, axis, progress);
-  return { light: light!, before: plain!, width, height, orientation: capture.orientation };
+  return { ...(await straighten(camera, even, planes, { width, height, axis }, progress)), width, height, orientation: capture.orientation };
 }
 
 /** Blocks along an axis, and their windows, 0 outside the picture. */
@@ -173,13 +171,12 @@ function add(total: Float32Array, width: number, height: number, out: Float32Arr
   const [top, left] = [rows.span.first, columns.span.first];
   const [y0, y1] = [Math.max(top, 0), Math.min(top + block, height)];
   const [x0, x1] = [Math.max(left, 0), Math.min(left + block, width)];
-  const step = columns.flip ? -1 : 1;
   for (let plane = 0; plane < 6; plane++) {
     for (let y = y0; y < y1; y++) {
-      const row = plane * block + (rows.flip ? block - 1 - (y - top) : y - top);
-      let from = row * block + (columns.flip ? block - 1 - (x0 - left) : x0 - left);
-      let to = (plane * height + y) * width + x0;
-      for (let x = x0; x < x1; x++, to++, from += step) total[to]! += out[from]!;
+      const row = (plane * block + (rows.flip ? block - 1 - (y - top) : y - top)) * block;
+      const to = (plane * height + y) * width;
+      if (columns.flip) for (let x = x0; x < x1; x++) total[to + x]! += out[row + block - 1 - (x - left)]!;
+      else for (let x = x0; x < x1; x++) total[to + x]! += out[row + x - left]!;
     }
   }
 }
@@ -187,7 +184,7 @@ function add(total: Float32Array, width: number, height: number, out: Float32Arr
 /** Tiles along an axis: first pixel, and first and last of those that are kept. */
 function tiles(size: number, side: number, halo: number): [number, number, number][] {
   const count = side >= size ? 1 : Math.ceil((size - 2 * halo) / (side - 2 * halo));
-  const firsts = Array.from({ length: count }, (_, i) => Math.min(i * (side - 2 * halo), size - Math.min(side, size)));
+  const firsts = Array.from({ length: count }, (_, i) => Math.min(i * (side - 2 * halo), size - side));
   return firsts.map((first, i) => [first, i ? first + halo : 0, i + 1 < count ? firsts[i + 1]! + halo : size]);
 }
 
@@ -205,7 +202,7 @@ async function clean(camera: Camera, size: string, restored: Restored, known: Va
   const { tile_px: side, sensor } = camera.about;
   const { planes, clipped, width, height, axis } = restored;
   const [wide, high] = [width, height].map((n) => Math.ceil(n / stride) * stride) as [number, number];
-  const [tall, broad] = [Math.min(side, high), Math.min(side, wide)];
+  const [broad, tall] = [Math.min(side, wide), Math.min(side, high)];
   const even = new Float32Array(3 * width * height);
   /** A tile of some planes, whose border repeats. */
   const cut = (from: Float32Array, count: number, x: number, y: number) => {
@@ -218,8 +215,8 @@ async function clean(camera: Camera, size: string, restored: Restored, known: Va
     }
     return camera.tensor(out, [1, count, tall, broad]);
   };
-  const across = tiles(wide, side, halo);
-  const down = tiles(high, side, halo);
+  const across = tiles(wide, broad, halo);
+  const down = tiles(high, tall, halo);
   let done = 0;
   for (const [y, top, bottom] of down) {
     for (const [x, left, right] of across) {
@@ -238,11 +235,20 @@ async function clean(camera: Camera, size: string, restored: Restored, known: Va
   return even;
 }
 
-/** Pictures in linear Rec.709 without distortion, all with the same places. */
-async function straighten(camera: Camera, pictures: Float32Array[], width: number, height: number, axis: [number, number], progress: NonNullable<Choices["progress"]>): Promise<Float32Array[]> {
+interface Frame {
+  width: number;
+  height: number;
+  axis: [number, number];
+}
+
+/** The picture in linear Rec.709 without distortion; the same of the demosaicked planes, to compare. */
+async function straighten(camera: Camera, even: Float32Array, planes: Float32Array, frame: Frame, progress: NonNullable<Choices["progress"]>): Promise<Pick<Developed, "light" | "before">> {
+  const { width, height, axis } = frame;
   const side = camera.about.warp_px;
-  const outs = pictures.map((one) => new Float32Array(one.length));
+  const light = new Float32Array(3 * width * height);
+  const before = new Float32Array(3 * width * height);
   const [across, down] = [Math.ceil(width / side), Math.ceil(height / side)];
+  let matrix: number[] | undefined;
   for (let tile = 0; tile < across * down; tile++) {
     progress("Straightening", 1 - SHARES.warp * (1 - tile / (across * down)));
     const [x, y] = [(tile % across) * side, Math.floor(tile / across) * side];
@@ -252,25 +258,59 @@ async function straighten(camera: Camera, pictures: Float32Array[], width: numbe
       axis_px: camera.exact(...axis),
       middle_px: camera.exact((width - 1) / 2, (height - 1) / 2),
     });
-    const box = sourceBox(places!.data as Float32Array, side, [x, y, right, bottom], width, height);
-    const [x0, y0, x1, y1] = box;
-    for (const [i, from] of pictures.entries()) {
-      const part = new Float32Array(3 * (y1 - y0) * (x1 - x0));
-      for (let row = 0, at = 0; row < 3 * (y1 - y0); row++, at += x1 - x0) {
-        const start = (Math.floor(row / (y1 - y0)) * height + y0 + (row % (y1 - y0))) * width;
-        part.set(from.subarray(start + x0, start + x1), at);
-      }
-      const { out } = await camera.run("warp", { planes: camera.tensor(part, [1, 3, y1 - y0, x1 - x0]), places: places!, first_px: camera.tensor([x0 - x, y0 - y]) });
-      const light = out!.data as Float32Array;
-      for (let plane = 0; plane < 3; plane++) {
-        for (let row = y; row < bottom; row++) {
-          const at = (plane * side + row - y) * side;
-          outs[i]!.set(light.subarray(at, at + right - x), (plane * height + row) * width + x);
-        }
+    const at = places!.data as Float32Array;
+    const [x0, y0, x1, y1] = sourceBox(at, side, [x, y, right, bottom], width, height);
+    const part = new Float32Array(3 * (y1 - y0) * (x1 - x0));
+    for (let row = 0, to = 0; row < 3 * (y1 - y0); row++, to += x1 - x0) {
+      const start = (Math.floor(row / (y1 - y0)) * height + y0 + (row % (y1 - y0))) * width;
+      part.set(even.subarray(start + x0, start + x1), to);
+    }
+    const { out } = await camera.run("warp", { planes: camera.tensor(part, [1, 3, y1 - y0, x1 - x0]), places: places!, first_px: camera.tensor([x0 - x, y0 - y]) });
+    const made = out!.data as Float32Array;
+    for (let plane = 0; plane < 3; plane++) {
+      for (let row = y; row < bottom; row++) {
+        const from = (plane * side + row - y) * side;
+        light.set(made.subarray(from, from + right - x), (plane * height + row) * width + x);
       }
     }
+    matrix ??= await colourMatrix(camera, places!.dims);
+    sample(before, planes, matrix, at, side, [x, y, right, bottom], frame);
   }
-  return outs;
+  return { light, before };
+}
+
+/** The matrix from the camera's colours to linear Rec.709: what the warp makes of each colour alone. */
+async function colourMatrix(camera: Camera, shape: readonly number[]): Promise<number[]> {
+  const places = new Float32Array(shape.reduce((product, n) => product * n, 1));
+  const map = places.length / shape[0]!;
+  for (let i = 0; i < 3 * shape[0]!; i++) places[Math.floor(i / 3) * map + 2 * (i % 3)] = i % 3;
+  const colours = camera.tensor([0.5, 0, 0, 0, 0.5, 0, 0, 0, 0.5], [1, 3, 1, 3]);
+  const { out } = await camera.run("warp", { planes: colours, places: camera.tensor(places, [...shape]), first_px: camera.tensor([0, 0]) });
+  return Array.from({ length: 9 }, (_, i) => 2 * (out!.data as Float32Array)[Math.floor(i / 3) * camera.about.warp_px ** 2 + (i % 3)]!);
+}
+
+/** Sample demosaicked planes, at most white, at the places of a tile: linear between pixels. */
+function sample(out: Float32Array, planes: Float32Array, matrix: number[], places: Float32Array, side: number, [x, y, right, bottom]: [number, number, number, number], { width, height }: Frame): void {
+  const map = places.length === 2 * side * side ? 0 : 2 * side * side;
+  const light = [0, 0, 0];
+  for (let row = y; row < bottom; row++) {
+    for (let column = x; column < right; column++) {
+      for (let c = 0; c < 3; c++) {
+        const i = c * map + 2 * ((row - y) * side + column - x);
+        const u = Math.min(Math.max(places[i]! + x, 0), width - 1);
+        const v = Math.min(Math.max(places[i + 1]! + y, 0), height - 1);
+        const [left, top] = [Math.floor(u), Math.floor(v)];
+        const from = (c * height + top) * width + left;
+        const next = left + 1 < width ? 1 : 0;
+        const below = top + 1 < height ? width : 0;
+        const upper = planes[from]! + (u - left) * (planes[from + next]! - planes[from]!);
+        const lower = planes[from + below]! + (u - left) * (planes[from + below + next]! - planes[from + below]!);
+        light[c] = Math.min(upper + (v - top) * (lower - upper), 1);
+      }
+      const [red, green, blue] = light as [number, number, number];
+      for (let c = 0; c < 3; c++) out[(c * height + row) * width + column] = matrix[3 * c]! * red + matrix[3 * c + 1]! * green + matrix[3 * c + 2]! * blue;
+    }
+  }
 }
 
 /** First and last pixel of the capture that the used places of a tile need: x0, y0, x1, y1. */

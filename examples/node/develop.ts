@@ -66,10 +66,10 @@ async function main(): Promise<void> {
   const made = await develop(camera, capture, { size: values.size });
   const { user, system } = process.cpuUsage(started);
   console.log(`${made.width}x${made.height}, ${((user + system) / 1e6).toFixed(2)} CPU s`);
-  const { light, width, height, orientation } = made;
+  const { light } = made;
   if (values.light) await writeFile(values.light, new Uint8Array(light.buffer, light.byteOffset, light.byteLength));
-  const { rgb, width: wide, height: high } = values.bits === "16" ? picture(light, width, height, orientation, 16) : picture(light, width, height, orientation, 8);
-  await writeFile(picturePath, await writePng(rgb, wide, high));
+  const { rgb, width, height } = picture(light, made, values.bits === "16" ? 16 : 8);
+  await writeFile(picturePath, await writePng(rgb, width, height));
 }
 
 main().catch((error: unknown) => {
