@@ -16,18 +16,19 @@ from camkit.bundle.reader import Bundle
 from camkit.errors import ContractError
 from camkit.runtime.bank.blocks import BORDER_SHARE
 from camkit.runtime.capture import SATURATION_SHARE
+from camkit.runtime.geometry.resampling import FLOOR, WHITE
 from camkit.runtime.portable.block import block_graph
 from camkit.runtime.portable.demosaic_taps import MARGIN_PX
 from camkit.runtime.portable.facts import CameraFacts, facts_of
 from camkit.runtime.portable.graph_builder import GraphBuilder, shared_tables
 from camkit.runtime.portable.place import place_graph
-from camkit.runtime.portable.tile import tile_graph
+from camkit.runtime.portable.tile import kept_graph, tile_graph
 from camkit.runtime.portable.warp import TILE_PX, places_graph, warp_graph
 
 PORTABLE_VERSION: Final = 1
 MANIFEST: Final = "portable.json"
 TABLES: Final = "portable.safetensors"
-TILE_SIDE_PX: Final = 1024
+TILE_SIDE_PX: Final = 768
 """Of a tile that the network sees, where a reader chooses none: 5 MB of planes per 100 kB."""
 
 
@@ -74,7 +75,8 @@ def _graphs(facts: CameraFacts, sizes: tuple[str, ...]) -> list[GraphBuilder]:
         block_graph(facts, mosaic=mosaic, lights=lit) for mosaic in kinds for lit in lights
     ]
     tiles = [tile_graph(facts, size) for size in sizes]
-    return [*places, *blocks, *tiles, places_graph(facts), warp_graph(facts)]
+    warps = [places_graph(facts), *(warp_graph(facts, limited=one) for one in (False, True))]
+    return [*places, *blocks, kept_graph(), *tiles, *warps]
 
 
 def portable_manifest(
@@ -123,6 +125,8 @@ def portable_manifest(
         "networks": networks,
         "tile_px": TILE_SIDE_PX,
         "warp_px": TILE_PX,
+        "warp_white": WHITE,
+        "warp_floor": FLOOR,
         "agrees": {
             "lights": bank.whole_blocks,
             "places": facts.warp.places == "fixed",

@@ -29,7 +29,8 @@ from camkit.runtime.portable.facts import CameraFacts
 from camkit.runtime.portable.graph_builder import GraphBuilder, Value
 from camkit.runtime.signal.stabilise import FAMILIAR_READ, LEAST_FAMILIAR_E
 
-TABLE_SAMPLES: Final = 4096
+TABLE_SAMPLES: Final = 1 << 17
+"""Of the squared height: the nearest one errs by some millionths."""
 _TINY: Final = 1e-6
 
 
@@ -37,32 +38,58 @@ def tile_graph(facts: CameraFacts, size: str) -> GraphBuilder:
     """Return the graph of a tile for a network of some size."""
     graph = GraphBuilder(f"tile_{size}")
     planes = graph.input("planes", (1, 6, "h", "w"))
-    clipped = graph.input("clipped", (1, 1, "h", "w"))
+    kept = graph.input("kept", (1, 1, "h", "w"))
     gains = graph.input("gains", (3,))
     shot, read = graph.input("shot", (3,)), graph.input("read_variance", (3,))
     origin = graph.input("origin_mm", (2,))
     shot, read = _familiar(facts, shot * gains, read * gains * gains)
     scale = facts.network.scale
-    slope = (1 / (shot * (scale * scale))).shaped(1, 3, 1, 1)
-    offset = slope * (read / shot).shaped(1, 3, 1, 1)
-    slopes, offsets = (graph.joined([part, part], axis=1) for part in (slope, offset))
-    given = (planes * slopes + offsets).relu().sqrt()
+    slope = 1 / (shot * (scale * scale))
+    offset = slope * (read / shot)
+    twice = (graph.joined([part, part], axis=0) for part in (slope, offset))
+    given = _line(graph, planes, *twice).relu().sqrt()
     role = facts.network.role
     model = onnx.load_from_string(facts.bundle.network_bytes(role, size))
     made = graph.copied(model, given).relu()
     front = given.part(1, 3, 6)
-    kept = _kept_share(graph, clipped)
+    added = made - front
     bound = _bound(facts)
     if bound is not None:
-        made = made - _excess(graph, front, made, kept, (bound, scale))
-    made = front + (made - front) * kept
+        added = added - _excess(graph, (front, added, made), kept, (bound, scale))
+    made = front + added * kept
     if bound is not None and bound.keeps_bright:
         bright = (slope * BRIGHT + offset).relu().sqrt()
-        made = made.at_least(front * _bright_share(front / bright) - BRIGHT_NOISE * 0.5 / scale)
+        share = _bright_share(front * (1 / bright).shaped(1, 3, 1, 1))
+        made = made.at_least(front * share - BRIGHT_NOISE * 0.5 / scale)
     made = made.relu()
-    light = (made * made - offset) / slope
-    light = _neutral(graph, light, gains.shaped(1, 3, 1, 1))
+    steepness = 1 / slope
+    light = _line(graph, made * made, steepness, offset * steepness * -1.0)
+    light = _neutral(graph, light, gains)
     graph.output("out", light * _gain(graph, facts, light, origin), (1, 3, "h", "w"))
+    return graph
+
+
+def _line(graph: GraphBuilder, planes: Value, slope: Value, offset: Value) -> Value:
+    """Return slope times planes, and the offset, one of each per channel, in one pass."""
+    zero, one = slope * 0.0, slope * 0.0 + 1.0
+    return graph.node("BatchNormalization", planes, slope, offset, zero, one, epsilon=0.0)
+
+
+def kept_graph() -> GraphBuilder:
+    """Return the graph of how much of what a network adds is kept beside clipped samples."""
+    graph = GraphBuilder("kept")
+    clipped = graph.input("clipped", (1, 1, "h", "w"))
+    share: Value | float = 1.0
+    for reach in NEAR_PX:
+        near = clipped
+        for along in (0, 1):
+            sides = [1, 1]
+            sides[along] = 2 * reach + 1
+            pads = [side // 2 for side in sides] * 2
+            near = graph.node("MaxPool", near, kernel_shape=sides, pads=pads)
+        share = share - near * (1 / len(NEAR_PX))
+    assert isinstance(share, Value)
+    graph.output("out", share, (1, 1, "h", "w"))
     return graph
 
 
@@ -79,30 +106,22 @@ def _bound(facts: CameraFacts) -> LightBound | None:
     return next(stage.light for stage in stages if isinstance(stage, Network))
 
 
-def _kept_share(graph: GraphBuilder, clipped: Value) -> Value:
-    """Return how much of what the network adds is kept beside clipped samples."""
-    share: Value | float = 1.0
-    for reach in NEAR_PX:
-        size = 2 * reach + 1
-        near = graph.node("MaxPool", clipped, kernel_shape=[size, size], pads=[reach] * 4)
-        share = share - near * (1 / len(NEAR_PX))
-    assert isinstance(share, Value)
-    return share
-
-
 def _excess(
-    graph: GraphBuilder, front: Value, made: Value, kept: Value, rule: tuple[LightBound, float]
+    graph: GraphBuilder,
+    change: tuple[Value, Value, Value],
+    kept: Value,
+    rule: tuple[LightBound, float],
 ) -> Value:
     """Return the change that goes beyond the bound, see `camkit.runtime.network.light_bound`."""
-    bound, scale = rule
+    (front, added, made), (bound, scale) = change, rule
     total, cell = (made + front) * kept, (0.5 / scale / CELL_PX) ** 2
 
     def means(planes: Value) -> Value:
         side = [CELL_PX, CELL_PX]
         return graph.node("AveragePool", planes, kernel_shape=side, strides=side)
 
-    change = _smoothed(graph, means((made - front) * total))
-    change = change / _smoothed(graph, means(total)).at_least(_TINY)
+    moved = _smoothed(graph, means(added * total))
+    moved = moved / _smoothed(graph, means(total)).at_least(_TINY)
     level = means(front)
     mean = _smoothed(graph, level)
     spread = (_smoothed(graph, level * level) - mean * mean).relu()
@@ -111,7 +130,7 @@ def _excess(
     if bound.light:
         square = square + mean * mean * (bound.light / 2) ** 2
     limit = square.sqrt()
-    excess = change - change.at_most(limit).at_least(limit * -1.0)
+    excess = moved - moved.at_most(limit).at_least(limit * -1.0)
     scales = np.array([1, 1, CELL_PX, CELL_PX], np.float32)
     return graph.node("Resize", excess, None, scales, mode="linear")
 
@@ -130,8 +149,16 @@ def _bright_share(levels: Value) -> Value:
 
 
 def _neutral(graph: GraphBuilder, light: Value, levels: Value) -> Value:
-    """Return burnt-out light made neutral, see `camkit.runtime.color.recover_highlights`."""
-    clipped = ((light - levels * CLIP_START) / (levels * (CLIP_FULL - CLIP_START))).clip(0.0, 1.0)
+    """Return burnt-out light made neutral, see `camkit.runtime.color.recover_highlights`.
+
+    Args:
+        graph: To add to.
+        light: (1, 3, h, w).
+        levels: (3,) at which the channels clip.
+    """
+    steepness = 1 / (levels * (CLIP_FULL - CLIP_START))
+    start = levels * steepness * -CLIP_START
+    clipped = _line(graph, light, steepness, start).clip(0.0, 1.0)
     red, green, blue = light.parts(1, 3)
     most = red.at_least(green).at_least(blue)
     assumed = light + clipped * (most - light)
@@ -141,7 +168,7 @@ def _neutral(graph: GraphBuilder, light: Value, levels: Value) -> Value:
 
 
 def _gain(graph: GraphBuilder, facts: CameraFacts, light: Value, origin: Value) -> Value:
-    """Return (h, w): one over the relative illumination, linear in the squared height."""
+    """Return (h, w): one over the relative illumination, the nearest sample by squared height."""
     radial = facts.bundle.illumination
     radial = getattr(radial, "radial_illumination", radial)
     end = float(radial.heights_mm[-1] * 1.05) ** 2
@@ -155,8 +182,5 @@ def _gain(graph: GraphBuilder, facts: CameraFacts, light: Value, origin: Value) 
         line = at.cast("float32") * facts.pitch_mm + place
         lines.append(line * line)
     square = lines[0] + graph.node("Unsqueeze", lines[1], np.array([1], np.int64))
-    at = (square * ((TABLE_SAMPLES - 1) / end)).clip(0.0, TABLE_SAMPLES - 1.001)
-    low = at.floor()
-    index = low.cast("int64")
-    below = graph.constant(gains).taken(index, 0)
-    return below + graph.constant(np.append(np.diff(gains), 0)).taken(index, 0) * (at - low)
+    index = (square * ((TABLE_SAMPLES - 1) / end) + 0.5).at_most(TABLE_SAMPLES - 1.0)
+    return graph.table("illumination_gain", gains).taken(index.cast("int64"), 0)

@@ -63,6 +63,9 @@ def places_graph(facts: CameraFacts) -> GraphBuilder:
     places = (dense * (PLACE_STEPS / NODE_STEPS) + 0.5).floor() * (1 / PLACE_STEPS)
     out = places.turned(0, 2, 3, 1).cast("float32")
     graph.output("places", out, (map_count(facts), TILE_PX, TILE_PX, 2))
+    for name, operator in (("least", "ReduceMin"), ("most", "ReduceMax")):
+        edge = graph.node(operator, nodes, np.array([0, 2, 3], np.int64), keepdims=0)
+        graph.output(name, (edge * (1 / NODE_STEPS)).cast("float32"), (2,))
     return graph
 
 
@@ -102,17 +105,36 @@ def _shift(centre: Value, c: np.ndarray) -> Value:
     return centre * ((radius + 1e-30) / (distorted + 1e-30 * c[0]) - 1.0)
 
 
-def warp_graph(facts: CameraFacts) -> GraphBuilder:
-    """Return the graph that takes samples of a box to places."""
-    graph = GraphBuilder("warp")
+def warp_graph(facts: CameraFacts, *, limited: bool) -> GraphBuilder:
+    """Return the graph that takes samples of a box to places.
+
+    Args:
+        facts: Of the camera.
+        limited: Whether values are limited at rims of lamps, and below `FLOOR`. The other graph is
+            faster and serves where there are none; it states its least value.
+    """
+    graph = GraphBuilder("warp_limited" if limited else "warp")
     maps = map_count(facts)
     planes = graph.input("planes", (1, 3, "h", "w"))
     places = graph.input("places", (maps, TILE_PX, TILE_PX, 2))
     first = graph.input("first_px", (2,))
     if maps > 1:
         planes = planes.turned(1, 0, 2, 3)
-    at = places - first
+    at = places.shaped(maps, TILE_PX, 2 * TILE_PX) - _along(graph, first)
     values = _sampled(graph, planes, at, "bicubic")
+    if limited:
+        values = _limited(graph, planes, at, values)
+    else:
+        least = graph.node("ReduceMin", values, keepdims=0)
+        graph.output("least", least.shaped(1), (1,))
+    matrix = rec709_of_planes(np.array(facts.sensor.color_matrix))
+    color = matrix @ values.shaped(3, TILE_PX * TILE_PX)
+    graph.output("out", color.shaped(3, TILE_PX, TILE_PX), (3, TILE_PX, TILE_PX))
+    return graph
+
+
+def _limited(graph: GraphBuilder, planes: Value, at: Value, values: Value) -> Value:
+    """Return values within the range of their samples, see `resampled_limited`."""
     pads = np.array([0, 0, BORDER_PX, BORDER_PX] * 2, np.int64)
     wide = graph.node("Pad", planes, pads, mode="edge")
     whole = at.floor() + (BORDER_PX - 1.0)
@@ -125,19 +147,21 @@ def warp_graph(facts: CameraFacts) -> GraphBuilder:
     over, under = graph.node("Greater", high, WHITE), graph.node("LessOrEqual", low, WHITE)
     rim = graph.node("And", over, under)
     limited = graph.node("Or", rim, graph.node("Less", values, FLOOR))
-    values = graph.node("Where", limited, values.at_least(low).at_most(high), values)
-    values.kind = "float32"
-    matrix = rec709_of_planes(np.array(facts.sensor.color_matrix))
-    color = matrix @ values.shaped(3, TILE_PX * TILE_PX)
-    graph.output("out", color.shaped(3, TILE_PX, TILE_PX), (3, TILE_PX, TILE_PX))
-    return graph
+    return graph.node("Where", limited, values.at_least(low).at_most(high), values)
+
+
+def _along(graph: GraphBuilder, pair: Value) -> Value:
+    """Return x, y, x, y, ... of (2,): beside places it is added in long rows."""
+    whole = graph.node("Expand", pair.shaped(1, 2), np.array([TILE_PX, 2], np.int64))
+    return whole.shaped(2 * TILE_PX)
 
 
 def _sampled(graph: GraphBuilder, planes: Value, at: Value, mode: str) -> Value:
     """Return planes at pixel places; beyond the border its samples repeat."""
     sides = graph.node("Shape", planes).taken(np.array([3, 2]), 0)
-    sides = graph.node("Cast", sides, to=1)
-    grid = (at * 2.0 + 1.0) / sides - 1.0
+    step = _along(graph, 2.0 / graph.node("Cast", sides, to=1))
+    grid = (at + 0.5) * step - 1.0
+    grid = grid.shaped(0, TILE_PX, TILE_PX, 2)
     return graph.node(
         "GridSample", planes, grid, mode=mode, padding_mode="border", align_corners=0
     )
