@@ -29,6 +29,8 @@ export interface About {
   networks: Record<string, { graph: string; halo_px: number; stride_px: number }>;
   tile_px: number;
   warp_px: number;
+  warp_white: number;
+  warp_floor: number;
   tables: string;
   graphs: Record<string, { file: string; inputs: string[]; tables: string[]; outputs: string[] }>;
 }

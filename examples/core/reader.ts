@@ -66,10 +66,16 @@ export async function develop(camera: Camera, capture: Capture, choices: Choices
     for (let i = 0; i < mosaic.length; i++) mosaic[i]! += black - blacks[2 * (Math.floor(i / width) & 1) + ((i % width) & 1)]!;
   }
   const progress = choices.progress ?? (() => undefined);
-  const planes = await restore(camera, { mosaic, width, height, cfa: capture.cfa ?? sensor.cfa, clip, axis }, known, progress);
+  const planes = await restore(camera, { mosaic, width, height, cfa: capture.cfa ?? patternAt(sensor.cfa, origin), clip, axis }, known, progress);
   const clipped = mosaic.map((sample) => (sample >= clip ? 1 : 0));
-  const even = await clean(camera, choices.size, { planes, clipped, width, height, axis }, known, progress);
+  const { out: kept } = await camera.run("kept", { clipped: camera.tensor(clipped, [1, 1, height, width]) });
+  const even = await clean(camera, choices.size, { planes, kept: kept!.data as Float32Array, width, height, axis }, known, progress);
   return { ...(await straighten(camera, even, planes, { width, height, axis }, progress)), width, height, orientation: capture.orientation };
+}
+
+/** Letters of the cell at a place of the sensor, whose own first cell is given. */
+function patternAt(cfa: string, [x, y]: number[]): string {
+  return [0, 1, 2, 3].map((i) => cfa[2 * (((i >> 1) + y!) & 1) + ((i + x!) & 1)]).join("");
 }
 
 /** Blocks along an axis, and their windows, 0 outside the picture. */
@@ -181,6 +187,12 @@ function add(total: Float32Array, width: number, height: number, out: Float32Arr
   }
 }
 
+/** Side of tiles along an axis: the least of as many as tiles of some side would need. */
+function sideOf(size: number, most: number, halo: number, stride: number): number {
+  const count = Math.max(1, Math.ceil((size - 2 * halo) / (most - 2 * halo)));
+  return Math.ceil((size + (count - 1) * 2 * halo) / (count * stride)) * stride;
+}
+
 /** Tiles along an axis: first pixel, and first and last of those that are kept. */
 function tiles(size: number, side: number, halo: number): [number, number, number][] {
   const count = side >= size ? 1 : Math.ceil((size - 2 * halo) / (side - 2 * halo));
@@ -190,7 +202,8 @@ function tiles(size: number, side: number, halo: number): [number, number, numbe
 
 interface Restored {
   planes: Float32Array;
-  clipped: Float32Array;
+  /** Share of what the network adds that counts, less beside clipped samples. */
+  kept: Float32Array;
   width: number;
   height: number;
   axis: [number, number];
@@ -200,9 +213,9 @@ interface Restored {
 async function clean(camera: Camera, size: string, restored: Restored, known: Values, progress: NonNullable<Choices["progress"]>): Promise<Float32Array> {
   const { graph, halo_px: halo, stride_px: stride } = camera.about.networks[size]!;
   const { tile_px: side, sensor } = camera.about;
-  const { planes, clipped, width, height, axis } = restored;
+  const { planes, kept, width, height, axis } = restored;
   const [wide, high] = [width, height].map((n) => Math.ceil(n / stride) * stride) as [number, number];
-  const [broad, tall] = [Math.min(side, wide), Math.min(side, high)];
+  const [broad, tall] = [wide, high].map((n) => sideOf(n, side, halo, stride)) as [number, number];
   const even = new Float32Array(3 * width * height);
   /** A tile of some planes, whose border repeats. */
   const cut = (from: Float32Array, count: number, x: number, y: number) => {
@@ -222,7 +235,7 @@ async function clean(camera: Camera, size: string, restored: Restored, known: Va
     for (const [x, left, right] of across) {
       progress("Removing noise", SHARES.blocks + (SHARES.tiles * done++) / (across.length * down.length));
       const origin = camera.tensor([(x - axis[0]) * sensor.pitch_mm, (y - axis[1]) * sensor.pitch_mm]);
-      const { out } = await camera.run(graph, { ...known, planes: cut(planes, 6, x, y), clipped: cut(clipped, 1, x, y), origin_mm: origin });
+      const { out } = await camera.run(graph, { ...known, planes: cut(planes, 6, x, y), kept: cut(kept, 1, x, y), origin_mm: origin });
       const light = out!.data as Float32Array;
       for (let plane = 0; plane < 3; plane++) {
         for (let row = top; row < Math.min(bottom, height); row++) {
@@ -253,28 +266,32 @@ async function straighten(camera: Camera, even: Float32Array, planes: Float32Arr
     progress("Straightening", 1 - SHARES.warp * (1 - tile / (across * down)));
     const [x, y] = [(tile % across) * side, Math.floor(tile / across) * side];
     const [right, bottom] = [Math.min(x + side, width), Math.min(y + side, height)];
-    const { places } = await camera.run("places", {
+    const places = await camera.run("places", {
       target_px: camera.exact(x, y),
       axis_px: camera.exact(...axis),
       middle_px: camera.exact((width - 1) / 2, (height - 1) / 2),
     });
-    const at = places!.data as Float32Array;
-    const [x0, y0, x1, y1] = sourceBox(at, side, [x, y, right, bottom], width, height);
+    const at = places.places!;
+    const [x0, x1] = sourceSpan(places, 0, x, width);
+    const [y0, y1] = sourceSpan(places, 1, y, height);
     const part = new Float32Array(3 * (y1 - y0) * (x1 - x0));
     for (let row = 0, to = 0; row < 3 * (y1 - y0); row++, to += x1 - x0) {
       const start = (Math.floor(row / (y1 - y0)) * height + y0 + (row % (y1 - y0))) * width;
       part.set(even.subarray(start + x0, start + x1), to);
     }
-    const { out } = await camera.run("warp", { planes: camera.tensor(part, [1, 3, y1 - y0, x1 - x0]), places: places!, first_px: camera.tensor([x0 - x, y0 - y]) });
-    const made = out!.data as Float32Array;
+    const values = { planes: camera.tensor(part, [1, 3, y1 - y0, x1 - x0]), places: at, first_px: camera.tensor([x0 - x, y0 - y]) };
+    // where there are no lamps and nothing falls far below black, nothing is to be limited
+    const plain = part.every((sample) => sample <= camera.about.warp_white) ? await camera.run("warp", values) : undefined;
+    const isEnough = plain && (plain.least!.data as Float32Array)[0]! >= camera.about.warp_floor;
+    const made = (isEnough ? plain : await camera.run("warp_limited", values)).out!.data as Float32Array;
     for (let plane = 0; plane < 3; plane++) {
       for (let row = y; row < bottom; row++) {
         const from = (plane * side + row - y) * side;
         light.set(made.subarray(from, from + right - x), (plane * height + row) * width + x);
       }
     }
-    matrix ??= await colourMatrix(camera, places!.dims);
-    sample(before, planes, matrix, at, side, [x, y, right, bottom], frame);
+    matrix ??= await colourMatrix(camera, at.dims);
+    sample(before, planes, matrix, at.data as Float32Array, side, [x, y, right, bottom], frame);
   }
   return { light, before };
 }
@@ -313,21 +330,9 @@ function sample(out: Float32Array, planes: Float32Array, matrix: number[], place
   }
 }
 
-/** First and last pixel of the capture that the used places of a tile need: x0, y0, x1, y1. */
-function sourceBox(places: Float32Array, side: number, [x, y, right, bottom]: [number, number, number, number], width: number, height: number): [number, number, number, number] {
-  const low = [Infinity, Infinity];
-  const high = [-Infinity, -Infinity];
-  for (let map = 0; map < places.length; map += 2 * side * side) {
-    for (let row = 0; row < bottom - y; row++) {
-      for (let i = 2 * row * side; i < 2 * (row * side + right - x); i++) {
-        const at = places[map + i]!;
-        if (at < low[i & 1]!) low[i & 1] = at;
-        if (at > high[i & 1]!) high[i & 1] = at;
-      }
-    }
-  }
-  const [first, size] = [[x, y], [width, height]];
-  const starts = [0, 1].map((i) => Math.min(Math.max(Math.floor(low[i]!) - 1 + first[i]!, 0), size[i]! - 1)) as [number, number];
-  const ends = [0, 1].map((i) => Math.max(Math.min(Math.floor(high[i]!) + 3 + first[i]!, size[i]!), starts[i]! + 1)) as [number, number];
-  return [...starts, ...ends];
+/** First pixel of the capture that the places of a tile need along x (0) or y (1), and the one behind the last. */
+function sourceSpan(places: Values, i: 0 | 1, target: number, size: number): [number, number] {
+  const [least, most] = [places.least!, places.most!].map(({ data }) => (data as Float32Array)[i]!) as [number, number];
+  const first = Math.min(Math.max(Math.floor(least) - 1 + target, 0), size - 1);
+  return [first, Math.max(Math.min(Math.ceil(most) + 3 + target, size), first + 1)];
 }

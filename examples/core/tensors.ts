@@ -24,8 +24,8 @@ export function readTensors(bytes: Uint8Array): Map<string, Numbers> {
     const Kind = type === "F16" ? Uint16Array : KINDS[type];
     const count = shape.reduce((product, n) => product * n, 1);
     check(Kind && end - first === count * Kind.BYTES_PER_ELEMENT && 8 + length + end <= bytes.length, damaged);
-    // a copy: numbers in the file may lie at any byte
-    const copy = bytes.slice(8 + length + first, 8 + length + end);
+    // a copy, since numbers in the file may lie at any byte; a Buffer of node would copy nothing
+    const copy = Uint8Array.from(bytes.subarray(8 + length + first, 8 + length + end));
     tensors.set(name, { type, shape, data: new Kind(copy.buffer, 0, count) });
   }
   return tensors;

@@ -67,7 +67,7 @@ export interface Tiff {
 /** Read all directories of a TIFF, those inside others too. */
 export function readTiff(bytes: Uint8Array): Tiff {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
-  check(bytes.length >= 8, "The file is too short to be a photograph.");
+  check(bytes.length >= 8, "The file is no TIFF or DNG: it is empty, or nearly.");
   const little = view.getUint16(0) === 0x4949;
   check(little || view.getUint16(0) === 0x4d4d, "The file is no TIFF or DNG.");
   const magic = view.getUint16(2, little);

@@ -40,11 +40,17 @@ class PortableCase:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PortableCamera:
-    """A camera as files: a folder, a zip, and its golden cases by name."""
+    """A camera as files: a zip, its golden cases by name, and the reader of examples/python."""
 
-    folder: Path
     archive: Path
     cases: dict[str, PortableCase]
+    reader: Any
+
+    def develop(self, photo: Path) -> FloatArray:
+        """Return (3, h, w) light, as the reader in Python makes it."""
+        capture = read_capture(photo, isolate=False)
+        facts = capture.iso, capture.white_balance, capture.origin_px
+        return np.asarray(self.reader.develop(np.asarray(capture.samples), *facts))
 
 
 def make_camera(name: str, size: str, folder: Path) -> PortableCamera:
@@ -59,7 +65,7 @@ def make_camera(name: str, size: str, folder: Path) -> PortableCamera:
     cases = {
         case.name: _case(bundle, case, size, reader, folder) for case in bundle.manifest.golden
     }
-    return PortableCamera(folder=graphs, archive=archive, cases=cases)
+    return PortableCamera(archive=archive, cases=cases, reader=reader)
 
 
 def _case(bundle: Bundle, case: GoldenCase, size: str, reader: Any, folder: Path) -> PortableCase:
@@ -87,7 +93,7 @@ def _case(bundle: Bundle, case: GoldenCase, size: str, reader: Any, folder: Path
     # gains as the file holds them: millionths
     gains = read_capture(photo, isolate=False).white_balance
     light = reader.develop(arrays.capture, case.iso, gains, case.origin_px)
-    follows = all(reader.about["agrees"].values())
+    follows = all(reader.facts["agrees"].values())
     output = arrays.output("image", size) if follows else None
     most = 1.0 if output is None else max(1.0, float(np.abs(output).max()))
     return PortableCase(

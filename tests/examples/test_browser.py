@@ -4,6 +4,7 @@ import base64
 import functools
 import http.server
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
@@ -13,9 +14,10 @@ import numpy as np
 import pytest
 
 from camkit.arrays import FloatArray
+from camkit.runtime.output.dng import write_bayer_dng
 from tests.chromium import PROGRAM, Page, chromium
 from tests.dng_builder import build_dng
-from tests.dng_factory import scene_mosaic
+from tests.dng_factory import dng_tags, scene_mosaic
 from tests.examples.built_examples import PAGE, build_examples
 from tests.examples.portable_cases import PortableCamera, difference_db, make_camera
 
@@ -176,6 +178,27 @@ def test_the_page_fits_a_telephone_and_every_control_a_finger(page: Page) -> Non
     )
     assert len(sides) >= 10
     assert min(sides) >= 40
+
+
+@pytest.mark.slow
+def test_a_photograph_takes_at_most_three_times_the_python_reader(
+    camera: PortableCamera, page: Page, tmp_path: Path
+) -> None:
+    """Seconds of 1500x1000 pixels, each on one thread, one after the other."""
+    photo = tmp_path / "large.dng"
+    rng = np.random.default_rng(7)
+    write_bayer_dng(photo, rng.integers(300, 1200, (1000, 1500), dtype=np.uint16), tags=dng_tags())
+    ratios = []
+    for _ in range(3):
+        _develop(page, photo)
+        said = page.value("document.querySelector('#news').textContent")
+        start = time.perf_counter()
+        camera.develop(photo)
+        here = time.perf_counter() - start
+        there = float(said.split()[2])
+        print(f"page {there:.1f} s, Python reader {here:.1f} s")
+        ratios.append(there / here)
+    assert sorted(ratios)[1] <= 3
 
 
 class _Isolated(http.server.SimpleHTTPRequestHandler):
