@@ -5,6 +5,7 @@ The public face, free of torch and loaded only when touched:
     camkit.load(bundle)            a live Pipeline from a bundle's name or path
     camkit.process(files, ...)     captures in, pictures and sidecars out
     camkit.simulate(scene, ...)    a sharp scene to a capture of a camera
+    camkit.portable(bundle, ...)   a camera as graphs for programs without camkit
     camkit.calibrate               measurements of a camera: calibrate.noise(...), ...
     camkit.make(lens, ...)         a lens and a sensor to a proved bundle (needs torch)
     camkit.recipe(lens, ...)       a lens and a sensor to a training recipe (needs torch)
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     from camkit.runtime.cancel import Cancelled
     from camkit.runtime.capture import MosaicOptions
     from camkit.runtime.development import FileResult
+    from camkit.runtime.face.portable_writing import portable
     from camkit.runtime.face.simulation import simulate
     from camkit.runtime.pipeline import Pipeline, load
 
@@ -62,6 +64,7 @@ __all__ = [
     "freeze",
     "load",
     "make",
+    "portable",
     "process",
     "recipe",
     "simulate",
@@ -77,6 +80,7 @@ _HOMES = {
     "FileResult": "camkit.runtime.development",
     "Cancelled": "camkit.runtime.cancel",
     "MosaicOptions": "camkit.runtime.capture",
+    "portable": "camkit.runtime.face.portable_writing",
     "simulate": "camkit.runtime.face.simulation",
     "freeze": "camkit.models_def.face.optics_freezing",
     "make": "camkit.report.making.camera_making",

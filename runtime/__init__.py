@@ -20,6 +20,7 @@
     merging/                           brackets to one picture
     proof/                             a bundle proves itself
     twin/                              the digital twin: a scene becomes a RAW file
+    portable/                          a camera as graphs for programs without camkit
     face/                              parts of the public face
     kind, kinds/, kind_parts/          what a kind of camera brings: readers, stages, products
 

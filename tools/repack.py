@@ -8,16 +8,16 @@ With `--floor SHARE` pictures of photons have no black where light was counted; 
 contrast between cells, and none darkens what is nearly white; with `--limited` undistortion leaves
 no rings around lamps; with `--streaks-from-samples` streaks are taken from the mosaic, and no
 network darkens a lamp; with `--portable` clipped lights are explained in whole blocks and places of
-undistortion are in fixed point, as readers in other languages do; with `--psf FILE` the same lens has a PSF of other depths (`camkit freeze
---depths-mm`). The laws of its pictures are measured and stated. The result proves itself before it
-gets its name.
+undistortion are in fixed point, as readers in other languages do; with `--psf FILE` the same lens
+has a PSF of other depths (`camkit freeze --depths-mm`). The laws of its pictures are measured and
+stated. The result proves itself before it gets its name.
 """
 
 import argparse
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -46,18 +46,17 @@ from camkit.runtime.plan.bounded_networks import ENFORCE, bounded_stages
 from camkit.runtime.proof.laws.proof import measure_laws, with_laws
 
 Change = tuple[type[Stage], dict[str, Any]]
+PORTABLE: Final = ((Wiener, {"whole_blocks": True}), (Undistort, {"places": "fixed"}))
+"""The rules that readers in other languages follow too."""
 
 
 def repack(
     old: Path,
     new: Path,
     *,
-    clip_reach_px: int | None = None,
-    floor: float | None = None,
+    changes: Sequence[Change] = (),
     light_spread: float | None = None,
-    limited: bool = False,
     from_samples: bool = False,
-    portable: bool = False,
     psf: Path | None = None,
 ) -> int:
     """Write one bundle anew; give its bytes.
@@ -65,12 +64,9 @@ def repack(
     Args:
         old: The bundle.
         new: The file to write.
-        clip_reach_px: Of the Wiener bank; None leaves it as it is.
-        floor: Of pictures of photons; None leaves it as it is.
+        changes: Numbers of stages, of each by its type.
         light_spread: Of the bound on networks behind a bank; None leaves it as it is.
-        limited: Limit the overshoot of undistortion.
         from_samples: Whether streaks of lights are taken from the samples of the mosaic.
-        portable: Whether lights and places follow rules that other readers can follow.
         psf: PSF that the same lens was frozen into anew; None leaves the old one.
 
     Raises:
@@ -86,9 +82,7 @@ def repack(
     manifest = bundle.manifest.model_copy(update={"format_version": ".".join(map(str, newest))})
     with tempfile.TemporaryDirectory() as folder:
         trial = Path(folder) / "trial.camkit"
-        changes = _simple_changes(clip_reach_px, floor, limited=limited)
-        if portable:
-            changes += [(Wiener, {"whole_blocks": True}), (Undistort, {"places": "fixed"})]
+        changes = list(changes)
         if light_spread is not None:  # with the mask that a bound needs
             manifest = manifest.model_copy(update={"stages": bounded_stages(manifest, ENFORCE)})
             changes.append((Network, {"light": LightBound(spread=light_spread, keeps_bright=True)}))
@@ -113,17 +107,17 @@ def repack(
     return new.stat().st_size
 
 
-def _simple_changes(
-    clip_reach_px: int | None, floor: float | None, *, limited: bool
-) -> list[Change]:
+def _simple_changes(arguments: argparse.Namespace) -> list[Change]:
     """Return the changes that set one number of one stage."""
     changes: list[Change] = []
-    if clip_reach_px is not None:
-        changes.append((Wiener, {"clip_reach_px": clip_reach_px}))
-    if floor is not None:
-        changes.append((SuperResolve, {"floor": floor}))
-    if limited:
+    if arguments.clip_reach_px is not None:
+        changes.append((Wiener, {"clip_reach_px": arguments.clip_reach_px}))
+    if arguments.floor is not None:
+        changes.append((SuperResolve, {"floor": arguments.floor}))
+    if arguments.limited:
         changes.append((Undistort, {"overshoot": "limited"}))
+    if arguments.portable:
+        changes += PORTABLE
     return changes
 
 
@@ -186,12 +180,9 @@ def main() -> None:
     after = repack(
         arguments.old,
         arguments.out,
-        clip_reach_px=arguments.clip_reach_px,
-        floor=arguments.floor,
+        changes=_simple_changes(arguments),
         light_spread=arguments.light_spread,
-        limited=arguments.limited,
         from_samples=arguments.streaks_from_samples,
-        portable=arguments.portable,
         psf=arguments.psf,
     )
     print(f"{arguments.out}: {after} bytes, before {before}")

@@ -36,6 +36,7 @@ from camkit.cli.use.calibrate.calibrate_app import calibrate_app
 from camkit.cli.use.info import info
 from camkit.cli.use.merge import merge
 from camkit.cli.use.plan import plan
+from camkit.cli.use.portable import portable
 from camkit.cli.use.process import process
 from camkit.cli.use.psf_group.psf_app import psf_app
 from camkit.cli.use.simulate import simulate
@@ -56,6 +57,7 @@ add_command(app, plan, USE, "Preview what process would do.")
 add_command(app, simulate, USE, "Simulate captures of a scene.")
 add_command(app, merge, USE, "Merge exposures into one EXR.")
 add_command(app, info, USE, "Describe a bundle or capture.")
+add_command(app, portable, USE, "Write graphs for other programs.")
 add_command(app, check, JUDGE, "Verify that a bundle works.")
 add_command(app, bench, JUDGE, "Compare speed, accuracy and memory.")
 add_command(app, stress, JUDGE, "Find where a network fails.")

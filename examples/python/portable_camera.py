@@ -1,124 +1,93 @@
 """A portable camera in numpy and onnxruntime: the mosaic of a capture in, linear Rec.709 out."""
-
-import json
-import math
+import json, math
 from pathlib import Path
-
-import numpy as np
-import onnxruntime as ort
-
+import numpy as np, onnxruntime as ort
 
 class PortableCamera:
     def __init__(self, folder, size="M", threads=1):
-        self.facts, options = json.loads((Path(folder) / "portable.json").read_text()), ort.SessionOptions()
-        options.intra_op_num_threads, data = threads, (Path(folder) / self.facts["tables"]).read_bytes()
-        start = 8 + int.from_bytes(data[:8], "little")  # safetensors: length, JSON, numbers
-        cut = lambda entry: data[start:][slice(*entry["data_offsets"])]
-        self.tables = {name: np.frombuffer(cut(entry), np.float32).reshape(entry["shape"])
-                       for name, entry in json.loads(data[8:start]).items() if name != "__metadata__"}
-        self.network = self.facts["networks"][size]
-        other = {network["graph"] for network in self.facts["networks"].values()} - {self.network["graph"]}
+        self.facts = json.loads((Path(folder) / "portable.json").read_text())
+        self.network, self.sensor, self.bank = self.facts["networks"][size], self.facts["sensor"], self.facts["bank"]
+        data, options = (Path(folder) / self.facts["tables"]).read_bytes(), ort.SessionOptions()
+        start, options.intra_op_num_threads = 8 + int.from_bytes(data[:8], "little"), threads
+        names = self.network["graph"], *self.facts["common"]
+        self.tables = {name: np.frombuffer(data[start:][slice(*t["data_offsets"])], np.float32).reshape(t["shape"])
+                       for name, t in json.loads(data[8:start]).items() if name != "__metadata__"}
         self.graphs = {name: (graph, ort.InferenceSession(Path(folder) / graph["file"], options))
-                       for name, graph in self.facts["graphs"].items() if name not in other}
+                       for name, graph in self.facts["graphs"].items() if name in names}
 
     def run(self, name, values):
         graph, session = self.graphs[name]
-        given = {i: values[i] for i in graph["inputs"]} | {t: self.tables[t] for t in graph["tables"]}
-        return dict(zip(graph["outputs"], session.run(graph["outputs"], given)))
+        inputs = {i: values[i] for i in graph["inputs"]} | {t: self.tables[t] for t in graph["tables"]}
+        return dict(zip(graph["outputs"], session.run(graph["outputs"], inputs)))
 
     def develop(self, mosaic, iso, white_balance, origin_px=(0, 0), levels=None, straight=True):
-        """Return (3, h, w); mosaic (h, w) in DN, white_balance gains, origin_px (x, y) on the sensor."""
-        sensor = self.facts["sensor"]
-        black, white = levels or (sensor["black_level"], sensor["white_level"])
-        clip, axis = math.ceil(black + sensor["clip_share"] * (white - black)), np.subtract(sensor["axis_px"], origin_px)
-        shot, read = noise_at(sensor, iso)
-        self.known = {"levels": np.float32([black, white, clip]), "gains": np.float32(white_balance),
-                      "shot": np.full(3, shot, np.float32), "read_variance": np.full(3, read, np.float32)}
+        """Return (3, h, w) of a mosaic (h, w) in DN; origin_px is (x, y) of its first pixel on the sensor."""
+        black, white = levels or (self.sensor["black_level"], self.sensor["white_level"])
+        clip = math.ceil(black + self.sensor["clip_share"] * (white - black))
+        axis = np.subtract(self.sensor["axis_px"], origin_px).astype(float)
+        self.capture = self.run("noise", {"iso": np.array([iso], float)})
+        self.capture |= {"levels": np.float32([black, white, clip]), "gains": np.float32(white_balance)}
         even = self.clean(self.restore(mosaic, mosaic >= clip, axis), mosaic >= clip, axis)
         return self.straighten(even, axis) if straight else even
 
     def restore(self, mosaic, clipped, axis):
-        """Return demosaicked and restored planes, (6, h, w), from blocks that are windowed and added."""
-        bank, (h, w), places = self.facts["bank"], mosaic.shape, {}
-        block, margin, red = bank["block_px"], bank["margin_px"], divmod(self.facts["sensor"]["cfa"].index("R"), 2)
-        for rows in spans(bank, h, axis[1], red[0], self.facts["sensor"]["pitch_mm"]):
-            for columns in spans(bank, w, axis[0], red[1], self.facts["sensor"]["pitch_mm"]):
-                places.setdefault((columns["place"], rows["place"]), []).append((rows, columns))
-        total = np.zeros((6, h, w), np.float32)
+        """Return demosaicked and restored planes, (6, h, w): blocks, windowed and added, place by place."""
+        side, m, within = (self.bank[name] for name in ("block_px", "margin_px", "mosaic_within_mm"))
+        planes, places = np.zeros((6, *np.add(mosaic.shape, 2 * side)), np.float32), {}
+        sizes = zip(mosaic.shape, axis[::-1], self.sensor["red_px"][::-1])
+        down, across = (self.run("spans", {"size_px": np.array([n]), "axis_px": np.array([at]), "red": np.array([red])})
+                        for n, at, red in sizes)
+        for i, j in np.ndindex(len(down["turn"]), len(across["turn"])):
+            places.setdefault((across["place_mm"][j], down["place_mm"][i]), []).append((i, j))
         for place, blocks in places.items():
-            kind = "_mosaic" if bank["mosaic_within_mm"] is not None and math.hypot(*place) <= bank["mosaic_within_mm"] else ""
-            known = self.known | self.run("place" + kind, {"place_mm": np.float32(place)})
-            for rows, columns in blocks:
-                known["mosaic"] = mosaic[rows["index"][:, None], columns["index"]].astype(np.float32)
-                known["phase"] = np.array([2 * rows["phase"] + columns["phase"]])
-                known["window_y"], known["window_x"] = rows["window"], columns["window"]
-                inner = rows["index"][margin:-margin, None], columns["index"][margin:-margin]
-                lit = bank["lights"] and clipped[inner].any()
-                out = self.run("block" + kind + "_lights" * bool(lit), known)["out"][:, :: rows["step"], :: columns["step"]]
-                total[:, rows["to"], columns["to"]] += out[:, rows["of"], columns["of"]]
-        return total
+            kind = "_mosaic" if within is not None and math.hypot(*place) <= within else ""
+            values = self.capture | self.run("place" + kind, {"place_mm": np.float32(place)})
+            for i, j in blocks:
+                y, x = down["index"][i, :, None], across["index"][j]
+                values |= {"window_y": down["window"][i], "window_x": across["window"][j]}
+                values |= {"mosaic": np.float32(mosaic[y, x]), "phase": 2 * down["phase"][i : i + 1] + across["phase"][j]}
+                lights = "_lights" if self.bank["lights"] and clipped[y[m:-m], x[m:-m]].any() else ""
+                out = self.run("block" + kind + lights, values)["out"][:, :: down["turn"][i], :: across["turn"][j]]
+                top, left = down["first_px"][i] + side, across["first_px"][j] + side
+                planes[:, top : top + side, left : left + side] += out
+        return planes[:, side:-side, side:-side]
 
     def clean(self, planes, clipped, axis):
-        """Return (3, h, w), clean and even light of the camera's colours, from tiles with a halo."""
+        """Return (3, h, w), clean and even light of the camera's colours: tiles, of which the halo is left out."""
+        stride, halo, (h, w) = self.network["stride_px"], self.network["halo_px"], clipped.shape
         kept = self.run("kept", {"clipped": np.float32(clipped)[None, None]})["out"][0]
-        (_, h, w), stride, halo, side = planes.shape, self.network["stride_px"], self.network["halo_px"], self.facts["tile_px"]
-        planes, kept = (np.pad(part, ((0, 0), (0, -h % stride), (0, -w % stride)), mode="edge") for part in (planes, kept))
-        even = np.empty((3, *planes.shape[1:]), np.float32)
-        for y, height, top, bottom in tiles(even.shape[1], side, halo, stride):
-            for x, width, left, right in tiles(even.shape[2], side, halo, stride):
-                part, origin = np.s_[None, :, y : y + height, x : x + width], (np.array([x, y]) - axis) * self.facts["sensor"]["pitch_mm"]
-                out = self.run(self.network["graph"], self.known | {"planes": planes[part], "kept": kept[part], "origin_mm": np.float32(origin)})["out"]
-                even[:, top:bottom, left:right] = out[0, :, top - y : bottom - y, left - x : right - x]
+        margins = (0, 0), (0, -h % stride), (0, -w % stride)
+        planes, kept = (np.pad(part, margins, mode="edge")[None] for part in (planes, kept))
+        even = np.empty((3, *planes.shape[2:]), np.float32)
+        for y, bottom, top, end in self.tiles(planes.shape[2], stride, halo):
+            for x, right, left, last in self.tiles(planes.shape[3], stride, halo):
+                values = {"planes": planes[:, :, y:bottom, x:right], "kept": kept[:, :, y:bottom, x:right]}
+                values["origin_mm"] = np.float32((np.array([x, y]) - axis) * self.sensor["pitch_mm"])
+                out = self.run(self.network["graph"], self.capture | values)["out"]
+                even[:, top:end, left:last] = out[0, :, top - y : end - y, left - x : last - x]
         return even[:, :h, :w]
 
+    def tiles(self, size, stride, halo):
+        """Return of every tile along an axis its first and last pixel, and those between which it counts."""
+        count = max(1, math.ceil((size - 2 * halo) / (self.facts["tile_px"] - 2 * halo)))
+        side = math.ceil((size + (count - 1) * 2 * halo) / (count * stride)) * stride
+        firsts = np.minimum(np.arange(count) * (side - 2 * halo), size - side)
+        cuts = [0, *(firsts[1:] + halo), size]
+        return list(zip(firsts, firsts + side, cuts, cuts[1:]))
+
     def straighten(self, even, axis):
-        """Return (3, h, w), linear Rec.709 without distortion, from boxes around where tiles come from."""
+        """Return (3, h, w), linear Rec.709 without distortion: tiles of pixels from boxes around their places."""
         size, side, straight = np.array(even.shape[:0:-1]), self.facts["warp_px"], np.empty_like(even)
         for x, y in np.ndindex(*-(-size // side)):
             target = np.array([x, y]) * side
-            known = self.run("places", {"target_px": target.astype(float), "axis_px": axis.astype(float), "middle_px": (size - 1) / 2})
-            first = np.clip(np.floor(known["least"]).astype(int) - 1 + target, 0, size - 1)
-            last = np.clip(np.ceil(known["most"]).astype(int) + 3 + target, first + 1, size)
-            known |= {"planes": even[None, :, first[1] : last[1], first[0] : last[0]], "first_px": np.float32(first - target)}
-            made = self.run("warp", known) if known["planes"].max() <= self.facts["warp_white"] else {"least": -math.inf}
-            made = made if made["least"] >= self.facts["warp_floor"] else self.run("warp_limited", known)
+            values = self.run("places", {"target_px": target * 1.0, "axis_px": axis, "middle_px": (size - 1) / 2})
+            first = np.clip(np.floor(values["least"]).astype(int) - 1 + target, 0, size - 1)
+            last = np.clip(np.ceil(values["most"]).astype(int) + 3 + target, first + 1, size)
+            values["planes"] = even[None, :, first[1] : last[1], first[0] : last[0]]
+            values["first_px"] = np.float32(first - target)
+            out = self.run("warp" if values["planes"].max() <= self.facts["warp_white"] else "warp_limited", values)
+            if out.get("least", 0) < self.facts["warp_floor"]:
+                out = self.run("warp_limited", values)
             part = straight[:, target[1] : target[1] + side, target[0] : target[0] + side]
-            part[...] = made["out"][:, : part.shape[1], : part.shape[2]]
+            part[...] = out["out"][:, : part.shape[1], : part.shape[2]]
         return straight
-
-
-def spans(bank, size, axis, red, pitch):
-    """Yield the blocks along an axis; one on the far side of the optical axis is mirrored."""
-    block, overlap, step = bank["block_px"], bank["overlap_px"], bank["block_px"] - bank["overlap_px"]
-    count, period = max(1, math.ceil((size + 2 * bank["border_px"] - overlap) / step)), max(2 * size - 2, 1)
-    rise = np.sin(np.pi / 2 * np.clip((np.arange(overlap) + 0.5 - overlap / 4) / (overlap / 2), 0, 1)) ** 2
-    for i in range(count):
-        first, window = i * step - (count * step + overlap - size) // 2, np.ones(block)
-        window[:overlap] *= rise if i > 0 else 1
-        window[step:] *= rise[::-1] if i < count - 1 else 1
-        start, stop = max(first, 0), min(first + block, size)
-        live = np.flatnonzero(window[start - first : stop - first]) + start
-        start, stop = live[0], live[-1] + 1
-        place = ((start + stop - 1) / 2 - axis) * pitch
-        turn = -1 if bank["mirrors"] and place < 0 else 1
-        at = np.arange(first - bank["margin_px"], first + block + bank["margin_px"])[::turn] % period
-        yield {"place": round(turn * place, 9), "step": turn, "index": np.minimum(at, period - at), "phase": (red - first - (turn < 0)) % 2,
-               "window": np.float32(window[::turn]), "to": slice(start, stop), "of": slice(start - first, stop - first)}
-
-
-def tiles(size, side, halo, stride):
-    """Yield of every tile along an axis its first pixel, its side, and the pixels that are kept."""
-    count = max(1, math.ceil((size - 2 * halo) / (side - 2 * halo)))
-    side = -(-(size + (count - 1) * 2 * halo) // (count * stride)) * stride
-    firsts = [min(i * (side - 2 * halo), size - side) for i in range(count)]
-    cuts = [0, *(first + halo for first in firsts[1:]), size]
-    yield from zip(firsts, [side] * count, cuts, cuts[1:])
-
-
-def noise_at(sensor, iso):
-    """Return variance per light, and at black; beyond the table the gain goes on as 1 / ISO."""
-    isos, gains, reads = np.array([[e["iso"], e["gain_e_per_dn"], e["read_noise_e"]] for e in sensor["noise"]]).T
-    at, isos = math.log(iso), np.log(isos)
-    gain = math.exp(np.interp(at, isos, np.log(gains)) - max(at - isos[-1], 0))
-    shot = 1 / (gain * (sensor["white_level"] - sensor["black_level"]))
-    return shot, (np.interp(at, isos, reads) * shot) ** 2

@@ -21,7 +21,7 @@ from camkit.runtime.portable.block_noise import (
 from camkit.runtime.portable.demosaic_taps import MARGIN_PX, demosaicked
 from camkit.runtime.portable.facts import CameraFacts
 from camkit.runtime.portable.graph_builder import GraphBuilder, Value
-from camkit.runtime.portable.lights import explain
+from camkit.runtime.portable.light_graph import explain
 from camkit.runtime.portable.mosaic_filter import restore_samples
 from camkit.runtime.portable.place import fall_table
 from camkit.runtime.portable.spectra import BlockShape, Spectrum, planes_of, spectrum
@@ -51,16 +51,16 @@ def block_graph(facts: CameraFacts, *, mosaic: bool, lights: bool) -> GraphBuild
     rgb = demosaicked(graph, samples - black, phase, gains / (white - black), shape)
     tapered = tapered_block(graph, rgb, transfer, facts)
     noise = noise_of(facts, tapered, (shot, read, gains))
-    left, lit = tapered, None
+    unlit, lit = tapered, None
     if lights:
         clipped = graph.node("GreaterOrEqual", samples, clip).cast("float32")
         inner = clipped.part(0, MARGIN_PX, MARGIN_PX + side).part(1, MARGIN_PX, MARGIN_PX + side)
         lit = explain(graph, facts, tapered, (transfer, noise), inner, wide=not mosaic)
-        left, noise = lit.left, raised(noise, lit.unexplained)
+        unlit, noise = lit.residual, raised(noise, lit.unexplained)
     if mosaic:
-        sharp = restore_samples(graph, facts, left, noise, phase)
+        sharp = restore_samples(graph, facts, unlit, noise, phase)
     else:
-        sharp = _restore_planes(graph, facts, left, noise, transfer)
+        sharp = _restore_planes(graph, facts, unlit, noise, transfer)
     planes = planes_of(graph, sharp, shape)
     if lit is not None:
         planes = planes + lit.lights
@@ -86,12 +86,12 @@ def _restore_planes(
         ratio = ratio / k**model.follow
     table = graph.table("noise", _noise_table(facts))
     weight = 1 / (ratio.shaped(3, 1, 1, 1, 1) * table + doubt)
-    g_re, g_im, seen = g_re * weight, g_im * weight, power * weight
+    g_re, g_im, power_share = g_re * weight, g_im * weight, power * weight
     a = share.shaped(3, 1, 1, 1, 1)
     fall = graph.table("fall", fall_table(facts))
-    rest = fall / (_sum(seen) + 1.0)
+    rest = fall / (_sum(power_share) + 1.0)
     light_re, light_im = _sum(g_re / a) * rest, _sum(g_im / a) * rest
-    shared = a - a * model.own * seen
+    shared = a - a * model.own * power_share
     prior = fall * model.own
     zero = np.zeros((1, 4, 2, q, q), np.bool_)
     zero[0, 0, :, 0, 0] = True
@@ -123,33 +123,38 @@ def _band_light(
     index = band_places(facts.shape)
     share, scale, ratio = block
 
-    def taken(part: Value) -> Value:
-        return part.shaped(3, -1).taken(index, 1)
+    def band_samples(part: Value) -> Value:
+        return part.shaped(3, -1).gather(index, 1)
 
     noise = graph.constant(_noise_table(facts).reshape(3, -1)[:, index])
-    power, doubt = (taken(part) for part in place)
+    power, doubt = (band_samples(part) for part in place)
     weight = ratio.shaped(3, 1) * noise + doubt
     snr = (power / weight).sum(0)
     squares = facts.shape.squares.ravel()[index]
     fall = facts.shape.side**2 * (squares + CORNER_FREQUENCY**2) ** (-facts.together.exponent / 2)
     fall_seen = graph.constant(fall[None]) / (snr + 1.0)
     weight = weight * share.shaped(3, 1)
-    light = [(taken(part) / weight).sum(0) * fall_seen for part in crossed]
-    found = light[0] * light[0] + light[1] * light[1]
-    return measured_light(found.sum(1).shaped(1), (fall_seen * snr).sum(1).shaped(1), scale)
+    light = [(band_samples(part) / weight).sum(0) * fall_seen for part in crossed]
+    measured_power = light[0] * light[0] + light[1] * light[1]
+    return measured_light(
+        measured_power.sum(1).shaped(1), (fall_seen * snr).sum(1).shaped(1), scale
+    )
 
 
 def band_places(shape: BlockShape) -> NDArray[np.int64]:
     """Return where the measured frequencies lie in a flattened (4, 2, q, q) spectrum."""
     side = shape.side
     rows, columns = (part.ravel() % side for part in shape.frequencies)
-    known = {(int(r), int(c)): i for i, (r, c) in reversed(list(enumerate(zip(rows, columns, strict=True))))}
+    numbers = {
+        (int(r), int(c)): i
+        for i, (r, c) in reversed(list(enumerate(zip(rows, columns, strict=True))))
+    }
     places = []
     for row in range(0, side, BAND_STEP):
         for column in range(0, side // 2 + 1, BAND_STEP):
             fy = (row if row <= side // 2 else row - side) / side
             if BAND[0] ** 2 <= fy * fy + (column / side) ** 2 <= BAND[1] ** 2:
                 mirrored = (-row % side, -column % side)
-                places.append(known.get((row, column), known.get(mirrored, -1)))
+                places.append(numbers.get((row, column), numbers.get(mirrored, -1)))
     assert min(places) >= 0
     return np.array(places, np.int64)

@@ -26,10 +26,10 @@ class BlockNoise:
 
 
 def noise_of(
-    facts: CameraFacts, tapered: Value, stated: tuple[Value, Value, Value]
+    facts: CameraFacts, tapered: Value, capture_noise: tuple[Value, Value, Value]
 ) -> BlockNoise:
     """Return noise and level of a (3, 4, n, n) block, of shot noise, read variance and gains."""
-    shot, read, gains = stated
+    shot, read, gains = capture_noise
     least_shot, least_read = facts.least_noise
     shot, read = shot.at_least(least_shot) * gains, read.at_least(least_read) * (gains * gains)
     side = facts.shape.side

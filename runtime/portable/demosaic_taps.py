@@ -21,14 +21,14 @@ def demosaicked(
 ) -> Value:
     """Return (3, 4, n, n): weights of a cell, of all phases, each tap times its colour's gain."""
     weights, colours = _demosaic_weights()
-    of_taps = (gains.shaped(1, 3) @ graph.constant(colours).taken(phase, 0).shaped(3, -1)).shaped(
+    of_taps = (gains.shaped(1, 3) @ graph.constant(colours).gather(phase, 0).shaped(3, -1)).shaped(
         1, CELL_TAPS, CELL_TAPS
     )
-    kernels = graph.constant(weights).taken(phase, 0).shaped(12, CELL_TAPS, CELL_TAPS) * of_taps
+    kernels = graph.constant(weights).gather(phase, 0).shaped(12, CELL_TAPS, CELL_TAPS) * of_taps
     whole = shape.side + 2 * MARGIN_PX
     kernels = kernels.shaped(12, 1, CELL_TAPS, CELL_TAPS)
-    made = graph.node("Conv", light.shaped(1, 1, whole, whole), kernels, strides=[2, 2])
-    return made.shaped(3, 4, shape.n, shape.n)
+    cells = graph.node("Conv", light.shaped(1, 1, whole, whole), kernels, strides=[2, 2])
+    return cells.shaped(3, 4, shape.n, shape.n)
 
 
 def _demosaic_weights() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -43,20 +43,20 @@ def _demosaic_weights() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         for y, x in np.ndindex(CELL_TAPS, CELL_TAPS):
             colours[phase, colour_at(phase, y, x), y, x] = 1
         for place, (y, x) in enumerate(PHASES):
-            own = colour_at(phase, y, x)
-            row = own, colour_at(phase, y, x + 1)
-            for wanted in range(3):
+            colour = colour_at(phase, y, x)
+            row = colour, colour_at(phase, y, x + 1)
+            for target in range(3):
                 kernel = np.zeros((5, 5))
                 kernel[2, 2] = 1
-                if own != wanted:
-                    kernel = MALVAR_KERNELS[_kernel_name(own, wanted, row)]
-                weights[phase, wanted, place, y : y + 5, x : x + 5] = kernel
+                if colour != target:
+                    kernel = MALVAR_KERNELS[_kernel_name(colour, target, row)]
+                weights[phase, target, place, y : y + 5, x : x + 5] = kernel
     return weights.reshape(4, 12, CELL_TAPS, CELL_TAPS), colours.reshape(4, 3, -1)
 
 
-def _kernel_name(own: int, wanted: int, row: tuple[int, int]) -> str:
-    if wanted == 1:
+def _kernel_name(colour: int, target: int, row: tuple[int, int]) -> str:
+    if target == 1:
         return "green"
-    if own == 1:
-        return "along_row" if wanted in row else "along_column"
+    if colour == 1:
+        return "along_row" if target in row else "along_column"
     return "diagonal"

@@ -20,7 +20,7 @@ STAGES: Final = (
     *("linearise", "repair", "white_balance", "demosaic", "wiener", "network"),
     *("raise_clipped", "illumination", "undistort", "color"),
 )
-"""The stages that the graphs stand for, in this order; repair and what reads a file stay outside."""
+"""The stages that the graphs stand for, in order; repair and the reading of files stay outside."""
 BLOCK_STEP_PX: Final = 8
 """Sides of blocks are multiples of it: four phases, whose means have a spectrum of even length."""
 

@@ -37,26 +37,32 @@ class Value:
         self.name = name
         self.kind = kind
 
-    def _with(self, operator: str, *others: Any, **attributes: Any) -> "Value":
+    def _operate(self, operator: str, *others: Any, **attributes: Any) -> "Value":
         return self.graph.node(operator, self, *others, **attributes)
 
     def __add__(self, other: Any) -> "Value":
-        return self._with("Add", other)
+        return self._operate("Add", other)
 
     def __mul__(self, other: Any) -> "Value":
-        return self._with("Mul", other)
+        return self._operate("Mul", other)
 
     def __sub__(self, other: Any) -> "Value":
-        return self._with("Sub", other)
+        return self._operate("Sub", other)
 
     def __truediv__(self, other: Any) -> "Value":
-        return self._with("Div", other)
+        return self._operate("Div", other)
 
     def __matmul__(self, other: Any) -> "Value":
-        return self._with("MatMul", other)
+        return self._operate("MatMul", other)
 
     def __pow__(self, other: Any) -> "Value":
-        return self._with("Pow", other)
+        return self._operate("Pow", other)
+
+    def __gt__(self, other: Any) -> "Value":
+        return Value(self.graph, self._operate("Greater", other).name, "bool")
+
+    def __lt__(self, other: Any) -> "Value":
+        return Value(self.graph, self._operate("Less", other).name, "bool")
 
     __radd__ = __add__
     __rmul__ = __mul__
@@ -66,7 +72,7 @@ class Value:
 
     def __rtruediv__(self, other: float) -> "Value":
         if other == 1:
-            return self._with("Reciprocal")
+            return self._operate("Reciprocal")
         return self.graph.constant(other, self.kind) / self
 
     def __rmatmul__(self, other: NDArray[Any]) -> "Value":
@@ -74,57 +80,57 @@ class Value:
 
     def relu(self) -> "Value":
         """Return what lies above 0, else 0."""
-        return self._with("Relu")
+        return self._operate("Relu")
 
     def sqrt(self) -> "Value":
         """Return the square root."""
-        return self._with("Sqrt")
+        return self._operate("Sqrt")
 
     def at_least(self, least: Any) -> "Value":
         """Return the larger of two."""
-        return self._with("Max", least)
+        return self._operate("Max", least)
 
     def at_most(self, most: Any) -> "Value":
         """Return the smaller of two."""
-        return self._with("Min", most)
+        return self._operate("Min", most)
 
     def clip(self, least: float, most: float) -> "Value":
         """Return the value within two numbers."""
-        return self._with("Clip", least, most)
+        return self._operate("Clip", least, most)
 
     def floor(self) -> "Value":
         """Return the largest whole number that is not above it."""
-        return self._with("Floor")
+        return self._operate("Floor")
 
     def shaped(self, *shape: int) -> "Value":
         """Return the same samples in another shape."""
-        return self._with("Reshape", np.array(shape, np.int64))
+        return self._operate("Reshape", np.array(shape, np.int64))
 
     def turned(self, *axes: int) -> "Value":
         """Return the axes in another order."""
-        return self._with("Transpose", perm=list(axes))
+        return self._operate("Transpose", perm=list(axes))
 
     def sum(self, *axes: int) -> "Value":
         """Return the sum over some axes, which stay with a length of one."""
-        return self._with("ReduceSum", np.array(axes, np.int64), keepdims=1)
+        return self._operate("ReduceSum", np.array(axes, np.int64), keepdims=1)
 
     def part(self, axis: int, start: int, stop: int, step: int = 1) -> "Value":
         """Return some samples along an axis."""
         numbers = (np.array([number], np.int64) for number in (start, stop, axis, step))
-        return self._with("Slice", *numbers)
+        return self._operate("Slice", *numbers)
 
     def parts(self, axis: int, count: int) -> "list[Value]":
         """Return equal parts along an axis."""
         return self.graph.nodes_out("Split", (self,), count, axis=axis, num_outputs=count)
 
-    def taken(self, index: Any, axis: int) -> "Value":
+    def gather(self, index: Any, axis: int) -> "Value":
         """Return the samples of these numbers along an axis."""
-        return self._with("Gather", index, axis=axis)
+        return self._operate("Gather", index, axis=axis)
 
     def cast(self, kind: str) -> "Value":
         """Return the value as float32, float64 or int64."""
-        made = self._with("Cast", to=TYPES[kind])
-        return Value(self.graph, made.name, kind)
+        output = self._operate("Cast", to=TYPES[kind])
+        return Value(self.graph, output.name, kind)
 
 
 class GraphBuilder:
@@ -150,13 +156,17 @@ class GraphBuilder:
         return list(self._outputs)
 
     def input(self, name: str, shape: Shape, kind: str = "float32") -> Value:
-        """Declare an input."""
+        """Return a new input."""
         self._inputs[name] = helper.make_tensor_value_info(name, TYPES[kind], list(shape))
         return Value(self, name, kind)
 
     def table(self, name: str, values: NDArray[Any]) -> Value:
-        """Declare a table: an input whose float32 numbers lie beside the graphs."""
-        if name not in self.tables:
+        """Return a table: an input whose float32 numbers lie beside the graphs."""
+        values_before = self.tables.get(name)
+        assert values_before is None or np.array_equal(values_before, np.float32(values)), (
+            f"two tables {name}"
+        )
+        if values_before is None:
             self.tables[name] = np.ascontiguousarray(values, np.float32)
             self.input(name, values.shape)
         return Value(self, name)
@@ -183,7 +193,8 @@ class GraphBuilder:
         self, operator: str, inputs: Sequence[Any], count: int, **attributes: Any
     ) -> list[Value]:
         """Return the outputs of a new node."""
-        kind = next((one.kind for one in inputs if isinstance(one, Value)), "float32")
+        kinds = [one.kind for one in inputs if isinstance(one, Value)]
+        kind = next((one for one in kinds if one != "bool"), "float32")
         names = [self._name_of(one, kind) for one in inputs]
         outputs = [f"v{len(self._nodes)}_{number}" for number in range(count)]
         self._nodes.append(helper.make_node(operator, names, outputs, **attributes))
@@ -213,7 +224,7 @@ class GraphBuilder:
         return Value(self, names[graph.output[0].name])
 
     def output(self, name: str, value: Value, shape: Shape) -> None:
-        """Declare an output."""
+        """Add an output."""
         self._nodes.append(helper.make_node("Identity", [value.name], [name]))
         self._outputs[name] = helper.make_tensor_value_info(name, TYPES[value.kind], list(shape))
 
@@ -246,6 +257,6 @@ def shared_tables(graphs: Sequence[GraphBuilder]) -> Mapping[str, NDArray[np.flo
     tables: dict[str, NDArray[np.float32]] = {}
     for graph in graphs:
         for name, values in graph.tables.items():
-            known = tables.setdefault(name, values)
-            assert np.array_equal(known, values), f"table {name} differs between graphs"
+            values_before = tables.setdefault(name, values)
+            assert np.array_equal(values_before, values), f"table {name} differs between graphs"
     return tables

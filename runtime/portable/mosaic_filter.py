@@ -18,7 +18,7 @@ OWN_COLOURS: Final = (0, 1, 1, 2)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MosaicPlace:
-    """What a place graph gives, see `camkit.runtime.bank.mosaic.MosaicTransfer`."""
+    """Terms of a place, see `camkit.runtime.bank.mosaic.MosaicTransfer`."""
 
     sharp: Spectrum
     low: Spectrum
@@ -59,7 +59,7 @@ def restore_samples(
     signs = np.array(
         [[(-1.0) ** (y * dy + x * dx) for dy, dx in PHASES] for y, x in PHASES]
     ).reshape(4, 1, 4, 1, 1, 1)
-    factor = graph.constant(signs).taken(phase, 0).shaped(1, 4, 1, 1, 1)
+    factor = graph.constant(signs).gather(phase, 0).shaped(1, 4, 1, 1, 1)
     factor = factor * share.shaped(3, 1, 1, 1, 1)
     zero = np.zeros((1, 4, 2, shape.q, shape.q), np.bool_)
     zero[0, 0, :, 0, 0] = True
@@ -89,28 +89,26 @@ def _data(
     """Return spectra of R, +, -, B over their colour's share, (1, 4, 2, q, q), and (3,) means."""
     shape = facts.shape
     phases = np.array([[p ^ other for other in range(4)] for p in range(4)])
-    own = graph.constant(phases).taken(phase, 0).shaped(4)
-    numbers = own + np.array([4 * c for c in OWN_COLOURS])
-    samples = planes.shaped(12, shape.n, shape.n).taken(numbers, 0)
-    spectra = phase_spectra(graph, samples, own, shape)
+    plane_phases = graph.constant(phases).gather(phase, 0).shaped(4)
+    numbers = plane_phases + np.array([4 * c for c in OWN_COLOURS])
+    samples = planes.shaped(12, shape.n, shape.n).gather(numbers, 0)
+    spectra = phase_spectra(graph, samples, plane_phases, shape)
     red_mean, first, second, blue_mean = (
         (samples.sum(1, 2) * (1 / shape.n**2)).shaped(4).parts(0, 4)
     )
     means = graph.joined([red_mean, (first + second) * 0.5, blue_mean], axis=0)
-    factors = (1 / share).taken(np.array(OWN_COLOURS), 0) * np.array([1, ROOT / 2, ROOT / 2, 1])
-    kept = np.ones((1, 4, 2, shape.q, shape.q))
-    kept[:, (0, 1, 3), :, 0, 0] = 0
+    factors = (1 / share).gather(np.array(OWN_COLOURS), 0) * np.array([1, ROOT / 2, ROOT / 2, 1])
+    weights = np.ones((1, 4, 2, shape.q, shape.q))
+    weights[:, (0, 1, 3), :, 0, 0] = 0
     data = []
     for part in spectra:
-        red, beside, below, blue = part.parts(1, 4)
-        parts = graph.joined([red, beside + below, beside - below, blue], axis=1)
-        data.append(parts * factors.shaped(1, 4, 1, 1, 1) * kept)
+        red, first, second, blue = part.parts(1, 4)
+        parts = graph.joined([red, first + second, first - second, blue], axis=1)
+        data.append(parts * factors.shaped(1, 4, 1, 1, 1) * weights)
     return (data[0], data[1]), means
 
 
-def _solved(
-    graph: GraphBuilder, data: Spectrum, place: MosaicPlace, ratio: Value
-) -> Spectrum:
+def _solved(graph: GraphBuilder, data: Spectrum, place: MosaicPlace, ratio: Value) -> Spectrum:
     """Return (1, 4, 2, q, q): K and noise, inverted, times spectra of R, +, -, B."""
     noises = [one.shaped(1, 1, 1, 1, 1) for one in ratio.parts(0, 3)]
     power_red, *greens_power, power_blue = place.power.parts(1, 4)
@@ -136,9 +134,7 @@ def _solved(
     by_blue, by_red = product(link, blue), crossed(red, link)
     solved_red = [of_red * one - other for one, other in zip(red, by_blue, strict=True)]
     solved_blue = [of_blue * one - other for one, other in zip(blue, by_red, strict=True)]
-    both = tuple(
-        graph.joined(pair, axis=0) for pair in zip(solved_red, solved_blue, strict=True)
-    )
+    both = tuple(graph.joined(pair, axis=0) for pair in zip(solved_red, solved_blue, strict=True))
     back = [part.sum(0) * greens for part in crossed((both[0], both[1]), place.cross)]
     parts = zip(solved_red, green, back, solved_blue, strict=True)
     re, im = (graph.joined([r, g - b_, b], axis=1) for r, g, b_, b in parts)

@@ -22,8 +22,9 @@ from camkit.runtime.portable.demosaic_taps import MARGIN_PX
 from camkit.runtime.portable.facts import CameraFacts, facts_of
 from camkit.runtime.portable.graph_builder import GraphBuilder, shared_tables
 from camkit.runtime.portable.place import place_graph
+from camkit.runtime.portable.spans_graph import noise_graph, spans_graph
 from camkit.runtime.portable.tile import kept_graph, tile_graph
-from camkit.runtime.portable.warp import TILE_PX, places_graph, warp_graph
+from camkit.runtime.portable.warp_graph import TILE_PX, places_graph, warp_graph
 
 PORTABLE_VERSION: Final = 1
 MANIFEST: Final = "portable.json"
@@ -50,16 +51,16 @@ def write_portable(
         ContractError: If a size is unknown, or the folder holds something.
     """
     facts = facts_of(bundle)
-    known = bundle.manifest.sizes
-    chosen = known if sizes is None else sizes
-    if unknown := [size for size in chosen if size not in known]:
-        raise ContractError(f"{bundle.manifest.name} has no size {unknown[0]}; got {known}")
+    bundle_sizes = bundle.manifest.sizes
+    used_sizes = bundle_sizes if sizes is None else sizes
+    if unknown := [size for size in used_sizes if size not in bundle_sizes]:
+        raise ContractError(f"{bundle.manifest.name} has no size {unknown[0]}; got {bundle_sizes}")
     if folder.exists() and any(folder.iterdir()):
         raise ContractError(f"{folder} must be empty or not exist")
-    graphs = _graphs(facts, chosen)
+    graphs = _graphs(facts, used_sizes)
     files = {f"{graph.name}.onnx": graph.to_bytes() for graph in graphs}
-    files[TABLES] = save({name: values for name, values in shared_tables(graphs).items()})
-    document = portable_manifest(facts, graphs, chosen)
+    files[TABLES] = save(dict(shared_tables(graphs)))
+    document = portable_manifest(facts, graphs, used_sizes)
     files[MANIFEST] = (json.dumps(document, indent=1) + "\n").encode()
     folder.mkdir(parents=True, exist_ok=True)
     for name, data in files.items():
@@ -71,12 +72,11 @@ def _graphs(facts: CameraFacts, sizes: tuple[str, ...]) -> list[GraphBuilder]:
     kinds = (False, True) if facts.bank.mosaic is not None else (False,)
     places = [place_graph(facts, mosaic=mosaic) for mosaic in kinds]
     lights = (False, True) if facts.bank.clip_iterations else (False,)
-    blocks = [
-        block_graph(facts, mosaic=mosaic, lights=lit) for mosaic in kinds for lit in lights
-    ]
+    blocks = [block_graph(facts, mosaic=mosaic, lights=lit) for mosaic in kinds for lit in lights]
     tiles = [tile_graph(facts, size) for size in sizes]
     warps = [places_graph(facts), *(warp_graph(facts, limited=one) for one in (False, True))]
-    return [*places, *blocks, kept_graph(), *tiles, *warps]
+    first = [noise_graph(facts), spans_graph(facts)]
+    return [*first, *places, *blocks, kept_graph(), *tiles, *warps]
 
 
 def portable_manifest(
@@ -108,6 +108,7 @@ def portable_manifest(
             "pitch_mm": facts.pitch_mm,
             "axis_px": list(facts.axis_px),
             "cfa": sensor.cfa,
+            "red_px": [sensor.cfa.index("R") % 2, sensor.cfa.index("R") // 2],
             "black_level": sensor.black_level,
             "white_level": sensor.white_level,
             "clip_share": SATURATION_SHARE,
@@ -117,6 +118,7 @@ def portable_manifest(
             "block_px": bank.block_px,
             "overlap_px": bank.overlap_px,
             "border_px": int(bank.overlap_px * BORDER_SHARE),
+            "step_px": bank.block_px - bank.overlap_px,
             "margin_px": MARGIN_PX,
             "mirrors": facts.kernels.turns,
             "mosaic_within_mm": None if bank.mosaic is None else bank.mosaic.within_mm,
@@ -132,6 +134,7 @@ def portable_manifest(
             "places": facts.warp.places == "fixed",
         },
         "tables": TABLES,
+        "common": [graph.name for graph in graphs if not graph.name.startswith("tile_")],
         "graphs": {
             graph.name: {
                 "file": f"{graph.name}.onnx",

@@ -54,7 +54,7 @@ def _turned(graph: GraphBuilder, facts: CameraFacts, place: Value, height: Value
     margins = ((0, 0), (PAD_PX, PAD_PX), (PAD_PX, PAD_PX), (0, 0))
     table = np.pad(np.moveaxis(kernels.kernels, 1, -1), margins)
     lines = graph.table("kernels", table.reshape(fields, wide, wide, colours))
-    kernel = _between(graph, lines, kernels.field_heights_mm, height)
+    kernel = _interpolated(lines, kernels.field_heights_mm, height)
     half = side // 2
     down, across = sample_positions(half)
     upright = height.clip(LEAST_HEIGHT_MM, 1e9)
@@ -71,13 +71,13 @@ def _turned(graph: GraphBuilder, facts: CameraFacts, place: Value, height: Value
     row_weights, column_weights = _catmull_rom(rows - row), _catmull_rom(columns - column)
     total: Value | None = None
     for i, weight in enumerate(row_weights):
-        part = taps.taken(first + np.int64(i * (wide - 3)), 0).turned(1, 0) * weight
+        part = taps.gather(first + np.int64(i * (wide - 3)), 0).turned(1, 0) * weight
         total = part if total is None else total + part
     assert total is not None
     mixed: Value | None = None
     for part, weight in zip(total.parts(0, 4), column_weights, strict=True):
-        part = part * weight
-        mixed = part if mixed is None else mixed + part
+        term = part * weight
+        mixed = term if mixed is None else mixed + term
     assert mixed is not None
     lit = mixed.relu()
     _, count = kernel_span(half)
@@ -110,9 +110,7 @@ def _catmull_rom(t: Value) -> list[Value]:
     ]
 
 
-def _between(
-    graph: GraphBuilder, table: Value, heights_mm: NDArray[np.float64], height: Value
-) -> Value:
+def _interpolated(table: Value, heights_mm: NDArray[np.float64], height: Value) -> Value:
     """Return the line of a table (height, ...) at a height, (1, ...); its last one holds beyond."""
     count = len(heights_mm)
     if count == 1:
@@ -121,8 +119,8 @@ def _between(
     starts, widths = heights_mm[:-1], np.diff(heights_mm)
     shares = ((height - starts) / widths).clip(0.0, 1.0)
     low = (shares.sum(0) - 1e-7).clip(0.0, count - 2.0).floor().cast("int64")
-    share = shares.taken(low, 0)
-    below, above = table.taken(low, 0), table.taken(low + np.int64(1), 0)
+    share = shares.gather(low, 0)
+    below, above = table.gather(low, 0), table.gather(low + np.int64(1), 0)
     return below + (above - below) * share
 
 
@@ -131,13 +129,13 @@ def _doubt(graph: GraphBuilder, facts: CameraFacts, height: Value) -> Value:
     spread, q = facts.together.spread, facts.shape.q
     heights = np.array(spread.heights_mm)
     variance = np.array(spread.variance)
-    line = _between(graph, graph.constant(variance), heights, height)
+    line = _interpolated(graph.constant(variance), heights, height)
     places = np.array(spread.frequencies)
     at = np.minimum(np.sqrt(facts.shape.squares.ravel()), places[-1])
     hats = np.stack([np.interp(at, places, unit) for unit in np.eye(len(places))])
     hats = hats * fall_table(facts).ravel() * facts.together.mistrust
-    made = line.shaped(variance.shape[1], len(places)) @ graph.table("spread", hats)
-    return made.shaped(variance.shape[1], 4, 2, q, q)
+    variance_now = line.shaped(variance.shape[1], len(places)) @ graph.table("spread", hats)
+    return variance_now.shaped(variance.shape[1], 4, 2, q, q)
 
 
 def _joint_terms(graph: GraphBuilder, facts: CameraFacts, transfer: Spectrum, doubt: Value) -> None:
@@ -165,12 +163,11 @@ def _mosaic_terms(
     fh = h[0] * fall, h[1] * fall
     greens = np.array([1.0, 2.0, 1.0])[:, None, None, None, None] / 16
     alone = doubt * greens + (h[0] * fh[0] + h[1] * fh[1]) * (1 + facts.together.own)
-    red, green, blue = (tuple(part.parts(0, 3)[c] for part in h) for c in range(3))
+    red, _, blue = (tuple(part.parts(0, 3)[c] for part in h) for c in range(3))
     _, fh_green, fh_blue = (tuple(part.parts(0, 3)[c] for part in fh) for c in range(3))
     by_green = [crossed(colour, fh_green) for colour in (red, blue)]
     cross = tuple(
-        graph.joined([_by_green(graph, pair[part]) for pair in by_green], axis=0)
-        for part in (0, 1)
+        graph.joined([_by_green(graph, pair[part]) for pair in by_green], axis=0) for part in (0, 1)
     )
     red_blue = [part.sum(1) for part in crossed(red, fh_blue)]
     alone_red, alone_green, alone_blue = alone.parts(0, 3)
@@ -180,7 +177,7 @@ def _mosaic_terms(
         part.parts(0, 2) for part in cross
     )
     detour = crossed((cross_red_re, cross_red_im), (cross_blue_re, cross_blue_im))
-    low = [graph.joined([one.part(1, 0, 1) for one in part], axis=1) for part in _lows(graph, h)]
+    low = [graph.joined([one.part(1, 0, 1) for one in part], axis=1) for part in _lows(h)]
     graph.output("sharp_re", fh[0], (3, 4, 2, q, q))
     graph.output("sharp_im", fh[1] * -1.0, (3, 4, 2, q, q))
     graph.output("low_re", low[0], (1, 4, 2, q, q))
@@ -194,7 +191,7 @@ def _mosaic_terms(
     graph.output("detour_im", detour[1], (1, 2, 2, q, q))
 
 
-def _lows(graph: GraphBuilder, h: Spectrum) -> list[list[Value]]:
+def _lows(h: Spectrum) -> list[list[Value]]:
     """Return H of the low alias as R, +, -, B see it: the difference of the greens does not."""
     lows = []
     for part in h:
@@ -208,6 +205,8 @@ def _by_green(graph: GraphBuilder, aliases: Value) -> Value:
     parts = aliases.parts(1, 4)
     sums = []
     for green in (1, 2):
-        first, second = (part for part, seen in zip(parts, GREENS, strict=True) if seen == green)
+        first, second = (
+            part for part, number in zip(parts, GREENS, strict=True) if number == green
+        )
         sums.append(first + second)
     return graph.joined(sums, axis=1)

@@ -77,15 +77,14 @@ def spectrum(
         reach: From the middle of a kernel to its border; None for a block.
     """
     first, count = (0, shape.n) if reach is None else kernel_span(reach)
-    down, cosines, sines = _phase_waves(shape, first, count)
-    rows, q = down @ planes, shape.q
+    name = "waves" if reach is None else "kernel_waves"
+    row_waves, cosines, sines = _wave_tables(graph, name, shape, (first, count))
+    rows, q = row_waves @ planes, shape.q
     by_cosines, by_sines = (_aliases(graph, rows @ part, 1) for part in (cosines, sines))
     return _split(graph, by_cosines, by_sines, q)
 
 
-def phase_spectra(
-    graph: GraphBuilder, planes: Value, phases: Value, shape: BlockShape
-) -> Spectrum:
+def phase_spectra(graph: GraphBuilder, planes: Value, phases: Value, shape: BlockShape) -> Spectrum:
     """Return (1, 4, 2, q, q): spectra of single planes, each as if the others were zero.
 
     Args:
@@ -94,22 +93,25 @@ def phase_spectra(
         phases: (4,) int64, the phase of each.
         shape: Of the block.
     """
-    waves = (
-        graph.constant(part).taken(phases, 0) for part in _phase_waves(shape, 0, shape.n)
-    )
-    down, cosines, sines = waves
-    rows, q = down @ planes, shape.q
-    by_cosines, by_sines = (
-        (rows @ part).shaped(1, 4, 2 * q, q) for part in (cosines, sines)
-    )
+    tables = _wave_tables(graph, "waves", shape, (0, shape.n))
+    row_waves, cosines, sines = (table.gather(phases, 0) for table in tables)
+    rows, q = row_waves @ planes, shape.q
+    by_cosines, by_sines = ((rows @ part).shaped(1, 4, 2 * q, q) for part in (cosines, sines))
     return _split(graph, by_cosines, by_sines, q)
 
 
 def _phase_waves(shape: BlockShape, first: int, count: int) -> tuple[FloatGrid, ...]:
     """Return waves of rows (4, 2 q, m), and cosines and sines of columns (4, m, q)."""
     waves = [shape.waves(first + 2.0 * np.arange(count) + p) for p in (0, 1)]
-    down = np.stack([np.concatenate(waves[py]) for py, _ in PHASES])
-    return down, *(np.stack([waves[px][part].T for _, px in PHASES]) for part in (0, 1))
+    row_waves = np.stack([np.concatenate(waves[py]) for py, _ in PHASES])
+    return row_waves, *(np.stack([waves[px][part].T for _, px in PHASES]) for part in (0, 1))
+
+
+def _wave_tables(
+    graph: GraphBuilder, name: str, shape: BlockShape, span: tuple[int, int]
+) -> list[Value]:
+    parts = zip(("rows", "cosines", "sines"), _phase_waves(shape, *span), strict=True)
+    return [graph.table(f"{name}_{part}", values) for part, values in parts]
 
 
 def _split(graph: GraphBuilder, by_cosines: Value, by_sines: Value, q: int) -> Spectrum:
@@ -131,17 +133,20 @@ def planes_of(graph: GraphBuilder, parts: Spectrum, shape: BlockShape) -> Value:
     (re, re_below), (im, im_below) = (_unsigned(part, q) for part in parts)
     by_cosines = graph.joined([re + re_below, im_below - im], axis=2)
     by_sines = graph.joined([(im + im_below) * -1.0, re_below - re], axis=2)
-    across = np.full(q, 2.0)
-    across[[0, -1]] = 1
-    down = np.full(q, 1.0)
-    down[[0, -1]] = 0.5
+    column_weights = np.full(q, 2.0)
+    column_weights[[0, -1]] = 1
+    row_waves = np.full(q, 1.0)
+    row_waves[[0, -1]] = 0.5
     waves = [shape.waves(2.0 * np.arange(n) + p) for p in (0, 1)]
     cosines, sines = (
-        np.stack([waves[px][part] * across[:, None] for _, px in PHASES]) for part in (0, 1)
+        np.stack([waves[px][part] * column_weights[:, None] for _, px in PHASES]) for part in (0, 1)
     )
-    rows = np.stack([np.concatenate([w * down[:, None] for w in waves[py]]).T for py, _ in PHASES])
+    rows = np.stack(
+        [np.concatenate([w * row_waves[:, None] for w in waves[py]]).T for py, _ in PHASES]
+    )
+    cosines, sines = graph.table("back_cosines", cosines), graph.table("back_sines", sines)
     columns = _aliases(graph, by_cosines, 1) @ cosines + _aliases(graph, by_sines, 1) @ sines
-    return (rows / (4.0 * n * n)) @ columns
+    return graph.table("back_rows", rows / (4.0 * n * n)) @ columns
 
 
 def _aliases(graph: GraphBuilder, planes: Value, axis: int) -> Value:

@@ -18,16 +18,14 @@ def tapered_block(graph: GraphBuilder, rgb: Value, transfer: Spectrum, facts: Ca
     repeats = np.kron(np.eye(m), np.ones((2, 1)))
     waves = np.concatenate([cosines, sines])
     mean = (rgb.sum(1) * 0.25).shaped(3, n, n)
-    found = (waves @ means) @ mean
-    by_cosines = found @ (means.T @ cosines.T)
-    by_sines = found @ (means.T @ sines.T)
+    row_spectrum = (waves @ means) @ mean
+    by_cosines = row_spectrum @ (means.T @ cosines.T)
+    by_sines = row_spectrum @ (means.T @ sines.T)
     cc, sc = by_cosines.part(1, 0, r), by_cosines.part(1, r, 2 * r)
     cs, ss = by_sines.part(1, 0, r), by_sines.part(1, r, 2 * r)
     above = cc - ss, (sc + cs) * -1.0
     below = cc + ss, sc - cs
-    low = [
-        [half.shaped(3, r, r) for half in _low(part, r).parts(2, 2)] for part in transfer
-    ]
+    low = [[half.shaped(3, r, r) for half in _low(part, r).parts(2, 2)] for part in transfer]
     re, im = product(above, (low[0][0], low[1][0]))
     re_below, im_below = product(below, (low[0][1], low[1][1]))
     # at the highest row of the small block the transfer of the negative frequency counts
@@ -35,10 +33,10 @@ def tapered_block(graph: GraphBuilder, rgb: Value, transfer: Spectrum, facts: Ca
     first[0] = last[0] = 0.5
     first[-1], last[-1] = 0.0, 1.0
     re, im, re_below, im_below = re * first, im * first, re_below * last, im_below * last
-    across = np.full((r, 1), 2.0)
-    across[[0, -1]] = 1
-    wide_cosines = (cosines * across) @ repeats.T / (m * m)
-    wide_sines = (sines * across) @ repeats.T / (m * m)
+    column_weights = np.full((r, 1), 2.0)
+    column_weights[[0, -1]] = 1
+    wide_cosines = (cosines * column_weights) @ repeats.T / (m * m)
+    wide_sines = (sines * column_weights) @ repeats.T / (m * m)
     columns = (
         graph.joined([re + re_below, im_below - im], axis=1) @ wide_cosines
         + graph.joined([(im + im_below) * -1.0, re_below - re], axis=1) @ wide_sines
@@ -47,7 +45,7 @@ def tapered_block(graph: GraphBuilder, rgb: Value, transfer: Spectrum, facts: Ca
     keep = taper_weights(side, min(facts.bank.overlap_px // 4, side // 4))
     keep = np.stack([keep[py::2, px::2] for py, px in PHASES])
     part = blurred.shaped(3, 1, n, n)
-    return part + (rgb - part) * keep
+    return part + (rgb - part) * graph.table("keep", keep)
 
 
 def _low(part: Value, r: int) -> Value:

@@ -38,7 +38,7 @@ def tile_graph(facts: CameraFacts, size: str) -> GraphBuilder:
     """Return the graph of a tile for a network of some size."""
     graph = GraphBuilder(f"tile_{size}")
     planes = graph.input("planes", (1, 6, "h", "w"))
-    kept = graph.input("kept", (1, 1, "h", "w"))
+    share = graph.input("kept", (1, 1, "h", "w"))
     gains = graph.input("gains", (3,))
     shot, read = graph.input("shot", (3,)), graph.input("read_variance", (3,))
     origin = graph.input("origin_mm", (2,))
@@ -47,23 +47,23 @@ def tile_graph(facts: CameraFacts, size: str) -> GraphBuilder:
     slope = 1 / (shot * (scale * scale))
     offset = slope * (read / shot)
     twice = (graph.joined([part, part], axis=0) for part in (slope, offset))
-    given = _line(graph, planes, *twice).relu().sqrt()
+    stable = _line(graph, planes, *twice).relu().sqrt()
     role = facts.network.role
     model = onnx.load_from_string(facts.bundle.network_bytes(role, size))
-    made = graph.copied(model, given).relu()
-    front = given.part(1, 3, 6)
-    added = made - front
+    output = graph.copied(model, stable).relu()
+    front = stable.part(1, 3, 6)
+    added = output - front
     bound = _bound(facts)
     if bound is not None:
-        added = added - _excess(graph, (front, added, made), kept, (bound, scale))
-    made = front + added * kept
+        added = added - _excess(graph, (front, added, output), share, (bound, scale))
+    output = front + added * share
     if bound is not None and bound.keeps_bright:
         bright = (slope * BRIGHT + offset).relu().sqrt()
         share = _bright_share(front * (1 / bright).shaped(1, 3, 1, 1))
-        made = made.at_least(front * share - BRIGHT_NOISE * 0.5 / scale)
-    made = made.relu()
+        output = output.at_least(front * share - BRIGHT_NOISE * 0.5 / scale)
+    output = output.relu()
     steepness = 1 / slope
-    light = _line(graph, made * made, steepness, offset * steepness * -1.0)
+    light = _line(graph, output * output, steepness, offset * steepness * -1.0)
     light = _neutral(graph, light, gains)
     graph.output("out", light * _gain(graph, facts, light, origin), (1, 3, "h", "w"))
     return graph
@@ -82,9 +82,9 @@ def kept_graph() -> GraphBuilder:
     share: Value | float = 1.0
     for reach in NEAR_PX:
         near = clipped
-        for along in (0, 1):
+        for axis in (0, 1):
             sides = [1, 1]
-            sides[along] = 2 * reach + 1
+            sides[axis] = 2 * reach + 1
             pads = [side // 2 for side in sides] * 2
             near = graph.node("MaxPool", near, kernel_shape=sides, pads=pads)
         share = share - near * (1 / len(NEAR_PX))
@@ -109,19 +109,19 @@ def _bound(facts: CameraFacts) -> LightBound | None:
 def _excess(
     graph: GraphBuilder,
     change: tuple[Value, Value, Value],
-    kept: Value,
+    share: Value,
     rule: tuple[LightBound, float],
 ) -> Value:
     """Return the change that goes beyond the bound, see `camkit.runtime.network.light_bound`."""
-    (front, added, made), (bound, scale) = change, rule
-    total, cell = (made + front) * kept, (0.5 / scale / CELL_PX) ** 2
+    (front, added, output), (bound, scale) = change, rule
+    total, cell = (output + front) * share, (0.5 / scale / CELL_PX) ** 2
 
     def means(planes: Value) -> Value:
         side = [CELL_PX, CELL_PX]
         return graph.node("AveragePool", planes, kernel_shape=side, strides=side)
 
-    moved = _smoothed(graph, means(added * total))
-    moved = moved / _smoothed(graph, means(total)).at_least(_TINY)
+    change_of_cells = _smoothed(graph, means(added * total))
+    change_of_cells = change_of_cells / _smoothed(graph, means(total)).at_least(_TINY)
     level = means(front)
     mean = _smoothed(graph, level)
     spread = (_smoothed(graph, level * level) - mean * mean).relu()
@@ -130,7 +130,7 @@ def _excess(
     if bound.light:
         square = square + mean * mean * (bound.light / 2) ** 2
     limit = square.sqrt()
-    excess = moved - moved.at_most(limit).at_least(limit * -1.0)
+    excess = change_of_cells - change_of_cells.at_most(limit).at_least(limit * -1.0)
     scales = np.array([1, 1, CELL_PX, CELL_PX], np.float32)
     return graph.node("Resize", excess, None, scales, mode="linear")
 
@@ -177,10 +177,10 @@ def _gain(graph: GraphBuilder, facts: CameraFacts, light: Value, origin: Value) 
     sides = graph.node("Shape", light)
     lines = []
     for axis, place in ((3, origin.part(0, 0, 1)), (2, origin.part(0, 1, 2))):
-        count = Value(graph, sides.taken(np.int64(axis), 0).name, "int64")
+        count = Value(graph, sides.gather(np.int64(axis), 0).name, "int64")
         at = graph.node("Range", Value(graph, graph.constant(0, "int64").name, "int64"), count, 1)
         line = at.cast("float32") * facts.pitch_mm + place
         lines.append(line * line)
     square = lines[0] + graph.node("Unsqueeze", lines[1], np.array([1], np.int64))
     index = (square * ((TABLE_SAMPLES - 1) / end) + 0.5).at_most(TABLE_SAMPLES - 1.0)
-    return graph.table("illumination_gain", gains).taken(index.cast("int64"), 0)
+    return graph.table("illumination_gain", gains).gather(index.cast("int64"), 0)

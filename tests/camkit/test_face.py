@@ -27,6 +27,7 @@ PUBLIC = [
     "freeze",
     "load",
     "make",
+    "portable",
     "process",
     "recipe",
     "simulate",

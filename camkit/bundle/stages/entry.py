@@ -13,7 +13,9 @@ from camkit.bundle.plane import Domain, Plane
 from camkit.bundle.sensor import Sensor
 
 BOUNDED: Final = Since((2, 8), "the light that a stage makes is bounded")
-PORTABLE: Final = Since((2, 12), "a stage follows a rule that other readers can follow in every bit")
+PORTABLE: Final = Since(
+    (2, 12), "a stage follows a rule that other readers can follow in every bit"
+)
 
 
 class JoinError(ValueError):

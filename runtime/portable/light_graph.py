@@ -1,5 +1,7 @@
-"""Clipped light of a block explained before the filter, the block as a whole; see
-`camkit.runtime.bank.lights`."""
+"""Clipped light of a block explained before the filter, the block as a whole.
+
+See `camkit.runtime.bank.lights`.
+"""
 
 from dataclasses import dataclass
 
@@ -23,7 +25,7 @@ class Lights:
     """
 
     lights: Value
-    left: Value
+    residual: Value
     unexplained: Value
 
 
@@ -31,7 +33,7 @@ def explain(
     graph: GraphBuilder,
     facts: CameraFacts,
     planes: Value,
-    known: tuple[Spectrum, BlockNoise],
+    place_and_noise: tuple[Spectrum, BlockNoise],
     clipped: Value,
     *,
     wide: bool,
@@ -42,11 +44,11 @@ def explain(
         graph: To add to.
         facts: Of the camera.
         planes: (3, 4, n, n), tapered.
-        known: Transfer and noise of the block.
+        place_and_noise: Transfer and noise of the block.
         clipped: (b, b), 1 where the sensor clipped, else 0.
         wide: Whether what the demosaic made of clipped samples is left out too.
     """
-    (transfer, noise), shape, bank = known, facts.shape, facts.bank
+    (transfer, noise), shape, bank = place_and_noise, facts.shape, facts.bank
     assert bank.clip_reach_px is not None
     near = _phases(_nearness(graph, clipped, bank.clip_reach_px), shape.side)
     widened = _phases(_widened(graph, clipped, CLIPPED_REACH_PX), shape.side)
@@ -69,8 +71,8 @@ def explain(
     unexplained = (missed * missed * near).sum(1, 2, 3) * (1 / shape.side**2)
     lights = light * near
     unknown = widened if wide else _phases(clipped, shape.side)
-    left = (planes - blurred(lights)) * (1.0 - unknown)
-    return Lights(lights=lights, left=left, unexplained=unexplained.shaped(3))
+    residual = (planes - blurred(lights)) * (1.0 - unknown)
+    return Lights(lights=lights, residual=residual, unexplained=unexplained.shaped(3))
 
 
 def _phases(plane: Value, side: int) -> Value:
@@ -83,27 +85,27 @@ def _widened(graph: GraphBuilder, clipped: Value, reach: int) -> Value:
     """Return the largest of squares around each sample."""
     whole = graph.node("Unsqueeze", clipped, np.array([0, 1], np.int64))
     size = 2 * reach + 1
-    made = graph.node("MaxPool", whole, kernel_shape=[size, size], pads=[reach] * 4)
-    return graph.node("Squeeze", made, np.array([0, 1], np.int64))
+    pooled = graph.node("MaxPool", whole, kernel_shape=[size, size], pads=[reach] * 4)
+    return graph.node("Squeeze", pooled, np.array([0, 1], np.int64))
 
 
 def _nearness(graph: GraphBuilder, clipped: Value, reach: int) -> Value:
     """Return 1 up to half the reach from clipped samples, falling smoothly to 0."""
     axes = np.array([0, 1], np.int64)
     line = graph.node("Unsqueeze", clipped, axes)
-    along = 1.0 - line  # distance along the row: how many widths hold no clipped sample
+    widths = 1.0 - line  # distance along the row: how many widths hold no clipped sample
     for width in range(1, reach + 1):
         pads = [0, width, 0, width]
         pooled = graph.node("MaxPool", line, kernel_shape=[1, 2 * width + 1], pads=pads)
-        along = along + (1.0 - pooled)
-    squares = graph.node("Squeeze", along * along, axes)
+        widths = widths + (1.0 - pooled)
+    squares = graph.node("Squeeze", widths * widths, axes)
     padding = np.array([reach, 0, reach, 0], np.int64)
     squares = graph.node("Pad", squares, padding, np.float32(4 * reach * reach))
     least: Value | None = None
     for step in range(-reach, reach + 1):
-        moved = squares.part(0, reach + step, 2**30 if step == reach else step - reach)
-        moved = moved + float(step * step)
-        least = moved if least is None else least.at_most(moved)
+        shifted = squares.part(0, reach + step, 2**30 if step == reach else step - reach)
+        shifted = shifted + float(step * step)
+        least = shifted if least is None else least.at_most(shifted)
     assert least is not None
     distance = least.at_most(float(reach * reach)).sqrt()
     t = (2.0 - distance * (2 / reach)).clip(0.0, 1.0)

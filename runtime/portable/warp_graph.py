@@ -9,6 +9,7 @@ such places: cubic, limited at rims of lamps, and in linear Rec.709.
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from camkit.runtime.color import rec709_of_planes
 from camkit.runtime.geometry.distortion import reference_channel
@@ -55,11 +56,13 @@ def places_graph(facts: CameraFacts) -> GraphBuilder:
         first_x, first_y = first.parts(0, 2)
         column = growth * x * (1 / unit) - first_x
         row = growth * y * (1 / unit) - first_y
-        maps.append(graph.joined([part.shaped(1, 1, cells + 2, cells + 2) for part in (column, row)], 1))
+        maps.append(
+            graph.joined([part.shaped(1, 1, cells + 2, cells + 2) for part in (column, row)], 1)
+        )
     nodes = graph.joined(maps, axis=0)
     nodes = (nodes * float(NODE_STEPS) + 0.5).floor()
-    down = _dense(graph, nodes, cells)
-    dense = _dense(graph, down.turned(0, 1, 3, 2), cells).turned(0, 1, 3, 2)
+    down = _dense(nodes, cells)
+    dense = _dense(down.turned(0, 1, 3, 2), cells).turned(0, 1, 3, 2)
     places = (dense * (PLACE_STEPS / NODE_STEPS) + 0.5).floor() * (1 / PLACE_STEPS)
     out = places.turned(0, 2, 3, 1).cast("float32")
     graph.output("places", out, (map_count(facts), TILE_PX, TILE_PX, 2))
@@ -69,20 +72,20 @@ def places_graph(facts: CameraFacts) -> GraphBuilder:
     return graph
 
 
-def _dense(graph: GraphBuilder, nodes: Value, cells: int) -> Value:
+def _dense(nodes: Value, cells: int) -> Value:
     """Return (maps, 2, 8 cells, w) of (maps, 2, cells + 2, w), linear between nodes."""
     k = np.arange(LATTICE_PX)
-    before = np.maximum((LATTICE_PX - 1) / 2 - k, 0) / LATTICE_PX
-    behind = before[::-1]
+    weight_before = np.maximum((LATTICE_PX - 1) / 2 - k, 0) / LATTICE_PX
+    weight_behind = weight_before[::-1]
     weights = np.zeros((cells, LATTICE_PX, cells + 2))
     for cell in range(cells):
-        weights[cell, :, cell] = before
-        weights[cell, :, cell + 1] = 1 - before - behind
-        weights[cell, :, cell + 2] = behind
+        weights[cell, :, cell] = weight_before
+        weights[cell, :, cell + 1] = 1 - weight_before - weight_behind
+        weights[cell, :, cell + 2] = weight_behind
     return weights.reshape(-1, cells + 2) @ nodes
 
 
-def _growth(c: np.ndarray, square: Value) -> Value:
+def _growth(c: NDArray[np.float64], square: Value) -> Value:
     growth = ((square * c[3] + c[2]) * square + c[1]) * square + c[0]
     if len(c) > 4:
         even = ((square * c[6] + c[5]) * square + c[4]) * square.sqrt()
@@ -90,7 +93,7 @@ def _growth(c: np.ndarray, square: Value) -> Value:
     return growth
 
 
-def _shift(centre: Value, c: np.ndarray) -> Value:
+def _shift(centre: Value, c: NDArray[np.float64]) -> Value:
     """Return (2,): how far the middle moves, in units of the distortion; Newton's method."""
     distorted = (centre * centre).sum(0).sqrt()
     radius = distorted * (1 / c[0])
@@ -120,7 +123,7 @@ def warp_graph(facts: CameraFacts, *, limited: bool) -> GraphBuilder:
     first = graph.input("first_px", (2,))
     if maps > 1:
         planes = planes.turned(1, 0, 2, 3)
-    at = places.shaped(maps, TILE_PX, 2 * TILE_PX) - _along(graph, first)
+    at = places.shaped(maps, TILE_PX, 2 * TILE_PX) - _long_row(graph, first)
     values = _sampled(graph, planes, at, "bicubic")
     if limited:
         values = _limited(graph, planes, at, values)
@@ -144,13 +147,13 @@ def _limited(graph: GraphBuilder, planes: Value, at: Value, values: Value) -> Va
         return _sampled(graph, pooled, whole, "nearest")
 
     high, low = most(wide), most(wide * -1.0) * -1.0
-    over, under = graph.node("Greater", high, WHITE), graph.node("LessOrEqual", low, WHITE)
-    rim = graph.node("And", over, under)
+    is_lit, is_dark = graph.node("Greater", high, WHITE), graph.node("LessOrEqual", low, WHITE)
+    rim = graph.node("And", is_lit, is_dark)
     limited = graph.node("Or", rim, graph.node("Less", values, FLOOR))
     return graph.node("Where", limited, values.at_least(low).at_most(high), values)
 
 
-def _along(graph: GraphBuilder, pair: Value) -> Value:
+def _long_row(graph: GraphBuilder, pair: Value) -> Value:
     """Return x, y, x, y, ... of (2,): beside places it is added in long rows."""
     whole = graph.node("Expand", pair.shaped(1, 2), np.array([TILE_PX, 2], np.int64))
     return whole.shaped(2 * TILE_PX)
@@ -158,10 +161,8 @@ def _along(graph: GraphBuilder, pair: Value) -> Value:
 
 def _sampled(graph: GraphBuilder, planes: Value, at: Value, mode: str) -> Value:
     """Return planes at pixel places; beyond the border its samples repeat."""
-    sides = graph.node("Shape", planes).taken(np.array([3, 2]), 0)
-    step = _along(graph, 2.0 / graph.node("Cast", sides, to=1))
+    sides = graph.node("Shape", planes).gather(np.array([3, 2]), 0)
+    step = _long_row(graph, 2.0 / graph.node("Cast", sides, to=1))
     grid = (at + 0.5) * step - 1.0
     grid = grid.shaped(0, TILE_PX, TILE_PX, 2)
-    return graph.node(
-        "GridSample", planes, grid, mode=mode, padding_mode="border", align_corners=0
-    )
+    return graph.node("GridSample", planes, grid, mode=mode, padding_mode="border", align_corners=0)

@@ -1,0 +1,141 @@
+"""A reader of 80 lines, with no import of camkit, gives what camkit gives."""
+
+import importlib.util
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import onnx
+import pytest
+
+from camkit.bundle.golden import golden_from_bytes
+from camkit.bundle.manifest import GoldenCase, format_of
+from camkit.bundle.reader import GOLDEN, Bundle, built_in_bundles, open_bundle
+from camkit.bundle.stages import Undistort, Wiener
+from camkit.bundle.writer import write_bundle
+from camkit.errors import ContractError, UnsupportedError
+from camkit.runtime.options import Options
+from camkit.runtime.pipeline import Pipeline
+from camkit.runtime.portable.package import write_portable
+from tools.repack import PORTABLE
+
+READER = Path(__file__).parents[3] / "examples" / "python" / "portable_camera.py"
+LEAST_DB = 100.0
+MOST_BYTES = 12_000_000
+
+
+def _module() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("portable_camera", READER)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
+    """Give `duet` with the rules that other readers follow too."""
+    old = open_bundle(built_in_bundles()["duet"])
+    changes = dict(PORTABLE)
+    stages = tuple(
+        stage.model_copy(update=changes.get(type(stage), {})) for stage in old.manifest.stages
+    )
+    manifest = old.manifest.model_copy(update={"stages": stages, "format_version": "2.12"})
+    members = {name: old.member(name) for name in old.names}
+    return write_bundle(tmp_path_factory.mktemp("bundle") / "duet.camkit", manifest, members)
+
+
+@pytest.fixture(scope="module")
+def folder(bundle: Bundle, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Give the portable camera, size S alone."""
+    folder = tmp_path_factory.mktemp("portable") / "duet"
+    write_portable(bundle, folder, ("S",))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def camera(folder: Path) -> Any:
+    """Give the camera of the reader."""
+    return _module().PortableCamera(folder, "S")
+
+
+def _camkit(bundle: Bundle, capture: np.ndarray, case: GoldenCase, **options: Any) -> np.ndarray:
+    pipeline = Pipeline(bundle, Options(size="S", threads=1, **options))
+    given = pipeline.capture_of(
+        capture, iso=case.iso, white_balance=case.white_balance, origin_px=case.origin_px
+    )
+    return np.asarray(pipeline.start(given).fill(product="image"))
+
+
+def _cases(bundle: Bundle) -> dict[str, tuple[GoldenCase, np.ndarray]]:
+    """Return golden captures, and one with lamps around the axis whose sides are no multiples."""
+    golden = golden_from_bytes(bundle.member(GOLDEN))
+    cases = {case.name: (case, golden[case.name].capture) for case in bundle.manifest.golden}
+    saturated, capture = cases["saturated"]
+    odd = saturated.model_copy(update={"origin_px": (2910, 1910)})
+    return cases | {"lamps_on_the_axis": (odd, np.ascontiguousarray(capture[:186, :190]))}
+
+
+@pytest.mark.parametrize("name", ["typical", "saturated", "very_dark", "lamps_on_the_axis"])
+def test_a_reader_agrees_with_camkit(bundle: Bundle, camera: Any, name: str) -> None:
+    case, capture = _cases(bundle)[name]
+    facts = capture, case.iso, case.white_balance, case.origin_px
+    expected = _camkit(bundle, capture, case, undistort=False, color="camera")
+    error = camera.develop(*facts, straight=False) - expected
+    assert 10 * np.log10(1 / np.mean(np.square(error, dtype=np.float64))) >= LEAST_DB
+    expected = _camkit(bundle, capture, case)
+    allowed = case.atol + case.rtol * max(1.0, float(np.abs(expected).max()))
+    assert np.abs(camera.develop(*facts) - expected).max() <= allowed
+
+
+def test_graphs_keep_to_the_default_domain_of_opset_18_without_control_flow(folder: Path) -> None:
+    for path in folder.glob("*.onnx"):
+        model = onnx.load(path)
+        assert [(one.domain, one.version) for one in model.opset_import] == [("", 18)]
+        operators = {node.op_type for node in model.graph.node}
+        assert not operators & {"If", "Loop", "Scan", "DFT", "STFT"}, path.name
+
+
+def test_one_size_takes_twelve_megabytes_at_most(folder: Path) -> None:
+    assert sum(path.stat().st_size for path in folder.iterdir()) <= MOST_BYTES
+
+
+def test_the_reader_is_eighty_lines_of_code() -> None:
+    lines = [line.strip() for line in READER.read_text().splitlines()]
+    assert sum(bool(line) and not line.startswith('"""') for line in lines) <= 80
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("thin-plate", "stage haze has no graph"),
+        ("trio-edof", "its bank finds the distance of the scene"),
+        ("streak-hdr", "its kind is hdr"),
+        ("spad-sr", "its kind is spad"),
+        ("deglare", "stage deglare has no graph"),
+    ],
+)
+def test_other_cameras_are_refused_by_what_has_no_graph(
+    name: str, reason: str, tmp_path: Path
+) -> None:
+    with pytest.raises(UnsupportedError, match=reason):
+        write_portable(open_bundle(built_in_bundles()[name]), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_full_folder_and_an_unknown_size_are_refused(bundle: Bundle, tmp_path: Path) -> None:
+    with pytest.raises(ContractError, match="no size L"):
+        write_portable(bundle, tmp_path / "out", ("L",))
+    (tmp_path / "mine.txt").write_text("mine")
+    with pytest.raises(ContractError, match="empty or not exist"):
+        write_portable(bundle, tmp_path)
+
+
+def test_the_rules_of_readers_need_format_2_12_and_are_off_by_default() -> None:
+    bank = Wiener(prior_scale=1.0, prior_exponent=2.0)
+    assert not bank.whole_blocks
+    assert Undistort().places == "float"
+    for kind, change in PORTABLE:
+        entry = (bank if kind is Wiener else Undistort()).model_copy(update=change)
+        assert format_of(None, [entry]) == "2.12"
