@@ -23,9 +23,8 @@ export interface About {
     black_level: number;
     white_level: number;
     clip_share: number;
-    noise: { iso: number; gain_e_per_dn: number; read_noise_e: number }[];
   };
-  bank: { block_px: number; overlap_px: number; border_px: number; margin_px: number; mirrors: boolean; mosaic_within_mm: number | null; lights: boolean };
+  bank: { block_px: number; margin_px: number; mosaic_within_mm: number | null; lights: boolean };
   networks: Record<string, { graph: string; halo_px: number; stride_px: number }>;
   tile_px: number;
   warp_px: number;
@@ -71,7 +70,7 @@ export class Camera {
     return new this.runtime.Tensor("float32", numbers instanceof Float32Array ? numbers : Float32Array.from(numbers), shape);
   }
 
-  /** A tensor of places, which are computed in double precision. */
+  /** A tensor of double precision. */
   exact(...numbers: number[]): Tensor {
     return new this.runtime.Tensor("float64", Float64Array.from(numbers), [numbers.length]);
   }
@@ -90,23 +89,6 @@ export class Camera {
     for (const table of graph.tables) feeds[table] = this.tables[table]!;
     for (const input of graph.inputs) feeds[input] = values[input]!;
     return (await session.run(feeds)) as Values;
-  }
-
-  /** Variance per light and at black, of light of which 1.0 is white, at an ISO. */
-  noiseAt(iso: number): [number, number] {
-    const { noise, white_level: white, black_level: black } = this.about.sensor;
-    const isos = noise.map((entry) => Math.log(entry.iso));
-    const last = isos.length - 1;
-    const inside = Math.min(Math.max(Math.log(iso), isos[0]!), isos[last]!);
-    const low = Math.max(0, Math.min(isos.findLastIndex((n) => n <= inside), last - 1));
-    const between = (of: (entry: About["sensor"]["noise"][number]) => number) => {
-      const [start, end] = [of(noise[low]!), of(noise[Math.min(low + 1, last)]!)];
-      if (inside === isos[last]) return of(noise[last]!);
-      return ((end - start) / (isos[low + 1]! - isos[low]!)) * (inside - isos[low]!) + start;
-    };
-    const gain = Math.exp(between((entry) => Math.log(entry.gain_e_per_dn)) - Math.max(Math.log(iso) - isos[last]!, 0));
-    const shot = 1 / (gain * (white - black));
-    return [shot, (between((entry) => entry.read_noise_e) * shot) ** 2];
   }
 }
 

@@ -1,8 +1,10 @@
 /**
  * The chain of a portable camera around its graphs, as docs/portable.md states it:
  *
- *   mosaic -> blocks (place, block) -> planes -> tiles (tile_S) -> even light -> places, warp -> picture
+ *   mosaic -> blocks (spans, place, block) -> planes -> tiles (kept, tile_S) -> even light
+ *          -> places, warp -> picture
  */
+import type { Tensor } from "onnxruntime-common";
 import type { Camera, Values } from "./camera.js";
 import type { Capture } from "./capture.js";
 import { check } from "./error.js";
@@ -26,18 +28,15 @@ export interface Choices {
 /** Share of the time that each step takes, for the progress alone. */
 const SHARES = { blocks: 0.6, tiles: 0.3, warp: 0.1 };
 
-interface Span {
-  first: number;
-  window: Float32Array;
-  /** Middle of what the window lets through. */
-  middle: number;
-}
-
-interface Axis {
-  span: Span;
-  size: number;
-  red: number;
-  flip: boolean;
+/** Blocks along an axis, as the graph `spans` lays them. */
+interface Spans {
+  count: number;
+  first: number[];
+  turn: number[];
+  index: number[];
+  phase: number[];
+  place: Float32Array;
+  window: Tensor[];
 }
 
 /** Develop a capture that states its ISO and white balance. */
@@ -54,13 +53,9 @@ export async function develop(camera: Camera, capture: Capture, choices: Choices
   const clip = Math.ceil(black + sensor.clip_share * (white - black));
   const origin = capture.origin ?? [0, 1].map((i) => 2 * Math.floor((sensor.size_px[i]! - [width, height][i]!) / 4));
   const axis = sensor.axis_px.map((at, i) => at - origin[i]!) as [number, number];
-  const [shot, read] = capture.noise ? [capture.noise.shot, capture.noise.readVariance] : camera.noiseAt(iso!).map((n) => [n, n, n]);
-  const known: Values = {
-    levels: camera.tensor([black, white, clip]),
-    gains: camera.tensor(gains),
-    shot: camera.tensor(shot!),
-    read_variance: camera.tensor(read!),
-  };
+  const stated = capture.noise && { shot: camera.tensor(capture.noise.shot), read_variance: camera.tensor(capture.noise.readVariance) };
+  const noise = stated ?? (await camera.run("noise", { iso: camera.exact(iso!) }));
+  const known: Values = { ...noise, levels: camera.tensor([black, white, clip]), gains: camera.tensor(gains) };
   const mosaic = Float32Array.from(samples);
   if (blacks.some((n) => n !== black)) {
     for (let i = 0; i < mosaic.length; i++) mosaic[i]! += black - blacks[2 * (Math.floor(i / width) & 1) + ((i % width) & 1)]!;
@@ -78,33 +73,20 @@ function patternAt(cfa: string, [x, y]: number[]): string {
   return [0, 1, 2, 3].map((i) => cfa[2 * (((i >> 1) + y!) & 1) + ((i + x!) & 1)]).join("");
 }
 
-/** Blocks along an axis, and their windows, 0 outside the picture. */
-function spans(size: number, block: number, overlap: number, border: number): Span[] {
-  const step = block - overlap;
-  const count = Math.max(1, Math.ceil((size + 2 * border - overlap) / step));
-  const start = -Math.floor((count * step + overlap - size) / 2);
-  const rise = (i: number) => Math.sin((Math.PI / 2) * Math.min(Math.max((i + 0.5 - overlap / 4) / (overlap / 2), 0), 1)) ** 2;
-  return Array.from({ length: count }, (_, n) => {
-    const first = start + n * step;
-    const window = new Float32Array(block);
-    for (let i = Math.max(0, -first); i < Math.min(block, size - first); i++) {
-      const up = n > 0 && i < overlap ? rise(i) : 1;
-      const down = n < count - 1 && i >= block - overlap ? rise(block - 1 - i) : 1;
-      window[i] = up * down;
-    }
-    const live = (weight: number) => weight !== 0;
-    return { first, window, middle: first + (window.findIndex(live) + window.findLastIndex(live)) / 2 };
-  });
-}
-
-/** Rows of a block with its margin, mirrored about the outermost ones of the picture. */
-function fold({ span, size, flip }: Axis, block: number, margin: number): Int32Array {
-  const period = Math.max(2 * (size - 1), 1);
-  const rows = Int32Array.from({ length: block + 2 * margin }, (_, i) => {
-    const at = (((span.first - margin + i) % period) + period) % period;
-    return Math.min(at, period - at);
-  });
-  return flip ? rows.reverse() : rows;
+async function laySpans(camera: Camera, size: number, axis: number, red: number): Promise<Spans> {
+  const made = await camera.run("spans", { size_px: camera.whole(size), axis_px: camera.exact(axis), red: camera.whole(red) });
+  const whole = (name: string) => Array.from(made[name]!.data as BigInt64Array, Number);
+  const window = made.window!.data as Float32Array;
+  const [count, block] = made.window!.dims as [number, number];
+  return {
+    count,
+    first: whole("first_px"),
+    turn: whole("turn"),
+    index: whole("index"),
+    phase: whole("phase"),
+    place: made.place_mm!.data as Float32Array,
+    window: Array.from({ length: count }, (_, i) => camera.tensor(window.slice(i * block, (i + 1) * block))),
+  };
 }
 
 interface Mosaic {
@@ -116,72 +98,65 @@ interface Mosaic {
   axis: [number, number];
 }
 
-/** Demosaicked and restored planes, six of them: blocks by place, mirrored places as one. */
+/** Demosaicked and restored planes, six of them: blocks by place, in the order in which places come up. */
 async function restore(camera: Camera, capture: Mosaic, known: Values, progress: NonNullable<Choices["progress"]>): Promise<Float32Array> {
-  const { bank, sensor } = camera.about;
+  const { bank } = camera.about;
   const { mosaic, width, height, cfa, clip, axis } = capture;
-  const { block_px: block, margin_px: margin } = bank;
   const red = cfa.indexOf("R");
-  const places = new Map<string, { place: [number, number]; blocks: [Axis, Axis][] }>();
-  const across = spans(width, block, bank.overlap_px, bank.border_px);
-  const down = spans(height, block, bank.overlap_px, bank.border_px);
-  for (const rows of down) {
-    for (const columns of across) {
-      const place = [(columns.middle - axis[0]) * sensor.pitch_mm, (rows.middle - axis[1]) * sensor.pitch_mm];
-      const flips = place.map((at) => bank.mirrors && at < 0);
-      const [x, y] = place.map((at, i) => Math.round((flips[i] ? -at : at) * 1e9) / 1e9) as [number, number];
-      const entry = places.get(`${x} ${y}`) ?? { place: [x, y], blocks: [] };
-      places.set(`${x} ${y}`, entry);
-      entry.blocks.push([
-        { span: rows, size: height, red: red >> 1, flip: flips[1]! },
-        { span: columns, size: width, red: red & 1, flip: flips[0]! },
-      ]);
+  const down = await laySpans(camera, height, axis[1], red >> 1);
+  const across = await laySpans(camera, width, axis[0], red & 1);
+  const places = new Map<string, [number, number][]>();
+  for (let i = 0; i < down.count; i++) {
+    for (let j = 0; j < across.count; j++) {
+      const key = `${across.place[j]} ${down.place[i]}`;
+      places.set(key, [...(places.get(key) ?? []), [i, j]]);
     }
   }
   const total = new Float32Array(6 * width * height);
-  const side = block + 2 * margin;
+  const margin = bank.margin_px;
+  const side = bank.block_px + 2 * margin;
   const samples = new Float32Array(side * side);
   let done = 0;
-  for (const { place, blocks } of places.values()) {
+  for (const blocks of places.values()) {
+    const [row, column] = blocks[0]!;
+    const place = [across.place[column]!, down.place[row]!];
     const kind = bank.mosaic_within_mm !== null && Math.hypot(...place) <= bank.mosaic_within_mm ? "_mosaic" : "";
     const here = { ...known, ...(await camera.run(`place${kind}`, { place_mm: camera.tensor(place) })) };
-    for (const axes of blocks) {
-      progress("Restoring blocks", (SHARES.blocks * done++) / (down.length * across.length));
-      const [rows, columns] = axes.map((one) => fold(one, block, margin)) as [Int32Array, Int32Array];
+    for (const [i, j] of blocks) {
+      progress("Restoring blocks", (SHARES.blocks * done++) / (down.count * across.count));
       let lit = false;
-      for (let i = 0, at = 0; i < side; i++) {
-        const row = rows[i]! * width;
-        for (let j = 0; j < side; j++, at++) {
-          const sample = mosaic[row + columns[j]!]!;
+      for (let y = 0, at = 0; y < side; y++) {
+        const start = down.index[i * side + y]! * width;
+        for (let x = 0; x < side; x++, at++) {
+          const sample = mosaic[start + across.index[j * side + x]!]!;
           samples[at] = sample;
-          lit ||= sample >= clip && i >= margin && j >= margin && i < side - margin && j < side - margin;
+          lit ||= sample >= clip && y >= margin && x >= margin && y < side - margin && x < side - margin;
         }
       }
-      const [phaseY, phaseX] = axes.map(({ span, flip, red: at }) => Math.abs(at - span.first - Number(flip)) % 2) as [number, number];
-      const [windowY, windowX] = axes.map(({ span, flip }) => camera.tensor(flip ? span.window.slice().reverse() : span.window));
       const { out } = await camera.run(`block${kind}${bank.lights && lit ? "_lights" : ""}`, {
         ...here,
         mosaic: camera.tensor(samples, [side, side]),
-        phase: camera.whole(2 * phaseY + phaseX),
-        window_y: windowY!,
-        window_x: windowX!,
+        phase: camera.whole(2 * down.phase[i]! + across.phase[j]!),
+        window_y: down.window[i]!,
+        window_x: across.window[j]!,
       });
-      add(total, width, height, out!.data as Float32Array, block, axes);
+      const from = { top: down.first[i]!, left: across.first[j]!, turnY: down.turn[i]! < 0, turnX: across.turn[j]! < 0 };
+      add(total, width, height, out!.data as Float32Array, bank.block_px, from);
     }
   }
   return total;
 }
 
-/** Add a block to the planes, turned back if it was mirrored. */
-function add(total: Float32Array, width: number, height: number, out: Float32Array, block: number, [rows, columns]: [Axis, Axis]): void {
-  const [top, left] = [rows.span.first, columns.span.first];
+/** Add a block to the planes, read backwards where it was turned. */
+function add(total: Float32Array, width: number, height: number, out: Float32Array, block: number, from: { top: number; left: number; turnY: boolean; turnX: boolean }): void {
+  const { top, left, turnY, turnX } = from;
   const [y0, y1] = [Math.max(top, 0), Math.min(top + block, height)];
   const [x0, x1] = [Math.max(left, 0), Math.min(left + block, width)];
   for (let plane = 0; plane < 6; plane++) {
     for (let y = y0; y < y1; y++) {
-      const row = (plane * block + (rows.flip ? block - 1 - (y - top) : y - top)) * block;
+      const row = (plane * block + (turnY ? block - 1 - (y - top) : y - top)) * block;
       const to = (plane * height + y) * width;
-      if (columns.flip) for (let x = x0; x < x1; x++) total[to + x]! += out[row + block - 1 - (x - left)]!;
+      if (turnX) for (let x = x0; x < x1; x++) total[to + x]! += out[row + block - 1 - (x - left)]!;
       else for (let x = x0; x < x1; x++) total[to + x]! += out[row + x - left]!;
     }
   }
