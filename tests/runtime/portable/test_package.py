@@ -27,7 +27,8 @@ MOST_BYTES = 12_000_000
 
 def _module() -> ModuleType:
     spec = importlib.util.spec_from_file_location("portable_camera", READER)
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -35,7 +36,7 @@ def _module() -> ModuleType:
 
 @pytest.fixture(scope="module")
 def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
-    """Give `duet` with the rules that other readers follow too."""
+    """Return `duet` with the rules that other readers follow too."""
     old = open_bundle(built_in_bundles()["duet"])
     changes = dict(PORTABLE)
     stages = tuple(
@@ -48,7 +49,7 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
 
 @pytest.fixture(scope="module")
 def folder(bundle: Bundle, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Give the portable camera, size S alone."""
+    """Return the portable camera, size S alone."""
     folder = tmp_path_factory.mktemp("portable") / "duet"
     write_portable(bundle, folder, ("S",))
     return folder
@@ -56,16 +57,16 @@ def folder(bundle: Bundle, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def camera(folder: Path) -> Any:
-    """Give the camera of the reader."""
+    """Return the camera of the reader."""
     return _module().PortableCamera(folder, "S")
 
 
 def _camkit(bundle: Bundle, capture: np.ndarray, case: GoldenCase, **options: Any) -> np.ndarray:
     pipeline = Pipeline(bundle, Options(size="S", threads=1, **options))
-    given = pipeline.capture_of(
+    prepared = pipeline.capture_of(
         capture, iso=case.iso, white_balance=case.white_balance, origin_px=case.origin_px
     )
-    return np.asarray(pipeline.start(given).fill(product="image"))
+    return np.asarray(pipeline.start(prepared).fill(product="image"))
 
 
 def _cases(bundle: Bundle) -> dict[str, tuple[GoldenCase, np.ndarray]]:
