@@ -66,7 +66,7 @@ def measured(path: Path, repeat: int) -> dict[str, Any]:
             "golden": [
                 row for size, camera in cameras.items() for row in _golden(bundle, camera, size)
             ],
-            "graph_ms": _graph_times(bundle, cameras),
+            "graph_ms": _graph_times(bundle, cameras) if repeat else {},
             "frames": [
                 _frame(bundle, camera, size, repeat) for size, camera in cameras.items() if repeat
             ],

@@ -11,7 +11,7 @@ sums are exact, and no reader of the bundle rounds a place to another 1/32 px.
 
 from collections.abc import Callable, Iterator
 from functools import partial
-from typing import Final
+from typing import Any, Final
 
 import cv2
 import numpy as np
@@ -179,25 +179,46 @@ class Warp:
     def maps(self, channel: int, top: int, bottom: int) -> Maps:
         """Return cv2's fixed-point maps of output rows top..bottom (top on the lattice)."""
         nodes = self.lattice(channel, top, bottom)
-        fixed = self._places == "fixed"
-        nodes = np.floor(nodes * NODE_STEPS + 0.5) if fixed else nodes.astype(np.float32)
-        width = self.window.size_px[0] + 2 * self._margin_px
-        # cv2.resize places node i in the middle of its cell, as the lattice does.
-        size = (nodes.shape[1] * LATTICE_PX, nodes.shape[0] * LATTICE_PX)
-        dense = cv2.resize(nodes, size, interpolation=cv2.INTER_LINEAR)
-        dense = dense[LATTICE_PX : LATTICE_PX + bottom - top, LATTICE_PX : LATTICE_PX + width]
-        if fixed:
-            return _fixed_maps(dense)
+        rows, columns = bottom - top, self.window.size_px[0] + 2 * self._margin_px
+        if self._places == "fixed":
+            return _fixed_maps(nodes, top, (rows, columns))
+        dense = _dense(nodes.astype(np.float32), (rows, columns))
         whole, fraction = cv2.convertMaps(dense, None, cv2.CV_16SC2)
         return whole, fraction
 
 
-def _fixed_maps(places: FloatGrid) -> Maps:
-    """Return cv2's maps of (h, w, 2) places in steps of nodes, rounded upwards from the middle."""
-    steps = np.floor(places * (PLACE_STEPS / NODE_STEPS) + 0.5).astype(np.int32)
-    whole = (steps >> 5).astype(np.int16)
-    x, y = (steps[..., axis] & (PLACE_STEPS - 1) for axis in (0, 1))
-    return whole, (y * PLACE_STEPS + x).astype(np.uint16)
+def _dense(nodes: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
+    """Return (rows, columns, 2), linear between the nodes around them."""
+    # cv2.resize places node i in the middle of its cell, as the lattice does.
+    sides = (nodes.shape[1] * LATTICE_PX, nodes.shape[0] * LATTICE_PX)
+    dense = cv2.resize(nodes, sides, interpolation=cv2.INTER_LINEAR)
+    inside: NDArray[Any] = dense[LATTICE_PX:, LATTICE_PX:][: size[0], : size[1]]
+    return inside
+
+
+def _fixed_maps(nodes: FloatGrid, top: int, size: tuple[int, int]) -> Maps:
+    """Return cv2's maps of (rows, columns) pixels from row `top` on, in fixed point.
+
+    How far a place lies from its pixel is interpolated, less what all have in common: a number
+    small enough for single precision to be exact.
+    """
+    steps = np.floor(nodes * NODE_STEPS + 0.5)
+    middle = (LATTICE_PX - 1) / 2
+    for axis, first in ((0, 0), (1, top // LATTICE_PX)):
+        cells = np.arange(first - 1, first - 1 + nodes.shape[1 - axis]) * LATTICE_PX + middle
+        steps[..., axis] -= (cells if axis == 0 else cells[:, None]) * NODE_STEPS
+    common = np.rint(steps.mean(axis=(0, 1)) / NODE_STEPS)
+    steps -= common * NODE_STEPS
+    is_exact = np.abs(steps).max() * LATTICE_PX * LATTICE_PX * 4 < 2**24
+    moves = _dense(steps.astype(np.float32 if is_exact else np.float64), size)
+    moves = moves * moves.dtype.type(PLACE_STEPS / NODE_STEPS)
+    moves += moves.dtype.type(0.5)
+    parts = np.floor(moves, out=moves).astype(np.int32 if not is_exact else np.int16)
+    whole = (parts >> 5).astype(np.int16)
+    whole[..., 0] += (np.arange(size[1]) + int(common[0])).astype(np.int16)
+    whole[..., 1] += (np.arange(top, top + size[0]) + int(common[1])).astype(np.int16)[:, None]
+    parts &= PLACE_STEPS - 1
+    return whole, (parts[..., 1] * PLACE_STEPS + parts[..., 0]).astype(np.uint16)
 
 
 def _warp_bands(

@@ -16,7 +16,7 @@ of one alias as -n / 2 of the next; sums over frequencies weigh them by half.
 """
 
 from functools import cached_property
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,7 +54,7 @@ class BlockShape:
         fy, fx = (((part + half) % self.side - half) / self.side for part in (rows, columns))
         return np.asarray(fy * fy + fx * fx)
 
-    def waves(self, positions: FloatGrid) -> tuple[FloatGrid, FloatGrid]:
+    def waves(self, positions: NDArray[np.floating[Any]]) -> tuple[FloatGrid, FloatGrid]:
         """Return cosines and sines (q, n) of the frequencies d at positions (n,)."""
         angle = np.pi / self.n * np.outer(np.arange(self.q), positions)
         return _clean(np.cos(angle)), _clean(np.sin(angle))
@@ -135,17 +135,17 @@ def planes_of(graph: GraphBuilder, parts: Spectrum, shape: BlockShape) -> Value:
     by_sines = graph.joined([(im + im_below) * -1.0, re_below - re], axis=2)
     column_weights = np.full(q, 2.0)
     column_weights[[0, -1]] = 1
-    row_waves = np.full(q, 1.0)
-    row_waves[[0, -1]] = 0.5
+    row_weights = np.full(q, 1.0)
+    row_weights[[0, -1]] = 0.5
     waves = [shape.waves(2.0 * np.arange(n) + p) for p in (0, 1)]
     cosines, sines = (
         np.stack([waves[px][part] * column_weights[:, None] for _, px in PHASES]) for part in (0, 1)
     )
     rows = np.stack(
-        [np.concatenate([w * row_waves[:, None] for w in waves[py]]).T for py, _ in PHASES]
+        [np.concatenate([w * row_weights[:, None] for w in waves[py]]).T for py, _ in PHASES]
     )
-    cosines, sines = graph.table("back_cosines", cosines), graph.table("back_sines", sines)
-    columns = _aliases(graph, by_cosines, 1) @ cosines + _aliases(graph, by_sines, 1) @ sines
+    columns = _aliases(graph, by_cosines, 1) @ graph.table("back_cosines", cosines)
+    columns = columns + _aliases(graph, by_sines, 1) @ graph.table("back_sines", sines)
     return graph.table("back_rows", rows / (4.0 * n * n)) @ columns
 
 

@@ -123,6 +123,31 @@ def test_map_follows_the_model_between_its_nodes() -> None:
     assert np.abs(found - warp.positions(1, x, y)).max() < MAP_ERROR_PX
 
 
+@given(x=st.integers(0, SENSOR[0] - 1), y=st.integers(0, SENSOR[1] - 1), top=st.integers(0, 120))
+@settings(max_examples=60, deadline=None)
+def test_places_in_fixed_point_are_sums_of_whole_numbers(x: int, y: int, top: int) -> None:
+    warp = Warp(BARREL, window(), to_sensor=False, places="fixed")
+    first = min(top * 8, y // 8 * 8)
+    whole, fraction = warp.maps(1, first, min(first + 256, SENSOR[1]))
+    if not first <= y < first + 256:
+        return
+
+    def shares(at: int) -> dict[int, int]:
+        """Return nodes around a pixel with their shares in sixteenths."""
+        cell, odd = at // 8, 2 * (at % 8) - 7
+        return {cell: 16 - abs(odd), cell + (1 if odd > 0 else -1): abs(odd)}
+
+    total = np.zeros(2, dtype=object)
+    for row, down in shares(y).items():
+        for column, across in shares(x).items():
+            node = warp.positions(1, np.array(8 * column + 3.5), np.array(8 * row + 3.5))
+            total += np.array([int(np.floor(v * 256 + 0.5)) for v in node], object) * down * across
+    expected = [(int(part) * 64 + 256 * 256) // (2 * 256 * 256) for part in total]
+    steps = int(np.asarray(fraction)[y - first, x])
+    found = whole[y - first, x].astype(int) * 32 + [steps % 32, steps // 32]
+    assert found.tolist() == expected
+
+
 def test_source_rows_are_read_downwards_and_forgotten() -> None:
     picture = band_limited(512, 384, 0.2)
     place = window((384, 512), (64, 256))
