@@ -63,9 +63,11 @@ async function main(): Promise<void> {
   }
   if (values.origin) capture.origin = numbers(values.origin, 2, "The origin") as [number, number];
   const started = process.cpuUsage();
+  const start = performance.now();
   const made = await develop(camera, capture, { size: values.size });
   const { user, system } = process.cpuUsage(started);
-  console.log(`${made.width}x${made.height}, ${((user + system) / 1e6).toFixed(2)} CPU s`);
+  const seconds = ((performance.now() - start) / 1000).toFixed(2);
+  console.log(`${made.width}x${made.height}: ${seconds} s, ${((user + system) / 1e6).toFixed(2)} CPU s`);
   const { light } = made;
   if (values.light) await writeFile(values.light, new Uint8Array(light.buffer, light.byteOffset, light.byteLength));
   const { rgb, width, height } = picture(light, made, values.bits === "16" ? 16 : 8);

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from camkit.arrays import FloatArray
 from camkit.bundle.golden import golden_from_bytes
@@ -68,12 +69,19 @@ def make_camera(name: str, size: str, folder: Path) -> PortableCamera:
     return PortableCamera(archive=archive, cases=cases, reader=reader)
 
 
-def _case(bundle: Bundle, case: GoldenCase, size: str, reader: Any, folder: Path) -> PortableCase:
+def write_photo(
+    path: Path,
+    bundle: Bundle,
+    samples: NDArray[np.uint16],
+    iso: float,
+    white_balance: tuple[float, float, float] | None,
+    origin_px: tuple[int, int],
+) -> None:
+    """Write a capture of a bundle's camera as a DNG that leaves its noise to its ISO."""
     sensor = bundle.manifest.sensor
-    arrays = golden_from_bytes(bundle.member(GOLDEN))[case.name]
     assert isinstance(sensor, BayerSensor)
-    red, green, blue = case.white_balance or (1.0, 1.0, 1.0)
-    extent, photo = sensor.known_extent, folder / f"{case.name}.dng"
+    red, green, blue = white_balance or (1.0, 1.0, 1.0)
+    extent = sensor.known_extent
     tags = DngTags(
         cfa=sensor.cfa,
         black=round(sensor.black_level),
@@ -81,24 +89,29 @@ def _case(bundle: Bundle, case: GoldenCase, size: str, reader: Any, folder: Path
         color_matrix=np.array(sensor.color_matrix),
         as_shot_neutral=(1 / red, 1 / green, 1 / blue),
         camera_model=f"camkit {bundle.manifest.name}",
-        metadata=Metadata(iso=case.iso),
+        metadata=Metadata(iso=iso),
         description=camkit_description(
             bundle=bundle.manifest.name,
-            origin_px=case.origin_px,
+            origin_px=origin_px,
             sensor_size_px=(extent.width_px, extent.height_px),
             pixel_pitch_um=extent.pixel_pitch_um,
         ),
     )
-    write_bayer_dng(photo, arrays.capture, tags=tags)
+    write_bayer_dng(path, samples, tags=tags)
+
+
+def _case(bundle: Bundle, case: GoldenCase, size: str, reader: Any, folder: Path) -> PortableCase:
+    arrays = golden_from_bytes(bundle.member(GOLDEN))[case.name]
+    photo = folder / f"{case.name}.dng"
+    write_photo(photo, bundle, arrays.capture, case.iso, case.white_balance, case.origin_px)
     # gains as the file holds them: millionths
     gains = read_capture(photo, isolate=False).white_balance
     light = reader.develop(arrays.capture, case.iso, gains, case.origin_px)
     follows = all(reader.facts["agrees"].values())
     output = arrays.output("image", size) if follows else None
     most = 1.0 if output is None else max(1.0, float(np.abs(output).max()))
-    return PortableCase(
-        photo=photo, light=light, output=output, allowed=case.atol + case.rtol * most
-    )
+    allowed = case.atol + case.rtol * most
+    return PortableCase(photo=photo, light=light, output=output, allowed=allowed)
 
 
 def _python_reader(folder: Path, size: str) -> Any:
