@@ -46,7 +46,7 @@ def _demosaic_weights() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
             colour = colour_at(phase, y, x)
             row = colour, colour_at(phase, y, x + 1)
             for target in range(3):
-                kernel = np.zeros((5, 5))
+                kernel = np.zeros((5, 5), np.float32)
                 kernel[2, 2] = 1
                 if colour != target:
                     kernel = MALVAR_KERNELS[_kernel_name(colour, target, row)]

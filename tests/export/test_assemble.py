@@ -253,7 +253,7 @@ def test_a_camera_with_a_haze_is_exported_with_its_case_of_cells(
 ) -> None:
     report = export_bundle(hazy_parts, tmp_path / "hazy.camkit")
     bundle = open_bundle(tmp_path / "hazy.camkit")
-    assert bundle.manifest.format_version == "2.8"
+    assert bundle.manifest.format_version == "2.12"
     types = [stage.type for stage in bundle.manifest.stages]
     assert types[types.index("demosaic") + 1 :][:3] == ["haze", "wiener", "network"]
     assert HAZE_GOLDEN in bundle.names

@@ -91,7 +91,9 @@ class BayerTraining:
 
     def design(self, recipe: BayerRecipe) -> Design:
         """Return the stages of every camera of this kind, with the recipe's bank."""
-        wiener, picture = recipe.wiener, recipe.wiener.takes[0]
+        # what the runtime does, every reader of the bundle can do: docs/portable.md
+        wiener = recipe.wiener.model_copy(update={"whole_blocks": True})
+        picture = wiener.takes[0]
         if recipe.haze is not None:
             (picture,) = recipe.haze.gives
             wiener = wiener.model_copy(update={"takes": (picture, *wiener.takes[1:])})
@@ -109,7 +111,7 @@ class BayerTraining:
             *restoring,
             RaiseClipped(),
             Illumination(),
-            Undistort(interpolation="cubic", overshoot="limited"),
+            Undistort(interpolation="cubic", overshoot="limited", places="fixed"),
             Color(),
         )
         absent = _without_meaning(recipe)
