@@ -40,6 +40,7 @@ const used = { camera: [] as string[], photo: [] as string[] };
 let camera: CameraFacts | undefined;
 let photo: PhotoFacts | undefined;
 let started = 0;
+let isAgain = false; // what the worker reads is known: it is a new one, after a cancel
 
 const threads = crossOriginIsolated ? Math.min(navigator.hardwareConcurrency || 1, MOST_THREADS) : 1;
 
@@ -66,10 +67,11 @@ async function startWorker(): Promise<void> {
   if (names.length) send({ kind: "files", files: names.map((name) => ({ name, bytes: given.get(name)! })) });
 }
 
-function fail(message: string): void {
+/** Show what is wrong; work goes on only if it is said. */
+function fail(message: string, goesOn = false): void {
   problem.textContent = message;
   problem.hidden = false;
-  rest();
+  if (!goesOn) rest();
 }
 
 /** Show that nothing is being done. */
@@ -87,12 +89,12 @@ function hear(message: Answer): void {
     case "camera":
       camera = message.facts;
       used.camera = message.files;
-      showGiven();
+      if (!isAgain) showGiven();
       break;
     case "photo":
       photo = message.facts;
       used.photo = [photo.name];
-      showGiven();
+      if (!isAgain) showGiven();
       break;
     case "progress":
       showProgress(message.step, message.share);
@@ -173,8 +175,10 @@ function download(blob: Blob, bits: number): void {
 }
 
 async function take(list: File[]): Promise<void> {
-  problem.hidden = true;
   if (!list.length) return;
+  if (!work.hidden) return fail("A photograph is being developed. Wait, or cancel it first.", true);
+  problem.hidden = true;
+  isAgain = false;
   news.textContent = "Reading the files.";
   const taken = await Promise.all(list.map(async (file) => ({ name: file.name, bytes: await file.arrayBuffer() })));
   for (const name of given.keys()) if (![...used.camera, ...used.photo].includes(name)) given.delete(name);
@@ -239,7 +243,9 @@ form.addEventListener("submit", (event) => {
 });
 cancelButton.addEventListener("click", () => {
   rest();
+  problem.hidden = true;
   news.textContent = "Cancelled.";
+  isAgain = true;
   developButton.focus();
   void startWorker();
 });

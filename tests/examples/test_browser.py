@@ -151,6 +151,9 @@ def test_keys_alone_develop_cancel_and_compare(camera: PortableCamera, page: Pag
             break
     page.press("Enter")
     page.wait("!document.querySelector('#cancel').hidden")
+    page.choose("#files", camera.cases["typical"].photo)
+    page.wait(REFUSED)
+    assert "cancel it first" in page.value("document.querySelector('#error').textContent")
     page.press("Tab")
     assert page.value("document.activeElement.id") == "cancel"
     page.press("Enter")
