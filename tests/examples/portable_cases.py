@@ -41,8 +41,9 @@ class PortableCase:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PortableCamera:
-    """A camera as files: a zip, its golden cases by name, and the reader of examples/python."""
+    """A camera as files, its golden cases by name, and the reader of examples/python."""
 
+    folder: Path
     archive: Path
     cases: dict[str, PortableCase]
     reader: Any
@@ -66,7 +67,7 @@ def make_camera(name: str, size: str, folder: Path) -> PortableCamera:
     cases = {
         case.name: _case(bundle, case, size, reader, folder) for case in bundle.manifest.golden
     }
-    return PortableCamera(archive=archive, cases=cases, reader=reader)
+    return PortableCamera(folder=graphs, archive=archive, cases=cases, reader=reader)
 
 
 def write_photo(

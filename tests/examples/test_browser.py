@@ -227,7 +227,7 @@ def test_a_page_served_with_isolation_uses_threads(camera: PortableCamera, tmp_p
             page.open(f"http://127.0.0.1:{server.server_port}/")
             page.wait(READY)
             assert " threads" in page.value("document.querySelector('#engine').textContent")
-            page.choose("#files", camera.archive, case.photo)
+            page.choose("#files", *sorted(camera.folder.iterdir()), case.photo)
             page.wait("!document.querySelector('#settings').hidden")
             light = _develop(page)
             assert page.console == []

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import struct
 import subprocess
 from pathlib import Path
 from typing import Any, Final
@@ -70,6 +71,23 @@ def test_a_plain_mosaic_is_developed_like_its_dng(camera: PortableCamera, tmp_pa
     inner = np.s_[:, 64:-64, 64:-64]
     # another grid of blocks and tiles: near the same, and nothing like it with colours swapped
     assert difference_db(light[inner], case.light[:, 3:, 1:][inner]) > 35
+
+
+@pytest.mark.parametrize(("orientation", "quarters", "mirrored"), [(6, 3, False), (7, 1, True)])
+def test_a_picture_is_turned_as_the_camera_was_held(
+    camera: PortableCamera, tmp_path: Path, orientation: int, quarters: int, mirrored: bool
+) -> None:
+    photo, turned = camera.cases["very_dark"].photo, tmp_path / "turned.dng"
+    data = photo.read_bytes()
+    stated, wanted = (struct.pack("<HHII", 274, 3, 1, n) for n in (1, orientation))
+    assert data.count(stated) == 1
+    turned.write_bytes(data.replace(stated, wanted))
+    pictures = []
+    for path in (photo, turned):
+        _develop(camera, path, "--bits", "16")
+        pictures.append(cv2.imread(str(path.with_suffix(".png")), cv2.IMREAD_UNCHANGED))
+    expected = np.rot90(pictures[0], quarters)
+    assert np.array_equal(pictures[1], expected[:, ::-1] if mirrored else expected)
 
 
 def _sha256(samples: np.ndarray) -> str:
