@@ -69,7 +69,7 @@ class PortableCamera:
 
     def tiles(self, size, stride, halo):
         """Return of every tile along an axis its first and last pixel, and those between which it counts."""
-        count = max(1, math.ceil((size - 2 * halo) / (self.facts["tile_px"] - 2 * halo)))
+        count = max(1, math.ceil((size - 2 * halo) / (self.network["tile_px"] - 2 * halo)))
         side = math.ceil((size + (count - 1) * 2 * halo) / (count * stride)) * stride
         firsts = np.minimum(np.arange(count) * (side - 2 * halo), size - side)
         cuts = [0, *(firsts[1:] + halo), size]

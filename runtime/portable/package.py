@@ -29,8 +29,9 @@ from camkit.runtime.portable.warp_graph import TILE_PX, places_graph, warp_graph
 PORTABLE_VERSION: Final = 1
 MANIFEST: Final = "portable.json"
 TABLES: Final = "portable.safetensors"
-TILE_SIDE_PX: Final = 768
-"""Of a tile that the network sees, where a reader chooses none: 5 MB of planes per 100 kB."""
+TILE_HALOS: Final = 12
+"""Of a side of a tile, where a reader chooses none: with fewer more is computed twice, with more the
+planes leave the cache."""
 
 
 def write_portable(
@@ -90,10 +91,12 @@ def portable_manifest(
         one = facts.bundle.network_facts(facts.network.role, size)
         reach = one.reach_px + facts.network.extra_reach_px
         stride = one.stride_px
+        halo = -(-reach // stride) * stride
         networks[size] = {
             "graph": f"tile_{size}",
-            "halo_px": -(-reach // stride) * stride,
+            "halo_px": halo,
             "stride_px": stride,
+            "tile_px": TILE_HALOS * halo,
         }
     return {
         "portable_version": PORTABLE_VERSION,
@@ -125,7 +128,6 @@ def portable_manifest(
             "lights": bank.clip_iterations > 0,
         },
         "networks": networks,
-        "tile_px": TILE_SIDE_PX,
         "warp_px": TILE_PX,
         "warp_white": WHITE,
         "warp_floor": FLOOR,

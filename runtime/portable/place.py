@@ -60,6 +60,8 @@ def _turned(graph: GraphBuilder, facts: CameraFacts, place: Value, height: Value
     upright = height.clip(LEAST_HEIGHT_MM, 1e9)
     out_x, out_y = (place / upright).parts(0, 2)
     out_y = out_y + graph.node("Cast", graph.node("Less", height, LEAST_HEIGHT_MM), to=1)
+    if not kernels.turns:
+        out_x, out_y = out_x * 0.0, out_y * 0.0 + 1.0
     most = half + PAD_PX - 2.0
     rows = (out_x * across + out_y * down).clip(-most, most) + (half + PAD_PX)
     columns = (out_y * across - out_x * down).clip(-most, most) + (half + PAD_PX)

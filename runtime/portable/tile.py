@@ -53,14 +53,17 @@ def tile_graph(facts: CameraFacts, size: str) -> GraphBuilder:
     output = graph.copied(model, stable).relu()
     front = stable.part(1, 3, 6)
     added = output - front
-    bound = _bound(facts)
+    network = _bounded_network(facts)
+    bound, planes_of_bundle = network.light, facts.bundle.manifest.all_planes
+    if not any(planes_of_bundle[name].domain == "mask" for name in network.takes):
+        share = share * 0.0 + 1.0
     if bound is not None:
         added = added - _excess(graph, (front, added, output), share, (bound, scale))
     output = front + added * share
     if bound is not None and bound.keeps_bright:
         bright = (slope * BRIGHT + offset).relu().sqrt()
-        share = _bright_share(front * (1 / bright).shaped(1, 3, 1, 1))
-        output = output.at_least(front * share - BRIGHT_NOISE * 0.5 / scale)
+        bright_share = _bright_share(front * (1 / bright).shaped(1, 3, 1, 1))
+        output = output.at_least(front * bright_share - BRIGHT_NOISE * 0.5 / scale)
     output = output.relu()
     steepness = 1 / slope
     light = _line(graph, output * output, steepness, offset * steepness * -1.0)
@@ -101,9 +104,9 @@ def _familiar(facts: CameraFacts, shot: Value, read: Value) -> tuple[Value, Valu
     return shot.at_least(read.sqrt() * (1 / high_e)), read.at_least(least * least)
 
 
-def _bound(facts: CameraFacts) -> LightBound | None:
+def _bounded_network(facts: CameraFacts) -> Network:
     stages = bounded_stages(facts.bundle.manifest, "stated")
-    return next(stage.light for stage in stages if isinstance(stage, Network))
+    return next(stage for stage in stages if isinstance(stage, Network))
 
 
 def _excess(
