@@ -25,8 +25,7 @@ export interface About {
     clip_share: number;
   };
   bank: { block_px: number; margin_px: number; mosaic_within_mm: number | null; lights: boolean };
-  networks: Record<string, { graph: string; halo_px: number; stride_px: number }>;
-  tile_px: number;
+  networks: Record<string, { graph: string; halo_px: number; stride_px: number; tile_px: number }>;
   warp_px: number;
   warp_white: number;
   warp_floor: number;

@@ -186,11 +186,11 @@ interface Restored {
 
 /** Three planes of light of the camera's colours, clean and even. */
 async function clean(camera: Camera, size: string, restored: Restored, known: Values, progress: NonNullable<Choices["progress"]>): Promise<Float32Array> {
-  const { graph, halo_px: halo, stride_px: stride } = camera.about.networks[size]!;
-  const { tile_px: side, sensor } = camera.about;
+  const { graph, halo_px: halo, stride_px: stride, tile_px: most } = camera.about.networks[size]!;
+  const { sensor } = camera.about;
   const { planes, kept, width, height, axis } = restored;
   const [wide, high] = [width, height].map((n) => Math.ceil(n / stride) * stride) as [number, number];
-  const [broad, tall] = [wide, high].map((n) => sideOf(n, side, halo, stride)) as [number, number];
+  const [broad, tall] = [wide, high].map((n) => sideOf(n, most, halo, stride)) as [number, number];
   const even = new Float32Array(3 * width * height);
   /** A tile of some planes, whose border repeats. */
   const cut = (from: Float32Array, count: number, x: number, y: number) => {
