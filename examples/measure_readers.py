@@ -112,7 +112,8 @@ def measured(path: str, size: str, folder: Path, is_timed: bool) -> dict[str, An
         }
         rows = {name: golden_rows(camera, run) for name, run in readers.items()}
         times = timed(camera, readers, simulated(path, folder)) if is_timed else {}
-    return {"bundle": Path(path).stem, "size": size, "golden": rows, "large": times}
+    manifest = open_bundle(find_bundle(path)).manifest
+    return {"bundle": f"{manifest.name} {manifest.version}", "size": size, "golden": rows, "large": times}
 
 
 def timed(camera: PortableCamera, readers: dict[str, Any], photo: Path) -> dict[str, Any]:
