@@ -10,9 +10,11 @@ interleaved, with `--repeat N` tiles of a simulated capture of 1500x1000 along e
 import argparse
 import importlib.util
 import json
+import math
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any, Final
@@ -93,7 +95,7 @@ def _camkit(bundle: Bundle, facts: Facts, **options: Any) -> NDArray[np.float32]
 
 def _decibels(a: NDArray[np.float32], b: NDArray[np.float32]) -> float:
     error = float(np.mean(np.square(a - b, dtype=np.float64)))
-    return round(-10 * np.log10(max(error, 1e-30)), 1)
+    return round(-10 * math.log10(max(error, 1e-30)), 1)
 
 
 def _golden(bundle: Bundle, camera: Any, size: str) -> list[dict[str, Any]]:
@@ -167,9 +169,7 @@ def _graph_times(bundle: Bundle, cameras: dict[str, Any]) -> dict[str, float]:
         camera.run = original
     times = {}
     for name, (run, values) in sorted(inputs.items()):
-        seconds = [
-            _cpu_seconds(lambda run=run, name=name, v=values: run(name, v)) for _ in range(CALLS)
-        ]
+        seconds = [_cpu_seconds(partial(run, name, values)) for _ in range(CALLS)]
         times[name] = round(median(seconds) * 1e3, 3)
     return times
 

@@ -57,7 +57,7 @@ class PortableCamera:
         stride, halo, (h, w) = self.network["stride_px"], self.network["halo_px"], clipped.shape
         kept = self.run("kept", {"clipped": np.float32(clipped)[None, None]})["out"][0]
         margins = (0, 0), (0, -h % stride), (0, -w % stride)
-        planes, kept = (np.pad(part, margins, mode="edge")[None] for part in (planes, kept))
+        planes, kept = ((np.pad(p, margins, mode="edge") if np.any(margins) else p)[None] for p in (planes, kept))
         even = np.empty((3, *planes.shape[2:]), np.float32)
         for y, bottom, top, end in self.tiles(planes.shape[2], stride, halo):
             for x, right, left, last in self.tiles(planes.shape[3], stride, halo):

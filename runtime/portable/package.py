@@ -30,8 +30,7 @@ PORTABLE_VERSION: Final = 1
 MANIFEST: Final = "portable.json"
 TABLES: Final = "portable.safetensors"
 TILE_HALOS: Final = 12
-"""Of a side of a tile, where a reader chooses none: with fewer more is computed twice, with more the
-planes leave the cache."""
+"""Of a side of a tile, where a reader chooses none; with fewer more is computed twice."""
 
 
 def write_portable(

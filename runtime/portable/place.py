@@ -165,8 +165,8 @@ def _mosaic_terms(
     fh = h[0] * fall, h[1] * fall
     greens = np.array([1.0, 2.0, 1.0])[:, None, None, None, None] / 16
     alone = doubt * greens + (h[0] * fh[0] + h[1] * fh[1]) * (1 + facts.together.own)
-    red, _, blue = (tuple(part.parts(0, 3)[c] for part in h) for c in range(3))
-    _, fh_green, fh_blue = (tuple(part.parts(0, 3)[c] for part in fh) for c in range(3))
+    red, _, blue = zip(h[0].parts(0, 3), h[1].parts(0, 3), strict=True)
+    _, fh_green, fh_blue = zip(fh[0].parts(0, 3), fh[1].parts(0, 3), strict=True)
     by_green = [crossed(colour, fh_green) for colour in (red, blue)]
     cross = tuple(
         graph.joined([_by_green(graph, pair[part]) for pair in by_green], axis=0) for part in (0, 1)

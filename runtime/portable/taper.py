@@ -37,15 +37,16 @@ def tapered_block(graph: GraphBuilder, rgb: Value, transfer: Spectrum, facts: Ca
     column_weights[[0, -1]] = 1
     wide_cosines = (cosines * column_weights) @ repeats.T / (m * m)
     wide_sines = (sines * column_weights) @ repeats.T / (m * m)
-    columns = (
+    columns: Value = (
         graph.joined([re + re_below, im_below - im], axis=1) @ wide_cosines
         + graph.joined([(im + im_below) * -1.0, re_below - re], axis=1) @ wide_sines
     )
-    blurred = (repeats @ waves.T) @ columns
+    blurred = graph.constant(repeats @ waves.T) @ columns
     keep = taper_weights(side, min(facts.bank.overlap_px // 4, side // 4))
     keep = np.stack([keep[py::2, px::2] for py, px in PHASES])
-    part = blurred.shaped(3, 1, n, n)
-    return part + (rgb - part) * graph.table("keep", keep)
+    part: Value = blurred.shaped(3, 1, n, n)
+    tapered: Value = part + (rgb - part) * graph.table("keep", keep)
+    return tapered
 
 
 def _low(part: Value, r: int) -> Value:

@@ -23,6 +23,7 @@ from camkit.bundle.light_bound import (
     LightBound,
 )
 from camkit.bundle.stages import Network
+from camkit.psf import FrozenPsf
 from camkit.runtime.color import CLIP_FULL, CLIP_START
 from camkit.runtime.plan.bounded_networks import bounded_stages
 from camkit.runtime.portable.facts import CameraFacts
@@ -172,9 +173,10 @@ def _neutral(graph: GraphBuilder, light: Value, levels: Value) -> Value:
 
 def _gain(graph: GraphBuilder, facts: CameraFacts, light: Value, origin: Value) -> Value:
     """Return (h, w): one over the relative illumination, the nearest sample by squared height."""
-    radial = facts.bundle.illumination
-    radial = getattr(radial, "radial_illumination", radial)
-    end = float(radial.heights_mm[-1] * 1.05) ** 2
+    optics = facts.bundle.illumination
+    radial = optics.radial_illumination if isinstance(optics, FrozenPsf) else optics
+    assert radial is not None
+    end = max(float(radial.heights_mm[-1] * 1.05) ** 2, 1e-6)
     squares = np.linspace(0.0, end, TABLE_SAMPLES)
     gains = 1 / np.interp(squares, radial.heights_mm**2, radial.light)
     sides = graph.node("Shape", light)

@@ -82,11 +82,11 @@ def _dense(nodes: Value, cells: int) -> Value:
         weights[cell, :, cell] = weight_before
         weights[cell, :, cell + 1] = 1 - weight_before - weight_behind
         weights[cell, :, cell + 2] = weight_behind
-    return weights.reshape(-1, cells + 2) @ nodes
+    return nodes.graph.constant(weights.reshape(-1, cells + 2), nodes.kind) @ nodes
 
 
 def _growth(c: NDArray[np.float64], square: Value) -> Value:
-    growth = ((square * c[3] + c[2]) * square + c[1]) * square + c[0]
+    growth: Value = ((square * c[3] + c[2]) * square + c[1]) * square + c[0]
     if len(c) > 4:
         even = ((square * c[6] + c[5]) * square + c[4]) * square.sqrt()
         growth = growth + even
@@ -105,7 +105,8 @@ def _shift(centre: Value, c: NDArray[np.float64]) -> Value:
             more = ((square * (6 * c[6]) + 4 * c[5]) * square + 2 * c[4]) * radius
             slope = slope + more
         radius = radius - (radius * growth - distorted) / slope
-    return centre * ((radius + 1e-30) / (distorted + 1e-30 * c[0]) - 1.0)
+    ratio: Value = (radius + 1e-30) / (distorted + 1e-30 * float(c[0]))
+    return centre * (ratio - 1.0)
 
 
 def warp_graph(facts: CameraFacts, *, limited: bool) -> GraphBuilder:
