@@ -189,3 +189,24 @@ def test_what_is_not_read_is_refused_by_its_name(tmp_path: Path) -> None:
         names, _read(*paths, tmp_path / "text.dng", tmp_path / "empty.dng"), strict=True
     ):
         assert name in facts.get("refused", ""), (name, facts)
+
+
+def test_a_damaged_file_is_read_or_refused_and_never_an_error(tmp_path: Path) -> None:
+    scene, rng = scene_mosaic(), np.random.default_rng(1)
+    jpeg = {"compression": 7, "pieces": [lossless_jpeg(scene, 6, components=2)]}
+    cv2.imwrite(str(tmp_path / "grey.png"), scene)
+    sound = [
+        (tmp_path / "grey.png").read_bytes(),
+        build_dng(tmp_path / "jpeg.dng", scene, **jpeg).read_bytes(),
+        build_dng(tmp_path / "tiles.dng", scene, chunk=(32, 48)).read_bytes(),
+    ]
+    paths = [tmp_path / f"damaged_{number}" for number in range(120)]
+    for number, path in enumerate(paths):
+        data = bytearray(sound[number % len(sound)])
+        reach = len(data) if number % 2 else 700  # the header alone, or anywhere
+        for place in rng.integers(0, reach, 4):
+            data[place] = rng.integers(0, 256)
+        path.write_bytes(data[: rng.integers(1, len(data))] if number % 7 == 0 else data)
+    answers = _read(*paths)
+    assert len(answers) == len(paths)
+    assert sum("refused" in answer for answer in answers) > len(paths) / 4
