@@ -9,7 +9,7 @@ SOURCES := camkit runtime export models_def tests tools examples/fastapi setup.p
 # else every process that a test starts compiles the product anew
 export PYTHONDONTWRITEBYTECODE =
 
-.PHONY: demo pictures test watched test-slow fuzz check types tidy format docs clean
+.PHONY: demo pictures test watched test-slow fuzz examples check types tidy format docs clean
 
 demo: $(RUNTIME_STAMP)  ## main job on the demo capture, runtime only (no torch)
 	@echo "1 of 2: a night scene with streak-hdr, on the way to out/night.png (about ten seconds)"
@@ -36,6 +36,10 @@ test-slow: $(DEV_STAMP)  ## also the tests that take minutes
 fuzz: $(DEV_STAMP)  ## search for bundles that camkit does not stand (Linux); FUZZ_SECONDS=600
 	$(DEV)/bin/python -m pip install -q --disable-pip-version-check -c constraints.txt -e ".[fuzz]"
 	OMP_NUM_THREADS=1 FUZZ_SECONDS=$(FUZZ_SECONDS) $(DEV)/bin/python -m tests.hostile.fuzz
+
+examples:  ## the page and the programs of examples/, with node and npm
+	@echo "Bringing 38 packages, among them onnxruntime (0.5 GB on disk), then building: about a minute"
+	cd examples && npm ci && npm run build
 
 check: $(DEV_STAMP)  ## weight, format, lint, types, layers, spelling; types beside the rest
 	@echo "Checking weight, format, lint, types, layers and spelling: about a minute"
