@@ -5,6 +5,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Final
 
+from camkit.bundle.psf_file import read_optics_bytes, read_source
 from camkit.caller import command_text, option_text
 from camkit.errors import ContractError
 from camkit.export.parts import (
@@ -18,6 +19,7 @@ from camkit.export.parts import (
 )
 from camkit.field_types import checked
 from camkit.models_def.face.torch_need import require_torch
+from camkit.progress import note
 from camkit.runtime.files.in_memory import FilePath
 from camkit.runtime.output.part_file import refuse_existing
 
@@ -105,7 +107,20 @@ def bundle(
         plan=_usual_file(plan, folder, PLAN_NAME),
         version=version,
     )
-    return assemble.export_bundle(parts, Path(out))
+    report = assemble.export_bundle(parts, Path(out))
+    if optics is not None and parts.freeze is None:
+        _note_missing_report(optics)
+    return report
+
+
+def _note_missing_report(psf: Path) -> None:
+    """Say that the manifest will lack what freezing found, where `camkit freeze` wrote the PSF."""
+    source = read_source(read_optics_bytes(psf, what="PSF"))
+    if source is not None:
+        note(
+            f"{psf.name} is of {source}: give its report by {option_text('freeze')}, or the "
+            "bundle states no focal length, F-number, PSF model and block grid of it"
+        )
 
 
 def _check_first(paths: tuple[Path, ...], *, network: bool) -> None:

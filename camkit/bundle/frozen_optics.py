@@ -28,6 +28,7 @@ from camkit.bundle.psf_file import (
     read_optics_bytes,
     read_psf,
     read_tensors,
+    with_source,
 )
 from camkit.bundle.states.lens_state import LensState, check_states, find_name
 from camkit.bundle.states.state_tensors import states_from_tensors, states_to_bytes
@@ -194,19 +195,22 @@ def read_optics_file(path: Path, *, channels: int) -> FrozenOptics:
     return optics_from_bytes(data, what=str(path), channels=channels)
 
 
-def write_optics_files(optics: FrozenOptics, path: Path, haze_path: Path | None = None) -> None:
+def write_optics_files(
+    optics: FrozenOptics, path: Path, haze_path: Path | None = None, *, source: str = ""
+) -> None:
     """Write frozen optics and the haze beside them, replacing files that are there.
 
     Args:
         optics: Kernels, or streaks.
         path: Receives them.
         haze_path: Receives the haze, which must be there then.
+        source: Where the optics are from, for `camkit info`; empty where it is not said.
     """
     _, data = optics.member
     for file in (path, haze_path):
         if file is not None:
             file.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(data)
+    path.write_bytes(with_source(data, source) if source else data)
     if haze_path is not None and optics.haze is not None:
         haze_path.write_bytes(haze_to_bytes(optics.haze))
 

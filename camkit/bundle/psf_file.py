@@ -7,10 +7,12 @@ The file holds seven tensors and no metadata, so that the same PSF always gives 
 grid its positions, `grid_x_mm` and `grid_y_mm`. Kernels of a moved sensor (format 2.5) add
 `focus_kernels` (float32) and `focus_um`; even powers of the distortion (format 2.6) add
 `distortion_even_coefficients` (channel, 3). A file of `camkit psf import` adds `uncertainty` (3,):
-noise, shift in pixels and width of `camkit.psf.PsfUncertainty`; bundles hold none. A file of a lens
-with several configurations (format 2.12) holds such tensors for each: `states/state_tensors.py`.
+noise, shift in pixels and width of `camkit.psf.PsfUncertainty`. A file of `camkit freeze` says in
+words where it is from: `source` of its metadata. Bundles hold neither. A file of a lens with
+several configurations (format 2.12) holds such tensors for each: `states/state_tensors.py`.
 """
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final, get_args
@@ -40,6 +42,7 @@ _EVEN: Final = "distortion_even_coefficients"
 _FOCUS: Final = ("focus_um", "focus_kernels")
 STATES: Final = "configurations"
 """The tensor that files of several states of a lens alone have."""
+_SOURCE: Final = "source"
 UNCERTAINTY: Final = "uncertainty"
 """The tensor that files of measured PSFs alone have."""
 _SIDES: Final = ("field", "depth", "wavelength", "h", "w")
@@ -219,6 +222,19 @@ def _check_tensors(tensors: Mapping[str, NDArray[Any]], symmetry: Symmetry, what
             raise BundleError(
                 f"{what}: {name} must be float64 of shape {shape}; got {array.dtype} {array.shape}"
             )
+
+
+def with_source(data: bytes, source: str) -> bytes:
+    """Return a safetensors file that says in words where its tensors are from."""
+    return save(load(data), metadata={_SOURCE: source})
+
+
+def read_source(data: bytes) -> str | None:
+    """Return what `with_source` put into a sound safetensors file; None where nothing did."""
+    length = int.from_bytes(data[:_LENGTH_BYTES], "little")
+    header = json.loads(data[_LENGTH_BYTES : _LENGTH_BYTES + length])
+    source = header.get("__metadata__", {}).get(_SOURCE)
+    return source if isinstance(source, str) else None
 
 
 def write_psf(path: Path, psf: FrozenPsf, uncertainty: PsfUncertainty | None = None) -> None:

@@ -1,7 +1,7 @@
 """Optics to a frozen PSF and its files: `camkit.freeze` and `camkit freeze`."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -125,7 +125,9 @@ def freeze(
             _refuse_beside_states([name for name, value in alone.items() if value is not None])
             states = read_states(file, glasses, catalogue, configurations)
             freezing = freeze_states(states, request_of)
-    write_optics_files(freezing.optics, Path(out), haze_path)
+    write_optics_files(
+        freezing.optics, Path(out), haze_path, source=_source_text(file, freezing.facts)
+    )
     if stress_path is not None and freezing.stress is not None:
         write_optics_files(freezing.stress, stress_path, stress_haze_path)
     if report_path is not None:
@@ -141,6 +143,12 @@ def _refuse_beside_states(names: list[str]) -> None:
             f"{option_list(names)} does not apply with {option_text('configurations')}: freeze "
             f"one by {option_text('configuration')}"
         )
+
+
+def _source_text(file: Path, facts: Mapping[str, object]) -> str:
+    """Return where a PSF is from, and its model where it is that of a lens in one state."""
+    model = facts.get("psf_model")
+    return f"camkit freeze of {file.name}" + (f", by {model}" if model else "")
 
 
 def focus_range_um(optics: "Optics", focus_um: float | str | None) -> float:

@@ -166,6 +166,8 @@ def _modelled(lens: LensOptics, request: FreezeRequest, tell: Tell) -> LensOptic
     if request.energy is not None:
         modelled = replace(modelled, light=1 - WAVE_SPARE * (1 - request.energy))
     tell(f"{lens.name}: PSF by {modelled.regime}")
+    if modelled.lost_diffraction:
+        tell(f"{lens.name}: {modelled.lost_diffraction}")
     return modelled
 
 

@@ -11,7 +11,12 @@ import torch
 from camkit.bundle.sensor import ColorSensor
 from camkit.errors import ContractError, UnsupportedError
 from camkit.models_def.optics.analysis.model_psf import WAVE_LIGHT, model_psf
-from camkit.models_def.optics.analysis.psf_model import PsfRegime, checked_regime, sensor_model
+from camkit.models_def.optics.analysis.psf_model import (
+    WAVE_BELOW,
+    PsfRegime,
+    checked_regime,
+    sensor_model,
+)
 from camkit.models_def.optics.asymmetric.place_psf import trace_place_psf
 from camkit.models_def.optics.asymmetric.turning import round_part
 from camkit.models_def.optics.distortion import trace_distortion
@@ -68,9 +73,10 @@ class LensOptics:
 
     @property
     def facts(self) -> Mapping[str, float | str]:
-        """The focal length, the configuration, the PSF model, and the blur that chose it."""
-        facts: dict[str, float | str] = {"efl_mm": paraxial_data(self.lens).efl_mm}
-        facts["psf_model"] = self.regime
+        """Name, focal length, F-number, configuration, PSF model, and the blur that chose it."""
+        data = paraxial_data(self.lens)
+        facts: dict[str, float | str] = {"lens": self.lens.name, "efl_mm": data.efl_mm}
+        facts |= {"f_number": abs(data.f_number), "psf_model": self.regime}
         if self.lens.state:
             facts["configuration"] = self.lens.state
         if self.blur_airy is not None:
@@ -95,6 +101,18 @@ class LensOptics:
             self,
             regime=own_regime or model.regime,
             blur_airy=least if math.isfinite(least) else None,
+        )
+
+    @property
+    def lost_diffraction(self) -> str:
+        """A line where rays were asked for though the rule takes waves; empty otherwise."""
+        blur = math.inf if self.blur_airy is None else self.blur_airy
+        could_be_waves = self.lens.is_round and not grooves_of(self.lens)
+        if self.regime == "waves" or blur >= WAVE_BELOW or not could_be_waves:
+            return ""
+        return (
+            f"rays leave out diffraction, which counts here: the blur is {blur:.2g} Airy radii, "
+            f"less than {WAVE_BELOW:g}; the rule takes waves"
         )
 
     @property

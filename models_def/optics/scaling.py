@@ -1,12 +1,16 @@
 """A lens made larger or smaller, faster or slower."""
 
 import math
+import re
 from dataclasses import replace
+from typing import Final
 
 from camkit.errors import ContractError
 from camkit.models_def.optics.paraxial import paraxial_data, paraxial_image
 from camkit.models_def.optics.prescription import Lens, Surface, require_plain
 from camkit.models_def.optics.shape.phase import Phase
+
+_F_NUMBER: Final = re.compile(r"\bF/\d+(\.\d+)?$")
 
 
 def scale_lens(lens: Lens, factor: float) -> Lens:
@@ -88,11 +92,16 @@ def scale_to_efl(lens: Lens, efl_mm: float, *, measured: Lens | None = None) -> 
     return scale_lens(lens, factor)
 
 
+def f_number_name(name: str, f_number: float) -> str:
+    """Return the name of a lens; one that ends in an F-number ends in the new one."""
+    return _F_NUMBER.sub(f"F/{f_number:.3g}", name)
+
+
 def with_f_number(lens: Lens, f_number: float, *, working: bool = False) -> Lens:
     """Return the lens stopped to an F-number, stated as its entrance pupil diameter.
 
-    The rim of the stop opens as far as the beam needs; the others stay as they are, so a lens that
-    is opened may be vignetted by its own glass.
+    A name that ends in an F-number gets the new one. The rim of the stop opens as far as the beam
+    needs; the others stay as they are, so a lens that is opened may be vignetted by its own glass.
 
     Args:
         lens: The prescription.
@@ -110,6 +119,7 @@ def with_f_number(lens: Lens, f_number: float, *, working: bool = False) -> Lens
     now = paraxial_image(lens).working_f_number if working else abs(data.f_number)
     stopped = replace(
         lens,
+        name=f_number_name(lens.name, f_number),
         aperture_kind="entrance_pupil_diameter_mm",
         aperture_value=data.entrance_pupil_diameter_mm * now / f_number,
     )

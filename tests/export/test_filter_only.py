@@ -156,7 +156,7 @@ def test_other_kernels_and_another_pitch_go_into_a_copy(lab, tmp_path, capsys):
     assert open_bundle(tmp_path / "fine.camkit").psf.grid_x_mm.tolist()[-1] == 4.0
 
 
-def test_a_frozen_psf_of_other_kernels_is_refused(lab, tmp_path):
+def test_a_frozen_psf_of_other_kernels_is_refused(lab, tmp_path, capsys):
     """One that lies beside a recipe by chance would take the place of the one it names."""
     recipe = (lab / "lab.toml").read_text(encoding="utf-8")
     (tmp_path / "lab.toml").write_text(recipe, encoding="utf-8")
@@ -164,7 +164,10 @@ def test_a_frozen_psf_of_other_kernels_is_refused(lab, tmp_path):
     words = ["--recipe", str(tmp_path / "lab.toml"), "--quick"]
     frozen = ["-o", str(tmp_path / "psf.safetensors")]
     assert run(["freeze", str(tmp_path / "lab.safetensors"), *frozen, *words]) == 0
-    export(tmp_path / "lab.toml", tmp_path / "own.camkit", network=False)
+    packed = ["export", str(tmp_path / "lab.toml"), "--no-network"]
+    assert run([*packed, "-o", str(tmp_path / "own.camkit")]) == 0
+    noted = "psf.safetensors is of camkit freeze of lab.safetensors: give its report by --freeze"
+    assert noted in capsys.readouterr().err
     np.save(tmp_path / "other.npy", counts(seed=4))
     other = ["-o", str(tmp_path / "lab.safetensors"), "--overwrite"]
     given = ["--pitch-um", "25", "--span-mm", SPAN]

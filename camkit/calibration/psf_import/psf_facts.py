@@ -13,7 +13,9 @@ LEAST_SPAN_MM: Final = 1.0
 MOST_SPAN_MM: Final = 150.0
 """Longest side of the sensors that cameras have, from endoscopes to large format."""
 MEASURED: Final = "kernels measured or computed elsewhere (camkit psf import, calibrate blur)"
-FROZEN: Final = "frozen optics (camkit freeze), or a measurement that states no uncertainty"
+STATES_SOURCE: Final = "camkit freeze"
+"""Of several configurations, which nothing else writes."""
+UNKNOWN_SOURCE: Final = "frozen optics (camkit freeze), or a measurement that states no uncertainty"
 
 
 def span_mm(psf: FrozenPsf) -> tuple[float, float] | None:
@@ -75,15 +77,35 @@ def state_facts(state: LensState) -> dict[str, Any]:
         "efl_mm": round(state.efl_mm, 4),
         "f_number": round(state.f_number, 4),
         "object_distance_mm": focus_mm if np.isfinite(focus_mm) else None,
-        **psf_facts(state.psf, None),
+        **psf_facts(state.psf, None, STATES_SOURCE),
     }
 
 
-def psf_facts(psf: FrozenPsf, uncertainty: PsfUncertainty | None) -> dict[str, Any]:
-    """Return what a file of a PSF holds, plain JSON values."""
-    sigmas, span = sigmas_px(psf), span_mm(psf)
+def half_light_px(psf: FrozenPsf) -> FloatGrid:
+    """Return the radius (field, depth, wavelength) about the centroid with half of the light.
+
+    Far rings of diffraction, which the window cuts off, widen it little; a sigma counts them by
+    their squared distance.
+    """
+    kernels = psf.kernels.reshape(-1, *psf.kernels.shape[-2:]).astype(np.float64)
+    y, x = np.indices(kernels.shape[1:])
+    radii = []
+    for kernel in kernels / kernels.sum((1, 2), keepdims=True):
+        distance = np.hypot(y - (kernel * y).sum(), x - (kernel * x).sum()).ravel()
+        light = kernel.ravel()[np.argsort(distance)].cumsum()
+        # pixels nearer than r fill the area of a circle
+        area_px = np.interp(0.5, [0.0, *light], np.arange(light.size + 1))
+        radii.append(np.sqrt(area_px / np.pi))
+    return np.array(radii).reshape(psf.kernels.shape[:3])
+
+
+def psf_facts(
+    psf: FrozenPsf, uncertainty: PsfUncertainty | None, source: str | None = None
+) -> dict[str, Any]:
+    """Return what a file of a PSF holds, plain JSON values; its source as far as it is stated."""
+    sigmas, halves, span = sigmas_px(psf), half_light_px(psf), span_mm(psf)
     return {
-        "source": FROZEN if uncertainty is None else MEASURED,
+        "source": source or (UNKNOWN_SOURCE if uncertainty is None else MEASURED),
         "places": int(psf.field_heights_mm.size),
         "symmetry": psf.symmetry,
         "span_mm": None if span is None else [round(side, 4) for side in span],
@@ -91,6 +113,7 @@ def psf_facts(psf: FrozenPsf, uncertainty: PsfUncertainty | None) -> dict[str, A
         "wavelengths_um": [round(float(wave), 4) for wave in psf.wavelengths_um],
         "side_px": int(psf.kernels.shape[-1]),
         "pixel_pitch_um": psf.pixel_pitch_um,
+        "half_light_px": [round(float(value), 3) for value in (halves.min(), halves.max())],
         "sigma_px": [round(float(value), 3) for value in (sigmas.min(), sigmas.max())],
         "depths": [depth_name(value) for value in psf.depths_mm],
         "focus_um": None if psf.focus_um is None else psf.focus_um.tolist(),

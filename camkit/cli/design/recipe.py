@@ -1,6 +1,7 @@
 """`camkit recipe`: the training recipe of a lens before a sensor."""
 
 import json
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -82,5 +83,6 @@ def recipe(
     optics = "a measured PSF"
     if "efl_mm" in facts:
         optics = f"{facts['efl_mm']:.4g} mm F/{facts['f_number']:.3g}"
-    focus = f"{facts['focus_mm'] / MM_PER_M:.4g} m"
-    say(f"{facts['recipe']}, {facts['lens']}: {optics} on {size}, focused on {focus}")
+    focus_m = facts["focus_mm"] / MM_PER_M
+    focus = f"on {focus_m:.4g} m" if math.isfinite(focus_m) else "at infinity"
+    say(f"{facts['recipe']}, {facts['lens']}: {optics} on {size}, focused {focus}")

@@ -87,18 +87,25 @@ def _describe_bundle(file: str) -> dict[str, Any]:
 
 
 def _describe_psf_file(path: Path) -> dict[str, Any]:
-    from camkit.bundle.psf_file import STATES, read_measurement, read_optics_bytes, read_tensors
+    from camkit.bundle.psf_file import (
+        STATES,
+        read_measurement,
+        read_optics_bytes,
+        read_source,
+        read_tensors,
+    )
     from camkit.bundle.states.state_tensors import states_from_tensors
     from camkit.calibration.psf_import.psf_facts import psf_facts, state_facts
     from camkit.runtime.raw import file_sha256
 
     facts = {"psf": str(path), "sha256": file_sha256(path)}
-    tensors = read_tensors(read_optics_bytes(path, what="PSF"), what=str(path))
+    data = read_optics_bytes(path, what="PSF")
+    tensors = read_tensors(data, what=str(path))
     if STATES in tensors:
         states = states_from_tensors(tensors, what=str(path))
         return {**facts, "configurations": {s.name: state_facts(s) for s in states}}
     psf, uncertainty = read_measurement(path)
-    return {**facts, **psf_facts(psf, uncertainty)}
+    return {**facts, **psf_facts(psf, uncertainty, read_source(data))}
 
 
 def _laws_text(laws: dict[str, dict[str, Any]]) -> dict[str, dict[str, str]]:

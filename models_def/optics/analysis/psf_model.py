@@ -31,6 +31,7 @@ WAVE_BELOW: Final = 7.0
 FIELDS: Final = 7
 _BLUR_SAMPLING: Final = "gauss:6x16"
 _LEAST_RESPONSE: Final = 1e-3
+_UNROUND: Final = "rays: this lens is not round, and waves are summed for round ones alone"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,7 +80,7 @@ def psf_model(
         reason = "rays: the light of grooves is no smooth wave"
         return replace(model, reason=reason)
     if not lens.is_round:
-        return replace(model, reason="rays: waves are summed for round lenses")
+        return replace(model, reason=_UNROUND)
     if not bool(torch.isfinite(ratio).any()):
         reason = "rays: no ray arrives at any field, so there is nothing to compare"
         return replace(model, reason=reason)

@@ -1,8 +1,9 @@
 """The configurations of a lens beside each other: first order and spots."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import torch
 
@@ -14,8 +15,6 @@ from camkit.models_def.optics.lens_file.states import configuration_name, plain_
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
 from camkit.units import to_degrees
-
-_PUPIL: Final = Pupil(definition="stop", sampling="hexapolar:6")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,23 +55,31 @@ class StateFacts:
         }
 
 
-def state_facts(lens: Lens) -> tuple[StateFacts, ...]:
-    """Measure a lens in each of its configurations, rays aimed at the stop; none gives none."""
+def state_facts(lens: Lens, pupil_of: Callable[[Lens], Pupil]) -> tuple[StateFacts, ...]:
+    """Measure a lens in each of its configurations; none gives none.
+
+    Args:
+        lens: With its configurations.
+        pupil_of: Chooses the pupil of a lens in one of them.
+    """
     usual = configuration_name(lens)
     return tuple(
-        _facts(plain_lens(lens, state.name), state.name, is_usual=state.name == usual)
+        _facts(plain_lens(lens, state.name), state.name, pupil_of, is_usual=state.name == usual)
         for state in lens.configurations
     )
 
 
-def _facts(lens: Lens, name: str, *, is_usual: bool) -> StateFacts:
+def _facts(
+    lens: Lens, name: str, pupil_of: Callable[[Lens], Pupil], *, is_usual: bool
+) -> StateFacts:
     data = paraxial_data(lens)
     wave = torch.tensor([lens.reference_wavelength_um], dtype=torch.float64)
     widest_rad = max(lens.field_angles_rad)
     slopes = field_slope(torch.tensor([0.0, widest_rad], dtype=torch.float64))
     try:
         with torch.no_grad():
-            axis_mm, edge_mm = rms_about_centroid(spot_diagram(lens, slopes, wave, _PUPIL))[:, 0]
+            spots = spot_diagram(lens, slopes, wave, pupil_of(lens))
+        axis_mm, edge_mm = rms_about_centroid(spots)[:, 0]
         spots_mm = float(axis_mm), float(edge_mm)
     except ContractError:  # the stop has no radius, or no ray passes it
         spots_mm = math.nan, math.nan

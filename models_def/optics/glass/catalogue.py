@@ -23,6 +23,8 @@ FORMER: Final = {"schott1983": "schott", "schottobsolete": "schott"}
 ALIASES: Final = {"nikon": "hikari", "nikon_hikari": "hikari", "nikon-hikari": "hikari"}
 AIR: Final = Glass(name="air", formula="constant", coefficients=(1.0,), source="reference medium")
 _NEAR: Final = 5
+_LEAST_LIKENESS: Final = 0.6
+"""Of a name that is suggested, 1 for the same letters."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -175,10 +177,8 @@ def find_glass(
             break
     near = [glass.name for glass, _ in several] or _near_names(name, catalogues)
     choice = f", or choose by {option_text('catalogue')}" if len(several) > 1 else ""
-    raise ContractError(
-        f"glass must be a known name with its source; got {name!r}; write {' or '.join(near)}"
-        f"{choice}"
-    )
+    remedy = f"write {' or '.join(near)}{choice}" if near else "no glass has a name like it"
+    raise ContractError(f"glass must be a known name with its source; got {name!r}; {remedy}")
 
 
 def own_glass(glass: Glass, catalogues: Iterable[GlassCatalogue]) -> Glass | None:
@@ -188,11 +188,12 @@ def own_glass(glass: Glass, catalogues: Iterable[GlassCatalogue]) -> Glass | Non
 
 def _near_names(name: str, catalogues: Sequence[GlassCatalogue]) -> list[str]:
     folded_name = name.casefold()
+    parts = (folded_name, folded_name.rpartition("-")[0])  # a maker may follow
 
     def likeness(glass: Glass) -> float:
         trade_name = trade_name_of(glass).casefold()
-        match = difflib.SequenceMatcher(None, trade_name, folded_name)
-        return max(match.ratio(), 0.99 * (glass.name.casefold() == folded_name))
+        ratios = [difflib.SequenceMatcher(None, trade_name, part).ratio() for part in parts]
+        return max(*ratios, 0.99 * (glass.name.casefold() == folded_name))
 
     ranked = sorted(_all(catalogues), key=likeness, reverse=True)
-    return [glass.name for glass in ranked[:_NEAR]]
+    return [glass.name for glass in ranked[:_NEAR] if likeness(glass) >= _LEAST_LIKENESS]

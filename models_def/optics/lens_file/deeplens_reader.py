@@ -43,7 +43,7 @@ _EMPTY: Final = ("", "air", "vacuum", "occluder")
 _PLASTICS: Final = {"ps": "POLYSTYR-Misc", "pc": "POLYCARB-Misc", "pmma": "PMMA-Misc"}
 _ORDER: Final = ("schott", "cdgm", "misc")
 """In which DeepLens looks for a name."""
-_FOCAL_TOLERANCE: Final = 0.01
+_FIRST_ORDER_TOLERANCE: Final = 0.01
 _FIELD_SHARES: Final = (0.0, 0.5, 0.7, 1.0)
 
 
@@ -99,10 +99,15 @@ def parse_deeplens(
         wavelengths_um=(F_LINE_UM, D_LINE_UM, C_LINE_UM),
         reference_wavelength_um=D_LINE_UM,
     )
-    efl_mm = paraxial_data(lens).efl_mm
-    stored_mm = number_at(plain, "foclen", "the file", efl_mm)
-    if abs(stored_mm - efl_mm) > _FOCAL_TOLERANCE * abs(efl_mm):
-        notes.append(f"the file states a focal length of {stored_mm:.5g} mm: it is {efl_mm:.5g} mm")
+    data = paraxial_data(lens)
+    efl_mm, f_number = data.efl_mm, abs(data.f_number)
+    for key, what, value, unit in (
+        ("foclen", "a focal length", efl_mm, " mm"),
+        ("fnum", "an F-number", f_number, ""),
+    ):
+        stored = number_at(plain, key, "the file", value)
+        if abs(stored - value) > _FIRST_ORDER_TOLERANCE * abs(value):
+            notes.append(f"the file states {what} of {stored:.5g}{unit}: it is {value:.5g}{unit}")
     fields, corner_mm = _fields_of_sensor(plain, efl_mm)
     fields_text = (
         f"fields to the sensor's corner ({corner_mm:.4g} mm) by the paraxial focal length"

@@ -20,7 +20,7 @@ from camkit.models_def.optics.focus import FocusMerit, with_focus
 from camkit.models_def.optics.glass.dispersion import refractive_index
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens, with_focus_shift
-from camkit.models_def.optics.scaling import with_f_number
+from camkit.models_def.optics.scaling import f_number_name, with_f_number
 
 DistanceOrigin = Literal["vertex", "sensor", "pupil"]
 DISTANCE_ORIGINS: Final[tuple[DistanceOrigin, ...]] = get_args(DistanceOrigin)
@@ -111,12 +111,13 @@ def stopped_lens(lens: Lens, *, f_number: float | None, stop_radius_mm: float | 
     stop = surfaces[lens.stop]
     rim_mm = max(stop.semi_diameter_mm, stop_radius_mm)
     surfaces[lens.stop] = replace(stop, semi_diameter_mm=rim_mm)
-    return replace(
+    stopped = replace(
         lens,
         surfaces=tuple(surfaces),
         aperture_kind="stop_semi_diameter_mm",
         aperture_value=stop_radius_mm,
     )
+    return replace(stopped, name=f_number_name(lens.name, abs(paraxial_data(stopped).f_number)))
 
 
 def with_object_na(lens: Lens, numerical_aperture: float) -> Lens:

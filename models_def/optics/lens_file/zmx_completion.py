@@ -19,11 +19,12 @@ _ASSUMED_LINE: Final = 0
 _SYSTEM: Final = (*APERTURES, *WAVELENGTHS, "FTYP")
 
 
-def completed(records: ZmxRecords) -> tuple[ZmxRecords, tuple[str, ...]]:
+def completed(records: ZmxRecords, mm_per_unit: float) -> tuple[ZmxRecords, tuple[str, ...]]:
     """Return a file with what it leaves out, and a note of each assumption.
 
     Args:
         records: The file.
+        mm_per_unit: Length unit of the file.
 
     Returns:
         The file and its notes; one that leaves nothing out comes back as it is.
@@ -31,8 +32,8 @@ def completed(records: ZmxRecords) -> tuple[ZmxRecords, tuple[str, ...]]:
     notes: list[str] = []
     if not any(key in records.system for key in _SYSTEM):
         records = _with_system(records, notes)
-    records = _with_stop(records, notes)
-    return _with_aperture(records, notes), tuple(notes)
+    records = _with_stop(records, notes, mm_per_unit)
+    return _with_aperture(records, notes, mm_per_unit), tuple(notes)
 
 
 def needs_focus(records: ZmxRecords) -> bool:
@@ -72,7 +73,7 @@ def _is_lens_surface(block: Records) -> bool:
     return "GLAS" in block or is_curved or ("DIAM" in block and leads_on)
 
 
-def _with_stop(records: ZmxRecords, notes: list[str]) -> ZmxRecords:
+def _with_stop(records: ZmxRecords, notes: list[str], mm_per_unit: float) -> ZmxRecords:
     """Return a file whose stop, where it names none, is the surface of least clear radius."""
     if any("STOP" in block for block in records.surfaces):
         return records
@@ -82,7 +83,7 @@ def _with_stop(records: ZmxRecords, notes: list[str]) -> ZmxRecords:
     blocks = list(records.surfaces)
     blocks[number] = {**blocks[number], "STOP": [_record("STOP")]}
     why = (
-        f"the one of least clear radius ({radii[number]:g} units of the file)"
+        f"the one of least clear radius ({radii[number] * mm_per_unit:g} mm)"
         if radii
         else "the first one, since none states a clear radius"
     )
@@ -90,7 +91,7 @@ def _with_stop(records: ZmxRecords, notes: list[str]) -> ZmxRecords:
     return replace(records, surfaces=tuple(blocks))
 
 
-def _with_aperture(records: ZmxRecords, notes: list[str]) -> ZmxRecords:
+def _with_aperture(records: ZmxRecords, notes: list[str], mm_per_unit: float) -> ZmxRecords:
     """Return a file that states no aperture opened to the clear radius of its stop."""
     stops = [block for block in records.surfaces if "STOP" in block]
     if any(key in records.system for key in APERTURES) or len(stops) != 1:
@@ -98,9 +99,8 @@ def _with_aperture(records: ZmxRecords, notes: list[str]) -> ZmxRecords:
     radius = _clear_radius(stops[0])
     if not radius > 0:
         return records
-    notes.append(
-        f"no aperture: the stop is open to its clear radius ({radius:g} units of the file)"
-    )
+    size = f"{radius * mm_per_unit:g} mm"
+    notes.append(f"no aperture: the stop is open to its clear radius ({size})")
     return replace(records, system={**records.system, "FLOA": [_record("FLOA")]})
 
 

@@ -94,9 +94,13 @@ def read_zmx(
         UnsupportedError: If it holds what camkit does not trace; the message names it.
         ContractError: If a glass is unknown or the lens makes no sense.
     """
-    return parse_zmx(
-        read_text(path), catalogues, rule, preferred, name=path.stem, choice=choice, every=every
-    )
+    text = read_text(path)
+    try:
+        return parse_zmx(
+            text, catalogues, rule, preferred, name=path.stem, choice=choice, every=every
+        )
+    except CamkitError as error:
+        raise type(error)(f"{path.name}: {error}") from error
 
 
 def parse_zmx(
@@ -153,13 +157,15 @@ def _read(
     name: str,
 ) -> tuple[Lens, tuple[str, ...]]:
     """Return the lens of a file without configurations, and notes."""
-    records, completion_notes = completed(records)
+    unit = last(records.system, "UNIT")
+    scale = _mm_per_unit(unit)
+    notes: tuple[str, ...] = () if unit is None or scale == 1 else (_unit_note(unit, scale),)
+    records, completion_notes = completed(records, scale)
     records, collimator_notes = without_collimator(records)
     system = records.system
     mode = last(system, "MODE")
     if mode is not None and mode.words[:1] not in {(), ("SEQ",)}:
         raise UnsupportedError(f"line {mode.line}: MODE {mode.text}; camkit reads MODE SEQ")
-    scale = _mm_per_unit(last(system, "UNIT"))
     object_mm = _object_distance_mm(records, scale)
     gcat = last(system, "GCAT")
     order = glass_order(gcat.words if gcat else (), catalogues, rule, preferred)
@@ -190,7 +196,7 @@ def _read(
     lens = _with_object_aperture(lens, system)
     lens, aperture_notes = _with_rim_aperture(lens, records, scale)
     lens, focus_notes = _with_image_distance(lens, records)
-    notes = (*completion_notes, *collimator_notes, *aperture_notes, *focus_notes, *image_notes)
+    notes += (*completion_notes, *collimator_notes, *aperture_notes, *focus_notes, *image_notes)
     notes += _notes(records, surfaces)
     notes += _glass_notes(records, surfaces, order)
     lens, field_notes = with_fields(lens, system, scale)
@@ -202,6 +208,10 @@ def _mm_per_unit(record: Record | None) -> float:
     if name not in _MM_PER_UNIT:
         raise DecodeError(f"UNIT must be one of {', '.join(_MM_PER_UNIT)}; got {name[:40]}")
     return _MM_PER_UNIT[name]
+
+
+def _unit_note(unit: Record, scale: float) -> str:
+    return f"lengths of the file are in {unit.words[0]}: {scale:g} mm each"
 
 
 def _object_distance_mm(records: ZmxRecords, scale: float) -> float:

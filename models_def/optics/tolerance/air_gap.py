@@ -61,8 +61,8 @@ def with_chosen_gap(lens: Lens, tolerances: Tolerances, view: View) -> Tolerance
     if not gaps or number not in (None, *gaps):
         places = f"follow surfaces {', '.join(map(str, gaps))}" if gaps else "there are none"
         raise ContractError(
-            f"the compensator gap needs an air gap between pieces of glass: {places}; "
-            f"got compensator_gap {number}"
+            f"the compensator gap needs an air gap between pieces of glass: {places}"
+            + ("" if number is None else f"; got compensator_gap {number}")
         )
     if number is not None:
         return tolerances

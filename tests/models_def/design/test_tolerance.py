@@ -79,6 +79,14 @@ def test_watch_is_told_every_batch() -> None:
     assert told == [(3, 8), (4, 8), (8, 8)]
 
 
+def test_without_a_ranking_samples_bound_the_run() -> None:
+    told: list[tuple[int, int]] = []
+    only, run = Tolerances().only("element_tilt"), replace(QUICK, ranking=False)
+    result = run_tolerance(DUET, only, run, lambda done, total: told.append((done, total)))
+    assert told == [(3, 4), (4, 4)]
+    assert (result.offenders, result.ranking) == ((), ())
+
+
 def test_a_lens_with_the_axis_alone_has_one_field() -> None:
     lens: Lens = replace(DUET, field_angles_rad=(0.0,), wavelengths_um=(1.0,))
     result = run_tolerance(lens, Tolerances().only("focus"), QUICK)

@@ -56,7 +56,7 @@ def test_the_command_says_what_is_a_default(
     words = ["recipe", "duet", "--sensor", "6000x4000@5.96um", "-o", str(out)]
     assert run(words) == 0
     told = capsys.readouterr()
-    assert "50 mm F/4 on 6000x4000 of 5.96 um, focused on inf m" in told.out
+    assert "50 mm F/4 on 6000x4000 of 5.96 um, focused at infinity" in told.out
     assert "defaults of the sensor, not facts: cfa, black_level" in told.err
     assert run([*words, "--focus-m", "1.5", "--json", "--overwrite"]) == 0
     facts = json.loads(capsys.readouterr().out)

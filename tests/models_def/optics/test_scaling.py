@@ -5,6 +5,7 @@ import pytest
 
 from camkit.errors import ContractError
 from camkit.models_def.optics.lens_file.lens_file import find_lens
+from camkit.models_def.optics.lens_file.placing import stopped_lens
 from camkit.models_def.optics.paraxial import paraxial_data, paraxial_image, with_paraxial_focus
 from camkit.models_def.optics.scaling import scale_lens, scale_to_efl, with_f_number
 from tests.physics.reference_lenses import cooke_triplet, thorlabs_al2550
@@ -44,6 +45,13 @@ def test_an_opened_lens_lets_its_wider_beam_through_the_stop() -> None:
     assert rim_mm == pytest.approx(paraxial_data(fast).stop_semi_diameter_mm, rel=EXACT)
     assert rim_mm > lens.surfaces[lens.stop].semi_diameter_mm
     assert with_f_number(lens, 8.0).surfaces == lens.surfaces
+
+
+def test_a_name_has_no_old_f_number() -> None:
+    assert with_f_number(find_lens("double-gauss"), 5.6).name == "double Gauss F/5.6"
+    assert with_f_number(find_lens("duet"), 5.6).name == "duet"
+    stopped = stopped_lens(find_lens("double-gauss"), f_number=None, stop_radius_mm=2.0)
+    assert stopped.name == "double Gauss F/7.92"
 
 
 def test_a_thick_lens_images_by_newton_s_equation() -> None:

@@ -1,8 +1,9 @@
 """`camkit lens convert`: a lens file in another format, scaled or stopped where asked."""
 
 import json
+import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
@@ -83,20 +84,39 @@ def convert(
         write_lens(lens, path)
     for note in notes:
         say(f"{source.name}: {note}", err=True)
-    if json_:
-        record: dict[str, object] = {"lens": lens.name, "surfaces": len(lens.surfaces)}
-        record |= {"out": str(path), "configurations": [s.name for s in lens.configurations]}
-        say(json.dumps({**record, "notes": list(notes)}))
-    else:
-        say(f"{path}: {lens.name}, {len(lens.surfaces)} surfaces")
+    record = {**_record(lens), "out": str(path), "notes": list(notes)}
+    say(json.dumps(record) if json_ else _text(record))
+
+
+def _record(lens: "Lens") -> dict[str, Any]:
+    from camkit.models_def.optics.lens_file.states import plain_lens
+    from camkit.models_def.optics.paraxial import paraxial_data
+
+    efl_mm = paraxial_data(plain_lens(lens)).efl_mm
+    return {
+        "lens": lens.name,
+        "surfaces": len(lens.surfaces),
+        "efl_mm": efl_mm if math.isfinite(efl_mm) else None,
+        "configurations": [state.name for state in lens.configurations],
+    }
+
+
+def _text(record: dict[str, Any]) -> str:
+    efl_mm = record["efl_mm"]
+    efl = "afocal" if efl_mm is None else f"EFL {efl_mm:.4g} mm"
+    return f"{record['out']}: {record['lens']}, {record['surfaces']} surfaces, {efl}"
 
 
 def _left_behind(lens: "Lens", suffix: str) -> list[str]:
     """Return what of a lens a format does not hold."""
     notes = []
     if suffix == ".zmx" and lens.configurations:
-        names = ", ".join(state.name for state in lens.configurations)
-        notes.append(f"configurations are numbered in OUT, their names stay behind: {names}")
+        names = [state.name for state in lens.configurations]
+        if names != [str(number) for number in range(1, len(names) + 1)]:
+            listed_names = ", ".join(names)
+            notes.append(
+                f"configurations are numbered in OUT, their names stay behind: {listed_names}"
+            )
     if suffix != ".toml" and any(surface.vary for surface in lens.surfaces):
         notes.append("what `vary` names stays behind: OUT is all fixed")
     return notes

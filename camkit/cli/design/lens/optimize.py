@@ -20,6 +20,7 @@ from camkit.cli.choices import (
 from camkit.cli.say import say
 from camkit.errors import ContractError
 from camkit.progress import working
+from camkit.units import to_degrees
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -31,9 +32,11 @@ if TYPE_CHECKING:
     from camkit.models_def.optics.search.variables import FreeLens
 
     _Outcome = tuple[Lens, dict[str, Any], list[str]]
-    """The better lens, facts of the search, and notes on rims that are too small."""
+    """The better lens, facts of the search, and notes."""
 
 RINGS: Final = 12
+UNITS: Final = {"rms": "mm²", "sum_abs": "mm", "energy": "mm²"}
+"""Of the merits."""
 GAPS: Final = "gaps"
 """The word of `--vary` for the gaps that configurations name."""
 
@@ -109,6 +112,12 @@ def optimize(
         if weights is not None:
             raise ContractError("--weights belongs to --configurations")
         lens, notes = read_noted_lens(*files, configuration)
+        if lens.state:
+            notes = (
+                *notes,
+                f"{out.name} holds configuration {lens.state} alone; "
+                "name others by --configurations",
+            )
         search = partial(_alone, lens, vary, problem_of, improve)
     else:
         _check_joint(out, configuration)
@@ -116,10 +125,10 @@ def optimize(
         choice = several_states(configurations) or "", weights
         search = partial(_together, lens, vary, choice, problem_of, improve)
     with one_torch_thread(), working(f"improving {lens.name}"):
-        better, facts, small_rims = search()
+        better, facts, notes_of_search = search()
     write_lens(better, out)
     report = {"lens": lens.name, "out": str(out), "merit": merit, **facts}
-    report["notes"] = [*notes, *small_rims]
+    report["notes"] = [*notes, *notes_of_search]
     for note in report["notes"]:
         say(f"{source.name}: {note}", err=True)
     say(json.dumps(report) if json_ else _text(report))
@@ -146,6 +155,7 @@ def _alone(
     from camkit.models_def.optics.search.own_frame import in_own_frame
 
     free, moves = _free(lens, vary)
+    free, plane_notes = _without_flat_conics(lens, free)
     if moves:
         raise ContractError("--vary gaps are those of --configurations; name thickness")
     problem = problem_of(free_lens(lens, free))
@@ -154,8 +164,8 @@ def _alone(
     result = improve(problem, begin)
     better = problem.free.lens_at(result.scaled)
     facts = _merits(result, len(problem.free.variables))
-    facts |= {"spot_rms_mm_before": _spots(lens), "spot_rms_mm_after": _spots(better)}
-    return better, facts, _small_rims(problem, result.scaled)
+    facts |= _comparison(lens, better)
+    return better, facts, [*plane_notes, *_small_rims(problem, result.scaled)]
 
 
 def _together(
@@ -172,6 +182,7 @@ def _together(
 
     words, weights = choice
     free, moves = _free(lens, vary)
+    free, plane_notes = _without_flat_conics(lens, free)
     joint = joint_problem(
         lens,
         state_names(lens, words),
@@ -182,16 +193,10 @@ def _together(
     ).in_own_frame()
     result = improve(joint.residuals, joint.scaled())
     better = joint.lens_at(result.scaled)
-    states, small_rims = {}, []
+    states, small_rims = {}, plane_notes
     for term in joint.terms:
         before, after = (plain_lens(one, term.name) for one in (lens, better))
-        states[term.name] = {
-            "weight": term.weight,
-            "efl_mm_before": term.efl_mm,
-            "efl_mm_after": _efl_mm(after),
-            "spot_rms_mm_before": _spots(before),
-            "spot_rms_mm_after": _spots(after),
-        }
+        states[term.name] = {"weight": term.weight, **_comparison(before, after)}
         rims = _small_rims(term.problem, result.scaled[term.places])
         small_rims += [f"{term.name}: {line}" for line in rims]
     facts = _merits(result, len(joint.variables)) | {"configurations": states}
@@ -236,6 +241,39 @@ def _free(lens: "Lens", vary: str | None) -> tuple[list[Any], bool]:
     refracting = refracting_surfaces(lens)
     free = [names if i in refracting else () for i in range(len(lens.surfaces))]
     return free, GAPS in words
+
+
+def _without_flat_conics(lens: "Lens", free: list[Any]) -> tuple[list[Any], list[str]]:
+    """Return what is free without conics of surfaces that are plane and stay so, and a note."""
+    flat = [
+        i
+        for i, (surface, names) in enumerate(zip(lens.surfaces, free, strict=True))
+        if "conic" in names and "curvature" not in names and surface.curvature_per_mm == 0
+    ]
+    if not flat:
+        return free, []
+    names = ", ".join(map(str, flat))
+    rest = [
+        tuple(name for name in names if i not in flat or name != "conic")
+        for i, names in enumerate(free)
+    ]
+    return rest, [f"a plane has no conic: that of surface {names} is not free"]
+
+
+def _comparison(before: "Lens", after: "Lens") -> dict[str, Any]:
+    """Return focal lengths and spots of a lens and of the better one, and fields that lost."""
+    angles = [round(to_degrees(angle), 9) for angle in before.field_angles_rad]
+    spots, better = _spots(before), _spots(after)
+    return {
+        "efl_mm_before": _efl_mm(before),
+        "efl_mm_after": _efl_mm(after),
+        "field_angles_deg": angles,
+        "spot_rms_mm_before": spots,
+        "spot_rms_mm_after": better,
+        "worse_fields_deg": [
+            angle for angle, old, new in zip(angles, spots, better, strict=True) if new > old
+        ],
+    }
 
 
 def _numbers(text: str) -> tuple[float, ...]:
@@ -294,10 +332,14 @@ def _spots(lens: "Lens") -> list[float]:
     return radii
 
 
+_WHEN: Final = ("before", "after")
+
+
 def _text(report: dict[str, Any]) -> str:
+    merit = report["merit"]
     lines = [
         f"{report['lens']}: merit {report['merit_before']:.4g} -> {report['merit_after']:.4g} "
-        f"({report['merit']}, {report['variables']} variables, {report['evaluations']} lenses "
+        f"{UNITS[merit]} ({merit}, {report['variables']} variables, {report['evaluations']} lenses "
         "traced)"
     ]
     for name, state in report.get("configurations", {"": report}).items():
@@ -305,6 +347,11 @@ def _text(report: dict[str, Any]) -> str:
         fields = ", ".join(
             f"{1000 * a:.1f} -> {1000 * b:.1f}" for a, b in zip(before, after, strict=True)
         )
-        efl = f"{name}: EFL {state['efl_mm_after']:.4g} mm. " if name else ""
-        lines.append(f"{efl}RMS spots of the fields in um: {fields}")
+        efl = " -> ".join(dict.fromkeys(f"{state[f'efl_mm_{when}']:.4g}" for when in _WHEN))
+        worse = ", ".join(f"{angle:.4g}" for angle in state["worse_fields_deg"])
+        lines.append(
+            (f"{name}: " if name else "")
+            + f"EFL {efl} mm. RMS spots of the fields in um: {fields}"
+            + (f"; worse at {worse} degrees" if worse else "")
+        )
     return "\n".join([*lines, report["out"]])

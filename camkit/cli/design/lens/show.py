@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -74,9 +75,17 @@ def show(
             configured, notes = read_configured_lens(file, glass or (), catalogue)
             lens = plain_lens(configured, configuration)
         with working(f"measuring {lens.name}"):
-            choice = choose_pupil(lens, asked_pupil.definition if pupil else None, sampling)
+            choose = partial(
+                choose_pupil,
+                definition=asked_pupil.definition if pupil else None,
+                sampling=sampling,
+            )
+            choice = choose(lens)
             facts = analyse(lens, choice, notes)
-            facts = replace(facts, states=state_facts(configured))
+            states = state_facts(
+                configured, lambda one: (choice if one == lens else choose(one)).pupil
+            )
+            facts = replace(facts, states=states)
         with working("drawing the page"):
             written = [] if folder is None else write_lens_page(facts, folder, name)
     if json_:

@@ -35,6 +35,13 @@ def tolerance(
         float, typer.Option(min=0, help="Standard deviation of the noise (1.0 = white level).")
     ] = 0.01,
     rays: Annotated[int, typer.Option(min=2, help="Number of rays through the pupil.")] = 512,
+    ranking: Annotated[
+        bool,
+        typer.Option(
+            "--ranking/--no-ranking",
+            help="Judge every single error at both limits too, which takes most of the time.",
+        ),
+    ] = True,
     out_dir: Annotated[
         Path | None,
         typer.Option("-o", "--out-dir", help="Folder for NAME-tolerance.png, .svg and .json."),
@@ -68,7 +75,13 @@ def tolerance(
     for note in notes:
         say(f"{file.name}: {note}", err=True)
     run = ToleranceRun(
-        copies=samples, seed=seed, pictures=data, pitch_um=pitch_um, noise=noise, rays=rays
+        copies=samples,
+        seed=seed,
+        pictures=data,
+        pitch_um=pitch_um,
+        noise=noise,
+        rays=rays,
+        ranking=ranking,
     )
     with working("judging Monte-Carlo samples", unit="samples") as task:
         result = run_tolerance(lens, _tolerances(file, errors), run, task.count)

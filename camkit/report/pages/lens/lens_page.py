@@ -8,6 +8,7 @@ from typing import Final
 
 from camkit.models_def.optics.analysis.seidel import SEIDEL_NAMES, Seidel
 from camkit.models_def.optics.prescription import Surface, grooves_of
+from camkit.models_def.optics.shape.phase import Phase, monomial_name
 from camkit.report.pages.lens.fan_charts import draw_opd_fans, draw_ray_fans
 from camkit.report.pages.lens.image_charts import draw_encircled, draw_psfs
 from camkit.report.pages.lens.layout import draw_layout
@@ -74,8 +75,8 @@ _GROOVES: Final = (
     *("surface", "groove, µm", "walls", "narrowest, mm", "tool radius, µm", "grooves"),
 )
 _FIELDS: Final = (
-    *("field", "µm", "RMS, µm", "RMS chief, µm", "max, µm", "Airy, µm", "OPD RMS, waves"),
-    *("Strehl", "distortion, %", "light", "rays lost"),
+    *("field", "µm", "chief height, mm", "RMS, µm", "RMS chief, µm", "max, µm", "Airy, µm"),
+    *("OPD RMS, waves", "Strehl", "distortion, %", "light", "rays lost"),
 )
 _BY_SAMPLING: Final = (
     "RMS radius in µm about the centroid, reference wavelength, by sampling of the pupil:"
@@ -194,18 +195,17 @@ def _prescription(facts: LensFacts) -> Table:
 
 def _polynomial(surface: Surface) -> str:
     """Return the polynomial part and the phase of a surface in words."""
-    part, phase = surface.asphere, surface.phase
-    radius, shift = part.normal_radius_mm, phase.radius_mm if phase else 0.0
+    part = surface.asphere
+    radius = part.normal_radius_mm
     rows = {
         "": part.even,
         "odd: ": part.odd,
         "Q_bfs: ": part.q_bfs,
         "Q_con: ": part.q_con,
-        f"phase (order {phase.order:g}, of r / {shift:g} mm), rad: " if phase else "-": (
-            phase.coefficients if phase else ()
-        ),
     }
     texts = [name + ", ".join(_number(a, 6) for a in row) for name, row in rows.items() if row]
+    if surface.phase is not None:
+        texts.append(_phase_text(surface.phase))
     if radius is not None:
         texts.insert(0, f"of r / {radius:g} mm")
     if surface.stance is not None:
@@ -213,6 +213,14 @@ def _polynomial(surface: Surface) -> str:
         tilt = " and ".join(f"{to_degrees(rad):.4g}" for rad in surface.stance.tilt_rad)
         texts.append(f"element decentred by {decentre} mm, tilted by {tilt} degrees (x and y)")
     return "; ".join(texts)
+
+
+def _phase_text(phase: Phase) -> str:
+    """Return the terms of a phase by name: r2, r4, then x3, x2y, ..."""
+    terms = [(f"r{2 * i}", a) for i, a in enumerate(phase.radial_rad, start=1)]
+    terms += [(monomial_name(m), m.coefficient_rad) for m in phase.free_rad]
+    text = ", ".join(f"{name} {_number(rad, 6)}" for name, rad in terms)
+    return f"phase (order {phase.order:g}, of lengths / {phase.radius_mm:g} mm), rad: {text}"
 
 
 def _grooves(facts: LensFacts) -> Table | None:
@@ -262,6 +270,7 @@ def _fields(facts: LensFacts) -> Table:
                 (
                     f"{to_degrees(angle_rad):.4g}°",
                     f"{wave:.4g}",
+                    _number(float(facts.chief_mm[i, j]), 5),
                     *(_number(float(v[i, j]) * UM_PER_MM, 5) for v in spots),
                     _number(float(facts.airy_mm[j]) * UM_PER_MM, 4),
                     _number(float(facts.wavefront_um[i, j]) / wave, 4),

@@ -179,6 +179,8 @@ def test_a_psf_is_described_by_places_span_colours_and_widths(
     assert (facts["places"], facts["symmetry"], facts["colours"]) == (6, "grid", 3)
     assert (facts["span_mm"], facts["pixel_pitch_um"], facts["side_px"]) == ([12.0, 8.0], 4.0, 31)
     assert facts["sigma_px"] == pytest.approx([1.5, 3.0], abs=2e-3)
+    # of a Gaussian: sigma sqrt(2 ln 2)
+    assert facts["half_light_px"] == pytest.approx([1.766, 3.532], abs=0.05)
     assert ("measured" in facts["source"]) == (uncertainty is not None)
     assert (facts["uncertainty"] or {}).get("noise") == (0.02 if uncertainty else None)
     text = camkit_command("info", str(path)).out

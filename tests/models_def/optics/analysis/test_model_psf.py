@@ -82,6 +82,7 @@ def test_built_in_cameras_are_frozen_by_rays(name: str) -> None:
     assert optics.blur_airy is not None
     assert optics.blur_airy > WAVE_BELOW
     assert optics.facts["psf_model"] == "rays"
+    assert optics.lost_diffraction == ""
 
 
 def test_sharp_lens_takes_waves_unless_told_otherwise() -> None:
@@ -89,7 +90,10 @@ def test_sharp_lens_takes_waves_unless_told_otherwise() -> None:
     assert isinstance(sensor, ColorSensor)
     optics = LensOptics(lens=find_lens("double-gauss"))
     assert optics.by_rule(sensor).regime == "waves"
-    assert optics.by_rule(sensor, regime="rays").regime == "rays"
+    assert optics.by_rule(sensor).lost_diffraction == ""
+    rays = optics.by_rule(sensor, regime="rays")
+    assert rays.regime == "rays"
+    assert "rays leave out diffraction, which counts here" in rays.lost_diffraction
     with pytest.raises(ContractError, match="rays, waves"):
         optics.by_rule(sensor, regime="both")
 

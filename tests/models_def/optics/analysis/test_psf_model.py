@@ -54,6 +54,7 @@ def test_uneven_lens_goes_by_rays_and_refuses_waves() -> None:
     first = replace(lens.surfaces[0], stance=askew)
     lens = replace(lens, surfaces=(stop, first, *lens.surfaces[1:]), stop=0)
     found = psf_model(lens, torch.zeros(1, dtype=torch.float64), waves)
-    assert (found.regime, found.reason) == ("rays", "rays: waves are summed for round lenses")
+    assert found.regime == "rays"
+    assert "this lens is not round" in found.reason
     with pytest.raises(UnsupportedError, match="surface 1"):
         wave_psf(lens, torch.zeros(1, dtype=torch.float64), waves, 9, 2.0)

@@ -82,7 +82,8 @@ def test_trade_name_of_one_catalogue_stands_for_the_strict_one() -> None:
         ("pmma", "PMMA-Sultanova2009"),
         ("PMMA-sultanova2009", "PMMA-Sultanova2009"),
         ("N-BK7-schott", "N-BK7-Schott"),
-        ("", "write"),
+        ("", "no glass has a name like it"),
+        ("UNOBTAINIUM7", "got 'UNOBTAINIUM7'; no glass has a name like it"),
         ("N-BK8", "N-BK7-Schott"),
     ],
 )

@@ -67,6 +67,12 @@ def test_a_file_with_deeplens_s_keys_is_read() -> None:
     assert "sensor's corner (10 mm)" in assumed
 
 
+def test_a_wrong_f_number_of_the_file_is_noted() -> None:
+    lens, notes = parse_deeplens(_changed("fnum", value=1.0))
+    f_number = paraxial_data(lens).f_number
+    assert notes[1] == f"the file states an F-number of 1: it is {f_number:.5g}"
+
+
 def test_without_a_stop_the_surface_of_least_clear_radius_is_taken() -> None:
     surfaces = [block for block in LENS["surfaces"] if block["type"] != "Aperture"]
     lens, notes = parse_deeplens(LENS | {"surfaces": surfaces})

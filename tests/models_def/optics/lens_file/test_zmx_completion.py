@@ -61,7 +61,7 @@ def test_a_list_that_begins_at_surf_1_has_a_distant_object_and_an_image_behind()
     listed, stop, aperture = zmx.notes
     assert "object is at infinity" in listed
     assert stop.startswith("no surface holds STOP: surface 2 is taken")
-    assert "28 units" in aperture
+    assert "(28 mm)" in aperture
 
 
 def test_a_list_that_begins_with_a_glass_is_a_lens_and_no_object_in_glass() -> None:
@@ -102,9 +102,7 @@ def test_without_stop_the_surface_of_least_clear_radius_is_taken() -> None:
 def test_without_aperture_the_stop_is_open_to_its_clear_radius() -> None:
     zmx = parse_zmx(LA1131.replace("ENPD 2.286E+1\n", ""))
     assert (zmx.lens.aperture_kind, zmx.lens.aperture_value) == ("stop_semi_diameter_mm", 12.7)
-    assert zmx.notes == (
-        "no aperture: the stop is open to its clear radius (12.7 units of the file)",
-    )
+    assert zmx.notes == ("no aperture: the stop is open to its clear radius (12.7 mm)",)
     bare = "\n".join(line for line in LA1131.splitlines() if "DIAM" not in line)
     with pytest.raises(DecodeError, match=r"aperture must be one of .* got none"):
         parse_zmx(bare.replace("ENPD 2.286E+1\n", ""))

@@ -42,6 +42,9 @@ def test_the_usual_state_is_shown_beside_a_table_of_all(camkit_command, lens_fil
     assert far["efl_mm"] == shown["efl_mm"]
     assert near["efl_mm"] != far["efl_mm"]
     assert near["axis_spot_rms_mm"] > far["axis_spot_rms_mm"] > 0
+    mine = next(r for r in shown["convergence"] if r["pupil_sampling"] == shown["pupil_sampling"])
+    spots = far["axis_spot_rms_mm"], far["widest_spot_rms_mm"]
+    assert spots == pytest.approx((mine["spot_rms_mm"][0], mine["spot_rms_mm"][-1]))
 
 
 def test_a_state_is_shown_by_number_and_its_page_lists_all(

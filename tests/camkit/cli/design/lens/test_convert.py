@@ -123,6 +123,22 @@ def test_tables_say_what_is_no_height(camkit_command, tmp_path: Path) -> None:
         assert [other in alone.err for other in told] == [other == text for other in told]
 
 
+def test_the_unit_of_a_file_and_the_focal_length_are_said(camkit_command, tmp_path: Path) -> None:
+    """A factor of 1000 is seen, and a file that cannot be read is named."""
+    zmx, out = tmp_path / "metres.zmx", tmp_path / "out.toml"
+    in_mm = camkit_command("lens", "convert", PRESCRIPTIONS / "duet.toml", zmx, "--json")
+    efl_mm = json.loads(in_mm.out)["efl_mm"]
+    text = zmx.read_text(encoding="utf-16")
+    assert "UNIT MM" in text
+    zmx.write_text(text.replace("UNIT MM", "UNIT METER"), encoding="utf-16")
+    outcome = camkit_command("lens", "convert", zmx, out)
+    assert f"surfaces, EFL {1000 * efl_mm:.4g} mm" in outcome.out
+    assert "metres.zmx: lengths of the file are in METER: 1000 mm each" in outcome.err
+    zmx.write_text(re.sub("TYPE [A-Z0-9_]+", "TYPE DGRATING", text), encoding="utf-16")
+    refused = camkit_command("lens", "convert", zmx, out, "--overwrite")
+    assert "camkit: metres.zmx: line " in refused.err
+
+
 def test_one_file_to_write_is_named(camkit_command, tmp_path: Path) -> None:
     none = camkit_command("lens", "convert", "duet")
     both = camkit_command("lens", "convert", "duet", tmp_path / "a.zmx", "-o", tmp_path / "b.zmx")

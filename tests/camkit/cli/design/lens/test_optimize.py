@@ -1,12 +1,14 @@
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from camkit.models_def.optics.lens_file.lens_file import read_lens
+from camkit.models_def.optics.lens_file.lens_file import read_lens, write_lens
 from camkit.models_def.optics.paraxial import paraxial_data
 
 PRESCRIPTIONS = Path(__file__).resolve().parents[5] / "models_def" / "prescriptions"
+SPOTS = ("spot_rms_mm_before", "spot_rms_mm_after")
 QUICK = ("--starts", "2", "--steps", "20", "--rays", "8")
 
 
@@ -36,6 +38,28 @@ def test_what_varies_may_stand_in_the_file(camkit_command, tmp_path: Path) -> No
     before, after = read_lens(source), read_lens(out)
     assert after.surfaces[4].vary == ("conic",)
     assert after.surfaces[2].curvature_per_mm == before.surfaces[2].curvature_per_mm
+
+
+def test_a_plane_has_no_conic_and_what_got_worse_is_said(camkit_command, tmp_path: Path) -> None:
+    source, out = tmp_path / "mine.toml", tmp_path / "better.toml"
+    lens = read_lens(PRESCRIPTIONS / "cooke-triplet.toml")
+    first, *others = lens.surfaces
+    surfaces = (replace(first, curvature_per_mm=0.0), *others)
+    write_lens(replace(lens, surfaces=surfaces, state="near"), source)
+    command = ("lens", "optimize", source, "-o", out, "--vary", "conic,thickness", *QUICK)
+    outcome = camkit_command(*command, "--json")
+    assert outcome.code == 0, outcome.err
+    assert "a plane has no conic: that of surface 0 is not free" in outcome.err
+    assert "better.toml holds configuration near alone" in outcome.err
+    report = json.loads(outcome.out)
+    assert report["efl_mm_after"] != report["efl_mm_before"]
+    assert report["worse_fields_deg"] == [
+        angle
+        for angle, before, after in zip(
+            *(report[key] for key in ("field_angles_deg", *SPOTS)), strict=True
+        )
+        if after > before
+    ]
 
 
 def test_focus_positions_are_sought_together(camkit_command, tmp_path: Path) -> None:

@@ -11,9 +11,10 @@ import pytest
 from camkit.models_def.optics.analysis.sampling import Pupil
 from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.prescription import Lens, Surface
+from camkit.models_def.optics.shape.phase import parse_phase
 from camkit.report.pages.lens.lens_facts import analyse
 from camkit.report.pages.lens.lens_json import WHY, to_json
-from camkit.report.pages.lens.lens_page import write_lens_page
+from camkit.report.pages.lens.lens_page import lens_page, write_lens_page
 from camkit.report.pages.lens.lens_pupil import CONVERGED, choose_pupil
 from tests.physics.reference_lenses import cooke_triplet
 
@@ -64,6 +65,17 @@ def test_glass_of_no_thickness_is_noted() -> None:
     surfaces[i] = replace(surfaces[i], thickness_mm=-1.0)
     notes = analyse(replace(lens, surfaces=tuple(surfaces)), Pupil()).notes
     assert any("-1 mm thick, which cannot be made" in note for note in notes)
+
+
+def test_the_page_names_terms_of_a_phase_and_has_chief_heights() -> None:
+    lens = _cooke(14)
+    phase = parse_phase((5.0,), {"x3": 40.0, "x2y": -2.0}, radius_mm=9.0, order=None)
+    surfaces = (replace(lens.surfaces[0], phase=phase), *lens.surfaces[1:])
+    facts = analyse(replace(lens, surfaces=surfaces), Pupil(), image=False)
+    page = str(lens_page(facts, {}))
+    assert "of lengths / 9 mm), rad: r2 5, x3 40, x2y -2" in page
+    assert "'chief height, mm'" in page
+    assert f"{float(facts.chief_mm[0, 0]):.5g}" in page
 
 
 def test_field_that_loses_all_rays_is_null_in_valid_json_and_the_page_is_made(
