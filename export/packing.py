@@ -114,7 +114,7 @@ def bundle(
 
 
 def _note_missing_report(psf: Path) -> None:
-    """Report that the manifest will lack what freezing found, where `camkit freeze` wrote the PSF."""
+    """Report that the manifest lacks what freezing found, where `camkit freeze` wrote the PSF."""
     source = read_source(read_optics_bytes(psf, what="PSF"))
     if source is not None:
         note(
