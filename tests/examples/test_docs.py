@@ -31,7 +31,7 @@ TOOL = re.compile(r"(?<![A-Za-z_])(?:tests/)?tools(?:[./][a-z_0-9]+)+")
 """A module of the tools, as `python -m` takes it or as a path."""
 COMMIT = re.compile(r"\bat ([0-9a-f]{8})\b")
 EVERYWHERE = {"--help", "-h", "--debug"}
-KEPT = {".md", ".json", ".jsonl", ".csv", ".png"}
+KEPT = {".md", ".json", ".jsonl", ".csv", ".png", ".toml"}
 MADE_ANEW = {".html", ".svg"}  # of results, which git ignores
 MOST_BYTES = 600_000
 RESULTS = ROOT / "docs" / "results"
