@@ -1,10 +1,11 @@
-"""Measure the readers in JavaScript: `python -m examples.measure_readers BUNDLE... -o FILE.json`.
+"""Measure readers of portable cameras: `python -m examples.measure_readers BUNDLE... -o FILE.json`.
 
-Golden cases of each bundle and size go through node, node with WebAssembly, and the page in
+Golden cases of each bundle and size go through C++, node, node with WebAssembly, and the page in
 Chromium on one thread. Decibels are to the reader in Python; their peak is white or the brightest
 light. Times are of a simulated capture of 1500x1000 pixels at ISO 400, all readers one after the
-other in each round: CPU seconds of Python and node, seconds of WebAssembly and the page, whose
-compiler works beside them. Run from the root of the repository, in the environment of the tests.
+other in each round: CPU seconds of camkit, Python, C++ and node, seconds of WebAssembly and the
+page, whose compiler works beside them. Run from the root of the repository, in the environment of
+the tests.
 """
 
 import argparse
@@ -21,9 +22,11 @@ from typing import Any
 
 import numpy as np
 
+import camkit
 from camkit.arrays import FloatArray
 from camkit.bundle.reader import find_bundle, open_bundle
 from camkit.runtime.kind import part_of
+from camkit.runtime.raw import read_capture
 from camkit.runtime.twin.simulate import SimulationOptions
 from camkit.scenes import procedural_scene
 from tests.chromium import Page, chromium
@@ -35,6 +38,7 @@ from tests.examples.portable_cases import (
     write_photo,
 )
 from tests.examples.test_browser import DONE, LIGHT, READY, SHOWN
+from tests.examples.test_cpp import cpp_program, read_pfm
 
 ROUNDS = 3
 
@@ -55,6 +59,19 @@ def run_node(camera: PortableCamera, photo: Path, size: str, *flags: str) -> tup
     said = subprocess.run(words, check=True, capture_output=True, text=True).stdout
     width, height = map(int, re.findall(r"\d+", said)[:2])
     return np.fromfile(light, np.float32).reshape(3, height, width), said
+
+
+def run_cpp(camera: PortableCamera, photo: Path, size: str) -> tuple[FloatArray, str]:
+    """Return light, and what the program says."""
+    capture = read_capture(photo, isolate=False)
+    mosaic, light = photo.with_suffix(".npy"), photo.with_suffix(".pfm")
+    np.save(mosaic, np.asarray(capture.samples, np.uint16))
+    gains, origin = capture.white_balance or (1.0, 1.0, 1.0), capture.origin_px or (0, 0)
+    words = [str(cpp_program()), str(camera.folder), "--network", size, "--iso", repr(capture.iso)]
+    words += ["--white-balance", ",".join(map(repr, map(float, gains)))]
+    words += ["--origin-px", ",".join(map(str, origin)), str(mosaic), str(light)]
+    said = subprocess.run(words, check=True, capture_output=True, text=True).stdout
+    return read_pfm(light), said.rpartition(", ")[2]
 
 
 def run_page(page: Page, photo: Path) -> tuple[FloatArray, str]:
@@ -106,30 +123,42 @@ def measured(path: str, size: str, folder: Path, is_timed: bool) -> dict[str, An
         page.choose("#files", camera.archive)
         page.wait("document.querySelector('#camera').textContent !== 'none yet'")
         readers: dict[str, Callable[[Path], tuple[FloatArray, str]]] = {
+            "C++": lambda photo: run_cpp(camera, photo, size),
             "node": lambda photo: run_node(camera, photo, size),
             "node, WebAssembly": lambda photo: run_node(camera, photo, size, "--wasm"),
             "page, one thread": lambda photo: run_page(page, photo),
         }
         rows = {name: golden_rows(camera, run) for name, run in readers.items()}
-        times = timed(camera, readers, simulated(path, folder)) if is_timed else {}
+        times = timed(camera, readers, simulated(path, folder), path, size) if is_timed else {}
     manifest = open_bundle(find_bundle(path)).manifest
-    return {"bundle": f"{manifest.name} {manifest.version}", "size": size, "golden": rows, "large": times}
+    return {
+        "bundle": f"{manifest.name} {manifest.version}",
+        "size": size,
+        "golden": rows,
+        "large": times,
+    }
 
 
-def timed(camera: PortableCamera, readers: dict[str, Any], photo: Path) -> dict[str, Any]:
+def timed(
+    camera: PortableCamera, readers: dict[str, Any], photo: Path, path: str, size: str
+) -> dict[str, Any]:
     """Return seconds of a large capture; of the page, its first and later ones."""
     seconds: dict[str, list[float]] = {}
+    pipeline = camkit.load(path, size=size, threads=1)
     for _ in range(ROUNDS):
+        cpu = time.process_time()
+        own = pipeline.process(photo).image
+        seconds.setdefault("camkit_cpu", []).append(time.process_time() - cpu)
         start, cpu = time.perf_counter(), time.process_time()
         light = camera.develop(photo)
         seconds.setdefault("python_cpu", []).append(time.process_time() - cpu)
         seconds.setdefault("python", []).append(time.perf_counter() - start)
+        seconds.setdefault("python to camkit, dB", []).append(difference_db(light, own))
         for name, run in readers.items():
             made, said = run(photo)
-            numbers = [float(n) for n in re.findall(r"([\d.]+) (?:CPU )?s", said)]
-            seconds.setdefault(name, []).append(numbers[0])
-            if "CPU" in said:
-                seconds.setdefault(f"{name}, CPU", []).append(numbers[1])
+            for unit, kind in (("s", ""), ("CPU s", ", CPU")):
+                for number in re.findall(rf"([\d.]+) {unit}\b", said):
+                    seconds.setdefault(f"{name}{kind}", []).append(float(number))
             seconds.setdefault(f"{name}, dB", []).append(difference_db(made, light))
     return {
         name: [round(n, 2) for n in each] + [round(median(each), 2)]

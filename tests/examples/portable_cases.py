@@ -63,7 +63,7 @@ def make_camera(name: str, size: str, folder: Path) -> PortableCamera:
     with zipfile.ZipFile(archive, "w") as zipped:
         for path in sorted(graphs.iterdir()):
             zipped.write(path, path.name)
-    reader = _python_reader(graphs, size)
+    reader = python_reader(graphs, size)
     cases = {
         case.name: _case(bundle, case, size, reader, folder) for case in bundle.manifest.golden
     }
@@ -115,7 +115,8 @@ def _case(bundle: Bundle, case: GoldenCase, size: str, reader: Any, folder: Path
     return PortableCase(photo=photo, light=light, output=output, allowed=allowed)
 
 
-def _python_reader(folder: Path, size: str) -> Any:
+def python_reader(folder: Path, size: str) -> Any:
+    """Return the reader of examples/python on a written camera."""
     path = ROOT / "examples" / "python" / "portable_camera.py"
     spec = importlib.util.spec_from_file_location("portable_camera", path)
     assert spec is not None

@@ -1,6 +1,5 @@
 """The reader in C++: it builds without a warning, and has the bits of the reader in Python."""
 
-import importlib.util
 import json
 import os
 import shutil
@@ -20,9 +19,9 @@ from camkit.bundle.golden import golden_from_bytes
 from camkit.bundle.manifest import GoldenCase
 from camkit.bundle.reader import GOLDEN, Bundle, find_bundle, open_bundle
 from camkit.runtime.portable.package import write_portable
+from tests.examples.portable_cases import ROOT, python_reader
 
-EXAMPLES: Final = Path(__file__).resolve().parents[2] / "examples"
-CPP: Final = EXAMPLES / "cpp"
+CPP: Final = ROOT / "examples" / "cpp"
 SIZE: Final = "S"
 ODD_DB: Final = 45.0
 """To camkit, whose places are others by 1/32 px before format 2.12; red for green leaves 22."""
@@ -38,7 +37,8 @@ class WrittenCamera:
 
 
 @cache
-def _program() -> Path:
+def cpp_program() -> Path:
+    """Return the built program; skip the test where it cannot be built."""
     for tool in ("cmake", "c++"):
         if shutil.which(tool) is None:
             pytest.skip(f"{tool} is not there; install it to test the reader in C++")
@@ -69,16 +69,10 @@ def camera(
 
 
 def _written(name: str, folder: Path) -> WrittenCamera:
-    _program()
+    cpp_program()
     bundle = open_bundle(find_bundle(name))
     write_portable(bundle, folder, (SIZE,))
-    path = EXAMPLES / "python" / "portable_camera.py"
-    spec = importlib.util.spec_from_file_location("portable_camera", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return WrittenCamera(bundle=bundle, folder=folder, reader=module.PortableCamera(folder, SIZE))
+    return WrittenCamera(bundle=bundle, folder=folder, reader=python_reader(folder, SIZE))
 
 
 def _developed(
@@ -88,11 +82,12 @@ def _developed(
     origin = ",".join(map(str, case.origin_px))
     about = ("--network", SIZE, "--iso", repr(case.iso), "--white-balance", gains)
     words = (*about, "--origin-px", origin, *options, *map(str, pairs))
-    made = _run(str(_program()), str(camera.folder), *words)
+    made = _run(str(cpp_program()), str(camera.folder), *words)
     assert made.returncode == 0, made.stderr
 
 
-def _read_pfm(path: Path) -> FloatArray:
+def read_pfm(path: Path) -> FloatArray:
+    """Return (3, h, w) light of a PFM."""
     kind, sides, scale, samples = path.read_bytes().split(b"\n", 3)
     width, height = map(int, sides.split())
     assert (kind, float(scale)) == (b"PF", -1.0)
@@ -110,7 +105,7 @@ def test_golden_cases_have_the_bits_of_the_reader_in_python(
         _developed(camera, case, mosaic, picture)
         gains = case.white_balance or (1.0, 1.0, 1.0)
         light = camera.reader.develop(arrays[case.name].capture, case.iso, gains, case.origin_px)
-        made = _read_pfm(picture)
+        made = read_pfm(picture)
         np.testing.assert_array_equal(made, light, err_msg=case.name)
         if all(json.loads((camera.folder / "portable.json").read_text())["agrees"].values()):
             output = arrays[case.name].outputs["image"][SIZE]
@@ -147,7 +142,7 @@ def test_captures_after_each_other_share_a_camera_and_keep_their_bits(
     for mosaic, names in ((wide, "ac"), (high, "b")):
         light = duet.reader.develop(mosaic, *about, straight=False)
         for name in names:
-            np.testing.assert_array_equal(_read_pfm(tmp_path / f"{name}.pfm"), light)
+            np.testing.assert_array_equal(read_pfm(tmp_path / f"{name}.pfm"), light)
 
 
 def test_a_crop_from_an_odd_pixel_begins_with_another_colour(
@@ -159,7 +154,7 @@ def test_a_crop_from_an_odd_pixel_begins_with_another_colour(
     _developed(duet, case, tmp_path / "odd.npy", tmp_path / "odd.pfm")
     pipeline = camkit.load("duet", size=SIZE, threads=1)
     light = pipeline.process_array(mosaic, iso=400.0, white_balance=gains, origin_px=origin)
-    error = np.mean((_read_pfm(tmp_path / "odd.pfm") - light) ** 2)
+    error = np.mean((read_pfm(tmp_path / "odd.pfm") - light) ** 2)
     assert -10 * np.log10(error) > ODD_DB
 
 
@@ -201,6 +196,6 @@ def test_damaged_cameras_and_files_are_refused_by_their_fault(
     }
     for fault, words in faults.items():
         size = () if "--network" in words else ("--network", SIZE)
-        made = _run(str(_program()), *map(str, words), str(tmp_path / "out.pfm"), *size)
+        made = _run(str(cpp_program()), *map(str, words), str(tmp_path / "out.pfm"), *size)
         assert (made.returncode, fault in made.stderr) == (1, True), (fault, made.stderr)
     assert not (tmp_path / "out.pfm").exists()
