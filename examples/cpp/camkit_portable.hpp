@@ -628,7 +628,7 @@ class Camera {
   template <class Tell>
   Picture clean(const Picture& planes, const Picture& kept, const Known& known, const Tell& tell) const {
     const int halo = (*network_)["halo_px"].integer(), stride = (*network_)["stride_px"].integer();
-    const int most = about_["tile_px"].integer();
+    const int most = (*network_)["tile_px"].integer();
     detail::check(stride > 0 && stride < (1 << 12), "the manifest's tiles are damaged");
     const auto whole = [stride](int size) { return (size + stride - 1) / stride * stride; };
     const auto [rows, h] = detail::tiles(whole(planes.height), most, halo, stride);

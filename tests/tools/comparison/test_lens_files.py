@@ -36,7 +36,8 @@ def test_the_table_counts_what_is_read_and_what_is_refused(
     # the singlet of the vendor: f = 50 mm at 587.6 nm, 44.2 mm from its back
     assert rows[0].startswith("lenses/a.zmx: read; EFL 49.8")
     assert rows[1] == (
-        "lenses/b.zmx: UnsupportedError: line 32: surface 1 is a mirror; camkit traces lenses only"
+        "lenses/b.zmx: UnsupportedError: b.zmx: line 32: surface 1 is a mirror; "
+        "camkit traces lenses only"
     )
     assert counts == "read: 2, UnsupportedError: 1"
     table = json.loads((tmp_path / "out.json").read_text())

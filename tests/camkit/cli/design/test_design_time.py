@@ -5,9 +5,12 @@ import math
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from safetensors.numpy import load
 
 import camkit
+from camkit.bundle.psf_file import read_source
 from camkit.cli.exit_code import ExitCode
 from camkit.models_def.face.torch_need import INSTALLED_BY
 from camkit.stopwatch import Stopwatch
@@ -194,7 +197,11 @@ def test_freeze_writes_psf_stress_psf_and_report(camkit_command, tmp_path, monke
     assert (seen["grid"].max_side_px, seen["limit_db"]) == (201, 0.1)
     assert json.loads(outcome.out) == json.loads((folder / "freeze.json").read_text())
     assert json.loads(outcome.out) == {"block_px": 512}
-    assert (folder / "psf.safetensors").read_bytes() == (folder / "stress.safetensors").read_bytes()
+    frozen = (folder / "psf.safetensors").read_bytes()
+    assert read_source(frozen) == "camkit freeze of lens.toml"
+    plain, stress = load(frozen), load((folder / "stress.safetensors").read_bytes())
+    assert plain.keys() == stress.keys()
+    assert all(np.array_equal(plain[name], stress[name]) for name in plain)
     assert seen["sensor"].width_px == 6000, "the camera of the default recipe"
     assert seen["settings"].clip_iterations == 3, "its Wiener bank measures the loss"
 
