@@ -153,7 +153,7 @@ def with_object_distance(lens: Lens, distance_mm: float) -> Lens:
     """Return the lens looking at another object distance, the sensor unmoved."""
     fields = lens.field_angles_rad
     if math.isfinite(distance_mm):  # no near object lies beside the lens
-        fields = tuple(angle for angle in fields if angle <= to_radians(TANGENT_DEG))
+        fields = tuple(angle for angle in fields if angle <= to_radians(TANGENT_DEG)) or (0.0,)
     return replace(lens, object_distance_mm=distance_mm, field_angles_rad=fields)
 
 

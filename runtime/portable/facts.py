@@ -105,10 +105,13 @@ def _missing(manifest: Manifest) -> str | None:
     if manifest.kind != "bayer" or not isinstance(manifest.sensor, BayerSensor):
         return f"its kind is {manifest.kind}"
     stages = {stage.type: stage for stage in manifest.stages}
-    if (types := tuple(stages)) != STAGES:
+    types = tuple(stage.type for stage in manifest.stages)
+    if types != STAGES:
         other = [name for name in types if name not in STAGES]
         lacking = [name for name in STAGES if name not in types]
-        return f"stage {other[0]} has no graph" if other else f"it has no stage {lacking[0]}"
+        if other or lacking:
+            return f"stage {other[0]} has no graph" if other else f"it has no stage {lacking[0]}"
+        return "its stages stand in another order, or twice"
     bank, network, warp = stages["wiener"], stages["network"], stages["undistort"]
     assert isinstance(bank, Wiener)
     assert isinstance(network, Network)

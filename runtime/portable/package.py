@@ -55,7 +55,7 @@ def write_portable(
     used_sizes = bundle_sizes if sizes is None else sizes
     if unknown := [size for size in used_sizes if size not in bundle_sizes]:
         raise ContractError(f"{bundle.manifest.name} has no size {unknown[0]}; got {bundle_sizes}")
-    if folder.exists() and any(folder.iterdir()):
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise ContractError(f"{folder} must be empty or not exist")
     graphs = _graphs(facts, used_sizes)
     files = {f"{graph.name}.onnx": graph.to_bytes() for graph in graphs}
@@ -63,8 +63,13 @@ def write_portable(
     document = portable_manifest(facts, graphs, used_sizes)
     files[MANIFEST] = (json.dumps(document, indent=1) + "\n").encode()
     folder.mkdir(parents=True, exist_ok=True)
-    for name, data in files.items():
-        (folder / name).write_bytes(data)
+    try:
+        for name, data in files.items():
+            (folder / name).write_bytes(data)
+    except BaseException:  # half a camera is in the way of the next try
+        for name in files:
+            (folder / name).unlink(missing_ok=True)
+        raise
     return {name: len(data) for name, data in files.items()}
 
 
@@ -95,7 +100,7 @@ def portable_manifest(
             "graph": f"tile_{size}",
             "halo_px": halo,
             "stride_px": stride,
-            "tile_px": TILE_HALOS * halo,
+            "tile_px": TILE_HALOS * max(halo, stride),
         }
     return {
         "portable_version": PORTABLE_VERSION,

@@ -6,6 +6,7 @@ The focal length of every state is kept by a residual: one curvature cannot be s
 The sensor does not ride: the gap in front of it is a variable, of each state where it moves.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
@@ -200,7 +201,7 @@ def joint_of(
             that some configuration names is shared.
     """
     shares = list(weights) or [1.0] * len(names)
-    if len(shares) != len(names) or not all(share > 0 for share in shares):
+    if len(shares) != len(names) or not all(0 < share < math.inf for share in shares):
         raise ContractError(
             f"weights are numbers > 0, one for each of {', '.join(names)}; got {shares}"
         )

@@ -58,8 +58,9 @@ def compiler_fault() -> str | None:
     if not compilers:
         return f"no C++ compiler found (looked for {', '.join(_COMPILERS)})"
     done = stored_path(tuple(compilers), "works")
-    if done.exists():
-        return None
+    with contextlib.suppress(OSError):  # such as a home that is not ours
+        if done.exists():
+            return None
     try:
         torch.compile(lambda x: x * 2 + 1, fullgraph=True)(torch.ones(8))
     except (RuntimeError, OSError, ImportError) as error:

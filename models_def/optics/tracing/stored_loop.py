@@ -45,7 +45,9 @@ def stored_path(key: tuple[object, ...], suffix: str) -> Path:
         suffix: Of the file.
     """
     processor = (platform.system(), platform.machine(), torch.backends.cpu.get_cpu_capability())
-    whole = (key, torch.__version__, platform.python_version(), processor, _own_files())
+    # torch guards a stored loop by the number of threads
+    threads = torch.get_num_threads()
+    whole = (key, torch.__version__, platform.python_version(), processor, threads, _own_files())
     digest = hashlib.sha256(repr(whole).encode()).hexdigest()[:32]
     home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(home) / "camkit" / "tracer" / f"{digest}.{suffix}"
@@ -80,6 +82,9 @@ class StoredLoop:
             return None
         try:
             with self._path.open("rb") as file:
+                if not _is_own(file.fileno()):
+                    _LOG.debug("%s is another user's", self._path)
+                    return None
                 return torch.compiler.load_compiled_function(file)
         except FileNotFoundError:
             return None
@@ -97,16 +102,28 @@ class StoredLoop:
         try:
             with config.patch(specialize_float=True):
                 loop = compiled.aot_compile((columns, {}))
-            self._path.parent.mkdir(parents=True, exist_ok=True)
+        except _FAULTS as error:
+            _LOG.debug("the loop is not to be stored: %s", error)
+            return None
+        try:
+            self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
             with tempfile.TemporaryDirectory(dir=self._path.parent) as folder:
                 whole = Path(folder) / self._path.name
                 loop.save_compiled_function(str(whole))
+                whole.chmod(0o600)
                 whole.replace(self._path)
         except _FAULTS as error:
             _LOG.debug("the loop is not stored: %s", error)
-            return None
         fitting: Loop = loop
         return fitting
+
+
+def _is_own(file: int) -> bool:
+    """Return whether an open file is the user's own, and nobody else may write it: it is code."""
+    status = os.fstat(file)
+    return not hasattr(os, "getuid") or (
+        status.st_uid == os.getuid() and not status.st_mode & 0o022
+    )
 
 
 def _patiently(loop: Loop, columns: tuple[Tensor, ...]) -> tuple[Tensor, ...]:
