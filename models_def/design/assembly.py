@@ -31,13 +31,14 @@ from camkit.models_def.optics.analysis.psf_model import checked_regime
 from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.lens_file.states import plain_lens
 from camkit.models_def.optics.optics_file import ALL, state_names
-from camkit.models_def.optics.paraxial import paraxial_data, paraxial_image
+from camkit.models_def.optics.paraxial import paraxial_image
 from camkit.models_def.optics.prescription import Lens, with_focus_shift
 from camkit.models_def.optics.pupil import half_disc
 from camkit.models_def.optics.search.joint_states import JointProblem, JointVariable, joint_of
-from camkit.models_def.optics.search.problem import Problem
+from camkit.models_def.optics.search.problem import Problem, image_scale_mm
 from camkit.models_def.optics.search.splat import Pixels
 from camkit.models_def.optics.search.variables import FreeLens
+from camkit.models_def.optics.trace import surface_tensors
 from camkit.models_def.training.first_weights import read_first_weights, take_first_weights
 from camkit.models_def.training.kind import read_recipe
 from camkit.models_def.training.pictures import SceneSource, open_scenes
@@ -77,13 +78,18 @@ def joint_problem_of(recipe: DesignRecipe, lens: Lens) -> JointProblem:
     choice = recipe.optics.configurations
     names = state_names(lens, ALL if choice == (ALL,) else choice)
     slopes = field_slopes(recipe.optics)
-    first_mm = paraxial_data(plain_lens(lens, names[0])).efl_mm
+    first_mm = _image_scale_mm(plain_lens(lens, names[0]))
 
     def problem_at(free: FreeLens) -> Problem:
-        return _problem_at(recipe, free, slopes * (first_mm / paraxial_data(free.lens).efl_mm))
+        return _problem_at(recipe, free, slopes * (first_mm / _image_scale_mm(free.lens)))
 
     shared = [JointVariable(variable=v) for v in recipe.variables]
     return joint_of(lens, names, [*shared, *recipe.state_variables], problem_at)
+
+
+def _image_scale_mm(lens: Lens) -> float:
+    wave = torch.tensor(lens.reference_wavelength_um, dtype=torch.float64)
+    return float(image_scale_mm(surface_tensors(lens, wave), lens.object_distance_mm))
 
 
 def _problem_at(recipe: DesignRecipe, free: FreeLens, slopes: Tensor) -> Problem:

@@ -81,7 +81,7 @@ def with_field_points(
     """
     notes: tuple[str, ...] = ()
     if kind == FieldType.ANGLE and math.isinf(lens.object_distance_mm):
-        angles = {math.fabs(to_radians(y)) if x == 0 else _skew_angle(x, y) for x, y in points}
+        angles = {_skew_angle(x, y) for x, y in points}
     elif kind == FieldType.ANGLE:
         at_pupil = {_skew_angle(x, y) for x, y in points}
         angles = {_angle_from_vertex(lens, a) if a < math.pi / 2 else a for a in at_pupil}
@@ -127,8 +127,8 @@ def _points(system: Records) -> list[tuple[float, float]]:
 
 
 def _skew_angle(x_deg: float, y_deg: float) -> float:
-    if not y_deg:
-        return math.fabs(to_radians(x_deg))
+    if not (x_deg and y_deg):
+        return to_radians(max(math.fabs(x_deg), math.fabs(y_deg)))
     return math.atan(math.hypot(math.tan(to_radians(x_deg)), math.tan(to_radians(y_deg))))
 
 

@@ -207,7 +207,7 @@ def limits_of(problem: Problem, traced: Traced, distance_mm: float) -> Tensor:
     if math.isfinite(limits.distortion) and len(problem.slopes) > 1:
         middle = len(problem.wavelengths_um) // 2
         chief = _radial(problem, traced.landings)[:, 1:, middle]
-        ideal = problem.slopes[1:] * _image_scale_mm(traced.reference, distance_mm)
+        ideal = problem.slopes[1:] * image_scale_mm(traced.reference, distance_mm)
         parts.append(distortion_residuals(limits, chief, ideal))
     return torch.cat(parts, dim=1)
 
@@ -220,7 +220,7 @@ def _radial(problem: Problem, landings: Rays) -> Tensor:
     )
 
 
-def _image_scale_mm(reference: SurfaceTensors, object_distance_mm: float) -> Tensor:
+def image_scale_mm(reference: SurfaceTensors, object_distance_mm: float) -> Tensor:
     """Return the paraxial image height per field slope (start, 1): the EFL for a distant object."""
     one = torch.ones_like(reference.index[0] * reference.curvature_per_mm[0])
     surfaces = range(len(reference.aspheric))
