@@ -19,7 +19,7 @@ _FLAGS: Final = (
 
 
 class BrowserError(Exception):
-    """What went wrong in a page or in the browser."""
+    """A fault of a page or of the browser."""
 
 
 class Page:
@@ -114,7 +114,7 @@ class Page:
             time.sleep(0.05)
 
     def choose(self, selector: str, *files: Path) -> None:
-        """Give files to a file input."""
+        """Choose files in a file input."""
         root = self.call("DOM.getDocument")["root"]["nodeId"]
         node = self.call("DOM.querySelector", nodeId=root, selector=selector)["nodeId"]
         self.call("DOM.setFileInputFiles", nodeId=node, files=[str(file) for file in files])

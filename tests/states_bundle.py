@@ -14,7 +14,7 @@ from tests.deep_bundle import FOCUS_MM, deep_psf
 
 
 def two_states() -> FrozenOptics:
-    """Give a wide state of one depth, and a long one of three."""
+    """Return a wide state of one depth, and a long one of three."""
     wide = LensState(
         name="wide", psf=tiny_psf(), efl_mm=24.0, f_number=2.8, object_distance_mm=np.inf
     )

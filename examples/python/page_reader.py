@@ -199,7 +199,7 @@ def restore(camera, stage, block, clipped, kernels, height, phase):
     spectrum = by_samples(block, known, phase, mosaic) if from_samples else by_planes(block, known)
     return lights + ifft2(spectrum).real
 def ratio_of(found, expected):
-    """How much more a block shows than is expected of it."""
+    """The ratio of what a block shows to what is expected of it."""
     return max(found.sum() / expected.sum(), 1e-6) if expected.sum() > 0 else 1
 def by_planes(block, known):
     """Spectra of the colours, restored together from three planes."""

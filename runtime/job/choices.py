@@ -24,7 +24,7 @@ ON_A_SENSOR: Final = frozenset({"assume", "origin_px"})
 """What means something wherever the size of the sensor is known."""
 WITH_A_BUNDLE: Final = frozenset({"force_bundle"})
 WITH_STATES: Final = frozenset({"configuration"})
-"""What means something where the lens has several configurations."""
+"""Options that mean something where the lens has several configurations."""
 ALWAYS: Final = frozenset({"unit", "tone", "halves"})
 OF_CAPTURE: Final = ON_A_SENSOR | WITH_A_BUNDLE | WITH_STATES | ALWAYS
 """What may be said of how a photograph was taken."""

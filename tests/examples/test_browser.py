@@ -215,7 +215,7 @@ class _Isolated(http.server.SimpleHTTPRequestHandler):
         super().end_headers()
 
     def log_message(self, *_: Any) -> None:
-        """Say nothing."""
+        """Log nothing."""
 
 
 def test_a_page_served_with_isolation_uses_threads(camera: PortableCamera, tmp_path: Path) -> None:

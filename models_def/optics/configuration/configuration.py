@@ -9,7 +9,7 @@ from camkit.bundle.states.lens_state import find_name
 from camkit.errors import ContractError
 
 BY_SURFACE: Final = ("thickness_mm", "semi_diameter_mm")
-"""What a state names surface by surface."""
+"""Keys of a state that name surfaces one by one."""
 
 Sizes = tuple[tuple[int, float], ...]
 """(surface, mm), one entry for each surface that a state names, in their order."""

@@ -26,7 +26,7 @@ _FAULTS: Final = (
     *(RuntimeError, OSError, ImportError, pickle.PickleError, EOFError),
     *(AttributeError, TypeError, ValueError, LookupError, AssertionError),
 )
-"""What the storing of a loop may raise, which is no part of torch that is settled."""
+"""Errors that the storing of a loop may raise, which is no part of torch that is settled."""
 
 Loop = Callable[..., tuple[Tensor, ...]]
 Layout = tuple[tuple[tuple[int, ...], torch.dtype], ...]

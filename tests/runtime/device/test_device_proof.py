@@ -27,7 +27,7 @@ Fault = Callable[[FloatArray], None]
 
 @pytest.fixture(autouse=True)
 def _stand_in(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let onnxruntime's CPU stand in for a graphics card; nothing is proved yet."""
+    """Replace a graphics card by onnxruntime's CPU; nothing is proved yet."""
     create = engine_module._create_session
 
     def on_cpu(model: bytes, threads: int, provider: str = "cpu", **memory: Any) -> Any:
