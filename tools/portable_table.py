@@ -31,7 +31,7 @@ from camkit.runtime.portable.package import write_portable
 from camkit.runtime.twin.simulate import SimulationOptions
 from camkit.scenes import procedural_scene
 
-READER: Final = Path(__file__).parents[1] / "examples" / "python" / "portable_camera.py"
+READERS: Final = Path(__file__).parents[1] / "examples" / "python"
 SCENE_SEED: Final = 7
 ISO: Final = 400.0
 EXPOSURE: Final = 0.25
@@ -54,7 +54,7 @@ def measured(path: Path, repeat: int) -> dict[str, Any]:
     bundle = open_bundle(path)
     with tempfile.TemporaryDirectory() as folder:
         files = write_portable(bundle, Path(folder) / "out")
-        reader = _reader()
+        reader = load_example("portable_camera")
         cameras = {
             size: reader.PortableCamera(Path(folder) / "out", size)
             for size in bundle.manifest.sizes
@@ -75,8 +75,9 @@ def measured(path: Path, repeat: int) -> dict[str, Any]:
         }
 
 
-def _reader() -> Any:
-    spec = importlib.util.spec_from_file_location("portable_camera", READER)
+def load_example(name: str) -> Any:
+    """Return a reader of `examples/python`, which is no package, as a module."""
+    spec = importlib.util.spec_from_file_location(name, READERS / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)

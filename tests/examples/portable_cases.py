@@ -1,6 +1,5 @@
 """Golden cases of a camera as files that any reader takes, and what the Python reader makes."""
 
-import importlib.util
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +17,7 @@ from camkit.runtime.metadata import Metadata
 from camkit.runtime.output.dng import DngTags, camkit_description, write_bayer_dng
 from camkit.runtime.portable.package import write_portable
 from camkit.runtime.raw import read_capture
+from tools.portable_table import load_example
 
 ROOT: Final = Path(__file__).resolve().parents[2]
 
@@ -117,13 +117,7 @@ def _case(bundle: Bundle, case: GoldenCase, size: str, reader: Any, folder: Path
 
 def python_reader(folder: Path, size: str) -> Any:
     """Return the reader of examples/python on a written camera."""
-    path = ROOT / "examples" / "python" / "portable_camera.py"
-    spec = importlib.util.spec_from_file_location("portable_camera", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module.PortableCamera(folder, size)
+    return load_example("portable_camera").PortableCamera(folder, size)
 
 
 def difference_db(light: FloatArray, other: FloatArray) -> float:

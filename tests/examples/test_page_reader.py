@@ -1,31 +1,25 @@
 """The format pages are enough: a reader of 400 lines, written by one who read nothing else."""
 
-import importlib.util
 import json
 import zipfile
-from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
 
 from camkit.bundle.reader import built_in_bundles
-from tests.examples.portable_cases import ROOT
+from tools.portable_table import READERS, load_example
 
-READER = ROOT / "examples" / "python" / "page_reader.py"
+READER = READERS / "page_reader.py"
 
 
 @pytest.fixture(scope="module", name="reader")
-def fixture_reader() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("page_reader", READER)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def fixture_reader() -> Any:
+    return load_example("page_reader")
 
 
 @pytest.mark.parametrize("name", ["duet", "duet-joint"])
-def test_golden_cases_are_met_from_the_pages_alone(reader: ModuleType, name: str) -> None:
+def test_golden_cases_are_met_from_the_pages_alone(reader: Any, name: str) -> None:
     path = built_in_bundles()[name]
     with zipfile.ZipFile(path) as bundle:
         cases = json.loads(bundle.read("manifest.json"))["golden"]
@@ -35,7 +29,7 @@ def test_golden_cases_are_met_from_the_pages_alone(reader: ModuleType, name: str
 
 
 @pytest.mark.parametrize("name", ["trio-edof", "thin-plate", "deglare", "streak-hdr", "spad-sr"])
-def test_other_cameras_are_refused_by_name(reader: ModuleType, name: str) -> None:
+def test_other_cameras_are_refused_by_name(reader: Any, name: str) -> None:
     with pytest.raises(SystemExit, match=f"{name} is not covered"):
         reader.develop(built_in_bundles()[name], "typical", "S")
 

@@ -1,8 +1,6 @@
 """A reader of 80 lines, with no import of camkit, gives what camkit gives."""
 
-import importlib.util
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -18,20 +16,12 @@ from camkit.errors import ContractError, UnsupportedError
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.portable.package import write_portable
+from tools.portable_table import READERS, load_example
 from tools.repack import PORTABLE
 
-READER = Path(__file__).parents[3] / "examples" / "python" / "portable_camera.py"
+READER = READERS / "portable_camera.py"
 LEAST_DB = 100.0
 MOST_BYTES = 12_000_000
-
-
-def _module() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("portable_camera", READER)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +48,7 @@ def folder(bundle: Bundle, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def camera(folder: Path) -> Any:
     """Return the camera of the reader."""
-    return _module().PortableCamera(folder, "S")
+    return load_example("portable_camera").PortableCamera(folder, "S")
 
 
 def _camkit(bundle: Bundle, capture: np.ndarray, case: GoldenCase, **options: Any) -> np.ndarray:
