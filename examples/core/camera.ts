@@ -11,7 +11,7 @@ export interface Runtime {
 
 export type Values = Record<string, Tensor>;
 
-/** What of portable.json the readers need; docs/portable.md says what each number means. */
+/** What of portable.json the readers need; docs/guides/portable.md says what each number means. */
 export interface About {
   portable_version: number;
   camera: { name: string; version: string };

@@ -1,5 +1,5 @@
 /**
- * The chain of a portable camera around its graphs, as docs/portable.md states it:
+ * The chain of a portable camera around its graphs, as docs/guides/portable.md states it:
  *
  *   mosaic -> blocks (spans, place, block) -> planes -> tiles (kept, tile_S) -> even light
  *          -> places, warp -> picture

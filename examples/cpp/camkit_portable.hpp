@@ -1,5 +1,5 @@
 // A portable camera (`camkit portable BUNDLE -o DIR`) in C++17: the mosaic of a capture in, linear
-// Rec.709 out. One header on onnxruntime's C API, no other library. docs/portable.md is the contract.
+// Rec.709 out. One header on onnxruntime's C API, no other library. docs/guides/portable.md is the contract.
 //
 //     camkit::Camera camera("duet-portable", {"S"});
 //     camkit::Picture picture = camera.develop({samples, 1500, 1000, 400, {2.0f, 1.0f, 1.6f}});

@@ -231,7 +231,7 @@ def _lens_camera(
     if is_plate(lens):
         raise UnsupportedError(
             f"{lens.name} is a diffractive plate: its camera is of another kind and has a recipe "
-            "of its own (docs/plates.md); lenses and measured PSFs are taken here"
+            "of its own (docs/guides/plates.md); lenses and measured PSFs are taken here"
         )
     placement = Placement(
         f_number=camera.f_number,
@@ -246,7 +246,7 @@ def _lens_camera(
     if any(surface.grooves is not None for surface in design.surfaces):
         raise UnsupportedError(
             f"{lens.name} has grooves, which throw a haze over the picture: its camera has a "
-            "recipe of its own with [haze] (docs/thin-plate.md)"
+            "recipe of its own with [haze] (docs/guides/thin-plate.md)"
         )
     use = placed_lens(with_fields_of(design, place[1]), placement)
     check_image_circle(use, place[1], lens.name)

@@ -47,7 +47,7 @@ from camkit.runtime.bank.total_variation import (
 )
 
 CROSS_TV_WEIGHT: Final = 2.5
-"""This and the next were tuned behind `duet` (docs/losses.md)."""
+"""This and the next were tuned behind `duet` (docs/guides/losses.md)."""
 CROSS_WEIGHT: Final = 10.0
 CROSS_ROUNDS: Final = 30
 LEAST_BRIGHTNESS: Final = np.float32(0.05)

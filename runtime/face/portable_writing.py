@@ -18,7 +18,7 @@ def portable(
         sizes: Sizes of the network, such as ["S"]; None for all.
 
     Returns:
-        Bytes of every file by its name. docs/portable.md says what they hold.
+        Bytes of every file by its name. docs/guides/portable.md says what they hold.
 
     Raises:
         UnsupportedError: If a part of the chain has no graph; the message names it.

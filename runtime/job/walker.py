@@ -24,7 +24,7 @@ from camkit.runtime.rows import ArrayRows, RowSource
 from camkit.runtime.stage_finder import module_of, stage_keys
 
 FIXED_BYTES: Final = 240_000_000
-"""Interpreter and libraries, and what they keep (measured, see docs/performance.md)."""
+"""Interpreter and libraries, and what they keep (measured, see docs/guides/performance.md)."""
 USUAL_BYTES: Final = 16_000_000
 """Of a bundle, and of the weights of a network: so much is part of that."""
 

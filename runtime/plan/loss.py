@@ -6,7 +6,7 @@
 One such line per target stands in the manifest's `plan` as four entries TARGET.TERM: `exact` is the
 squared error that size M leaves (sRGB values), every other target what is added to it when a cell
 gets only that: `plain` (developed samples), `wiener` (the bank), or a smaller size of network.
-Fitted by `tools/plan_report.py calibrate`; docs/plan.md says how well.
+Fitted by `tools/plan_report.py calibrate`; docs/guides/plan.md says how well.
 """
 
 from collections.abc import Mapping

@@ -2,7 +2,7 @@
 
     bundle -> facts -> graphs + portable.safetensors + portable.json
 
-`docs/portable.md` is the contract; `examples/` holds readers.
+`docs/guides/portable.md` is the contract; `examples/` holds readers.
 """
 
 import json

@@ -20,7 +20,7 @@ from camkit.runtime.rows import Rows, read_bands
 METHODS: Final[tuple[str, ...]] = ()
 OPTIONS: Final = ("color", "exposure_ev")
 BYTES_PER_COLUMN: Final = 1_000
-"""Of rows on their way (measured, see docs/performance.md)."""
+"""Of rows on their way (measured, see docs/guides/performance.md)."""
 REST_SHARE: Final = 0.06
 
 

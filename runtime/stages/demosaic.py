@@ -25,7 +25,7 @@ from camkit.runtime.signal.demosaic import (
 METHODS: Final[tuple[str, ...]] = ()
 OPTIONS: Final = ("demosaic", "scale")
 BYTES_PER_COLUMN: Final = 2_000
-"""Of rows on their way (measured, see docs/performance.md)."""
+"""Of rows on their way (measured, see docs/guides/performance.md)."""
 REST_SHARE: Final = 0.15
 
 

@@ -19,7 +19,7 @@ from camkit.runtime.rows import Rows
 METHODS: Final[tuple[str, ...]] = ()
 OPTIONS: Final[tuple[str, ...]] = ()
 BYTES_PER_COLUMN: Final = 1_000
-"""Of rows on their way (measured, see docs/performance.md)."""
+"""Of rows on their way (measured, see docs/guides/performance.md)."""
 REST_SHARE: Final = 0.06
 
 

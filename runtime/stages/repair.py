@@ -26,7 +26,7 @@ from camkit.runtime.signal.noise import (
 METHODS: Final[tuple[str, ...]] = ()
 OPTIONS: Final[tuple[str, ...]] = ()
 BYTES_PER_COLUMN: Final = 1_000
-"""Of rows on their way (measured, see docs/performance.md)."""
+"""Of rows on their way (measured, see docs/guides/performance.md)."""
 REST_SHARE: Final = 0.2
 
 MOST_KEPT: Final = 2**18

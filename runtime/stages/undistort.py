@@ -16,7 +16,7 @@ from camkit.runtime.plan.speed import Speed
 METHODS: Final[tuple[str, ...]] = ()
 OPTIONS: Final = ("undistort",)
 BYTES_PER_COLUMN: Final = 4_280
-"""Of rows on their way (measured, see docs/performance.md)."""
+"""Of rows on their way (measured, see docs/guides/performance.md)."""
 LIMITED_BYTES_PER_COLUMN: Final = 1_060
 """Of what is looked at where overshoot is limited: four bytes a sample of a band."""
 REST_SHARE: Final = 0.25

@@ -11,7 +11,9 @@ from camkit.bundle.manifest import Manifest
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = ("bundle-chain", "bundle-streaks", "bundle-format")
-TEXTS = {page: (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8") for page in PAGES}
+TEXTS = {
+    page: (ROOT / "docs" / "reference" / f"{page}.md").read_text(encoding="utf-8") for page in PAGES
+}
 TEXT = TEXTS["bundle-chain"]
 ROWS = TEXT + TEXTS["bundle-streaks"]
 ROW = re.compile(r"^\| `([a-z0-9_/]+)\.py` \| (.+) \|$", re.MULTILINE)

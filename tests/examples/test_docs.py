@@ -174,7 +174,7 @@ def test_results_are_data_and_pictures_of_no_great_size() -> None:
 
 
 def _sections() -> dict[str, str]:
-    text = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "reference" / "commands.md").read_text(encoding="utf-8")
     parts = re.split(r"^## camkit ([a-z-]+)[^\n]*\n", text, flags=re.MULTILINE)[1:]
     return dict(zip(parts[::2], parts[1::2], strict=True))
 
@@ -195,7 +195,7 @@ def test_the_reference_lists_the_options_of_design_time(command: str) -> None:
 
 @pytest.mark.parametrize("command", sorted(_commands()["calibrate"].commands))
 def test_the_manual_of_calibration_lists_the_options_of_every_command(command: str) -> None:
-    text = (ROOT / "docs" / "calibrating.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "guides" / "calibrating.md").read_text(encoding="utf-8")
     named = [part for part in text.split("\n## ") if f"`camkit calibrate {command}`" in part]
     table = "\n".join(line for line in named[0].splitlines() if line.startswith("|"))
     _check_options(table, _commands()["calibrate"].commands[command])
@@ -210,7 +210,7 @@ def _check_options(text: str, command: Any) -> None:
 
 
 def test_the_reference_lists_what_options_of_a_kind_may_be() -> None:
-    text = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "reference" / "commands.md").read_text(encoding="utf-8")
     for option in (option for kind in KINDS.values() for option in kind.options if option.choices):
         choices = "\\|".join(option.choices)
         assert f"| `--{option.name} {choices}` |" in text, option.name
@@ -229,7 +229,7 @@ def test_the_reference_lists_the_keys_of_sidecar_and_json(tmp_path: Path) -> Non
 
 
 def test_the_format_lists_every_field_of_the_manifest() -> None:
-    text = (ROOT / "docs" / "bundle-format.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "reference" / "bundle-format.md").read_text(encoding="utf-8")
     named = set(re.findall(r"`([a-z0-9_]+)`", text))
     schema = Manifest.model_json_schema()
     fields = set(schema["properties"])

@@ -37,7 +37,7 @@ SHELL = (
 
 PAGES = [
     path
-    for path in sorted((ROOT / "docs").glob("*.md"))
+    for path in sorted((ROOT / "docs").rglob("*.md"))
     if BLOCK.search(path.read_text(encoding="utf-8"))
 ]
 

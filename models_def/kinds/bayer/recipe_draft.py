@@ -102,7 +102,7 @@ def recipe_text(draft: RecipeDraft) -> str:
     if len(depths) > 1:
         bank["depth"] = "estimated"
     lines = [
-        f"# The camera {draft.name}: every key, with its default. See docs/training.md.",
+        f"# The camera {draft.name}: every key, with its default. See docs/guides/training.md.",
         "",
         key_line("name", draft.name),
         "# Of the focus, from the first vertex of the lens.",

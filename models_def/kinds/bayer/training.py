@@ -91,7 +91,7 @@ class BayerTraining:
 
     def design(self, recipe: BayerRecipe) -> Design:
         """Return the stages of every camera of this kind, with the recipe's bank."""
-        # what the runtime does, every reader of the bundle can do: docs/portable.md
+        # what the runtime does, every reader of the bundle can do: docs/guides/portable.md
         wiener = recipe.wiener.model_copy(update={"whole_blocks": True})
         picture = wiener.takes[0]
         if recipe.haze is not None:

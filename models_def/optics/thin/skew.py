@@ -4,7 +4,7 @@ Every ray is bent at a plane, by the slope of the profile there: what `trace` do
 grooves, without their steps, so that spots follow smoothly from the numbers of the profiles. The
 planes lie half a groove into the plate, where the steps are on average; the way to the sensor is
 counted from the rear one, so a sensor at that distance from the rear face itself stands half a
-groove too far out (docs/thin-plate.md, "How it is solved").
+groove too far out (docs/guides/thin-plate.md, "How it is solved").
 """
 
 from collections.abc import Sequence

@@ -101,7 +101,7 @@ def _tolerances(file: Path, errors: Path | None) -> "Tolerances":
     if errors is not None:
         tolerances = read_tolerances(errors)
         if tolerances is None:
-            raise ContractError(f"{errors} has no [tolerance] table; see docs/tolerance.md")
+            raise ContractError(f"{errors} has no [tolerance] table; see docs/guides/tolerance.md")
         return tolerances
     of_lens = read_tolerances(file) if file.suffix.lower() == ".toml" else None
     return of_lens or Tolerances()
