@@ -19,7 +19,7 @@ STATED = {
     *("streak_clipping", "peak", "plate_rotation", "single_colour", "light_outside"),
     *("streak_like_edges", "wrong_depth", "bit_depth", "noise", "saturated_area", "blob_size"),
 }
-"""What docs/guides/stress.md names."""
+"""What docs/results/stress.md names."""
 
 
 @pytest.fixture(scope="module")
