@@ -9,7 +9,7 @@ SOURCES := camkit runtime export models_def tests tools examples/fastapi setup.p
 # else every process that a test starts compiles the product anew
 export PYTHONDONTWRITEBYTECODE =
 
-.PHONY: demo pictures test watched test-slow fuzz examples check types tidy format docs clean
+.PHONY: demo pictures test watched test-slow fuzz dist examples check types tidy format docs clean
 
 demo: $(RUNTIME_STAMP)  ## main job on the demo capture, runtime only (no torch)
 	@echo "1 of 2: a night scene with streak-hdr, on the way to out/night.png (about ten seconds)"
@@ -37,6 +37,10 @@ fuzz: $(DEV_STAMP)  ## search for bundles that camkit does not stand (Linux); FU
 	$(DEV)/bin/python -m pip install -q --disable-pip-version-check -c constraints.txt -e ".[fuzz]"
 	OMP_NUM_THREADS=1 FUZZ_SECONDS=$(FUZZ_SECONDS) $(DEV)/bin/python -m tests.hostile.fuzz
 
+dist: $(DEV_STAMP)  ## wheels and sdists of camkit (with duet) and camkit-bundles, in dist/
+	$(DEV)/bin/python -m pip install -q --disable-pip-version-check -c constraints.txt build
+	$(DEV)/bin/python -m tools.dist -o dist
+
 examples:  ## the page and the programs of examples/, with node and npm
 	@echo "Bringing 38 packages, among them onnxruntime (0.5 GB on disk), then building: about a minute"
 	cd examples && npm ci && npm run build
@@ -60,8 +64,8 @@ format: $(DEV_STAMP)
 	$(DEV)/bin/ruff check --fix $(SOURCES)
 
 $(RUNTIME_STAMP): pyproject.toml constraints.txt
-	@echo "Installing camkit and 40 packages, without torch, into $(VENV): about 210 MB to fetch,"
-	@echo "0.7 GB on disk, one to four minutes. Nothing outside this folder changes."
+	@echo "Installing camkit and 25 packages, without torch, into $(VENV): about 190 MB to fetch,"
+	@echo "0.6 GB on disk, one to four minutes. Nothing outside this folder changes."
 	$(PYTHON) -m venv $(VENV)
 	$(VENV)/bin/python -m pip install -q --disable-pip-version-check -c constraints.txt -e .
 	touch $@

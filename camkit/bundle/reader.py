@@ -9,7 +9,9 @@ session is made, since `onnx` belongs to the runtime.
 import difflib
 import hashlib
 import importlib.resources
+import importlib.util
 import math
+import tomllib
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
@@ -63,6 +65,9 @@ PLATE_HEIGHTS: Final = "plate.safetensors"
 CARD: Final = "card.md"
 PREVIEW: Final = "preview.png"
 
+BUNDLES: Final = "camkit.bundles"
+MORE_BUNDLES: Final = "camkit_bundles"
+"""Of the package camkit-bundles; in a checkout all bundles lie in the first."""
 CHECKED_AT_ONCE: Final = 2
 _MAX_MANIFEST_BYTES: Final = 2**20
 _PITCH_RTOL: Final = 1e-6
@@ -480,9 +485,18 @@ def _check_psf(
 
 
 def built_in_bundles() -> dict[str, Path]:
-    """Return the bundles that come with camkit, name -> path."""
-    folder = Path(str(importlib.resources.files("camkit.bundles")))
-    return {path.stem: path for path in sorted(folder.glob(f"*{SUFFIX}"))}
+    """Return the bundles that come with camkit and with `camkit-bundles`, name -> path."""
+    packages = (MORE_BUNDLES, BUNDLES) if importlib.util.find_spec(MORE_BUNDLES) else (BUNDLES,)
+    folders = [Path(str(importlib.resources.files(package))) for package in packages]
+    paths = {path.stem: path for folder in folders for path in folder.glob(f"*{SUFFIX}")}
+    return dict(sorted(paths.items()))
+
+
+def missing_bundles() -> list[str]:
+    """Return the names of the bundles of this version that are not installed."""
+    table = importlib.resources.files(BUNDLES) / "bundles.toml"
+    listed = tomllib.loads(table.read_text(encoding="utf-8"))
+    return sorted(listed.keys() - built_in_bundles().keys())
 
 
 def is_built_in(bundle: Bundle) -> bool:
@@ -505,6 +519,8 @@ def find_bundle(name_or_path: str | Path) -> Path:
         return path
     if path.suffix == SUFFIX or path.name != text:
         raise BundleError(f"there is no bundle file {text}")
+    if text in missing_bundles():
+        raise BundleError(f"{text} is not installed: pip install camkit-bundles")
     near = difflib.get_close_matches(text, bundles, n=3)
     hint = f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(bundles)}."
     raise BundleError(

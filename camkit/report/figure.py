@@ -12,6 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.report.judge_need import require_judge
+
 if TYPE_CHECKING:
     from matplotlib import axes, figure
 
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
     Figure = figure.Figure
 else:  # matplotlib is imported by what draws
     Panel = Figure = object
+
+require_judge()
 
 FIELD_COLORS: Final = ("#1f6fb4", "#2e8b57", "#c8452f", "#8855aa", "#b8860b", "#008b8b")
 CHANNEL_COLORS: Final = {"R": "#c8452f", "G": "#2e8b57", "B": "#1f6fb4"}

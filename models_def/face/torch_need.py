@@ -5,7 +5,7 @@ from typing import Final
 
 from camkit.errors import UnsupportedError
 
-INSTALLED_BY: Final = 'pip install -c constraints.txt -e ".[train]"'
+INSTALLED_BY: Final = "pip install 'camkit[train]'"
 """What the design side needs."""
 
 
@@ -16,6 +16,4 @@ def require_torch(command: str) -> None:
         UnsupportedError: If torch cannot be imported.
     """
     if util.find_spec("torch") is None:
-        raise UnsupportedError(
-            f"{command} needs torch; install it from the checkout with: {INSTALLED_BY}"
-        )
+        raise UnsupportedError(f"{command} needs torch; install with: {INSTALLED_BY}")

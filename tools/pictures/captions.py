@@ -7,9 +7,9 @@ from typing import Final
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
 
 from camkit.arrays import FloatArray
-from camkit.report.figure import new_figure, to_png
 
 GAP_PX: Final = 6
 JPEG: Final = (
@@ -73,18 +73,9 @@ def text_px(width_px: int) -> int:
 
 def _draw_text(lines: Sequence[Line], height: int, width: int, size_px: int) -> NDArray[np.uint8]:
     """Return a white page (height, width, 3), BGR, with lines of text."""
-    figure = new_figure(1, 1)
-    figure.set_layout_engine("none")
-    # half a pixel more, since sizes in inches are cut to whole pixels
-    figure.set_size_inches((width + 0.5) / figure.dpi, (height + 0.5) / figure.dpi)
+    page = Image.new("L", (width, height), 255)
+    pen, font = ImageDraw.Draw(page), ImageFont.load_default(size_px)
     for left, top, text, weight in lines:
-        figure.text(
-            (left + size_px / 4) / width,
-            1 - (top + size_px) / height,
-            text,
-            fontsize=size_px * 72 / figure.dpi,
-            fontweight=weight,
-            verticalalignment="center",
-        )
-    encoded = np.frombuffer(to_png(figure), np.uint8)
-    return np.asarray(cv2.imdecode(encoded, cv2.IMREAD_COLOR), np.uint8)
+        at = (left + size_px / 4, top + size_px)
+        pen.text(at, text, 0, font, anchor="lm", stroke_width=0.4 * (weight == "bold"))
+    return np.repeat(np.asarray(page, np.uint8)[..., None], 3, axis=2)

@@ -20,7 +20,7 @@ PACKAGES = [
     "onnx",
     "openvino",
     "rawpy",
-    "opencv-contrib-python-headless",
+    "opencv-python-headless",
     "OpenEXR",
     "tifffile",
     "pillow",
@@ -32,6 +32,15 @@ PACKAGES = [
     "torch",
     "onnxscript",
 ]
+PURPOSES = {
+    "charts, pages and scores of pictures": ("judge", ("matplotlib", "skimage")),
+    "design, training and export": ("train", ("torch", "onnxscript")),
+    "photon files (.h5, .mat, .ptu, .sdt)": ("spad", ("h5py", "ptufile", "sdtfile")),
+    "TIFFs of rare codecs": ("tiff", ("imagecodecs",)),
+    "batches on many machines": ("batch", ("distributed",)),
+    "networks in bfloat16": ("openvino", ("openvino",)),
+}
+"""What an extra is for -> its name and the modules that it brings."""
 
 
 def doctor(
@@ -57,7 +66,6 @@ def examine() -> dict[str, Any]:
     from camkit import __version__
     from camkit.bundle.reader import built_in_bundles
     from camkit.kinds import kinds_of_packages
-    from camkit.models_def.face.torch_need import INSTALLED_BY
     from camkit.report.bench.machine import memory_mb, package_version, processor_name
     from camkit.runtime.network.engine import available_threads, providers
     from camkit.runtime.network.openvino_session import missing_bfloat16
@@ -76,12 +84,26 @@ def examine() -> dict[str, Any]:
             "off" if os.environ.get("ORT_DISABLE_TELEMETRY") == "1" else "not switched off"
         ),
         "raw_decoder": _try_decoder(),
-        "design_time": ("ready" if util.find_spec("torch") else f"not installed: {INSTALLED_BY}"),
+        "ready_for": ready_for(),
         "bundles": {name: str(path) for name, path in sorted(built_in_bundles().items())},
         "kinds_of_packages": kinds_of_packages(),
         "stages_of_packages": states_of_packages(),
         "packages": {name: package_version(name) or "not installed" for name in PACKAGES},
     }
+
+
+def ready_for() -> dict[str, str]:
+    """Return what can be done here, and what is missing for the rest."""
+    from camkit.bundle.reader import missing_bundles
+
+    states = {"pictures of captures": "ready"}
+    if missing := missing_bundles():
+        cameras = ", ".join(missing)
+        states[f"the cameras {cameras}"] = "not installed: pip install camkit-bundles"
+    for purpose, (extra, modules) in PURPOSES.items():
+        missing = [module for module in modules if util.find_spec(module) is None]
+        states[purpose] = f"not installed: pip install 'camkit[{extra}]'" if missing else "ready"
+    return states
 
 
 def _openvino_state(missing: str | None) -> str:

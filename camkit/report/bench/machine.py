@@ -11,7 +11,7 @@ from camkit.runtime.machine.processor import processor_fact
 from camkit.runtime.network.engine import available_threads, usable_providers
 
 PACKAGES: Final = (
-    *("numpy", "scipy", "onnxruntime", "opencv-contrib-python-headless", "rawpy", "OpenEXR"),
+    *("numpy", "scipy", "onnxruntime", "opencv-python-headless", "rawpy", "OpenEXR"),
     *("tifffile", "scikit-image", "torch", "openvino"),
 )
 _TELLING: Final = ("sse4_2", "avx", "fma", "f16c", "amx", "neon", "asimd", "sve", "bf16", "i8mm")

@@ -4,7 +4,6 @@ A colour is a camera, a marker a method; its area follows peak memory.
 """
 
 from collections.abc import Iterable, Sequence
-from importlib import util
 from typing import Any, Final
 
 from camkit.report.bench.row import Row
@@ -26,18 +25,13 @@ BEST_TWO: Final = "of every camera the best\nmethod with a network\nand without"
 
 
 def draw_chart(report: dict[str, Any]) -> Figure | None:
-    """Return the chart; None if there is nothing to draw, or matplotlib is not installed.
+    """Return the chart; None if there is nothing to draw.
 
     Args:
         report: See `camkit.report.bench.run`.
     """
     cameras = [label for label in report["cameras"] if plottable(report["rows"], label)]
-    return _draw_figure(report, cameras) if cameras and has_matplotlib() else None
-
-
-def has_matplotlib() -> bool:
-    """Return whether charts can be drawn here."""
-    return util.find_spec("matplotlib") is not None
+    return _draw_figure(report, cameras) if cameras else None
 
 
 @chart

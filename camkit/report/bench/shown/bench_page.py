@@ -84,7 +84,7 @@ NOISE_NOTE: Final = (
     "row stands for it. Patches are the busiest of their captures, so their PSNR lies below "
     "the mean."
 )
-NO_CHART: Final = "No chart: it needs accuracy, and matplotlib installed."
+NO_CHART: Final = "No chart: it needs accuracy."
 
 Group = Mapping[str, Any]
 """The captures of one ISO or place, see `camkit.report.bench.split`."""

@@ -6,9 +6,13 @@ References: Wang, Bovik, Sheikh, Simoncelli 2004: SSIM, Gaussian of 1.5 px in 11
 from typing import Final
 
 import numpy as np
-from skimage.metrics import structural_similarity
 
 from camkit.arrays import FloatArray
+from camkit.report.judge_need import require_judge
+
+require_judge()
+
+from skimage.metrics import structural_similarity  # noqa: E402
 
 MOST_DB: Final = 100.0
 SIGMA_PX: Final = 1.5

@@ -1,8 +1,19 @@
 """`camkit doctor`: facts about this machine, and a decoder that was tried."""
 
 import json
+import tomllib
+from importlib import util
+from pathlib import Path
 
-from camkit.errors import DecodeError
+import pytest
+
+from camkit.bundle import reader
+from camkit.cli.judge.doctor import PURPOSES, ready_for
+from camkit.errors import BundleError, DecodeError, UnsupportedError
+from camkit.report.judge_need import require_judge
+from tests.bundle_factory import write_tiny_bundle
+
+SETTINGS = Path(__file__).resolve().parents[4] / "pyproject.toml"
 
 
 def test_doctor_tells_versions_and_tries_the_decoder(camkit_command) -> None:
@@ -15,6 +26,43 @@ def test_doctor_tells_versions_and_tries_the_decoder(camkit_command) -> None:
     assert "CPUExecutionProvider" in facts["providers"]
     assert facts["packages"]["numpy"][0].isdigit()
     assert "bf16" in facts["openvino"]
+    assert facts["ready_for"]["charts, pages and scores of pictures"] == "ready"
+
+
+def test_doctor_says_what_is_missing_for_what(monkeypatch) -> None:
+    project = tomllib.loads(SETTINGS.read_text(encoding="utf-8"))["project"]
+    assert {extra for extra, _ in PURPOSES.values()} <= project["optional-dependencies"].keys()
+    monkeypatch.setattr(util, "find_spec", lambda _: None)
+    monkeypatch.setattr(reader, "BUNDLES", "camkit.bundles")
+    states = ready_for()
+    assert states.pop("pictures of captures") == "ready"
+    extras = {
+        purpose: f"not installed: pip install 'camkit[{e}]'" for purpose, (e, _) in PURPOSES.items()
+    }
+    assert states == extras
+    with pytest.raises(UnsupportedError, match=r"matplotlib and scikit-image; .*camkit\[judge\]"):
+        require_judge()
+
+
+def test_cameras_of_the_other_package_are_found_or_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A wheel of camkit holds one camera; the rest come with camkit-bundles."""
+    own, more = tmp_path / "own_bundles", tmp_path / "more_bundles"
+    for folder, name in ((own, "duet"), (more, "tiny")):
+        folder.mkdir()
+        (folder / "__init__.py").touch()
+        write_tiny_bundle(folder, f"{name}.camkit")
+    (own / "bundles.toml").write_text("duet = {}\ntiny = {}\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(reader, "BUNDLES", "own_bundles")
+    monkeypatch.setattr(reader, "MORE_BUNDLES", "absent_bundles")
+    with pytest.raises(BundleError, match="tiny is not installed: pip install camkit-bundles"):
+        reader.find_bundle("tiny")
+    assert "the cameras tiny" in ready_for()
+    monkeypatch.setattr(reader, "MORE_BUNDLES", "more_bundles")
+    assert reader.find_bundle("tiny") == more / "tiny.camkit"
+    assert not reader.missing_bundles()
 
 
 def test_doctor_says_when_the_decoder_fails(camkit_command, monkeypatch) -> None:

@@ -15,8 +15,6 @@ from camkit.report.bench.crops import SHARP, Patch
 from camkit.report.bench.output import write_bench
 from camkit.report.bench.row import make_row
 from camkit.report.bench.run import Result
-from camkit.report.bench.shown import bench_chart
-from camkit.report.bench.shown.bench_chart import draw_chart
 from camkit.report.bench.shown.bench_page import bench_page
 from camkit.report.bench.shown.front_panel import plottable
 from camkit.report.figure import PNG_START
@@ -105,13 +103,6 @@ def test_without_accuracy_there_is_no_chart_and_an_old_one_goes(
     assert {path.suffix for path in files} == {".json", ".csv", ".html"}
     assert not (tmp_path / "bench.png").exists()
     assert "No chart" in (tmp_path / "bench.html").read_text()
-
-
-def test_without_matplotlib_there_is_no_chart(
-    result: Result, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(bench_chart, "has_matplotlib", lambda: False)
-    assert draw_chart(result.report) is None
 
 
 def test_rows_without_seconds_are_not_plotted(result: Result) -> None:
