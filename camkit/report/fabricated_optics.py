@@ -35,11 +35,12 @@ def fabricated_optics(
     cache_folder: Path,
     prescription: Path | None = None,
     depth_mm: float | None = None,
+    dense: bool = True,
 ) -> FrozenOptics:
     """Trace one fabricated copy of a bundle's lens, or read what an earlier call traced.
 
-    The field grid is twice and the wavelength grid three times as dense as the bundle's; the
-    object lies at one distance. A lens with a haze is frozen on its own grid, haze included,
+    Where `dense`, the field grid is twice and the wavelength grid three times as dense as the
+    bundle's; the object lies at one distance. A lens with a haze is frozen on its own grid, haze included,
     a minute and a half for a plate of 24 megapixels.
 
     Errors are uniform: radius +-0.2 %, thickness +-0.03 mm, index +-0.0005; the copy is focused at
@@ -52,6 +53,7 @@ def fabricated_optics(
         prescription: The lens, if the bundle does not hold it.
         depth_mm: Object distance; None for the bundle's reference depth, which alone a lens with a
             haze has.
+        dense: Else the grid is the bundle's own, a sixth of the kernels.
 
     Raises:
         ContractError: If the lens is not known or its light does not fit the kernels.
@@ -66,12 +68,14 @@ def fabricated_optics(
     content.append(repr((_max_side_px(bundle.psf), ENERGY, [depth_mm])))
     if bundle.manifest.has_haze:
         content.append(repr(bundle.haze.cell_px))
+    if not dense:
+        content.append("own grid")
     name = hashlib.sha256("\n".join(content).encode()).hexdigest()[:16]
     cached = cache_folder / f"psf-{seed}-{name}.safetensors"
     haze_path = cached.with_stem(f"haze-{seed}-{name}") if bundle.manifest.has_haze else None
     if not cached.exists():
         cache_folder.mkdir(parents=True, exist_ok=True)
-        traced = _trace(bundle, text, seed, depth_mm)
+        traced = _trace(bundle, text, seed, depth_mm, dense=dense)
         if haze_path is not None and traced.haze is not None:
             write_haze(haze_path, traced.haze)
         write_psf(cached, traced.psf)
@@ -100,7 +104,9 @@ def lens_text(bundle: Bundle, prescription: Path | None) -> str:
     return bundle.member(PRESCRIPTION).decode("utf-8")
 
 
-def _trace(bundle: Bundle, text: str, seed: int, depth_mm: float) -> FrozenOptics:
+def _trace(
+    bundle: Bundle, text: str, seed: int, depth_mm: float, *, dense: bool
+) -> FrozenOptics:
     from camkit.models_def.optics.analysis.psf_model import checked_regime
     from camkit.models_def.optics.frozen import FreezeGrid, dense_grid, freeze
     from camkit.models_def.optics.kernel_bank import focused_copies
@@ -138,5 +144,6 @@ def _trace(bundle: Bundle, text: str, seed: int, depth_mm: float) -> FrozenOptic
     )
     # bundles of before waves do not say it
     regime = checked_regime(str(bundle.freeze_fact("psf_model") or "rays")) or "rays"
-    traced = freeze(LensOptics(lens=copy, regime=regime), sensor, dense_grid(frozen_grid))
+    grid = dense_grid(frozen_grid) if dense else frozen_grid
+    traced = freeze(LensOptics(lens=copy, regime=regime), sensor, grid)
     return FrozenOptics(psf=traced.psf)

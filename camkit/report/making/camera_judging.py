@@ -118,7 +118,9 @@ def captures_of(
 
     @lru_cache(maxsize=COPIES)
     def lens(seed: int) -> FrozenOptics:
-        return fabricated_optics(bundle, seed, cache_folder=cache_folder)
+        # a kernel by waves takes as long as twenty by rays
+        dense = bundle.freeze_fact("psf_model") != "waves"
+        return fabricated_optics(bundle, seed, cache_folder=cache_folder, dense=dense)
 
     for number, (name, scene) in enumerate(scenes_of(bundle, pictures)):
         for position in POSITIONS:

@@ -39,6 +39,8 @@ def test_the_grid_is_twice_and_three_times_as_dense(bundle: Bundle, tmp_path: Pa
     psf = traced(bundle, 1, tmp_path)
     assert psf.field_heights_mm.size == 2 * 2 - 1
     assert psf.wavelengths_um.size == 3 * 3 - 2
+    own = fabricated_optics(bundle, 1, cache_folder=tmp_path, dense=False).psf
+    assert own.kernels.shape[:3] == bundle.psf.kernels.shape[:3]
 
 
 def test_a_lens_that_throws_light_far_gets_the_widest_window(
