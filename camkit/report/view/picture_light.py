@@ -1,0 +1,133 @@
+"""A result, and the capture that it was made of, as linear light: (3, h, w), upright, Rec.709."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from camkit.arrays import FloatArray
+from camkit.caller import option_text
+from camkit.errors import CamkitError, ContractError, DecodeError
+from camkit.report.view.result_search import ViewedResult
+from camkit.runtime.capture import MosaicOptions
+from camkit.runtime.files.picture import read_orientation, read_scene
+from camkit.runtime.geometry.turning import turn
+from camkit.runtime.pipeline import load
+from camkit.runtime.raw import file_sha256, is_picture
+
+_SAME: Final = ("exposure_ev", "demosaic", "scale")
+"""Options of a sidecar with which its capture is developed anew, beside the white balance."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Before:
+    """The capture before its restoration.
+
+    Attributes:
+        light: (3, h, w) float32 linear Rec.709, as large as the result; None where it is unknown.
+        note: What it is, or why it is unknown.
+    """
+
+    light: FloatArray | None
+    note: str
+
+
+def read_result(path: Path) -> FloatArray:
+    """Read a picture, developing it where it is a RAW file or a linear DNG.
+
+    Raises:
+        DecodeError: If it cannot be read; names it.
+    """
+    try:
+        if is_picture(path):
+            return np.ascontiguousarray(turn(read_scene(path), read_orientation(path)))
+        return _developed(path, {}, None)
+    except OSError as error:
+        raise DecodeError(f"cannot read {path}: {error.strerror or error}") from error
+
+
+def find_before(result: ViewedResult, given: Path | None, size_px: tuple[int, int]) -> Before:
+    """Return the capture of a result, developed alone.
+
+    Args:
+        result: The result.
+        given: A picture or capture that stands for it; None for that which the sidecar names.
+        size_px: (height, width) that it must have.
+
+    Raises:
+        ContractError: If what is given is of another size.
+        DecodeError: If what is given cannot be read.
+    """
+    if given is not None:
+        light = read_result(given)
+        if light.shape[1:] != size_px:
+            raise ContractError(
+                f"{given} is {_size_text(light.shape[1:])}, the result {_size_text(size_px)}: "
+                f"{option_text('before')} must be of the same size"
+            )
+        return Before(light=light, note=f"Before is {given.name}.")
+    if result.record is None:
+        return Before(light=None, note=f"There is no before: {_advice()}.")
+    source, reason = find_capture(result)
+    if source is None:
+        return Before(light=None, note=f"There is no before: {reason}; {_advice()}.")
+    try:
+        light = _developed(source, *_settings(result.record))
+    except CamkitError as error:
+        return Before(light=None, note=f"There is no before: {error}; {_advice()}.")
+    if light.shape[1:] != size_px:
+        sizes = f"it is {_size_text(light.shape[1:])}, the result {_size_text(size_px)}"
+        return Before(light=None, note=f"There is no before: {sizes}; {_advice()}.")
+    return Before(
+        light=light,
+        note=f"Before is {source.name}, only developed: demosaicked, white balance and colour "
+        "applied, nothing restored.",
+    )
+
+
+def find_capture(result: ViewedResult) -> tuple[Path | None, str]:
+    """Return the capture that a sidecar names, if it is there and unchanged, else why not."""
+    record = result.record or {}
+    named = Path(str(record.get("input")))
+    stated, base = Path(str(record.get("output"))), result.path.resolve().parent
+    # the sidecar's paths count from the folder in which camkit process ran
+    ran_in = base
+    if not stated.is_absolute():
+        for _ in stated.parent.parts:
+            ran_in = ran_in.parent
+    places = (named, ran_in / named, base / named.name, base.parent / named.name)
+    files = [place for place in places if place.is_file()]
+    if not files:
+        return None, f"the capture {named} is not there"
+    for file in files:
+        if file_sha256(file) == record.get("input_sha256"):
+            return file, ""
+    return None, f"{files[0]} is not the capture that was processed: its hash differs"
+
+
+def _settings(record: Mapping[str, Any]) -> tuple[dict[str, Any], MosaicOptions | None]:
+    options = record.get("options")
+    if not isinstance(options, dict):
+        return {}, None
+    if options.get("tone") is not None or options.get("halves") is not None:
+        raise ContractError("the capture was read with a tone curve, or as two halves")
+    choices = {name: options[name] for name in _SAME if name in options}
+    if (gains := options.get("white_balance")) is not None:
+        choices["white_balance"] = tuple(gains)
+    mosaic = options.get("mosaic")
+    return choices, None if mosaic is None else MosaicOptions(**mosaic)
+
+
+def _developed(path: Path, choices: Mapping[str, Any], mosaic: MosaicOptions | None) -> FloatArray:
+    developed = load("none", **choices).process(path, mosaic=mosaic)
+    return np.ascontiguousarray(turn(developed.image, developed.orientation))
+
+
+def _size_text(size_px: tuple[int, ...]) -> str:
+    return f"{size_px[1]} x {size_px[0]} px"
+
+
+def _advice() -> str:
+    return f"{option_text('before')} gives one"
