@@ -1,5 +1,6 @@
 """A result, and the capture that it was made of, as linear light: (3, h, w), upright, Rec.709."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from camkit.arrays import FloatArray
+from camkit.bundle.reader import find_bundle, open_bundle
 from camkit.caller import option_text
 from camkit.errors import CamkitError, ContractError, DecodeError
 from camkit.report.view.result_search import ViewedResult
@@ -15,10 +17,16 @@ from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.files.picture import read_orientation, read_scene
 from camkit.runtime.geometry.turning import turn
 from camkit.runtime.pipeline import load
+from camkit.runtime.plan.decision import DEVELOP
 from camkit.runtime.raw import file_sha256, is_picture
 
 _SAME: Final = ("exposure_ev", "demosaic", "scale")
 """Options of a sidecar with which its capture is developed anew, beside the white balance."""
+_SAME_OF_BUNDLE: Final = (
+    *("configuration", "vignetting", "undistort", "assume", "force_bundle", "depth_m"),
+)
+"""Likewise those that mean something with its bundle alone."""
+_NONE: Final = "none"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,18 +81,33 @@ def find_before(result: ViewedResult, given: Path | None, size_px: tuple[int, in
     source, reason = find_capture(result)
     if source is None:
         return Before(light=None, note=f"There is no before: {reason}; {_advice()}.")
+    bundle = _bundle_of(result.record)
     try:
-        light = _developed(source, *_settings(result.record))
+        light = _developed(source, *_settings(result.record, bundle), bundle=bundle)
     except CamkitError as error:
         return Before(light=None, note=f"There is no before: {error}; {_advice()}.")
     if light.shape[1:] != size_px:
         sizes = f"it is {_size_text(light.shape[1:])}, the result {_size_text(size_px)}"
         return Before(light=None, note=f"There is no before: {sizes}; {_advice()}.")
+    is_same = bundle != _NONE
+    geometry = "as in the result" if is_same else "not corrected, so that edges may be shifted"
     return Before(
         light=light,
         note=f"Before is {source.name}, only developed: demosaicked, white balance and colour "
-        "applied, nothing restored.",
+        f"applied, nothing restored; vignetting and distortion are {geometry}.",
     )
+
+
+def _bundle_of(record: Mapping[str, Any]) -> str:
+    """Return the bundle of a sidecar where this very one is at hand, else none."""
+    name = record.get("bundle")
+    if not name:
+        return _NONE
+    try:
+        bundle = open_bundle(find_bundle(str(name)))
+    except CamkitError:
+        return _NONE
+    return str(bundle.path) if bundle.sha256 == record["bundle_sha256"] else _NONE
 
 
 def find_capture(result: ViewedResult) -> tuple[Path | None, str]:
@@ -107,21 +130,35 @@ def find_capture(result: ViewedResult) -> tuple[Path | None, str]:
     return None, f"{files[0]} is not the capture that was processed: its hash differs"
 
 
-def _settings(record: Mapping[str, Any]) -> tuple[dict[str, Any], MosaicOptions | None]:
+def _settings(
+    record: Mapping[str, Any], bundle: str
+) -> tuple[dict[str, Any], MosaicOptions | None]:
     options = record.get("options")
     if not isinstance(options, dict):
         return {}, None
     if options.get("tone") is not None or options.get("halves") is not None:
         raise ContractError("the capture was read with a tone curve, or as two halves")
-    choices = {name: options[name] for name in _SAME if name in options}
-    if (gains := options.get("white_balance")) is not None:
-        choices["white_balance"] = tuple(gains)
+    names = _SAME if bundle == _NONE else (*_SAME, *_SAME_OF_BUNDLE)
+    choices = {name: options[name] for name in names if name in options}
+    if choices.get("depth_m") == "inf":
+        choices["depth_m"] = math.inf
+    for name in ("white_balance", "origin_px"):
+        if options.get(name) is not None and (name != "origin_px" or bundle != _NONE):
+            choices[name] = tuple(options[name])
+    if bundle != _NONE:
+        choices["method"] = DEVELOP
     mosaic = options.get("mosaic")
     return choices, None if mosaic is None else MosaicOptions(**mosaic)
 
 
-def _developed(path: Path, choices: Mapping[str, Any], mosaic: MosaicOptions | None) -> FloatArray:
-    developed = load("none", **choices).process(path, mosaic=mosaic)
+def _developed(
+    path: Path,
+    choices: Mapping[str, Any],
+    mosaic: MosaicOptions | None,
+    *,
+    bundle: str = _NONE,
+) -> FloatArray:
+    developed = load(bundle, **choices).process(path, mosaic=mosaic)
     return np.ascontiguousarray(turn(developed.image, developed.orientation))
 
 

@@ -6,12 +6,12 @@ from typing import Any, Final
 from camkit.bundle.reader import find_bundle, open_bundle
 from camkit.errors import CamkitError
 from camkit.report.pages.page import Cell, Part, Row, Table, Words, sentences
+from camkit.report.stress.measured_ranges import OPEN_HIGH
 from camkit.runtime.envelope import QUANTITIES
 
 _SLOWEST: Final = 3
 _HIGHLIGHTS: Final = {
-    "peak": "the brightest light that was recovered is {:.4g} times white",
-    "regions": "{:.0f} group(s) of clipped lights",
+    "regions": "groups of clipped lights that were recovered: {:.0f}",
     "saturated_fraction": "{:.2%} of the samples were saturated",
     "unexplained": "{:.2%} of the streaks are not explained by the lights",
 }
@@ -63,7 +63,7 @@ def range_table(record: Mapping[str, Any]) -> Table | None:
             (
                 Cell(text=QUANTITIES.get(name, name), look="words"),
                 f"{value:.4g}",
-                "-" if span is None else f"{span[0]:.3g} to {span[1]:.3g}",
+                "-" if span is None else _span_text(*span),
                 Cell(text="-" if span is None else "yes" if is_inside else "no",
                      look="" if is_inside else "bad"),
             )
@@ -75,6 +75,10 @@ def key_table(record: Mapping[str, Any]) -> Table:
     """Return every key of a sidecar with its value."""
     rows = [(key, Cell(text=text, look="words")) for key, text in _flat(record, "")]
     return Table(header=("key", "value"), rows=rows)
+
+
+def _span_text(low: float, high: float) -> str:
+    return f"{low:.3g} or more" if high >= OPEN_HIGH else f"{low:.3g} to {high:.3g}"
 
 
 def _ranges(record: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
@@ -105,10 +109,12 @@ def _camera(record: Mapping[str, Any]) -> str:
 
 def _work(record: Mapping[str, Any]) -> str:
     seconds = record["seconds"]
-    way = "developed it without a bundle"
+    way = "developed alone, without a bundle"
     if record.get("bundle"):
         size = record.get("size") or record.get("plan", {}).get("size")
-        way = f"used the bundle {record['bundle']}" + (f" with network {size}" if size else "")
+        way = f"made with the bundle {record['bundle']}" + (
+            f" and its network {size}" if size else ""
+        )
     total = sum(seconds.values())
     slow = sorted(seconds.items(), key=lambda item: -item[1])[:_SLOWEST]
     slowest = ", ".join(f"{name} {value:.2f} s" for name, value in slow)
@@ -119,8 +125,8 @@ def _work(record: Mapping[str, Any]) -> str:
     ]
     skipped = f" It left out: {', '.join(left_out)}." if left_out else ""
     return (
-        f"camkit {record.get('camkit', '')} {way}. It took {total:.2f} s, most of it for "
-        f"{slowest}, and at most {record['peak_rss_mb']:.0f} MB of memory.{skipped}"
+        f"The result was {way}, by camkit {record.get('camkit', '')}. It took {total:.2f} s, most "
+        f"for {slowest}, and at most {record['peak_rss_mb']:.0f} MB of memory.{skipped}"
     )
 
 

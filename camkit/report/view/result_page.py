@@ -10,6 +10,7 @@ import numpy as np
 
 from camkit.caller import option_text
 from camkit.errors import ContractError
+from camkit.progress import counted
 from camkit.report.pages.page import Cell, Details, Page, Part, Section, Table, Words
 from camkit.report.view.cell_map import TIER_WORDS, spared_cells
 from camkit.report.view.crops import choose_crops
@@ -32,7 +33,7 @@ from camkit.report.view.viewers import film_viewer, map_viewer, picture_viewer
 from camkit.runtime.kinds.spad.products.preview import white_of
 
 BRIGHT: Final = 1.02
-"""Light from which on a picture gets an exposure slider: floats of white itself scatter a little."""
+"""Light from which on a picture gets an exposure slider: white itself scatters a little."""
 PHOTON_SIDE_PX: Final = 768
 """About as large as pictures of few pixels are shown."""
 KEYS: Final = (
@@ -57,7 +58,7 @@ def result_page(
         ContractError: If a part lies outside, or `before` fits no result.
     """
     sections = []
-    for number, result in enumerate(results, start=1):
+    for number, result in enumerate(counted(results, "reading", "results"), start=1):
         make = _photon_parts if result.is_archive else _picture_parts
         if result.is_archive and (crops or before is not None):
             unused = "before" if before is not None else "crop"
@@ -100,8 +101,8 @@ def _picture_parts(
     facts = f"The picture has {width} x {height} px."
     if is_bright:
         facts += (
-            f" Its brightest sample is {peak:.4g} times white: lower the exposure to look into the "
-            "lamps. The page keeps light from 1/4096 of white to the brightest sample."
+            f" Its brightest sample is {peak:.4g} times white: lower the exposure to look into "
+            "lights. The page keeps light from 1/4096 of white to the brightest sample."
         )
     viewer = picture_viewer(
         result.path.name,
@@ -117,7 +118,11 @@ def _picture_parts(
 def _spared_note(result: ViewedResult, cells: object) -> Part:
     if cells:
         letters = ", ".join(f"{letter} {text}" for letter, text in TIER_WORDS.items())
-        return Words(f"Letters of the cells in which work was spared: {letters}.", "small")
+        return Words(
+            f"Letters of the cells in which work was spared: {letters}. Cells lie where they are on "
+            "the sensor, before distortion is corrected.",
+            "small",
+        )
     if result.record is None:
         return None
     is_whole = cells is not None or not result.record.get("plan", {}).get("decisions")

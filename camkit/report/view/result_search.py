@@ -11,6 +11,8 @@ from camkit.runtime.output.sidecar import SIDECAR_SUFFIX, read_sidecar, sidecar_
 from camkit.runtime.raw import file_sha256
 
 ARCHIVE_SUFFIX: Final = ".npz"
+_TYPES: Final = {"seconds": dict, "plan": dict, "options": dict, "warnings": list, "output": str}
+"""Of what a page reads in a sidecar."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,7 +81,7 @@ def _result_of(path: Path) -> ViewedResult:
             notes=(f"{file.name} does not lie beside it: only the picture is known",),
         )
     record = read_sidecar(near)
-    if record is None:
+    if record is None or any(not isinstance(record.get(k), v) for k, v in _TYPES.items()):
         raise DecodeError(f"{file} is damaged, or not a sidecar of this version of camkit")
     return _believed_result(path, record, is_sidecar=is_sidecar)
 

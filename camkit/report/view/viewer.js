@@ -196,7 +196,7 @@ function pictureViewer(viewer, data) {
 /** Size a canvas of few pixels so that each is a whole number of pixels of the page, if it can be. */
 function enlarge(viewer, canvas) {
   const times = Math.min(viewer.clientWidth, 1024) / canvas.width;
-  canvas.style.width = `${canvas.width * (times > 1 ? Math.floor(times) : times)}px`;
+  canvas.style.width = `${canvas.width * (times >= 2 ? Math.floor(times) : times)}px`;
 }
 
 async function mapViewer(viewer, data) {

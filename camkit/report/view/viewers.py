@@ -160,7 +160,7 @@ def _stage(name: str, *, has_before: bool) -> str:
 
 
 def _buttons(label: str, names: Sequence[str]) -> str:
-    if len(names) < 2:  # noqa: PLR2004 - one needs no choice
+    if len(names) < 2:
         return ""
     buttons = "".join(
         f'<button type="button" aria-pressed="{str(not number).lower()}">{escape(text)}</button>'
