@@ -16,10 +16,11 @@ def view(
         typer.Argument(help="Results, their sidecars, or folders of them.", metavar="RESULT..."),
     ],
     out: Annotated[Path, typer.Option("-o", "--out", help="Page to write (.html).")],
-    before: Annotated[
+    before_file: Annotated[
         Path | None,
         typer.Option(
-            help="Picture or capture to compare with; default: the capture that the sidecar names."
+            "--before",
+            help="Picture or capture to compare with; default: the capture that the sidecar names.",
         ),
     ] = None,
     crop: Annotated[
@@ -37,7 +38,7 @@ def view(
     from camkit.report.view.page_making import view as write
 
     crops = [whole_pair(text, "--crop") for text in crop or ()]
-    page = write(results, out, before=before, crops=crops, overwrite=overwrite)
+    page = write(results, out, before_file=before_file, crops=crops, overwrite=overwrite)
     if json_:
         say(json.dumps(page.to_json()))
         return

@@ -2,7 +2,7 @@
 
 result_search   files, sidecars and folders become results with their records
 picture_light   a result, and what the capture was, as linear light
-crops           the places that are shown at 100 %
+view_crops      the places that are shown at 100 %
 page_data       light, maps and films as data of a page
 viewers         the viewer of a picture, of maps and of a film: markup with its data
 photon_arrays   maps and films of a camera that counts photons

@@ -1,4 +1,4 @@
-"""Where the plan of a capture spared work, as rectangles of the picture that stands upright."""
+"""Cells in which the plan of a capture spared work, as rectangles of the upright picture."""
 
 from collections.abc import Mapping
 from typing import Any, Final

@@ -46,7 +46,7 @@ def view(
     results: Sequence[FilePath] | FilePath,
     out: FilePath,
     *,
-    before: FilePath | None = None,
+    before_file: FilePath | None = None,
     crops: Sequence[tuple[int, int]] = (),
     overwrite: bool = False,
 ) -> ViewPage:
@@ -56,7 +56,7 @@ def view(
         results: Pictures (EXR, TIFF, PNG, JPEG, linear DNG) or archives of photons (NPZ) with the
             sidecars beside them, the sidecars, or folders of them.
         out: The page to write, one HTML file.
-        before: Picture or capture that stands on the left of the slider; None for the capture that
+        before_file: Picture or capture that stands on the left of the slider; None for the capture that
             the sidecar names, developed alone. For one picture.
         crops: (x, y) in px of parts to show at 100 %, beside those that are chosen.
         overwrite: Whether a page that exists is replaced.
@@ -64,23 +64,25 @@ def view(
     Raises:
         DecodeError: If a result cannot be read; names it.
         ContractError: If the page exists or would be larger than `MOST_MB`, a part lies outside, or
-            `before` fits no result.
+            `before_file` fits no result.
     """
     path = Path(out)
     refuse_existing([path], overwrite=overwrite)
-    shown = find_results(list_paths(results))
-    if not shown:
+    viewed = find_results(list_paths(results))
+    if not viewed:
         raise ContractError("there is no result to show; give pictures, sidecars or folders")
-    if before is not None and len(shown) > 1:
-        raise ContractError(f"{option_text('before')} is for one result; there are {len(shown)}")
-    text = _with_size(result_page(shown, optional_path(before), crops))
+    if before_file is not None and len(viewed) > 1:
+        raise ContractError(
+            f"{option_text('before_file')} is for one result; there are {len(viewed)}"
+        )
+    text = _with_size(result_page(viewed, optional_path(before_file), crops))
     megabytes = len(text) / _BYTES_PER_MB
     if megabytes > MOST_MB:
         raise ContractError(
             f"the page would have {megabytes:.0f} MB, more than {MOST_MB}: show fewer results on it"
         )
     write_together({path: text})
-    return ViewPage(path=path, results=tuple(one.path for one in shown), megabytes=megabytes)
+    return ViewPage(path=path, results=tuple(one.path for one in viewed), megabytes=megabytes)
 
 
 def _with_size(page: Page) -> bytes:

@@ -76,10 +76,12 @@ def read_archive(path: Path) -> dict[str, NDArray[Any]]:
             arrays = {name: file[name] for name in file.files}
     except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
         raise DecodeError(f"cannot read {path}: {error}") from error
-    known = {"depth_m", "lifetime_ps", "intensity", "frames", "transient"}
-    if not known & arrays.keys():
+    products = {"depth_m", "lifetime_ps", "intensity", "frames", "transient"}
+    if not products & arrays.keys():
         names = ", ".join(sorted(arrays)) or "nothing"
-        raise DecodeError(f"{path} holds {names}; a result has one of {', '.join(sorted(known))}")
+        raise DecodeError(
+            f"{path} holds {names}; a result has one of {', '.join(sorted(products))}"
+        )
     return arrays
 
 
@@ -110,18 +112,20 @@ def film_of(arrays: Mapping[str, NDArray[Any]]) -> Film | None:
     if name is None or arrays[name].ndim != 3:
         return None
     frames = arrays[name]
-    apart = max(1, -(-frames.size // MOST_FILM_SAMPLES))
-    chosen = frames[::apart]
+    stride = max(1, -(-frames.size // MOST_FILM_SAMPLES))
+    frames_shown = frames[::stride]
     is_flight = name == "transient"
     white = white_of_flight(frames) if is_flight else max(map(white_of, frames))
-    share = np.clip(chosen / max(white, 1e-9), 0, 1)
-    labels = [f"frame {number * apart + 1} of {len(frames)}" for number in range(len(chosen))]
+    share = np.clip(frames_shown / max(white, 1e-9), 0, 1)
+    labels = [
+        f"frame {number * stride + 1} of {len(frames)}" for number in range(len(frames_shown))
+    ]
     if is_flight and "time_ps" in arrays:
-        times = arrays["time_ps"][::apart]
+        times = arrays["time_ps"][::stride]
         labels = [f"{label}, {time:.0f} ps" for label, time in zip(labels, times, strict=True)]
     note = f"White is {white:.3g} photons, shown with gamma {GAMMA}."
-    if apart > 1:
-        note += f" One of {apart} frames is shown: the page would be too large otherwise."
+    if stride > 1:
+        note += f" One of {stride} frames is shown: the page would be too large otherwise."
     return Film(
         name="Light in flight" if is_flight else "Film of photons",
         codes=np.round(share ** (1 / GAMMA) * 255).astype(np.uint8),
@@ -148,8 +152,8 @@ def photons_before(result: ViewedResult, shape: tuple[int, int]) -> tuple[Any | 
     timing = (result.record or {}).get("options", {}).get("of_kind", {}).get("timing")
     choices = {"timing": timing} if timing else {}
     try:
-        made = load("none", kind="spad", product="intensity", **choices).run(source)
-        photons = made.arrays["intensity"]
+        developed = load("none", kind="spad", product="intensity", **choices).run(source)
+        photons = developed.arrays["intensity"]
     except (CamkitError, KeyError) as error:
         return None, f"There is no before: {error}."
     times = shape[0] // photons.shape[-2]
@@ -157,7 +161,7 @@ def photons_before(result: ViewedResult, shape: tuple[int, int]) -> tuple[Any | 
     if large.shape != shape:
         return None, "There is no before: the capture is of another size."
     return large, (
-        f"Before is {source.name}: the photons of each pixel of the array, nothing made finer."
+        f"Before is {source.name}: the photons of each pixel of the array, nothing developed finer."
     )
 
 
@@ -173,14 +177,14 @@ def _layers(
 
 
 def _map(name: str, unit: str, values: NDArray[Any], colours: str, *, is_turned: bool) -> ValueMap:
-    apart = -(-max(values.shape) // MOST_SIDE_PX)
-    shown = np.asarray(values[::apart, ::apart], dtype=np.float64)
-    finite = shown[np.isfinite(shown)]
+    stride = -(-max(values.shape) // MOST_SIDE_PX)
+    plane = np.asarray(values[::stride, ::stride], dtype=np.float64)
+    finite = plane[np.isfinite(plane)]
     low, high = np.percentile(finite, PERCENTILES) if finite.size else (0.0, 1.0)
     return ValueMap(
         name=name,
         unit=unit,
-        values=shown,
+        values=plane,
         low=float(low),
         high=float(max(high, low + 1e-9)),
         colours=colours,

@@ -30,7 +30,7 @@ _NONE: Final = "none"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Before:
+class Original:
     """The capture before its restoration.
 
     Attributes:
@@ -56,42 +56,44 @@ def read_result(path: Path) -> FloatArray:
         raise DecodeError(f"cannot read {path}: {error.strerror or error}") from error
 
 
-def find_before(result: ViewedResult, given: Path | None, size_px: tuple[int, int]) -> Before:
+def find_original(
+    result: ViewedResult, before_file: Path | None, size_px: tuple[int, int]
+) -> Original:
     """Return the capture of a result, developed alone.
 
     Args:
         result: The result.
-        given: A picture or capture that stands for it; None for that which the sidecar names.
+        before_file: A picture or capture that stands for it; None for that which the sidecar names.
         size_px: (height, width) that it must have.
 
     Raises:
         ContractError: If what is given is of another size.
         DecodeError: If what is given cannot be read.
     """
-    if given is not None:
-        light = read_result(given)
+    if before_file is not None:
+        light = read_result(before_file)
         if light.shape[1:] != size_px:
             raise ContractError(
-                f"{given} is {_size_text(light.shape[1:])}, the result {_size_text(size_px)}: "
-                f"{option_text('before')} must be of the same size"
+                f"{before_file} is {_size_text(light.shape[1:])}, the result {_size_text(size_px)}: "
+                f"{option_text('before_file')} must be of the same size"
             )
-        return Before(light=light, note=f"Before is {given.name}.")
+        return Original(light=light, note=f"Before is {before_file.name}.")
     if result.record is None:
-        return Before(light=None, note=f"There is no before: {_advice()}.")
+        return Original(light=None, note=f"There is no before: {_advice()}.")
     source, reason = find_capture(result)
     if source is None:
-        return Before(light=None, note=f"There is no before: {reason}; {_advice()}.")
+        return Original(light=None, note=f"There is no before: {reason}; {_advice()}.")
     bundle = _bundle_of(result.record)
     try:
         light = _developed(source, *_settings(result.record, bundle), bundle=bundle)
     except CamkitError as error:
-        return Before(light=None, note=f"There is no before: {error}; {_advice()}.")
+        return Original(light=None, note=f"There is no before: {error}; {_advice()}.")
     if light.shape[1:] != size_px:
         sizes = f"it is {_size_text(light.shape[1:])}, the result {_size_text(size_px)}"
-        return Before(light=None, note=f"There is no before: {sizes}; {_advice()}.")
+        return Original(light=None, note=f"There is no before: {sizes}; {_advice()}.")
     is_same = bundle != _NONE
     geometry = "as in the result" if is_same else "not corrected, so that edges may be shifted"
-    return Before(
+    return Original(
         light=light,
         note=f"Before is {source.name}, only developed: demosaicked, white balance and colour "
         f"applied, nothing restored; vignetting and distortion are {geometry}.",
@@ -113,17 +115,22 @@ def _bundle_of(record: Mapping[str, Any]) -> str:
 def find_capture(result: ViewedResult) -> tuple[Path | None, str]:
     """Return the capture that a sidecar names, if it is there and unchanged, else why not."""
     record = result.record or {}
-    named = Path(str(record.get("input")))
-    stated, base = Path(str(record.get("output"))), result.path.resolve().parent
+    named_file = Path(str(record.get("input")))
+    output, base = Path(str(record.get("output"))), result.path.resolve().parent
     # the sidecar's paths count from the folder in which camkit process ran
     ran_in = base
-    if not stated.is_absolute():
-        for _ in stated.parent.parts:
+    if not output.is_absolute():
+        for _ in output.parent.parts:
             ran_in = ran_in.parent
-    places = (named, ran_in / named, base / named.name, base.parent / named.name)
+    places = (
+        named_file,
+        ran_in / named_file,
+        base / named_file.name,
+        base.parent / named_file.name,
+    )
     files = [place for place in places if place.is_file()]
     if not files:
-        return None, f"the capture {named} is not there"
+        return None, f"the capture {named_file} is not there"
     for file in files:
         if file_sha256(file) == record.get("input_sha256"):
             return file, ""
@@ -167,4 +174,4 @@ def _size_text(size_px: tuple[int, ...]) -> str:
 
 
 def _advice() -> str:
-    return f"{option_text('before')} gives one"
+    return f"{option_text('before_file')} gives one"

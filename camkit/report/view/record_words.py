@@ -134,8 +134,10 @@ def _sections(record: Mapping[str, Any]) -> list[str]:
     notes = []
     if record.get("clipped_fraction") is not None:
         notes.append(f"{record['clipped_fraction']:.2%} of the samples were clipped")
-    found = record.get("hdr", {})
-    notes += [text.format(found[key]) for key, text in _HIGHLIGHTS.items() if key in found]
+    highlights = record.get("hdr", {})
+    notes += [
+        text.format(highlights[key]) for key, text in _HIGHLIGHTS.items() if key in highlights
+    ]
     if photons := record.get("spad", {}).get("photons"):
         notes.append(f"the sensor counted about {photons:,.0f} photons")
     if (valid := record.get("spad", {}).get("valid")) and record["spad"].get("pixels"):

@@ -13,7 +13,6 @@ from camkit.errors import ContractError
 from camkit.progress import counted
 from camkit.report.pages.page import Cell, Details, Page, Part, Section, Table, Words
 from camkit.report.view.cell_map import TIER_WORDS, spared_cells
-from camkit.report.view.crops import choose_crops
 from camkit.report.view.photon_arrays import (
     ValueMap,
     film_of,
@@ -21,7 +20,7 @@ from camkit.report.view.photon_arrays import (
     photons_before,
     read_archive,
 )
-from camkit.report.view.picture_light import find_before, read_result
+from camkit.report.view.picture_light import find_original, read_result
 from camkit.report.view.record_words import (
     decision_table,
     key_table,
@@ -29,6 +28,7 @@ from camkit.report.view.record_words import (
     record_sentences,
 )
 from camkit.report.view.result_search import ViewedResult
+from camkit.report.view.view_crops import choose_crops
 from camkit.report.view.viewers import film_viewer, map_viewer, picture_viewer
 from camkit.runtime.kinds.spad.products.preview import white_of
 
@@ -44,29 +44,29 @@ KEYS: Final = (
 
 
 def result_page(
-    results: Sequence[ViewedResult], before: Path | None, crops: Sequence[tuple[int, int]]
+    results: Sequence[ViewedResult], before_file: Path | None, crops: Sequence[tuple[int, int]]
 ) -> Page:
     """Return the page of results.
 
     Args:
         results: At least one.
-        before: Picture or capture that stands for the capture of the one result.
+        before_file: Picture or capture that stands for the capture of the one result.
         crops: (x, y) of parts to show at 100 %.
 
     Raises:
         DecodeError: If a result cannot be read; names it.
-        ContractError: If a part lies outside, or `before` fits no result.
+        ContractError: If a part lies outside, or `before_file` fits no result.
     """
     sections = []
     for number, result in enumerate(counted(results, "reading", "results"), start=1):
         make = _photon_parts if result.is_archive else _picture_parts
-        if result.is_archive and (crops or before is not None):
-            unused = "before" if before is not None else "crop"
+        if result.is_archive and (crops or before_file is not None):
+            unused = "before_file" if before_file is not None else "crops"
             raise ContractError(
                 f"{option_text(unused)} is for pictures; {result.path.name} holds photons"
             )
         parts = [*(Words(f"Note: {note}.", "note") for note in result.notes)]
-        parts += make(result, before, crops) if make is _picture_parts else make(result)
+        parts += make(result, before_file, crops) if make is _picture_parts else make(result)
         sections.append(
             Section(result.path.name, [*parts, *_record_parts(result)], f"result-{number}")
         )
@@ -90,12 +90,12 @@ def _contents(results: Sequence[ViewedResult]) -> Table | None:
 
 
 def _picture_parts(
-    result: ViewedResult, given: Path | None, centres: Sequence[tuple[int, int]]
+    result: ViewedResult, before_file: Path | None, centres: Sequence[tuple[int, int]]
 ) -> list[Part]:
-    light = read_result(result.path)
-    height, width = light.shape[1:]
-    before = find_before(result, given, (height, width))
-    peak = float(light.max())
+    after = read_result(result.path)
+    height, width = after.shape[1:]
+    before = find_original(result, before_file, (height, width))
+    peak = float(after.max())
     is_bright = peak > BRIGHT
     cells = None if result.record is None else spared_cells(result.record, (height, width))
     facts = f"The picture has {width} x {height} px."
@@ -106,9 +106,9 @@ def _picture_parts(
         )
     viewer = picture_viewer(
         result.path.name,
-        light,
+        after,
         before.light,
-        choose_crops(light, before.light, centres),
+        choose_crops(after, before.light, centres),
         is_bright=is_bright,
         cells=cells,
     )
@@ -119,8 +119,8 @@ def _spared_note(result: ViewedResult, cells: object) -> Part:
     if cells:
         letters = ", ".join(f"{letter} {text}" for letter, text in TIER_WORDS.items())
         return Words(
-            f"Letters of the cells in which work was spared: {letters}. Cells lie where they are on "
-            "the sensor, before distortion is corrected.",
+            f"Letters of the cells in which work was spared: {letters}. Cells lie where they are "
+            "on the sensor, before distortion is corrected.",
             "small",
         )
     if result.record is None:
@@ -144,7 +144,7 @@ def _photon_parts(result: ViewedResult) -> list[Part]:
 
 
 def _photon_picture(result: ViewedResult, photons: np.ndarray) -> list[Part]:
-    before, note = photons_before(result, photons.shape)
+    coarse, note = photons_before(result, photons.shape)
     white = max(white_of(photons), 1e-9)
     times = max(1, PHOTON_SIDE_PX // max(photons.shape))
 
@@ -152,21 +152,21 @@ def _photon_picture(result: ViewedResult, photons: np.ndarray) -> list[Part]:
         large = np.maximum(values / white, 0).astype(np.float32)
         return np.stack([large.repeat(times, axis=0).repeat(times, axis=1)] * 3)
 
-    light = light_of(photons)
-    old = None if before is None else light_of(before)
+    after = light_of(photons)
+    before = None if coarse is None else light_of(coarse)
     facts = (
         f"The picture has {photons.shape[1]} x {photons.shape[0]} px, each drawn {times} px wide. "
         f"White is {white:.4g} photons."
     )
-    crops = choose_crops(light, old, ())
-    return [facts, note, picture_viewer(result.path.name, light, old, crops, is_bright=True)]
+    crops = choose_crops(after, before, ())
+    return [facts, note, picture_viewer(result.path.name, after, before, crops, is_bright=True)]
 
 
 def _map_note(maps: Sequence[ValueMap]) -> str:
     height, width = maps[0].values.shape
-    known = np.isfinite(maps[0].values).mean()
+    valid = np.isfinite(maps[0].values).mean()
     return (
-        f"The map has {width} x {height} px, {known:.1%} of them valid; others are grey. Colours "
+        f"The map has {width} x {height} px, {valid:.1%} of them valid; others are grey. Colours "
         "run between the percentiles 2 and 98, values beyond have the colours of the ends."
     )
 

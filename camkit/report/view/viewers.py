@@ -10,7 +10,6 @@ import numpy as np
 from camkit.arrays import FloatArray
 from camkit.report.pages.page import Widget
 from camkit.report.view.cell_map import TIER_WORDS
-from camkit.report.view.crops import Crop
 from camkit.report.view.page_data import (
     coded_bytes,
     coded_colours,
@@ -20,6 +19,7 @@ from camkit.report.view.page_data import (
     light_scale,
 )
 from camkit.report.view.photon_arrays import Film, ValueMap
+from camkit.report.view.view_crops import Crop
 
 MOST_EV: Final = 6
 Cells = Sequence[tuple[int, int, int, int, str]]
@@ -27,7 +27,7 @@ Cells = Sequence[tuple[int, int, int, int, str]]
 
 def picture_viewer(
     name: str,
-    light: FloatArray,
+    after: FloatArray,
     before: FloatArray | None,
     crops: Sequence[Crop],
     *,
@@ -38,13 +38,13 @@ def picture_viewer(
 
     Args:
         name: Of the result.
-        light: (3, h, w) float32 linear Rec.709.
+        after: (3, h, w) float32 linear Rec.709.
         before: The same of the capture; None for no slider.
         crops: Parts that can be chosen, the whole picture first.
         is_bright: Whether light above white is kept, for the exposure slider.
         cells: See `spared_cells`; None for none.
     """
-    peak = max(float(p.max()) for p in (light, before) if p is not None) if is_bright else 1.0
+    peak = max(float(p.max()) for p in (after, before) if p is not None) if is_bright else 1.0
     scale = light_scale(peak)
 
     def coded(picture: FloatArray | None, crop: Crop) -> str | None:
@@ -64,7 +64,7 @@ def picture_viewer(
             "width": crop.width // crop.step,
             "height": crop.height // crop.step,
             "before": coded(before, crop),
-            "after": coded(light, crop),
+            "after": coded(after, crop),
         }
         for crop in crops
     ]

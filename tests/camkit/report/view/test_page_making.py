@@ -10,8 +10,8 @@ import pytest
 import camkit
 from camkit.errors import ContractError, DecodeError
 from camkit.report.view.cell_map import spared_cells
-from camkit.report.view.crops import choose_crops
 from camkit.report.view.result_search import find_results
+from camkit.report.view.view_crops import choose_crops
 from camkit.runtime.geometry.turning import turn
 from camkit.runtime.output.sidecar import sidecar_path
 from tests.dng_factory import write_scene
@@ -75,7 +75,7 @@ def test_without_its_capture_a_line_says_why_and_before_may_be_given(
     text = _text(path, tmp_path)
     assert 'class="split"' not in text
     assert {"gone": "is not there", "changed": "its hash differs"}[fault] in text
-    given = _text(path, tmp_path, before=folder / "exr.exr", overwrite=True)
+    given = _text(path, tmp_path, before_file=folder / "exr.exr", overwrite=True)
     assert 'class="split"' in given
     assert "Before is exr.exr" in given
 
@@ -116,7 +116,7 @@ def test_wrong_wishes_are_refused(folder: Path, tmp_path: Path) -> None:
     with pytest.raises(ContractError, match="lies outside"):
         camkit.view(folder / "png.png", tmp_path / "page.html", crops=[(80, 0)])
     with pytest.raises(ContractError, match="for one result"):
-        camkit.view(folder, tmp_path / "page.html", before=folder / "png.png")
+        camkit.view(folder, tmp_path / "page.html", before_file=folder / "png.png")
     (tmp_path / "page.html").touch()
     with pytest.raises(ContractError, match="exists"):
         camkit.view(folder, tmp_path / "page.html")

@@ -61,7 +61,7 @@ def _open(browser: Page, path: Path, **options: object) -> None:
 @pytest.fixture(scope="module")
 def compared(pictures: Path) -> Path:
     return camkit.view(
-        pictures / "after.exr", pictures / "a.html", before=pictures / "before.exr"
+        pictures / "after.exr", pictures / "a.html", before_file=pictures / "before.exr"
     ).path
 
 

@@ -47,39 +47,39 @@ class Crop:
 
 
 def choose_crops(
-    light: FloatArray, before: FloatArray | None, centres: Sequence[tuple[int, int]]
+    after: FloatArray, before: FloatArray | None, centres: Sequence[tuple[int, int]]
 ) -> list[Crop]:
     """Return the whole picture, and the parts that are shown at 100 %.
 
     A picture that is shown whole at 100 % has no chosen parts.
 
     Args:
-        light: (3, h, w) of the result.
+        after: (3, h, w) of the result.
         before: The same of the capture; None where it is unknown.
         centres: (x, y) of the parts that the caller names.
 
     Raises:
         ContractError: If a centre lies outside.
     """
-    _, height, width = light.shape
+    _, height, width = after.shape
     step = -(-max(height, width) // WHOLE_PX)
     name = "Whole picture" + ("" if step == 1 else f", 1 : {step}")
     crops = [Crop(name=name, left=0, top=0, width=width, height=height, step=step)]
     if step > 1:
-        crops.append(_around("Middle", width // 2, height // 2, light.shape))
+        crops.append(_crop_at("Middle", width // 2, height // 2, after.shape))
         if before is not None:
-            crops.append(_around("Strongest change", *_changed(light, before), light.shape))
-        crops.append(_around("Brightest light", *_brightest(light), light.shape))
+            crops.append(_crop_at("Strongest change", *_changed(after, before), after.shape))
+        crops.append(_crop_at("Brightest light", *_brightest(after), after.shape))
     for x, y in centres:
         if not (0 <= x < width and 0 <= y < height):
             raise ContractError(
-                f"{option_text('crop')} {x},{y} lies outside the picture of {width} x {height} px"
+                f"{option_text('crops')} {x},{y} lies outside the picture of {width} x {height} px"
             )
-        crops.append(_around(f"At {x}, {y}", x, y, light.shape))
+        crops.append(_crop_at(f"At {x}, {y}", x, y, after.shape))
     return crops
 
 
-def _around(name: str, x: int, y: int, shape: tuple[int, ...]) -> Crop:
+def _crop_at(name: str, x: int, y: int, shape: tuple[int, ...]) -> Crop:
     height, width = shape[1:]
     across, down = min(CROP_PX[0], width), min(CROP_PX[1], height)
     left = min(max(x - across // 2, 0), width - across)
@@ -94,12 +94,12 @@ def _brightest(light: FloatArray) -> tuple[int, int]:
     return x, y
 
 
-def _changed(light: FloatArray, before: FloatArray) -> tuple[int, int]:
+def _changed(after: FloatArray, before: FloatArray) -> tuple[int, int]:
     """Return (x, y) of the middle of the crop whose codes differ most.
 
     Clipped light differs whatever was done, so only codes below white count.
     """
-    codes = [encode_uint8(picture, tone="srgb").max(axis=0) for picture in (light, before)]
+    codes = [encode_uint8(picture, tone="srgb").max(axis=0) for picture in (after, before)]
     difference = cv2.absdiff(*codes)
     difference[(codes[0] == np.iinfo(np.uint8).max) | (codes[1] == np.iinfo(np.uint8).max)] = 0
     size = (difference.shape[1] // _LOOKED_PX, difference.shape[0] // _LOOKED_PX)
