@@ -56,8 +56,8 @@ def view(
         results: Pictures (EXR, TIFF, PNG, JPEG, linear DNG) or archives of photons (NPZ) with the
             sidecars beside them, the sidecars, or folders of them.
         out: The page to write, one HTML file.
-        before_file: Picture or capture that stands on the left of the slider; None for the capture that
-            the sidecar names, developed alone. For one picture.
+        before_file: Picture or capture that stands on the left of the slider, for one picture;
+            None for the capture that the sidecar names, developed alone.
         crops: (x, y) in px of parts to show at 100 %, beside those that are chosen.
         overwrite: Whether a page that exists is replaced.
 

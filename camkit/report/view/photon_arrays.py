@@ -37,6 +37,7 @@ class ValueMap:
         low, high: Between which its colours run.
         colours: Name of its colour map.
         is_turned: Whether low values have the colours of high ones: near is red.
+        stride: Of so many pixels along a side one is kept.
     """
 
     name: str
@@ -46,6 +47,7 @@ class ValueMap:
     high: float
     colours: str
     is_turned: bool = False
+    stride: int = 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -189,4 +191,5 @@ def _map(name: str, unit: str, values: NDArray[Any], colours: str, *, is_turned:
         high=float(max(high, low + 1e-9)),
         colours=colours,
         is_turned=is_turned,
+        stride=stride,
     )

@@ -74,8 +74,8 @@ def find_original(
         light = read_result(before_file)
         if light.shape[1:] != size_px:
             raise ContractError(
-                f"{before_file} is {_size_text(light.shape[1:])}, the result {_size_text(size_px)}: "
-                f"{option_text('before_file')} must be of the same size"
+                f"{before_file} is {_size_text(light.shape[1:])}, the result "
+                f"{_size_text(size_px)}: {option_text('before_file')} must be of the same size"
             )
         return Original(light=light, note=f"Before is {before_file.name}.")
     if result.record is None:

@@ -59,14 +59,12 @@ def result_page(
     """
     sections = []
     for number, result in enumerate(counted(results, "reading", "results"), start=1):
-        make = _photon_parts if result.is_archive else _picture_parts
-        if result.is_archive and (crops or before_file is not None):
-            unused = "before_file" if before_file is not None else "crops"
-            raise ContractError(
-                f"{option_text(unused)} is for pictures; {result.path.name} holds photons"
-            )
-        parts = [*(Words(f"Note: {note}.", "note") for note in result.notes)]
-        parts += make(result, before_file, crops) if make is _picture_parts else make(result)
+        parts: list[Part] = [Words(f"Note: {note}.", "note") for note in result.notes]
+        if result.is_archive:
+            _check_no_wishes(result, before_file, crops)
+            parts += _photon_parts(result)
+        else:
+            parts += _picture_parts(result, before_file, crops)
         sections.append(
             Section(result.path.name, [*parts, *_record_parts(result)], f"result-{number}")
         )
@@ -77,6 +75,16 @@ def result_page(
         style=_asset("viewer.css"),
         script=_asset("viewer.js"),
     )
+
+
+def _check_no_wishes(
+    result: ViewedResult, before_file: Path | None, crops: Sequence[tuple[int, int]]
+) -> None:
+    if crops or before_file is not None:
+        unused = "crops" if before_file is None else "before_file"
+        raise ContractError(
+            f"{option_text(unused)} is for pictures; {result.path.name} holds photons"
+        )
 
 
 def _contents(results: Sequence[ViewedResult]) -> Table | None:
@@ -165,9 +173,10 @@ def _photon_picture(result: ViewedResult, photons: np.ndarray) -> list[Part]:
 def _map_note(maps: Sequence[ValueMap]) -> str:
     height, width = maps[0].values.shape
     valid = np.isfinite(maps[0].values).mean()
+    part = "" if maps[0].stride == 1 else f" One of {maps[0].stride} px along each side is shown."
     return (
-        f"The map has {width} x {height} px, {valid:.1%} of them valid; others are grey. Colours "
-        "run between the percentiles 2 and 98, values beyond have the colours of the ends."
+        f"The map has {width} x {height} px, {valid:.1%} of them valid; others are grey.{part} "
+        "Colours run between the percentiles 2 and 98, values beyond have the colours of the ends."
     )
 
 

@@ -225,7 +225,7 @@ async function mapViewer(viewer, data) {
   const read = (x, y) => {
     at = [Math.min(width - 1, Math.max(0, x)), Math.min(height - 1, Math.max(0, y))];
     const here = at[1] * width + at[0];
-    readout.textContent = `x ${at[0]}, y ${at[1]}: ` +
+    readout.textContent = `x ${at[0] * data.stride}, y ${at[1] * data.stride}: ` +
       maps.map(one => `${one.name.toLowerCase()} ${text(one, one.numbers[here])}`).join("; ");
     place();
   };

@@ -101,6 +101,7 @@ def map_viewer(name: str, maps: Sequence[ValueMap]) -> Widget:
     data = {
         "width": width,
         "height": height,
+        "stride": maps[0].stride,
         "maps": [
             {
                 "name": one.name,
