@@ -10,8 +10,8 @@ from camkit.runtime.plan.decision import TIER_NAMES
 
 FULL_LETTER: Final = "F"
 TIER_WORDS: Final = {
-    "P": "developed only",
-    "W": "filter bank, no network",
+    "P": "neither network nor filter bank",
+    "W": "filter bank without a network",
     "S": "smaller network",
 }
 assert {name[0].upper() for name in TIER_NAMES} == {*TIER_WORDS, FULL_LETTER}

@@ -163,7 +163,7 @@ def photons_before(result: ViewedResult, shape: tuple[int, int]) -> tuple[Any | 
     if large.shape != shape:
         return None, "There is no before: the capture is of another size."
     return large, (
-        f"Before is {source.name}: the photons of each pixel of the array, nothing developed finer."
+        f"Before is {source.name}: the photons of each pixel of the array, nothing resolved finer."
     )
 
 

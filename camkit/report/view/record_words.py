@@ -109,7 +109,7 @@ def _camera(record: Mapping[str, Any]) -> str:
 
 def _work(record: Mapping[str, Any]) -> str:
     seconds = record["seconds"]
-    way = "developed alone, without a bundle"
+    way = "made without a bundle"
     if record.get("bundle"):
         size = record.get("size") or record.get("plan", {}).get("size")
         way = f"made with the bundle {record['bundle']}" + (

@@ -57,7 +57,7 @@ def result_page(
         DecodeError: If a result cannot be read; names it.
         ContractError: If a part lies outside, or `before_file` fits no result.
     """
-    sections = []
+    sections, titles = [], _titles(results)
     for number, result in enumerate(counted(results, "reading", "results"), start=1):
         parts: list[Part] = [Words(f"Note: {note}.", "note") for note in result.notes]
         if result.is_archive:
@@ -66,7 +66,7 @@ def result_page(
         else:
             parts += _picture_parts(result, before_file, crops)
         sections.append(
-            Section(result.path.name, [*parts, *_record_parts(result)], f"result-{number}")
+            Section(titles[number - 1], [*parts, *_record_parts(result)], f"result-{number}")
         )
     return Page(
         title="Results of camkit",
@@ -85,6 +85,14 @@ def _check_no_wishes(
         raise ContractError(
             f"{option_text(unused)} is for pictures; {result.path.name} holds photons"
         )
+
+
+def _titles(results: Sequence[ViewedResult]) -> list[str]:
+    """Return names of files, with their folders where a name comes twice."""
+    names = [result.path.name for result in results]
+    if len({*names}) == len(names):
+        return names
+    return [str(result.path) for result in results]
 
 
 def _contents(results: Sequence[ViewedResult]) -> Table | None:

@@ -3,6 +3,7 @@
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,12 +11,15 @@ import pytest
 import camkit
 from camkit.errors import ContractError, DecodeError
 from camkit.report.view.cell_map import spared_cells
+from camkit.report.view.picture_light import find_original, read_result
 from camkit.report.view.result_search import find_results
 from camkit.report.view.view_crops import choose_crops
 from camkit.runtime.geometry.turning import turn
 from camkit.runtime.output.sidecar import sidecar_path
 from tests.dng_factory import write_scene
 
+HALF_FLOAT_STEP = 1e-3
+"""Of floats of 16 bits near white, through a colour matrix."""
 FORMATS = ("exr", "tiff", "png", "jpeg", "dng")
 
 
@@ -53,6 +57,32 @@ def test_a_sidecar_its_picture_and_its_folder_are_one_result(folder: Path) -> No
     names = [result.path.name for result in results]
     assert sorted(names) == ["dng.dng", "exr.exr", "jpeg.jpg", "png.png", "tiff.tif"]
     assert not any(result.notes for result in results)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"color": "acescg"},
+        {"color": "camera", "scale": "1/2"},
+        {"format": "tiff", "linear": True, "exposure_ev": 0.5, "white_balance": (2.0, 1.0, 1.5)},
+        {"format": "dng", "exposure_ev": -1.0},
+        {"format": "png"},
+    ],
+    ids=str,
+)
+def test_the_capture_of_a_developed_picture_is_that_picture(
+    tmp_path: Path, options: dict[str, Any]
+) -> None:
+    """Whatever its format, colour space, exposure and orientation."""
+    write_scene(tmp_path / "a.dng", orientation=6)
+    camkit.process(tmp_path / "a.dng", bundle="none", out_dir=tmp_path / "out", **options)
+    (result,) = find_results([tmp_path / "out"])
+    after = read_result(result.path)
+    before = find_original(result, None, after.shape[1:]).light
+    assert before is not None
+    assert after.shape[1] > after.shape[2]
+    difference = np.abs(np.clip(after, 0, 1) - np.clip(before, 0, 1))
+    assert float(difference.max()) < HALF_FLOAT_STEP
 
 
 def _copied(folder: Path, tmp_path: Path, name: str = "png.png") -> Path:
