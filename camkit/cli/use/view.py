@@ -13,7 +13,7 @@ from camkit.cli.say import say
 def view(
     results: Annotated[
         list[str],
-        typer.Argument(help="Results, their sidecars, or folders of them.", metavar="RESULT..."),
+        typer.Argument(help="Results, sidecars or folders with sidecars.", metavar="RESULT..."),
     ],
     out: Annotated[Path, typer.Option("-o", "--out", help="Page to write (.html).")],
     before_file: Annotated[
@@ -34,7 +34,7 @@ def view(
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Show results on a page: before and after, exposure, depth, and what the sidecars say."""
+    """Show results on a page: before and after, exposure, depth, and facts of the sidecars."""
     from camkit.report.view.page_making import view as write
 
     crops = [whole_pair(text, "--crop") for text in crop or ()]
