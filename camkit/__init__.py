@@ -4,6 +4,7 @@ The public face, free of torch and loaded only when touched:
 
     camkit.load(bundle)            a live Pipeline from a bundle's name or path
     camkit.process(files, ...)     captures in, pictures and sidecars out
+    camkit.view(results, ...)      results on one page, to look at
     camkit.simulate(scene, ...)    a sharp scene to a capture of a camera
     camkit.portable(bundle, ...)   a camera as graphs for programs without camkit
     camkit.calibrate               measurements of a camera: calibrate.noise(...), ...
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from camkit.models_def.face.optics_freezing import freeze
     from camkit.models_def.face.recipe_writing import CameraWords, recipe
     from camkit.report.making.camera_making import make
+    from camkit.report.view.page_making import ViewPage, view
     from camkit.runtime.batch import process
     from camkit.runtime.cancel import Cancelled
     from camkit.runtime.capture import MosaicOptions
@@ -58,6 +60,7 @@ __all__ = [
     "ParityError",
     "Pipeline",
     "UnsupportedError",
+    "ViewPage",
     "__version__",
     "calibrate",
     "export",
@@ -69,6 +72,7 @@ __all__ = [
     "recipe",
     "simulate",
     "train",
+    "view",
 ]
 
 __version__ = "0.2.0"
@@ -87,6 +91,8 @@ _HOMES = {
     "recipe": "camkit.models_def.face.recipe_writing",
     "CameraWords": "camkit.models_def.face.recipe_writing",
     "train": "camkit.models_def.face.network_training",
+    "view": "camkit.report.view.page_making",
+    "ViewPage": "camkit.report.view.page_making",
 }
 _PACKAGES = {"calibrate": "camkit.calibrate", "export": "camkit.export"}
 

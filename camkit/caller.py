@@ -29,6 +29,8 @@ FLAGS: Final = {
     "darks": "--dark",
     "flats": "--flat",
     "photo": "--from",
+    "before_file": "--before",
+    "crops": "--crop",
 }
 """Options whose flag is not their name."""
 PARAMETERS: Final = {

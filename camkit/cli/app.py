@@ -40,6 +40,7 @@ from camkit.cli.use.portable import portable
 from camkit.cli.use.process import process
 from camkit.cli.use.psf_group.psf_app import psf_app
 from camkit.cli.use.simulate import simulate
+from camkit.cli.use.view import view
 from camkit.errors import CamkitError
 from camkit.stopwatch import Stopwatch
 
@@ -53,6 +54,7 @@ app = typer.Typer(
 )
 GROUPS = (analyse_app, lens_app, plate_app, network_app, calibrate_app, psf_app)
 add_command(app, process, USE, "Restore captures to finished pictures.")
+add_command(app, view, USE, "Show results on a page.")
 add_command(app, plan, USE, "Preview what process would do.")
 add_command(app, simulate, USE, "Simulate captures of a scene.")
 add_command(app, merge, USE, "Merge exposures into one EXR.")

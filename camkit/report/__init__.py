@@ -17,6 +17,7 @@
     analysis/           what a camera can tell of a scene, and what it only seems to tell
     figure              charts: their style, and how they become SVG and PNG
     pages/              the one writer of pages; those of lenses, plates and calibrations
+    view/               results of `camkit process` to look at
 
 Test pictures are only ever measured on.
 """

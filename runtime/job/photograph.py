@@ -21,7 +21,7 @@ from camkit.runtime.geometry.placement import place
 from camkit.runtime.job.job import Job
 from camkit.runtime.options import Options
 from camkit.runtime.plan.binned_work import SIDES_PX, draft_side_px
-from camkit.runtime.plan.decision import DEVELOP, Subject, Work
+from camkit.runtime.plan.decision import DEVELOP, Subject, Work, cells_record
 from camkit.runtime.plan.planner import make_plan, needs_content
 from camkit.runtime.plan.rules.lights import needs_lights
 from camkit.runtime.plan.ways import ways_of, without_networks
@@ -139,6 +139,8 @@ def _planned(job: Job) -> Job:
         job.log.notes.append(plan.note)
     job.log.record["quality"] = options.quality
     job.log.record["decisions"] = [decision.to_json() for decision in plan.decisions()]
+    if plan.work.labels is not None:
+        job.log.record["cells"] = cells_record(plan.work.labels)
     return replace(job, plan=plan, work=plan.work)
 
 

@@ -11,7 +11,7 @@ from camkit.bundle.facts import NetworkFacts
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Network
 from camkit.errors import ContractError
-from camkit.runtime.content import Content
+from camkit.runtime.content import CELL_PX, Content
 from camkit.runtime.geometry.placement import Placement
 from camkit.runtime.options import Mode, Options
 from camkit.runtime.plan.bounded_networks import bounded_stages
@@ -138,6 +138,15 @@ class Work:
             tier = FULL if size == self.size else SMALL
             numbers[self.labels == tier] = number
         return numbers
+
+
+def cells_record(labels: Labels) -> dict[str, Any]:
+    """Return the tiers of (row, column) cells for a sidecar: a letter each, a text per row.
+
+    Cells count from the top left of the capture, in sensor orientation.
+    """
+    letters = np.array([name[0].upper() for name in TIER_NAMES])
+    return {"side_px": CELL_PX, "rows": ["".join(row) for row in letters[labels]]}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

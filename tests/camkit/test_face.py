@@ -21,6 +21,7 @@ PUBLIC = [
     "ParityError",
     "Pipeline",
     "UnsupportedError",
+    "ViewPage",
     "__version__",
     "calibrate",
     "export",
@@ -32,6 +33,7 @@ PUBLIC = [
     "recipe",
     "simulate",
     "train",
+    "view",
 ]
 
 

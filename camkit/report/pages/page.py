@@ -1,6 +1,6 @@
 """The writer of every page: a title, what is said first, sections; one file, no other needed.
 
-    Words, Table, Picture -> Section -> Page -> to_html
+    Words, Table, Details, Picture, Widget -> Section -> Page -> to_html
 
 A text among the parts of a section is a paragraph, None is nothing. Every table with a header is
 sorted by a click on a head.
@@ -129,7 +129,31 @@ class Picture:
             raise ContractError(f"the picture {self.caption!r} of a page must be a PNG or an SVG")
 
 
-Part = str | Words | Table | Picture | None
+@dataclass(frozen=True, slots=True)
+class Widget:
+    """A part that a page brings with it, beside the style and the script that it needs.
+
+    Attributes:
+        html: Markup, whose texts are escaped already.
+    """
+
+    html: str
+
+
+@dataclass(frozen=True, slots=True)
+class Details:
+    """A table behind a line that opens it.
+
+    Attributes:
+        title: The line.
+        table: What it opens.
+    """
+
+    title: str
+    table: Table
+
+
+Part = str | Words | Table | Picture | Widget | Details | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,11 +179,15 @@ class Page:
         title: Heading.
         lead: What stands before the sections.
         sections: In their order.
+        style: Of its widgets, after that of all pages.
+        script: Likewise.
     """
 
     title: str
     lead: Sequence[Part] = ()
     sections: Sequence[Section]
+    style: str = ""
+    script: str = ""
 
 
 def sentences(*notes: str) -> str | None:
@@ -182,9 +210,9 @@ def to_html(page: Page) -> str:
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width">'
-        f"<title>{escape(page.title)}</title><style>{STYLE}</style></head>\n<body>"
+        f"<title>{escape(page.title)}</title><style>{STYLE}{page.style}</style></head>\n<body>"
         + "\n".join(part for part in parts if part)
-        + f"\n<script>{SCRIPT}</script></body></html>\n"
+        + f"\n<script>{SCRIPT}{page.script}</script></body></html>\n"
     )
 
 
@@ -196,6 +224,11 @@ def _part(part: Part) -> str:
     if isinstance(part, Words):
         text = escape(part.text)
         return f"<h3>{text}</h3>" if part.look == "head" else f'<p class="{part.look}">{text}</p>'
+    if isinstance(part, Widget):
+        return part.html
+    if isinstance(part, Details):
+        title = escape(part.title)
+        return f"<details><summary>{title}</summary>{_table(part.table)}</details>"
     return _table(part) if isinstance(part, Table) else _picture(part)
 
 

@@ -20,6 +20,7 @@ OPTIONS = {
     "--max-mem --threads --jobs --resume --overwrite --json --dry-run --debug",
     "plan": "--bundle --size --quality --max-seconds --max-error-db --out-dir --method --mode "
     "--assume --max-mem --threads --json --debug",
+    "view": "-o --before --crop --overwrite --json --debug",
     "portable": "--out --size --json --debug",
     "info": "--schema --json --debug",
     "check": "--level --json --debug",

@@ -1,0 +1,92 @@
+"""`camkit.view`: results of `camkit process` on one page that needs no other file."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+from camkit.caller import option_text
+from camkit.errors import ContractError
+from camkit.field_types import checked
+from camkit.report.pages.page import Page, Words, to_html
+from camkit.report.view.result_page import result_page
+from camkit.report.view.result_search import find_results
+from camkit.runtime.files.in_memory import FilePath, list_paths, optional_path
+from camkit.runtime.output.part_file import refuse_existing, write_together
+
+MOST_MB: Final = 150
+_BYTES_PER_MB: Final = 1e6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ViewPage:
+    """The page that was written.
+
+    Attributes:
+        path: Its file.
+        results: The results on it, in their order.
+        megabytes: Its size in MB.
+    """
+
+    path: Path
+    results: tuple[Path, ...]
+    megabytes: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain JSON values."""
+        return {
+            "path": str(self.path),
+            "results": [str(path) for path in self.results],
+            "megabytes": round(self.megabytes, 2),
+        }
+
+
+@checked
+def view(
+    results: Sequence[FilePath] | FilePath,
+    out: FilePath,
+    *,
+    before_file: FilePath | None = None,
+    crops: Sequence[tuple[int, int]] = (),
+    overwrite: bool = False,
+) -> ViewPage:
+    """Write a page that shows results of `process`: before and after, exposure, depth, facts.
+
+    Args:
+        results: Pictures (EXR, TIFF, PNG, JPEG, linear DNG) or archives of photons (NPZ) with the
+            sidecars beside them, the sidecars, or folders of them.
+        out: The page to write, one HTML file.
+        before_file: Picture or capture that stands on the left of the slider, for one picture;
+            None for the capture that the sidecar names, developed alone.
+        crops: (x, y) in px of parts to show at 100 %, beside those that are chosen.
+        overwrite: Whether a page that exists is replaced.
+
+    Raises:
+        DecodeError: If a result cannot be read; names it.
+        ContractError: If the page exists or would be larger than `MOST_MB`, a part lies outside, or
+            `before_file` fits no result.
+    """
+    path = Path(out)
+    refuse_existing([path], overwrite=overwrite)
+    viewed = find_results(list_paths(results))
+    if not viewed:
+        raise ContractError("there is no result to show; give pictures, sidecars or folders")
+    if before_file is not None and len(viewed) > 1:
+        raise ContractError(
+            f"{option_text('before_file')} is for one result; there are {len(viewed)}"
+        )
+    text = _with_size(result_page(viewed, optional_path(before_file), crops))
+    megabytes = len(text) / _BYTES_PER_MB
+    if megabytes > MOST_MB:
+        raise ContractError(
+            f"the page would have {megabytes:.0f} MB, more than {MOST_MB}: show fewer results on it"
+        )
+    write_together({path: text})
+    return ViewPage(path=path, results=tuple(one.path for one in viewed), megabytes=megabytes)
+
+
+def _with_size(page: Page) -> bytes:
+    """Return a page that states its own size."""
+    size = len(to_html(page).encode()) / _BYTES_PER_MB
+    note = f"This page has {size:.1f} MB and needs no other file and no network."
+    return to_html(replace(page, lead=[*page.lead, Words(note, "small")])).encode()
