@@ -33,6 +33,9 @@ QUANTITIES: Final = {
     "side_px": "shorter side in pixels",
 }
 """Names of the envelope, in the order in which they are reported."""
+OPEN_LOW: Final = 0.0
+OPEN_HIGH: Final = 1e9
+"""Ends that nothing bounds; the manifest takes no infinity."""
 
 
 def grey_noise(noise: NoiseModel) -> float:

@@ -40,8 +40,8 @@ def fabricated_optics(
     """Trace one fabricated copy of a bundle's lens, or read what an earlier call traced.
 
     Where `dense`, the field grid is twice and the wavelength grid three times as dense as the
-    bundle's; the object lies at one distance. A lens with a haze is frozen on its own grid, haze included,
-    a minute and a half for a plate of 24 megapixels.
+    bundle's; the object lies at one distance. A lens with a haze is frozen on its own grid, haze
+    included, a minute and a half for a plate of 24 megapixels.
 
     Errors are uniform: radius +-0.2 %, thickness +-0.03 mm, index +-0.0005; the copy is focused at
     assembly to +-0.02 mm (lengths less below 40 mm of focal length, see `usual_errors`).
@@ -104,9 +104,7 @@ def lens_text(bundle: Bundle, prescription: Path | None) -> str:
     return bundle.member(PRESCRIPTION).decode("utf-8")
 
 
-def _trace(
-    bundle: Bundle, text: str, seed: int, depth_mm: float, *, dense: bool
-) -> FrozenOptics:
+def _trace(bundle: Bundle, text: str, seed: int, depth_mm: float, *, dense: bool) -> FrozenOptics:
     from camkit.models_def.optics.analysis.psf_model import checked_regime
     from camkit.models_def.optics.frozen import FreezeGrid, dense_grid, freeze
     from camkit.models_def.optics.kernel_bank import focused_copies

@@ -42,7 +42,6 @@ STYLE: Final[Any] = {
     "lines.linewidth": 1,
     "lines.markersize": 4,
 }
-PNG_START: Final = b"\x89PNG\r\n\x1a\n"
 BLUE: Final = FIELD_COLORS[0]
 _WAVE_COLORS: Final = (
     (0.40, (0x5B, 0x2A, 0x9D)),

@@ -10,14 +10,17 @@ import base64
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
-from importlib import util
 from pathlib import Path
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
-from camkit.errors import ContractError, UnsupportedError
-from camkit.report.figure import PNG_START, Figure, to_png, to_svg
+from camkit.errors import ContractError
+from camkit.report.judge_need import require_judge
 from camkit.runtime.output.part_file import write_together
 
+if TYPE_CHECKING:
+    from camkit.report.figure import Figure
+
+PNG_START: Final = b"\x89PNG\r\n\x1a\n"
 STYLE: Final = """
 body { font: 15px/1.45 system-ui, sans-serif; margin: 2em auto; max-width: 70em; padding: 0 1em;
   color: #222; background: #fff }
@@ -271,7 +274,7 @@ def page_path(folder: Path, name: str) -> Path:
 def write_page(
     folder: Path,
     name: str,
-    charts: Mapping[str, Callable[[], Figure]],
+    charts: Mapping[str, Callable[[], "Figure"]],
     page: Callable[[Mapping[str, str]], Page],
 ) -> list[Path]:
     """Write NAME.html, and NAME-CHART.svg and .png beside it; all of them or none.
@@ -288,8 +291,9 @@ def write_page(
     Raises:
         UnsupportedError: If matplotlib is not installed.
     """
-    if util.find_spec("matplotlib") is None:
-        raise UnsupportedError("pictures need matplotlib; install it with: pip install matplotlib")
+    require_judge()
+    from camkit.report.figure import to_png, to_svg
+
     pictures, files = {}, {}
     for chart, draw in charts.items():
         figure = draw()

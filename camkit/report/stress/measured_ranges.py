@@ -11,7 +11,6 @@ outside the ranges falls back, explains it no better.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +18,7 @@ from numpy.typing import NDArray
 from camkit.bundle.manifest import Range
 from camkit.report.stress.break_point import CHI2, sound_values
 from camkit.report.stress.curve import Curve, margins
-
-OPEN_LOW: Final = 0.0
-OPEN_HIGH: Final = 1e9
-"""Ends that a scenario does not bound; the manifest takes no infinity."""
+from camkit.runtime.envelope import OPEN_HIGH, OPEN_LOW
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,8 +6,7 @@ from typing import Any, Final
 from camkit.bundle.reader import find_bundle, open_bundle
 from camkit.errors import CamkitError
 from camkit.report.pages.page import Cell, Part, Row, Table, Words, sentences
-from camkit.report.stress.measured_ranges import OPEN_HIGH
-from camkit.runtime.envelope import QUANTITIES
+from camkit.runtime.envelope import OPEN_HIGH, QUANTITIES
 
 _SLOWEST: Final = 3
 _HIGHLIGHTS: Final = {

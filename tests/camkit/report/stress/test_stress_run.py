@@ -13,12 +13,13 @@ from camkit.bundle.reader import open_bundle
 from camkit.cli.app import run as run_command
 from camkit.errors import ContractError
 from camkit.report.stress.curve import curve_of
-from camkit.report.stress.measured_ranges import OPEN_HIGH, OPEN_LOW, measured_ranges
+from camkit.report.stress.measured_ranges import measured_ranges
 from camkit.report.stress.scenario import Scenario, choose
 from camkit.report.stress.score import Judge
 from camkit.report.stress.stress_run import StressOptions, run_stress, write_envelope
 from camkit.report.stress.sweep import Point, read_points
 from camkit.report.stress.verdict import Outcome, Verdict
+from camkit.runtime.envelope import OPEN_HIGH, OPEN_LOW
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from tests.wide_bundle import write_wide_bundle
