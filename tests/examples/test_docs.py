@@ -25,7 +25,8 @@ from tests.capture_factory import write_tiny_captures
 from tools.reference import reference
 
 ROOT = Path(__file__).resolve().parents[2]
-DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+DOCS = ROOT / "docs"
+DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.rglob("*.md"))]
 CURRENT = [path for path in DOCUMENTS if path.parent.name != "background"]
 """History names commands, options and files as they were."""
 ENTRY_POINTS = {"stages"}
@@ -115,10 +116,34 @@ def test_every_command_in_a_sentence_exists_with_its_options(document: Path) -> 
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=_id)
-def test_every_link_leads_somewhere(document: Path) -> None:
-    for target in re.findall(r"\]\(([^)#]+)\)", document.read_text(encoding="utf-8")):
-        if not target.startswith("http"):
-            assert (document.parent / target).exists(), target
+def test_every_link_leads_to_a_file_and_a_heading(document: Path) -> None:
+    """In docs, to a file of docs: the site has nothing else."""
+    for target in re.findall(r"\]\(([^)\s]+)\)", _prose(document)):
+        if target.startswith(("http:", "https:")):
+            continue
+        name, _, anchor = target.partition("#")
+        path = (document.parent / name).resolve() if name else document
+        assert path.exists(), target
+        if DOCS in document.parents:
+            assert path.is_file(), f"{target}: name folders as code"
+            assert DOCS in path.parents, f"{target}: name files outside docs as code"
+        assert not anchor or anchor in _anchors(path), target
+
+
+def _prose(path: Path) -> str:
+    """Return a page without its blocks of code."""
+    text = path.read_text(encoding="utf-8")
+    return re.sub(r"^(```+)[^\n]*\n.*?^\1$", "", text, flags=re.DOTALL | re.MULTILINE)
+
+
+@cache
+def _anchors(path: Path) -> set[str]:
+    """Return the anchors of a page's headings, as git hosts and the site make them."""
+    anchors: set[str] = set()
+    for heading in re.findall(r"^#+ +(.+?) *#*$", _prose(path), re.MULTILINE):
+        text = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", heading)
+        anchors.add(re.sub(r"[^\w\- ]", "", text.lower()).replace(" ", "-"))
+    return anchors
 
 
 @pytest.mark.parametrize("document", CURRENT, ids=_id)
