@@ -6,6 +6,7 @@ Purpose, usage and options are the help texts of the commands; to change the pag
 `GUIDES` names the page that explains a command, or a group of commands.
 """
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
@@ -52,6 +53,7 @@ GUIDES: Final = {
 EVERYWHERE: Final = frozenset({"--debug", "--help"})
 SAME_OPTIONS: Final = {"plan": "process"}
 """Commands whose options are those of another one, and not listed again."""
+FLAG: Final = re.compile(r"(?<![`\w-])--[a-z][a-z-]*")
 DEFAULT: Final = "; default: "
 VALUES: Final = {"int": "integer", "float": "number", "Path": "path"}
 """Types of parameters, as typer names them; all else is text."""
@@ -93,7 +95,7 @@ def _sections(name: str, command: Any, *, level: int) -> Iterator[str]:
     subcommands: dict[str, Any] = getattr(command, "commands", {})
     text = [f"{'#' * level} camkit {name}", _paragraphs(command.help)]
     if guide:
-        text.append(f"Guide: [{guide}](../guides/{guide}).")
+        text.append(f"Guide: [{guide.removesuffix('.md')}](../guides/{guide}).")
     if subcommands:
         rows = [
             f"| [`{n}`](#camkit-{name}-{n}) | {_cell(_purpose(c))} |"
@@ -177,7 +179,9 @@ def _value(parameter: Any) -> str:
 
 
 def _cell(text: str) -> str:
-    return " ".join(text.split()).replace("|", "\\|").replace("<", "&lt;")
+    """Return a text for a table: one line, its pipes escaped, options as code."""
+    line = " ".join(text.split()).replace("|", "\\|").replace("<", "&lt;")
+    return FLAG.sub(r"`\g<0>`", line)
 
 
 if __name__ == "__main__":
