@@ -2,8 +2,10 @@
 PYTHON ?= python3
 VENV := .venv
 DEV := .venv-dev
+MANUALS := .venv-docs
 RUNTIME_STAMP := $(VENV)/.runtime-installed
 DEV_STAMP := $(DEV)/.dev-installed
+MANUALS_STAMP := $(MANUALS)/.docs-installed
 FUZZ_SECONDS ?= 600
 SOURCES := camkit runtime export models_def tests tools examples/fastapi setup.py
 # else every process that a test starts compiles the product anew
@@ -45,6 +47,9 @@ examples:  ## the page and the programs of examples/, with node and npm
 	@echo "Bringing 38 packages, among them onnxruntime (0.5 GB on disk), then building: about a minute"
 	cd examples && npm ci && npm run build
 
+docs: $(MANUALS_STAMP)  ## the manuals as a site in site/, links and anchors checked
+	$(MANUALS)/bin/python -m tools.site
+
 check: $(DEV_STAMP)  ## weight, format, lint, types, layers, spelling; types beside the rest
 	@echo "Checking weight, format, lint, types, layers and spelling: about a minute"
 	$(MAKE) --no-print-directory -j2 types tidy
@@ -78,5 +83,11 @@ $(DEV_STAMP): pyproject.toml constraints.txt
 	$(DEV)/bin/python -m pip install -q --disable-pip-version-check -c constraints.txt -e ".[dev]"
 	touch $@
 
+$(MANUALS_STAMP): pyproject.toml constraints.txt
+	@echo "Installing zensical and mkdocstrings into $(MANUALS): 0.16 GB on disk, half a minute."
+	$(PYTHON) -m venv $(MANUALS)
+	$(MANUALS)/bin/python -m pip install -q --disable-pip-version-check -c constraints.txt zensical mkdocstrings-python
+	touch $@
+
 clean:
-	rm -rf out build dist .coverage* .mypy_cache .ruff_cache .pytest_cache
+	rm -rf out build dist site .cache .coverage* .mypy_cache .ruff_cache .pytest_cache

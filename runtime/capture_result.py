@@ -47,7 +47,7 @@ class Result:
 
     @property
     def image(self) -> FloatArray:
-        """Return the picture.
+        """Return the picture: (3, h, w) float32, linear, see `arrays`.
 
         Raises:
             ContractError: If the capture became something else.

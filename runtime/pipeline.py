@@ -272,12 +272,12 @@ class Pipeline:
 
         Args:
             file: A path, bytes, a file opened in binary mode; or an array as the bundle's sensor
-                gives it, see `process_array`.
+                gives it: (h, w) mosaic in DN or (c, h, w) linear planes, see `process_array`.
             products: Names of products; None for the image of a photograph, or what the capture of
                 another kind is for.
             mosaic: How to read a headerless mosaic, or levels in place of a RAW file's.
             origin_px: (x, y) of its first pixel on the sensor, for a crop that records none.
-            out: (3, h, w) float32 to fill with the first product; a new array when None.
+            out: (3, h, w) float32, linear, to fill with the first product; None for a new array.
             progress: Called with (work done, work in all), over all stages.
             cancel: Asked ten times a second; true raises `Cancelled`.
 
@@ -304,7 +304,20 @@ class Pipeline:
         progress: Progress | None = None,
         cancel: Cancel | None = None,
     ) -> Result:
-        """Read one photograph and reconstruct it: `run`, whose result has an `image`."""
+        """Read one photograph and reconstruct it: `run`, whose result has an `image`.
+
+        Args:
+            file: A path, bytes, or a file opened in binary mode.
+            mosaic: How to read a headerless mosaic, or levels in place of a RAW file's.
+            origin_px: (x, y) of its first pixel on the sensor, for a crop that records none.
+            out: (3, h, w) float32, linear, to fill with the picture; None for a new array.
+            progress: Called with (work done, work in all), over all stages.
+            cancel: Asked ten times a second; true raises `Cancelled`.
+
+        Raises:
+            DecodeError: If the file cannot be read.
+            ContractError: If capture, options and bundle do not fit each other.
+        """
         return self.run(
             file, mosaic=mosaic, origin_px=origin_px, out=out, progress=progress, cancel=cancel
         )
@@ -330,7 +343,8 @@ class Pipeline:
         """Return what `run` would do with a capture, without doing it.
 
         Args:
-            file: A path, bytes, a file opened in binary mode, or an array as `process_array` takes.
+            file: A path, bytes, a file opened in binary mode, or an array as `process_array` takes:
+                (h, w) mosaic in DN or (c, h, w) linear planes.
             mosaic: How to read a headerless mosaic, or levels in place of a RAW file's.
             origin_px: (x, y) of its first pixel on the sensor, for a crop that records none.
             cancel: Asked ten times a second; true raises `Cancelled`.
@@ -386,7 +400,7 @@ class Pipeline:
 
         Args:
             file: RAW, DNG, EXR, TIFF or PNG: a path, bytes, or a file opened in binary mode.
-            on_band: Called with (first row, band (3, rows, w) float32) from top to bottom.
+            on_band: Called with (first row, band (3, rows, w) float32, linear) from top to bottom.
             mosaic: How to read a headerless mosaic, or levels in place of a RAW file's.
             origin_px: (x, y) of its first pixel on the sensor, for a crop that records none.
             progress: Called with (work done, work in all), over all stages.
@@ -434,12 +448,12 @@ class Pipeline:
             white_balance: Gains (R, G, B); None takes those of the bundle's illuminant.
             origin_px: (x, y) of the first pixel on the sensor, for a crop; None for that of the
                 options, else a whole frame. An odd one begins with another pixel of the CFA.
-            out: (3, H, W) float32 to fill; a new array when None.
+            out: (3, h, w) float32, linear, to fill; None for a new array.
             progress: Called with (work done, work in all), over all stages.
             cancel: Asked ten times a second; true raises `Cancelled`.
 
         Returns:
-            (3, H, W) float32, linear, Rec.709 unless the options ask otherwise.
+            (3, h, w) float32, linear, Rec.709 unless the options ask otherwise.
 
         Raises:
             ContractError: If shape, type or size do not fit the bundle.
@@ -460,6 +474,12 @@ class Pipeline:
         origin_px: tuple[int, int] | None,
     ) -> Any:
         """Return an array with the meaning that the bundle's sensor gives it; see `process_array`.
+
+        Args:
+            image: (h, w) mosaic in DN, or (c, h, w) linear planes with 1.0 = white level.
+            iso: For the noise model; None measures the noise.
+            white_balance: Gains (R, G, B); None takes those of the bundle's illuminant.
+            origin_px: (x, y) of the first pixel on the sensor; None as for `process_array`.
 
         Raises:
             ContractError: If shape, type or size do not fit the bundle.

@@ -119,7 +119,16 @@ def saturating_exposure(
 
 
 def with_exposure(scene: FloatArray, exposure: float, *, ceiling: float = CEILING) -> FloatArray:
-    """Return a scene at an exposure, which ends at a ceiling in times white."""
+    """Return a scene at an exposure, which ends at a ceiling.
+
+    Args:
+        scene: (3, h, w) float32, linear, 1.0 = white.
+        exposure: Factor on the scene.
+        ceiling: Brightest value that stays, in times white.
+
+    Returns:
+        (3, h, w) float32, linear, 1.0 = white.
+    """
     return np.asarray(np.minimum(scene * np.float32(exposure), np.float32(ceiling)))
 
 

@@ -51,7 +51,13 @@ def gaussian_response(
     centres_um: tuple[float, float, float] = (0.600, 0.540, 0.460),
     fwhm_um: float = 0.090,
 ) -> ChannelResponse:
-    """Return Gaussian colour channels on a wavelength grid: camkit's own model camera."""
+    """Return Gaussian colour channels on a wavelength grid: camkit's own model camera.
+
+    Args:
+        wavelengths_um: (wavelength,), in um.
+        centres_um: Of R, G and B.
+        fwhm_um: Full width at half maximum of each.
+    """
     sigma = fwhm_um / GAUSS_FWHM
     offset_um = wavelengths_um[None] - np.array(centres_um)[:, None]
     response = np.exp(-0.5 * (offset_um / sigma) ** 2)
@@ -63,7 +69,7 @@ def gaussian_response(
 
 
 def wavelength_grid(count: int, low_um: float = 0.42, high_um: float = 0.68) -> NDArray[np.float64]:
-    """Return evenly spaced wavelengths."""
+    """Return evenly spaced wavelengths (count,) in um."""
     return np.linspace(low_um, high_um, count)
 
 

@@ -155,7 +155,13 @@ def _setting(options: SimulationOptions) -> Setting:
 
 
 def photograph(scene: FloatArray, bundle: Bundle, options: SimulationOptions) -> Simulation:
-    """Photograph a scene with sensor and optics of a bundle; see `simulate` and `bare_psf`."""
+    """Photograph a scene with sensor and optics of a bundle; see `simulate` and `bare_psf`.
+
+    Args:
+        scene: (3, h, w) float32, linear Rec.709, 1.0 = white.
+        bundle: The camera.
+        options: ISO, exposure, seed and place on the sensor.
+    """
     psf = bundle.psf if options.plate else bare_psf(bundle)
     haze = bundle.haze if bundle.manifest.has_haze else None
     return simulate(scene, bundle.manifest.light_sensor, psf, options, haze=haze)

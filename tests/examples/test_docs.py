@@ -16,12 +16,17 @@ from rich.text import Text
 import camkit
 from camkit.bundle.manifest import Manifest
 from camkit.cli.app import app
-from camkit.kinds import KINDS
+from camkit.cli.exit_code import ExitCode
+from camkit.errors import CamkitError
+from camkit.runtime.machine import limits as machine_limits
+from camkit.runtime.machine.limits import Limit
 from camkit.runtime.output.sidecar import sidecar_path
 from tests.capture_factory import write_tiny_captures
+from tools.reference import reference
 
 ROOT = Path(__file__).resolve().parents[2]
-DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+DOCS = ROOT / "docs"
+DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.rglob("*.md"))]
 CURRENT = [path for path in DOCUMENTS if path.name != "history.md"]
 """History names commands, options and files as they were."""
 ENTRY_POINTS = {"stages"}
@@ -111,10 +116,34 @@ def test_every_command_in_a_sentence_exists_with_its_options(document: Path) -> 
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=_id)
-def test_every_link_leads_somewhere(document: Path) -> None:
-    for target in re.findall(r"\]\(([^)#]+)\)", document.read_text(encoding="utf-8")):
-        if not target.startswith("http"):
-            assert (document.parent / target).exists(), target
+def test_every_link_leads_to_a_file_and_a_heading(document: Path) -> None:
+    """In docs, to a file of docs: the site has nothing else."""
+    for target in re.findall(r"\]\(([^)\s]+)\)", _prose(document)):
+        if target.startswith(("http:", "https:")):
+            continue
+        name, _, anchor = target.partition("#")
+        path = (document.parent / name).resolve() if name else document
+        assert path.exists(), target
+        if DOCS in document.parents:
+            assert path.is_file(), f"{target}: name folders as code"
+            assert DOCS in path.parents, f"{target}: name files outside docs as code"
+        assert not anchor or anchor in _anchors(path), target
+
+
+def _prose(path: Path) -> str:
+    """Return a page without its blocks of code."""
+    text = path.read_text(encoding="utf-8")
+    return re.sub(r"^(```+)[^\n]*\n.*?^\1$", "", text, flags=re.DOTALL | re.MULTILINE)
+
+
+@cache
+def _anchors(path: Path) -> set[str]:
+    """Return the anchors of a page's headings, as git hosts and the site make them."""
+    anchors: set[str] = set()
+    for heading in re.findall(r"^#+ +(.+?) *#*$", _prose(path), re.MULTILINE):
+        text = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", heading)
+        anchors.add(re.sub(r"[^\w\- ]", "", text.lower()).replace(" ", "-"))
+    return anchors
 
 
 @pytest.mark.parametrize("document", CURRENT, ids=_id)
@@ -173,51 +202,38 @@ def test_results_are_data_and_pictures_of_no_great_size() -> None:
     assert not [path for path in kept if path.stat().st_size > MOST_BYTES]
 
 
-def _sections() -> dict[str, str]:
-    text = (ROOT / "docs" / "reference" / "commands.md").read_text(encoding="utf-8")
-    parts = re.split(r"^## camkit ([a-z-]+)[^\n]*\n", text, flags=re.MULTILINE)[1:]
-    return dict(zip(parts[::2], parts[1::2], strict=True))
+def _reference(page: str) -> str:
+    return (ROOT / "docs" / "reference" / f"{page}.md").read_text(encoding="utf-8")
 
 
-def test_the_reference_has_a_section_for_every_command() -> None:
-    assert set(_sections()) == set(_commands())
+def test_the_page_of_commands_is_what_the_command_line_says() -> None:
+    assert reference() == _reference("commands"), "run `python -m tools.reference`"
 
 
-@pytest.mark.parametrize("command", ["process", "info", "check", "simulate", "merge", "doctor"])
-def test_the_reference_lists_the_options_of_use_time(command: str) -> None:
-    _check_options(_sections()[command], _commands()[command])
+def test_the_page_of_errors_names_every_exit_code_error_and_limit() -> None:
+    text = _reference("errors")
+    codes = re.findall(r"^\| ([0-9]+) \|", text, re.MULTILINE)
+    assert list(map(int, codes)) == [code.value for code in ExitCode]
+    tree = {kind.__name__ for kind in (CamkitError, *CamkitError.__subclasses__())}
+    assert tree <= set(re.findall(r"`(?:camkit\.)?([A-Z][A-Za-z]+)`", text))
+    limits = {v.variable for v in vars(machine_limits).values() if isinstance(v, Limit)}
+    assert set(re.findall(r"`(CAMKIT_MAX_[A-Z_]+)`", text)) == limits
 
 
-@pytest.mark.parametrize("command", ["freeze", "train", "export"])
-def test_the_reference_lists_the_options_of_design_time(command: str) -> None:
-    _check_options(_sections()[command], _commands()[command])
-
-
-def _check_options(text: str, command: Any) -> None:
-    documented = set(re.findall(r"`(--[a-z-]+|-o)\b", text))
-    options = _options(command)
-    assert not documented - EVERYWHERE.union(*options)
-    for names in options:
-        assert names & (documented | EVERYWHERE), f"{command.name}: {names} is not documented"
-
-
-def test_the_reference_lists_what_options_of_a_kind_may_be() -> None:
-    text = (ROOT / "docs" / "reference" / "commands.md").read_text(encoding="utf-8")
-    for option in (option for kind in KINDS.values() for option in kind.options if option.choices):
-        choices = "\\|".join(option.choices)
-        assert f"| `--{option.name} {choices}` |" in text, option.name
-
-
-def test_the_reference_lists_the_keys_of_sidecar_and_json(tmp_path: Path) -> None:
+def test_the_page_of_output_lists_the_keys_of_sidecar_and_json(tmp_path: Path) -> None:
     bundle = write_tiny_captures(tmp_path, ["a"])
     (result,) = camkit.process(tmp_path / "a.dng", bundle=bundle, out_dir=tmp_path / "out")
     assert result.output is not None, result.error
-    section = _sections()["process"]
-    sentence = section.partition("One object of")[2].partition("With `--dry-run`")[0]
-    table = section.partition("### The sidecar")[2].partition("`--resume` skips")[0]
-    in_table = set(re.findall(r"`([a-z0-9_]+)`", "".join(re.findall(r"^\|(.*?)\|", table, re.M))))
-    assert set(result.to_json()) <= set(re.findall(r"`([a-z_]+)`", sentence))
-    assert in_table == set(json.loads(sidecar_path(result.output).read_text()))
+    before, _, sidecar = _reference("output").partition("## The sidecar")
+    assert set(result.to_json()) <= _keys(before.partition("## JSON of process")[2])
+    assert _keys(sidecar.partition("\n## ")[0]) == set(
+        json.loads(sidecar_path(result.output).read_text())
+    )
+
+
+def _keys(text: str) -> set[str]:
+    """Return what the first column of a table names."""
+    return set(re.findall(r"`([a-z0-9_]+)`", "".join(re.findall(r"^\|(.*?)\|", text, re.M))))
 
 
 def test_the_format_lists_every_field_of_the_manifest() -> None:

@@ -45,4 +45,5 @@ def _options() -> list[tuple[str, KindOption]]:
 
 def _help(kind: str, option: KindOption) -> str:
     choices = f": {', '.join(option.choices)}" if option.choices else ""
-    return f"{option.text.rstrip('.')} ({kind}{choices})."
+    text, mark, default = option.text.partition("; default: ")
+    return f"{text.removesuffix('.')} ({kind}{choices}){mark}{default.removesuffix('.')}."

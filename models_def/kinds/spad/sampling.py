@@ -46,7 +46,7 @@ FULL_LIGHT: Final = float(SCALE**2)
 
 
 def gaussian_psf(sigma: float = GAUSSIAN_SIGMA) -> FloatArray:
-    """Return an (11, 11) Gaussian of unit sum; sigma in sub-pixels, > 0.
+    """Return an (11, 11) Gaussian whose weights sum to 1; sigma in sub-pixels, > 0.
 
     Raises:
         ContractError: If sigma is not a number > 0.

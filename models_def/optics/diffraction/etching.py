@@ -52,7 +52,13 @@ class Etching:
         return self.range_um / (self.levels if self.wraps else self.levels - 1)
 
     def level(self, height_um: Tensor) -> Tensor:
-        """Return the level of every cell, 0 .. levels - 1, int64.
+        """Return the level of every cell.
+
+        Args:
+            height_um: (cells, cells), heights in um.
+
+        Returns:
+            (cells, cells) int64, indices 0 .. levels - 1.
 
         Raises:
             ContractError: If a height is not finite.
@@ -68,8 +74,11 @@ class Etching:
         """Return the heights as etched; gradients flow as if nothing had been rounded.
 
         Args:
-            height_um: As designed.
+            height_um: (cells, cells), heights in um as designed.
             depth_errors: (mask,), share by which each mask etches too deep; none if empty.
+
+        Returns:
+            (cells, cells), heights in um.
 
         Raises:
             ContractError: If a height is not finite, or there is not one error a mask.

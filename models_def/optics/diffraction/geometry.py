@@ -80,8 +80,11 @@ class Bench:
         """Return path through places of the plate less that through its middle, without a plate.
 
         Args:
-            r2_mm: Squared distances from the axis, mm^2.
+            r2_mm: Squared distances from the axis in mm^2, of any shape such as (cells, cells).
             depth_mm: Of a source on the axis; inf is allowed.
+
+        Returns:
+            Path differences in mm, in the shape of `r2_mm`.
 
         References: Sun 2021, eq. (2.6), (2.8), (2.9), each without the part that is the same
             everywhere.

@@ -31,7 +31,7 @@ class Pattern(Protocol):
     """A function that returns heights for a bench."""
 
     def height_um(self, bench: Bench, index_at: IndexAt, cells: int) -> Tensor:
-        """Return the heights (cells, cells), float32."""
+        """Return the heights (cells, cells) in um, float32."""
         ...
 
 
@@ -66,7 +66,7 @@ class StarPattern:
         return chirped_gratings(streaks, bench, cells)
 
     def height_um(self, bench: Bench, index_at: IndexAt, cells: int) -> Tensor:
-        """Return the heights."""
+        """Return the heights (cells, cells) in um."""
         heights: Tensor = self.grating_map(bench, index_at, cells)()
         return heights.detach().float()
 
@@ -117,7 +117,7 @@ class CrossPattern:
         return height_map
 
     def height_um(self, bench: Bench, index_at: IndexAt, cells: int) -> Tensor:
-        """Return the heights."""
+        """Return the heights (cells, cells) in um."""
         heights: Tensor = self.rank_map(bench, index_at, cells)()
         return heights.detach()
 
@@ -155,7 +155,7 @@ class PeakPattern:
             )
 
     def height_um(self, bench: Bench, index_at: IndexAt, cells: int) -> Tensor:
-        """Return the heights.
+        """Return the heights (cells, cells) in um.
 
         Raises:
             ContractError: If the cells are too wide for the prism's slope.
@@ -190,7 +190,7 @@ class FlatPattern:
     """No relief: the Dirac of comparisons, which is the bare lens."""
 
     def height_um(self, bench: Bench, index_at: IndexAt, cells: int) -> Tensor:
-        """Return zeros."""
+        """Return zeros (cells, cells): heights in um."""
         del bench, index_at
         return torch.zeros(cells, cells)
 

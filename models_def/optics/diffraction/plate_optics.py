@@ -50,7 +50,7 @@ def plate_kernels(
         bare: Of the same lens and aperture with a flat plate (the Dirac of comparisons).
 
     Returns:
-        (depth, wavelength, side, side), as it falls on the sensor.
+        (depth, wavelength, side, side), shares of the light of a point, as it falls on the sensor.
 
     Raises:
         ContractError: If the plate's cells are too wide for the window, or a wavelength lies

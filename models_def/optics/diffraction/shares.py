@@ -58,7 +58,8 @@ def find_streaks(psf: Tensor, bare: Tensor) -> tuple[Streak, ...]:
 
     Args:
         psf: (side, side), shares of the light.
-        bare: The same of the lens without the plate, whose own halo is no streak.
+        bare: (side, side), shares of the light of the lens without the plate, whose own halo is
+            no streak.
 
     Raises:
         ContractError: If the two are no PSFs of one odd side.
@@ -108,7 +109,12 @@ def side_for(psf: Tensor, share: float) -> int:
 
 
 def shares(psf: Tensor, streaks: tuple[Streak, ...]) -> Shares:
-    """Compute the shares of a PSF (side, side) in core, streaks and haze."""
+    """Compute the shares of a PSF in core, streaks and haze.
+
+    Args:
+        psf: (side, side), shares of the light.
+        streaks: Of this PSF, see `find_streaks`.
+    """
     distance = _distance(psf)
     core = distance <= CORE_PX
     on_streak = torch.zeros_like(core)

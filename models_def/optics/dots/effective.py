@@ -29,7 +29,7 @@ def effective_psf(
     """Return the PSF that an array of small pixels sees through a plate.
 
     Args:
-        height_um: (cells, cells) of one unit, as it is made.
+        height_um: (cells, cells) heights in um of one unit, as it is made.
         camera: Laser, lens, lattice, active area.
         view: How the plate stands.
         side: Sub-pixels along a side, odd. More than 11 show the light beside the dots.

@@ -61,7 +61,7 @@ def match_dots(
     """Find the plate whose dots are nearest to a light.
 
     Args:
-        target: (11, 11) of unit sum, see `to_target`.
+        target: (11, 11), shares of the light that sum to 1, see `to_target`.
         camera: Laser, lens, lattice, cells.
         levels: 2, 4, 8, ... 64.
         rng: For starts, and the order of cells.

@@ -14,10 +14,10 @@ _NUMBERS: Final = "biuf"
 
 
 def to_target(values: NDArray[Any]) -> FloatGrid:
-    """Return light (11, 11) of unit sum.
+    """Return light (11, 11), shares that sum to 1.
 
     Args:
-        values: (11, 11), >= 0 and finite, of any sum > 0.
+        values: (11, 11) relative light, >= 0 and finite, of any sum > 0.
 
     Raises:
         ContractError: If it is none.
@@ -69,7 +69,7 @@ def likeness(light: FloatGrid, target: FloatGrid) -> Likeness:
 
     Args:
         light: (n, n) shares of all light, n odd and as of the target.
-        target: (n, n), of any sum.
+        target: (n, n) relative light, of any sum.
 
     References: Sun 2021, figure 4.4. The correlation of an even light is not defined; it counts
         as 1 where both are even, else as 0.

@@ -126,7 +126,7 @@ def render(
         sampling: How many rays; thesis values by default.
 
     Returns:
-        (3, h, w) in the type of the texture.
+        (3, h, w), linear, in the type and the unit of the texture.
     """
     settings = sampling or Sampling()
     labels = stop_labels(optics)

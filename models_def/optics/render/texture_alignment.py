@@ -93,7 +93,7 @@ def align_reference(
         oversample: Points along each side of a pixel that are averaged.
 
     Returns:
-        (3, h, w).
+        (3, h, w), linear, in the unit of the texture.
     """
     if oversample < 1:
         raise ContractError(f"oversample must be >= 1; got {oversample}")

@@ -65,7 +65,14 @@ class ErrorWidth:
             )
 
     def signed(self, uniform: Array) -> Array:
-        """Convert uniform draws of 0..1 to errors of both signs."""
+        """Convert uniform draws to errors of both signs.
+
+        Args:
+            uniform: (n,) or any shape, numbers 0 to 1.
+
+        Returns:
+            Errors in the shape of the draws, and in the unit of the width: mm, deg or no unit.
+        """
         if self.distribution == "uniform":
             return self.half_width * (2 * uniform - 1)
         low = ndtr(-NORMAL_SIGMAS)
@@ -73,7 +80,14 @@ class ErrorWidth:
         return np.asarray(sigma * ndtri(low + uniform * (1 - 2 * low)))
 
     def length(self, uniform: Array) -> Array:
-        """Convert uniform draws of 0..1 to lengths of vectors of any direction."""
+        """Convert uniform draws to lengths of vectors of any direction.
+
+        Args:
+            uniform: (n,) or any shape, numbers 0 to 1.
+
+        Returns:
+            Lengths in the shape of the draws, and in the unit of the width: mm, deg or no unit.
+        """
         if self.distribution == "uniform":
             return self.half_width * np.sqrt(uniform)
         cut = 1 - math.exp(-(NORMAL_SIGMAS**2) / 2)
