@@ -37,6 +37,9 @@ class PortableCamera:
         red = np.add(self.sensor["red_px"], axis - self.sensor["axis_px"]).astype(int) % 2
         down, across = (self.run("spans", {"size_px": np.array([n]), "axis_px": np.array([at]), "red": np.array([r])})
                         for n, at, r in zip(mosaic.shape, axis[::-1], red[::-1]))
+        if "haze" in self.graphs:  # found in coarse cells of the whole capture
+            cells = self.run("cells", self.capture | {"mosaic": np.float32(mosaic), "red_px": red})
+            self.capture |= self.run("haze", cells | {"axis_px": axis})
         for i, j in np.ndindex(len(down["turn"]), len(across["turn"])):
             places.setdefault((across["place_mm"][j], down["place_mm"][i]), []).append((i, j))
         for place, blocks in places.items():
@@ -44,7 +47,7 @@ class PortableCamera:
             values = self.capture | self.run("place" + kind, {"place_mm": np.float32(place)})
             for i, j in blocks:
                 y, x = down["index"][i, :, None], across["index"][j]
-                values |= {"window_y": down["window"][i], "window_x": across["window"][j]}
+                values |= {"window_y": down["window"][i], "window_x": across["window"][j], "row_index": y[:, 0], "column_index": x}
                 values |= {"mosaic": np.float32(mosaic[y, x]), "phase": 2 * down["phase"][i : i + 1] + across["phase"][j]}
                 lights = "_lights" if self.bank["lights"] and clipped[y[m:-m], x[m:-m]].any() else ""
                 out = self.run("block" + kind + lights, values)["out"][:, :: down["turn"][i], :: across["turn"][j]]

@@ -9,8 +9,11 @@ taper          the ring of a block blended to its own blur
 block_noise    noise and level of a block
 light_graph    clipped light explained
 mosaic_filter  the filter on the samples of the mosaic
+cell_waves     spectra of pictures in coarse cells
+haze_graph     a haze found in coarse cells, and cleared
 block          all of that: one block
 tile           the network and what lies behind it
 warp_graph     where output pixels come from, and the pixels
+folder         files in a folder or a zip, all or none
 package        graphs, tables and manifest in a folder
 """

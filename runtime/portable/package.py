@@ -20,13 +20,18 @@ from camkit.runtime.geometry.resampling import FLOOR, WHITE
 from camkit.runtime.portable.block import block_graph
 from camkit.runtime.portable.demosaic_taps import MARGIN_PX
 from camkit.runtime.portable.facts import CameraFacts, facts_of
+from camkit.runtime.portable.folder import check_target, write_files
 from camkit.runtime.portable.graph_builder import GraphBuilder, shared_tables
+from camkit.runtime.portable.haze_graph import cells_graph, haze_graph
 from camkit.runtime.portable.place import place_graph
 from camkit.runtime.portable.spans_graph import noise_graph, spans_graph
 from camkit.runtime.portable.tile import kept_graph, tile_graph
 from camkit.runtime.portable.warp_graph import TILE_PX, places_graph, warp_graph
+from camkit.units import MM_PER_M
 
 PORTABLE_VERSION: Final = 1
+HAZE_VERSION: Final = 2
+"""Of cameras whose blocks need what the graphs `cells` and `haze` find; others stay what they are."""
 MANIFEST: Final = "portable.json"
 TABLES: Final = "portable.safetensors"
 TILE_HALOS: Final = 12
@@ -34,42 +39,39 @@ TILE_HALOS: Final = 12
 
 
 def write_portable(
-    bundle: Bundle, folder: Path, sizes: tuple[str, ...] | None = None
+    bundle: Bundle,
+    out: Path,
+    sizes: tuple[str, ...] | None = None,
+    *,
+    depth_mm: float | None = None,
 ) -> Mapping[str, int]:
-    """Write a camera as graphs, tables and a manifest into a new or empty folder.
+    """Write a camera as graphs, tables and a manifest: all of them or none.
 
     Args:
         bundle: Of the camera.
-        folder: Made if it does not exist.
+        out: A new or empty folder, or a new file of the type .zip.
         sizes: Of the network; None for all that the bundle holds.
+        depth_mm: Object distance whose kernels the graphs take; None for the mean over all.
 
     Returns:
         Bytes of every file by its name.
 
     Raises:
         UnsupportedError: If the camera has no such graphs; the message names why.
-        ContractError: If a size is unknown, or the folder holds something.
+        ContractError: If a size or distance is unknown, or something lies at `out`.
     """
-    facts = facts_of(bundle)
+    check_target(out)
+    facts = facts_of(bundle, depth_mm)
     bundle_sizes = bundle.manifest.sizes
     used_sizes = bundle_sizes if sizes is None else sizes
     if unknown := [size for size in used_sizes if size not in bundle_sizes]:
         raise ContractError(f"{bundle.manifest.name} has no size {unknown[0]}; got {bundle_sizes}")
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise ContractError(f"{folder} must be empty or not exist")
     graphs = _graphs(facts, used_sizes)
     files = {f"{graph.name}.onnx": graph.to_bytes() for graph in graphs}
     files[TABLES] = save(dict(shared_tables(graphs)))
     document = portable_manifest(facts, graphs, used_sizes)
     files[MANIFEST] = (json.dumps(document, indent=1) + "\n").encode()
-    folder.mkdir(parents=True, exist_ok=True)
-    try:
-        for name, data in files.items():
-            (folder / name).write_bytes(data)
-    except BaseException:  # half a camera is in the way of the next try
-        for name in files:
-            (folder / name).unlink(missing_ok=True)
-        raise
+    write_files(out, files)
     return {name: len(data) for name, data in files.items()}
 
 
@@ -81,6 +83,8 @@ def _graphs(facts: CameraFacts, sizes: tuple[str, ...]) -> list[GraphBuilder]:
     tiles = [tile_graph(facts, size) for size in sizes]
     warps = [places_graph(facts), *(warp_graph(facts, limited=one) for one in (False, True))]
     first = [noise_graph(facts), spans_graph(facts)]
+    if facts.haze is not None:
+        first += [cells_graph(facts.haze), haze_graph(facts.haze)]
     return [*first, *places, *blocks, kept_graph(), *tiles, *warps]
 
 
@@ -103,7 +107,7 @@ def portable_manifest(
             "tile_px": TILE_HALOS * max(halo, stride),
         }
     return {
-        "portable_version": PORTABLE_VERSION,
+        "portable_version": PORTABLE_VERSION if facts.haze is None else HAZE_VERSION,
         "camera": {
             "name": manifest.name,
             "version": manifest.version,
@@ -130,7 +134,9 @@ def portable_manifest(
             "mirrors": facts.kernels.turns,
             "mosaic_within_mm": None if bank.mosaic is None else bank.mosaic.within_mm,
             "lights": bank.clip_iterations > 0,
+            "depth_m": None if facts.depth_mm is None else facts.depth_mm / MM_PER_M,
         },
+        "haze": None if facts.haze is None else {"cell_px": facts.haze.kernels.cell_px},
         "networks": networks,
         "warp_px": TILE_PX,
         "warp_white": WHITE,
