@@ -12,11 +12,11 @@ from camkit.bundle.sensor import BayerSensor
 from camkit.bundle.stages import Dehaze, Network, Undistort, Wiener
 from camkit.bundle.stages.together import Together
 from camkit.caller import option_text
-from camkit.errors import UnsupportedError
 from camkit.runtime.bank.blocks import UNCUT_PX
 from camkit.runtime.bank.haze import hazy_kernels
 from camkit.runtime.bank.psf import FieldKernels, color_kernels
 from camkit.runtime.portable.haze_graph import HazeFacts
+from camkit.runtime.portable.refusal import refusal, stage_of_host
 from camkit.runtime.portable.spectra import BlockShape
 
 STAGES: Final = (
@@ -91,7 +91,7 @@ def facts_of(bundle: Bundle, depth_mm: float | None = None) -> CameraFacts:
     """
     manifest = bundle.manifest
     if reason := _missing(manifest, depth_mm):
-        raise _refusal(manifest, reason)
+        raise refusal(manifest, reason)
     sensor = manifest.sensor
     stages = {stage.type: stage for stage in manifest.stages}
     bank, network, warp = stages["wiener"], stages["network"], stages["undistort"]
@@ -128,19 +128,17 @@ def _haze_of(bundle: Bundle, depth_mm: float | None) -> HazeFacts | None:
     sensor = manifest.light_sensor
     kernels = hazy_kernels(bundle.psf, bundle.haze, *sensor.response_arrays(), depth_mm=depth_mm)
     if kernels.differ:
-        raise _refusal(manifest, "every place of its haze needs a filter of its own")
+        raise refusal(manifest, "every place of its haze needs a filter of its own")
     if kernels.core.field_heights_mm.size < LEAST_HAZE_FIELDS:
-        raise _refusal(manifest, f"its haze is known at fewer than {LEAST_HAZE_FIELDS} fields")
+        raise refusal(manifest, f"its haze is known at fewer than {LEAST_HAZE_FIELDS} fields")
     pitch_mm = sensor.known_extent.pixel_pitch_um / 1000
     return HazeFacts(stage=stage, kernels=kernels, pitch_mm=pitch_mm)
 
 
-def _refusal(manifest: Manifest, reason: str) -> UnsupportedError:
-    return UnsupportedError(f"{manifest.name} cannot be made portable: {reason}")
-
-
 def _missing(manifest: Manifest, depth_mm: float | None) -> str | None:
     """Return what of a camera has no graph; None if all has one."""
+    if reason := stage_of_host(manifest):
+        return reason
     if manifest.kind != "bayer" or not isinstance(manifest.sensor, BayerSensor):
         return f"its kind is {manifest.kind}"
     stages = {stage.type: stage for stage in manifest.stages}
@@ -174,8 +172,8 @@ def _missing(manifest: Manifest, depth_mm: float | None) -> str | None:
         ),
         "its demosaic is not fast": getattr(stages["demosaic"], "method", "") != "fast",
     }
-    reason = next((reason for reason, applies in reasons.items() if applies), None)
-    return reason or _other_planes(manifest)
+    first = next((reason for reason, applies in reasons.items() if applies), None)
+    return first or _other_planes(manifest)
 
 
 def _other_planes(manifest: Manifest) -> str | None:

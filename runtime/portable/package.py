@@ -13,7 +13,9 @@ from typing import Any, Final
 from safetensors.numpy import save
 
 from camkit.bundle.reader import Bundle
+from camkit.bundle.sensor import SpadSensor
 from camkit.errors import ContractError
+from camkit.psf import depth_name
 from camkit.runtime.bank.blocks import BORDER_SHARE
 from camkit.runtime.capture import SATURATION_SHARE
 from camkit.runtime.geometry.resampling import FLOOR, WHITE
@@ -21,17 +23,17 @@ from camkit.runtime.portable.block import block_graph
 from camkit.runtime.portable.demosaic_taps import MARGIN_PX
 from camkit.runtime.portable.facts import CameraFacts, facts_of
 from camkit.runtime.portable.folder import check_target, write_files
+from camkit.runtime.portable.frames_graph import fine_stage, frame_graphs, frames_manifest
 from camkit.runtime.portable.graph_builder import GraphBuilder, shared_tables
 from camkit.runtime.portable.haze_graph import cells_graph, haze_graph
 from camkit.runtime.portable.place import place_graph
 from camkit.runtime.portable.spans_graph import noise_graph, spans_graph
 from camkit.runtime.portable.tile import kept_graph, tile_graph
 from camkit.runtime.portable.warp_graph import TILE_PX, places_graph, warp_graph
-from camkit.units import MM_PER_M
 
 PORTABLE_VERSION: Final = 1
-HAZE_VERSION: Final = 2
-"""Of cameras whose blocks need what the graphs `cells` and `haze` find; others stay what they are."""
+KINDS_VERSION: Final = 2
+"""Of cameras that programs for version 1 cannot run: with a haze, or of another kind than Bayer."""
 MANIFEST: Final = "portable.json"
 TABLES: Final = "portable.safetensors"
 TILE_HALOS: Final = 12
@@ -61,15 +63,22 @@ def write_portable(
         ContractError: If a size or distance is unknown, or something lies at `out`.
     """
     check_target(out)
-    facts = facts_of(bundle, depth_mm)
-    bundle_sizes = bundle.manifest.sizes
+    manifest = bundle.manifest
+    is_array = isinstance(manifest.sensor, SpadSensor)
+    facts = None if is_array else facts_of(bundle, depth_mm)
+    bundle_sizes = tuple(manifest.networks[fine_stage(bundle).role]) if is_array else manifest.sizes
     used_sizes = bundle_sizes if sizes is None else sizes
     if unknown := [size for size in used_sizes if size not in bundle_sizes]:
-        raise ContractError(f"{bundle.manifest.name} has no size {unknown[0]}; got {bundle_sizes}")
-    graphs = _graphs(facts, used_sizes)
+        raise ContractError(f"{manifest.name} has no size {unknown[0]}; got {bundle_sizes}")
+    if facts is None:
+        if depth_mm is not None:
+            raise ContractError(f"{manifest.name} has no kernels by distance; leave it out")
+        graphs, numbers = frame_graphs(bundle, used_sizes), frames_manifest(bundle, used_sizes)
+    else:
+        graphs, numbers = _graphs(facts, used_sizes), _bayer_numbers(facts, used_sizes)
+    document = portable_manifest(bundle, graphs, numbers)
     files = {f"{graph.name}.onnx": graph.to_bytes() for graph in graphs}
     files[TABLES] = save(dict(shared_tables(graphs)))
-    document = portable_manifest(facts, graphs, used_sizes)
     files[MANIFEST] = (json.dumps(document, indent=1) + "\n").encode()
     write_files(out, files)
     return {name: len(data) for name, data in files.items()}
@@ -89,10 +98,45 @@ def _graphs(facts: CameraFacts, sizes: tuple[str, ...]) -> list[GraphBuilder]:
 
 
 def portable_manifest(
-    facts: CameraFacts, graphs: list[GraphBuilder], sizes: tuple[str, ...]
+    bundle: Bundle, graphs: list[GraphBuilder], numbers: dict[str, Any]
 ) -> dict[str, Any]:
-    """Return the numbers of `portable.json`."""
-    manifest, sensor, bank = facts.bundle.manifest, facts.sensor, facts.bank
+    """Return `portable.json`.
+
+    Args:
+        bundle: Of the camera.
+        graphs: All that are written.
+        numbers: Of its kind.
+    """
+    manifest = bundle.manifest
+    one_size = {network["graph"] for network in numbers["networks"].values()}
+    is_old = manifest.kind == "bayer" and numbers["haze"] is None
+    return {
+        "portable_version": PORTABLE_VERSION if is_old else KINDS_VERSION,
+        "kind": manifest.kind,
+        "camera": {
+            "name": manifest.name,
+            "version": manifest.version,
+            "licence": manifest.licence,
+            "bundle_sha256": bundle.sha256,
+        },
+        **numbers,
+        "tables": TABLES,
+        "common": [graph.name for graph in graphs if graph.name not in one_size],
+        "graphs": {
+            graph.name: {
+                "file": f"{graph.name}.onnx",
+                "inputs": graph.inputs,
+                "tables": list(graph.tables),
+                "outputs": graph.outputs,
+            }
+            for graph in graphs
+        },
+    }
+
+
+def _bayer_numbers(facts: CameraFacts, sizes: tuple[str, ...]) -> dict[str, Any]:
+    """Return the numbers of `portable.json` of a Bayer camera."""
+    sensor, bank = facts.sensor, facts.bank
     extent = sensor.known_extent
     networks = {}
     for size in sizes:
@@ -107,13 +151,6 @@ def portable_manifest(
             "tile_px": TILE_HALOS * max(halo, stride),
         }
     return {
-        "portable_version": PORTABLE_VERSION if facts.haze is None else HAZE_VERSION,
-        "camera": {
-            "name": manifest.name,
-            "version": manifest.version,
-            "licence": manifest.licence,
-            "bundle_sha256": facts.bundle.sha256,
-        },
         "sensor": {
             "size_px": [extent.width_px, extent.height_px],
             "pitch_mm": facts.pitch_mm,
@@ -134,7 +171,7 @@ def portable_manifest(
             "mirrors": facts.kernels.turns,
             "mosaic_within_mm": None if bank.mosaic is None else bank.mosaic.within_mm,
             "lights": bank.clip_iterations > 0,
-            "depth_m": None if facts.depth_mm is None else facts.depth_mm / MM_PER_M,
+            "distance": None if facts.depth_mm is None else depth_name(facts.depth_mm),
         },
         "haze": None if facts.haze is None else {"cell_px": facts.haze.kernels.cell_px},
         "networks": networks,
@@ -144,16 +181,5 @@ def portable_manifest(
         "agrees": {
             "lights": bank.whole_blocks,
             "places": facts.warp.places == "fixed",
-        },
-        "tables": TABLES,
-        "common": [graph.name for graph in graphs if not graph.name.startswith("tile_")],
-        "graphs": {
-            graph.name: {
-                "file": f"{graph.name}.onnx",
-                "inputs": graph.inputs,
-                "tables": list(graph.tables),
-                "outputs": graph.outputs,
-            }
-            for graph in graphs
         },
     }
