@@ -232,9 +232,7 @@ def _cpu_seconds(work: Callable[[], Any]) -> float:
     return time.process_time() - start
 
 
-def _frame(
-    bundle: Bundle, camera: Any, options: dict[str, Any], repeat: int
-) -> dict[str, Any]:
+def _frame(bundle: Bundle, camera: Any, options: dict[str, Any], repeat: int) -> dict[str, Any]:
     """Return CPU seconds of camkit and the reader for a whole capture, interleaved."""
     facts, pairs = _capture(bundle, repeat), []
     for _ in range(1 if repeat > 1 else 3):

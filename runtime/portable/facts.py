@@ -163,7 +163,8 @@ def _missing(manifest: Manifest, depth_mm: float | None) -> str | None:
         f"its blocks are no multiple of {BLOCK_STEP_PX} px": bank.block_px % BLOCK_STEP_PX != 0,
         f"its blocks are larger than {UNCUT_PX} px": bank.block_px > UNCUT_PX,
         "its kernels lie on a grid": optics is None or getattr(optics, "symmetry", "") == "grid",
-        "its bank works on the mosaic, which has a haze": "haze" in stages and bank.mosaic is not None,
+        "its bank works on the mosaic, which has a haze": "haze" in stages
+        and bank.mosaic is not None,
         "its network takes numbers of its own": network.transform != "stabilise",
         "its network runs near lights only": network.lights_px is not None,
         "its network keeps lamps white": network.keeps_white,

@@ -38,7 +38,9 @@ def fine_stage(bundle: Bundle) -> SuperResolve:
     manifest = bundle.manifest
     stages = manifest.stages_of(SuperResolve)
     if len(stages) != 1 or manifest.stages[1] != stages[0]:
-        raise refusal(manifest, f"it has {len(stages)} stages super_resolve, not one behind the counts")
+        raise refusal(
+            manifest, f"it has {len(stages)} stages super_resolve, not one behind the counts"
+        )
     if manifest.products.get(IMAGE) != stages[0].gives[0]:
         raise refusal(manifest, f"its pictures are not what stage {stages[0].type} gives")
     if not manifest.networks.get(stages[0].role):
@@ -111,8 +113,15 @@ def _frame_graph(bundle: Bundle, size: str) -> GraphBuilder:
         pads = [1, 1, 1, 1]
         darkest = graph.node("MaxPool", whole, kernel_shape=[3, 3], pads=pads) * -stage.floor
         scales = np.array([1, 1, scale, scale], np.float32)
-        least = graph.node("Resize", darkest, None, scales, mode="nearest", nearest_mode="floor",
-                           coordinate_transformation_mode="asymmetric")
+        least = graph.node(
+            "Resize",
+            darkest,
+            None,
+            scales,
+            mode="nearest",
+            nearest_mode="floor",
+            coordinate_transformation_mode="asymmetric",
+        )
         picture = picture.at_least(graph.node("Squeeze", least, axes))
     graph.output("out", picture, ("rows", "columns"))
     return graph

@@ -251,7 +251,9 @@ class _Blur:
         graph = self._graph
         share = graph.node("ReduceMean", self._weights, _AXES[2] + 1, keepdims=1)
         signs = [[(part * share).sum(0) for part in sign] for sign in self._spectra]
-        return _Undo(waves=self._waves, mean=((signs[0][0], signs[0][1]), (signs[1][0], signs[1][1])))
+        return _Undo(
+            waves=self._waves, mean=((signs[0][0], signs[0][1]), (signs[1][0], signs[1][1]))
+        )
 
     def _blurred(self, parts: Value) -> Value:
         signs = []

@@ -20,7 +20,7 @@ OPTIONS = {
     "--max-mem --threads --jobs --resume --overwrite --json --dry-run --debug",
     "plan": "--bundle --size --quality --max-seconds --max-error-db --out-dir --method --mode "
     "--assume --max-mem --threads --json --debug",
-    "portable": "--out --size --json --debug",
+    "portable": "--out --size --depth-m --json --debug",
     "info": "--schema --json --debug",
     "check": "--level --json --debug",
     "simulate": "--bundle --iso --seed --origin-px -o --debug",
