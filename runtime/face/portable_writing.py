@@ -34,5 +34,5 @@ def portable(
     """
     opened = open_bundle(find_bundle(bundle))
     depth_mm = None if depth_m is None else depth_m * MM_PER_M
-    chosen = None if sizes is None else tuple(sizes)
-    return write_portable(opened, Path(folder), chosen, depth_mm=depth_mm)
+    size_names = None if sizes is None else tuple(sizes)
+    return write_portable(opened, Path(folder), size_names, depth_mm=depth_mm)

@@ -89,9 +89,9 @@ class CellWaves:
         self._down = graph.joined(down, axis=1).turned(1, 0)
         self._across = graph.joined(across, axis=1)
         weights = self._rows.doubled(0.5, 1.0) / self._rows.period
-        self._up = graph.joined([part * weights for part in down], axis=1)
+        self._row_waves = graph.joined([part * weights for part in down], axis=1)
         weights = self._columns.doubled(1.0, 2.0) / self._columns.period
-        self._back = graph.joined([part * weights for part in across], axis=1).turned(1, 0)
+        self._column_waves = graph.joined([part * weights for part in across], axis=1).turned(1, 0)
 
     def spectrum(self, planes: Value) -> CellSpectrum:
         """Return the spectrum of pictures (t, h, w)."""
@@ -109,7 +109,7 @@ class CellWaves:
         by_cosines = self._graph.joined([re + re_below, im_below - im], axis=1)
         by_sines = self._graph.joined([(im + im_below) * -1.0, re_below - re], axis=1)
         parts = self._graph.joined([by_cosines, by_sines], axis=2)
-        return self._up @ parts @ self._back
+        return self._row_waves @ parts @ self._column_waves
 
     def _signed(self, parts: Value) -> CellSpectrum:
         upper, lower = parts.parts(1, 2)

@@ -179,15 +179,16 @@ def _missing(manifest: Manifest, depth_mm: float | None) -> str | None:
 
 def _other_planes(manifest: Manifest) -> str | None:
     """Return which stage takes other planes than those that its graph is given; None if none."""
-    planes, before = manifest.all_planes, ""
+    planes, last_plane = manifest.all_planes, ""
     for stage in manifest.stages:
-        taken = [name for name in stage.takes if planes[name].domain != "mask"]
-        given = [before] if before else list(stage.takes[:1])
+        stage_planes = [name for name in stage.takes if planes[name].domain != "mask"]
+        graph_planes = [last_plane] if last_plane else list(stage.takes[:1])
         if isinstance(stage, Network):
             bank = manifest.stage(Wiener)
             assert bank is not None
-            given = [bank.takes[0], before]
-        if taken != given:
-            return f"its stage {stage.type} takes {', '.join(taken)}, not {', '.join(given)}"
-        before = stage.gives[0]
+            graph_planes = [bank.takes[0], last_plane]
+        if stage_planes != graph_planes:
+            names, expected = (", ".join(some) for some in (stage_planes, graph_planes))
+            return f"its stage {stage.type} takes {names}, not {expected}"
+        last_plane = stage.gives[0]
     return None

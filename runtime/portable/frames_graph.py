@@ -15,12 +15,7 @@ import onnx
 from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import SpadSensor
 from camkit.bundle.stages import SuperResolve
-from camkit.runtime.kinds.spad.finer.camera import (
-    LEAST_WHITE,
-    NOISE_SCALE,
-    WHITE_PERCENTILE,
-)
-from camkit.runtime.kinds.spad.finer.pictures import SURE
+from camkit.bundle.stages.super_resolve import LEAST_WHITE, NOISE_SCALE, SURE, WHITE_PERCENTILE
 from camkit.runtime.portable.graph_builder import GraphBuilder, Value
 from camkit.runtime.portable.refusal import refusal
 

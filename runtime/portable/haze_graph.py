@@ -172,21 +172,21 @@ def _mirrored(graph: GraphBuilder, count: Value) -> Value:
 
 
 class _CellShares:
-    """How every cell lies between the nodes whose kernels are known, see `lay_nodes`."""
+    """The shares of the nodes whose kernels are known in every cell, see `lay_nodes`."""
 
     def __init__(
         self, graph: GraphBuilder, facts: HazeFacts, sides: tuple[Value, Value], axis: Value
     ) -> None:
         cell_px, heights = facts.kernels.cell_px, facts.kernels.core.field_heights_mm
         places = []
-        for side, along in zip(sides, axis.parts(0, 2)[::-1], strict=True):
+        for side, axis_place in zip(sides, axis.parts(0, 2)[::-1], strict=True):
             cell = (line(graph, side) - MARGIN_CELLS).cast("float64")
-            place = (cell * float(cell_px) + ((cell_px - 1) / 2) - along) * facts.pitch_mm
+            place = (cell * float(cell_px) + ((cell_px - 1) / 2) - axis_place) * facts.pitch_mm
             places.append(place.cast("float32"))
         y, x = places[0].shaped(-1, 1), places[1]
         height = (x * x + y * y).sqrt()
-        above = graph.node("GreaterOrEqual", height, heights[1:-1, None, None]).cast("int64")
-        low = graph.node("Squeeze", above.sum(0), _AXES[1])
+        is_inside = graph.node("GreaterOrEqual", height, heights[1:-1, None, None]).cast("int64")
+        low = graph.node("Squeeze", is_inside.sum(0), _AXES[1])
         widths = graph.constant(np.diff(heights))
         share = (height - graph.constant(heights).gather(low, 0)) / widths.gather(low, 0)
         share = share.clip(0.0, 1.0)
