@@ -91,6 +91,8 @@ def repack(
         if psf is not None:
             members[PSF] = psf_to_bytes(_psf_of_same_lens(psf, bundle.psf))
         if changes or psf is not None:
+            if GOLDEN not in members:
+                raise ContractError(f"{old} has no golden cases, which a change is proved by")
             manifest = _changed(manifest, changes)
             version = format_of(None, [manifest], least=newest)
             manifest = manifest.model_copy(update={"format_version": version})
@@ -152,7 +154,14 @@ def _psf_of_same_lens(path: Path, old: FrozenPsf) -> FrozenPsf:
 
 
 def _changed(manifest: Manifest, changes: Sequence[Change]) -> Manifest:
-    """Return the manifest with changed stages, as the next minor version of the bundle."""
+    """Return the manifest with changed stages, as the next minor version of the bundle.
+
+    Raises:
+        ContractError: If it has none of the stages that change.
+    """
+    if changes and not any(manifest.stage(kind) for kind, _ in changes):
+        names = ", ".join(sorted({kind.__name__.lower() for kind, _ in changes}))
+        raise ContractError(f"{manifest.name} has no stage to change: {names}")
     stages = tuple(
         stage.model_copy(
             update={k: v for kind, c in changes if isinstance(stage, kind) for k, v in c.items()}

@@ -86,7 +86,7 @@ function readSamples(bytes: Uint8Array, tiff: Tiff, picture: Directory, width: n
     const y = Math.floor(i / across) * tall;
     const x = (i % across) * wide;
     const rows = tiled ? tall : Math.min(tall, height - y);
-    const part = picture.first(259, 1) === 7 ? decodeLosslessJpeg(chunk).samples : unpack(chunk, bits, wide, rows, tiff.little);
+    const part = picture.first(259, 1) === 7 ? decodeLosslessJpeg(chunk, wide * tall).samples : unpack(chunk, bits, wide, rows, tiff.little);
     const kept = Math.min(wide, width - x);
     check(part.length >= (Math.min(rows, height - y) - 1) * wide + kept, "A strip or tile of the DNG holds fewer samples than it should. The file is damaged.");
     for (let r = 0; r < Math.min(rows, height - y); r++) out.set(part.subarray(r * wide, r * wide + kept), (y + r) * width + x);

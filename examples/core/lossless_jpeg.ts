@@ -81,8 +81,8 @@ export interface JpegFrame {
   samples: Uint16Array;
 }
 
-/** Decode a lossless JPEG. */
-export function decodeLosslessJpeg(bytes: Uint8Array): JpegFrame {
+/** Decode a lossless JPEG that has so many samples, not more. */
+export function decodeLosslessJpeg(bytes: Uint8Array, most: number): JpegFrame {
   check(bytes[0] === 0xff && bytes[1] === 0xd8, DAMAGED);
   const tables = new Map<number, HuffmanTable>();
   let frame: { precision: number; height: number; width: number; ids: number[] } | undefined;
@@ -114,6 +114,7 @@ export function decodeLosslessJpeg(bytes: Uint8Array): JpegFrame {
       interval = (body[0]! << 8) | body[1]!;
     } else if (marker === 0xda) {
       check(frame && body[0] === frame.ids.length && body.length >= 4 + 2 * body[0], DAMAGED);
+      check(frame.width * frame.height * frame.ids.length <= most, DAMAGED);
       const used = frame.ids.map((_, i) => tables.get(body[2 + 2 * i]! >> 4));
       const last = 1 + 2 * frame.ids.length;
       return decodeScan(new Bits(bytes, at), frame, used, { predictor: body[last]!, shift: body[last + 2]! & 15, interval });

@@ -17,10 +17,14 @@ export function crc32(bytes: Uint8Array): number {
   return (crc ^ 0xffffffff) >>> 0;
 }
 
-/** Send bytes through a stream that packs or unpacks them. */
-export async function through(bytes: Uint8Array, stream: CompressionStream | DecompressionStream): Promise<Uint8Array> {
+/** Send bytes through a stream that packs or unpacks them; more than `most` bytes are an error. */
+export async function through(bytes: Uint8Array, stream: CompressionStream | DecompressionStream, most = Infinity): Promise<Uint8Array> {
+  let left = most;
+  const bound = new TransformStream<Uint8Array, Uint8Array>({
+    transform: (part, controller) => ((left -= part.length) < 0 ? controller.error(new RangeError("too long")) : controller.enqueue(part)),
+  });
   const source = new Blob([bytes as Uint8Array<ArrayBuffer>]).stream();
-  return new Uint8Array(await new Response(source.pipeThrough(stream)).arrayBuffer());
+  return new Uint8Array(await new Response(source.pipeThrough(stream).pipeThrough(bound)).arrayBuffer());
 }
 
 export function isPng(bytes: Uint8Array): boolean {
@@ -44,9 +48,9 @@ export async function readMosaic(bytes: Uint8Array): Promise<Capture> {
   check(colour === 0 && (bits === 8 || bits === 16) && interlace === 0, "The PNG is no mosaic: a mosaic is grey, of 8 or 16 bits, not interlaced. Drop the samples of the sensor, not a picture.");
   check(width >= 2 && height >= 2 && width * height <= 1000 * bytes.length, DAMAGED);
   const packed = new Uint8Array(await new Blob(parts as Uint8Array<ArrayBuffer>[]).arrayBuffer());
-  const data = await through(packed, new DecompressionStream("deflate")).catch(() => undefined);
   const step = bits / 8;
   const row = width * step;
+  const data = await through(packed, new DecompressionStream("deflate"), height * (row + 1)).catch(() => undefined);
   check(data && data.length >= height * (row + 1), DAMAGED);
   const samples = new Uint16Array(width * height);
   let above: Uint8Array = new Uint8Array(row);

@@ -50,22 +50,27 @@ export async function develop(camera: Camera, capture: Capture, choices: Choices
   const blacks = capture.black ?? Array<number>(4).fill(sensor.black_level);
   const black = blacks[0]!;
   check(Math.max(...blacks) < white, `Black (${Math.max(...blacks)}) must lie below white (${white}).`);
-  const clip = Math.ceil(black + sensor.clip_share * (white - black));
+  const even = blacks.every((n) => n === black);
+  const limit = black + sensor.clip_share * (white - black);
+  const clip = even ? Math.ceil(limit) : limit; // of other blacks no whole numbers are left
   const origin = capture.origin ?? [0, 1].map((i) => 2 * Math.floor((sensor.size_px[i]! - [width, height][i]!) / 4));
   const axis = sensor.axis_px.map((at, i) => at - origin[i]!) as [number, number];
   const stated = capture.noise && { shot: camera.tensor(capture.noise.shot), read_variance: camera.tensor(capture.noise.readVariance) };
   const noise = stated ?? (await camera.run("noise", { iso: camera.exact(iso!) }));
   const known: Values = { ...noise, levels: camera.tensor([black, white, clip]), gains: camera.tensor(gains) };
   const mosaic = Float32Array.from(samples);
-  if (blacks.some((n) => n !== black)) {
-    for (let i = 0; i < mosaic.length; i++) mosaic[i]! += black - blacks[2 * (Math.floor(i / width) & 1) + ((i % width) & 1)]!;
+  if (!even) {
+    for (let i = 0; i < mosaic.length; i++) {
+      const own = blacks[2 * (Math.floor(i / width) & 1) + ((i % width) & 1)]!;
+      mosaic[i] = black + ((mosaic[i]! - own) * (white - black)) / (white - own);
+    }
   }
   const progress = choices.progress ?? (() => undefined);
   const planes = await restore(camera, { mosaic, width, height, cfa: capture.cfa ?? patternAt(sensor.cfa, origin), clip, axis }, known, progress);
   const clipped = mosaic.map((sample) => (sample >= clip ? 1 : 0));
   const { out: kept } = await camera.run("kept", { clipped: camera.tensor(clipped, [1, 1, height, width]) });
-  const even = await clean(camera, choices.size, { planes, kept: kept!.data as Float32Array, width, height, axis }, known, progress);
-  return { ...(await straighten(camera, even, planes, { width, height, axis }, progress)), width, height, orientation: capture.orientation };
+  const cleaned = await clean(camera, choices.size, { planes, kept: kept!.data as Float32Array, width, height, axis }, known, progress);
+  return { ...(await straighten(camera, cleaned, planes, { width, height, axis }, progress)), width, height, orientation: capture.orientation };
 }
 
 /** Letters of the cell at a place of the sensor, whose own first cell is given. */

@@ -93,7 +93,7 @@ export function readTiff(bytes: Uint8Array): Tiff {
     }
     const directory = new Directory(view, little, fields);
     directories.push(directory);
-    waiting.push(...SUB_DIRECTORIES.flatMap((tag) => directory.numbers(tag)));
+    waiting.push(...SUB_DIRECTORIES.flatMap((tag) => directory.numbers(tag).slice(0, MOST_DIRECTORIES)));
     if (end + 4 <= bytes.length) waiting.push(view.getUint32(end, little));
   }
   return { directories, little };

@@ -30,7 +30,7 @@ export async function readZip(bytes: Uint8Array): Promise<Map<string, Uint8Array
     check((total += size) <= MOST_BYTES && local + 30 <= bytes.length, DAMAGED);
     const start = local + 30 + view.getUint16(local + 26, true) + view.getUint16(local + 28, true);
     const body = bytes.subarray(start, start + packed);
-    const content = method === 0 ? body : await through(body, new DecompressionStream("deflate-raw")).catch(() => undefined);
+    const content = method === 0 ? body : await through(body, new DecompressionStream("deflate-raw"), size).catch(() => undefined);
     check(content?.length === size && crc32(content) === crc, DAMAGED);
     members.set(path.slice(path.lastIndexOf("/") + 1), content);
   }

@@ -63,6 +63,14 @@ class Workers:
         while not self._free.empty():
             self._free.get_nowait().pool.shutdown()
 
+    async def _take(self, is_gone: Callable[[], Awaitable[bool]]) -> Worker:
+        """Return the next free worker; a client that leaves meanwhile takes none."""
+        while self._free.empty():
+            if await is_gone():
+                raise camkit.Cancelled("the client left before a worker was free")
+            await asyncio.sleep(POLL_S)
+        return self._free.get_nowait()
+
     async def make(
         self,
         source: Path,
@@ -77,7 +85,8 @@ class Workers:
             Cancelled: If the client is gone.
             BrokenProcessPool: If two workers ended while they made it.
         """
-        worker = await self._free.get()
+        worker = await self._take(is_gone)
+        job = None
         try:
             for is_last in (False, True):  # the system may have ended one: the capture gets another
                 worker.stop.clear()
@@ -94,4 +103,8 @@ class Workers:
                     if is_last:
                         raise
         finally:
-            self._free.put_nowait(worker)
+            if job is None or job.done():
+                self._free.put_nowait(worker)
+            else:  # the request was cancelled: the worker is free once it has heard of that
+                worker.stop.set()
+                job.add_done_callback(lambda _: self._free.put_nowait(worker))

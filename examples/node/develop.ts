@@ -17,7 +17,8 @@ import { readZip } from "../core/zip.js";
 
 async function readCamera(path: string): Promise<Map<string, Uint8Array>> {
   if (!(await stat(path)).isDirectory()) return readZip(await readFile(path));
-  const names = await readdir(path);
+  const entries = await readdir(path, { withFileTypes: true });
+  const names = entries.filter((entry) => entry.isFile()).map((entry) => entry.name);
   return new Map(await Promise.all(names.map(async (name) => [name, new Uint8Array(await readFile(join(path, name)))] as const)));
 }
 

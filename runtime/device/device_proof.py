@@ -10,6 +10,7 @@ much is stated, and refused below `LEAST_DB`.
 """
 
 import math
+import os
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -40,6 +41,7 @@ Engines = Callable[[str, str], NetworkEngine]
 """Gives the network of a role and size."""
 _CPU: Final = "cpu"
 _TF32_ALONE: Final = "tensorrt"
+_TF32_VARIABLE: Final = "NVIDIA_TF32_OVERRIDE"
 """It has no option against TF32, which the environment switches off."""
 
 
@@ -109,8 +111,8 @@ class DeviceProof:
         return {**facts, **record}
 
 
-_PROOFS: Final[dict[tuple[str, ...], DeviceProof]] = {}
-"""Of this process, by bundle, size, provider, precision, device and library."""
+_PROOFS: Final[dict[tuple[object, ...], DeviceProof]] = {}
+"""Of this process, by bundle, size, provider, precision, device, library, TF32 and memory cap."""
 
 
 def device_proof(
@@ -129,7 +131,8 @@ def device_proof(
         ParityError: If it does not.
     """
     device, library = device_and_library(options.provider)
-    key = (bundle.sha256, size, options.provider, options.dtype, device, library)
+    what = (bundle.sha256, size, options.provider, options.dtype, device, library)
+    key = (*what, os.environ.get(_TF32_VARIABLE), options.max_mem_bytes)
     with _ONE_AT_A_TIME:
         if key not in _PROOFS:
             _PROOFS[key] = _compare(bundle, size, engines, options, threads)
@@ -262,7 +265,7 @@ def _refusal(bundle: Bundle, proof: DeviceProof) -> str:
         bound = f"{LEAST_DB:g} dB are needed"
     advice = f"use {option_text('provider', _CPU)}"
     if proof.provider == _TF32_ALONE:
-        advice += " or set NVIDIA_TF32_OVERRIDE=0, since TensorRT may round to TF32"
+        advice += f" or set {_TF32_VARIABLE}=0, since TensorRT may round to TF32"
     return (
         f"{proof.provider} ({proof.device}, {proof.library}) does not compute "
         f"{bundle.manifest.name} as stated in {len(proof.refused)} comparisons: {worst.what} "

@@ -214,9 +214,13 @@ def _fixed_maps(nodes: FloatGrid, top: int, size: tuple[int, int]) -> Maps:
     moves = moves * moves.dtype.type(PLACE_STEPS / NODE_STEPS)
     moves += moves.dtype.type(0.5)
     parts = np.floor(moves, out=moves).astype(np.int32 if not is_exact else np.int16)
-    whole = (parts >> 5).astype(np.int16)
-    whole[..., 0] += (np.arange(size[1]) + int(common[0])).astype(np.int16)
-    whole[..., 1] += (np.arange(top, top + size[0]) + int(common[1])).astype(np.int16)[:, None]
+    # places between nodes lie between theirs: few pictures need more than 16 bits before the cut
+    kind = np.int16 if np.abs(nodes).max() < MAX_SIDE_PX else np.int32
+    whole = (parts >> 5).astype(kind)
+    whole[..., 0] += (np.arange(size[1]) + int(common[0])).astype(kind)
+    whole[..., 1] += (np.arange(top, top + size[0]) + int(common[1])).astype(kind)[:, None]
+    if kind is not np.int16:
+        whole = whole.clip(-(2**15), 2**15 - 1).astype(np.int16)
     parts &= PLACE_STEPS - 1
     return whole, (parts[..., 1] * PLACE_STEPS + parts[..., 0]).astype(np.uint16)
 

@@ -77,16 +77,19 @@ def write_photo(
     iso: float,
     white_balance: tuple[float, float, float] | None,
     origin_px: tuple[int, int],
+    **levels: Any,
 ) -> None:
-    """Write a capture of a bundle's camera as a DNG that leaves its noise to its ISO."""
+    """Write a capture of a bundle's camera as a DNG that leaves its noise to its ISO.
+
+    Levels are `black` and `white`, where they are not those of the sensor.
+    """
     sensor = bundle.manifest.sensor
     assert isinstance(sensor, BayerSensor)
     red, green, blue = white_balance or (1.0, 1.0, 1.0)
     extent = sensor.known_extent
     tags = DngTags(
         cfa=sensor.cfa,
-        black=round(sensor.black_level),
-        white=round(sensor.white_level),
+        **{"black": round(sensor.black_level), "white": round(sensor.white_level)} | levels,
         color_matrix=np.array(sensor.color_matrix),
         as_shot_neutral=(1 / red, 1 / green, 1 / blue),
         camera_model=f"camkit {bundle.manifest.name}",

@@ -143,6 +143,47 @@ def test_a_client_that_leaves_cancels_and_a_worker_that_ends_is_replaced_once(
     assert left == (2 if ends == "01" else 1)
 
 
+async def _ends_while_it_waits(workers: ModuleType) -> tuple[str, int]:
+    """Return how a capture ends whose client leaves before a worker is free, and the free ones."""
+    pool = workers.Workers(0)
+    try:
+        await pool.make(Path("in"), Path("out"), lambda _: None, _leaves)
+    except camkit.Cancelled as error:
+        return str(error), pool._free.qsize()
+    return "made", pool._free.qsize()
+
+
+async def _cancelled_request(workers: ModuleType, stand: Stand) -> tuple[bool, int]:
+    """Return whether the worker of a request that is cancelled hears of it, and the free ones."""
+
+    async def stays() -> bool:
+        return False
+
+    pool = workers.Workers(1)
+    task = asyncio.create_task(pool.make(Path("in"), Path("out"), lambda _: None, stays))
+    while not stand.share.value:
+        await asyncio.sleep(0.01)
+    task.cancel()
+    await asyncio.wait([task])
+    for _ in range(500):
+        if pool._free.qsize():
+            break
+        await asyncio.sleep(0.01)
+    return stand.stop.is_set(), pool._free.qsize()
+
+
+def test_a_worker_is_neither_waited_for_in_vain_nor_left_busy(
+    app: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    workers, stand = sys.modules["workers"], Stand()
+    assert asyncio.run(_ends_while_it_waits(workers)) == (
+        "the client left before a worker was free",
+        0,
+    )
+    monkeypatch.setattr(workers, "Worker", lambda: stand)
+    assert asyncio.run(_cancelled_request(workers, stand)) == (True, 1)
+
+
 def test_the_page_shows_the_code_as_it_is() -> None:
     page = (FOLDER.parents[1] / "docs" / "start" / "embedding.md").read_text(encoding="utf-8")
     files = {"@app.put": "app.py", "def _load": "workers.py"}

@@ -12,11 +12,17 @@ import numpy as np
 import pytest
 
 from camkit.arrays import FloatArray
+from camkit.bundle.reader import find_bundle, open_bundle
 from camkit.runtime.raw import read_capture
 from tests.dng_builder import build_dng
 from tests.dng_factory import scene_mosaic, write_scene
 from tests.examples.built_examples import PROGRAMS, build_examples
-from tests.examples.portable_cases import PortableCamera, difference_db, make_camera
+from tests.examples.portable_cases import (
+    PortableCamera,
+    difference_db,
+    make_camera,
+    write_photo,
+)
 from tests.lossless_jpeg import lossless_jpeg
 from tests.tiff_factory import pack
 
@@ -71,6 +77,25 @@ def test_a_plain_mosaic_is_developed_like_its_dng(camera: PortableCamera, tmp_pa
     inner = np.s_[:, 64:-64, 64:-64]
     # another grid of blocks and tiles: near the same, and nothing like it with colours swapped
     assert difference_db(light[inner], case.light[:, 3:, 1:][inner]) > 35
+
+
+def test_blacks_that_differ_by_place_change_nothing_of_the_light(
+    camera: PortableCamera, tmp_path: Path
+) -> None:
+    bundle = open_bundle(find_bundle("duet"))
+    capture = read_capture(camera.cases["saturated"].photo, isolate=False)
+    light = (capture.samples - 256.0).clip(0) / (4095 - 256)
+    assert light.max() >= 1
+    pictures = []
+    for black in (np.full((2, 2), 4096), np.array([[4096, 9000], [500, 7000]])):
+        below = np.tile(black, np.array(light.shape) // 2)
+        samples = np.rint(below + light * (65535 - below)).astype(np.uint16)
+        photo = tmp_path / f"{black[0, 1]}.dng"
+        origin = capture.origin_px or (0, 0)
+        gains = capture.white_balance
+        write_photo(photo, bundle, samples, 100, gains, origin, black=black, white=65535)
+        pictures.append(_develop(camera, photo))
+    assert difference_db(*pictures) > 70
 
 
 @pytest.mark.parametrize(("orientation", "quarters", "mirrored"), [(6, 3, False), (7, 1, True)])

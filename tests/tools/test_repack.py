@@ -12,11 +12,12 @@ from camkit.bundle.manifest import planes_of
 from camkit.bundle.optics import PSF
 from camkit.bundle.psf_file import write_psf
 from camkit.bundle.reader import GOLDEN, MANIFEST, open_bundle
-from camkit.bundle.stages import Demosaic, Highlights, Network, Undistort, Wiener
+from camkit.bundle.stages import Demosaic, Highlights, Network, SuperResolve, Undistort, Wiener
 from camkit.errors import ContractError, ParityError
 from camkit.export import proving
 from camkit.runtime.proof.check import CheckReport, Layer
 from tests.hdr_bundle import write_hdr_bundle
+from tests.plain_bundle import write_networkless_bundle
 from tools import repack
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "data" / "example-1.0.camkit"
@@ -125,3 +126,13 @@ def test_streaks_are_taken_from_the_mosaic_where_lights_are_sought(tmp_path: Pat
     assert planes_of(made.stages, made.parts) == manifest.planes
     with pytest.raises(ContractError, match="seeks no lights in the colours of a mosaic"):
         repack._lights_from_samples(open_bundle(EXAMPLE).manifest)
+
+
+def test_a_change_without_its_stage_or_its_proof_is_refused(tmp_path: Path) -> None:
+    new = tmp_path / "new.camkit"
+    with pytest.raises(ContractError, match="has no stage to change: superresolve"):
+        repack.repack(EXAMPLE, new, changes=[(SuperResolve, {"floor": 0.1})])
+    bare = write_networkless_bundle(tmp_path).path
+    with pytest.raises(ContractError, match="has no golden cases"):
+        repack.repack(bare, new, changes=repack.PORTABLE)
+    assert not new.exists()

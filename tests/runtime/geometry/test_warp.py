@@ -148,6 +148,19 @@ def test_places_in_fixed_point_are_sums_of_whole_numbers(x: int, y: int, top: in
     assert found.tolist() == expected
 
 
+def test_places_beyond_16_bits_end_there_in_both_arithmetics() -> None:
+    """A long picture whose corners reach far outside of it."""
+    size = (32760, 64)
+    model = distortion(*[(1.01, 0, 0, 0)] * 3)
+    place = SensorWindow(size_px=size, origin_px=(0, 0), sensor_size_px=size, pitch_um=0.1)
+    rows = [
+        Warp(model, place, to_sensor=False, places=places).maps(1, 0, 64)[0].astype(int)
+        for places in ("float", "fixed")
+    ]
+    assert rows[0].max() == rows[1].max() == 32767
+    assert np.abs(rows[0] - rows[1]).max() <= 1
+
+
 def test_source_rows_are_read_downwards_and_forgotten() -> None:
     picture = band_limited(512, 384, 0.2)
     place = window((384, 512), (64, 256))
