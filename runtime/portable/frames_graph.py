@@ -32,7 +32,7 @@ def fine_stage(bundle: Bundle) -> SuperResolve:
     """
     manifest = bundle.manifest
     stages = manifest.stages_of(SuperResolve)
-    if len(stages) != 1 or manifest.stages[1] != stages[0]:
+    if len(stages) != 1 or manifest.stages[1:2] != stages:
         raise refusal(
             manifest, f"it has {len(stages)} stages super_resolve, not one behind the counts"
         )
