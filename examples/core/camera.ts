@@ -14,6 +14,7 @@ export type Values = Record<string, Tensor>;
 /** What of portable.json the readers need; docs/guides/portable.md says what each number means. */
 export interface About {
   portable_version: number;
+  kind?: string;
   camera: { name: string; version: string };
   sensor: {
     size_px: [number, number];
@@ -25,6 +26,7 @@ export interface About {
     clip_share: number;
   };
   bank: { block_px: number; margin_px: number; mosaic_within_mm: number | null; lights: boolean };
+  haze?: { cell_px: number } | null;
   networks: Record<string, { graph: string; halo_px: number; stride_px: number; tile_px: number }>;
   warp_px: number;
   warp_white: number;
@@ -33,7 +35,7 @@ export interface About {
   graphs: Record<string, { file: string; inputs: string[]; tables: string[]; outputs: string[] }>;
 }
 
-const VERSION = 1;
+const VERSIONS = [1, 2];
 
 export class Camera {
   private readonly sessions = new Map<string, InferenceSession>();
@@ -57,7 +59,8 @@ export class Camera {
     const document = files.get("portable.json");
     check(document, "There is no portable.json: drop the whole folder, or the zip, that camkit portable wrote.");
     const about = parse(document);
-    check(about.portable_version === VERSION, `The camera is of version ${about.portable_version} of the format; this program reads version ${VERSION}.`);
+    check(VERSIONS.includes(about.portable_version), `The camera is of version ${about.portable_version} of the format; this program reads versions ${VERSIONS.join(" and ")}.`);
+    check((about.kind ?? "bayer") === "bayer", `The camera is of the kind ${about.kind}; this program develops the mosaics of Bayer cameras.`);
     for (const name of [about.tables, ...Object.values(about.graphs).map(({ file }) => file)]) {
       check(files.has(name), `The camera lacks its file ${name}. Drop the whole folder, or the zip, that camkit portable wrote.`);
     }
@@ -74,8 +77,9 @@ export class Camera {
     return new this.runtime.Tensor("float64", Float64Array.from(numbers), [numbers.length]);
   }
 
-  whole(number: number): Tensor {
-    return new this.runtime.Tensor("int64", BigInt64Array.of(BigInt(number)), [1]);
+  /** A tensor of whole numbers. */
+  whole(...numbers: number[]): Tensor {
+    return new this.runtime.Tensor("int64", BigInt64Array.from(numbers, BigInt), [numbers.length]);
   }
 
   /** Run a graph with what it needs of some values; it is loaded when it is first used. */

@@ -110,6 +110,11 @@ async function restore(camera: Camera, capture: Mosaic, known: Values, progress:
   const red = cfa.indexOf("R");
   const down = await laySpans(camera, height, axis[1], red >> 1);
   const across = await laySpans(camera, width, axis[0], red & 1);
+  if (camera.about.haze) {
+    // it is found in coarse cells of the whole capture
+    const whole = { ...known, mosaic: camera.tensor(mosaic, [height, width]), red_px: camera.whole(red & 1, red >> 1) };
+    known = { ...known, ...(await camera.run("haze", { ...(await camera.run("cells", whole)), axis_px: camera.exact(...axis) })) };
+  }
   const places = new Map<string, [number, number][]>();
   for (let i = 0; i < down.count; i++) {
     for (let j = 0; j < across.count; j++) {
@@ -144,6 +149,8 @@ async function restore(camera: Camera, capture: Mosaic, known: Values, progress:
         phase: camera.whole(2 * down.phase[i]! + across.phase[j]!),
         window_y: down.window[i]!,
         window_x: across.window[j]!,
+        row_index: camera.whole(...down.index.slice(i * side, (i + 1) * side)),
+        column_index: camera.whole(...across.index.slice(j * side, (j + 1) * side)),
       });
       const from = { top: down.first[i]!, left: across.first[j]!, turnY: down.turn[i]! < 0, turnX: across.turn[j]! < 0 };
       add(total, width, height, out!.data as Float32Array, bank.block_px, from);

@@ -384,7 +384,10 @@ class Camera {
       : options_(std::move(options)), engine_(options_.threads) {
     using namespace detail;
     about_ = JsonParser(read_file(folder / "portable.json")).document();
-    check(about_["portable_version"].integer() == 1, "portable.json is of another version than 1");
+    const int version = about_["portable_version"].integer();
+    check(version == 1 || version == 2, "portable.json is of another version than 1 and 2");
+    const Json* kind = about_.find("kind");
+    check(!kind || kind->text() == "bayer", "the camera is no Bayer camera");
     const Json& networks = about_["networks"];
     std::string known;
     for (const std::string& size : networks.keys) known += " " + size;
@@ -531,6 +534,7 @@ class Camera {
     const auto [x, y] = capture.origin_px;  // an odd one begins with another colour
     const Spans down = spans(capture.height, known.axis[1], (int(red[1]) + y) & 1, block, margin);
     const Spans across = spans(capture.width, known.axis[0], (int(red[0]) + x) & 1, block, margin);
+    const Values whole = cleared(capture, known, {(int(red[0]) + x) & 1, (int(red[1]) + y) & 1});
     std::vector<std::pair<Place, std::vector<std::array<std::size_t, 2>>>> places;
     std::map<Place, std::size_t> numbers;
     for (std::size_t i = 0; i < down.turn.size(); ++i)
@@ -546,13 +550,16 @@ class Camera {
       const bool is_near = within.kind == detail::Json::Kind::number && std::hypot(double(at[0]), double(at[1])) <= within.number();
       const std::string kind = is_near ? "_mosaic" : "";
       Values values = place("place" + kind, at);
-      values.insert(known.values.begin(), known.values.end());
+      values.insert(whole.begin(), whole.end());
       for (const auto& [i, j] : blocks) {
         std::vector<float> mosaic = cut(capture, down, across, i, j, block + 2 * margin);
         const bool lit = lights && clips(mosaic, block, margin, known.clip);
         const std::array<std::int64_t, 1> phase{2 * down.phase[i] + across.phase[j]};
         values["mosaic"] = engine_.tensor(mosaic, {block + 2 * margin, block + 2 * margin});
         values["phase"] = engine_.tensor(phase);
+        const std::size_t lines = std::size_t(block + 2 * margin);
+        values["row_index"] = engine_.tensor(&down.index[i * lines], lines, {block + 2 * margin});
+        values["column_index"] = engine_.tensor(&across.index[j * lines], lines, {block + 2 * margin});
         values["window_y"] = engine_.tensor(&down.window[i * std::size_t(block)], std::size_t(block), {block});
         values["window_x"] = engine_.tensor(&across.window[j * std::size_t(block)], std::size_t(block), {block});
         const Values made = run("block" + kind + (lit ? "_lights" : ""), values);
@@ -561,6 +568,23 @@ class Camera {
       }
     }
     return total;
+  }
+
+  // Returns what is known of the capture; a haze is found in coarse cells of all of it.
+  Values cleared(const Capture& capture, const Known& known, const std::array<std::int64_t, 2>& red) const {
+    Values values = known.values;
+    const detail::Json* haze = about_.find("haze");
+    if (!haze || haze->kind == detail::Json::Kind::null) return values;
+    const std::size_t count = std::size_t(capture.height) * std::size_t(capture.width);
+    const std::vector<float> mosaic(capture.samples, capture.samples + count);
+    values["mosaic"] = engine_.tensor(mosaic, {capture.height, capture.width});
+    values["red_px"] = engine_.tensor(red);
+    Values cells = run("cells", values);
+    cells["axis_px"] = engine_.tensor(known.axis);
+    const Values made = run("haze", cells);
+    values = known.values;
+    values.insert(made.begin(), made.end());
+    return values;
   }
 
   static std::vector<float> cut(const Capture& capture, const Spans& down, const Spans& across, std::size_t i,

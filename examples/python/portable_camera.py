@@ -9,11 +9,10 @@ class PortableCamera:
         self.network, self.sensor, self.bank = self.facts["networks"][size], self.facts["sensor"], self.facts["bank"]
         data, options = (Path(folder) / self.facts["tables"]).read_bytes(), ort.SessionOptions()
         start, options.intra_op_num_threads = 8 + int.from_bytes(data[:8], "little"), threads
-        names = self.network["graph"], *self.facts["common"]
         self.tables = {name: np.frombuffer(data[start:][slice(*t["data_offsets"])], np.float32).reshape(t["shape"])
                        for name, t in json.loads(data[8:start]).items() if name != "__metadata__"}
         self.graphs = {name: (graph, ort.InferenceSession(Path(folder) / graph["file"], options))
-                       for name, graph in self.facts["graphs"].items() if name in names}
+                       for name, graph in self.facts["graphs"].items() if name in (self.network["graph"], *self.facts["common"])}
 
     def run(self, name, values):
         graph, session = self.graphs[name]
@@ -37,6 +36,8 @@ class PortableCamera:
         red = np.add(self.sensor["red_px"], axis - self.sensor["axis_px"]).astype(int) % 2
         down, across = (self.run("spans", {"size_px": np.array([n]), "axis_px": np.array([at]), "red": np.array([r])})
                         for n, at, r in zip(mosaic.shape, axis[::-1], red[::-1]))
+        if self.facts.get("haze"):  # it is found in coarse cells of the whole capture
+            self.capture |= self.run("haze", {"axis_px": axis} | self.run("cells", {"mosaic": np.float32(mosaic), "red_px": red} | self.capture))
         for i, j in np.ndindex(len(down["turn"]), len(across["turn"])):
             places.setdefault((across["place_mm"][j], down["place_mm"][i]), []).append((i, j))
         for place, blocks in places.items():
@@ -44,7 +45,7 @@ class PortableCamera:
             values = self.capture | self.run("place" + kind, {"place_mm": np.float32(place)})
             for i, j in blocks:
                 y, x = down["index"][i, :, None], across["index"][j]
-                values |= {"window_y": down["window"][i], "window_x": across["window"][j]}
+                values |= {"window_y": down["window"][i], "window_x": across["window"][j], "row_index": y[:, 0], "column_index": x}
                 values |= {"mosaic": np.float32(mosaic[y, x]), "phase": 2 * down["phase"][i : i + 1] + across["phase"][j]}
                 lights = "_lights" if self.bank["lights"] and clipped[y[m:-m], x[m:-m]].any() else ""
                 out = self.run("block" + kind + lights, values)["out"][:, :: down["turn"][i], :: across["turn"][j]]
@@ -83,8 +84,7 @@ class PortableCamera:
             values = self.run("places", {"target_px": target * 1.0, "axis_px": axis, "middle_px": (size - 1) / 2})
             first = np.clip(np.floor(values["least"]).astype(int) - 1 + target, 0, size - 1)
             last = np.clip(np.ceil(values["most"]).astype(int) + 3 + target, first + 1, size)
-            values["planes"] = even[None, :, first[1] : last[1], first[0] : last[0]]
-            values["first_px"] = np.float32(first - target)
+            values |= {"planes": even[None, :, first[1] : last[1], first[0] : last[0]], "first_px": np.float32(first - target)}
             out = self.run("warp" if values["planes"].max() <= self.facts["warp_white"] else "warp_limited", values)
             if out.get("least", 0) < self.facts["warp_floor"]:
                 out = self.run("warp_limited", values)

@@ -1,6 +1,7 @@
 """The graphs of a block: samples of a mosaic in, demosaicked and restored planes out.
 
-    mosaic -> light, white balance, demosaic: one convolution -> taper -> spectrum -> filter -> out
+    mosaic -> light, white balance, demosaic: one convolution -> haze cleared, where there is one
+           -> taper -> spectrum -> filter -> out
 
 Side b, n = b / 2. The block comes with two samples more on every side, for the demosaic; out is
 what `camkit.runtime.bank` makes of it, times its window, so that the host only adds.
@@ -21,6 +22,7 @@ from camkit.runtime.portable.block_noise import (
 from camkit.runtime.portable.demosaic_taps import MARGIN_PX, demosaicked
 from camkit.runtime.portable.facts import CameraFacts
 from camkit.runtime.portable.graph_builder import GraphBuilder, Value
+from camkit.runtime.portable.haze_graph import cleared
 from camkit.runtime.portable.light_graph import explain
 from camkit.runtime.portable.mosaic_filter import restore_samples
 from camkit.runtime.portable.place import fall_table
@@ -49,8 +51,12 @@ def block_graph(facts: CameraFacts, *, mosaic: bool, lights: bool) -> GraphBuild
     assert len(transfer) == 2
     black, white, clip = levels.parts(0, 3)
     rgb = demosaicked(graph, samples - black, phase, gains / (white - black), shape)
+    rise = None
+    if facts.haze is not None:
+        rgb = cleared(graph, rgb, shape, facts.haze.kernels.cell_px)
+        rise = graph.input("noise_rise", (3,))
     tapered = tapered_block(graph, rgb, transfer, facts)
-    noise = noise_of(facts, tapered, (shot, read, gains))
+    noise = noise_of(facts, tapered, (shot, read, gains), rise)
     unlit, lit = tapered, None
     if lights:
         clipped = graph.node("GreaterOrEqual", samples, clip).cast("float32")

@@ -26,12 +26,24 @@ class BlockNoise:
 
 
 def noise_of(
-    facts: CameraFacts, tapered: Value, capture_noise: tuple[Value, Value, Value]
+    facts: CameraFacts,
+    tapered: Value,
+    capture_noise: tuple[Value, Value, Value],
+    rise: Value | None,
 ) -> BlockNoise:
-    """Return noise and level of a (3, 4, n, n) block, of shot noise, read variance and gains."""
+    """Return noise and level of a (3, 4, n, n) block.
+
+    Args:
+        facts: Of the camera.
+        tapered: The block.
+        capture_noise: Shot noise, read variance and gains.
+        rise: (3,) by which the variance was multiplied besides; None for nothing.
+    """
     shot, read, gains = capture_noise
     least_shot, least_read = facts.least_noise
     shot, read = shot.at_least(least_shot) * gains, read.at_least(least_read) * (gains * gains)
+    if rise is not None:
+        shot, read = shot * rise, read * rise
     side = facts.shape.side
     mean = (tapered.sum(1, 2, 3) * (1 / side**2)).shaped(3).relu()
     level = (mean * mean).at_least(read).at_least(LEAST_POWER).sqrt()

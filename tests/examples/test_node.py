@@ -62,6 +62,13 @@ def test_node_computes_what_python_computes(camera: PortableCamera, name: str) -
         assert float(np.abs(light - case.output).max()) <= case.allowed
 
 
+def test_a_haze_is_found_as_python_finds_it(tmp_path: Path) -> None:
+    build_examples()
+    camera = make_camera("thin-plate", "S", tmp_path)
+    case = camera.cases["saturated"]
+    assert difference_db(_develop(camera, case.photo), case.light) >= SAME_DB
+
+
 def test_a_plain_mosaic_is_developed_like_its_dng(camera: PortableCamera, tmp_path: Path) -> None:
     """Cropped at an odd place, where the cell of the sensor begins with another colour."""
     case = camera.cases["typical"]

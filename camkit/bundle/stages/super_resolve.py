@@ -1,7 +1,7 @@
 """Photons of an array behind a plate on a finer grid: linearly, or by a network."""
 
 from collections.abc import Sequence
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -18,6 +18,14 @@ from camkit.bundle.stages.entry import (
 
 PORTS = (1, 1)
 """Channels of a network: light, and what is told of its noise."""
+NOISE_SCALE: Final = 3.0
+"""Deviations in the plane that tells a network of noise."""
+WHITE_PERCENTILE: Final = 99.5
+"""Of the photons of a picture that are taken for white where nobody says."""
+LEAST_WHITE: Final = 4.0
+"""Photons: below, chance alone makes the brightest pixel."""
+SURE: Final = 2.0
+"""Standard deviations below what a pixel counted: so much light was there for sure."""
 Sampled = Literal["plate", "low_fill", "full_fill", "gaussian"]
 
 

@@ -21,7 +21,7 @@ OPTIONS = {
     "plan": "--bundle --size --quality --max-seconds --max-error-db --out-dir --method --mode "
     "--assume --max-mem --threads --json --debug",
     "view": "-o --before --crop --overwrite --json --debug",
-    "portable": "--out --size --json --debug",
+    "portable": "--out --size --depth-m --json --debug",
     "info": "--schema --json --debug",
     "check": "--level --json --debug",
     "simulate": "--bundle --iso --seed --origin-px -o --debug",

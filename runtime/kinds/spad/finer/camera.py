@@ -20,6 +20,7 @@ from camkit.bundle.manifest import Manifest
 from camkit.bundle.reader import Bundle, is_built_in
 from camkit.bundle.sensor import SpadSensor
 from camkit.bundle.stages import SuperResolve
+from camkit.bundle.stages.super_resolve import LEAST_WHITE, NOISE_SCALE, WHITE_PERCENTILE
 from camkit.caller import option_text
 from camkit.errors import BundleError, ContractError
 from camkit.runtime.cancel import Cancel, check_cancelled
@@ -29,12 +30,6 @@ from camkit.runtime.kinds.spad.finer.sampling import sampling_kernel
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.graph import check_graph
 
-NOISE_SCALE: Final = 3.0
-"""Deviations in the plane that tells a network of noise."""
-WHITE_PERCENTILE: Final = 99.5
-"""Of the photons of a picture that are taken for white where nobody says."""
-LEAST_WHITE: Final = 4.0
-"""Photons: below, chance alone makes the brightest pixel."""
 DEFAULT_SIZE: Final = "M"
 
 

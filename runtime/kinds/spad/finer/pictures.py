@@ -8,11 +8,10 @@ from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter
 
 from camkit.arrays import FloatArray
+from camkit.bundle.stages.super_resolve import SURE
 from camkit.runtime.cancel import Cancel, check_cancelled
 from camkit.runtime.kinds.spad.finer.camera import FineCamera, white_of
 
-SURE: Final = 2.0
-"""Standard deviations below what a pixel counted: so much light was there for sure."""
 EMPTY: Final = 0.0
 """Photons of a frame, dark counts taken off: with fewer there is nothing to see."""
 

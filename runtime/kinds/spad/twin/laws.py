@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import SuperResolve
+from camkit.bundle.stages.super_resolve import SURE
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
-from camkit.runtime.kinds.spad.finer.pictures import SURE, finer_frames
+from camkit.runtime.kinds.spad.finer.pictures import finer_frames
 from camkit.runtime.kinds.spad.twin.counting import Disturbances, count_frames
 from camkit.runtime.kinds.spad.twin.photon_twin import fitted, luminance, seen_by
 from camkit.runtime.proof.laws.law import SHARE, Law
