@@ -23,7 +23,7 @@ pictures: $(RUNTIME_STAMP)  ## the pictures of the README and of docs/gallery.md
 	$(VENV)/bin/python -m tools.pictures.gallery --out-dir docs/images
 
 test: tidy  ## set-up with everything, gate, tests with branch coverage; types beside the tests
-	@echo "Running all tests: about twelve minutes on two cores"
+	@echo "Running all tests: about half an hour on two cores"
 	$(MAKE) --no-print-directory -j2 types watched
 
 watched: $(DEV_STAMP)  # tests/conftest.py names the tests that the coverage gate counts
