@@ -252,7 +252,7 @@ def by_samples(block, known, phase, mosaic):
 def explain(stage, block, clipped, unknown, transfer, offset, kernel_half):
     """Light about clipped samples, and the variance that it leaves unexplained."""
     side, lights, left, weights = len(clipped), np.zeros(block.shape), 0, np.zeros(clipped.shape)
-    size, windows = choose_windows(clipped, kernel_half)
+    size, windows = choose_windows(clipped, kernel_half, stage.get("whole_blocks", False))
     for top, first, own in windows:
         cut = np.s_[..., top:top + size, first:first + size]
         here = transfer[:, ::side // size, ::side // size]
@@ -274,10 +274,10 @@ def richardson_lucy(stage, samples, unknown, transfer, offset):
         ratio = np.where(unknown, np.maximum(ratio, 1), ratio)
         light = light * np.maximum(filtered(transfer.conj(), ratio), 0) ** stage["clip_power"]
     return light
-def choose_windows(clipped, kernel_half):
+def choose_windows(clipped, kernel_half, whole):
     """Side and places of windows, each with clipped samples of its own; or the whole block."""
     side, least, best = len(clipped), clipped.size, (len(clipped), [(0, 0, clipped)])
-    for parts in (4, 3, 2):
+    for parts in () if whole else (4, 3, 2):
         size, core = side // parts, side // parts - 40
         if side % parts or size % 4 or core < 1 or size < kernel_half + 0.5:
             continue
@@ -353,21 +353,21 @@ def undistort(camera, stage, planes):
     result, radius = [], np.maximum(np.hypot(*places) / unit, 1e-12)
     for plane, curve in zip(planes, curves):
         at = places * curve(radius) / radius / camera.pitch - camera.corner[:, None, None]
-        columns, rows = fine_positions(at, height, width)
+        columns, rows = fine_positions(at, height, width, stage.get("places") == "fixed")
         values, around = resample(plane, rows, columns, -0.75)
         inside = resample(plane, np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1), 0)[1]
         mixed = (inside > 1).any((0, 1)) & (inside <= 1).any((0, 1))
         limited = np.clip(values, around.min((0, 1)), around.max((0, 1)))
         result.append(np.where(mixed | (values < -0.02), limited, values))
     return (np.stack(result),)
-def fine_positions(nodes, height, width):
-    """Positions of all pixels, in float32, from those of nodes 8 px apart."""
-    values = nodes.astype(np.float32)
+def fine_positions(nodes, height, width, fixed):
+    """Positions of all pixels, from those of nodes 8 px apart: fixed ones exactly."""
+    values = np.floor(nodes * 256 + 0.5) / 256 if fixed else nodes.astype(np.float32)
     for count in (width, height):
         at = (np.arange(count) - 3.5) / 8 + 1
         low, part = at.astype(int), (at % 1).astype(np.float32)
         values = (values[..., low] * (1 - part) + values[..., low + 1] * part).swapaxes(1, 2)
-    return np.round(values * 32) / 32
+    return (np.floor(values * 32 + 0.5) if fixed else np.round(values * 32)) / 32
 def color(camera, stage, planes):
     """The picture in linear Rec.709."""
     primaries = np.array([[0.640, 0.300, 0.150], [0.330, 0.600, 0.060], [0.030, 0.100, 0.790]])
