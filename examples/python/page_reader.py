@@ -327,7 +327,7 @@ def bound_light(numbers, scale, last, given, keep, bright):
                      for plane in change - np.clip(change, -limit, limit)]
     given = last + (given - last) * keep
     share = np.clip(((last / bright).min(0) - 0.7) / 0.3, 0, 1)
-    return np.maximum(given, share * last - 4 / scale) if numbers["keeps_bright"] else given
+    return np.maximum(given, share * last - 4 / scale) if numbers.get("keeps_bright") else given
 def raise_clipped(camera, stage, planes):
     """Clipped light made neutral."""
     gains = camera.gains[:, None, None]
