@@ -108,6 +108,8 @@ def _read(
     try:
         check_regular(file)
         head = _head(file)
+        if not head:
+            raise DecodeError("the file is empty")  # noqa: TRY301
         foreign.check_not_foreign(head)
         if is_picture(file):
             capture = _read_picture(file, mosaic, reading)

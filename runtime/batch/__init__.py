@@ -13,7 +13,7 @@ the others; `resume` skips only what a sidecar proves done.
 
 from camkit.runtime.batch.making import Pipelines
 from camkit.runtime.batch.processing import kind_of_run, process
-from camkit.runtime.batch.sources import expand
+from camkit.runtime.batch.sources import expand, unmatched_text
 from camkit.runtime.batch.tasks import Task, list_tasks
 
-__all__ = ["Pipelines", "Task", "expand", "kind_of_run", "list_tasks", "process"]
+__all__ = ["Pipelines", "Task", "expand", "kind_of_run", "list_tasks", "process", "unmatched_text"]

@@ -15,7 +15,7 @@ from camkit.kinds import Kind
 from camkit.progress import working
 from camkit.runtime.batch.batch_progress import PictureCount
 from camkit.runtime.batch.making import Common, FileProgress, Pipelines, run_task
-from camkit.runtime.batch.sources import expand
+from camkit.runtime.batch.sources import expand, unmatched_text
 from camkit.runtime.batch.tasks import NO_BUNDLE, Task, list_tasks
 from camkit.runtime.cancel import Cancel
 from camkit.runtime.capture import MosaicOptions
@@ -68,8 +68,8 @@ def process(  # noqa: PLR0913 - each says one thing to its caller
         client: Of dask.distributed; its workers make the pictures, each file a task. They must see
             captures and `out_dir` under the same absolute names. `threads` and `max_mem_bytes` are
             those of a file then.
-        on_notice: Called with what concerns no single file, such as a worker that is left out;
-            None logs it.
+        on_notice: Called with what concerns no single file, such as a worker that is left out or
+            a glob that matches nothing; None logs it.
         **choices: Single fields of `Options` and `WriteOptions` by name.
 
     Returns:
@@ -104,9 +104,13 @@ def process(  # noqa: PLR0913 - each says one thing to its caller
     bundle_name = None if bundle is None else str(bundle)
     pipelines = Pipelines(_shared(options, write.jobs))
     kind = kind_of_run(bundle_name, options, pipelines)
-    sources = expand(list_paths(files), kind, options.halves)
+    unmatched: list[str] = []
+    sources = expand(list_paths(files), kind, options.halves, unmatched.append)
     if not sources:
         return []
+    notice = on_notice or logger.warning
+    if unmatched:
+        notice(unmatched_text(unmatched))
     tasks = list_tasks(sources, bundle=bundle_name, write=write, options=options, kind=kind)
     write.out_dir.mkdir(parents=True, exist_ok=True)
     for folder in {task.target.parent for task in tasks}:
@@ -125,7 +129,7 @@ def process(  # noqa: PLR0913 - each says one thing to its caller
             common=common,
             pipelines=pipelines,
             on_result=count.result,
-            notice=on_notice or logger.warning,
+            notice=notice,
         )
         return process_on_cluster(client, tasks, wishes)
 

@@ -1,7 +1,7 @@
 """Captures named by files, folders and globs, each capture once."""
 
 import glob
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -20,7 +20,10 @@ CAPTURE_SUFFIXES: Final = RAW_SUFFIXES | {".exr", ".tif", ".tiff", ".png"}
 
 
 def expand(
-    files: Sequence[FilePath], kind: Kind | None = None, halves: Halves | None = None
+    files: Sequence[FilePath],
+    kind: Kind | None = None,
+    halves: Halves | None = None,
+    on_unmatched: Callable[[str], None] | None = None,
 ) -> list[Path]:
     """Return the captures named by files, folders and globs, each once, in the order given.
 
@@ -32,23 +35,35 @@ def expand(
         files: What was named.
         kind: Of the captures, where that is known: a folder stands for its types of files alone.
         halves: What differs in the paths of two halves of a capture, which the left one names.
+        on_unmatched: Called with each glob and folder that stands for nothing.
     """
     suffixes = _suffixes(kind)
     paths: dict[Path, None] = {}
     for item in files:
-        path = Path(item)
-        if _is_unreachable(path):
-            paths[path] = None
-        elif path.is_dir():
-            inside = sorted(p for p in path.iterdir() if p.suffix.lower() in suffixes)
-            paths.update(dict.fromkeys(p for p in inside if p.is_file() and not is_result(p)))
-        elif not path.exists() and glob.has_magic(str(item)):
-            # pathlib has no glob that takes an absolute pattern
-            matches = sorted(Path(m) for m in glob.glob(str(item), recursive=True))  # noqa: PTH207
-            paths.update(dict.fromkeys(p for p in matches if p.is_file()))
-        else:
-            paths[path] = None
+        matches = _matches(item, suffixes)
+        if not matches and on_unmatched is not None:
+            on_unmatched(str(item))
+        paths.update(dict.fromkeys(matches))
     return without_right_halves(list(paths), halves)
+
+
+def unmatched_text(names: Sequence[str]) -> str:
+    """Return the notice about globs and folders that stand for nothing."""
+    return f"no capture matches {', '.join(names)}"
+
+
+def _matches(item: FilePath, suffixes: frozenset[str]) -> list[Path]:
+    path = Path(item)
+    if _is_unreachable(path):
+        return [path]
+    if path.is_dir():
+        inside = sorted(p for p in path.iterdir() if p.suffix.lower() in suffixes)
+        return [p for p in inside if p.is_file() and not is_result(p)]
+    if not path.exists() and glob.has_magic(str(item)):
+        # pathlib has no glob that takes an absolute pattern
+        matches = sorted(Path(m) for m in glob.glob(str(item), recursive=True))  # noqa: PTH207
+        return [p for p in matches if p.is_file()]
+    return [path]
 
 
 def _suffixes(kind: Kind | None) -> frozenset[str]:

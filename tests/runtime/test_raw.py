@@ -263,12 +263,17 @@ def test_a_child_that_misbehaves_costs_one_file(scene, monkeypatch, program, mes
         read_capture(scene[0])
 
 
-def test_missing_and_empty_files_are_refused(tmp_path):
+def test_a_missing_file_is_refused(tmp_path):
     with pytest.raises(DecodeError, match="cannot read"):
         read_capture(tmp_path / "none.dng")
-    (tmp_path / "empty.dng").touch()
-    with pytest.raises(DecodeError, match=r"empty\.dng"):
-        read_capture(tmp_path / "empty.dng", isolate=False)
+
+
+@pytest.mark.parametrize("suffix", [".dng", ".cr2", ".jpg", ".png", ".tif", ".exr", ".hdr", ""])
+def test_an_empty_file_is_called_empty_whatever_its_name(tmp_path, suffix):
+    path = tmp_path / f"shot{suffix}"
+    path.touch()
+    with pytest.raises(DecodeError, match=f"^shot{suffix}: the file is empty$"):
+        read_capture(path)
 
 
 def test_a_pattern_for_a_raw_file_is_refused(scene):

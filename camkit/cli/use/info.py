@@ -1,4 +1,4 @@
-"""`camkit info`: what a bundle, a PSF or a capture is, or the schema of the manifest."""
+"""`camkit info`: what a bundle, a PSF, a capture or a sidecar is, or the manifest's schema."""
 
 import json
 from pathlib import Path
@@ -23,7 +23,8 @@ def info(
     file: Annotated[
         str | None,
         typer.Argument(
-            help="Bundle (NAME or PATH), PSF (.safetensors) or capture to describe.", metavar="FILE"
+            help="Bundle (NAME or PATH), PSF (.safetensors), capture or sidecar to describe.",
+            metavar="FILE",
         ),
     ] = None,
     schema: Annotated[
@@ -35,15 +36,20 @@ def info(
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Print what a bundle, a PSF or a capture contains."""
+    """Print what a bundle, a PSF, a capture or a sidecar contains."""
     if schema:
         from camkit.bundle.manifest import manifest_schema
 
         say(json.dumps(manifest_schema(), indent=2))
         return
     if file is None:
-        raise ContractError("give a bundle, a PSF or a capture, or --schema")
+        raise ContractError("give a bundle, a PSF, a capture or a sidecar, or --schema")
 
+    from camkit.report.view.result_search import is_sidecar_name
+
+    if is_sidecar_name(Path(file)):
+        _print_sidecar(Path(file), as_json=json_)
+        return
     options = mosaic_options(mosaic, black_level, white_level)
     facts = _describe(file, options)
     if json_:
@@ -52,6 +58,15 @@ def info(
     if facts.get("laws"):
         facts["laws"] = _laws_text(facts["laws"])
     for line in _lines(facts, ""):
+        say(line)
+
+
+def _print_sidecar(path: Path, *, as_json: bool) -> None:
+    from camkit.report.view.record_words import record_lines
+    from camkit.report.view.result_search import read_record
+
+    record = read_record(path)
+    for line in [json.dumps(record)] if as_json else record_lines(record):
         say(line)
 
 

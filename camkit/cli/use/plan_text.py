@@ -38,14 +38,17 @@ def print_plans(
     Raises:
         BundleError: If the bundle that was named is refused.
     """
-    from camkit.runtime.batch import Pipelines, expand, kind_of_run, list_tasks
+    from camkit.runtime.batch import Pipelines, expand, kind_of_run, list_tasks, unmatched_text
 
     pipelines = Pipelines(options)
     kind = kind_of_run(bundle, options, pipelines)
     done = True
-    sources = expand(files, kind, options.halves)
+    unmatched: list[str] = []
+    sources = expand(files, kind, options.halves, unmatched.append)
     if not sources:
         return None
+    if unmatched:
+        say(f"camkit: {unmatched_text(unmatched)}", err=True)
     tasks = list_tasks(
         sources, bundle=bundle, write=write, options=options, kind=kind, writes=False
     )

@@ -214,6 +214,7 @@ def process(
     from camkit.cli.use.cluster import cluster_client
     from camkit.cli.use.results import print_result
     from camkit.runtime.batch import process as run
+    from camkit.runtime.batch import unmatched_text
     from camkit.runtime.machine.memory import keep_memory_for_good
     from camkit.runtime.options import Options, parse_memory, read_noise, with_choices
     from camkit.runtime.signal.halves import read_halves
@@ -286,7 +287,7 @@ def process(
             )
         done = all(result.status != "failed" for result in results) if results else None
     if done is None:
-        say(f"camkit: no capture matches {', '.join(files)}", err=True)
+        say(f"camkit: {unmatched_text(files)}", err=True)
         raise typer.Exit(ExitCode.NOTHING_MATCHED)
     if not done:
         raise typer.Exit(ExitCode.INPUT_FAILED)

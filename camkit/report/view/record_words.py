@@ -26,6 +26,13 @@ def record_sentences(record: Mapping[str, Any]) -> list[Part]:
     ]
 
 
+def record_lines(record: Mapping[str, Any]) -> list[str]:
+    """Return what a sidecar says as lines of text: files, capture, work, warnings."""
+    parts = [f"{record['input']} -> {record['output']}", *record_sentences(record)]
+    texts = [part.text if isinstance(part, Words) else part for part in parts]
+    return [text for text in texts if isinstance(text, str)]
+
+
 def decision_table(record: Mapping[str, Any]) -> Table | None:
     """Return what was decided for a capture, and what was spared; None without decisions."""
     decisions = record.get("plan", {}).get("decisions")

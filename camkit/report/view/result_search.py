@@ -67,10 +67,9 @@ def _inside(path: Path) -> list[Path]:
 def _result_of(path: Path) -> ViewedResult:
     if not path.is_file():
         raise DecodeError(f"cannot read {path}: there is no such file")
-    is_sidecar = path.name.endswith(SIDECAR_SUFFIX)
+    is_sidecar = is_sidecar_name(path)
+    near = _any_output(path) if is_sidecar else path
     # of NAME.preview.jpg the sidecar is that of NAME
-    name = path.name.removesuffix(SIDECAR_SUFFIX) + ".any" if is_sidecar else path.name
-    near = path.with_name(name)
     if not sidecar_path(near).is_file() and near.stem.endswith(".preview"):
         near = near.with_name(near.stem.removesuffix(".preview") + near.suffix)
     file = sidecar_path(near)
@@ -80,10 +79,30 @@ def _result_of(path: Path) -> ViewedResult:
             record=None,
             notes=(f"{file.name} does not lie beside it: only the picture is known",),
         )
-    record = read_sidecar(near)
+    return _believed_result(path, read_record(file), is_sidecar=is_sidecar)
+
+
+def is_sidecar_name(path: Path) -> bool:
+    """Return whether a file has the name of a sidecar."""
+    return path.name.endswith(SIDECAR_SUFFIX)
+
+
+def read_record(sidecar: Path) -> dict[str, Any]:
+    """Read a sidecar, given by its own path.
+
+    Raises:
+        DecodeError: If it is not there, or cannot be read as a sidecar.
+    """
+    if not sidecar.is_file():
+        raise DecodeError(f"cannot read {sidecar}: there is no such file")
+    record = read_sidecar(_any_output(sidecar))
     if record is None or any(not isinstance(record.get(k), v) for k, v in _TYPES.items()):
-        raise DecodeError(f"{file} is damaged, or not a sidecar of this version of camkit")
-    return _believed_result(path, record, is_sidecar=is_sidecar)
+        raise DecodeError(f"{sidecar} is damaged, or not a sidecar of this version of camkit")
+    return record
+
+
+def _any_output(sidecar: Path) -> Path:
+    return sidecar.with_name(sidecar.name.removesuffix(SIDECAR_SUFFIX) + ".any")
 
 
 def _believed_result(path: Path, record: dict[str, Any], *, is_sidecar: bool) -> ViewedResult:

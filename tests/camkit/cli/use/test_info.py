@@ -199,3 +199,27 @@ def test_a_file_that_is_no_psf_is_refused_by_its_name(
     assert outcome.code not in (0, None)
     assert "lab.safetensors" in outcome.err
     assert len(outcome.err.strip().splitlines()) == 1
+
+
+def test_a_sidecar_is_described_in_words_and_printed_whole(captures, camkit_command) -> None:
+    camkit_command("process", "a.dng", "--bundle", "tiny.camkit", "--out-dir", "out")
+    sidecar = captures / "out" / "a.camkit.json"
+    lines = camkit_command("info", sidecar).out.splitlines()
+    assert lines[0] == "a.dng -> out/a.exr"
+    assert any("made with the bundle tiny and its network M" in line for line in lines)
+    assert any(line.startswith("Warning: in ") for line in lines)
+    printed = camkit_command("info", sidecar, "--json").out
+    assert json.loads(printed) == json.loads(sidecar.read_text())
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[1]", None])
+def test_a_sidecar_that_is_damaged_or_gone_is_refused_in_one_line(
+    tmp_path, camkit_command, text
+) -> None:
+    sidecar = tmp_path / "a.camkit.json"
+    if text is not None:
+        sidecar.write_text(text)
+    outcome = camkit_command("info", sidecar)
+    assert outcome.code == ExitCode.INPUT_FAILED
+    assert len(outcome.err.splitlines()) == 1
+    assert ("is damaged" if text is not None else "no such file") in outcome.err

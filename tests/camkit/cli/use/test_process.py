@@ -340,3 +340,13 @@ def test_products_of_single_photons_have_no_preview(captures: Path, camkit_comma
     done = camkit_command("process", "a.npz", "--bundle", "none", "--preview")
     assert done.code == ExitCode.USAGE
     assert "--preview is for photographs; a.npz becomes products" in done.err
+
+
+@pytest.mark.parametrize("more", [(), ("--dry-run",)])
+def test_what_matches_nothing_beside_captures_is_named_once(captures, camkit_command, more) -> None:
+    (captures / "hollow").mkdir()
+    outcome = camkit_command(
+        *("process", "a.dng", "more/*.dng", "hollow", "--bundle", "none", "--out-dir", "out"), *more
+    )
+    assert outcome.code == 0
+    assert outcome.err.splitlines() == ["camkit: no capture matches more/*.dng, hollow"]
