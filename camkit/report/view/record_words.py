@@ -140,6 +140,9 @@ def _sections(record: Mapping[str, Any]) -> list[str]:
     notes = []
     if record.get("clipped_fraction") is not None:
         notes.append(f"{record['clipped_fraction']:.2%} of the samples were clipped")
+    envelope = record.get("plan", {}).get("envelope") or {}
+    if envelope.get("outside") == []:
+        notes.append("the capture lies inside the measured range of the bundle")
     highlights = record.get("hdr", {})
     notes += [
         text.format(highlights[key]) for key, text in _HIGHLIGHTS.items() if key in highlights
