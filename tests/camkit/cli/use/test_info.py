@@ -209,7 +209,11 @@ def test_a_sidecar_is_described_in_words_and_printed_whole(captures, camkit_comm
     assert any("made with the bundle tiny and its network M" in line for line in lines)
     assert any(line.startswith("Warning: in ") for line in lines)
     printed = camkit_command("info", sidecar, "--json").out
-    assert json.loads(printed) == json.loads(sidecar.read_text())
+    record = json.loads(sidecar.read_text())
+    assert json.loads(printed) == record
+    record["plan"]["envelope"] = {"seen": {}, "outside": [], "fallback": False}
+    sidecar.write_text(json.dumps(record))
+    assert "lies inside the measured range" in camkit_command("info", sidecar).out
 
 
 @pytest.mark.parametrize("text", ["", "{}", "[1]", None])
