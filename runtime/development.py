@@ -192,8 +192,9 @@ def _extent(record: Mapping[str, Any]) -> str:
     """Return what was read of a capture with bins or frames; nothing of photographs."""
     if "bins" not in record:
         return ""
-    name = "bins" if "time_bin_ps" in record else "frames"
-    return f"{record['bins']} {name}, {record['width']}x{record['height']} pixels"
+    count = record["bins"]
+    name = "bins" if "time_bin_ps" in record else "frame" if count == 1 else "frames"
+    return f"{count} {name}, {record['width']}x{record['height']} pixels"
 
 
 def _check_free(source: Path, paths: list[Path], write: WriteOptions) -> None:

@@ -33,7 +33,8 @@ def process(
     bundle: Annotated[
         str | None,
         typer.Option(
-            help="Camera bundle (NAME, PATH) or 'none' (develop; SPAD: own array); default: the capture's."
+            help="Camera bundle (NAME, PATH) or 'none' (develop; SPAD: own array); default: "
+            "the capture's."
         ),
     ] = None,
     size: Annotated[

@@ -37,6 +37,9 @@ from camkit.runtime.rows import Rows, RowSource
 
 LONG: Final = 1.5
 """Times the other axes: a last axis so long may be time."""
+POOLED: Final = (
+    "{option}: a square is taken as one distance; on slanted surfaces sigma is too small"
+)
 IN_MEMORY: Final = Path("the array")
 
 
@@ -208,6 +211,8 @@ def _understood(file: CountsFile, settings: Settings, manifest: Manifest | None)
         timing = with_bundle(timing, manifest)
     elif settings.timing.array.axes is None:
         notes = _turned(file)
+    if product == "depth" and settings.way.pool not in ("auto", "1"):
+        notes += (POOLED.format(option=option_text("pool", settings.way.pool)),)
     timing = timing.with_stated(file.assumed)
     _check_listed(product, manifest)
     return PhotonCapture(

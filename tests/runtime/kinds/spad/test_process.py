@@ -451,6 +451,14 @@ def test_a_stated_histogram_has_no_gate_of_its_bundle(tmp_path: Path) -> None:
     assert not any("left out" in told for told in stated_gate.warnings)
 
 
+@pytest.mark.parametrize(("pool", "is_told"), [("auto", False), ("1", False), ("5", True)])
+def test_squares_asked_for_are_told_to_be_flat(
+    scan: Path, timing: Path, pool: str, *, is_told: bool
+) -> None:
+    made = camkit.load(None, kind="spad", timing=timing, pool=pool).make(scan)
+    assert is_told == any("a square is taken as one distance" in told for told in made.warnings)
+
+
 def test_a_last_axis_that_looks_like_time_is_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
