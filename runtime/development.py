@@ -3,6 +3,7 @@
 import json
 import math
 import time
+from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -40,6 +41,7 @@ class FileResult:
         peak_rss_mb: Peak memory of this process so far, its decoding child included.
         warnings: What the user should know.
         beside: Further files that were written, the sidecar left out.
+        extent: Bins (or frames) and pixels of a capture of photons, in words; else empty.
     """
 
     input: Path
@@ -52,6 +54,7 @@ class FileResult:
     peak_rss_mb: float
     warnings: tuple[str, ...] = ()
     beside: tuple[Path, ...] = ()
+    extent: str = ""
 
     @classmethod
     def failure(cls, source: Path, bundle: str | None, error: str) -> Self:
@@ -82,8 +85,10 @@ class FileResult:
 
     def to_json(self) -> dict[str, Any]:
         """Return the result as plain JSON values."""
+        values = asdict(self)
+        del values["extent"]  # the plan has its numbers
         return {
-            **asdict(self),
+            **values,
             "input": str(self.input),
             "output": None if self.output is None else str(self.output),
             "seconds": {name: round(value, 4) for name, value in self.seconds.items()},
@@ -164,6 +169,7 @@ def make_file(
                 peak_rss_mb=max(peak_rss_mb(), decoded_mb),
                 warnings=product.warnings,
                 beside=tuple(paths[1:]),
+                extent=_extent(work.record),
             )
             if estimate is not None:
                 total_s = sum(seconds.values())
@@ -180,6 +186,15 @@ def make_file(
             }
             proof.write_text(sidecar_text(record, product.sections), encoding="utf-8")
     return result
+
+
+def _extent(record: Mapping[str, Any]) -> str:
+    """Return what was read of a capture with bins or frames; nothing of photographs."""
+    if "bins" not in record:
+        return ""
+    count = record["bins"]
+    name = "bins" if "time_bin_ps" in record else "frame" if count == 1 else "frames"
+    return f"{count} {name}, {record['width']}x{record['height']} pixels"
 
 
 def _check_free(source: Path, paths: list[Path], write: WriteOptions) -> None:

@@ -95,7 +95,8 @@ def list_tasks(
     if nameless and not sound:
         names = ", ".join(str(t.source) for t in nameless)
         raise ContractError(
-            f"no file names a bundle ({names}); name one by {_bundle_options()} to develop only"
+            f"no file names a bundle ({names}); name one by {_bundle_options()}: photographs are "
+            "developed only, photons are fitted by formulas alone"
         )
     existing = [p for t in sound for p in t.files if p.exists() and p not in t.own_files]
     if existing and not (write.resume or write.overwrite):

@@ -204,6 +204,7 @@ def _record(
         "photons": options.photons,
         "seed": options.seed,
         "counts": int(recording.values.sum(dtype="int64")),
+        "notes": list(recording.notes),
     }
     return SimulatedCapture(samples=recording.values, facts=facts)
 

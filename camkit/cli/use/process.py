@@ -33,7 +33,8 @@ def process(
     bundle: Annotated[
         str | None,
         typer.Option(
-            help="Camera bundle (NAME, PATH) or 'none' to only develop; default: the capture's."
+            help="Camera bundle (NAME, PATH) or 'none' (develop; SPAD: own array); default: "
+            "the capture's."
         ),
     ] = None,
     size: Annotated[
@@ -55,7 +56,8 @@ def process(
     format_: Annotated[
         str | None,
         typer.Option(
-            "--format", help="File format: exr, tiff, png, jpeg (jpg) or dng; default: exr."
+            "--format",
+            help="File format: exr, tiff, png, jpeg (jpg) or dng; default: exr (SPAD: NPZ).",
         ),
     ] = None,
     preview: Annotated[

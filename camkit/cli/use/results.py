@@ -27,6 +27,7 @@ def _print_made(result: "FileResult") -> None:
         say(f"{head}: {'; '.join(result.warnings) or 'done before'}, skipped")
         return
     stages = ", ".join(f"{name} {value:.2f}" for name, value in result.seconds.items())
-    say(f"{head}: {total:.2f} s ({stages}), peak {result.peak_rss_mb:.0f} MB")
+    extent = f"{result.extent}, " if result.extent else ""
+    say(f"{head}: {extent}{total:.2f} s ({stages}), peak {result.peak_rss_mb:.0f} MB")
     for warning in result.warnings:
         say(f"  note: {warning}", err=True)

@@ -75,7 +75,9 @@ def simulate(
     ] = None,
     truth: Annotated[
         Path | None,
-        typer.Option(help="Also write the ideal picture of a perfect lens and sensor (.exr)."),
+        typer.Option(
+            help="Also write the ideal picture of a perfect lens and sensor (.exr); not for SPAD."
+        ),
     ] = None,
     overwrite: Overwrite = False,
     json_: Json = False,
@@ -113,6 +115,8 @@ def simulate(
         say(json.dumps(capture.facts, allow_nan=False))
     else:
         say(_line(capture.facts, with_saturation=saturate is not None))
+        for note in capture.facts.get("notes", ()):
+            say(f"  note: {note}", err=True)
 
 
 def _line(facts: Mapping[str, Any], *, with_saturation: bool) -> str:

@@ -25,7 +25,7 @@ from camkit.bundle.stages import Sharpen
 from camkit.report.bench.timed.process_run import Job, run_job
 from camkit.report.bench.trial import Skip
 from camkit.report.kinds.spad.scenes import drawn_pictures
-from camkit.runtime.kinds.spad.captures.photon_capture import times_of_bundle
+from camkit.runtime.kinds.spad.captures.bundle_times import times_of_bundle
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from camkit.runtime.kinds.spad.finer.depth import FineSharpener
 from camkit.runtime.kinds.spad.finer.pictures import finer_frames

@@ -15,25 +15,31 @@ from numpy.typing import NDArray
 
 from camkit.bundle.manifest import Manifest
 from camkit.bundle.plane import Plane
-from camkit.bundle.sensor import SpadSensor
-from camkit.bundle.stages import Sharpen, SuperResolve
+from camkit.bundle.stages import SuperResolve
 from camkit.caller import option_text
 from camkit.errors import ContractError, UnsupportedError
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.job.job import Job
+from camkit.runtime.kinds.spad.captures.bundle_times import (
+    check_bins,
+    notes_of_bundle,
+    with_bundle,
+)
 from camkit.runtime.kinds.spad.captures.settings import Product, Settings
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
 from camkit.runtime.kinds.spad.files.counts_file import CountsFile, Hints
 from camkit.runtime.kinds.spad.files.open_counts import open_counts
 from camkit.runtime.kinds.spad.finer.camera import size_of
 from camkit.runtime.kinds.spad.time_axis import TimeAxis
-from camkit.runtime.kinds.spad.timing import Timing, timing_beside
+from camkit.runtime.kinds.spad.timing import Timing
 from camkit.runtime.options import Options
 from camkit.runtime.rows import Rows, RowSource
 
-PULSE: Final = frozenset({"width_ps", "rc_ps", "jitter_ps", "fwhm_ps"})
-WHAT: Final = {"gate": "a scan with a gate", "histogram": "a histogram of arrivals"}
-"""Orientation -> what such a capture is."""
+LONG: Final = 1.5
+"""Times the other axes: a last axis so long may be time."""
+POOLED: Final = (
+    "{option}: a square is taken as one distance; on slanted surfaces sigma is too small"
+)
 IN_MEMORY: Final = Path("the array")
 
 
@@ -195,13 +201,19 @@ def photons_of_array(
 
 def _understood(file: CountsFile, settings: Settings, manifest: Manifest | None) -> PhotonCapture:
     timing = settings.timing.with_stated(file.stated_times)
+    product = settings.product_of(is_histogram=file.kind != "counts")
     notes: tuple[str, ...] = ()
     if manifest is not None:
         _check_shape(file, manifest)
-        notes = _surprise(file, timing, manifest)
-        timing = _with_bundle(timing, manifest)
+        if product != "intensity":
+            check_bins(file, timing, manifest)
+            notes = notes_of_bundle(file, timing, manifest)
+        timing = with_bundle(timing, manifest)
+    elif settings.timing.array.axes is None:
+        notes = _turned(file)
+    if product == "depth" and settings.way.pool not in ("auto", "1"):
+        notes += (POOLED.format(option=option_text("pool", settings.way.pool)),)
     timing = timing.with_stated(file.assumed)
-    product = settings.product_of(is_histogram=file.kind != "counts")
     _check_listed(product, manifest)
     return PhotonCapture(
         file=file,
@@ -209,7 +221,19 @@ def _understood(file: CountsFile, settings: Settings, manifest: Manifest | None)
         timing=timing,
         axis=None if file.kind == "counts" else _axis(file, timing),
         settings=settings,
-        notes=() if product == "intensity" else notes,
+        notes=notes,
+    )
+
+
+def _turned(file: CountsFile) -> tuple[str, ...]:
+    """Return a note where the last axis of an array is so long that it may be time."""
+    last, others = file.width, max(file.bins, file.height)
+    if file.kind != "histogram" or file.axes != "tyx" or last < LONG * others:
+        return ()
+    return (
+        f"{file.path.name} is taken as {file.bins} time bins of {file.width}x{file.height} pixels; "
+        f'if its last axis is time, state [array] axes = "yxt" in a file for '
+        f"{option_text('timing')}",
     )
 
 
@@ -276,45 +300,6 @@ def _check_shape(file: CountsFile, manifest: Manifest) -> None:
                 f'"{"".join(axes)}" in a file for {option_text("timing")}'
             )
     raise ContractError(text)
-
-
-def times_of_bundle(manifest: Manifest) -> dict[str, Any]:
-    """Return what a bundle says of times and pulse, by the names of a timing file."""
-    usual, sensor = manifest.stage(Sharpen), manifest.sensor
-    if usual is None or not isinstance(sensor, SpadSensor):
-        return {}
-    values = {
-        "orientation": usual.orientation,
-        "time_bin_ps": sensor.time_bin_ps,
-        "first_ps": usual.first_ps,
-        "width_ps": usual.gate_width_ps,
-        "rc_ps": usual.gate_rc_ps,
-        "jitter_ps": usual.jitter_ps,
-        "fwhm_ps": usual.laser_fwhm_ps,
-        "wavelength_nm": usual.laser_wavelength_nm,
-    }
-    return {name: value for name, value in values.items() if value is not None}
-
-
-def _with_bundle(timing: Timing, manifest: Manifest) -> Timing:
-    """Return what is known of times, with what the bundle says where nobody else does."""
-    pitch_um = manifest.sensor.known_extent.pixel_pitch_um
-    values = {"pitch_um": pitch_um, **times_of_bundle(manifest)}
-    # a measured pulse stands for gate and laser together
-    unwanted = PULSE if timing.irf.file is not None else frozenset()
-    return timing.with_stated({n: value for n, value in values.items() if n not in unwanted})
-
-
-def _surprise(file: CountsFile, timing: Timing, manifest: Manifest) -> tuple[str, ...]:
-    """Return a note where a bundle makes something else of a capture than is usual."""
-    usual, of_bundle = file.assumed.get("orientation"), times_of_bundle(manifest).get("orientation")
-    if timing.timing.orientation is not None or None in (usual, of_bundle) or usual == of_bundle:
-        return ()
-    return (
-        f"{file.path.name} is taken as {WHAT[str(of_bundle)]}, as bundle {manifest.name} "
-        f"states, though such files usually hold {WHAT[str(usual)]}; state [timing] orientation in "
-        f"a file for {option_text('timing')}, or in {timing_beside(file.path).name} beside it",
-    )
 
 
 def _axis(file: CountsFile, timing: Timing) -> TimeAxis:

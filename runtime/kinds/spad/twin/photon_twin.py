@@ -6,6 +6,7 @@ an NPZ of transient             the same, of light in flight
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,14 +17,14 @@ from numpy.typing import NDArray
 from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle
 from camkit.errors import ContractError, DecodeError
-from camkit.runtime.kinds.spad.captures.photon_capture import times_of_bundle
+from camkit.runtime.kinds.spad.captures.bundle_times import times_of_bundle
 from camkit.runtime.kinds.spad.files.npz import read_npz
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from camkit.runtime.kinds.spad.finer.linear import Grid
 from camkit.runtime.kinds.spad.finer.sampling import light_of
 from camkit.runtime.kinds.spad.pulse import Pulse
 from camkit.runtime.kinds.spad.time_axis import TimeAxis
-from camkit.runtime.kinds.spad.timing import Timing
+from camkit.runtime.kinds.spad.timing import LIGHT_M_PER_PS, Timing
 from camkit.runtime.kinds.spad.twin.array import see_through
 from camkit.runtime.kinds.spad.twin.counting import (
     Disturbances,
@@ -62,16 +63,34 @@ def record(scene: FloatArray | Path, bundle: Bundle, options: PhotonOptions) -> 
         return _counted(camera, light, options, rng)
     arrays = read_scene(scene)
     axis, pulse = times_of(camera)
+    notes: tuple[str, ...] = ()
     if "transient" in arrays:
         light = light_in_flight(arrays["transient"], axis.bins)
     elif {"depth_m", "albedo"} <= arrays.keys():
         light = light_of_depth(arrays["depth_m"], arrays["albedo"], axis, pulse)
+        notes = _outside(light, arrays["depth_m"], arrays["albedo"], axis)
     else:
         raise ContractError(
             f"{scene.name} holds {', '.join(arrays) or 'nothing'}; a scene has depth_m and albedo, "
             "or transient"
         )
-    return _timed(camera, light, axis, options, rng)
+    return replace(_timed(camera, light, axis, options, rng), notes=notes)
+
+
+def _outside(
+    light: FloatArray, depth_m: NDArray[Any], albedo: NDArray[Any], axis: TimeAxis
+) -> tuple[str, ...]:
+    """Return a note where less than half of the pulse of a surface lies on the time axis."""
+    is_surface = ~np.isnan(depth_m) & (albedo > 0)
+    is_lost = is_surface & (light.sum(axis=0) < albedo / 2)
+    if not is_lost.any():
+        return ()
+    share = is_lost.sum() / is_surface.sum()
+    deep_m = axis.bins * axis.step_ps * LIGHT_M_PER_PS / 2
+    return (
+        f"{share:.1%} of the scene lies outside the time axis, {axis.bins} x {axis.step_ps:g} ps "
+        f"({deep_m:.2f} m deep)",
+    )
 
 
 def luminance(picture: FloatArray) -> FloatArray:

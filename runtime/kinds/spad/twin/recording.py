@@ -41,8 +41,10 @@ class Recorded:
         name: What its array is called in files.
         values: The array.
         attributes: What a file should say of it, by name.
+        notes: What the user should know of how the scene was recorded.
     """
 
     name: str
     values: NDArray[Any]
     attributes: Mapping[str, Any]
+    notes: tuple[str, ...] = ()

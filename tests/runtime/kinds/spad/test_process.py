@@ -409,6 +409,77 @@ def test_a_plan_of_a_capture_in_this_folder_is_told(
     assert [path.name for path in scan.parent.iterdir()] == ["scan.npz"]
 
 
+def test_a_capture_without_times_takes_those_of_its_bundle_and_is_told(tmp_path: Path) -> None:
+    shape = (spad_bundle.HEIGHT, spad_bundle.WIDTH)
+    bundle = str(spad_bundle.write_spad_bundle(tmp_path).path)
+    path = tmp_path / "a.npz"
+
+    def notes(bins: int, **stated: Any) -> str:
+        counts = np.random.default_rng(0).poisson(9, (bins, *shape)).astype(np.uint16)
+        np.savez(path, histogram=counts, **stated)
+        return " | ".join(camkit.load(bundle, method="linear").make(path).warnings)
+
+    with pytest.raises(ContractError, match=r"has 100 time bins and states no times; .* has 80 of"):
+        notes(100)
+    assert "those of bundle" not in notes(100, time_bin_ps=16, fwhm_ps=70)
+    borrowed = "of bundle tiny-spad; the capture states none"
+    assert f"times and pulse are those {borrowed}" in notes(80)
+    assert f"times are those {borrowed}" in notes(80, fwhm_ps=70)
+    assert f"the pulse is that {borrowed}" in notes(80, time_bin_ps=20)
+
+
+def test_a_stated_histogram_has_no_gate_of_its_bundle(tmp_path: Path) -> None:
+    """Else its times would be those of the gate, all too early by half its width."""
+    shape = (spad_bundle.HEIGHT, spad_bundle.WIDTH)
+    bundle = str(spad_bundle.write_spad_bundle(tmp_path).path)
+    path, rng = tmp_path / "a.npz", np.random.default_rng(0)
+    sigma_ps = np.hypot(42.5, 70 / 2.3548)
+    stamps = rng.normal(800, sigma_ps, (400, *shape))
+    counts = np.stack([(np.round(stamps / 20) == t).sum(axis=0) for t in range(spad_bundle.BINS)])
+    stated = {"orientation": "histogram", "time_bin_ps": 20, "fwhm_ps": 70}
+    np.savez(path, histogram=counts.astype(np.uint16), **stated)
+    made = camkit.load(bundle, method="linear").make(path)
+    assert np.median(made.arrays["time_of_flight_ps"]) == pytest.approx(800, abs=3)
+    assert made.record["pulse"] == {
+        "fwhm_ps": pytest.approx(sigma_ps * 2.3548, abs=0.01),
+        "guessed": False,
+    }
+    assert any("the gate of bundle tiny-spad is left out" in told for told in made.warnings)
+    np.savez(path, histogram=counts.astype(np.uint16), width_ps=200, **stated)
+    stated_gate = camkit.load(bundle, method="linear").make(path)
+    assert stated_gate.record["pulse"]["width_ps"] == 200
+    assert not any("left out" in told for told in stated_gate.warnings)
+
+
+@pytest.mark.parametrize(("pool", "is_told"), [("auto", False), ("1", False), ("5", True)])
+def test_squares_asked_for_are_told_to_be_flat(
+    scan: Path, timing: Path, pool: str, *, is_told: bool
+) -> None:
+    made = camkit.load(None, kind="spad", timing=timing, pool=pool).make(scan)
+    assert is_told == any("a square is taken as one distance" in told for told in made.warnings)
+
+
+def test_a_last_axis_that_looks_like_time_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stated = {"orientation": "histogram", "time_bin_ps": 20, "fwhm_ps": 100}
+    path, beside = tmp_path / "a.npz", tmp_path / "a.npz.toml"
+    cube = np.tile(small_cube()[:, :1, :1], (1, 9, 11))
+    bins, height, width = cube.shape
+    words = ("process", path, "--bundle", "none", "--overwrite", "--out-dir", tmp_path / "out")
+    hint = f"taken as {height} time bins of {bins}x{width} pixels; if its last axis is time, state"
+    for axes, counts in (("tyx", cube), ("yxt", cube.transpose(1, 2, 0))):
+        np.savez(path, histogram=counts, **stated)
+        beside.write_text(f'[array]\naxes = "{axes}"\n', encoding="utf-8")
+        assert _command(*words) == 0
+        told = capsys.readouterr()
+        assert f"a.npz: {bins} bins, {width}x{height} pixels, " in told.out
+        assert hint not in told.err
+        beside.unlink()
+        assert _command(*words) == 0
+        assert (hint in " ".join(capsys.readouterr().err.split())) == (axes == "yxt")
+
+
 def test_zipped_histograms_are_named_without_their_type(tmp_path: Path) -> None:
     write_sdt_zip(tmp_path / "cells.sdt.zip", small_cube())
     (result,) = camkit.process(

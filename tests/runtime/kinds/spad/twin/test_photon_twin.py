@@ -313,6 +313,24 @@ def test_a_scene_that_announces_more_than_it_holds_is_refused(
         record(tmp_path / "scene.npz", bundle, PhotonOptions(photons=10))
 
 
+def test_a_scene_beyond_the_time_axis_is_told(
+    bundle: Bundle, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, depth = tmp_path / "scene.npz", np.full(FINE, 0.15)
+    depth[:, : FINE[1] // 4] = 3.0
+    depth[:, -FINE[1] // 2 :] = np.nan  # no surface is no part of the scene
+    np.savez(path, depth_m=depth, albedo=np.ones(FINE))
+    words = (path, "--bundle", bundle.path, "-o", tmp_path / "scan.npz", "--overwrite")
+    assert _simulate(*words) == 0
+    told = "50.0% of the scene lies outside the time axis, 80 x 20 ps (0.24 m deep)"
+    assert told in capsys.readouterr().err
+    assert _simulate(*words, "--json") == 0
+    assert json.loads(capsys.readouterr().out)["notes"] == [told]
+    np.savez(path, depth_m=np.full(FINE, 0.15), albedo=np.ones(FINE))
+    assert _simulate(*words) == 0
+    assert "outside" not in capsys.readouterr().err
+
+
 def test_light_of_a_surface_is_its_albedo_at_its_time(camera: FineCamera) -> None:
     axis, pulse = times_of(camera)
     depth = np.array([[0.10, 0.12], [np.nan, 0.14]])
