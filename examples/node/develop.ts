@@ -43,7 +43,7 @@ async function loadRuntime(wasm: boolean): Promise<Runtime> {
 
 function numbers(text: string, count: number, what: string): number[] {
   const values = text.split(",").map(Number);
-  check(values.length === count && values.every(Number.isFinite), `${what} must be ${count} numbers; got ${text}.`);
+  check(values.length === count && values.every(Number.isFinite), `${what} takes ${count} number${count > 1 ? "s" : ""}; got ${text}.`);
   return values;
 }
 
