@@ -82,7 +82,7 @@ class Walk:
                 return cap
 
     def _fit(self, cap: int) -> None:
-        """Share a cap among the stages that run.
+        """Plan the stages that run within a cap.
 
         Raises:
             MemoryCapError: If it is too small for one of them.

@@ -293,7 +293,7 @@ def lay_network(
         MemoryCapError: If the cap is too small; it names one that is enough.
         ContractError: If a network that looks at the whole picture would be tiled in mode exact.
     """
-    spent = (
+    budget = (
         f"of the cap of {limits.cap_bytes // 10**6} MB everything but the network takes "
         f"{limits.spent_bytes // 10**6} MB; "
     )
@@ -305,9 +305,9 @@ def lay_network(
         if limits.mode == "exact" and any(n.is_global and _has_fast(n.facts) for n in networks):
             fast = option_text("mode", "fast")
             cure += f", or use {fast}, which processes windows separately"
-        raise MemoryCapError(f"{spent}{error}{cure}", need) from error
+        raise MemoryCapError(f"{budget}{error}{cure}", need) from error
     except ContractError as error:
-        raise ContractError(f"{spent}{error}") from error
+        raise ContractError(f"{budget}{error}") from error
 
 
 def _lay_windows(
