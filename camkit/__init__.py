@@ -32,6 +32,7 @@ if TYPE_CHECKING:
         CamkitError,
         ContractError,
         DecodeError,
+        MemoryCapError,
         ParityError,
         UnsupportedError,
     )
@@ -56,6 +57,7 @@ __all__ = [
     "ContractError",
     "DecodeError",
     "FileResult",
+    "MemoryCapError",
     "MosaicOptions",
     "ParityError",
     "Pipeline",

@@ -2,6 +2,7 @@
 
     CamkitError
     |-- ContractError (also ValueError)   the caller broke a promise: shape, range, option
+    |   `-- MemoryCapError                the memory cap is too small for this capture
     |-- DecodeError                       a capture or picture cannot be read
     |-- BundleError                       a bundle was refused
     |-- UnsupportedError                  understood, but not offered here
@@ -46,6 +47,18 @@ def unexpected(error: Exception) -> str:
 
 class ContractError(CamkitError, ValueError):
     """An argument breaks the stated contract (shape, range, unknown option)."""
+
+
+class MemoryCapError(ContractError):
+    """The memory cap is too small for a capture: raise `max_mem_bytes`.
+
+    Attributes:
+        need_bytes: A cap that is enough; 0 where that is not known.
+    """
+
+    def __init__(self, text: str = "", need_bytes: int = 0) -> None:
+        super().__init__(text)
+        self.need_bytes = need_bytes
 
 
 class DecodeError(CamkitError):

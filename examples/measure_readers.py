@@ -54,6 +54,7 @@ def run_node(camera: PortableCamera, photo: Path, size: str, *flags: str) -> tup
         size,
         "--light",
         str(light),
+        "--overwrite",
         *flags,
     ]
     said = subprocess.run(words, check=True, capture_output=True, text=True).stdout
@@ -67,7 +68,7 @@ def run_cpp(camera: PortableCamera, photo: Path, size: str) -> tuple[FloatArray,
     mosaic, light = photo.with_suffix(".npy"), photo.with_suffix(".pfm")
     np.save(mosaic, np.asarray(capture.samples, np.uint16))
     gains, origin = capture.white_balance or (1.0, 1.0, 1.0), capture.origin_px or (0, 0)
-    words = [str(cpp_program()), str(camera.folder), "--network", size, "--iso", repr(capture.iso)]
+    words = [str(cpp_program()), str(camera.folder), "--size", size, "--iso", repr(capture.iso)]
     words += ["--white-balance", ",".join(map(repr, map(float, gains)))]
     words += ["--origin-px", ",".join(map(str, origin)), str(mosaic), str(light)]
     said = subprocess.run(words, check=True, capture_output=True, text=True).stdout

@@ -19,7 +19,7 @@ PICTURE  .pfm (float32, linear Rec.709) or .ppm (16 bit, sRGB)
   --origin-px X,Y         of the first sample on the sensor; default: 0,0
   --levels BLACK,WHITE    in DN; default: the sensor's
   --size-px W,H           of raw mosaics
-  --network SIZE          S, M, ...; default: M
+  --size S                of the network; default: M
   --threads N             of a graph; default: 1
   --straight no           stop before the distortion is taken out: the camera's colours
 )";
@@ -117,7 +117,7 @@ void develop(const std::vector<std::string>& words) {
       capture.levels = {{take(2)[0], take(2)[1]}};
     } else if (option == "--size-px") {
       width = int(take(2)[0]), height = int(take(2)[1]);
-    } else if (option == "--network") {
+    } else if (option == "--size") {
       options.size = words[i];
     } else if (option == "--threads") {
       options.threads = int(take(1)[0]);

@@ -1,11 +1,13 @@
 """A web service on camkit: a capture comes in, a restored JPEG goes out, or the reason why not.
 
-pip install camkit fastapi uvicorn
+pip install fastapi uvicorn
 uvicorn --app-dir examples/fastapi app:app
 curl --fail-with-body -T shot.dng http://127.0.0.1:8000/captures/shot.dng -o shot.jpg
 """
 
 import asyncio
+import json
+import re
 import tempfile
 from collections.abc import AsyncIterator
 from concurrent.futures.process import BrokenProcessPool
@@ -13,8 +15,7 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Annotated
 
-import fastapi
-from fastapi import FastAPI, HTTPException, Request, Response
+from fastapi import Depends, FastAPI, HTTPException, Request, Response
 from starlette.requests import ClientDisconnect
 from workers import Workers
 
@@ -22,8 +23,19 @@ import camkit
 
 WORKERS, WAITING = 2, 4  # captures at once, and those that wait; one more is answered by a 503
 MOST_BYTES, UPLOAD_S = 200_000_000, 60
-Key = Annotated[str, fastapi.Path(pattern=r"^[\w-]{1,64}\.[A-Za-z0-9]{2,4}$")]
 jobs: dict[str, float] = {}  # how far each capture is
+
+
+def check_key(key: str) -> str:
+    """Return a key that may name a capture."""
+    if not re.fullmatch(r"[\w-]{1,64}\.[A-Za-z0-9]{2,4}", key):
+        raise HTTPException(
+            422, "a key is a name of letters, digits, _ and -, and a suffix: shot.dng"
+        )
+    return key
+
+
+Key = Annotated[str, Depends(check_key)]
 
 
 @asynccontextmanager
@@ -52,12 +64,16 @@ async def restore(key: Key, request: Request) -> Response:
             async with asyncio.timeout(UPLOAD_S):
                 await receive(request, source)
             workers, tell = request.app.state.workers, lambda share: jobs.update({key: share})
-            await workers.make(source, picture, tell, request.is_disconnected)
-            return Response(picture.read_bytes(), media_type="image/jpeg")
+            warnings = await workers.make(source, picture, tell, request.is_disconnected)
+            headers = {"X-Camkit-Warnings": json.dumps(warnings)}
+            return Response(picture.read_bytes(), headers=headers, media_type="image/jpeg")
     except TimeoutError:
         raise HTTPException(408, f"the upload took more than {UPLOAD_S} s") from None
     except (camkit.Cancelled, ClientDisconnect):
         return Response(status_code=499)  # nobody reads it
+    except camkit.MemoryCapError as error:
+        need_mb = error.need_bytes // 10**6 + 1
+        raise HTTPException(507, f"too large for this service: it takes {need_mb} MB") from error
     except camkit.CamkitError as error:
         raise HTTPException(422, str(error).replace(f"{folder}/", "")) from error
     except BrokenProcessPool as error:

@@ -14,7 +14,7 @@ from camkit.runtime.development import make_file
 from camkit.runtime.write_options import WriteOptions
 
 BUNDLE = os.environ.get("CAMERA", "duet")
-CAP_BYTES = 500_000_000  # memory of one worker
+CAP_BYTES = 800_000_000  # memory of one worker: enough for 6000x4000 pixels of duet
 POLL_S = 0.1
 _loaded: dict[str, Any] = {}  # in a worker
 
@@ -24,12 +24,15 @@ def _load(stop: Any, share: Any) -> None:
     _loaded.update(camera=camera, stop=stop, share=share)
 
 
-def _make(source: Path, picture: Path) -> None:
+def _make(source: Path, picture: Path) -> tuple[str, ...]:
     def count(done: int, total: int) -> None:
         _loaded["share"].value = done / total
 
-    write, stop = WriteOptions(format="jpeg"), _loaded["stop"]
-    make_file(source, picture, _loaded["camera"], write, progress=count, cancel=stop)
+    def is_stopped() -> bool:
+        return bool(_loaded["stop"].value)
+
+    camera, write = _loaded["camera"], WriteOptions(format="jpeg")
+    return make_file(source, picture, camera, write, progress=count, cancel=is_stopped).warnings
 
 
 class Worker:
@@ -38,7 +41,7 @@ class Worker:
     def __init__(self) -> None:
         """Start the process; the camera is loaded before its first task."""
         spawn = multiprocessing.get_context("spawn")
-        self.stop, self.share = spawn.Event(), spawn.RawValue("d", 0.0)
+        self.stop, self.share = spawn.RawValue("b", 0), spawn.RawValue("d", 0.0)
         self.pool = ProcessPoolExecutor(1, spawn, _load, (self.stop, self.share))
 
 
@@ -77,8 +80,11 @@ class Workers:
         picture: Path,
         progress: Callable[[float], None],
         is_gone: Callable[[], Awaitable[bool]],
-    ) -> None:
+    ) -> tuple[str, ...]:
         """Make a picture by the next free worker, which is cancelled when the client is gone.
+
+        Returns:
+            What camkit warns of.
 
         Raises:
             CamkitError: What is wrong with the capture.
@@ -89,14 +95,14 @@ class Workers:
         job = None
         try:
             for is_last in (False, True):  # the system may have ended one: the capture gets another
-                worker.stop.clear()
+                worker.stop.value = False
                 worker.share.value = 0.0
                 try:
                     job = asyncio.wrap_future(worker.pool.submit(_make, source, picture))
                     while not (await asyncio.wait([job], timeout=POLL_S))[0]:
                         progress(worker.share.value)
                         if await is_gone():
-                            worker.stop.set()
+                            worker.stop.value = True
                     return job.result()
                 except BrokenProcessPool:
                     worker = Worker()
@@ -106,5 +112,5 @@ class Workers:
             if job is None or job.done():
                 self._free.put_nowait(worker)
             else:  # the request was cancelled: the worker is free once it has heard of that
-                worker.stop.set()
+                worker.stop.value = True
                 job.add_done_callback(lambda _: self._free.put_nowait(worker))

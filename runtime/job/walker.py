@@ -14,7 +14,7 @@ from camkit.bundle.chain import CAPTURE
 from camkit.bundle.plane import Plane
 from camkit.bundle.stages import StageEntry
 from camkit.caller import option_text
-from camkit.errors import ContractError
+from camkit.errors import ContractError, MemoryCapError
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
@@ -27,6 +27,8 @@ FIXED_BYTES: Final = 240_000_000
 """Interpreter and libraries, and what they keep (measured, see docs/guides/performance.md)."""
 USUAL_BYTES: Final = 16_000_000
 """Of a bundle, and of the weights of a network: so much is part of that."""
+CAP_STEP_BYTES: Final = 1_000_000
+"""By which a cap rises at least until everything fits."""
 
 
 class Walk:
@@ -45,8 +47,8 @@ class Walk:
             job: The capture, planned.
 
         Raises:
-            ContractError: If the memory does not do, or a stage is left out that no plane stands in
-                for.
+            MemoryCapError: If the memory does not do; it names a cap that does.
+            ContractError: If a stage is left out that no plane stands in for.
         """
         self._job = job
         self.stages = job.setup.stages
@@ -61,16 +63,36 @@ class Walk:
         job.log.is_ready = True
 
     def _share_memory(self) -> None:
-        job = self._job
+        cap = self._job.options.max_mem_bytes or DEFAULT_MAX_MEM_BYTES
+        try:
+            self._fit(cap)
+        except MemoryCapError as error:
+            if (need := self._enough_bytes(error.need_bytes)) == error.need_bytes:
+                raise
+            raise MemoryCapError(_refusal(need, cap), need) from error
+
+    def _enough_bytes(self, cap: int) -> int:
+        """Return the next cap by which everything fits."""
+        while True:
+            try:
+                self._fit(cap)
+            except MemoryCapError as error:
+                cap = max(error.need_bytes, cap + CAP_STEP_BYTES)
+            else:
+                return cap
+
+    def _fit(self, cap: int) -> None:
+        """Plan the stages that run within a cap.
+
+        Raises:
+            MemoryCapError: If it is too small for one of them.
+        """
         running = [work for work, way in zip(self._works, self.ways, strict=True) if way]
         flexible = [work for work in running if work.fit is not None]
-        cap = job.options.max_mem_bytes or DEFAULT_MAX_MEM_BYTES
         planned, first = self._fixed_bytes(running), self._first_bytes(running)
         if first > cap or (planned > cap and not flexible):
-            raise ContractError(
-                f"this takes about {max(planned, first) // 10**6} MB, the cap is "
-                f"{cap // 10**6} MB; raise {option_text('max_mem_bytes')}"
-            )
+            need = max(planned, first)
+            raise MemoryCapError(_refusal(need, cap), need)
         for number, work in enumerate(flexible):
             assert work.fit is not None
             share = max(cap - planned, 1) // (len(flexible) - number)
@@ -170,6 +192,13 @@ class Walk:
     def _inputs_of(self, number: int) -> tuple[str, ...]:
         """Return the names of the planes that a stage takes; stand-ins for what is left out."""
         return tuple(self._instead.get(name, name) for name in self.stages[number].takes)
+
+
+def _refusal(need_bytes: int, cap_bytes: int) -> str:
+    return (
+        f"this takes about {need_bytes // 10**6} MB, the cap is {cap_bytes // 10**6} MB; "
+        f"raise {option_text('max_mem_bytes', need_bytes)}"
+    )
 
 
 def _giver_of(plane: str, stages: Sequence[StageEntry]) -> int:

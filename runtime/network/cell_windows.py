@@ -12,6 +12,7 @@ there, so the pixels of its cells are those of the untiled run whatever rectangl
 ramp depends on the labels alone. Strips and rectangles only decide what it costs.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
@@ -21,8 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.arrays import FloatArray
-from camkit.caller import option_text
-from camkit.errors import ContractError
+from camkit.errors import ContractError, MemoryCapError
 from camkit.runtime.cancel import Cancel, check_cancelled
 from camkit.runtime.network.guard import TileGuard, is_finite
 from camkit.runtime.network.light_keeper import WindowFinish
@@ -175,7 +175,8 @@ def lay_cells(
         limits: Cell side and memory.
 
     Raises:
-        ContractError: If the labels do not fit the picture, or the cap is too small for one cell.
+        ContractError: If the labels do not fit the picture.
+        MemoryCapError: If the memory is too small for one cell; it names what is enough.
     """
     cell = limits.cell_px
     lattice = tuple(-(-side // cell) for side in size_px)
@@ -384,10 +385,11 @@ def _strip_cells(
         most_px = int((limits.max_bytes - row_bytes) / max(per_px, 1))
         if most_px >= _padded_px(cell, cells, min(2, cells), halo):
             return cells, most_px
-    need = (cell + 2 * halo) * width * in_bytes + _padded_px(cell, 1, 1, halo) * per_px
-    raise ContractError(
-        f"{width}x{height} pixels with a halo of {halo} need at least {need / 2**20:.0f} MiB for "
-        f"one cell; got {limits.max_bytes / 2**20:.0f} MiB: raise {option_text('max_mem_bytes')}"
+    need = math.ceil(row_bytes + _padded_px(cell, 1, 1, halo) * max(per_px, 1)) + 1
+    raise MemoryCapError(
+        f"{width}x{height} pixels with a halo of {halo} need at least {need / 10**6:.0f} MB for "
+        f"one cell; got {limits.max_bytes / 10**6:.0f} MB",
+        need,
     )
 
 

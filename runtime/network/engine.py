@@ -31,7 +31,7 @@ from onnxruntime.capi import onnxruntime_pybind11_state as ort_errors  # noqa: E
 logger = logging.getLogger(__name__)
 if _IMPORTED_BEFORE:
     logger.warning(
-        "onnxruntime was imported before camkit, so its telemetry may be on; "
+        "onnxruntime was imported before camkit first loaded a bundle, so its telemetry may be on; "
         "set ORT_DISABLE_TELEMETRY=1 in the environment"
     )
 

@@ -15,6 +15,7 @@ the lattice of its stride and kernels that sum alike wherever a pixel lies, kept
 of the untiled run bit for bit. Nothing is blended.
 """
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -24,8 +25,7 @@ from typing import Final, Protocol
 import numpy as np
 
 from camkit.arrays import FloatArray
-from camkit.caller import option_text
-from camkit.errors import ContractError
+from camkit.errors import ContractError, MemoryCapError
 from camkit.runtime.cancel import Cancel, check_cancelled
 from camkit.runtime.network.guard import TileGuard, is_finite
 from camkit.runtime.network.light_keeper import WindowFinish
@@ -238,7 +238,8 @@ def lay_windows(height_px: int, width_px: int, limits: TileLimits) -> TileLayout
         The layout; it depends on nothing but the arguments.
 
     Raises:
-        ContractError: If a side is < 1 or the cap is too small for the smallest windows.
+        ContractError: If a side is < 1.
+        MemoryCapError: If the smallest windows do not fit; it names what is enough.
     """
     if height_px < 1 or width_px < 1:
         raise ContractError(f"a picture has at least 1x1 pixels; got {width_px}x{height_px}")
@@ -281,10 +282,10 @@ def _least_work(size: tuple[int, int], halo: int, limits: TileLimits) -> tuple[i
     fitting = [window for window in costs if costs[window][2] <= limits.max_bytes]
     if not fitting:
         least = min(memory for *_, memory in costs.values())
-        raise ContractError(
+        raise MemoryCapError(
             f"{size[1]}x{size[0]} pixels with a halo of {halo} need at least "
-            f"{least / 2**20:.0f} MiB for one window; got {limits.max_bytes / 2**20:.0f} MiB: "
-            f"raise {option_text('max_mem_bytes')}"
+            f"{least / 10**6:.0f} MB for one window; got {limits.max_bytes / 10**6:.0f} MB",
+            math.ceil(least),
         )
     return min(fitting, key=lambda window: (costs[window], window))
 

@@ -16,7 +16,7 @@ from typing import Any, Final
 from camkit.arrays import FloatArray
 from camkit.bundle.facts import HaloError, NetworkFacts
 from camkit.caller import option_text
-from camkit.errors import ContractError
+from camkit.errors import ContractError, MemoryCapError
 from camkit.runtime.cancel import Cancel
 from camkit.runtime.network.cell_windows import (
     CellLayout,
@@ -290,16 +290,24 @@ def lay_network(
         labels: (row, column): 0 none, n the n-th network; None for the first one everywhere.
 
     Raises:
-        ContractError: If the cap is too small, or a network that looks at the whole picture would
-            be tiled in mode exact.
+        MemoryCapError: If the cap is too small; it names one that is enough.
+        ContractError: If a network that looks at the whole picture would be tiled in mode exact.
     """
+    budget = (
+        f"of the cap of {limits.cap_bytes // 10**6} MB everything but the network takes "
+        f"{limits.spent_bytes // 10**6} MB; "
+    )
     try:
         return _lay_windows(size_px, networks, limits, labels)
+    except MemoryCapError as error:
+        need = limits.spent_bytes + error.need_bytes
+        cure = f": raise {option_text('max_mem_bytes', need)}"
+        if limits.mode == "exact" and any(n.is_global and _has_fast(n.facts) for n in networks):
+            fast = option_text("mode", "fast")
+            cure += f", or use {fast}, which processes windows separately"
+        raise MemoryCapError(f"{budget}{error}{cure}", need) from error
     except ContractError as error:
-        raise ContractError(
-            f"of the cap of {limits.cap_bytes // 10**6} MB everything but the network takes "
-            f"{limits.spent_bytes // 10**6} MB; {error}"
-        ) from error
+        raise ContractError(f"{budget}{error}") from error
 
 
 def _lay_windows(
@@ -397,16 +405,16 @@ def _check_one_window(
     if layout.window_count == 1 and window_bytes <= limits.max_bytes:
         return
     height, width = size_px
-    cure = f"one window of {width}x{height} px takes {window_bytes // 10**6} MB"
-    cure += f": raise {option_text('max_mem_bytes', limits.spent_bytes + window_bytes)}"
-    if layout.window_count > 1:
-        cure = f"leave out the tile size, which makes {layout.window_count} windows"
-    elif _has_fast(network.facts):
-        cure += f", or use {option_text('mode', 'fast')}, which processes windows separately"
-    raise ContractError(
+    reason = (
         f"the network looks at the whole picture ({network.facts.global_text}) and cannot be "
-        f"tiled exactly: {cure}"
+        "tiled exactly"
     )
+    if layout.window_count > 1:
+        raise ContractError(
+            f"{reason}: leave out the tile size, which makes {layout.window_count} windows"
+        )
+    window = f"one window of {width}x{height} px takes {window_bytes // 10**6} MB"
+    raise MemoryCapError(f"{reason}: {window}", window_bytes)
 
 
 def _has_fast(facts: NetworkFacts) -> bool:

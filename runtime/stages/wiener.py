@@ -13,7 +13,7 @@ from camkit.bundle.manifest import Manifest
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Wiener
 from camkit.caller import option_text
-from camkit.errors import ContractError
+from camkit.errors import MemoryCapError
 from camkit.psf import depth_name
 from camkit.runtime.bank.baselines import TUNED_ON, method_numbers, restoration_bank
 from camkit.runtime.bank.blocks import (
@@ -84,16 +84,17 @@ def check(entry: Wiener, manifest: Manifest, max_bytes: int) -> None:
 
     Raises:
         BundleError: If every pixel would be transformed too often.
-        ContractError: If one block does not fit.
+        MemoryCapError: If one block does not fit.
     """
     channels = len(manifest.sensor.channels)
     BANK_WORK.check(bank_work(entry, channels), f"the Wiener bank of {manifest.name}")
     least = FIXED_BYTES + block_bytes(entry.block_px, channels, threads=1)
     if least > max_bytes:
-        raise ContractError(
+        raise MemoryCapError(
             f"the Wiener bank of {manifest.name} has blocks of {entry.block_px} px, which take "
             f"{least // 10**6} MB; got {max_bytes // 10**6} MB: raise "
-            f"{option_text('max_mem_bytes')}"
+            f"{option_text('max_mem_bytes', least)}",
+            least,
         )
 
 

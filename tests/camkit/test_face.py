@@ -17,6 +17,7 @@ PUBLIC = [
     "ContractError",
     "DecodeError",
     "FileResult",
+    "MemoryCapError",
     "MosaicOptions",
     "ParityError",
     "Pipeline",

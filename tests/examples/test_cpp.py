@@ -81,7 +81,7 @@ def _developed(
 ) -> None:
     gains = ",".join(map(repr, case.white_balance or (1.0, 1.0, 1.0)))
     origin = ",".join(map(str, case.origin_px))
-    about = ("--network", SIZE, "--iso", repr(case.iso), "--white-balance", gains)
+    about = ("--size", SIZE, "--iso", repr(case.iso), "--white-balance", gains)
     words = (*about, "--origin-px", origin, *options, *map(str, pairs))
     made = _run(str(cpp_program()), str(camera.folder), *words)
     assert made.returncode == 0, made.stderr
@@ -194,7 +194,7 @@ def test_damaged_cameras_and_files_are_refused_by_their_fault(
         "another version": (folders["newer"], *raw),
         "is damaged": (folders["bent"], *raw),
         "cannot read": (folders["missing"], *raw),
-        "no network of size M; it has S": (duet.folder, "--network", "M", *raw),
+        "no network of size M; it has S": (duet.folder, "--size", "M", *raw),
         "100 bytes of samples, not 1200": (duet.folder, *raw),
         "no array of uint16": (duet.folder, str(tmp_path / "float.npy")),
         "the manifest has no tile_px": (
@@ -206,7 +206,7 @@ def test_damaged_cameras_and_files_are_refused_by_their_fault(
         ),
     }
     for fault, words in faults.items():
-        size = () if "--network" in words else ("--network", SIZE)
+        size = () if "--size" in words else ("--size", SIZE)
         made = _run(str(cpp_program()), *map(str, words), str(tmp_path / "out.pfm"), *size)
         assert (made.returncode, fault in made.stderr) == (1, True), (fault, made.stderr)
     assert not (tmp_path / "out.pfm").exists()

@@ -6,6 +6,7 @@ import re
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import AsyncIterator, Iterator
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
@@ -35,12 +36,13 @@ class Upload:
     async def is_disconnected(self) -> bool:
         return False
 
-    async def make(self, source: Path, picture: Path, progress: Any, is_gone: Any) -> None:
+    async def make(self, source: Path, picture: Path, progress: Any, is_gone: Any) -> Any:
         assert source.read_bytes() == self._data
         progress(0.5)
         if self._error is not None:
             raise type(self._error)(str(self._error).replace("FILE", str(source)))
         picture.write_bytes(b"JPEG")
+        return ("sigma \u03c3 is rough",)
 
 
 @pytest.fixture
@@ -66,6 +68,11 @@ def _status(app: ModuleType, upload: Upload, key: str = "a.dng") -> tuple[int, s
         (None, 200, "JPEG"),
         (camkit.DecodeError("FILE: cut off"), 422, "capture.dng: cut off "),
         (camkit.ContractError("FILE is no mosaic"), 422, "capture.dng is no mosaic "),
+        (
+            camkit.MemoryCapError("raise max_mem_bytes"),
+            507,
+            "too large for this service: it takes 1 MB ",
+        ),
         (camkit.Cancelled("gone"), 499, ""),
         (BrokenProcessPool("dead"), 500, "two workers ended while they made this capture "),
     ],
@@ -76,6 +83,14 @@ def test_each_end_has_its_status_and_leaves_no_file(
     assert _status(app, Upload(error)) == (status, text)
     assert not app.jobs
     assert not list(tmp_path.iterdir())
+
+
+def test_warnings_come_with_the_picture_and_a_key_is_explained(app: ModuleType) -> None:
+    answer = asyncio.run(app.restore("a.dng", Upload(None)))
+    assert answer.headers["X-Camkit-Warnings"] == '["sigma \\u03c3 is rough"]'
+    assert app.check_key("a-1.dng") == "a-1.dng"
+    with pytest.raises(fastapi.HTTPException, match=r"a name .* and a suffix"):
+        app.check_key("../a.dng")
 
 
 def test_what_is_too_much_is_refused_before_it_is_kept(
@@ -97,7 +112,7 @@ class Stand:
     """A worker that is a thread; its capture ends when it is cancelled."""
 
     def __init__(self, ends: int = 0) -> None:
-        self.stop, self.share = threading.Event(), SimpleNamespace(value=0.0)
+        self.stop, self.share = SimpleNamespace(value=False), SimpleNamespace(value=0.0)
         self.pool, self._ends = self, ends
 
     def submit(self, *_: object) -> Future[None]:
@@ -108,7 +123,11 @@ class Stand:
 
         def wait() -> None:
             self.share.value = 0.5
-            assert self.stop.wait(5)
+            for _ in range(500):
+                if self.stop.value:
+                    break
+                time.sleep(0.01)
+            assert self.stop.value
             future.set_exception(camkit.Cancelled("stopped"))
 
         threading.Thread(target=wait).start()
@@ -169,7 +188,7 @@ async def _cancelled_request(workers: ModuleType, stand: Stand) -> tuple[bool, i
         if pool._free.qsize():
             break
         await asyncio.sleep(0.01)
-    return stand.stop.is_set(), pool._free.qsize()
+    return stand.stop.value, pool._free.qsize()
 
 
 def test_a_worker_is_neither_waited_for_in_vain_nor_left_busy(
@@ -186,7 +205,5 @@ def test_a_worker_is_neither_waited_for_in_vain_nor_left_busy(
 
 def test_the_page_shows_the_code_as_it_is() -> None:
     page = (FOLDER.parents[1] / "docs" / "start" / "embedding.md").read_text(encoding="utf-8")
-    files = {"@app.put": "app.py", "def _load": "workers.py"}
-    for start, name in files.items():
-        (block,) = re.findall(rf"```python\n({start}.*?)```", page, re.DOTALL)
-        assert block in (FOLDER / name).read_text(encoding="utf-8")
+    (block,) = re.findall(r"```python\n(@app.put.*?)```", page, re.DOTALL)
+    assert block in (FOLDER / "app.py").read_text(encoding="utf-8")

@@ -47,10 +47,33 @@ def _develop(camera: PortableCamera, photo: Path, *options: str) -> FloatArray:
     """Return (3, h, w) light."""
     light = photo.with_suffix(".light")
     program = ["node", str(PROGRAMS / "develop.mjs"), str(camera.archive), str(photo)]
-    words = [*program, str(photo.with_suffix(".png")), "--light", str(light), *options]
+    words = [*program, str(photo.with_suffix(".png")), "--light", str(light), "--overwrite"]
+    words += ["--size", "S", *options]
     subprocess.run(words, check=True, capture_output=True)
     height, width = cv2.imread(str(photo.with_suffix(".png"))).shape[:2]
     return np.fromfile(light, np.float32).reshape(3, height, width)
+
+
+def test_words_are_explained_or_refused_in_a_line_and_no_picture_is_replaced(
+    tmp_path: Path,
+) -> None:
+    build_examples()
+
+    def run(*words: object) -> subprocess.CompletedProcess[str]:
+        program = ["node", str(PROGRAMS / "develop.mjs"), *map(str, words)]
+        return subprocess.run(program, capture_output=True, text=True, check=False)
+
+    told = run("--help")
+    assert (told.returncode, told.stderr, "--white-balance R,G,B" in told.stdout) == (0, "", True)
+    kept = tmp_path / "kept.png"
+    kept.write_text("a picture")
+    for fault, words in {
+        "Unknown option '--gains'": ("--gains", "1,2"),
+        "kept.png exists; add --overwrite": ("camera", "a.dng", kept),
+    }.items():
+        made = run(*words)
+        assert (made.returncode, fault in made.stderr, made.stderr.count("\n")) == (1, True, 1)
+    assert kept.read_text() == "a picture"
 
 
 @pytest.mark.parametrize("name", ["typical", "saturated", "very_dark"])
@@ -77,8 +100,8 @@ def test_a_plain_mosaic_is_developed_like_its_dng(camera: PortableCamera, tmp_pa
     assert capture.white_balance is not None
     mosaic, (x, y) = capture.samples[3:, 1:], capture.origin_px
     cv2.imwrite(str(tmp_path / "mosaic.png"), mosaic)
-    red, _, blue = capture.white_balance
-    facts = ("--iso", "100", "--gains", f"{red},{blue}", "--origin", f"{x + 1},{y + 3}")
+    gains = ",".join(map(repr, capture.white_balance))
+    facts = ("--iso", "100", "--white-balance", gains, "--origin-px", f"{x + 1},{y + 3}")
     light = _develop(camera, tmp_path / "mosaic.png", *facts)
     assert light.shape[1:] == mosaic.shape
     inner = np.s_[:, 64:-64, 64:-64]

@@ -1,6 +1,6 @@
 """The workers of a run: looked at before they are given work, named if they do not fit."""
 
-import importlib.metadata
+import pkgutil
 import platform
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -129,8 +129,9 @@ class Crew:
         """Query new workers in turn; each question goes to those that are left."""
         from camkit import __version__
 
-        # asked with what every worker has: it may hold no camkit to ask with
-        workers = self._answers(client, new, importlib.metadata.version, "camkit")
+        # asked with what every worker has: it may hold no camkit to ask with; the metadata of an
+        # editable install may be those of an earlier version
+        workers = self._answers(client, new, pkgutil.resolve_name, "camkit:__version__")
         workers = self._keep(
             workers, lambda got: got == __version__, f"has camkit {{}}, not {__version__}"
         )
@@ -235,6 +236,6 @@ def _workers(client: "Client") -> dict[str, dict[str, Any]]:
 
 def _trouble(error: BaseException) -> str:
     """Return the answer of a worker in words."""
-    if isinstance(error, ModuleNotFoundError | importlib.metadata.PackageNotFoundError):
+    if isinstance(error, ModuleNotFoundError):
         return f"lacks {error.name}"
     return " ".join(str(error).split()) or type(error).__name__

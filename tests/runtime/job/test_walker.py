@@ -1,5 +1,6 @@
 """The stages joined: the same bits however rows are shared, left out where a plane stands in."""
 
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -8,11 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+import camkit
 from camkit.arrays import FloatArray
 from camkit.bundle.facts import Port
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Color, Linearise, Network, Repair, Wiener
-from camkit.errors import ContractError
+from camkit.errors import ContractError, MemoryCapError
 from camkit.runtime.capture import Capture
 from camkit.runtime.job import walker
 from camkit.runtime.job.job import Job
@@ -183,6 +185,30 @@ def test_rows_beyond_the_cap_are_refused_before_any_work(tmp_path: Path) -> None
     camera = write_planes_bundle(tmp_path, stages, sensor=planes_sensor())
     with pytest.raises(ContractError, match=r"cap is 400 MB; raise max_mem_bytes"):
         start(camera, capture, max_mem_bytes=400_000_000, assume="scale")
+
+
+def _refused(plan: Callable[[int], object], cap_bytes: int) -> str:
+    """Return the refusal of a cap, once the cap that it names was found to be enough."""
+    with pytest.raises(MemoryCapError) as refused:
+        plan(cap_bytes)
+    (named,) = re.findall(r"raise max_mem_bytes=([\d_]+)$", str(refused.value))
+    assert int(named) == refused.value.need_bytes
+    plan(int(named))
+    return str(refused.value)
+
+
+def test_the_cap_that_a_refusal_names_is_enough(tmp_path: Path) -> None:
+    fanned, light = _fanned(tmp_path), made_planes(samples=np.zeros((1, 1100, 30_000), np.float32))
+    _refused(
+        lambda cap: start(fanned, light, max_mem_bytes=cap, assume="scale"), cap_bytes=400_000_000
+    )
+    mosaic = np.full((4000, 6000), 500, np.uint16)
+
+    def plan(cap: int) -> object:
+        return camkit.load("duet", size="S", threads=1, max_mem_bytes=cap).plan(mosaic)
+
+    assert "this takes about" in _refused(plan, 400_000_000)
+    assert "for one window" in _refused(plan, 440_000_000)
 
 
 def _ran(monkeypatch: pytest.MonkeyPatch, *types: str) -> list[str]:

@@ -210,7 +210,7 @@ def test_onnxruntime_imported_before_camkit_is_told(tmp_path: Path) -> None:
         "    sys.modules['onnxruntime' + name] = module\n"
         "sys.modules['onnxruntime.capi'].onnxruntime_pybind11_state = module\n"
     )
-    told = "onnxruntime was imported before camkit"
+    told = "onnxruntime was imported before camkit first loaded a bundle"
     assert told in _fresh(stand_in + "import camkit.runtime.network.engine", tmp_path).stderr
     assert told not in _fresh("import camkit.runtime.network.engine", tmp_path).stderr
 

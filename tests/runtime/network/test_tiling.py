@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camkit.arrays import FloatArray
-from camkit.errors import CamkitError, ContractError
+from camkit.errors import CamkitError, ContractError, MemoryCapError
 from camkit.runtime.cancel import Cancelled
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.tiling import (
@@ -129,10 +129,12 @@ def test_whole_is_one_window_of_the_padded_picture() -> None:
 
 
 def test_cap_too_small_names_what_is_needed() -> None:
-    with pytest.raises(
-        ContractError, match=r"need at least \d+ MiB .* got 1 MiB: raise max_mem_bytes"
-    ):
+    with pytest.raises(MemoryCapError, match=r"need at least \d+ MB .* got 1 MB") as refused:
         lay_windows(4000, 6000, _limits(max_bytes=2**20))
+    need = refused.value.need_bytes
+    assert lay_windows(4000, 6000, _limits(max_bytes=need)).window_count > 1
+    with pytest.raises(MemoryCapError):
+        lay_windows(4000, 6000, _limits(max_bytes=need - 1))
 
 
 @pytest.mark.parametrize(

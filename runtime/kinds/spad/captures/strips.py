@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from camkit.caller import option_text
-from camkit.errors import ContractError
+from camkit.errors import MemoryCapError
 
 KEPT_BYTES: Final = 260_000_000
 """What the process needs beside its rows."""
@@ -50,7 +50,7 @@ def pieces(
         held_bytes: What of it all products together take.
 
     Raises:
-        ContractError: If not even one row fits.
+        MemoryCapError: If not even one row fits.
     """
     height, width = shape
     free = max_mem_bytes - KEPT_BYTES - held_bytes
@@ -59,10 +59,11 @@ def pieces(
     least = of_row * BYTES_OF_COUNT * min(height, 2 * reach + 1)
     if free < least:
         need = KEPT_BYTES + held_bytes + least
-        raise ContractError(
+        raise MemoryCapError(
             f"{width}x{height} pixels of {bins} bins need "
             f"{option_text('max_mem_bytes', need)}; the cap "
-            f"is {max_mem_bytes // 10**6}M"
+            f"is {max_mem_bytes // 10**6}M",
+            need,
         )
     return list(_cut(height, max(rows, 1), reach))
 
@@ -77,13 +78,14 @@ def check_room(shape: tuple[int, int], bins: int, of_count: int, max_mem_bytes: 
         max_mem_bytes: Memory that the process may take.
 
     Raises:
-        ContractError: Says how much it needs.
+        MemoryCapError: Says how much it needs.
     """
     need = KEPT_BYTES + of_count * shape[0] * shape[1] * bins
     if need > max_mem_bytes:
-        raise ContractError(
+        raise MemoryCapError(
             f"{shape[1]}x{shape[0]} pixels of {bins} bins on the fine grid of a bundle need "
-            f"{option_text('max_mem_bytes', need)}; the cap is {max_mem_bytes // 10**6}M"
+            f"{option_text('max_mem_bytes', need)}; the cap is {max_mem_bytes // 10**6}M",
+            need,
         )
 
 

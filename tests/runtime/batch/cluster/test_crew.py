@@ -20,16 +20,22 @@ from tests.capture_factory import write_tiny_captures
 from tests.runtime.batch.cluster.farm import Farm
 
 OTHER_VERSION = """
+import camkit
+camkit.__version__ = "0.0.9"
+"""
+OLD_METADATA = """
 import importlib.metadata
 importlib.metadata.version = lambda name: "0.0.9"
 """
 NO_CAMKIT = """
-import importlib.metadata
+import sys
 
-def version(name):
-    raise importlib.metadata.PackageNotFoundError(name)
+class Lack:
+    def find_spec(self, name, *_):
+        if name == "camkit":
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
-importlib.metadata.version = version
+sys.meta_path.insert(0, Lack())
 """
 OTHER_MACHINE = """
 import platform
@@ -62,7 +68,10 @@ UNFIT = {
     "machine": (OTHER_MACHINE, "is riscv64, this machine "),
     "folders": (OTHER_FOLDERS, "where the pictures go"),
     "disk": (FULL_DISK, "No space left on device"),
-    "memory": (None, "MB for files, one may take 930 MB: give it more or lower max_mem_bytes"),
+    "memory": (
+        OLD_METADATA,
+        "MB for files, one may take 930 MB: give it more or lower max_mem_bytes",
+    ),
 }
 
 
