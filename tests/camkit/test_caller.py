@@ -180,7 +180,7 @@ def test_an_option_with_its_value_is_what_the_caller_can_write(
 
 
 def test_names_of_the_two_languages_are_names_of_options() -> None:
-    elsewhere = {"cfa", "times_s", "first", "darks", "flats", "photo", "before_file"}
+    elsewhere = {"cfa", "times_s", "first", "darks", "flats", "photo", "before_file", "crops"}
     assert set(FLAGS) - elsewhere <= set(Options.__dataclass_fields__)
     assert set(PARAMETERS) == set(camkit.MosaicOptions.__dataclass_fields__)
 

@@ -127,7 +127,7 @@ def measure_field(
         subject: The lens.
         options: Settings of the measurement.
         tell: Takes lines about what is being done.
-        watch: Is shown every frame that is photographed, see `recover`.
+        watch: Is shown every frame that is photographed, (3, h, w) of sRGB; see `recover`.
 
     Raises:
         ContractError: If no light arrives.
