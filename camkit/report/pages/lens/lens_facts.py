@@ -28,6 +28,7 @@ from camkit.models_def.optics.analysis.spots import (
 )
 from camkit.models_def.optics.analysis.state_facts import StateFacts
 from camkit.models_def.optics.analysis.wavefront import trace_wavefront, wavefront_rms_um
+from camkit.models_def.optics.focus import focus_note
 from camkit.models_def.optics.paraxial import Paraxial, paraxial_data
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import real_stop_radius_mm
@@ -212,6 +213,7 @@ def analyse(
         notes=(
             *notes,
             *(f"{what}: {why}" for what, why in reasons.by_name.items()),
+            *focus_note(lens),
             *_warnings(lens, spots),
             *sampling_note(lens, choice),
         ),
