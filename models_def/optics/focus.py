@@ -89,7 +89,7 @@ def focus_note(lens: Lens) -> tuple[str, ...]:
         focus = spot_focus(lens)
     except (ContractError, UnsupportedError):
         return ()
-    airy_mm = max(map(lambda wave: airy_radius_mm(lens, wave), lens.wavelengths_um))
+    airy_mm = max(airy_radius_mm(lens, wave) for wave in lens.wavelengths_um)
     if not focus.best_rms_mm < _FAR * focus.rms_mm or not focus.rms_mm > airy_mm:
         return ()
     way = "farther from" if focus.shift_mm > 0 else "nearer to"

@@ -79,8 +79,8 @@ def make(
         raise ContractError(f"minutes must be >= 0; got {minutes:g}")
     if minutes and not judge:
         raise ContractError(
-            "a network enters a bundle only if it is judged better than the filter: without judging "
-            f"give {option_text('minutes')} 0; got {minutes:g}"
+            "a network enters a bundle only if it is judged better than the filter: without "
+            f"judging give {option_text('minutes')} 0; got {minutes:g}"
         )
     if overwrite:
         remove_work(work_path)

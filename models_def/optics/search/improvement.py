@@ -24,6 +24,7 @@ _ASPHERE_TERMS: Final = 4
 _ASPHERE_SAG_MM: Final = 0.2
 _PHASE: Final = 500.0  # radians
 _TOUCH: Final = 1e-6
+_UNITS: Final = {"curvature": " 1/mm", "thickness": " mm", "defocus": " mm"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -172,7 +173,7 @@ def on_limits(variables: Sequence[Variable], scaled: Tensor) -> tuple[str, ...]:
     """
     at_low, at_high = (scaled <= _TOUCH).tolist(), (scaled >= 1 - _TOUCH).tolist()
     return tuple(
-        f"{_variable_name(one)} = {one.low if low else one.high:.4g}"
+        f"{_variable_name(one)} = {one.low if low else one.high:.4g}{_UNITS.get(one.kind, '')}"
         for one, low, high in zip(variables, at_low, at_high, strict=True)
         if (low or high) and one.low < one.high
     )

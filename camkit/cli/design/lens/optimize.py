@@ -51,7 +51,8 @@ def optimize(
     vary: Annotated[
         str | None,
         typer.Option(
-            help="List of curvature, conic, thickness, even_asphere, odd_asphere, q_asphere, phase, gaps.",
+            help="List of curvature, conic, thickness, even_asphere, odd_asphere, q_asphere, "
+            "phase, gaps.",
             show_default="`vary` of each surface",
         ),
     ] = None,
@@ -180,9 +181,9 @@ def _together(
     improve: "Callable[[Residuals | Problem, Tensor], Improvement]",
 ) -> "_Outcome":
     """Improve a lens in several configurations at once."""
+    from camkit.models_def.optics.focus import focus_note
     from camkit.models_def.optics.lens_file.states import plain_lens
     from camkit.models_def.optics.optics_file import state_names
-    from camkit.models_def.optics.focus import focus_note
     from camkit.models_def.optics.search.improvement import on_limits
     from camkit.models_def.optics.search.joint_states import joint_problem
 
