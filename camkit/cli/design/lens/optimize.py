@@ -43,7 +43,8 @@ GAPS: Final = "gaps"
 
 def optimize(
     source: Annotated[
-        Path, typer.Argument(help="Lens file (.toml, .zmx, .json) or built-in name.", metavar="FILE")
+        Path,
+        typer.Argument(help="Lens file (.toml, .zmx, .json) or built-in name.", metavar="FILE"),
     ],
     out: Annotated[
         Path, typer.Option("-o", "--out", help="Improved lens to write (.toml, .zmx or .json).")
