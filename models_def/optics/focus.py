@@ -29,7 +29,7 @@ from camkit.units import UM_PER_MM
 FocusMerit = Literal["paraxial", "spot", "wavefront"]
 FOCUS_MERITS: Final[tuple[FocusMerit, ...]] = get_args(FocusMerit)
 _RAYS: Final = 256
-_FAR: Final = 1 / 3
+_REMAINING_SHARE: Final = 1 / 3
 """Share of the spots that is left at the best focus, below which a sensor is far from it."""
 
 
@@ -90,7 +90,7 @@ def focus_note(lens: Lens) -> tuple[str, ...]:
     except (ContractError, UnsupportedError):
         return ()
     airy_mm = max(airy_radius_mm(lens, wave) for wave in lens.wavelengths_um)
-    if not focus.best_rms_mm < _FAR * focus.rms_mm or not focus.rms_mm > airy_mm:
+    if not focus.best_rms_mm < _REMAINING_SHARE * focus.rms_mm or not focus.rms_mm > airy_mm:
         return ()
     way = "farther from" if focus.shift_mm > 0 else "nearer to"
     return (

@@ -83,8 +83,8 @@ def make(
 ) -> None:
     """Make a camera from a lens: PSF, filter, network, checks and a page (needs torch).
 
-    The bundle is usable as soon as its filter is written: from then on Ctrl-C loses only the
-    network and the page. After an interruption the same command repeats no finished step.
+    The bundle is usable as soon as its filter is written; Ctrl-C then loses only network and
+    page. After an interruption the same command repeats no finished step.
     """
     from camkit.models_def.face.recipe_writing import CameraWords
     from camkit.models_def.face.torch_need import require_torch
