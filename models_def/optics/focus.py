@@ -11,10 +11,9 @@ from typing import Final, Literal, get_args
 import torch
 from torch import Tensor
 
-from camkit.errors import ContractError, UnsupportedError
+from camkit.errors import ContractError
 from camkit.models_def.optics.aiming.field import field_slope
 from camkit.models_def.optics.aiming.start import path_before
-from camkit.models_def.optics.analysis.first_order import airy_radius_mm
 from camkit.models_def.optics.paraxial import paraxial_image
 from camkit.models_def.optics.prescription import (
     Lens,
@@ -24,13 +23,10 @@ from camkit.models_def.optics.prescription import (
 )
 from camkit.models_def.optics.pupil import half_disc, pupil_rays
 from camkit.models_def.optics.trace import Rays, surface_tensors, trace
-from camkit.units import UM_PER_MM
 
 FocusMerit = Literal["paraxial", "spot", "wavefront"]
 FOCUS_MERITS: Final[tuple[FocusMerit, ...]] = get_args(FocusMerit)
 _RAYS: Final = 256
-_REMAINING_SHARE: Final = 1 / 3
-"""Share of the spots that is left at the best focus, below which a sensor is far from it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,26 +74,6 @@ def spot_focus(lens: Lens) -> SpotFocus:
     """
     landings, weight = _landings(lens, "spot")
     return _spot_focus(landings, weight)
-
-
-def focus_note(lens: Lens) -> tuple[str, ...]:
-    """Return a line if the sensor is far out of focus: refocusing leaves a third of the spots.
-
-    A spot within the Airy disc, or a lens that cannot be focused by spots, has none.
-    """
-    try:
-        focus = spot_focus(lens)
-    except (ContractError, UnsupportedError):
-        return ()
-    airy_mm = max(airy_radius_mm(lens, wave) for wave in lens.wavelengths_um)
-    if not focus.best_rms_mm < _REMAINING_SHARE * focus.rms_mm or not focus.rms_mm > airy_mm:
-        return ()
-    way = "farther from" if focus.shift_mm > 0 else "nearer to"
-    return (
-        f"the sensor is out of focus: {abs(focus.shift_mm):.3g} mm {way} the lens the RMS spot "
-        f"over all fields is {focus.best_rms_mm * UM_PER_MM:.3g} um, not "
-        f"{focus.rms_mm * UM_PER_MM:.3g} um",
-    )
 
 
 def _landings(lens: Lens, merit: FocusMerit) -> tuple[Rays, Tensor]:

@@ -154,7 +154,7 @@ def _alone(
     improve: "Callable[[Residuals | Problem, Tensor], Improvement]",
 ) -> "_Outcome":
     """Improve a lens in one state."""
-    from camkit.models_def.optics.focus import focus_note
+    from camkit.models_def.optics.analysis.focus_note import focus_note
     from camkit.models_def.optics.search.improvement import free_lens, on_limits
     from camkit.models_def.optics.search.own_frame import in_own_frame
 
@@ -182,7 +182,7 @@ def _together(
     improve: "Callable[[Residuals | Problem, Tensor], Improvement]",
 ) -> "_Outcome":
     """Improve a lens in several configurations at once."""
-    from camkit.models_def.optics.focus import focus_note
+    from camkit.models_def.optics.analysis.focus_note import focus_note
     from camkit.models_def.optics.lens_file.states import plain_lens
     from camkit.models_def.optics.optics_file import state_names
     from camkit.models_def.optics.search.improvement import on_limits

@@ -14,6 +14,7 @@ from camkit.models_def.optics.aiming.chief_path import chief_path
 from camkit.models_def.optics.analysis.curves import distortion
 from camkit.models_def.optics.analysis.fans import Fans, trace_fans
 from camkit.models_def.optics.analysis.first_order import airy_radius_mm
+from camkit.models_def.optics.analysis.focus_note import focus_note
 from camkit.models_def.optics.analysis.psf_model import PsfModel, psf_model
 from camkit.models_def.optics.analysis.sampling import Pupil, disc_quadrature
 from camkit.models_def.optics.analysis.seidel import Seidel, seidel_sums
@@ -28,7 +29,6 @@ from camkit.models_def.optics.analysis.spots import (
 )
 from camkit.models_def.optics.analysis.state_facts import StateFacts
 from camkit.models_def.optics.analysis.wavefront import trace_wavefront, wavefront_rms_um
-from camkit.models_def.optics.focus import focus_note
 from camkit.models_def.optics.paraxial import Paraxial, paraxial_data
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import real_stop_radius_mm

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from camkit.models_def.optics.focus import focus_note, with_focus
+from camkit.models_def.optics.analysis.focus_note import focus_note
+from camkit.models_def.optics.focus import with_focus
 from camkit.models_def.optics.lens_file.lens_file import read_lens, write_lens
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import with_focus_shift
