@@ -114,6 +114,9 @@ def _spot_focus(landings: Rays, weight: Tensor) -> SpotFocus:
     tx, y = landings.l / landings.n, centred(landings.y)
     both = float((weight * (landings.x * tx + y * ty)).sum())
     steepness = float((weight * (tx**2 + ty**2)).sum())
+    if not steepness > 0:  # the light is parallel: no place is better
+        rms_mm = math.sqrt(float((weight * (landings.x**2 + y**2)).sum() / weight.sum()))
+        return SpotFocus(shift_mm=math.nan, rms_mm=rms_mm, best_rms_mm=rms_mm)
     light, spread = float(weight.sum()), float((weight * (landings.x**2 + y**2)).sum())
     return SpotFocus(
         shift_mm=-both / steepness,
