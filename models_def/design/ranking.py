@@ -31,6 +31,7 @@ class Ranked:
         single: The error at the limit that loses more.
         loss_db: There, the larger of both.
         spot_growth_mm: There.
+        worst_spot_growth_mm: At the limit with the larger spots, which may be the other one.
         loss_place: Its place by loss, from 1.
         spot_place: Its place by the larger growth of its limits, from 1.
     """
@@ -38,6 +39,7 @@ class Ranked:
     single: Single
     loss_db: float
     spot_growth_mm: float
+    worst_spot_growth_mm: float
     loss_place: int
     spot_place: int
 
@@ -56,6 +58,7 @@ def rank_errors(offenders: tuple[Offender, ...]) -> tuple[Ranked, ...]:
             single=worst[part].single,
             loss_db=worst[part].loss_db,
             spot_growth_mm=worst[part].spot_growth_mm,
+            worst_spot_growth_mm=growths[part],
             loss_place=place,
             spot_place=1 + spot_order.index(part),
         )

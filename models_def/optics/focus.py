@@ -4,7 +4,8 @@ The last two are least squares with one solution, since rays are straight behind
 on a sensor moved by s is x + s l / n, and a path to a point on it grows linearly with s.
 """
 
-from dataclasses import replace
+import math
+from dataclasses import dataclass, replace
 from typing import Final, Literal, get_args
 
 import torch
@@ -28,6 +29,21 @@ FOCUS_MERITS: Final[tuple[FocusMerit, ...]] = get_args(FocusMerit)
 _RAYS: Final = 256
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SpotFocus:
+    """The place of the sensor with the least spots.
+
+    Attributes:
+        shift_mm: By how much the sensor should move away from the lens.
+        rms_mm: RMS radius over all fields and wavelengths where the sensor is.
+        best_rms_mm: The same at the best place.
+    """
+
+    shift_mm: float
+    rms_mm: float
+    best_rms_mm: float
+
+
 def focus_shift_mm(lens: Lens, merit: FocusMerit) -> float:
     """Return the distance by which the sensor should move away from the lens.
 
@@ -45,6 +61,23 @@ def focus_shift_mm(lens: Lens, merit: FocusMerit) -> float:
         raise ContractError(f"the merit must be one of {', '.join(FOCUS_MERITS)}; got {merit}")
     if merit == "paraxial":
         return paraxial_image(lens).distance_mm - lens.surfaces[-1].thickness_mm
+    if merit == "spot":
+        return spot_focus(lens).shift_mm
+    return _wave_shift(*_landings(lens, merit))
+
+
+def spot_focus(lens: Lens) -> SpotFocus:
+    """Return the best place of the sensor by spots, and what they gain there.
+
+    Raises:
+        ContractError: If the lens is not round, or no ray arrives.
+    """
+    landings, weight = _landings(lens, "spot")
+    return _spot_focus(landings, weight)
+
+
+def _landings(lens: Lens, merit: FocusMerit) -> tuple[Rays, Tensor]:
+    """Return rays on the sensor (field, wavelength, rays) with their paths, and their weights."""
     require_round(lens, f"focus by {merit}")
     slopes = field_slope(torch.tensor(lens.field_angles_rad, dtype=torch.float64))
     waves = torch.tensor(lens.wavelengths_um, dtype=torch.float64)
@@ -58,7 +91,7 @@ def focus_shift_mm(lens: Lens, merit: FocusMerit) -> float:
         weight = torch.where(landings.valid, weight, 0.0)
         if not bool(weight.sum() > 0):
             raise ContractError(f"no ray of {lens.name} reaches the sensor; it cannot be focused")
-        return _spot_shift(landings, weight) if merit == "spot" else _wave_shift(landings, weight)
+    return landings, weight
 
 
 def with_focus(lens: Lens, merit: FocusMerit) -> Lens:
@@ -67,7 +100,7 @@ def with_focus(lens: Lens, merit: FocusMerit) -> Lens:
     return with_focus_shift(lens, focus_shift_mm(lens, merit))
 
 
-def _spot_shift(landings: Rays, weight: Tensor) -> float:
+def _spot_focus(landings: Rays, weight: Tensor) -> SpotFocus:
     """Minimise sum w |p - mean p + s (t - mean t)|^2, p the landing points, t their slopes.
 
     The pupil's half x < 0 mirrors the other, so means of x are 0 in it: x needs no mean.
@@ -79,8 +112,17 @@ def _spot_shift(landings: Rays, weight: Tensor) -> float:
 
     ty = centred(landings.m / landings.n)
     tx, y = landings.l / landings.n, centred(landings.y)
-    both = (weight * (landings.x * tx + y * ty)).sum()
-    return float(-both / (weight * (tx**2 + ty**2)).sum())
+    both = float((weight * (landings.x * tx + y * ty)).sum())
+    steepness = float((weight * (tx**2 + ty**2)).sum())
+    if not steepness > 0:  # the light is parallel: no place is better
+        rms_mm = math.sqrt(float((weight * (landings.x**2 + y**2)).sum() / weight.sum()))
+        return SpotFocus(shift_mm=math.nan, rms_mm=rms_mm, best_rms_mm=rms_mm)
+    light, spread = float(weight.sum()), float((weight * (landings.x**2 + y**2)).sum())
+    return SpotFocus(
+        shift_mm=-both / steepness,
+        rms_mm=math.sqrt(spread / light),
+        best_rms_mm=math.sqrt(max(spread - both**2 / steepness, 0.0) / light),
+    )
 
 
 def _wave_shift(landings: Rays, weight: Tensor) -> float:

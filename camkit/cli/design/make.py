@@ -48,7 +48,7 @@ def make(
     catalogue: GlassCatalogues = None,
     configuration: Configuration = None,
     minutes: Annotated[
-        float, typer.Option(help="CPU time in min for everything; 0 makes the filter alone.")
+        float, typer.Option(help="CPU time in min for everything; 0 makes and judges the filter.")
     ] = 15.0,
     size: Annotated[str, typer.Option(help="Size of the network: S or M.")] = "S",
     name: Annotated[
@@ -70,14 +70,21 @@ def make(
         typer.Option(help="Folder of the steps; default: NAME.work beside the bundle."),
     ] = None,
     workers: Annotated[int, typer.Option(help="Number of processes that make samples.")] = 1,
+    judge: Annotated[
+        bool,
+        typer.Option(
+            "--judge/--no-judge",
+            help="Judge on captures and write the page; only 0 minutes can skip it.",
+        ),
+    ] = True,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
     """Make a camera from a lens: PSF, filter, network, checks and a page (needs torch).
 
-    The bundle is usable as soon as its filter is written. After an interruption the same command
-    repeats no finished step.
+    The bundle is usable as soon as its filter is written; Ctrl-C then loses only network and
+    page. After an interruption the same command repeats no finished step.
     """
     from camkit.models_def.face.recipe_writing import CameraWords
     from camkit.models_def.face.torch_need import require_torch
@@ -111,12 +118,16 @@ def make(
         start=start,
         work_dir=work_dir,
         workers=workers,
+        judge=judge,
         overwrite=overwrite,
         on_note=lambda text: say(f"camkit make: {text}", err=True),
         stopwatch=context.find_object(Stopwatch),
     )
     if json_:
         say(json.dumps(facts))
+        return
+    if facts["page"] is None:
+        say(f"{facts['bundle']}: its filter is not judged, and no page is written")
         return
     from camkit.report.making.camera_page import name_of
 

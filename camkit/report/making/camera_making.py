@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
-from camkit.caller import command_text
+from camkit.caller import command_text, option_text
 from camkit.errors import ContractError
 from camkit.field_types import checked
 from camkit.models_def.face.recipe_writing import CameraWords
@@ -36,6 +36,7 @@ def make(
     start: FilePath = START,
     work_dir: FilePath | None = None,
     workers: int = 1,
+    judge: bool = True,
     overwrite: bool = False,
     on_note: Callable[[str], object] | None = None,
     stopwatch: Stopwatch | None = None,
@@ -58,12 +59,14 @@ def make(
         start: Bundle or checkpoint with the first weights.
         work_dir: Folder of the steps; None for NAME.work beside `out`.
         workers: Processes that make samples.
+        judge: Whether the camera is judged on captures and gets a page; needed by a network.
         overwrite: Whether `out` and the work of an earlier call are replaced.
         on_note: Called with a line when a step is done.
         stopwatch: Counts the minutes; None begins now.
 
     Returns:
-        The files, decibels of every method with their gains, and the CPU-seconds of every step.
+        The files, decibels of every method with their gains, and the CPU-seconds of every step. Not
+        judged, there are no decibels, and the page is None.
 
     Raises:
         ContractError: If a word is wrong, or files exist that other words made.
@@ -74,8 +77,15 @@ def make(
     work_path = path.with_suffix(WORK_SUFFIX) if work_dir is None else Path(work_dir)
     if minutes < 0:
         raise ContractError(f"minutes must be >= 0; got {minutes:g}")
+    if minutes and not judge:
+        raise ContractError(
+            "a network enters a bundle only if it is judged better than the filter: without "
+            f"judging give {option_text('minutes')} 0; got {minutes:g}"
+        )
     if overwrite:
         remove_work(work_path)
+        if not judge:
+            path.with_suffix(PAGE_SUFFIX).unlink(missing_ok=True)  # of another camera
     elif not work_path.is_dir():
         refuse_existing((path, path.with_suffix(PAGE_SUFFIX)), overwrite=False)
     from camkit.models_def.torch_threads import one_torch_thread
@@ -95,7 +105,7 @@ def make(
     )
     work = WorkFolder(work_path, wish.to_json(), stopwatch or Stopwatch())
     with one_torch_thread():
-        return Making(CameraSteps(wish=wish, work=work), path, on_note or _ignore).run()
+        return Making(CameraSteps(wish=wish, work=work), path, on_note or _ignore).run(judge=judge)
 
 
 def _ignore(_text: str) -> None:

@@ -4,6 +4,8 @@ described, frozen, filtered -> OUT, usable   (about two minutes)
 fitted -> OUT anew
 trained for what is left of the minutes, exported, judged -> OUT, if it beats its filter
 page
+
+Not judged, the filter is all.
 """
 
 from collections.abc import Callable, Mapping
@@ -41,8 +43,8 @@ class Making:
         self._steps, self._out, self._tell = steps, out, tell
         self._work, self._wish = steps.work, steps.wish
 
-    def run(self) -> dict[str, Any]:
-        """Make the camera; return what is known of it."""
+    def run(self, *, judge: bool = True) -> dict[str, Any]:
+        """Make the camera; return what is known of it. Not judged, it has no page."""
         steps, work = self._steps, self._work
         finished = self._finished()
         if finished is not None:
@@ -58,7 +60,9 @@ class Making:
             frozen = work.step("frozen", steps.freeze)
             self._tell(f"kernels of {frozen['side_px']} px hold {frozen['energy_kept']:.1%}")
         work.step("filtered", steps.export_filter)
-        self._ship(FILTER_BUNDLE, "its filter restores, usable now")
+        last = judge and not self._wish.minutes
+        later = "; what follows is judging for the page" if last else ""
+        self._ship(FILTER_BUNDLE, f"its filter restores, usable now{later}")
         is_grey = facts["channels"] == 1
         fits = not is_grey and not facts["is_grid"]
         if fits and (self._left_s() > LEAST_FIT_S or work.is_done("fitted")):
@@ -68,6 +72,8 @@ class Making:
             self._tell("colours are not restored together: that takes four minutes")
         if is_grey and self._wish.minutes:
             self._tell("networks are trained on three colours; a grey camera has its filter alone")
+        if not judge:
+            return self._result(open_bundle(self._out), {}, None)
         judged = self._judged(FILTER_BUNDLE) if is_grey else self._with_network()
         gain_db, error_db = judged[FILTER].gain_over(judged[DEVELOP])
         if gain_db <= error_db:
@@ -152,11 +158,11 @@ class Making:
         )
 
     def _result(
-        self, bundle: Bundle, judged: Mapping[str, Judgement], page: Path
+        self, bundle: Bundle, judged: Mapping[str, Judgement], page: Path | None
     ) -> dict[str, Any]:
         return {
             "bundle": str(self._out),
-            "page": str(page),
+            "page": None if page is None else str(page),
             "sizes": list(bundle.manifest.sizes),
             "psnr_db": {m: round(float(np.mean(j.psnr_db)), 3) for m, j in judged.items()},
             "over_filter_db": {

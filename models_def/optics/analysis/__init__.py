@@ -16,6 +16,7 @@ In the order in which data flows (every result states its pupil, see `camkit...o
 - `point_image`: the diffraction image of a field: its light, Strehl ratio, encircled energy
 - `fans`: transverse aberrations and OPD along two lines through the pupil
 - `mtf`: contrast from rays or from a PSF, and its diffraction limit
+- `focus_note`: a line if the sensor is far out of focus
 - `state_facts`: the configurations of a lens beside each other
 - `psf_model`: the one rule by which a lens takes rays or waves
 - `model_psf`: the PSF of a lens by the model that it takes

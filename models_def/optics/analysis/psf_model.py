@@ -15,6 +15,7 @@ from torch import Tensor
 
 from camkit.caller import option_text
 from camkit.errors import ContractError
+from camkit.models_def.optics.aiming.field import field_angle
 from camkit.models_def.optics.analysis.first_order import airy_radius_mm
 from camkit.models_def.optics.analysis.sampling import Pupil
 from camkit.models_def.optics.analysis.spots import rms_about_centroid, spot_diagram
@@ -86,9 +87,10 @@ def psf_model(
         return replace(model, reason=reason)
     field, colour = divmod(int(ratio.argmin()), len(means_um))
     regime: PsfRegime = "waves" if float(ratio.min()) < WAVE_BELOW else "rays"
+    angle_deg = float(torch.rad2deg(field_angle(slopes[field])))
     side = "less" if regime == "waves" else "no less"
     reason = (
-        f"{regime}: the sharpest spot (field {field + 1}, {means_um[colour]:.3g} um) has "
+        f"{regime}: the sharpest spot ({angle_deg:.3g} degrees, {means_um[colour]:.3g} um) has "
         f"an RMS radius of {float(blur[field, colour]) * UM_PER_MM:.2f} um, "
         f"{float(ratio[field, colour]):.2g} times the Airy radius of "
         f"{float(airy[colour]) * UM_PER_MM:.2f} um, {side} than {WAVE_BELOW:g} times"

@@ -23,6 +23,8 @@ _LEAST_AIR_MM: Final = 0.1
 _ASPHERE_TERMS: Final = 4
 _ASPHERE_SAG_MM: Final = 0.2
 _PHASE: Final = 500.0  # radians
+_TOUCH: Final = 1e-6
+_UNITS: Final = {"curvature": " 1/mm", "thickness": " mm", "defocus": " mm"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -160,6 +162,28 @@ def _variable_near(
     parameter: Parameter, i: int, value: float, reach: float, *, term: int = 0
 ) -> Variable:
     return Variable(kind=parameter, surface=i, term=term, low=value - reach, high=value + reach)
+
+
+def on_limits(variables: Sequence[Variable], scaled: Tensor) -> tuple[str, ...]:
+    """Return the variables that stand on a limit of their range, with their values, for people.
+
+    Args:
+        variables: Free ones.
+        scaled: (variable,), 0 at the lower limit and 1 at the upper.
+    """
+    at_low, at_high = (scaled <= _TOUCH).tolist(), (scaled >= 1 - _TOUCH).tolist()
+    return tuple(
+        f"{_variable_name(one)} = {one.low if low else one.high:.4g}{_UNITS.get(one.kind, '')}"
+        for one, low, high in zip(variables, at_low, at_high, strict=True)
+        if (low or high) and one.low < one.high
+    )
+
+
+def _variable_name(one: Variable) -> str:
+    if one.kind == "defocus":
+        return one.kind
+    term = f" term {one.term}" if one.kind not in ("curvature", "conic", "thickness") else ""
+    return f"{one.kind}{term} of surface {one.surface}"
 
 
 def improve(

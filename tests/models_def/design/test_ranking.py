@@ -33,6 +33,7 @@ def test_each_part_stands_once_by_the_worse_of_its_limits() -> None:
     ]
     assert [r.loss_place for r in ranking] == [1, 2, 3]
     assert ranking[1].single.value == -0.1
+    assert [r.worst_spot_growth_mm for r in ranking] == [2.0, 5.0, 3.0]
 
 
 def test_agreement_is_1_for_the_same_order_and_less_1_for_the_opposite() -> None:

@@ -6,6 +6,6 @@
 - `thin`: a thin plate, solved from a recipe
 - `peak`: the light near the peak of a point
 - `sag`: the profile of a surface, for the workshop
-- `tolerance`: fabricated copies, their yield, what to tighten first
+- `tolerance`: Monte-Carlo samples, their yield, what to tighten first
 - `convert`: between .toml, .zmx and .json (optiland), and to a sag table
 """

@@ -76,7 +76,7 @@ def convert(
         lens = scale_to_efl(lens, efl_mm, measured=plain_lens(lens))
     if f_number is not None:
         lens = with_f_number(lens, f_number)
-        notes = (*notes, *_clipped(lens))
+        notes = (*notes, *_clipped(lens, is_scaled=efl_mm is not None))
     notes = (*notes, *_left_behind(lens, path.suffix.lower()))
     if is_table:
         notes = (*notes, *write_lens_sag(lens, path))
@@ -122,8 +122,8 @@ def _left_behind(lens: "Lens", suffix: str) -> list[str]:
     return notes
 
 
-def _clipped(lens: "Lens") -> list[str]:
-    """Return whether rims that stayed cut the beam on the axis."""
+def _clipped(lens: "Lens", *, is_scaled: bool) -> list[str]:
+    """Return whether rims that were not opened cut the beam on the axis."""
     import torch
 
     from camkit.models_def.optics.analysis.sampling import Pupil
@@ -135,4 +135,8 @@ def _clipped(lens: "Lens") -> list[str]:
     cut = int((fate == Fate.VIGNETTED).sum())
     if not cut:
         return []
-    return [f"rims stay and cut {cut} of {fate.numel()} rays on the axis: open them in the file"]
+    scaled = "scaled with the lens, " if is_scaled else ""
+    return [
+        f"rims are {scaled}not opened for the new F-number: they cut {cut} of {fate.numel()} rays "
+        "on the axis; open them in the file"
+    ]

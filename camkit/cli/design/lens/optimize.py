@@ -1,7 +1,7 @@
 """`camkit lens optimize`: a lens made better on spots."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -18,7 +18,7 @@ from camkit.cli.choices import (
     several_states,
 )
 from camkit.cli.say import say
-from camkit.errors import ContractError
+from camkit.errors import ContractError, UnsupportedError
 from camkit.progress import working
 from camkit.units import to_degrees
 
@@ -43,7 +43,8 @@ GAPS: Final = "gaps"
 
 def optimize(
     source: Annotated[
-        Path, typer.Argument(help="Lens file (.toml, .zmx or .json).", metavar="FILE")
+        Path,
+        typer.Argument(help="Lens file (.toml, .zmx, .json) or built-in name.", metavar="FILE"),
     ],
     out: Annotated[
         Path, typer.Option("-o", "--out", help="Improved lens to write (.toml, .zmx or .json).")
@@ -51,7 +52,9 @@ def optimize(
     vary: Annotated[
         str | None,
         typer.Option(
-            help="Variables, such as curvature,thickness, or gaps; default: `vary` of each surface."
+            help="List of curvature, conic, thickness, even_asphere, odd_asphere, q_asphere, "
+            "phase, gaps.",
+            show_default="`vary` of each surface",
         ),
     ] = None,
     merit: Annotated[str, typer.Option(help="Merit function: rms, sum_abs or energy.")] = "sum_abs",
@@ -151,7 +154,8 @@ def _alone(
     improve: "Callable[[Residuals | Problem, Tensor], Improvement]",
 ) -> "_Outcome":
     """Improve a lens in one state."""
-    from camkit.models_def.optics.search.improvement import free_lens
+    from camkit.models_def.optics.analysis.focus_note import focus_note
+    from camkit.models_def.optics.search.improvement import free_lens, on_limits
     from camkit.models_def.optics.search.own_frame import in_own_frame
 
     free, moves = _free(lens, vary)
@@ -165,7 +169,9 @@ def _alone(
     better = problem.free.lens_at(result.scaled)
     facts = _merits(result, len(problem.free.variables))
     facts |= _comparison(lens, better)
-    return better, facts, [*plane_notes, *_small_rims(problem, result.scaled)]
+    facts["on_limits"] = on_limits(problem.free.variables, result.scaled)
+    notes = [*focus_note(lens), *plane_notes, *_limit_notes(facts["on_limits"])]
+    return better, facts, [*notes, *_small_rims(problem, result.scaled)]
 
 
 def _together(
@@ -176,8 +182,10 @@ def _together(
     improve: "Callable[[Residuals | Problem, Tensor], Improvement]",
 ) -> "_Outcome":
     """Improve a lens in several configurations at once."""
+    from camkit.models_def.optics.analysis.focus_note import focus_note
     from camkit.models_def.optics.lens_file.states import plain_lens
     from camkit.models_def.optics.optics_file import state_names
+    from camkit.models_def.optics.search.improvement import on_limits
     from camkit.models_def.optics.search.joint_states import joint_problem
 
     words, weights = choice
@@ -193,14 +201,23 @@ def _together(
     ).in_own_frame()
     result = improve(joint.residuals, joint.scaled())
     better = joint.lens_at(result.scaled)
-    states, small_rims = {}, plane_notes
+    limits = [
+        f"{one.state}: {name}" if one.state else name
+        for one, scaled in zip(joint.variables, result.scaled, strict=True)
+        for name in on_limits([one.variable], scaled[None])
+    ]
+    states, notes = {}, [*plane_notes, *_limit_notes(limits)]
     for term in joint.terms:
         before, after = (plain_lens(one, term.name) for one in (lens, better))
         states[term.name] = {"weight": term.weight, **_comparison(before, after)}
         rims = _small_rims(term.problem, result.scaled[term.places])
-        small_rims += [f"{term.name}: {line}" for line in rims]
-    facts = _merits(result, len(joint.variables)) | {"configurations": states}
-    return better, facts, small_rims
+        notes += [f"{term.name}: {line}" for line in (*focus_note(before), *rims)]
+    facts = _merits(result, len(joint.variables)) | {"configurations": states, "on_limits": limits}
+    return better, facts, notes
+
+
+def _limit_notes(names: Sequence[str]) -> list[str]:
+    return [f"on the limit of its range: {', '.join(names)}"] if names else []
 
 
 def _merits(result: "Improvement", variables: int) -> dict[str, Any]:
@@ -264,16 +281,28 @@ def _comparison(before: "Lens", after: "Lens") -> dict[str, Any]:
     """Return focal lengths and spots of a lens and of the better one, and fields that lost."""
     angles = [round(to_degrees(angle), 9) for angle in before.field_angles_rad]
     spots, better = _spots(before), _spots(after)
+    focused = _refocused(before)
     return {
         "efl_mm_before": _efl_mm(before),
         "efl_mm_after": _efl_mm(after),
         "field_angles_deg": angles,
         "spot_rms_mm_before": spots,
+        "spot_rms_mm_refocused": None if focused is None else _spots(focused),
         "spot_rms_mm_after": better,
         "worse_fields_deg": [
             angle for angle, old, new in zip(angles, spots, better, strict=True) if new > old
         ],
     }
+
+
+def _refocused(lens: "Lens") -> "Lens | None":
+    """Return the lens with its sensor at the least spots; None if it cannot be focused so."""
+    from camkit.models_def.optics.focus import with_focus
+
+    try:
+        return with_focus(lens, "spot")
+    except (ContractError, UnsupportedError):
+        return None
 
 
 def _numbers(text: str) -> tuple[float, ...]:
@@ -343,15 +372,17 @@ def _text(report: dict[str, Any]) -> str:
         "traced)"
     ]
     for name, state in report.get("configurations", {"": report}).items():
-        before, after = state["spot_rms_mm_before"], state["spot_rms_mm_after"]
+        steps = [state[f"spot_rms_mm_{when}"] for when in ("before", "refocused", "after")]
+        columns = [spots for spots in steps if spots is not None]
         fields = ", ".join(
-            f"{1000 * a:.1f} -> {1000 * b:.1f}" for a, b in zip(before, after, strict=True)
+            " -> ".join(f"{1000 * mm:.1f}" for mm in row) for row in zip(*columns, strict=True)
         )
+        stages = "file -> refocused -> improved" if all(steps) else "file -> improved"
         efl = " -> ".join(dict.fromkeys(f"{state[f'efl_mm_{when}']:.4g}" for when in _WHEN))
         worse = ", ".join(f"{angle:.4g}" for angle in state["worse_fields_deg"])
         lines.append(
             (f"{name}: " if name else "")
-            + f"EFL {efl} mm. RMS spots of the fields in um: {fields}"
+            + f"EFL {efl} mm. RMS spots of the fields in um, {stages}: {fields}"
             + (f"; worse at {worse} degrees" if worse else "")
         )
     return "\n".join([*lines, report["out"]])

@@ -16,7 +16,10 @@ PAGE: Final = ".html"
 
 
 def show(
-    file: Annotated[Path, typer.Argument(help="Lens file (.toml, .zmx or .json).", metavar="FILE")],
+    file: Annotated[
+        Path,
+        typer.Argument(help="Lens file (.toml, .zmx, .json) or built-in name.", metavar="FILE"),
+    ],
     pupil: Annotated[
         str | None,
         typer.Option(

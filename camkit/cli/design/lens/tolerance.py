@@ -16,7 +16,10 @@ if TYPE_CHECKING:
 
 
 def tolerance(
-    file: Annotated[Path, typer.Argument(help="Lens file (.toml, .zmx or .json).", metavar="FILE")],
+    file: Annotated[
+        Path,
+        typer.Argument(help="Lens file (.toml, .zmx, .json) or built-in name.", metavar="FILE"),
+    ],
     errors: Annotated[
         Path | None,
         typer.Option(

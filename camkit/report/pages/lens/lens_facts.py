@@ -14,6 +14,7 @@ from camkit.models_def.optics.aiming.chief_path import chief_path
 from camkit.models_def.optics.analysis.curves import distortion
 from camkit.models_def.optics.analysis.fans import Fans, trace_fans
 from camkit.models_def.optics.analysis.first_order import airy_radius_mm
+from camkit.models_def.optics.analysis.focus_note import focus_note
 from camkit.models_def.optics.analysis.psf_model import PsfModel, psf_model
 from camkit.models_def.optics.analysis.sampling import Pupil, disc_quadrature
 from camkit.models_def.optics.analysis.seidel import Seidel, seidel_sums
@@ -212,6 +213,7 @@ def analyse(
         notes=(
             *notes,
             *(f"{what}: {why}" for what, why in reasons.by_name.items()),
+            *focus_note(lens),
             *_warnings(lens, spots),
             *sampling_note(lens, choice),
         ),

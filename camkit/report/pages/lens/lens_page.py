@@ -47,12 +47,12 @@ _CAPTIONS: Final = {
     "layout": "Rays of the reference wavelength; of many fields, five.",
     "mtf": "Tangential: lines across the meridian; sagittal: along it. Of many fields, five.",
     "spots": "About the chief ray of the reference wavelength, all fields to one scale; circle: "
-    "Airy disc. RMS about the centroid at the wavelength of the file next to the reference.",
+    "Airy disc. RMS about the centroid at the wavelength of the file nearest to the reference.",
     "field": "T tangential (solid), S sagittal (dashed) focus of close rays. Distortion against "
     "the paraxial chief ray on the sensor. Light is traced with every ray aimed at the stop.",
     "psf": "The image of a point about the chief ray of the reference wavelength, all wavelengths "
     "with equal weight, to one scale; brightness is the root of the light, each picture to its "
-    "own peak. Strehl ratio at the wavelength next to the reference. Of many fields, five.",
+    "own peak. Strehl ratio at the wavelength nearest to the reference. Of many fields, five.",
     "encircled": "Light within circles about the centroid. By waves it is the share of all light "
     "that passes the lens; by rays diffraction is left out. Of many fields, five.",
     "rayfans": "Where rays land from the chief ray of the reference wavelength: y of a fan in the "
@@ -75,7 +75,15 @@ _GROOVES: Final = (
     *("surface", "groove, µm", "walls", "narrowest, mm", "tool radius, µm", "grooves"),
 )
 _FIELDS: Final = (
-    *("field", "µm", "chief height, mm", "RMS, µm", "RMS chief, µm", "max, µm", "Airy, µm"),
+    *(
+        "field",
+        "wavelength, µm",
+        "chief height, mm",
+        "RMS, µm",
+        "RMS chief, µm",
+        "max, µm",
+        "Airy, µm",
+    ),
     *("OPD RMS, waves", "Strehl", "distortion, %", "light", "rays lost"),
 )
 _BY_SAMPLING: Final = (
@@ -317,4 +325,4 @@ def _number(value: float, digits: int) -> str:
         return "–"
     if math.isinf(value):
         return "∞" if value > 0 else "-∞"
-    return f"{value:.{digits}g}"
+    return f"{value + 0.0:.{digits}g}"  # no -0

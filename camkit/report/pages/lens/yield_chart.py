@@ -59,7 +59,7 @@ def draw_yield(result: ToleranceResult) -> Figure:
     _draw_classes(right, result)
     _draw_worst(last, result)
     for panel in (left, middle):
-        panel.set(ylabel="share of copies, %", ylim=(0, 102))
+        panel.set(ylabel="share of Monte-Carlo samples, %", ylim=(0, 102))
     return figure
 
 
@@ -70,9 +70,12 @@ def _draw_share(panel: Panel, result: ToleranceResult) -> None:
     nominal = result.nominal.mean_db[0]
     panel.axvline(nominal, color="black", linewidth=0.8, linestyle="--", label="as designed")
     for percent in PERCENTS:
-        panel.plot(result.percentile_db(percent), 100 - percent, "o", color=field_color(2))
+        label = "10, 50, 90 % of the samples are below" if percent == PERCENTS[0] else None
+        place = result.percentile_db(percent), 100 - percent
+        panel.plot(*place, "o", color=field_color(2), label=label)
     panel.set(
-        title=f"{result.lens.name}: {len(order)} copies", xlabel="PSNR after recovery, at least, dB"
+        title=f"{result.lens.name}: {len(order)} Monte-Carlo samples",
+        xlabel="PSNR after recovery, at least, dB",
     )
     panel.legend(loc="lower left")
     # the same downwards is upwards
@@ -94,7 +97,7 @@ def _draw_classes(panel: Panel, result: ToleranceResult) -> None:
             sensitivity.loss_db, [place] * len(sensitivity.loss_db), ".", color=field_color(2)
         )
     panel.axvline(0, color="black", linewidth=0.8)
-    panel.set_title("each class alone at its limit: loss, dB")
+    panel.set_title("each class alone at its limit: mean loss, dB (dot: one sample)")
     panel.grid(visible=False)
 
 
@@ -198,7 +201,8 @@ def _offender(offender: Offender | Ranked) -> dict[str, Any]:
 
 
 def _ranked(one: Ranked) -> dict[str, Any]:
-    return {"place": one.loss_place, "place_by_spots": one.spot_place, **_offender(one)}
+    places = {"place": one.loss_place, "place_by_spots": one.spot_place}
+    return {**places, **_offender(one), "worst_spot_growth_mm": one.worst_spot_growth_mm}
 
 
 def to_text(result: ToleranceResult) -> str:
@@ -211,33 +215,52 @@ def to_text(result: ToleranceResult) -> str:
         for loss in LOSSES_DB
     )
     lines = [
-        f"{result.lens.name}: {result.run.copies} fabricated copies, refocused at assembly: "
+        f"{result.lens.name}: {result.run.copies} Monte-Carlo samples, refocused at assembly: "
         f"{result.tolerances.compensator}{_gap_text(result)}",
-        f"PSNR after recovery: {nominal:.2f} dB as designed; of the copies 10 % are below "
+        f"PSNR after recovery: {nominal:.2f} dB as designed; of the samples 10 % are below "
         f"{low:.2f}, half below {middle:.2f}, 90 % below {high:.2f} dB",
         f"of the design: {yields}",
-        f"RMS spot over all fields: {_overall_um(result.nominal)[0]:.2f} um as designed, copies "
+        f"RMS spot over all fields: {_overall_um(result.nominal)[0]:.2f} um as designed, samples "
         f"{spots.min():.2f} to {spots.max():.2f} um",
     ]
     if result.classes:
-        lines += ["", f"{'alone, at its limit':<19} {'half-width':>12} {'loss dB':>8} {'worst':>7}"]
+        first, count = result.classes[0], len(result.classes[0].loss_db)
+        if first.loss_db.mean() > 0:
+            lines.append(f"tighten first: {first.error_class} ({first.loss_db.mean():.2f} dB)")
+        lines += [
+            "",
+            f"each class alone, all its errors at their limits with random signs, {count} samples:",
+            f"{'class':<19} {'half-width':>12} {'mean loss dB':>12} {'worst':>7}",
+        ]
     lines += [
         f"{c.error_class:<19} {in_file_units(c.error_class, c.half_width):>12} "
-        f"{c.loss_db.mean():8.2f} {c.loss_db.max():7.2f}"
+        f"{c.loss_db.mean():12.2f} {c.loss_db.max():7.2f}"
         for c in result.classes
     ]
     return "\n".join([*lines, *_worst_lines(result)])
 
 
 def _worst_lines(result: ToleranceResult) -> list[str]:
-    """Return both orders of single errors: by loss each part once, by spots each limit."""
+    """Return both orders of single errors: by loss each part once, by spots each limit.
+
+    Beside its place by spots an error has the growth at the limit with the larger spots.
+    """
     if not result.offenders:
         return []
-    head = f"{'part':>4} {'error':>13} {'loss dB':>8} {'spot grows um':>13}"
-    lines = ["", f"{'worst by loss':<19} {head} {'place by spots':>15}"]
-    lines += [f"{_row(one)} {one.spot_place:15d}" for one in result.ranking[:_WORST]]
-    lines += ["", f"{'worst single errors':<19} {head}"]
-    lines += [_row(one) for one in result.offenders[:_WORST]]
+    head = f"{'part':>4} {'error':>13} {'loss dB':>8}"
+    grows = "spot grows um"
+    lines = [
+        "",
+        f"{'worst by loss':<19} {head} {grows + ', either limit':>27} {'place by spots':>15}",
+    ]
+    lines += [
+        f"{_row(one)} {one.worst_spot_growth_mm * UM_PER_MM:+27.3f} {one.spot_place:15d}"
+        for one in result.ranking[:_WORST]
+    ]
+    lines += ["", f"{'worst by spots':<19} {head} {grows:>13}"]
+    lines += [
+        f"{_row(one)} {one.spot_growth_mm * UM_PER_MM:+13.3f}" for one in result.offenders[:_WORST]
+    ]
     agreement = rank_agreement(result.ranking)
     if agreement is not None:
         lines += ["", f"order by loss against order by spots: {agreement:.2f} (Spearman, 1 = same)"]
@@ -247,10 +270,7 @@ def _worst_lines(result: ToleranceResult) -> list[str]:
 def _row(one: Offender | Ranked) -> str:
     single = one.single
     error = in_file_units(single.error_class, single.value)
-    return (
-        f"{single.error_class:<19} {_part(single) or '-':>4} {error:>13} {one.loss_db:8.3f} "
-        f"{one.spot_growth_mm * UM_PER_MM:+13.3f}"
-    )
+    return f"{single.error_class:<19} {_part(single) or '-':>4} {error:>13} {one.loss_db:8.3f}"
 
 
 def _gap_text(result: ToleranceResult) -> str:

@@ -77,6 +77,30 @@ def test_a_lens_becomes_a_proved_filter_and_a_page(
     assert "begun with another minutes" in capsys.readouterr().err
 
 
+def test_a_filter_without_judging_has_no_page_and_is_judged_later(
+    small: None,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    out, page = tmp_path / "mine.camkit", tmp_path / "mine.html"
+    words = ["make", "any.zmx", "--sensor", SENSOR, "-o", str(out), "--minutes", "0"]
+    Steps(monkeypatch, tmp_path, 30.0)
+    page.write_text("of another camera")
+    assert run([*words, "--no-judge", "--overwrite"]) == 0
+    assert "its filter is not judged, and no page is written" in capsys.readouterr().out
+    assert open_bundle(out).manifest.sensor.width_px
+    assert not page.exists()
+    assert run([*words, "--no-judge", "--json"]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert (facts["page"], facts["psnr_db"], facts["over_filter_db"]) == (None, {}, {})
+    # the same words without it go on where they were
+    assert run(words) == 0
+    assert page.exists()
+    assert run(["make", "duet", "--sensor", SENSOR, "-o", str(out), "--no-judge"]) == 2
+    assert "without judging give --minutes 0; got 15" in capsys.readouterr().err
+
+
 def measured_grid(path: Path) -> Path:
     """Write the PSF of a laboratory: kernels of three colours on a grid."""
     np.save(path.with_suffix(".npy"), counts())

@@ -41,7 +41,10 @@ def test_rims_that_cut_the_opened_beam_are_said(camkit_command, tmp_path: Path) 
     text = out.read_text().replace("semi_diameter_mm = ", "semi_diameter_mm = 4.0 # ", 1)
     narrow.write_text(text)
     opened = camkit_command("lens", "convert", narrow, tmp_path / "y.toml", "--f-number", 4)
-    assert "rims stay and cut" in opened.err
+    assert "rims are not opened for the new F-number: they cut" in opened.err
+    scaled = ("--f-number", 4, "--efl-mm", 60, "--overwrite")
+    both = camkit_command("lens", "convert", narrow, tmp_path / "y.toml", *scaled)
+    assert "rims are scaled with the lens, not opened" in both.err
 
 
 def test_what_is_left_out_is_said_on_stderr(camkit_command, tmp_path: Path) -> None:

@@ -4,8 +4,11 @@ from pathlib import Path
 
 import pytest
 
+from camkit.models_def.optics.analysis.focus_note import focus_note
+from camkit.models_def.optics.focus import with_focus
 from camkit.models_def.optics.lens_file.lens_file import read_lens, write_lens
 from camkit.models_def.optics.paraxial import paraxial_data
+from camkit.models_def.optics.prescription import with_focus_shift
 
 PRESCRIPTIONS = Path(__file__).resolve().parents[5] / "models_def" / "prescriptions"
 SPOTS = ("spot_rms_mm_before", "spot_rms_mm_after")
@@ -25,7 +28,31 @@ def test_a_better_lens_of_the_same_focal_length_is_written(camkit_command, tmp_p
     assert paraxial_data(read_lens(out)).efl_mm == pytest.approx(kept, rel=1e-6)
     rims = [[s.semi_diameter_mm for s in read_lens(path).surfaces] for path in (source, out)]
     assert rims[0] == rims[1], "rims stay"
-    assert all("the beam needs" in note for note in report["notes"])
+    limit, *others = report["notes"]
+    assert limit == f"on the limit of its range: {', '.join(report['on_limits'])}"
+    assert report["on_limits"] == ["thickness of surface 2 = 1 mm"]
+    assert all("the beam needs" in note for note in others)
+
+
+def test_what_refocusing_alone_gains_is_said(camkit_command, tmp_path: Path) -> None:
+    """A sensor 3 mm off at F/4: spots of 3 / 4 / 2 / sqrt(2) mm."""
+    source, out = tmp_path / "far.toml", tmp_path / "better.toml"
+    lens = with_focus(read_lens(PRESCRIPTIONS / "cooke-triplet.toml"), "spot")
+    write_lens(with_focus_shift(lens, -3.0), source)
+    command = ("lens", "optimize", source, "-o", out, "--vary", "conic", "--overwrite")
+    short = ("--starts", "1", "--steps", "1", "--rays", "8")
+    report = json.loads(camkit_command(*command, *short, "--json").out)
+    before, after = report["spot_rms_mm_before"], report["spot_rms_mm_refocused"]
+    assert before[0] == pytest.approx(3 / 8 / 2**0.5, rel=0.05)
+    assert max(after) < 0.03
+    note = "the sensor is out of focus: 3 mm farther from the lens the RMS spot over all fields is"
+    told = camkit_command(*command, *short)
+    assert note in told.err
+    assert f"file -> refocused -> improved: {1000 * before[0]:.1f} -> {1000 * after[0]:.1f} ->" in (
+        told.out
+    )
+    assert any(note in line for line in focus_note(read_lens(source)))
+    assert focus_note(lens) == ()
 
 
 def test_what_varies_may_stand_in_the_file(camkit_command, tmp_path: Path) -> None:

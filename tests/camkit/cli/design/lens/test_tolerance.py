@@ -23,7 +23,7 @@ def test_yield_is_printed_charted_and_written(camkit_command, tmp_path: Path, er
     outcome = camkit_command(*command)
     assert outcome.code == 0, outcome.err
     assert outcome.err == ""
-    assert "2 fabricated copies" in outcome.out
+    assert "2 Monte-Carlo samples" in outcome.out
     assert "element_decentre" in outcome.out
     names = {path.name for path in out.iterdir()}
     assert names == {f"duet-tolerance.{kind}" for kind in ("png", "svg", "json")}

@@ -88,6 +88,7 @@ def test_json_has_the_yield_in_plain_numbers(result: ToleranceResult) -> None:
         "error": "1 fringe",
         "loss_db": 0.75,
         "spot_growth_mm": 1e-3,
+        "worst_spot_growth_mm": 1e-3,
     }
     assert found["rank_agreement"] is None
     assert found["compensator_gap"] is None
@@ -106,10 +107,21 @@ def test_text_says_what_to_tighten(result: ToleranceResult) -> None:
     assert "+2.000" in text
     assert text.index("worst by loss") < text.index("irregularity") < text.index("focus  ")
     assert "Spearman" not in text
+    assert "tighten first: radius (1.50 dB)" in text
+    assert "their limits with random signs, 2 samples:" in text
     assert "refocused at assembly: paraxial\n" in text
     gap = Tolerances(compensator="gap", compensator_gap=2)
     text = to_text(replace(result, tolerances=gap))
     assert "assembly: gap after surface 2 (-0.050 to +0.020 mm)" in text
+
+
+def test_a_place_by_spots_stands_beside_the_growth_that_it_counts(result: ToleranceResult) -> None:
+    """The limit that loses more is not the one with the larger spots."""
+    focus = Single(error_class="focus", part=None, value=0.02)
+    other = Offender(single=focus, loss_db=0.1, spot_growth_mm=9e-3)
+    text = to_text(replace(result, offenders=(other, *result.offenders)))
+    (row,) = (line for line in text.splitlines() if "-0.02 mm" in line and line.endswith(" 1"))
+    assert "+9.000" in row
 
 
 def test_files_are_the_same_from_run_to_run(result: ToleranceResult, tmp_path: Path) -> None:
@@ -125,4 +137,5 @@ def test_files_are_the_same_from_run_to_run(result: ToleranceResult, tmp_path: P
 def test_a_run_without_errors_is_drawn_too(result: ToleranceResult, tmp_path: Path) -> None:
     none = replace(result, classes=(), offenders=())
     assert all(path.stat().st_size for path in write_tolerance(none, tmp_path, "x"))
-    assert "worst single errors" not in to_text(none)
+    assert "worst by" not in to_text(none)
+    assert "tighten first" not in to_text(none)
