@@ -4,7 +4,7 @@ pool of samples -> patches of a step -> network -> loss in the square-root domai
                                                         -> average of the weights -> validation
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, TypeVar
@@ -41,7 +41,7 @@ from camkit.models_def.training.log import RunLog
 from camkit.models_def.training.pool import SamplePool, open_pool
 from camkit.models_def.training.recipe import Recipe
 from camkit.models_def.training.refinement import Refinement
-from camkit.models_def.training.schedule import progress_of
+from camkit.models_def.training.schedule import NO_STEP, progress_of, short_time_text
 from camkit.progress import Task, duration, left_text, note, working
 from camkit.stopwatch import Stopwatch
 
@@ -224,21 +224,29 @@ def train(
     # A pool of its own: another size may be trained beside this one.
     samples = options.out_dir / f"samples_{_label(role, options.size)}"
     seed = entry.schedule.seed
-    pool = open_pool(samples, recipe_path, material, options.data_folder, seed=seed, role=role)
-    what = f"training {recipe.name} {_label(role, options.size)}"
-    with pool, working(what, total=1.0, writes_lines=True) as task:
+    what = f"{recipe.name} {_label(role, options.size)}"
+    begin = stopwatch.wall_s(), stopwatch.cpu_s()
+    with working(f"preparing the scenes of {what}"):
+        pool = open_pool(samples, recipe_path, material, options.data_folder, seed=seed, role=role)
+    with pool:
         pool.start_workers(options.workers)
-        run = _Run(
-            recipe,
-            material,
-            options,
-            toml=recipe_path.read_text(encoding="utf-8"),
-            refinement=refinement,
-            first=first,
-            fitting=fitting,
-            stopwatch=stopwatch,
-        )
-        run.loop(pool, task)
+        with working(f"preparing the validation of {what}"):
+            run = _Run(
+                recipe,
+                material,
+                options,
+                toml=recipe_path.read_text(encoding="utf-8"),
+                refinement=refinement,
+                first=first,
+                fitting=fitting,
+                stopwatch=stopwatch,
+                begin_s=begin,
+            )
+        note(run.plan_line())
+        with working(f"preparing the first samples of {what}", unit="samples") as task:
+            run.prepare(pool, task)
+        with working(f"training {what}", total=1.0, writes_lines=True) as task:
+            run.loop(pool, task)
     return run.result()
 
 
@@ -267,8 +275,9 @@ class _Run:
         first: FirstWeights | None,
         fitting: OwnFitting | None,
         stopwatch: Stopwatch,
+        begin_s: tuple[float, float],
     ) -> None:
-        self.stopwatch = stopwatch
+        self.stopwatch, self.begin_s = stopwatch, begin_s
         self.options, self.material_digest = options, material.digest()
         self.recipe, self.toml = recipe, toml
         self.designed = dict(material.designed)
@@ -306,6 +315,7 @@ class _Run:
         self.log = RunLog(self.path.with_suffix(".jsonl"), keep_until_step=last_step)
         self.closing_s: dict[str, tuple[float, float]] = {}
         self.setup_shares = (0.0, 0.0)
+        self.too_short = ""
         self.baselines = dict(self._closing("judge", self.judge.baselines))
 
     def _restore(self, saved: Checkpoint) -> None:
@@ -336,14 +346,59 @@ class _Run:
         self.closing_s[name] = wall_s - begin[0], cpu_s - begin[1]
         return returned
 
+    def prepare(self, pool: SamplePool, task: Task) -> None:
+        """Make the first samples, unless the time ends before."""
+        begin_s: tuple[float, float] | None = None
+        there = 0
+
+        def go_on(ready: int, total: int) -> bool:
+            nonlocal begin_s, there
+            now_s = self.stopwatch.wall_s(), self.stopwatch.cpu_s() + pool.workers_cpu_s()
+            if begin_s is None:
+                begin_s, there = now_s, ready
+                task.total = total
+                task.begin(ready)
+            task.count(ready)
+            if not self._is_over(self._progress(pool)):
+                return True
+            spent_s = [now - begin for now, begin in zip(now_s, begin_s, strict=True)]
+            self.too_short = self._too_short(pool, (there, ready, total), spent_s)
+            return False
+
+        if pool.make_ready(self.step, go_on) and self._is_over(self._progress(pool)):
+            self.too_short = self._too_short(pool, (0, 0, 0), (0.0, 0.0))
+
+    def _too_short(
+        self, pool: SamplePool, samples: tuple[int, int, int], spent_s: Sequence[float]
+    ) -> str:
+        """Return the line of a run whose time ended before its first step.
+
+        Args:
+            pool: Of its samples.
+            samples: Those there at first, those there now, and those in all.
+            spent_s: Wall and CPU time of making some of them.
+        """
+        options, shares = self.options, self._shares(pool)
+        if self.step or max(shares) < 1:
+            return NO_STEP
+        which = shares.index(max(shares))
+        most = (options.max_minutes, options.max_cpu_minutes)[which] or 0.0
+        first, ready, total = samples
+        is_known = ready > first or ready == total
+        left_s = spent_s[which] * (total - ready) / max(1, ready - first)
+        need_s = 60 * most * shares[which] + left_s
+        return short_time_text(
+            need_s,
+            # a repeat has the kernels and the samples
+            need_s - self.begin_s[which] - spent_s[which],
+            limit=f"{most:g} {('minutes', 'CPU-minutes')[which]}",
+            made=f"{ready} of {total} samples" if total else "",
+            is_known=is_known,
+        )
+
     def loop(self, pool: SamplePool, task: Task) -> None:
         """Fit until the schedule, the time or the asked step ends; checkpoint and validate."""
         schedule, options = self.entry.schedule, self.options
-        note(self._plan_line())
-        what = task.what
-        task.tell(f"{what}: making the first samples")
-        pool.draw_batch(self.step, 1, schedule.patch_px)
-        task.tell(what)
         task.begin(self._progress(pool))
         self.setup_shares, first_step = self._shares(pool), self.step
         self.log.write(
@@ -369,7 +424,7 @@ class _Run:
                 saved_s = self.elapsed_s()
         task.count(1.0)
         if self.step == first_step and self.step not in (self.steps, options.stop_at_step):
-            note("no step was trained: the time ended before the first one; give more minutes")
+            note(self.too_short or NO_STEP)
         self._validate(pool, task)
         self._save(pool)
         self.spent_s = self.elapsed_s(), self.cpu_s(pool)
@@ -424,7 +479,7 @@ class _Run:
         self.log.write(entry | parts | self._baseline_entries())
         note(self._line(pool, task, self.valid.mean_db))
 
-    def _plan_line(self) -> str:
+    def plan_line(self) -> str:
         """Return the line about the end of the run."""
         ends = [f"{self.steps} steps"]
         budgets = {"minutes": self.options.max_minutes, "CPU-minutes": self.options.max_cpu_minutes}
