@@ -34,8 +34,8 @@ SURE: Final = 0.95
 LOWEST: Final = -0.05
 BORDERS: Final = 1.5
 RIM_PX: Final = 24
-FARTHER: Final = ("farther from the truth than the front end", "nearer to the truth than it")
-BELOW: Final = ("below the front end", "above the front end")
+ERROR_WORDS: Final = ("farther from the truth than the front end", "nearer to the truth than it")
+LOSS_WORDS: Final = ("below the front end", "above the front end")
 SCENES: Final = range(5_300_000, 5_300_004)
 """Seeds of procedural scenes that nothing is trained on."""
 SIDE_PX: Final = 320
@@ -164,7 +164,7 @@ def _flat(room: Darkroom, ranges: _Ranges) -> Law:
         unit=SHARE,
         front=front_error,
         where=where,
-        beside_front=FARTHER,
+        beside_front=ERROR_WORDS,
     )
 
 
@@ -228,7 +228,7 @@ def _better(scenes: list[tuple[str, Exposed]]) -> Law:
         worst = max(worst, (float(-gains.mean()), error, place))
     loss, error, where = worst
     return Law(
-        name="better", worst=loss, limit=error, unit="dB", where=where, beside_front=BELOW
+        name="better", worst=loss, limit=error, unit="dB", where=where, beside_front=LOSS_WORDS
     )
 
 
