@@ -140,9 +140,9 @@ def short_time_text(
     is_known = ready > first or ready == total
     more = "about" if is_known else "more than"
     need_s = spent_s + making_s * (total - ready) / max(1, ready - first)
-    made_text = "what was made" + (f" ({ready} of {total} samples)" if total else "")
+    repeat_s = need_s - kept_s - making_s
     return (
         f"no step was trained: preparation and last validation take {more} {need_s / 60:.1f} of "
-        f"{limit}; {made_text} is kept, so a repeat in this folder with {option_text('overwrite')} "
-        f"needs {more} {(need_s - kept_s - making_s) / 60:.1f} for them"
+        f"{limit}; what was made ({ready} of {total} samples) is kept, so a repeat in this folder "
+        f"with {option_text('overwrite')} needs {more} {repeat_s / 60:.1f} for them"
     )

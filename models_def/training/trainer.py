@@ -291,25 +291,20 @@ class _Run:
 
     def _prepare(self, pool: SamplePool, task: Task) -> None:
         """Make the first samples, unless the time ends before."""
-        begin_s: tuple[float, float] | None = None
-        there = 0
+        begin_s = self.elapsed_s(), self.cpu_s(pool)
 
         def go_on(ready: int, total: int) -> bool:
-            nonlocal begin_s, there
-            now_s = self.stopwatch.wall_s(), self.stopwatch.cpu_s() + pool.workers_cpu_s()
-            if begin_s is None:
-                begin_s, there = now_s, ready
-                task.total = total
+            if task.total is None:
                 task.begin(ready)
-            task.count(ready)
+            task.count(ready, total)
             if not self._is_over(self._progress(pool)):
                 return True
-            making_s = [now - begin for now, begin in zip(now_s, begin_s, strict=True)]
-            self.too_short = self._too_short(pool, (there, ready, total), making_s)
+            making_s = self.elapsed_s() - begin_s[0], self.cpu_s(pool) - begin_s[1]
+            samples = int(task.skipped), ready, total
+            self.too_short = self._too_short(pool, samples, making_s)
             return False
 
-        if pool.make_ready(self.step, go_on) and self._is_over(self._progress(pool)):
-            self.too_short = self._too_short(pool, (0, 0, 0), (0.0, 0.0))
+        pool.make_ready(self.step, go_on)
 
     def _too_short(
         self, pool: SamplePool, samples: tuple[int, int, int], making_s: Sequence[float]
@@ -321,12 +316,9 @@ class _Run:
             samples: Those there at first, those there now, and those in all.
             making_s: Wall and CPU time of making some of them.
         """
-        limits, shares = (
-            (self.options.max_minutes, self.options.max_cpu_minutes),
-            self._shares(pool),
-        )
+        shares = self._shares(pool)
         which = shares.index(max(shares))
-        limit = limits[which]
+        limit = (self.options.max_minutes, self.options.max_cpu_minutes)[which]
         if self.step or limit is None or shares[which] < 1:
             return NO_STEP
         return short_time_text(
