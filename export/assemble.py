@@ -162,14 +162,22 @@ def export_bundle(parts: Parts, out: Path) -> dict[str, Any]:
 
 
 def _notes(camera: "_Camera") -> dict[str, str]:
-    """Return what is odd of the places of a measured PSF."""
+    """Return what is odd of the networks, and of the places of a measured PSF."""
+    untrained = [
+        f"the network {size}{'' if len(camera.checkpoints) == 1 else f' of {role}'} was not "
+        "trained: step 0"
+        for role, sizes in camera.checkpoints.items()
+        for size, checkpoint in sizes.items()
+        if checkpoint.step == 0
+    ]
+    notes = {"warning": "; ".join(untrained)} if untrained else {}
     extent = camera.recipe.sensor.extent
     if PSF not in camera.designed or extent is None:
-        return {}
+        return notes
     pitch_um = extent.pixel_pitch_um
     sides_mm = (to_mm(side * pitch_um) for side in (extent.width_px, extent.height_px))
     note = reach_note(camera.optics.psf, *sides_mm)
-    return {} if note is None else {"note": note}
+    return notes if note is None else notes | {"note": note}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -410,10 +410,12 @@ def _judge(draft: _Draft, bundle: Bundle, cases: Cases, laws: MeasuredLaws) -> N
     _begin(draft.task, 7)
     before, after = _mean_db(draft.camera, cases, DEVELOP), _mean_db(bundle, cases)
     draft.report |= {"developed_db": round(before, 2), "network_db": round(after, 2)}
+    if draft.camera.manifest.networks:
+        draft.report["camera_network_db"] = round(_mean_db(draft.camera, cases), 2)
     if after < before:
         draft.warnings.append(
-            f"on the camera's twin the network makes pictures of {after:.2f} dB, developing alone "
-            f"{before:.2f} dB: it is worse than its own input"
+            f"on the simulated camera the network makes pictures of {after:.2f} dB, developing "
+            f"alone {before:.2f} dB: it is worse than its own input"
         )
     if isinstance(laws, str):
         return

@@ -14,6 +14,7 @@ import json
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -88,10 +89,14 @@ class PoolFiles:
         missing = missing[missing % share[1] == share[0]]
         return int(missing[0]) if missing.size else None
 
+    def ready(self, low: int, end: int) -> int:
+        """Return how many of the samples low .. end - 1 are there."""
+        indices = np.arange(low, end)
+        return int((self.slots[indices % self.size] == indices + 1).sum())
+
     def are_ready(self, low: int, end: int) -> bool:
         """Return whether the samples low .. end - 1 are all there."""
-        indices = np.arange(low, end)
-        return bool((self.slots[indices % self.size] == indices + 1).all())
+        return self.ready(low, end) == end - low
 
     def store(self, index: int, sample: Sample) -> None:
         """Write a sample; its slot counts as empty while it is being written.
@@ -220,13 +225,26 @@ class SamplePool:
             torch.from_numpy(planes), torch.from_numpy(targets), torch.from_numpy(weights)
         )
 
-    def _ensure(self, low: int, end: int) -> None:
+    def make_ready(self, step: int, go_on: Callable[[int, int], bool]) -> bool:
+        """Make the samples of a step, and return whether they are all there.
+
+        Args:
+            step: Number of the step.
+            go_on: Called with the samples that are there and those in all; False stops.
+
+        Raises:
+            ContractError: If a worker has died.
+        """
+        low, end = self.span(step)
+        return self._ensure(low, end, lambda: go_on(self._files.ready(low, end), end - low))
+
+    def _ensure(self, low: int, end: int, go_on: Callable[[], bool] = lambda: True) -> bool:
         """Make sure that the samples exist, and allow the worker to work ahead."""
         self._files.goal[0] = end + AHEAD
-        if self._files.are_ready(low, end):
-            return
         start = time.perf_counter()
         while not self._files.are_ready(low, end):
+            if not go_on():
+                return False
             if not self._workers:
                 self._make_missing()
             elif any(worker.poll() is not None for worker in self._workers):
@@ -234,6 +252,7 @@ class SamplePool:
             else:
                 time.sleep(POLL_S)
         self.waited_s += time.perf_counter() - start
+        return True
 
     def _make_missing(self) -> None:
         index = self._files.next_missing()

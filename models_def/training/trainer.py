@@ -4,8 +4,9 @@ pool of samples -> patches of a step -> network -> loss in the square-root domai
                                                         -> average of the weights -> validation
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
@@ -41,85 +42,19 @@ from camkit.models_def.training.log import RunLog
 from camkit.models_def.training.pool import SamplePool, open_pool
 from camkit.models_def.training.recipe import Recipe
 from camkit.models_def.training.refinement import Refinement
-from camkit.models_def.training.schedule import progress_of
+from camkit.models_def.training.schedule import (
+    NO_STEP,
+    TrainOptions,
+    progress_of,
+    short_time_text,
+)
 from camkit.progress import Task, duration, left_text, note, working
 from camkit.stopwatch import Stopwatch
 
+__all__ = ["TrainOptions", "TrainResult", "checkpoint_path", "train"]
+
 LOG_STEPS: Final = 50
 Returned = TypeVar("Returned")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TrainOptions:
-    """The options of a run besides its recipe.
-
-    Attributes:
-        out_dir: Checkpoint, log and sample pool are kept here.
-        size: Which network of the recipe.
-        role: Of which role; None for a recipe of one.
-        data_folder: Pictures to train on; None for procedural scenes alone.
-        valid_folder: Pictures to choose by; None for procedural scenes.
-        steps: Steps of the whole schedule; None for the recipe's.
-        max_minutes: Wall time after which the run, decay included, ends; None for its steps.
-        max_cpu_minutes: The same of CPU time, that of the workers included. Both count all of the
-            run: kernels that are traced, samples, and validations, the last one too.
-        start: Checkpoint or bundle with the same network, of another camera say, whose weights
-            are the first ones; None for random weights.
-        stop_at_step: Stop there though the schedule goes on, as an interruption would.
-        session_minutes: The same after so much wall time of this call.
-        resume: Go on from the checkpoint in `out_dir`.
-        overwrite: Start anew over a checkpoint that lies there.
-        threads: Threads of torch.
-        workers: Processes that make samples; 0 makes them in this process.
-        device: cpu or cuda.
-        vgg: Weights of VGG-19, where the loss of the role looks at it.
-        sharp_folder: Sharp pictures without captures, where the loss of the role has a critic.
-        pairs: Folder of real pairs, where the kind of camera trains on them.
-        checkpoint_s: Seconds between checkpoints.
-        validate_s: Seconds between validations.
-    """
-
-    out_dir: Path
-    size: str = "M"
-    role: str | None = None
-    data_folder: Path | None = None
-    valid_folder: Path | None = None
-    steps: int | None = None
-    max_minutes: float | None = None
-    max_cpu_minutes: float | None = None
-    start: Path | None = None
-    stop_at_step: int | None = None
-    session_minutes: float | None = None
-    resume: bool = False
-    overwrite: bool = False
-    threads: int = 1
-    workers: int = 1
-    device: str = "cpu"
-    vgg: Path | None = None
-    sharp_folder: Path | None = None
-    pairs: Path | None = None
-    checkpoint_s: float = 100.0
-    validate_s: float = 180.0
-
-    def __post_init__(self) -> None:
-        for name in ("max_minutes", "max_cpu_minutes", "session_minutes"):
-            minutes = getattr(self, name)
-            if minutes is not None and minutes <= 0:
-                raise ContractError(f"{name} must be > 0; got {minutes}")
-        if self.steps is not None and self.steps < 1:
-            raise ContractError(f"steps must be >= 1; got {self.steps}")
-        if self.start is not None and self.resume:
-            raise ContractError("a run that is resumed has begun; leave start away")
-        if self.overwrite and self.resume:
-            raise ContractError(
-                "resume goes on from the checkpoint, overwrite drops it: choose one"
-            )
-        if self.threads < 1 or self.workers < 0:
-            raise ContractError(
-                f"threads must be >= 1, workers >= 0; got {self.threads}, {self.workers}"
-            )
-        if self.device != "cpu" and not torch.cuda.is_available():
-            raise ContractError(f"device {self.device} is not there; use cpu")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -224,9 +159,11 @@ def train(
     # A pool of its own: another size may be trained beside this one.
     samples = options.out_dir / f"samples_{_label(role, options.size)}"
     seed = entry.schedule.seed
-    pool = open_pool(samples, recipe_path, material, options.data_folder, seed=seed, role=role)
-    what = f"training {recipe.name} {_label(role, options.size)}"
-    with pool, working(what, total=1.0, writes_lines=True) as task:
+    what = f"{recipe.name} {_label(role, options.size)}"
+    begin = stopwatch.wall_s(), stopwatch.cpu_s()
+    with working(f"preparing the scenes of {what}"):
+        pool = open_pool(samples, recipe_path, material, options.data_folder, seed=seed, role=role)
+    with pool:
         pool.start_workers(options.workers)
         run = _Run(
             recipe,
@@ -238,8 +175,8 @@ def train(
             fitting=fitting,
             stopwatch=stopwatch,
         )
-        run.loop(pool, task)
-    return run.result()
+        run.begin_s = begin
+        return run.work(pool, what)
 
 
 def checkpoint_path(recipe: Recipe, options: TrainOptions, refinement: Refinement | None) -> Path:
@@ -275,7 +212,9 @@ class _Run:
         self.role = recipe.role(options.role)
         self.entry = recipe.network(options.size, self.role)
         kind = training_kind(recipe.kind)
-        self.judge: Judge = kind.judge(recipe, self.role, material, options.valid_folder)
+        self._make_judge = partial(kind.judge, recipe, self.role, material, options.valid_folder)
+        self.judge: Judge | None = None
+        self.baselines: dict[str, float] = {}
         data = describe_data(recipe.data, options.data_folder)
         self.data = data + ("" if first is None else first.credit(data))
         if fitting is not None:
@@ -306,7 +245,8 @@ class _Run:
         self.log = RunLog(self.path.with_suffix(".jsonl"), keep_until_step=last_step)
         self.closing_s: dict[str, tuple[float, float]] = {}
         self.setup_shares = (0.0, 0.0)
-        self.baselines = dict(self._closing("judge", self.judge.baselines))
+        self.begin_s = (0.0, 0.0)
+        self.too_short = ""
 
     def _restore(self, saved: Checkpoint) -> None:
         identity = (self.material_digest, self.role, self.entry.network, dict(self.entry.config))
@@ -336,14 +276,62 @@ class _Run:
         self.closing_s[name] = wall_s - begin[0], cpu_s - begin[1]
         return returned
 
-    def loop(self, pool: SamplePool, task: Task) -> None:
+    def work(self, pool: SamplePool, what: str) -> TrainResult:
+        """Prepare and train, and return the result."""
+        if self.step or max(self._shares(pool)) < 1:
+            with working(f"preparing the validation of {what}"):
+                self.judge = self._make_judge()
+                self.baselines = dict(self._closing("judge", self.judge.baselines))
+        note(self._plan_line())
+        with working(f"preparing the first samples of {what}", unit="samples") as task:
+            self._prepare(pool, task)
+        with working(f"training {what}", total=1.0, writes_lines=True) as task:
+            self._loop(pool, task)
+        return self._result()
+
+    def _prepare(self, pool: SamplePool, task: Task) -> None:
+        """Make the first samples, unless the time ends before."""
+        begin_s = self.elapsed_s(), self.cpu_s(pool)
+
+        def go_on(ready: int, total: int) -> bool:
+            if task.total is None:
+                task.begin(ready)
+            task.count(ready, total)
+            if not self._is_over(self._progress(pool)):
+                return True
+            making_s = self.elapsed_s() - begin_s[0], self.cpu_s(pool) - begin_s[1]
+            samples = int(task.skipped), ready, total
+            self.too_short = self._too_short(pool, samples, making_s)
+            return False
+
+        pool.make_ready(self.step, go_on)
+
+    def _too_short(
+        self, pool: SamplePool, samples: tuple[int, int, int], making_s: Sequence[float]
+    ) -> str:
+        """Return the line of a run whose time ended before its first step.
+
+        Args:
+            pool: Of its samples.
+            samples: Those there at first, those there now, and those in all.
+            making_s: Wall and CPU time of making some of them.
+        """
+        shares = self._shares(pool)
+        which = shares.index(max(shares))
+        limit = (self.options.max_minutes, self.options.max_cpu_minutes)[which]
+        if self.step or limit is None or shares[which] < 1:
+            return NO_STEP
+        return short_time_text(
+            f"{limit:g} {('minutes', 'CPU-minutes')[which]}",
+            samples,
+            spent_s=60 * limit * shares[which],
+            kept_s=self.begin_s[which],
+            making_s=making_s[which],
+        )
+
+    def _loop(self, pool: SamplePool, task: Task) -> None:
         """Fit until the schedule, the time or the asked step ends; checkpoint and validate."""
         schedule, options = self.entry.schedule, self.options
-        note(self._plan_line())
-        what = task.what
-        task.tell(f"{what}: making the first samples")
-        pool.draw_batch(self.step, 1, schedule.patch_px)
-        task.tell(what)
         task.begin(self._progress(pool))
         self.setup_shares, first_step = self._shares(pool), self.step
         self.log.write(
@@ -369,7 +357,7 @@ class _Run:
                 saved_s = self.elapsed_s()
         task.count(1.0)
         if self.step == first_step and self.step not in (self.steps, options.stop_at_step):
-            note("no step was trained: the time ended before the first one; give more minutes")
+            note(self.too_short or NO_STEP)
         self._validate(pool, task)
         self._save(pool)
         self.spent_s = self.elapsed_s(), self.cpu_s(pool)
@@ -377,10 +365,10 @@ class _Run:
     def _shares(self, pool: SamplePool) -> tuple[float, float]:
         """Return the shares of the wall and the CPU time that are spent, the end of the run too."""
         options = self.options
-        walls_s, cpus_s = zip(*self.closing_s.values(), strict=True)
+        wall_s, cpu_s = (sum(times_s[i] for times_s in self.closing_s.values()) for i in (0, 1))
         budgets = (
-            (self.elapsed_s() + sum(walls_s), options.max_minutes),
-            (self.cpu_s(pool) + sum(cpus_s), options.max_cpu_minutes),
+            (self.elapsed_s() + wall_s, options.max_minutes),
+            (self.cpu_s(pool) + cpu_s, options.max_cpu_minutes),
         )
         wall, cpu = (0.0 if most is None else seconds / (60 * most) for seconds, most in budgets)
         return wall, cpu
@@ -411,7 +399,10 @@ class _Run:
         self.log.write({"step": self.step, "loss": loss} | self.fitter.notes() | clock | waited)
 
     def _validate(self, pool: SamplePool, task: Task) -> None:
-        self.valid = self._closing("judge", lambda: self.judge.score(self.fitter.restore))
+        judge = self.judge
+        if judge is None:
+            return
+        self.valid = self._closing("judge", lambda: judge.score(self.fitter.restore))
         if self.picks_best and (self.best_db is None or self.valid.mean_db > self.best_db):
             self.best, self.best_db = self.fitter.average(), self.valid.mean_db
         entry: dict[str, Any] = {
@@ -470,7 +461,7 @@ class _Run:
         )
         self._closing("save", lambda: write_checkpoint(self.path, saved))
 
-    def result(self) -> TrainResult:
+    def _result(self) -> TrainResult:
         saved = read_checkpoint(self.path)
         return TrainResult(
             checkpoint=self.path,

@@ -159,6 +159,7 @@ def test_an_exported_bundle_states_measured_facts_and_repeats_its_golden_cases(
         again = case_work(bundle, case, arrays[case.name], "S").fill()
         stored = arrays[case.name].outputs[IMAGE]["S"]
         np.testing.assert_array_equal(again.astype(np.float16), stored.astype(np.float16))
+    assert report["warning"] == "the network S was not trained: step 0"
     assert report["bytes"] == Path(report["bundle"]).stat().st_size
     assert b"95 % energy" in bundle.member("card.md")
 

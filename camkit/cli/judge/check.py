@@ -15,7 +15,8 @@ def check(
     level: Annotated[
         str,
         typer.Option(
-            help="Tests to run: all, or up to schema, hash, graph, golden, tiling, range or laws."
+            help="All tests, or one with those it needs: schema, hash, graph, golden, tiling, "
+            "range, laws."
         ),
     ] = "all",
     json_: Json = False,

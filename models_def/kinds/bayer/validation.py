@@ -27,6 +27,7 @@ from camkit.models_def.kinds.bayer.samples import (
 from camkit.models_def.sensors.stabilise import unstabilise
 from camkit.models_def.training.kind import Restorer, Score, mean_score
 from camkit.models_def.training.pictures import SCENE_SEED, list_pictures, read_picture, to_linear
+from camkit.progress import counted
 from camkit.runtime.twin.light import camera_space
 from camkit.scenes import procedural_scene
 
@@ -83,7 +84,8 @@ def make_validation_captures(
     """
     side = scene_side_px(recipe, bank)
     captures = []
-    for number, crop in enumerate(_crops(pictures, side)):
+    crops = _crops(pictures, side)
+    for number, crop in enumerate(counted(crops, "photographing", "pictures")):
         for spot, share in enumerate(FIELD_SHARES):
             for iso in ISOS:
                 rng = np.random.default_rng((SEED, number, spot, int(iso)))

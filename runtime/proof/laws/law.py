@@ -23,6 +23,8 @@ class Law:
         unit: Of both.
         front: The same number of the front end alone; None where there is none.
         where: Where it was met.
+        beside_front: Of a number that is a difference from the front end's: words behind one above
+            0, and behind one below.
     """
 
     name: str
@@ -31,6 +33,7 @@ class Law:
     unit: str
     front: float | None = None
     where: str = ""
+    beside_front: tuple[str, str] | None = None
 
     @property
     def is_kept(self) -> bool:
@@ -43,15 +46,19 @@ class Law:
         return self.worst - self.limit
 
     def describe(self) -> str:
-        """Return the law in words."""
-        front = "" if self.front is None else f", front end {number_text(self.front, self.unit)}"
-        where = f", {self.where}" if self.where and not self.is_kept else ""
-        verdict = (
-            ""
-            if self.is_kept
-            else f" BROKEN (at most {number_text(self.limit, self.unit)}{front}{where})"
-        )
-        return f"{self.name.replace('_', ' ')} {number_text(self.worst, self.unit)}{verdict}"
+        """Return the law in words, with the front end and the limit where it is broken."""
+        worst, words = self.worst, ""
+        if self.beside_front is not None:
+            words = f" {self.beside_front[worst < 0]}"
+            worst = abs(worst)
+        text = f"{self.name.replace('_', ' ')} {number_text(worst, self.unit)}{words}"
+        if self.is_kept:
+            return text
+        if self.front is not None:
+            front = number_text(self.front, self.unit)
+            text += f" ({front})" if words else f" (front end {front})"
+        where = f", {self.where}" if self.where else ""
+        return f"{text}: BROKEN (at most {number_text(self.limit, self.unit)}{where})"
 
     def to_stated(self) -> StatedLaw:
         """Return the manifest's entry of the law."""

@@ -34,6 +34,8 @@ SURE: Final = 0.95
 LOWEST: Final = -0.05
 BORDERS: Final = 1.5
 RIM_PX: Final = 24
+ERROR_WORDS: Final = ("farther from the truth than the front end", "nearer to the truth than it")
+LOSS_WORDS: Final = ("below the front end", "above the front end")
 SCENES: Final = range(5_300_000, 5_300_004)
 """Seeds of procedural scenes that nothing is trained on."""
 SIDE_PX: Final = 320
@@ -156,7 +158,13 @@ def _flat(room: Darkroom, ranges: _Ranges) -> Law:
                     worst = max(worst, candidate)
     more, front_error, where = worst
     return Law(
-        name="flat", worst=max(more, 0.0), limit=FLAT, unit=SHARE, front=front_error, where=where
+        name="flat",
+        worst=max(more, 0.0),
+        limit=FLAT,
+        unit=SHARE,
+        front=front_error,
+        where=where,
+        beside_front=ERROR_WORDS,
     )
 
 
@@ -219,7 +227,9 @@ def _better(scenes: list[tuple[str, Exposed]]) -> Law:
         error = float(gains.std(ddof=1) / np.sqrt(gains.size))
         worst = max(worst, (float(-gains.mean()), error, place))
     loss, error, where = worst
-    return Law(name="better", worst=loss, limit=error, unit="dB", where=where)
+    return Law(
+        name="better", worst=loss, limit=error, unit="dB", where=where, beside_front=LOSS_WORDS
+    )
 
 
 def _psnr(picture: FloatArray, truth: FloatArray) -> float:

@@ -13,6 +13,7 @@ from camkit import stopwatch as stopwatch_module
 from camkit.models_def.kinds.bayer.validation import BayerJudge
 from camkit.models_def.training import trainer
 from camkit.models_def.training.fitter import Fitter
+from camkit.models_def.training.kind import read_recipe
 from camkit.models_def.training.pool import SamplePool, open_pool
 from camkit.models_def.training.trainer import TrainOptions, train
 from camkit.progress import Board, listening
@@ -203,3 +204,34 @@ def test_a_run_without_a_step_says_so(tmp_path, recipe_path, material, clock) ->
             stopwatch=watch,
         )
     assert any("no step was trained" in line for line in lines)
+
+
+def test_a_limit_ends_the_first_samples_and_the_run_says_what_it_needs(
+    tmp_path, recipe_path, material, monkeypatch, clock
+) -> None:
+    PARTS["opening the pool"](monkeypatch, clock.spend)
+    _costs(SamplePool, "_make_missing")(monkeypatch, clock.spend)
+    lines: list[str] = []
+    lines: list[str] = []
+    board = Board(note=lines.append)
+    make = SamplePool._make_missing
+
+    def seen(pool: SamplePool) -> None:
+        lines.append(" ".join(task.what for task in board.tasks))
+        assert not any(task.writes_lines for task in board.tasks), "the display shows it"
+        make(pool)
+
+    monkeypatch.setattr(SamplePool, "_make_missing", seen)
+    given = _options(tmp_path, max_cpu_minutes=3.5 * PART_S / 60)
+    with listening(board):
+        result = train(recipe_path, given, material=material)
+        first = read_recipe(recipe_path).data.first_samples
+        assert (result.steps, len(lines)) == (0, 3)
+        assert set(lines) == {"preparing the first samples of tiny S"}
+        (line,) = [line for line in lines if "no step was trained" in line]
+        assert f"(3 of {first} samples) is kept" in line
+        assert f"about {(1 + first) * PART_S / 60:.1f} of 0.583333 CPU-minutes" in line
+        assert f"needs about {(1 + first - 3) * PART_S / 60:.1f} for them" in line
+        more = _options(tmp_path, max_cpu_minutes=60.0, overwrite=True, stop_at_step=1)
+        assert train(recipe_path, more, material=material).steps == 1
+    assert len(lines) == first, "those of the first run are kept"

@@ -1,7 +1,8 @@
 """Laws of photographs, held against cameras that break one of them each."""
 
+import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -108,7 +109,20 @@ def test_a_camera_that_gives_the_truth_keeps_every_law() -> None:
 def test_a_camera_that_breaks_a_law_is_told_by_it(network: Camera, law: str) -> None:
     found = _laws(network)[law]
     assert not found.is_kept
-    assert "BROKEN" in found.describe()
+    assert ": BROKEN (at most " in found.describe()
+
+
+def test_a_difference_from_the_front_end_says_so() -> None:
+    words = _laws(_losing_magenta)["flat"].describe()
+    assert re.match(
+        r"flat [\d.]+ % farther from the truth than the front end \([\d.]+ %\): BROKEN "
+        r"\(at most 1.00 %, ",
+        words,
+    )
+    worse = _laws(_blurred)["better"].describe()
+    assert re.match(r"better [\d.]+ dB below the front end: BROKEN \(at most ", worse)
+    gain = replace(_laws(_blurred)["better"], worst=-0.5).describe()
+    assert gain == "better 0.5 dB above the front end"
 
 
 def test_a_front_end_that_is_as_bad_excuses_a_network() -> None:

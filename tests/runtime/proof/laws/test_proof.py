@@ -36,14 +36,14 @@ def stated(tmp_path, monkeypatch):  # type: ignore[no-untyped-def]
 def test_a_law_that_is_broken_and_not_stated_fails(stated) -> None:  # type: ignore[no-untyped-def]
     layer = stated(None)
     assert layer.status == "fail"
-    assert "M: flat 5.00 % BROKEN (at most 1.00 %, front end 0.20 %, corner)" in layer.message
+    assert "M: flat 5.00 % (front end 0.20 %): BROKEN (at most 1.00 %, corner)" in layer.message
     assert [fact["kept"] for fact in layer.facts] == [True, False]
 
 
 def test_a_law_that_is_broken_as_stated_passes_and_says_so(stated) -> None:  # type: ignore[no-untyped-def]
     layer = stated({"M": {"flat": BAD.to_stated()}})
     assert layer.status == "pass"
-    assert "flat 5.00 % broken as stated" in layer.message
+    assert "flat 5.00 % (front end 0.20 %): broken as stated" in layer.message
 
 
 def test_a_law_that_is_broken_further_than_stated_fails(stated) -> None:  # type: ignore[no-untyped-def]
