@@ -305,7 +305,7 @@ def test_without_torch_a_door_of_design_time_says_how_to_get_it(
     name: str, call: Callable[[], object], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "torch", None)
-    with pytest.raises(camkit.UnsupportedError, match=rf"camkit\.{name} needs torch; install it"):
+    with pytest.raises(camkit.UnsupportedError, match=rf"camkit\.{name} needs torch; install with"):
         call()
 
 

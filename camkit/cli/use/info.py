@@ -45,9 +45,9 @@ def info(
     if file is None:
         raise ContractError("give a bundle, a PSF, a capture or a sidecar, or --schema")
 
-    from camkit.report.view.result_search import is_sidecar_name
+    from camkit.runtime.output.sidecar import SIDECAR_SUFFIX
 
-    if is_sidecar_name(Path(file)):
+    if file.endswith(SIDECAR_SUFFIX):
         _print_sidecar(Path(file), as_json=json_)
         return
     options = mosaic_options(mosaic, black_level, white_level)

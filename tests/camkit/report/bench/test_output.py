@@ -17,8 +17,7 @@ from camkit.report.bench.row import make_row
 from camkit.report.bench.run import Result
 from camkit.report.bench.shown.bench_page import bench_page
 from camkit.report.bench.shown.front_panel import plottable
-from camkit.report.figure import PNG_START
-from camkit.report.pages.page import to_html
+from camkit.report.pages.page import PNG_START, to_html
 from tests.bench_factory import make_facts, make_run, make_scores, make_trial
 
 NAMES = ("S", "M <b>", "wiener")
