@@ -212,12 +212,12 @@ def test_a_limit_ends_the_first_samples_and_the_run_says_what_it_needs(
     PARTS["opening the pool"](monkeypatch, clock.spend)
     _costs(SamplePool, "_make_missing")(monkeypatch, clock.spend)
     lines: list[str] = []
-    lines: list[str] = []
+    shown: list[str] = []
     board = Board(note=lines.append)
     make = SamplePool._make_missing
 
     def seen(pool: SamplePool) -> None:
-        lines.append(" ".join(task.what for task in board.tasks))
+        shown.append(" ".join(task.what for task in board.tasks))
         assert not any(task.writes_lines for task in board.tasks), "the display shows it"
         make(pool)
 
@@ -226,12 +226,12 @@ def test_a_limit_ends_the_first_samples_and_the_run_says_what_it_needs(
     with listening(board):
         result = train(recipe_path, given, material=material)
         first = read_recipe(recipe_path).data.first_samples
-        assert (result.steps, len(lines)) == (0, 3)
-        assert set(lines) == {"preparing the first samples of tiny S"}
+        assert (result.steps, len(shown)) == (0, 3)
+        assert set(shown) == {"preparing the first samples of tiny S"}
         (line,) = [line for line in lines if "no step was trained" in line]
         assert f"(3 of {first} samples) is kept" in line
         assert f"about {(1 + first) * PART_S / 60:.1f} of 0.583333 CPU-minutes" in line
         assert f"needs about {(1 + first - 3) * PART_S / 60:.1f} for them" in line
         more = _options(tmp_path, max_cpu_minutes=60.0, overwrite=True, stop_at_step=1)
         assert train(recipe_path, more, material=material).steps == 1
-    assert len(lines) == first, "those of the first run are kept"
+    assert len(shown) == first, "those of the first run are kept"
