@@ -17,11 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from camkit.arrays import FloatArray
 from camkit.colorimetry import D65, REC709_PRIMARIES, rgb_to_xyz
-from camkit.report.judge_need import require_judge
-
-require_judge()
-
-from skimage.metrics import structural_similarity  # noqa: E402
+from camkit.report.image_scores import structural_similarity
 
 BANDING_GLARE: Final = (
     *(0.353487901, 0.3734658629, 8.277049286e-05, 0.9062562627),

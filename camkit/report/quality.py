@@ -22,15 +22,11 @@ from camkit.bundle.golden import IMAGE
 from camkit.bundle.reader import Bundle
 from camkit.colorimetry import encode_srgb
 from camkit.errors import ContractError, DecodeError
-from camkit.report.judge_need import require_judge
+from camkit.report.image_scores import peak_signal_noise_ratio, structural_similarity
 from camkit.runtime.files.picture import read_light
 from camkit.runtime.geometry.sensor_window import centred_origin
 from camkit.runtime.twin.simulate import Simulation, SimulationOptions, simulate
 from camkit.runtime.twin.truth import light_sensor, picture_scale, true_picture
-
-require_judge()
-
-from skimage.metrics import peak_signal_noise_ratio, structural_similarity  # noqa: E402
 
 FIELD_SHARES: Final = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Places from centred on the axis to touching the sensor's corner, as shares of that way."""

@@ -8,11 +8,7 @@ from typing import Final
 import numpy as np
 
 from camkit.arrays import FloatArray
-from camkit.report.judge_need import require_judge
-
-require_judge()
-
-from skimage.metrics import structural_similarity  # noqa: E402
+from camkit.report.image_scores import structural_similarity
 
 MOST_DB: Final = 100.0
 SIGMA_PX: Final = 1.5
