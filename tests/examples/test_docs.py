@@ -14,6 +14,7 @@ import typer
 from rich.text import Text
 
 import camkit
+from camkit import errors
 from camkit.bundle.manifest import Manifest
 from camkit.cli.app import app
 from camkit.cli.exit_code import ExitCode
@@ -214,7 +215,11 @@ def test_the_page_of_errors_names_every_exit_code_error_and_limit() -> None:
     text = _reference("errors")
     codes = re.findall(r"^\| ([0-9]+) \|", text, re.MULTILINE)
     assert list(map(int, codes)) == [code.value for code in ExitCode]
-    tree = {kind.__name__ for kind in (CamkitError, *CamkitError.__subclasses__())}
+    kinds = {
+        name: kind for name in camkit.__all__ if isinstance(kind := getattr(camkit, name), type)
+    }
+    tree = {name for name, kind in kinds.items() if issubclass(kind, CamkitError)}
+    assert tree >= {name for name in vars(errors) if name.endswith("Error")}
     assert tree <= set(re.findall(r"`(?:camkit\.)?([A-Z][A-Za-z]+)`", text))
     limits = {v.variable for v in vars(machine_limits).values() if isinstance(v, Limit)}
     assert set(re.findall(r"`(CAMKIT_MAX_[A-Z_]+)`", text)) == limits
