@@ -18,7 +18,7 @@ SIDE_PX: Final = 200
 PLACES: Final = {"centre": (388, 266), "corner": (568, 312)}
 """(x, y) of the first pixel of a crop."""
 FORWARD: Final = ("blur", "setting")
-HEADS: Final = ("dB", "red", "green", "blue", "centre", "corner")
+HEADS: Final = ("dB", "centre", "corner")
 CAPTIONS: Final = {"untouched": "f/4", "wiener": "filter", "rl": "Richardson-Lucy"}
 DIFFERENCE_GAIN: Final = 4.0
 
@@ -27,23 +27,27 @@ COMMAND: Final = (
     "--crops CROPS"
 )
 INTRODUCTION: Final = (
-    "Canon RF 50 mm f/1.8 from its patent, and photographs of a poster through it by LinYark/Sdirt "
-    "(commit 5fa8ff5, MIT): 768x512 pixels of 46.875 um, halves of dual pixels averaged, read by "
-    "the curve that they measured. What it means, and pictures: [real-lens.md](../real-lens.md). "
-    "Data: [real-lens.json](real-lens.json). Machine: {machine}."
+    "A Canon RF 50 mm f/1.8, traced from its patent, predicts a photograph at f/4 from one at f/20 "
+    "and restores it. Ranges below are over what distances may count from, which one plane cannot "
+    "decide. Guide, with pictures: [real-lens.md](../guides/real-lens.md). Data, by colour "
+    "too: [real-lens.json](real-lens.json)."
+)
+HOW: Final = (
+    "Photographs of a poster by LinYark/Sdirt (commit 5fa8ff5, MIT): 768x512 pixels of 46.875 um, "
+    "halves of dual pixels averaged, read by their measured curve. Machine: {machine}."
 )
 FORWARD_TEXT: Final = (
-    "PSNR of codes, white at 1, of the f/4 picture predicted from the f/20 one. For every blur "
-    "alike a gain of each colour and its fall with r^2 are fitted on half of the blocks and judged "
-    "on the other half; {share:.0%} of the frame counts (no clipped sample near, no border). Sizes "
-    "of Gaussian and disc are fitted to the very picture; {lens}."
+    "PSNR of codes, white at 1, of the predicted f/4 picture. For every blur, each colour's gain "
+    "and its fall with r^2 are fitted on half of the blocks and judged on the other half. "
+    "{share:.0%} of the frame counts (no clipped sample near, no border). Sizes of Gaussian and "
+    "disc are fitted to this picture; {lens}."
 )
 OF_FIT: Final = "of the lens only the defocus is, where the sensor was moved"
 OF_HELD_OUT: Final = (
-    "nothing of the lens is: defocus and curve are those of 1.5 m, and this shot was judged once"
+    "of the lens nothing is: defocus and curve are those of 1.5 m, and this shot was judged once"
 )
 INVERSE_TEXT: Final = (
-    "PSNR of codes against the f/20 picture, judged likewise; cameras as `camkit make` has them "
+    "PSNR of codes against the f/20 picture, judged alike; cameras as `camkit make` leaves them "
     "after its filter."
 )
 
@@ -73,12 +77,8 @@ def page_text(record: Mapping[str, Any], names: Sequence[str]) -> str:
     held_out = " --held-out FOLDER" if len(names) > 1 else ""
     parts = [
         "# A real lens",
-        INTRODUCTION.format(machine=machine_text),
-        "    " + COMMAND.format(held_out=held_out),
-        "## The pair at 1.5 m",
-        f"> {facts['sentence']}",
-        "\n".join(f"- {note}" for note in facts["notes"]),
-        origins,
+        INTRODUCTION,
+        "\n".join(_summary(record[name], name) for name in names),
     ]
     for name in names:
         shot, is_fitted = record[name], name == names[0]
@@ -92,11 +92,42 @@ def page_text(record: Mapping[str, Any], names: Sequence[str]) -> str:
             INVERSE_TEXT,
             markdown_table(("restored by", *HEADS), map(_inverse_row, shot["inverse"])),
         ]
+    parts += [
+        "## The pair at 1.5 m",
+        f"> {facts['sentence']}",
+        origins,
+        "\n".join(f"- {note}" for note in facts["notes"]),
+        "## How",
+        "    " + COMMAND.format(held_out=held_out),
+        HOW.format(machine=machine_text),
+    ]
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
+def _summary(shot: Mapping[str, Any], name: str) -> str:
+    """Return the range of predictions and restorations of a shot as a line of a list."""
+    lens = [row for row in shot["forward"] if row["blur"].startswith("lens")]
+    simple = [row for row in shot["forward"] if row not in lens]
+    best = max(simple, key=_psnr)
+    restored = [row for row in shot["inverse"] if row["method"].startswith("rl, from")]
+    return (
+        f"- {name}: the lens predicts to {_range(lens)}, a fitted {best['blur']} to "
+        f"{_range([best])}; Richardson-Lucy restores {_range(shot['inverse'][:1])} to "
+        f"{_range(restored)}."
+    )
+
+
+def _range(rows: Sequence[Mapping[str, Any]]) -> str:
+    ends = dict.fromkeys(f"{end(map(_psnr, rows)):.2f}" for end in (min, max))
+    return " - ".join(ends) + " dB"
+
+
+def _psnr(row: Mapping[str, Any]) -> float:
+    return float(row["psnr_db"])
+
+
 def _numbers(row: Mapping[str, Any]) -> list[str]:
-    values = [row["psnr_db"], *row["colours_db"], row["centre_db"], row["corner_db"]]
+    values = [row["psnr_db"], row["centre_db"], row["corner_db"]]
     return ["-" if value is None else f"{value:.2f}" for value in values]
 
 
