@@ -40,11 +40,11 @@ FORWARD_TEXT: Final = (
     "PSNR of codes, white at 1, of the predicted f/4 picture. For every blur, each colour's gain "
     "and its fall with r^2 are fitted on half of the blocks and judged on the other half. "
     "{share:.0%} of the frame counts (no clipped sample near, no border). Sizes of Gaussian and "
-    "disc are fitted to this picture; {lens}."
+    "disc are fitted to this picture; of the lens only the defocus is, where the sensor was moved."
 )
-OF_FIT: Final = "of the lens only the defocus is, where the sensor was moved"
-OF_HELD_OUT: Final = (
-    "of the lens nothing is: defocus and curve are those of 1.5 m, and this shot was judged once"
+HELD_OUT_TEXT: Final = (
+    "Judged alike, and once; {share:.0%} of the frame counts. Gaussian and disc are fitted to this "
+    "picture; defocus and curve of the lens are those of 1.5 m."
 )
 INVERSE_TEXT: Final = (
     "PSNR of codes against the f/20 picture, judged alike; cameras as `camkit make` leaves them "
@@ -83,10 +83,10 @@ def page_text(record: Mapping[str, Any], names: Sequence[str]) -> str:
     for name in names:
         shot, is_fitted = record[name], name == names[0]
         title = name if is_fitted else f"{name}, held back"
-        lens = OF_FIT if is_fitted else OF_HELD_OUT
+        text = FORWARD_TEXT if is_fitted else HELD_OUT_TEXT
         parts += [
             f"## Forward, {title}",
-            FORWARD_TEXT.format(share=shot["share"], lens=lens),
+            text.format(share=shot["share"]),
             markdown_table((*FORWARD, *HEADS), map(_forward_row, shot["forward"])),
             f"## Inverse, {title}",
             INVERSE_TEXT,
