@@ -144,19 +144,24 @@ def warp_graph(facts: CameraFacts, *, limited: bool) -> GraphBuilder:
 def _limited(graph: GraphBuilder, planes: Value, at: Value, values: Value) -> Value:
     """Return values within the range of their samples, see `resampled_limited`.
 
-    Samples beyond the border repeat. Whether a rim is near is asked at a place moved into the box.
+    Samples beyond the border repeat; whether a rim is near is asked at a place moved into the box.
+    Where one is, the ends of the range are swapped, so that two planes tell all.
     """
     pads = np.array([0, 0, BORDER_PX, BORDER_PX] * 2, np.int64)
-    wide, whole = graph.node("Pad", planes, pads, mode="edge"), at.floor()
+    wide, whole = graph.node("Pad", planes, pads, mode="edge"), at.floor() + (BORDER_PX - 1.0)
     high, low = (graph.node("MaxPool", wide * sign, kernel_shape=[4, 4]) for sign in (1.0, -1.0))
     low = low * -1.0
     is_lit, is_dark = graph.node("Greater", high, WHITE), graph.node("LessOrEqual", low, WHITE)
     rim = graph.node("And", is_lit, is_dark).cast("float32")
     rim = rim.part(2, BORDER_PX - 1, -1).part(3, BORDER_PX - 1, -1)
-    is_rim = graph.node("Greater", _sampled(graph, rim, whole, "nearest"), 0.5)
-    whole = whole + (BORDER_PX - 1.0)
-    high, low = (_sampled(graph, pooled, whole, "nearest") for pooled in (high, low))
-    limited = graph.node("Or", is_rim, graph.node("Less", values, FLOOR))
+    pads = np.array([0, 0, BORDER_PX - 1, BORDER_PX - 1, 0, 0, 1, 1], np.int64)
+    is_rim = graph.node("Greater", graph.node("Pad", rim, pads, mode="edge"), 0.5)
+    begin, end = (
+        _sampled(graph, graph.node("Where", is_rim, *ends), whole, "nearest")
+        for ends in ((high, low), (low, high))
+    )
+    low, high = begin.at_most(end), begin.at_least(end)
+    limited = graph.node("Or", begin > end, graph.node("Less", values, FLOOR))
     return graph.node("Where", limited, values.at_least(low).at_most(high), values)
 
 
