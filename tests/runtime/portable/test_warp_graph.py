@@ -1,4 +1,4 @@
-"""The graphs of the warp limit what camkit limits, also where pixels come from beyond the border."""
+"""The warp as graphs limits what camkit limits, also where pixels come from beyond the border."""
 
 from functools import partial
 from types import SimpleNamespace
