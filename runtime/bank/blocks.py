@@ -193,7 +193,7 @@ def cut_block_px(block_px: int, overlap_px: int, size_px: tuple[int, int]) -> in
 
 def _rise(overlap_px: int) -> FloatArray:
     """Return a rise: zero over a quarter of the overlap, sin^2 over its half, then one."""
-    t = (np.arange(overlap_px) + 0.5 - overlap_px / 4) / max(overlap_px / 2, 1)
+    t = (np.arange(overlap_px) + 0.5 - overlap_px / 4) / max(overlap_px / 2, 0.5)
     return np.asarray(np.sin(np.pi / 2 * np.clip(t, 0, 1)) ** 2, dtype=np.float32)
 
 

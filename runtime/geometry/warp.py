@@ -266,12 +266,12 @@ def _warp_rows(
 def _source_spans(warp: Warp, tops: range, height: int) -> list[tuple[int, int]]:
     # Sources forget rows above the latest read, so no band may start above the one before it.
     spans: list[tuple[int, int]] = []
-    lowest = height - 1
+    lowest = max(height - LANCZOS_REACH_PX, 0)
     for top in reversed(tops):
         bottom = min(top + tops.step, height)
         y = np.stack([warp.lattice(c, top, bottom)[..., 1] for c in range(warp.channels)])
         first = int(np.floor(y.min())) - LANCZOS_REACH_PX
-        last = int(np.ceil(y.max())) + LANCZOS_REACH_PX + 1
+        last = int(np.ceil(max(y.max(), 0.0))) + LANCZOS_REACH_PX + 1
         lowest = min(lowest, max(first, 0))
         spans.append((lowest, min(max(last, lowest + 1), height)))
     return spans[::-1]

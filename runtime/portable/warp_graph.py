@@ -66,9 +66,13 @@ def places_graph(facts: CameraFacts) -> GraphBuilder:
     places = (dense * (PLACE_STEPS / NODE_STEPS) + 0.5).floor() * (1 / PLACE_STEPS)
     out = places.turned(0, 2, 3, 1).cast("float32")
     graph.output("places", out, (map_count(facts), TILE_PX, TILE_PX, 2))
+    # where all places lie beyond a border, its last samples stay within reach of the box
+    most_px, least_px = target * -1.0, middle * 2.0 - target
     for name, operator in (("least", "ReduceMin"), ("most", "ReduceMax")):
         edge = graph.node(operator, nodes, np.array([0, 2, 3], np.int64), keepdims=0)
-        graph.output(name, (edge * (1 / NODE_STEPS)).cast("float32"), (2,))
+        edge = edge * (1 / NODE_STEPS)
+        edge = edge.at_most(least_px) if name == "least" else edge.at_least(most_px)
+        graph.output(name, edge.cast("float32"), (2,))
     return graph
 
 
@@ -138,19 +142,26 @@ def warp_graph(facts: CameraFacts, *, limited: bool) -> GraphBuilder:
 
 
 def _limited(graph: GraphBuilder, planes: Value, at: Value, values: Value) -> Value:
-    """Return values within the range of their samples, see `resampled_limited`."""
+    """Return values within the range of their samples, see `resampled_limited`.
+
+    Samples beyond the border repeat; whether a rim is near is asked at a place moved into the box.
+    Where one is, the ends of the range are swapped, so that two planes tell all.
+    """
     pads = np.array([0, 0, BORDER_PX, BORDER_PX] * 2, np.int64)
-    wide = graph.node("Pad", planes, pads, mode="edge")
-    whole = at.floor() + (BORDER_PX - 1.0)
-
-    def most(samples: Value) -> Value:
-        pooled = graph.node("MaxPool", samples, kernel_shape=[4, 4])
-        return _sampled(graph, pooled, whole, "nearest")
-
-    high, low = most(wide), most(wide * -1.0) * -1.0
+    wide, whole = graph.node("Pad", planes, pads, mode="edge"), at.floor() + (BORDER_PX - 1.0)
+    high, low = (graph.node("MaxPool", wide * sign, kernel_shape=[4, 4]) for sign in (1.0, -1.0))
+    low = low * -1.0
     is_lit, is_dark = graph.node("Greater", high, WHITE), graph.node("LessOrEqual", low, WHITE)
-    rim = graph.node("And", is_lit, is_dark)
-    limited = graph.node("Or", rim, graph.node("Less", values, FLOOR))
+    rim = graph.node("And", is_lit, is_dark).cast("float32")
+    rim = rim.part(2, BORDER_PX - 1, -1).part(3, BORDER_PX - 1, -1)
+    pads = np.array([0, 0, BORDER_PX - 1, BORDER_PX - 1, 0, 0, 1, 1], np.int64)
+    is_rim = graph.node("Greater", graph.node("Pad", rim, pads, mode="edge"), 0.5)
+    begin, end = (
+        _sampled(graph, graph.node("Where", is_rim, *ends), whole, "nearest")
+        for ends in ((high, low), (low, high))
+    )
+    low, high = begin.at_most(end), begin.at_least(end)
+    limited = graph.node("Or", begin > end, graph.node("Less", values, FLOOR))
     return graph.node("Where", limited, values.at_least(low).at_most(high), values)
 
 

@@ -42,7 +42,7 @@ def keep(block):
     return block.samples
 
 
-@given(SIZES, st.sampled_from([(16, 0), (16, 8), (32, 10), (64, 20)]))
+@given(SIZES, st.sampled_from([(16, 0), (16, 1), (16, 3), (16, 8), (32, 10), (64, 20)]))
 @settings(deadline=None, max_examples=60)
 def test_windows_sum_to_one_and_only_neighbours_overlap(size_px, layout):
     total = np.zeros(size_px)

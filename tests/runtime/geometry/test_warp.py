@@ -114,6 +114,27 @@ def test_pixels_do_not_depend_on_the_bands(
     np.testing.assert_array_equal(undistort(picture, model, place, band_rows), whole)
 
 
+@pytest.mark.parametrize("interpolation", ["cubic", "lanczos"])
+def test_rims_beyond_the_border_do_not_depend_on_the_bands(interpolation: Interpolation) -> None:
+    """Magnified: bands of 8 rows at both ends come from beyond the picture alone."""
+    model, place = distortion((1.0937, 0, 0, 0)), window((16, 640), (700, 200))
+    picture = np.random.default_rng(6).uniform(1.1, 1.9, (3, 640, 16)).astype(np.float32)
+    picture[:, 1:-1] -= 1
+
+    def limited(band_rows: int) -> FloatArray:
+        bands = undistort_bands(
+            ArrayRows(picture),
+            model,
+            place,
+            band_rows=band_rows,
+            interpolation=interpolation,
+            overshoot="limited",
+        )
+        return np.concatenate(list(bands), axis=1)
+
+    np.testing.assert_allclose(limited(8), limited(640), atol=1e-6)
+
+
 def test_map_follows_the_model_between_its_nodes() -> None:
     warp = Warp(BARREL, window(), to_sensor=False)
     whole, fraction = warp.maps(1, 512, 576)
