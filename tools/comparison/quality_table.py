@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from tools.comparison.measurement import Measurement
-from tools.comparison.names import CLASSICAL, title_of
+from tools.comparison.names import CLASSICAL, EARLIER, title_of
 from tools.comparison.paired import best_classical, paired_gains, pairs_of, to_lines
 from tools.tables.records import markdown_table
 
@@ -125,17 +125,18 @@ def to_markdown(report: Mapping[str, Any]) -> str:
     """
     lines = [f"# Quality of `{report['bundle']['name']}`", "", _best_line(report), ""]
     methods = list(report["methods"])
+    current = [name for name in methods if not name.endswith(EARLIER)]
     for psf, summary in report["summary"].items():
         lines += [f"## Captures through {PSF_TITLES[psf]}", ""]
         lines += _table(summary["by_iso"], summary["overall"], methods)
         lines += to_lines(summary["gains"])
-        lines += _copy_lines(summary["by_copy"], report.get("copies", {}), methods)
+        lines += _copy_lines(summary["by_copy"], report.get("copies", {}), current)
         lines += ["### By picture set", ""]
-        lines += _groups(summary["by_set"], methods, "set")
+        lines += _groups(summary["by_set"], current, "set")
         lines += ["### By field position", ""]
         heights = summary["height_mm"]
         places = {f"{p} ({heights[p]:.1f} mm)": v for p, v in summary["by_position"].items()}
-        lines += _groups(places, methods, "position (mean distance from the axis)")
+        lines += _groups(places, current, "position (mean distance from the axis)")
     return "\n".join([*lines, *_protocol_lines(report)]) + "\n"
 
 
