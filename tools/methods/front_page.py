@@ -42,7 +42,7 @@ HOW: Final = (
         "- **Captures**: {pictures} pictures, at {places} of the way to the corner, ISO {isos}, "
         "each through one of eight fabricated lenses, traced afresh; methods know the kernels of "
         "the design only. PSNR on sRGB values as in [quality.md](quality.md). Errors are those of "
-        "a mean over pictures."
+        "a mean over pictures. The JSON of the same name has the gains by ISO."
     ),
     (
         "- **Classical methods** are tuned on pictures of `valid_open`, at ISO 400 half-way "
@@ -62,6 +62,15 @@ DEVELOPED: Final = (
     "from those of starting. Tone and colours differ by program, so no decibels are compared."
 )
 """Text above the table of developers."""
+HEADS: Final = (
+    "method",
+    "PSNR, dB",
+    "over S, paired",
+    "CPU-s/MP",
+    "runs in",
+    "steps",
+    "parameters",
+)
 SHARES: Final = ("0", "0.25", "0.5", "0.75", "1")
 
 
@@ -71,12 +80,8 @@ def to_page(record: Mapping[str, Any]) -> str:
     isos = ", ".join(f"{iso:g}" for iso in record["isos"])
     facts = {"minutes": record["minutes"], "pictures": record["pictures"]}
     how = [line.format(**facts, places=places, isos=isos) for line in HOW]
-    heads = [
-        *("method", "PSNR, dB", "over S, paired", "CPU-s/MP", "runs in", "steps", "parameters"),
-        *(f"over S, ISO {iso:g}" for iso in record["isos"]),
-    ]
     rows = sorted(record["rows"], key=lambda row: row["cpu_s_per_mp"])
-    table = markdown_table(heads, [_cells(row, record) for row in rows])
+    table = markdown_table(HEADS, [_cells(row) for row in rows])
     left_out = [f"- {name}: {reason}" for name, reason in record["left_out"].items()]
     left_out += [""] if left_out else []
     machine = f"Timed and trained on {record['machine']}."
@@ -104,10 +109,9 @@ def _developers(developers: Sequence[Mapping[str, Any]]) -> str:
     return markdown_table(["program", "version", "CPU-s/MP", "CPU-s to start"], rows)
 
 
-def _cells(row: Mapping[str, Any], record: Mapping[str, Any]) -> list[str]:
+def _cells(row: Mapping[str, Any]) -> list[str]:
     training = row["training"] or {}
     against_s = row["over_s"]
-    gains = {} if against_s is None else against_s["by_iso"]
     return [
         row["title"],
         f"{row['psnr_db']:.2f}",
@@ -116,7 +120,6 @@ def _cells(row: Mapping[str, Any], record: Mapping[str, Any]) -> list[str]:
         row["runs_in"],
         str(training.get("steps", "")),
         str(training.get("parameters", "")),
-        *(_gain(gains[f"{iso:g}"]) if f"{iso:g}" in gains else "" for iso in record["isos"]),
     ]
 
 
