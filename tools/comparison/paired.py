@@ -93,7 +93,8 @@ def _aim_cell(gain: Mapping[str, Any]) -> str:
     aim = gain["aim_db"]
     if aim is None:
         return ""
-    return f"{aim:+.1f}: {'reached' if gain['all']['db'] >= aim else 'missed'}"
+    gap_db = aim - gain["all"]["db"]
+    return f"{aim:+.1f}: {'reached' if gap_db <= 0 else f'{gap_db:.2f} below'}"
 
 
 def _aim(method: str, reference: str) -> float | None:

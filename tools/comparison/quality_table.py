@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from tools.comparison.measurement import Measurement
-from tools.comparison.names import CLASSICAL, title_of
+from tools.comparison.names import CLASSICAL, EARLIER, title_of
 from tools.comparison.paired import best_classical, paired_gains, pairs_of, to_lines
 from tools.tables.records import markdown_table
 
@@ -118,25 +118,37 @@ def seconds_per_megapixel(measurements: Iterable[Measurement]) -> dict[str, floa
 
 
 def to_markdown(report: Mapping[str, Any]) -> str:
-    """Write the page: how it was measured, then the tables.
+    """Write the page: the best method, the tables, then how it was measured.
 
     Args:
         report: The mapping of the JSON file.
     """
-    lines = ["# Quality", "", *_protocol_lines(report), ""]
+    lines = [f"# Quality of `{report['bundle']['name']}`", "", _best_line(report), ""]
     methods = list(report["methods"])
+    current = [name for name in methods if not name.endswith(EARLIER)]
     for psf, summary in report["summary"].items():
         lines += [f"## Captures through {PSF_TITLES[psf]}", ""]
         lines += _table(summary["by_iso"], summary["overall"], methods)
         lines += to_lines(summary["gains"])
-        lines += _copy_lines(summary["by_copy"], report.get("copies", {}), methods)
+        lines += _copy_lines(summary["by_copy"], report.get("copies", {}), current)
         lines += ["### By picture set", ""]
-        lines += _groups(summary["by_set"], methods, "set")
+        lines += _groups(summary["by_set"], current, "set")
         lines += ["### By field position", ""]
         heights = summary["height_mm"]
         places = {f"{p} ({heights[p]:.1f} mm)": v for p, v in summary["by_position"].items()}
-        lines += _groups(places, methods, "position (mean distance from the axis)")
-    return "\n".join(lines).rstrip() + "\n"
+        lines += _groups(places, current, "position (mean distance from the axis)")
+    return "\n".join([*lines, *_protocol_lines(report)]) + "\n"
+
+
+def _best_line(report: Mapping[str, Any]) -> str:
+    """Return the best method and the input over all captures, as a sentence."""
+    overall = next(iter(report["summary"].values()))["overall"]
+    best = max(overall, key=lambda name: overall[name]["psnr_db"])
+    developed = f"; {title_of('input')}: {_cell(overall['input'])}" if "input" in overall else ""
+    return (
+        f"Best in PSNR over {overall[best]['n']} captures: {title_of(best)}, {_cell(overall[best])}"
+        f"{developed} (PSNR in dB / SSIM). Every measurement is in `{report['json_name']}`."
+    )
 
 
 def _plain(mean_of: Mapping[str, Mean]) -> dict[str, Any]:
@@ -168,9 +180,10 @@ def _protocol_lines(report: Mapping[str, Any]) -> list[str]:
         for peer, by_iso in report["tuned"]["values"].items()
     )
     return [
+        "## How it was measured",
+        "",
         f"Written by {', then '.join(f'`{command}`' for command in report['commands'])} on "
-        f"{machine['cpu']} with {machine['cores']} cores; "
-        f"every single measurement stands in `{report['json_name']}`.",
+        f"{machine['cpu']} with {machine['cores']} cores.",
         "",
         *(f"- {line}" for line in protocol["text"]),
         f"- Parameters of the classical methods, tuned on `{report['tuned']['data']}`: {tuned}.",

@@ -5,58 +5,72 @@ from typing import Any, Final
 
 from tools.tables.records import markdown_table
 
-TITLE: Final = "# The front of methods"
+TITLE: Final = "# Modern methods beside camkit's"
+INTRO: Final = (
+    "Decibels against CPU-seconds of methods that were trained from scratch for the same "
+    "{minutes:g} CPU-minutes on the same samples, and judged on the same captures of `duet`."
+)
 HOW: Final = (
-    (
-        "Modern methods beside camkit's: trained from scratch for the same CPU-minutes on the "
-        "same samples, judged on the same captures, timed beside each other. Written by `python "
-        "-m tools.methods judge`; `python -m tools.methods chart` draws it."
-    ),
+    "Written by `python -m tools.methods judge`; `python -m tools.methods chart` draws it.",
     (
         "- **Samples** are those of `models_def/recipes/duet.toml`, made once by the maker of "
-        "`camkit train` and kept; every method draws its patches from them (networks that know "
-        "the blur draw blocks with their surroundings and the kernels of their place)."
+        "`camkit train`. Networks that know the blur draw blocks with their surroundings and the "
+        "kernels of their place."
     ),
     (
-        "- **Training**: {minutes:g} CPU-minutes each on one thread, without the samples; the "
-        "loss that the recipe has for M, AdamW, a rate that falls with the share of the minutes "
-        "spent, averaged weights, nothing chosen by validation. Behind the bank the loss is that "
-        "of what the bound on light leaves, as in `camkit train`."
+        "- **Training**: one thread, without the time of the samples; the recipe's loss for M, "
+        "AdamW, a rate that falls with the share of the minutes spent, averaged weights, nothing "
+        "chosen by validation. Behind the bank the loss is taken after the bound on light, as in "
+        "`camkit train`."
     ),
     (
-        "- **Methods**: S and M as in the recipe. NAFNet of width 16 with one block a scale (20.3 "
-        "kMAC/px; the published depth takes three times as much), behind the bank and on the "
-        "capture alone; it learns on patches and sees whole pictures here. The U-Net on the "
-        "capture is M with three planes. *Feature Wiener* deconvolves eight learned linear "
-        "features of every colour with the kernels of the place, each with its own ratio of noise "
-        "to signal, and refines them by a U-Net of the size of S. *HQS* alternates three "
-        "closed-form steps with three such U-Nets. *Two stages* are S at half size, one closed- "
-        "form step behind it, and S again. XS has half the work of S (2.4 kMAC/px); taught, it is "
-        "fitted to what M makes as much as to the truth."
+        "- **S and M** are those of the recipe; as shipped, they were trained longer. XS has half "
+        "the work of S (2.4 kMAC/px); taught, it is fitted to M's result as much as to the truth. "
+        "The U-Net on the capture is M with three planes."
+    ),
+    (
+        "- **NAFNet** has width 16 and one block a scale (20.3 kMAC/px; the published depth takes "
+        "three times as much). It learns on patches and restores whole pictures."
+    ),
+    (
+        "- **Feature Wiener** deconvolves eight learned linear features of every colour with the "
+        "kernels of the place, each with its own ratio of noise to signal, and refines them by a "
+        "U-Net of the size of S. **HQS** alternates three closed-form steps with three such "
+        "U-Nets. **Two stages** are S at half size, one closed-form step, and S again."
     ),
     (
         "- **Captures**: {pictures} pictures, at {places} of the way to the corner, ISO {isos}, "
-        "each through one of eight fabricated copies of the lens, traced afresh; methods know the "
-        "kernels of the design only. PSNR on sRGB values as in [quality.md](quality.md). The "
-        "parameters of the classical methods are tuned on pictures of `valid_open`, at ISO 400 "
-        "they lie half-way (deepinv: two numbers for all ISOs, by 3 x 3 tries on one of them); "
-        "where these are the pictures judged on, that is in their favour."
+        "each through one of eight fabricated lenses, traced afresh; methods know the kernels of "
+        "the design only. PSNR on sRGB values as in [quality.md](quality.md). Errors are those of "
+        "a mean over pictures. The JSON of the same name has the gains by ISO."
     ),
     (
-        "- **CPU-seconds** a megapixel, one thread, from developed to restored planes (the bank "
-        "included; development and colours, the same for all, are not): medians of rounds in "
-        "which the rows take turns. Networks run in onnxruntime where they export, else in torch, "
-        "as the table says."
+        "- **Classical methods** are tuned on pictures of `valid_open`, at ISO 400 half-way "
+        "(deepinv: two numbers for all ISOs, by 3 x 3 tries on one picture). Where these are the "
+        "pictures judged on, that favours them."
     ),
-    ("- An error is that of a mean over pictures."),
+    (
+        "- **CPU-seconds** a megapixel on one thread, from developed to restored planes with the "
+        "bank, without development and colours (the same for all): medians of rounds in which the "
+        "rows take turns. Networks run in onnxruntime if they export, else in torch."
+    ),
 )
-"""Text above the table."""
+"""Text below the table."""
 DEVELOPED: Final = (
-    "Programs that develop alone, whole commands on one thread, a DNG of the camera to a 16-bit "
-    "TIFF, medians of rounds in turn. Two sizes tell the CPU-seconds of a megapixel from those of "
-    "starting. Tone and colours are each program's own, so no decibels are compared."
+    "Programs that only develop: whole commands on one thread, a DNG of the camera to a 16-bit "
+    "TIFF, medians of rounds in turn. Two picture sizes separate the CPU-seconds of a megapixel "
+    "from those of starting. Tone and colours differ by program, so no decibels are compared."
 )
 """Text above the table of developers."""
+HEADS: Final = (
+    "method",
+    "PSNR, dB",
+    "over S, paired",
+    "CPU-s/MP",
+    "runs in",
+    "steps",
+    "parameters",
+)
 SHARES: Final = ("0", "0.25", "0.5", "0.75", "1")
 
 
@@ -65,17 +79,26 @@ def to_page(record: Mapping[str, Any]) -> str:
     places = ", ".join(SHARES[position] for position in record["positions"])
     isos = ", ".join(f"{iso:g}" for iso in record["isos"])
     facts = {"minutes": record["minutes"], "pictures": record["pictures"]}
-    intro, *how = (line.format(**facts, places=places, isos=isos) for line in HOW)
-    heads = [
-        *("method", "PSNR, dB", "over S, paired", "CPU-s/MP", "runs in", "steps", "parameters"),
-        *(f"over S, ISO {iso:g}" for iso in record["isos"]),
-    ]
+    how = [line.format(**facts, places=places, isos=isos) for line in HOW]
     rows = sorted(record["rows"], key=lambda row: row["cpu_s_per_mp"])
-    table = markdown_table(heads, [_cells(row, record) for row in rows])
+    table = markdown_table(HEADS, [_cells(row) for row in rows])
     left_out = [f"- {name}: {reason}" for name, reason in record["left_out"].items()]
+    left_out += [""] if left_out else []
     machine = f"Timed and trained on {record['machine']}."
-    text = [TITLE, "", intro, "", *how, "", machine, "", table, "", DEVELOPED, ""]
-    return "\n".join([*text, _developers(record["developers"]), "", *left_out, ""])
+    intro = f"{INTRO.format(**facts)} {_summary(record['rows'])}"
+    developed = [DEVELOPED, "", _developers(record["developers"])]
+    measured = ["## How it was measured", "", f"{how[0]} {machine}", "", *how[1:]]
+    return "\n".join([TITLE, "", intro, "", table, "", *developed, "", *left_out, *measured, ""])
+
+
+def _summary(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return the best and the lowest row in two sentences."""
+    best = max(rows, key=lambda row: row["psnr_db"])
+    lowest = min(rows, key=lambda row: row["psnr_db"])
+    return (
+        f"Best: {best['title']}, {best['psnr_db']:.2f} dB in {best['cpu_s_per_mp']:.2f} CPU-s a "
+        f"megapixel. Lowest: {lowest['title']}, {lowest['psnr_db']:.2f} dB."
+    )
 
 
 def _developers(developers: Sequence[Mapping[str, Any]]) -> str:
@@ -86,10 +109,9 @@ def _developers(developers: Sequence[Mapping[str, Any]]) -> str:
     return markdown_table(["program", "version", "CPU-s/MP", "CPU-s to start"], rows)
 
 
-def _cells(row: Mapping[str, Any], record: Mapping[str, Any]) -> list[str]:
+def _cells(row: Mapping[str, Any]) -> list[str]:
     training = row["training"] or {}
     against_s = row["over_s"]
-    gains = {} if against_s is None else against_s["by_iso"]
     return [
         row["title"],
         f"{row['psnr_db']:.2f}",
@@ -98,7 +120,6 @@ def _cells(row: Mapping[str, Any], record: Mapping[str, Any]) -> list[str]:
         row["runs_in"],
         str(training.get("steps", "")),
         str(training.get("parameters", "")),
-        *(_gain(gains[f"{iso:g}"]) if f"{iso:g}" in gains else "" for iso in record["isos"]),
     ]
 
 
