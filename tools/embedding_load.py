@@ -33,7 +33,7 @@ from typing import Any, Final
 
 import camkit
 from camkit.report.bench.machine import describe_machine
-from camkit.report.bench.timed.process_run import child_environment
+from camkit.runtime.files.decoder import camkit_environment
 from tools.memory import process_tree, pss_mb
 
 EXAMPLE: Final = Path(__file__).resolve().parents[1] / "examples" / "fastapi"
@@ -236,7 +236,7 @@ def serve(bundle: str, temporary: Path) -> Iterator[tuple[subprocess.Popen[bytes
         probe.bind(("127.0.0.1", 0))
         port = int(probe.getsockname()[1])
     words = ["--app-dir", str(EXAMPLE), "app:app", "--port", str(port), "--log-level", "warning"]
-    environment = child_environment() | {"CAMERA": bundle, "TMPDIR": str(temporary)}
+    environment = camkit_environment() | {"CAMERA": bundle, "TMPDIR": str(temporary)}
     with subprocess.Popen([sys.executable, "-m", "uvicorn", *words], env=environment) as process:
         try:
             wait_until_ready(process, port)
