@@ -26,7 +26,7 @@ from camkit.runtime.output.claim import claimed
 PROCESS: Final = "from camkit.runtime.batch.pool_worker import main; main()"
 TRIES: Final = 2
 STOPPED: Final = "stopped on request"
-GONE: Final = (EOFError, OSError, ValueError, pickle.UnpicklingError)
+PIPE_ERRORS: Final = (EOFError, OSError, ValueError, pickle.UnpicklingError)
 """Errors of the pipes of a process that has ended."""
 
 
@@ -58,7 +58,7 @@ class Job:
             return True
 
     def finish(self, answer: FileResult | Exception) -> None:
-        """Resolve the future, unless its caller has cancelled it."""
+        """End the future, unless its caller has cancelled it."""
         answer = self.error or answer
         if not self.future.set_running_or_notify_cancel():
             return
@@ -76,7 +76,7 @@ class WorkerProcess:
         self.child = self._start()
 
     def check_ready(self) -> None:
-        """Wait until the camera is loaded.
+        """Check that the camera is loaded.
 
         Raises:
             BundleError: If it is refused; any other error of `camkit.load` likewise.
@@ -84,7 +84,7 @@ class WorkerProcess:
         """
         try:
             answer = pickle.load(cast("IO[bytes]", self.child.stdout))
-        except GONE:
+        except PIPE_ERRORS:
             raise WorkerError(f"a worker {self.end()} while it loaded the camera") from None
         if isinstance(answer, Exception):
             raise answer
@@ -108,7 +108,7 @@ class WorkerProcess:
                     answer := pickle.load(cast("IO[bytes]", self.child.stdout)), tuple
                 ):
                     job.tell(*answer)
-            except GONE:
+            except PIPE_ERRORS:
                 how = self.end()
             else:
                 return answer
@@ -129,7 +129,7 @@ class WorkerProcess:
 
     def end(self) -> str:
         """End the process, and return how it ended."""
-        with contextlib.suppress(*GONE):
+        with contextlib.suppress(*PIPE_ERRORS):
             self.send(None)
         try:
             code = self.child.wait(GRACE_S)
@@ -148,7 +148,7 @@ class WorkerProcess:
             env=camkit_environment(),
             process_group=0,  # an interrupt is for the parent, which then ends the child
         )
-        with contextlib.suppress(*GONE):  # whoever waits for it hears of that
+        with contextlib.suppress(*PIPE_ERRORS):  # whoever waits for it hears of that
             _send(self._setup, child)
         return child
 

@@ -17,7 +17,7 @@ from camkit.bundle.reader import find_bundle
 from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.field_types import check_value
-from camkit.runtime.batch.pool_process import GONE, STOPPED, Job, WorkerProcess
+from camkit.runtime.batch.pool_process import PIPE_ERRORS, STOPPED, Job, WorkerProcess
 from camkit.runtime.batch.pool_worker import GRACE_S, STOP, Order
 from camkit.runtime.batch.tasks import NO_BUNDLE
 from camkit.runtime.cancel import POLL_S, Cancel, Cancelled
@@ -205,7 +205,7 @@ class WorkerPool:
             if is_waiting:
                 del self._jobs[job]
             elif worker is not None:
-                with contextlib.suppress(*GONE):
+                with contextlib.suppress(*PIPE_ERRORS):
                     worker.send(STOP)  # again and again: a process may have just begun
         if is_waiting:
             job.finish(Cancelled(STOPPED))
