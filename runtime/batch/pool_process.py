@@ -26,6 +26,7 @@ from camkit.runtime.output.claim import claimed
 PROCESS: Final = "from camkit.runtime.batch.pool_worker import main; main()"
 TRIES: Final = 2
 STOPPED: Final = "stopped on request"
+Answer = FileResult | Exception | tuple[int, int]
 PIPE_ERRORS: Final = (EOFError, OSError, ValueError, pickle.UnpicklingError)
 """Errors of the pipes of a process that has ended."""
 
@@ -83,7 +84,7 @@ class WorkerProcess:
             WorkerError: If the process ended.
         """
         try:
-            answer = pickle.load(cast("IO[bytes]", self.child.stdout))
+            answer = self._receive()
         except PIPE_ERRORS:
             raise WorkerError(f"a worker {self.end()} while it loaded the camera") from None
         if isinstance(answer, Exception):
@@ -104,9 +105,7 @@ class WorkerProcess:
                 self.check_ready()
             try:
                 self.send(job.order)
-                while isinstance(
-                    answer := pickle.load(cast("IO[bytes]", self.child.stdout)), tuple
-                ):
+                while isinstance(answer := self._receive(), tuple):
                     job.tell(*answer)
             except PIPE_ERRORS:
                 how = self.end()
@@ -139,6 +138,9 @@ class WorkerProcess:
         with contextlib.suppress(OSError), self.child:
             pass  # closes the pipes
         return f"ended with signal {-code}" if code < 0 else f"ended with exit code {code}"
+
+    def _receive(self) -> Answer:
+        return cast("Answer", pickle.load(cast("IO[bytes]", self.child.stdout)))
 
     def _start(self) -> subprocess.Popen[bytes]:
         child = subprocess.Popen(
