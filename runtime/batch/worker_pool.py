@@ -4,6 +4,7 @@ submit -> captures that wait -> thread of a worker -> its process (`pool_process
              one thread more asks ten times a second which of them shall end
 """
 
+import atexit
 import contextlib
 import queue
 import threading
@@ -86,6 +87,7 @@ class WorkerPool:
         self._watcher = threading.Thread(target=self._watch, name="camkit-pool", daemon=True)
         for thread in (*self._threads, self._watcher):
             thread.start()
+        atexit.register(self.close, cancel=True)
 
     def submit(
         self,
@@ -161,6 +163,7 @@ class WorkerPool:
             thread.join()
         self._has_ended.set()
         self._watcher.join()
+        atexit.unregister(self.close)
 
     def __enter__(self) -> Self:
         return self
