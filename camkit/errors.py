@@ -77,7 +77,8 @@ class UnsupportedError(CamkitError):
 class WorkerError(CamkitError):
     """A worker process of a pool failed: it ended, and so did the one that tried once more.
 
-    The system may lack memory, or a library crash over the capture.
+    The system may lack memory, or a library may crash over the capture. Also raised if a process
+    runs out of memory by itself, or over a fault of camkit.
     """
 
 
