@@ -4,6 +4,7 @@ The public face, free of torch and loaded only when touched:
 
     camkit.load(bundle)            a live Pipeline from a bundle's name or path
     camkit.process(files, ...)     captures in, pictures and sidecars out
+    camkit.WorkerPool(bundle, ...) processes with a camera loaded, for services
     camkit.view(results, ...)      results on one page, to look at
     camkit.simulate(scene, ...)    a sharp scene to a capture of a camera
     camkit.portable(bundle, ...)   a camera as graphs for programs without camkit
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
         MemoryCapError,
         ParityError,
         UnsupportedError,
+        WorkerError,
     )
     from camkit.models_def.face.network_training import train
     from camkit.models_def.face.optics_freezing import freeze
@@ -42,6 +44,7 @@ if TYPE_CHECKING:
     from camkit.report.making.camera_making import make
     from camkit.report.view.page_making import ViewPage, view
     from camkit.runtime.batch import process
+    from camkit.runtime.batch.worker_pool import WorkerPool
     from camkit.runtime.cancel import Cancelled
     from camkit.runtime.capture import MosaicOptions
     from camkit.runtime.development import FileResult
@@ -63,6 +66,8 @@ __all__ = [
     "Pipeline",
     "UnsupportedError",
     "ViewPage",
+    "WorkerError",
+    "WorkerPool",
     "__version__",
     "calibrate",
     "export",
@@ -83,6 +88,7 @@ _HOMES = {
     "load": "camkit.runtime.pipeline",
     "Pipeline": "camkit.runtime.pipeline",
     "process": "camkit.runtime.batch",
+    "WorkerPool": "camkit.runtime.batch.worker_pool",
     "FileResult": "camkit.runtime.development",
     "Cancelled": "camkit.runtime.cancel",
     "MosaicOptions": "camkit.runtime.capture",

@@ -6,6 +6,7 @@
     |-- DecodeError                       a capture or picture cannot be read
     |-- BundleError                       a bundle was refused
     |-- UnsupportedError                  understood, but not offered here
+    |-- WorkerError                       a worker process ended, and so did its substitute
     `-- ParityError                       two computations that must agree do not
 
 A message says what was expected, what came, and what to do.
@@ -71,6 +72,14 @@ class BundleError(CamkitError):
 
 class UnsupportedError(CamkitError):
     """The request is understood but not offered here (missing extra, unknown variant)."""
+
+
+class WorkerError(CamkitError):
+    """A worker process of a pool failed: it ended, and so did the one that tried once more.
+
+    The system may lack memory, or a library may crash over the capture. Also raised if a process
+    runs out of memory by itself, or over a fault of camkit.
+    """
 
 
 class ParityError(CamkitError):

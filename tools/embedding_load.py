@@ -33,9 +33,12 @@ from typing import Any, Final
 
 import camkit
 from camkit.report.bench.machine import describe_machine
-from camkit.report.bench.timed.process_run import child_environment
+from camkit.runtime.batch.pool_process import PROCESS
+from camkit.runtime.files.decoder import camkit_environment
 from tools.memory import process_tree, pss_mb
 
+BUNDLE: Final = "duet"
+"""The camera of the example."""
 EXAMPLE: Final = Path(__file__).resolve().parents[1] / "examples" / "fastapi"
 SMALL_PX, LARGE_PX = (480, 320), (1500, 1000)
 """Of the captures; one in twenty is large."""
@@ -119,7 +122,6 @@ class WorkerWatch:
 def main(words: Sequence[str] | None = None) -> None:
     """Run the load, print the record, and end with 1 if anything was lost."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--bundle", default="duet")
     parser.add_argument("--requests", type=int, default=200)
     parser.add_argument("--at-once", type=int, default=8)
     parser.add_argument("--seed", type=int, default=7)
@@ -130,12 +132,12 @@ def main(words: Sequence[str] | None = None) -> None:
         temporary = Path(folder) / "temporary"
         temporary.mkdir()
         before_s = children_cpu_s()
-        with serve(arguments.bundle, temporary) as (process, port):
+        with serve(temporary) as (process, port):
             record = load(process, port, uploads, arguments.at_once)
         record["service_cpu_seconds"] = round(children_cpu_s() - before_s, 1)
         record["files_left"] = sorted(path.name for path in temporary.iterdir())
     command = f"python -m tools.embedding_load --requests {arguments.requests}"
-    record |= {"command": f"{command} --at-once {arguments.at_once}", "bundle": arguments.bundle}
+    record |= {"command": f"{command} --at-once {arguments.at_once}", "bundle": BUNDLE}
     record["machine"] = describe_machine()
     text = json.dumps(record, indent=1)
     print(text)
@@ -154,7 +156,7 @@ def children_cpu_s() -> float:
 def plan_uploads(arguments: argparse.Namespace, folder: Path) -> list[Upload]:
     """Return what clients send, in random order."""
     rng = random.Random(arguments.seed)
-    small, large = (capture(arguments.bundle, px, folder) for px in (SMALL_PX, LARGE_PX))
+    small, large = (capture(px, folder) for px in (SMALL_PX, LARGE_PX))
     bad = itertools.cycle(damaged(small.data, rng))
     shares = itertools.cycle((0.5, 1.0))
     uploads = []
@@ -170,13 +172,13 @@ def plan_uploads(arguments: argparse.Namespace, folder: Path) -> list[Upload]:
     return uploads
 
 
-def capture(bundle: str, size_px: tuple[int, int], folder: Path) -> Upload:
+def capture(size_px: tuple[int, int], folder: Path) -> Upload:
     """Return a simulated capture with the picture that camkit makes of it in this process."""
     name = f"{size_px[0]}x{size_px[1]}.dng"
     path = folder / name
-    camkit.simulate("procedural:7", bundle, path, size_px=size_px, iso=200)
+    camkit.simulate("procedural:7", BUNDLE, path, size_px=size_px, iso=200)
     (result,) = camkit.process(
-        path, bundle=bundle, size="S", format="jpeg", out_dir=folder / "made"
+        path, bundle=BUNDLE, size="S", format="jpeg", out_dir=folder / "made"
     )
     if result.output is None:
         raise SystemExit(f"{name}: {result.error}")
@@ -226,7 +228,7 @@ def damaged(data: bytes, rng: random.Random) -> list[Upload]:
 
 
 @contextmanager
-def serve(bundle: str, temporary: Path) -> Iterator[tuple[subprocess.Popen[bytes], int]]:
+def serve(temporary: Path) -> Iterator[tuple[subprocess.Popen[bytes], int]]:
     """Start the example, and end it behind the block.
 
     Raises:
@@ -236,7 +238,7 @@ def serve(bundle: str, temporary: Path) -> Iterator[tuple[subprocess.Popen[bytes
         probe.bind(("127.0.0.1", 0))
         port = int(probe.getsockname()[1])
     words = ["--app-dir", str(EXAMPLE), "app:app", "--port", str(port), "--log-level", "warning"]
-    environment = child_environment() | {"CAMERA": bundle, "TMPDIR": str(temporary)}
+    environment = camkit_environment() | {"TMPDIR": str(temporary)}
     with subprocess.Popen([sys.executable, "-m", "uvicorn", *words], env=environment) as process:
         try:
             wait_until_ready(process, port)
@@ -268,7 +270,7 @@ def worker_pids(server_pid: int) -> list[int]:
     for task in Path(f"/proc/{server_pid}/task").glob("*/children"):
         try:
             children = [int(word) for word in task.read_text().split()]
-            pids += [pid for pid in children if "spawn_main" in _command_line(pid)]
+            pids += [pid for pid in children if PROCESS in _command_line(pid)]
         except OSError:
             continue
     return pids
@@ -289,13 +291,14 @@ def load(
             for number, upload in enumerate(uploads)
         ]
         futures[len(futures) // 2].result()
-        killed = worker_pids(process.pid)[0]
-        os.kill(killed, signal.SIGKILL)
+        workers = worker_pids(process.pid)
+        os.kill(workers[0], signal.SIGKILL)
         for future in futures:
             future.result()
     seconds = time.monotonic() - began
     last = next(upload for upload in uploads if upload.picture is not None)
-    send(port, len(uploads), last, tally)  # it still serves
+    for number, _ in enumerate(workers, len(uploads)):
+        send(port, number, last, tally)  # it still serves, by each worker
     workers = worker_pids(process.pid)
     watch.stop()
     return {
@@ -372,8 +375,9 @@ def ask_progress(port: int, key: str, tally: Tally, is_answered: threading.Event
         finally:
             connection.close()
         if answer.status == 200:
+            work = json.loads(body)  # None before its upload, and behind it
             with tally.lock:
-                tally.shares.add(float(json.loads(body)["share"]))
+                tally.shares |= set() if work is None else {work[0] / work[1]}
 
 
 def leave(port: int, key: str, upload: Upload) -> None:

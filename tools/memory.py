@@ -27,7 +27,7 @@ from camkit.bundle.optics import HAZE, PSF
 from camkit.bundle.psf_file import psf_from_bytes, psf_to_bytes
 from camkit.bundle.reader import STRESS_HAZE, STRESS_PSF, Bundle, find_bundle, open_bundle
 from camkit.bundle.writer import write_bundle
-from camkit.report.bench.timed.process_run import child_environment
+from camkit.runtime.files.decoder import camkit_environment
 from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES, parse_memory
 from camkit.runtime.twin.simulate import SimulationOptions, photograph, write_capture
 from camkit.scenes import procedural_scene
@@ -139,7 +139,7 @@ class Captures:
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
                 text=True,
-                env=child_environment(),
+                env=camkit_environment(),
             ) as child:
                 watch = PssWatch(child.pid)
                 output = child.communicate()[0]

@@ -6,6 +6,9 @@ making      one capture claimed, made, told as a result
 batch_progress    how many are done, and how much of those under way
 cluster/    the same on the workers of a dask cluster
 processing  all of them, `jobs` at once
+worker_pool       processes with a camera loaded, for services: a future for each capture
+pool_process      such a process, seen from its parent
+pool_worker       what runs in it
 
 Pictures and sidecars are claimed, written to part files and renamed. One file's failure never stops
 the others; `resume` skips only what a sidecar proves done.

@@ -1,4 +1,4 @@
-"""The options of `camkit.load` and `camkit.process` as keywords, for type checkers.
+"""The options of `camkit.load`, `camkit.process` and pools as keywords, for type checkers.
 
 `Options`, `WriteOptions` and the kinds of cameras say what the keywords are; a test compares.
 Options that a kind of somebody else's package brings are taken at run time all the same.
@@ -70,16 +70,21 @@ class LoadKeywords(KindKeywords, total=False):
     provider: Provider
 
 
-class ProcessKeywords(LoadKeywords, total=False):
-    """Besides, the fields of `WriteOptions`."""
+class PictureKeywords(TypedDict, total=False):
+    """The fields of `WriteOptions` for one picture whose place is known."""
 
-    out_dir: str | PathLike[str]
-    keep_folders: bool
     format: FileFormat | None
     preview: bool
     linear: bool
     jpeg_quality: int | None
     strip_metadata: bool
-    resume: bool
     overwrite: bool
+
+
+class ProcessKeywords(LoadKeywords, PictureKeywords, total=False):
+    """Besides, the fields of `WriteOptions` for many."""
+
+    out_dir: str | PathLike[str]
+    keep_folders: bool
+    resume: bool
     jobs: int

@@ -125,13 +125,19 @@ def _started(arguments: Sequence[str], *, stdin: int) -> Decoder:
 
 
 def child_environment() -> dict[str, str]:
-    """Return variables that lead the child to this camkit, also one that is not installed.
+    """Return the variables of a decoding child.
 
     Threads reserve address space (stacks, arenas), which on a machine with many cores would fill
     the memory limit by itself; decoding uses few of them anyway. LibRaw takes the date of a file
     through the time zone, which must not change with the machine.
     """
-    environment = {"OMP_NUM_THREADS": "4", **os.environ, "OPENBLAS_NUM_THREADS": "1", "TZ": "UTC"}
+    threads = {"OMP_NUM_THREADS": "4"}
+    return {**threads, **camkit_environment(), "OPENBLAS_NUM_THREADS": "1", "TZ": "UTC"}
+
+
+def camkit_environment() -> dict[str, str]:
+    """Return variables that lead a child to this camkit, also one that is not installed."""
+    environment = dict(os.environ)
     root = str(Path(camkit.__file__).resolve().parents[1])
     if not root.endswith(("site-packages", "dist-packages")):
         search_path = environment.get("PYTHONPATH")

@@ -23,6 +23,8 @@ PUBLIC = [
     "Pipeline",
     "UnsupportedError",
     "ViewPage",
+    "WorkerError",
+    "WorkerPool",
     "__version__",
     "calibrate",
     "export",

@@ -45,6 +45,9 @@ def develop(files: list[Path], out_dir: Path) -> list[str]:
             lines.append(f"{result.input}: {result.status} {sum(result.seconds.values()):.1f} s")
     except camkit.ContractError as error:
         lines.append(str(error))
+    with camkit.WorkerPool("duet", size="S") as pool:
+        job = pool.submit(files[0], out_dir / "a.jpg", cancel=lambda: False, overwrite=True)
+        lines += job.result().warnings
     picture = pipeline.process(files[0])
     return [*lines, *picture.warnings, f"{picture.image.dtype} {picture.image.shape}"]
 
@@ -117,6 +120,10 @@ def test_a_foreign_program_passes_a_strict_type_checker_and_wrong_ones_do_not(
     writes = WRONG | WRONG_TO_WRITE
     lines += [f"camkit.process([], {_call(choices)})" for choices in writes.values()]
     lines += ["camkit.load(3)", "camkit.process(3)", "camkit.load(None).plan(3)"]
+    lines += [
+        "camkit.WorkerPool(None, sizes=1)",
+        "camkit.WorkerPool(None).submit('a', 'b', jobs=2)",
+    ]
     _, told = _check(tmp_path, "import camkit\n" + "\n".join(lines).replace("**{}, ", "") + "\n")
     for number, line in enumerate(lines, 2):
         assert f"program.py:{number}: error" in told, f"{line}\n{told}"

@@ -9,7 +9,7 @@ import time
 from typing import Final
 
 from camkit.errors import UnsupportedError
-from camkit.report.bench.timed.process_run import child_environment
+from camkit.runtime.files.decoder import camkit_environment
 
 SIDE: Final = 768
 """Side of the matrices: a product is long enough to be peak, short enough to be undisturbed."""
@@ -32,7 +32,7 @@ def gemm_peak_gmac_per_s(threads: int, seconds: float = 1.0) -> float:
     Raises:
         UnsupportedError: If the process fails.
     """
-    environment = {**child_environment(), **dict.fromkeys(_THREAD_NAMES, str(threads))}
+    environment = {**camkit_environment(), **dict.fromkeys(_THREAD_NAMES, str(threads))}
     command = [sys.executable, "-P", "-m", "camkit.report.bench.gemm", str(seconds)]
     process = subprocess.run(
         command, env=environment, capture_output=True, text=True, timeout=TIMEOUT_S, check=False

@@ -20,7 +20,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import IO, Any, Final
 
-import camkit
+from camkit.runtime.files.decoder import camkit_environment
 
 POLL_S: Final = 0.02
 TIMEOUT_S: Final = 3600.0
@@ -96,7 +96,7 @@ def run_job(job: Job) -> Run:
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=complaints,
-            env=child_environment(),
+            env=camkit_environment(),
             start_new_session=True,
         ) as child:
             timer = threading.Timer(TIMEOUT_S, _end, (child,))
@@ -155,16 +155,6 @@ def _last_words(complaints: IO[bytes]) -> str:
     complaints.seek(max(0, complaints.seek(0, os.SEEK_END) - 4096))
     lines = complaints.read().decode(errors="replace").strip().splitlines()
     return lines[-1] if lines else SILENT
-
-
-def child_environment() -> dict[str, str]:
-    """Return variables by which a child finds this camkit, installed or not."""
-    environment = dict(os.environ)
-    root = str(Path(camkit.__file__).resolve().parents[1])
-    if not root.endswith(("site-packages", "dist-packages")):
-        paths = environment.get("PYTHONPATH")
-        environment["PYTHONPATH"] = os.pathsep.join([*([paths] if paths else []), root])
-    return environment
 
 
 def _end(child: subprocess.Popen[bytes]) -> None:

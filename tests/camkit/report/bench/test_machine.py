@@ -49,7 +49,7 @@ def test_the_product_is_measured_in_a_process_of_its_own() -> None:
 
 
 def test_a_failing_process_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(gemm, "child_environment", lambda: {"PYTHONPATH": "/nowhere"})
+    monkeypatch.setattr(gemm, "camkit_environment", lambda: {"PYTHONPATH": "/nowhere"})
     monkeypatch.setattr(gemm.sys, "executable", "/bin/false")
     with pytest.raises(UnsupportedError, match="matrix product"):
         gemm.gemm_peak_gmac_per_s(1)
