@@ -252,7 +252,7 @@ TABLES: Final[Mapping[str, type]] = {
 """What the keys of each table of a recipe are read as; docs/reference/recipes.md lists them."""
 REPEATED: Final = frozenset({"vary", "phase"})
 """Tables that are written once for each number or phase."""
-NEEDED: Final = ("name", "prescription", "vary", "optics", "pixels")
+REQUIRED: Final = ("name", "prescription", "vary", "optics", "pixels")
 STATE_KEY: Final = "configuration"
 """Of [[vary]]: the state that a gap is of."""
 
@@ -271,7 +271,7 @@ def read_design(path: Path) -> DesignRecipe:
 def to_design(table: Mapping[str, Any]) -> DesignRecipe:
     """Convert a parsed TOML table to a recipe; raises ContractError as `read_design` does."""
     check_keys("design recipe", table, {"name", "prescription", *TABLES})
-    for key in NEEDED:
+    for key in REQUIRED:
         if key not in table:
             raise ContractError(f"design recipe lacks {key}")
     free, phases = table["vary"], table.get("phase", [])

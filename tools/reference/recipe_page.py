@@ -12,7 +12,7 @@ from types import UnionType
 from typing import Any, Final, Literal, get_args, get_origin, get_type_hints
 
 from camkit.models_def.design.design_recipe import (
-    NEEDED,
+    REQUIRED,
     REPEATED,
     STATE_KEY,
     TABLES,
@@ -103,7 +103,7 @@ def _top() -> Iterator[str]:
     rows = [(f"`{key}`", "text", "", "required", meanings[key]) for key in ("name", "prescription")]
     yield table(HEADER, rows)
     rows = [
-        (f"[{_title(key)}](#{key})", "required" if key in NEEDED else "", _summary(kind)[0])
+        (f"[{_title(key)}](#{key})", "required" if key in REQUIRED else "", _summary(kind)[0])
         for key, kind in TABLES.items()
     ]
     yield table(("table", "", "purpose"), rows)
@@ -157,8 +157,8 @@ def _summary(kind: type) -> list[str]:
 def attribute_texts(kind: type) -> dict[str, str]:
     """Return the texts of the attributes of a docstring by their names."""
     block = (inspect.getdoc(kind) or "").partition("Attributes:\n")[2].partition("\n\n")[0]
-    found = re.findall(r"^    (\w+): (.*(?:\n {8,}.*)*)", block, re.MULTILINE)
-    return {name: " ".join(text.split()) for name, text in found}
+    texts = re.findall(r"^    (\w+): (.*(?:\n {8,}.*)*)", block, re.MULTILINE)
+    return {name: " ".join(text.split()) for name, text in texts}
 
 
 def _value(hint: Any, choices: Sequence[str]) -> str:
