@@ -12,8 +12,8 @@ from types import UnionType
 from typing import Any, Final, Literal, get_args, get_origin, get_type_hints
 
 from camkit.models_def.design.design_recipe import (
-    REQUIRED,
     REPEATED,
+    REQUIRED,
     STATE_KEY,
     TABLES,
     DesignRecipe,

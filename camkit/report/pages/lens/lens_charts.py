@@ -115,6 +115,8 @@ def _draw_spot(panel: Panel, facts: LensFacts, spots: Spots, field: int, reach_u
         panel.add_patch(circle)
     rms = float(facts.rms_mm[field, nearest]) * UM_PER_MM
     text = "no light" if math.isnan(rms) else f"RMS {rms:.4g} µm"
+    if not math.isnan(rms) and len(facts.wavelengths_um) > 1:
+        text += f", all {float(facts.rms_all_mm[field]) * UM_PER_MM:.4g}"
     panel.set(
         title=f"{angle:.4g}°   {text}",
         xlim=(-reach_um, reach_um),

@@ -47,7 +47,8 @@ _CAPTIONS: Final = {
     "layout": "Rays of the reference wavelength; of many fields, five.",
     "mtf": "Tangential: lines across the meridian; sagittal: along it. Of many fields, five.",
     "spots": "About the chief ray of the reference wavelength, all fields to one scale; circle: "
-    "Airy disc. RMS about the centroid at the wavelength of the file nearest to the reference.",
+    "Airy disc. RMS about the centroid at the wavelength of the file nearest to the reference, "
+    "and of all wavelengths, with equal weight, about their common centroid.",
     "field": "T tangential (solid), S sagittal (dashed) focus of close rays. Distortion against "
     "the paraxial chief ray on the sensor. Light is traced with every ray aimed at the stop.",
     "psf": "The image of a point about the chief ray of the reference wavelength, all wavelengths "
@@ -288,6 +289,10 @@ def _fields(facts: LensFacts) -> Table:
                     ", ".join(f"{n} {name.replace('_', ' ')}" for name, n in losses.items()) or "0",
                 )
             )
+        if len(facts.wavelengths_um) > 1:
+            rms = _number(float(facts.rms_all_mm[i]) * UM_PER_MM, 5)
+            blank = [""] * (len(_FIELDS) - 4)
+            rows.append((f"{to_degrees(angle_rad):.4g}°", "all", "", rms, *blank))
     return Table(header=_FIELDS, rows=rows)
 
 
