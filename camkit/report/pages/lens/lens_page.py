@@ -17,10 +17,10 @@ from camkit.report.pages.lens.lens_charts import (
     draw_field,
     draw_mtf,
     draw_seidel,
-    draw_spots,
 )
 from camkit.report.pages.lens.lens_facts import LensFacts
 from camkit.report.pages.lens.lens_image import SHARES
+from camkit.report.pages.lens.spot_charts import OtherLens, draw_spots
 from camkit.report.pages.page import Cell, Page, Part, Picture, Section, Table, Words, write_page
 from camkit.units import UM_PER_MM, to_degrees
 
@@ -92,8 +92,16 @@ _BY_SAMPLING: Final = (
 )
 
 
-def write_lens_page(facts: LensFacts, folder: Path, name: str) -> list[Path]:
+def write_lens_page(
+    facts: LensFacts, folder: Path, name: str, other: OtherLens | None = None
+) -> list[Path]:
     """Write NAME.html, and NAME-CHART.svg and .png beside it; return the files, the page first.
+
+    Args:
+        facts: Of the lens.
+        folder: For the files.
+        name: NAME.
+        other: A lens to draw the spots of as well.
 
     Raises:
         UnsupportedError: If matplotlib is not installed.
@@ -103,6 +111,7 @@ def write_lens_page(facts: LensFacts, folder: Path, name: str) -> list[Path]:
         for chart, draw in _CHARTS.items()
         if chart != "seidel" or facts.seidel is not None
     }
+    charts["spots"] = partial(draw_spots, facts, name, other)
     return write_page(folder, name, charts, partial(lens_page, facts))
 
 
