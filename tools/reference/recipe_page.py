@@ -21,10 +21,9 @@ from camkit.models_def.design.design_recipe import (
 from camkit.models_def.networks.catalog import NETWORK_NAMES
 from camkit.models_def.optics.analysis.psf_model import PSF_REGIMES
 from camkit.models_def.optics.configuration.configuration_table import ConfigurationTable
-from camkit.models_def.optics.prescription import VARY
 from camkit.models_def.optics.search.improvement import RANGES
 from camkit.models_def.optics.search.joint_states import JointVariable
-from camkit.models_def.optics.search.variables import KINDS
+from camkit.models_def.optics.search.variables import KINDS, PARAMETERS
 from camkit.models_def.toml_table import TYPE_NAMES, key_line
 from tools.reference.command_page import table
 
@@ -102,11 +101,11 @@ def _top() -> Iterator[str]:
     meanings = attribute_texts(DesignRecipe)
     rows = [(f"`{key}`", "text", "", "required", meanings[key]) for key in ("name", "prescription")]
     yield table(HEADER, rows)
-    rows = [
+    tables = [
         (f"[{_title(key)}](#{key})", "required" if key in REQUIRED else "", _summary(kind)[0])
         for key, kind in TABLES.items()
     ]
-    yield table(("table", "", "purpose"), rows)
+    yield table(("table", "", "purpose"), tables)
 
 
 def _tables() -> Iterator[str]:
@@ -123,8 +122,7 @@ def _tables() -> Iterator[str]:
 
 
 def _ranges() -> str:
-    kinds = (*VARY, "defocus")
-    rows = [(f"`{kind}`", KINDS[kind][0], KINDS[kind][1], RANGES[kind]) for kind in kinds]
+    rows = [(f"`{kind}`", *KINDS[kind], RANGES[kind]) for kind in PARAMETERS]
     return table(("name", "unit", "free number", "range"), rows)
 
 

@@ -14,8 +14,8 @@ def weighted_waves(
         weights: By wavelength; without a weight other than 0 all count.
     """
     waves = tuple(sorted(wave for wave, weight in weights.items() if weight) or sorted(weights))
-    kept = [weights[wave] for wave in waves]
-    if len(set(kept)) == 1:
+    shares = [weights[wave] for wave in waves]
+    if len(set(shares)) == 1:
         return waves, ()
-    listed = ", ".join(f"{weight:g}" for weight in kept)
+    listed = ", ".join(f"{weight:g}" for weight in shares)
     return waves, (f"wavelength weights {listed} left out: all wavelengths count alike",)
