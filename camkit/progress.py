@@ -16,7 +16,7 @@ from typing import Final, TypeVar
 
 Item = TypeVar("Item")
 LEAST_SHARE: Final = 0.05
-"""No time left is known before so much is done."""
+"""No time left is known before so much is done, unless a task says otherwise."""
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -31,6 +31,8 @@ class Task:
         is_even: Whether units take about equally long, so that time left follows from those done.
         writes_lines: Whether the work notes lines of its own often enough.
         skipped: Units of `done` that no time was spent on, such as those of an earlier run.
+        least_share: Of the units, done before the time left is known; 0 where the first unit is
+            as good a sample as any.
         since_s: When it began, in seconds of `time.monotonic`.
     """
 
@@ -41,6 +43,7 @@ class Task:
     is_even: bool = True
     writes_lines: bool = False
     skipped: float = 0.0
+    least_share: float = LEAST_SHARE
     since_s: float = field(default_factory=time.monotonic)
 
     def tell(self, what: str) -> None:
@@ -65,7 +68,7 @@ class Task:
         if not self.total or not self.is_even:
             return None
         fresh, remaining = self.done - self.skipped, self.total - self.done
-        if fresh < LEAST_SHARE * self.total or remaining <= 0:
+        if min(fresh, remaining) <= 0 or fresh < self.least_share * self.total:
             return None
         spent_s = (time.monotonic() if now_s is None else now_s) - self.since_s
         return spent_s * remaining / fresh

@@ -8,6 +8,7 @@ They are not in the wheel. A file here is a command; a folder holds what command
     evidence            products, plans and seconds of two checkouts compared
     methods             modern methods beside camkit's: dB against CPU-seconds
     tables              tables of the thesis, their networks trained for equal times
+    reference           pages of docs/reference that are generated from the code
     design_start        a start lens by random search
     stage_profile       where the time of a photograph goes
     gpu_networks        networks rebuilt in torch, checked and timed where a GPU is lent

@@ -28,40 +28,39 @@ from camkit.side_file import read_side_toml
 T = TypeVar("T")
 Spacing = Literal["height", "area"]
 
-_KEYS: Final = {
-    *("name", "prescription", "vary", "optics", "limits", "pixels", "front", "network", "loss"),
-    *("schedule", "data", "starts", "fabrication", "camera", "descent", "phase"),
-}
-
 _LATER_KEYS: Final = (("optics", "psf_model"), ("optics", "azimuths_deg"), ("starts", "depth_mm"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OpticsRecipe:
-    """The fields, wavelengths and depths at which the lens is sampled.
+    """The fields and depths at which the lens is sampled, and what its sensor and power follow.
+
+    With `configurations`, distances, apertures and focal lengths come from the lens file:
+    `object_distances_mm`, `f_number`, `efl_mm` and `rides = true` are refused.
 
     Attributes:
-        half_field_deg: Field angle of the far end of the strip.
-        fields: How many fields from the axis.
-        spacing: Of the fields: equal steps of ideal image height, or of its square, so that every
-            field stands for an equal area of the image circle.
-        object_distances_mm: Depths; empty for that of the lens.
-        focus_distance_mm: The depth that the sensor is focused on; 0 for the first one.
-        efl_mm: Kept by the curvature of `solved_surface`; 0 keeps nothing.
-        solved_surface: See there.
-        rides: Whether the sensor rides on the paraxial image.
-        pupil_rays: In half the pupil.
-        whiten: Whether one unit of every move changes the spots alike.
-        units: Without whitening a move of 1 is the whole `range` of a number or 1 in its `own`
-            unit (1/mm, mm, 1 for a conic), which is what the rates of the thesis are in.
-        f_number: Of the lens; 0 for that of the prescription.
-        configurations: Names of the states of the lens that count, or "all"; empty for one state.
-            Fields are then those of the first, and the same image heights of the others.
-        azimuths_deg: Of the images of the fields, from +y towards +x: each but the axis is looked
-            at from all of them, by rays through the whole pupil, as a lens that is not round
-            needs. Empty for +y alone.
-        psf_model: "rays", "waves", or empty for waves where the lens at the start is that sharp;
-            see `camkit.models_def.optics.analysis.psf_model`.
+        half_field_deg: Field angle at the end of the strip of fields; more than 0, less than 80.
+        fields: Number of fields, the axis included; at least 2.
+        spacing: Steps between fields. `height`: equal steps of ideal image height. `area`: equal
+            steps of its square, so that every field stands for an equal area of the image circle.
+        object_distances_mm: Depths that count; empty for the distance of the lens file.
+        focus_distance_mm: Depth that the sensor is focused on; 0 for the first one.
+        efl_mm: Focal length that the curvature of `solved_surface` keeps; 0 keeps none.
+        solved_surface: Surface whose curvature keeps `efl_mm`, from 0; -1 is the last one. Its
+            curvature is not free.
+        rides: The sensor follows the paraxial image. If false, free the last gap.
+        pupil_rays: Number of rays in half the pupil.
+        whiten: One unit of every move changes the RMS spot by one pixel, so that one
+            `lens_rate` serves all numbers.
+        units: Unit of a move where `whiten` is false. `range`: the whole range of a number.
+            `own`: 1 in the unit of its kind, as in the thesis.
+        f_number: F-number of the lens; 0 for the aperture of the lens file.
+        configurations: Names of the states of the lens that count, or `["all"]`; empty for one
+            state. The fields are those of the first state; the others see the same image heights.
+        azimuths_deg: Directions of the fields from +y towards +x, traced through the whole pupil,
+            as a lens that is not round needs. Empty for +y alone.
+        psf_model: Model of the PSF; empty for waves where the blur of the lens at the start is
+            below 7 Airy radii, else rays. `azimuths_deg` takes no waves.
     """
 
     half_field_deg: float
@@ -108,14 +107,18 @@ class OpticsRecipe:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PhaseRecipe:
-    """A phase plate or diffractive surface that the lens at the start has besides.
+    """A phase plate or diffractive surface that is added to the lens at the start.
+
+    It needs `radial_rad` or `free_rad`. Its coefficients become free by `[[vary]]` of kind
+    `phase`, counted in this order: radial ones first.
 
     Attributes:
-        surface: That it lies on.
-        radius_mm: To which r, x and y are normalised.
-        radial_rad: Coefficients of (r / radius)^2, (r / radius)^4, ...
-        free_rad: Coefficients by the name of a term in x and y, such as x3.
-        order: Of diffraction.
+        surface: Surface that it lies on, from 0.
+        radius_mm: Radius that r, x and y are divided by.
+        radial_rad: Coefficients of r^2, r^4, r^6, ...
+        free_rad: Coefficients by the name of a term in x and y, such as
+            `{ x3 = 200.0, y3 = 200.0 }`; the lens is then not round.
+        order: Diffraction order; all light goes into it.
     """
 
     surface: int
@@ -144,12 +147,13 @@ class PixelRecipe:
     """The sensor of a design.
 
     Attributes:
-        pitch_um: Of the pixels.
-        kernel_px: Odd window of a PSF; 0 takes what the lens at the start needs.
-        wavelengths_um: Increasing, an odd number.
-        color_weights: One row of weights for R, G and B, as many as wavelengths.
-        noise: Standard deviation, 1.0 = white level.
-        cfa: RGGB or another order of the colour filters; empty for three colours in each pixel.
+        pitch_um: Pixel pitch.
+        kernel_px: Side of the window of a PSF, odd; 0 takes what holds 99 % of the light of the
+            lens at the start, and a quarter more.
+        wavelengths_um: Wavelengths that are traced: an odd number of them, increasing.
+        color_weights: Three rows (R, G, B) of one weight per wavelength.
+        noise: Standard deviation of the noise; 1.0 = white level.
+        cfa: Order of the colour filters, such as `RGGB`; empty for three colours in every pixel.
     """
 
     pitch_um: float
@@ -173,18 +177,17 @@ class PixelRecipe:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NetworkChoice:
-    """The choice of a network; the empty name stands for none.
+    """The network behind the front end.
 
     Attributes:
-        name: In the catalogue.
-        config: What of its config differs from the defaults.
-        start: First weights: a bundle, the name of a built-in one, or a checkpoint; empty for
-            weights drawn by chance.
-        start_size: The network of a bundle with several.
+        name: Network of the catalogue; empty for none: the front end alone recovers.
+        config: Settings of the network that differ from its defaults.
+        start: First weights: a bundle, a built-in name or a checkpoint; empty for random ones.
+        start_size: Size of the network of that bundle.
     """
 
     name: str = ""
-    config: dict[str, Any]
+    config: dict[str, Any] = field(default_factory=dict)
     start: str = ""
     start_size: str = "S"
 
@@ -200,8 +203,8 @@ class DesignRecipe:
     """A joint design.
 
     Attributes:
-        name: Of the camera.
-        prescription: Name of a built-in prescription or path of a lens file.
+        name: Name of the camera; the files of the run bear it.
+        prescription: Lens at the start: a built-in name, or a lens file beside the recipe.
         variables: What of the lens is free.
         state_variables: Gaps that are free in one configuration each.
         phases: That the lens at the start has besides.
@@ -230,6 +233,30 @@ class DesignRecipe:
     phases: tuple[PhaseRecipe, ...] = ()
 
 
+TABLES: Final[Mapping[str, type]] = {
+    "vary": Variable,
+    "phase": PhaseRecipe,
+    "optics": OpticsRecipe,
+    "limits": Limits,
+    "pixels": PixelRecipe,
+    "front": Front,
+    "network": NetworkChoice,
+    "loss": DesignLoss,
+    "schedule": DesignSchedule,
+    "data": SceneRecipe,
+    "starts": Starts,
+    "fabrication": FabricationErrors,
+    "camera": CameraChoice,
+    "descent": Descent,
+}
+"""What the keys of each table of a recipe are read as; docs/reference/recipes.md lists them."""
+REPEATED: Final = frozenset({"vary", "phase"})
+"""Tables that are written once for each number or phase."""
+REQUIRED: Final = ("name", "prescription", "vary", "optics", "pixels")
+STATE_KEY: Final = "configuration"
+"""Of [[vary]]: the state that a gap is of."""
+
+
 def read_design(path: Path) -> DesignRecipe:
     """Read and check a design recipe.
 
@@ -243,8 +270,8 @@ def read_design(path: Path) -> DesignRecipe:
 
 def to_design(table: Mapping[str, Any]) -> DesignRecipe:
     """Convert a parsed TOML table to a recipe; raises ContractError as `read_design` does."""
-    check_keys("design recipe", table, _KEYS)
-    for key in ("name", "prescription", "vary", "optics", "pixels"):
+    check_keys("design recipe", table, {"name", "prescription", *TABLES})
+    for key in REQUIRED:
         if key not in table:
             raise ContractError(f"design recipe lacks {key}")
     free, phases = table["vary"], table.get("phase", [])
@@ -253,7 +280,6 @@ def to_design(table: Mapping[str, Any]) -> DesignRecipe:
     if not isinstance(phases, list):
         raise ContractError("added phases must be written as [[phase]] tables")
     variables = [_variable(f"vary[{i}]", one) for i, one in enumerate(free)]
-    network = {"config": {}, **dict(table.get("network", {}))}
     recipe = DesignRecipe(
         name=typed("name", table["name"], str),
         prescription=typed("prescription", table["prescription"], str),
@@ -264,7 +290,7 @@ def to_design(table: Mapping[str, Any]) -> DesignRecipe:
         limits=section("limits", Limits, table.get("limits", {})),
         pixels=section("pixels", PixelRecipe, table["pixels"]),
         front=section("front", Front, table.get("front", {})),
-        network=section("network", NetworkChoice, network),
+        network=section("network", NetworkChoice, table.get("network", {})),
         loss=section("loss", DesignLoss, table.get("loss", {})),
         schedule=section("schedule", DesignSchedule, table.get("schedule", {})),
         data=section("data", SceneRecipe, table.get("data", {})),
@@ -287,10 +313,10 @@ def to_design(table: Mapping[str, Any]) -> DesignRecipe:
 
 def _variable(where: str, table: Any) -> JointVariable:
     """Read a free number, and the configuration that it is of, if any."""
-    if not isinstance(table, Mapping) or "configuration" not in table:
+    if not isinstance(table, Mapping) or STATE_KEY not in table:
         return JointVariable(variable=section(where, Variable, table))
-    state = typed(f"{where}.configuration", table["configuration"], str)
-    rest = {key: value for key, value in table.items() if key != "configuration"}
+    state = typed(f"{where}.{STATE_KEY}", table[STATE_KEY], str)
+    rest = {key: value for key, value in table.items() if key != STATE_KEY}
     return JointVariable(variable=section(where, Variable, rest), state=state)
 
 

@@ -35,20 +35,23 @@ LOST_WEIGHT: Final = 40.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Descent:
-    """The descent of a lens on the expected error, before its loop.
+    """The descent of a lens on the error that the bank is expected to leave, before the loop.
+
+    It needs `[camera]` and `[fabrication]`, and takes no pictures.
 
     Attributes:
         rounds: Descents from the best lens; each with moves that are whitened anew.
-        evaluations: Of the error in a round.
+        evaluations: Evaluations of the error in a round.
         starts: Lenses that are descended from, the given one among them.
-        spread: Standard deviation of the others' moves, of which 1 changes the spots by a pixel.
-        copies: Monte-Carlo samples that V is measured with.
-        iso: At which the error is expected.
-        level: Of the scene, 1.0 = white.
-        evenness: Per dB. Gains over the lens at the start count by a mean that weighs small gains
-            more: 0 is the plain mean, which takes from the corner for the axis; with much of it
-            only the least gain of a field and ISO counts.
-        penalty_weight: Of the limits of the lens.
+        spread: Standard deviation of the moves to the other lenses; a move of 1 changes the
+            spots by one pixel.
+        copies: Monte-Carlo samples that the spread of the lens is measured with.
+        iso: ISO values at which the error is expected.
+        level: Level of the scene; 1.0 = white level.
+        evenness: Weight of small gains over the lens at the start, per dB. 0 is the plain mean,
+            which takes from the corner for the axis; with a large value only the least gain of
+            a field and ISO counts.
+        penalty_weight: Weight of `[limits]` in the loss.
     """
 
     rounds: int = 3

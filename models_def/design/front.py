@@ -23,14 +23,16 @@ class Front:
     """The planes that a network sees, in sRGB tone.
 
     Attributes:
-        kind: none: the capture (3 planes); wiener: the capture and its Wiener result (6);
-            together: the developed capture and what the bank of a camera makes of it (6,
-            stabilised).
-        signal_to_noise: Power of the signal at one cycle per pixel over that of the noise.
-        exponent: Of the fall of the signal's power.
-        filter_margin_px: Pixels recorded around a patch for the filter and cut off again.
-        depth_known: Whether the filter is that of the depth of the patch; otherwise that of the
-            mean kernel over depths, as where a bundle is not told the depth.
+        kind: `none`: the network sees the capture (3 planes). `wiener`: the capture and what a
+            Wiener filter restores of each colour (6). `together`: the developed capture and what
+            the bank of a camera restores of it (6, stabilised); needs `[camera]`.
+        signal_to_noise: Power of the signal at one cycle per pixel over that of the noise, for
+            `wiener`. A high value punishes even blur.
+        exponent: Exponent of the fall of the signal's power with the frequency, for `wiener`.
+        filter_margin_px: Pixels recorded around a patch for the filter and cut off again; wide
+            kernels need more.
+        depth_known: The filter is that of the depth of the patch. If false, it is that of the
+            mean kernel over all depths. Several configurations need true.
     """
 
     kind: FrontName = "none"

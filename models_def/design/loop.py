@@ -45,19 +45,19 @@ class DesignSchedule:
     """The schedule of a design.
 
     Attributes:
-        steps: In all.
-        batch: Patches a step.
-        patch_px: Side of a patch after blur and margins.
+        steps: Number of steps.
+        batch: Patches of a step.
+        patch_px: Side of a patch after blur and margins; a multiple of the network's stride.
         lens_rate: Learning rate of the lens; 0 trains the network alone.
-        network_rate: Of the network.
+        network_rate: Learning rate of the network.
         epoch_steps: Steps after which both rates are multiplied by `decay`.
-        decay: See there.
-        hold_steps: The lens stays for so many steps at first, until the network follows.
-        freeze_share: The lens stays for this last share of the steps.
-        penalty_weight: Of the limits of the lens.
+        decay: Factor of both rates after every `epoch_steps`; more than 0, at most 1.
+        hold_steps: First steps in which the lens stays, until the network follows.
+        freeze_share: Last share of the steps in which the lens stays, 0 to 1.
+        penalty_weight: Weight of `[limits]` in the loss.
         valid_steps: Steps between validations.
-        valid_patches: Of a validation.
-        seed: Of weights and draws.
+        valid_patches: Fixed patches of a validation.
+        seed: Random seed of weights and samples.
     """
 
     steps: int = 2000

@@ -25,11 +25,13 @@ class DesignLoss:
     """The loss of a recipe.
 
     Attributes:
-        kind: Which.
-        depth_weights: zeta of eq. (6.16), one a depth; for the others the weights of the
-            depths' losses; empty for all alike.
-        reference_depth: Index of the depth that eq. (6.16) compares with.
-        ssim_weight: Of 1 - SSIM in eq. (6.16).
+        kind: `l1`: mean absolute error of the recovered picture. `log_mse`: mean logarithm of the
+            mean square error of a patch, which weighs patches as the mean PSNR does. `edof`: eq.
+            (6.16) of the thesis, of captures, without a network.
+        depth_weights: Weight of each depth or configuration (zeta in eq. (6.16)); empty for
+            equal ones.
+        reference_depth: Index, from 0, of the depth that `edof` compares the others with.
+        ssim_weight: Weight of 1 - SSIM in `edof`.
     """
 
     kind: LossName = "l1"

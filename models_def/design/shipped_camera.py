@@ -46,11 +46,15 @@ LEAST_ELECTRONS_SQUARED: Final = 1e-4
 class CameraChoice:
     """The camera of a design whose front restores colours together.
 
+    The front `together` and this table belong together.
+
     Attributes:
-        recipe: File of its training recipe, relative to that of the design.
-        iso: Least and greatest; drawn log-uniformly.
-        copies: Monte-Carlo samples that V is measured with; 0 takes the table of the recipe.
-        spread_steps: Steps between measurements of V.
+        recipe: File of its training recipe, relative to the design recipe. `pitch_um` of
+            `[pixels]` must be that of its sensor.
+        iso: Least and greatest ISO value; drawn log-uniformly.
+        copies: Monte-Carlo samples that the spread of the lens is measured with; 0 takes the
+            table of the training recipe.
+        spread_steps: Steps between measurements of that spread.
     """
 
     recipe: str

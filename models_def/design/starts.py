@@ -36,20 +36,23 @@ class Starts:
 
     Attributes:
         count: Lenses that are tried, the given one among them; 0 begins at it as it is.
-        spread: Half-width of the draws about the given lens, as a share of each number's bounds.
-        anywhere: Share of the lenses that are drawn from the whole bounds instead.
-        merit: Of their spots.
-        core_um: The size that the merit compares spots with; 0 for the pixel pitch.
-        judged: How many of those with the best spots the recovery judges, at most the quarter
-            that goes to the end; 0: spots decide.
-        scout_steps: Steps of damped least squares for each.
+        spread: Half-width of the draws about the given lens, as a share of each number's range,
+            0 to 1.
+        anywhere: Share of the lenses that are drawn from the whole ranges instead, 0 to 1.
+        merit: Merit of the spots. `rms`: mean r^2. `sum_abs`: about the mean radius, which
+            recovery prefers. `energy`: light outside `core_um`.
+        core_um: Radius below which a spot counts as sharp; 0 for the pixel pitch.
+        judged: Number of lenses with the best spots that the recovery judges, 2 to a quarter of
+            `count` and 1; 0: spots decide. It needs a fixed `kernel_px`.
+        scout_steps: Steps of damped least squares for each lens.
         dls_steps: Further steps for the best quarter.
-        seed: Of the draws.
-        depth_mm: The search looks at this depth alone, at the lens without phases: a plate blurs
-            for all depths what is sharp at one. 0: it looks at what the design looks at.
-        library: Whether the search begins at the built-in lenses too, scaled to the recipe.
-        library_lenses: How many of them go on, those with the best spots; they share the count.
-        elements: Of these lenses, cemented ones counted one by one; 0 for any.
+        seed: Random seed of the draws.
+        depth_mm: Only depth that the search looks at, at the lens without phases: a plate blurs
+            for all depths what is sharp at one. 0: it looks at all that the design looks at.
+        library: The search begins at the built-in lenses too, scaled to the recipe.
+        library_lenses: Number of built-in lenses that go on, those with the best spots; they
+            share `count`.
+        elements: Number of elements of these lenses, cemented ones counted one by one; 0 for any.
     """
 
     count: int = 0

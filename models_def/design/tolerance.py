@@ -186,7 +186,7 @@ def run_tolerance(
         lens: Nominal, focused as it is meant to be.
         tolerances: Widths of the errors.
         run: How.
-        watch: Is told how many copies are done, and of how many.
+        watch: Is told how many copies are done, and of how many; 0 once the design is judged.
 
     Raises:
         ContractError: If a field of the lens or of a copy loses its light.
@@ -216,6 +216,8 @@ def run_tolerance(
         )
 
     nominal = judge.measure(no_deviations(lens))
+    if watch is not None:
+        watch(0, total)
     copies = measure(tolerances, parts, at_limits=False)
     losses = [
         _class_loss(tolerances, one, nominal, measure(tolerances.only(one), limits, at_limits=True))

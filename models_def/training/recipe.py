@@ -59,9 +59,9 @@ class SceneRecipe:
     """Sources of sharp crops.
 
     Attributes:
-        picture_share: Share of crops of pictures, the rest is procedural; without a folder of
-            pictures every crop is procedural.
-        procedural_scenes: Different procedural scenes of `scene_px` a side.
+        picture_share: Share of crops from pictures, 0 to 1; the rest, and all without a folder of
+            pictures, is procedural.
+        procedural_scenes: Number of different procedural scenes.
         scene_px: Side of a procedural scene.
     """
 

@@ -24,7 +24,7 @@ from camkit.models_def.optics.pupil import (
     pupil_rays,
     real_stop_radius_mm,
 )
-from camkit.models_def.optics.spot import Spots, rms_radius
+from camkit.models_def.optics.spot import Spots, all_waves, rms_radius
 from camkit.models_def.optics.trace import (
     Fate,
     Rays,
@@ -167,6 +167,14 @@ def spot_diagram(lens: Lens, slopes: Tensor, wavelengths_um: Tensor, pupil: Pupi
 def rms_about_centroid(spots: Spots) -> Tensor:
     """Return the RMS radius (field, wavelength) in mm about the centroid; NaN without rays."""
     return torch.where(spots.weight.sum(-1) > 0, rms_radius(spots), math.nan)
+
+
+def rms_of_all_waves(spots: Spots) -> Tensor:
+    """Return the RMS radius (field,) in mm of all wavelengths about their common centroid.
+
+    Every wavelength has the same weight, however many of its rays are lost; NaN without rays.
+    """
+    return rms_about_centroid(all_waves(spots))[:, 0]
 
 
 def rms_about_chief(spots: Spots) -> Tensor:

@@ -17,8 +17,20 @@ APERTURES: Final = ("f_number", "entrance_pupil_diameter_mm", "stop_semi_diamete
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _ConfigurationTable:
-    """The keys of [[configuration]], as people write them."""
+class ConfigurationTable:
+    """One state of a lens; what it does not name stays. At most one of the apertures is given.
+
+    Attributes:
+        name: Name that `--configuration` takes.
+        thickness_mm: Gaps by the number of the surface before them, from 0, such as
+            `{ 4 = 1.8, 19 = 7.9 }`.
+        semi_diameter_mm: Rims by the number of their surface, such as a stop that opens.
+        object_distance_mm: Distance of the object from the first vertex; inf is far away.
+        f_number: Aperture as an F-number.
+        entrance_pupil_diameter_mm: Aperture as the diameter of the entrance pupil.
+        stop_semi_diameter_mm: Aperture as the radius of the stop.
+        field_angles_deg: Fields, increasing.
+    """
 
     name: str
     thickness_mm: dict[str, Any] = field(default_factory=dict)
@@ -36,7 +48,7 @@ def parse_configuration(where: str, table: Any) -> Configuration:
     Raises:
         ContractError: If a key is unknown, missing or of a wrong type.
     """
-    keys = section(where, _ConfigurationTable, table)
+    keys = section(where, ConfigurationTable, table)
     apertures = {kind: getattr(keys, kind) for kind in APERTURES}
     kinds = [kind for kind, value in apertures.items() if value is not None]
     if len(kinds) > 1:

@@ -7,6 +7,7 @@ In the order in which data flows:
 - `zmx_glass`: glasses named as .zmx files name them
 - `zmx_surface`: one surface of a .zmx file
 - `zmx_field`: fields of any type as field angles
+- `wavelength_weights`: the wavelengths that count
 - `zmx_configurations`: each configuration of a .zmx file as a file of its own
 - `zmx_reader`: a .zmx file as a `Lens`, with notes on what was left out
 - `zmx_configuration_writer`: fields and configurations as lines of a .zmx file

@@ -19,6 +19,7 @@ from camkit.models_def.optics.lens_file.json_table import (
 )
 from camkit.models_def.optics.lens_file.optiland_glass import read_glass_table
 from camkit.models_def.optics.lens_file.placing import with_object_na
+from camkit.models_def.optics.lens_file.wavelength_weights import weighted_waves
 from camkit.models_def.optics.lens_file.zmx_field import FieldType, with_field_points
 from camkit.models_def.optics.prescription import ApertureKind, Lens, Surface
 from camkit.models_def.optics.shape.polynomial import without_last_zeros
@@ -85,7 +86,7 @@ def parse_optiland(
     stops = [i for i, block in enumerate(blocks[1:-1]) if block.get("is_stop") is True]
     if len(stops) != 1:
         raise DecodeError(f"one surface of the lens must be the stop; got {stops or 'none'}")
-    waves, reference = _wavelengths(table_at(table, "wavelengths", "the file"))
+    waves, reference, wave_notes = _wavelengths(table_at(table, "wavelengths", "the file"))
     lens = Lens(
         name=text_at(table, "name") or name,
         note=text_at(table, "note"),
@@ -102,7 +103,7 @@ def parse_optiland(
     lens = _with_aperture(lens, table_at(table, "aperture", "the file"))
     fields = table_at(table, "fields", "the file")
     lens, field_notes = _with_fields(lens, fields)
-    return lens, (*_notes(table, fields), *field_notes)
+    return lens, (*_notes(table, fields), *wave_notes, *field_notes)
 
 
 def _file_glass(glass: Glass) -> Glass | None:
@@ -194,7 +195,8 @@ def _radius(block: Table, where: str) -> float:
     return radius_mm
 
 
-def _wavelengths(table: Table) -> tuple[tuple[float, ...], float]:
+def _wavelengths(table: Table) -> tuple[tuple[float, ...], float, tuple[str, ...]]:
+    """Return the wavelengths in um, increasing, the primary one, and notes."""
     entries = tables_at(table, "wavelengths", "wavelengths")
     if not entries:
         raise DecodeError("the file states no wavelength")
@@ -207,8 +209,8 @@ def _wavelengths(table: Table) -> tuple[tuple[float, ...], float]:
         wave = number_at(entry, "value", "wavelengths") * _UM_PER_UNIT[unit]
         waves[wave] = number_at(entry, "weight", "wavelengths", 1.0)
         reference = wave if entry.get("is_primary") is True else reference
-    weighted = {wave for wave, weight in waves.items() if weight} or set(waves)
-    return tuple(sorted(weighted)), next(iter(waves)) if reference is None else reference
+    counted, notes = weighted_waves(waves)
+    return counted, next(iter(waves)) if reference is None else reference, notes
 
 
 def _with_aperture(lens: Lens, table: Table) -> Lens:

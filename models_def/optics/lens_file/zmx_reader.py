@@ -17,6 +17,7 @@ from camkit.models_def.optics.glass.catalogue import (
 from camkit.models_def.optics.glass.encoding import read_text
 from camkit.models_def.optics.lens_file.placing import with_object_na
 from camkit.models_def.optics.lens_file.states import named_state, with_states
+from camkit.models_def.optics.lens_file.wavelength_weights import weighted_waves
 from camkit.models_def.optics.lens_file.zmx_collimator import without_collimator
 from camkit.models_def.optics.lens_file.zmx_completion import (
     APERTURES,
@@ -177,7 +178,7 @@ def _read(
     object_context = SurfaceContext(number=0, mm_per_unit=scale, order=order)
     object_glass = medium_after(records.surfaces[0], object_context)
     stop = _stop(records)
-    waves, reference = _wavelengths(system)
+    waves, reference, wave_notes = _wavelengths(system)
     title = last(system, "NAME")
     kind, value = _aperture(records, stop, scale, object_mm)
     lens = Lens(
@@ -200,7 +201,7 @@ def _read(
     notes += _notes(records, surfaces)
     notes += _glass_notes(records, surfaces, order)
     lens, field_notes = with_fields(lens, system, scale)
-    return lens, (*notes, *field_notes)
+    return lens, (*notes, *wave_notes, *field_notes)
 
 
 def _mm_per_unit(record: Record | None) -> float:
@@ -338,8 +339,8 @@ def _with_object_aperture(lens: Lens, system: Records) -> Lens:
         raise DecodeError(f"line {record.line}: OBNA: {error}") from error
 
 
-def _wavelengths(system: Records) -> tuple[tuple[float, ...], float]:
-    """Return the wavelengths in um, increasing, each once, and the primary one."""
+def _wavelengths(system: Records) -> tuple[tuple[float, ...], float, tuple[str, ...]]:
+    """Return the wavelengths in um, increasing, each once, the primary one, and notes."""
     entries = [*system.get("WAVM", []), *system.get("WAVE", [])]
     listed = [(r.number(1), r.number(2, 1.0)) for r in sorted(entries, key=lambda r: r.number(0))]
     old = last(system, "WAVL")
@@ -358,9 +359,11 @@ def _wavelengths(system: Records) -> tuple[tuple[float, ...], float]:
             listed.pop()
     if not 1 <= position <= len(listed):
         raise DecodeError(f"PWAV must be one of {len(listed)} wavelengths; got {position}")
-    # a wavelength of weight 0 is not looked at, but may define the focus
-    weighted = {wave for wave, weight in listed if weight} or {wave for wave, _ in listed}
-    return tuple(sorted(weighted)), listed[position - 1][0]
+    weights: dict[float, float] = {}
+    for wave, weight in listed:
+        weights[wave] = weights.get(wave, 0.0) + weight
+    waves, notes = weighted_waves(weights)
+    return waves, listed[position - 1][0], notes
 
 
 def _notes(records: ZmxRecords, surfaces: tuple[Surface, ...]) -> tuple[str, ...]:

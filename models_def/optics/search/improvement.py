@@ -1,6 +1,6 @@
 """A given lens made better: its free numbers moved by damped least squares."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, Literal, NoReturn
 
@@ -14,7 +14,7 @@ from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import VARY, Lens, Surface, Vary
 from camkit.models_def.optics.search.least_squares import Residuals, descend
 from camkit.models_def.optics.search.problem import Problem, residuals
-from camkit.models_def.optics.search.variables import FreeLens, Parameter, Variable
+from camkit.models_def.optics.search.variables import KINDS, FreeLens, Parameter, Variable
 
 CONIC_REACH: Final = 5.0
 FOCUS_REACH_MM: Final = 2.0
@@ -24,7 +24,26 @@ _ASPHERE_TERMS: Final = 4
 _ASPHERE_SAG_MM: Final = 0.2
 _PHASE: Final = 500.0  # radians
 _TOUCH: Final = 1e-6
-_UNITS: Final = {"curvature": " 1/mm", "thickness": " mm", "defocus": " mm"}
+_WIDER_GAP_MM: Final = 5.0
+RANGES: Final[Mapping[Parameter, str]] = {
+    "curvature": "± the curvature or ± 1 / EFL, the larger. The last refracting surface whose "
+    "curvature is free keeps the focal length instead.",
+    "conic": f"± {CONIC_REACH:g}. A plane whose curvature is not free has none.",
+    "thickness": f"From {_LEAST_AIR_MM:g} mm (air) or {_LEAST_GLASS_MM:g} mm (glass), or the gap "
+    f"itself if less, to twice the gap or {_WIDER_GAP_MM:g} mm more, the larger. The last gap is "
+    "not among them.",
+    "even_asphere": f"± twice the coefficient or ± {_ASPHERE_SAG_MM:g} mm of sag, the larger, for "
+    f"r^4 to r^{2 * _ASPHERE_TERMS} and further terms of the file. The sag counts at the rim or at "
+    "the diameter of the entrance pupil, the smaller. r^2 stays.",
+    "odd_asphere": f"As `even_asphere`, for r^3 to r^{2 * _ASPHERE_TERMS - 1} and further terms of "
+    "the file. r stays.",
+    "q_asphere": f"± twice the coefficient or ± {_ASPHERE_SAG_MM:g} mm, the larger, for the terms "
+    "of the file.",
+    "phase": f"± twice the coefficient or ± {_PHASE:g} rad, the larger, for the radial terms of "
+    "the file.",
+    "defocus": f"± {FOCUS_REACH_MM:g} mm. Always free.",
+}
+"""The ranges of `surface_variables` about the values of a lens, for people."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -129,7 +148,7 @@ def gap_variable(lens: Lens, i: int) -> Variable:
     surface = lens.surfaces[i]
     gap_mm = surface.thickness_mm
     least = _LEAST_AIR_MM if surface.glass == "air" else _LEAST_GLASS_MM
-    most = max(2 * gap_mm, gap_mm + 5)
+    most = max(2 * gap_mm, gap_mm + _WIDER_GAP_MM)
     return Variable(kind="thickness", surface=i, low=min(least, gap_mm), high=most)
 
 
@@ -173,10 +192,16 @@ def on_limits(variables: Sequence[Variable], scaled: Tensor) -> tuple[str, ...]:
     """
     at_low, at_high = (scaled <= _TOUCH).tolist(), (scaled >= 1 - _TOUCH).tolist()
     return tuple(
-        f"{_variable_name(one)} = {one.low if low else one.high:.4g}{_UNITS.get(one.kind, '')}"
+        f"{_variable_name(one)} = {one.low if low else one.high:.4g}{_unit_text(one)}"
         for one, low, high in zip(variables, at_low, at_high, strict=True)
         if (low or high) and one.low < one.high
     )
+
+
+def _unit_text(one: Variable) -> str:
+    """Return a space and the unit; none where that depends on the term."""
+    unit = KINDS[one.kind][0]
+    return f" {unit}" if unit and "term" not in unit else ""
 
 
 def _variable_name(one: Variable) -> str:

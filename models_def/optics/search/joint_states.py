@@ -38,7 +38,7 @@ class JointVariable:
 
     Attributes:
         variable: What is free, and its bounds.
-        state: The configuration that it is of; empty for all.
+        state: Configuration that the gap is free in, where states differ in it; empty for all.
     """
 
     variable: Variable

@@ -18,15 +18,17 @@ _SOFT: Final = 1e-3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """Limits of a search.
+    """The limits of a lens, beside the ranges of its free numbers.
 
     Attributes:
-        distortion: Share of the ideal height that costs nothing; inf for no limit.
+        distortion: Greatest distortion that costs nothing, as a share of the ideal image height;
+            inf for no limit.
         min_edge_mm: Least edge thickness of an element.
-        min_air_mm: Least edge distance of two elements.
+        min_air_mm: Least distance of the edges of two elements.
         min_bfl_mm: Least distance of the sensor from the last vertex.
-        max_curvature_per_mm: Of the solved surface, which has no bounds of its own.
-        max_steepness: Of a surface: its curvature times the height of the beam on it.
+        max_curvature_per_mm: Greatest curvature of the solved surface, which has no range.
+        max_steepness: Greatest product of the curvature of a surface and the height of the beam
+            on it.
     """
 
     distortion: float = math.inf

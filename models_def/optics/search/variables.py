@@ -6,6 +6,7 @@ sensor may ride on the paraxial image, so that the variables do not undo each ot
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import repeat
 from typing import Final, Literal, get_args
@@ -31,6 +32,18 @@ Parameter = Literal[
     "defocus",
 ]
 PARAMETERS: Final[tuple[Parameter, ...]] = get_args(Parameter)
+_IN_MM: Final = "; in mm on a surface with `normal_radius_mm`."
+KINDS: Final[Mapping[Parameter, tuple[str, str]]] = {
+    "curvature": ("1/mm", "Curvature of the surface."),
+    "conic": ("", "Conic constant; 0 is a sphere."),
+    "thickness": ("mm", "Gap after the surface."),
+    "even_asphere": ("mm^-(2 term + 1)", "Coefficient of r^(2 term + 2)" + _IN_MM),
+    "odd_asphere": ("mm^-(2 term)", "Coefficient of r^(2 term + 1)" + _IN_MM),
+    "q_asphere": ("mm", "Coefficient number `term` of `q_bfs` or `q_con`, whichever it has."),
+    "phase": ("rad", "Coefficient of the phase: radial ones first, then those in x and y."),
+    "defocus": ("mm", "Distance of the sensor from the paraxial image that it follows."),
+}
+"""Unit and meaning, for people."""
 _SERIES: Final = ("even_asphere", "odd_asphere", "q_asphere", "phase")
 _ROUNDING: Final = 1e-9
 
@@ -39,14 +52,13 @@ _ROUNDING: Final = 1e-9
 class Variable:
     """One free number of a lens.
 
+    A lens whose number lies outside `low` to `high` begins at the bound, with a note.
+
     Attributes:
-        kind: curvature (1/mm), conic, thickness (mm, after the surface), even_asphere
-            (coefficient of r^(2 term + 2)), odd_asphere (of r^(2 term + 1)), q_asphere (of Q
-            number term, in mm), phase (coefficient in radians: radial ones, then those in x and
-            y), or defocus (mm, of the sensor from where it rides).
-        surface: Its surface; not used by defocus.
-        term: Of a polynomial: 0 is its first coefficient.
-        low: Lower bound.
+        kind: What is free.
+        surface: Its surface, from 0; `defocus` needs none.
+        term: Its coefficient, where the kind is a list: 0 is the first one.
+        low: Lower bound, in the unit of the kind.
         high: Upper bound; equal to `low` holds the number there.
     """
 

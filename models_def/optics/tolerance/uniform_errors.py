@@ -9,13 +9,13 @@ from camkit.models_def.optics.prescription import Lens, Surface, require_plain
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FabricationErrors:
-    """Half-widths of uniform errors of a fabricated copy.
+    """Half-widths of the uniform errors of a Monte-Carlo sample of the lens.
 
     Attributes:
-        radius_relative: Of every curved surface.
-        thickness_mm: Of every gap and element, the last one (focus) excepted.
-        index: Of every glass.
-        focus_mm: Of the distance to the sensor.
+        radius_relative: Relative error of the radius of every curved surface.
+        thickness_mm: Error of every gap and thickness but the last one.
+        index: Error of the index of every glass.
+        focus_mm: Error of the distance to the sensor.
     """
 
     radius_relative: float = 0.002

@@ -126,6 +126,15 @@ def test_time_left_leaves_out_what_was_done_before(clock) -> None:
     assert time_left([task], clock.now_s + 50) == ", about 50 s left"
 
 
+def test_time_left_follows_the_first_of_equal_units_and_not_what_prepares_them(clock) -> None:
+    task = Task(what="judging", least_share=0.0, since_s=clock.now_s - 40)
+    task.begin(0)
+    task.count(0, 200)
+    assert time_left([task], clock.now_s + 3) == ""
+    task.count(4)
+    assert time_left([task], clock.now_s + 2) == ", about 1 min 38 s left"
+
+
 def test_work_within_a_unit_changes_neither_the_line_nor_the_time_left(clock) -> None:
     whole, part = _begun(clock, total=4, unit="pictures"), _begun(clock, total=10)
     whole.count(1)

@@ -76,14 +76,14 @@ def test_watch_is_told_every_batch() -> None:
     only = Tolerances().only("element_tilt")
     run_tolerance(DUET, only, QUICK, lambda done, total: told.append((done, total)))
     # 3 samples, 1 of the class at its limit, 2 elements at 2 limits each
-    assert told == [(3, 8), (4, 8), (8, 8)]
+    assert told == [(0, 8), (3, 8), (4, 8), (8, 8)]
 
 
 def test_without_a_ranking_samples_bound_the_run() -> None:
     told: list[tuple[int, int]] = []
     only, run = Tolerances().only("element_tilt"), replace(QUICK, ranking=False)
     result = run_tolerance(DUET, only, run, lambda done, total: told.append((done, total)))
-    assert told == [(3, 4), (4, 4)]
+    assert told == [(0, 4), (3, 4), (4, 4)]
     assert (result.offenders, result.ranking) == ((), ())
 
 

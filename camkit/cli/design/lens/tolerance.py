@@ -86,8 +86,16 @@ def tolerance(
         rays=rays,
         ranking=ranking,
     )
-    with working("judging Monte-Carlo samples", unit="samples") as task:
-        result = run_tolerance(lens, _tolerances(file, errors), run, task.count)
+    with working(f"judging {lens.name} as designed", unit="samples") as task:
+
+        def watch(done: int, total: int) -> None:
+            if done == 0:
+                task.tell("judging Monte-Carlo samples")
+                task.begin(0)
+            task.count(done, total)
+
+        task.least_share = 0.0  # all samples take equally long
+        result = run_tolerance(lens, _tolerances(file, errors), run, watch)
     written = () if folder is None else write_tolerance(result, folder, file.stem)
     if json_:
         say(json.dumps(to_json(result), allow_nan=False))

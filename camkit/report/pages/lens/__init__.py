@@ -6,7 +6,8 @@ lens_facts     everything that is computed about a lens
 lens_json      its JSON
 left_out       the fields that charts leave out
 layout         the lens drawn to scale, with rays and stop
-lens_charts    spots, contrast, curves over the field and over colour, third-order sums
+spot_charts    spots, alone or below those of another lens
+lens_charts    contrast, curves over the field and over colour, third-order sums
 fan_charts     ray fans and OPD fans
 image_charts   pictures of points, encircled energy
 lens_page      the page

@@ -1,4 +1,4 @@
-"""The charts of a lens's curves: spots, MTF, over the field, over colour, third-order sums."""
+"""The charts of a lens's curves: MTF, over the field, over colour, third-order sums."""
 
 import math
 from typing import Final
@@ -26,17 +26,13 @@ from camkit.models_def.optics.analysis.spots import spot_diagram
 from camkit.models_def.optics.analysis.wave_psf import widest_aperture
 from camkit.models_def.optics.analysis.wavefront import trace_wavefront
 from camkit.models_def.optics.render.illumination import relative_illumination_of
-from camkit.models_def.optics.spot import Spots
-from camkit.report.figure import MARKS, Figure, Panel, chart, field_color, new_figure, wave_color
-from camkit.report.pages.lens.left_out import left_out_text, say_left_out
+from camkit.report.figure import Figure, Panel, chart, field_color, new_figure, wave_color
+from camkit.report.pages.lens.left_out import left_out_text
 from camkit.report.pages.lens.lens_facts import LensFacts
 from camkit.units import UM_PER_MM, to_degrees
 
-COLUMNS = 5
 MAX_CYCLES_PER_MM: Final = 100.0
 _FREQUENCIES: Final = 101
-_MOST_DOTS: Final = 600
-_DRAWN_SAMPLING: Final = "hexapolar:10"
 _DENSE_SAMPLING: Final = "gauss:24x48"
 _POINTS: Final = 25
 _LIGHT_POINTS: Final = 13
@@ -52,75 +48,6 @@ _SUMS: Final = {
     "C_L axial colour": "#777777",
     "C_T lateral colour": "#bbbbbb",
 }
-
-
-@chart
-def draw_spots(facts: LensFacts) -> Figure:
-    """Draw the spots about the chief ray of the reference wavelength, with the Airy circle."""
-    numbers = facts.lit_fields()
-    columns = min(COLUMNS, max(len(numbers), 1))
-    rows = math.ceil(len(numbers) / columns)
-    largest = facts.max_mm[numbers]
-    reach_um = float(torch.nan_to_num(largest).max()) * UM_PER_MM if numbers else 0.0
-    airy_um = (
-        float(torch.where(torch.isfinite(facts.airy_mm), facts.airy_mm, 0.0).max()) * UM_PER_MM
-    )
-    reach_um = 1.1 * max(reach_um, 1.5 * airy_um, 1e-3)
-    figure = new_figure(max(2.6 * columns, 5.2), 3.0 * rows + 0.5)
-    spots = _drawn_spots(facts)
-    for place, i in enumerate(numbers):
-        panel = figure.add_subplot(rows, columns, place + 1)
-        _draw_spot(panel, facts, spots, i, reach_um)
-        panel.label_outer(remove_inner_ticks=True)
-    if numbers:
-        handles, labels = figure.axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=6)
-    say_left_out(figure, facts, "µm" if numbers else "")
-    return figure
-
-
-def _drawn_spots(facts: LensFacts) -> Spots:
-    """Return the spots that are drawn: those of the numbers, or fewer rays to their rim."""
-    if len(facts.pupil.samples.x) <= _MOST_DOTS:
-        return facts.spots
-    pupil = Pupil(definition=facts.pupil.definition, sampling=_DRAWN_SAMPLING)
-    return spot_diagram(facts.lens, facts.slopes, facts.wavelengths_um, pupil)
-
-
-def _draw_spot(panel: Panel, facts: LensFacts, spots: Spots, field: int, reach_um: float) -> None:
-    from matplotlib.patches import Circle
-
-    angle = to_degrees(facts.lens.field_angles_rad[field])
-    for j, wave in enumerate(facts.lens.wavelengths_um):
-        alive = spots.weight[field, j] > 0
-        x = spots.x_mm[field, j][alive] * UM_PER_MM
-        y = (spots.y_mm[field, j][alive] - spots.chief_y_mm[field]) * UM_PER_MM
-        mark = MARKS[j % len(MARKS)]
-        panel.plot(
-            x.detach(),
-            y.detach(),
-            mark,
-            markersize=3 if len(x) < 400 else 1.8,
-            markeredgewidth=0.6,
-            markerfacecolor="none",
-            color=wave_color(wave),
-            label=f"{wave:.4g} µm",
-        )
-    nearest = facts.nearest_wavelength
-    radius = float(facts.airy_mm[nearest]) * UM_PER_MM
-    if math.isfinite(radius):
-        circle = Circle(
-            (0, 0), radius, fill=False, color="black", linewidth=0.8, label="Airy disc", zorder=3
-        )
-        panel.add_patch(circle)
-    rms = float(facts.rms_mm[field, nearest]) * UM_PER_MM
-    text = "no light" if math.isnan(rms) else f"RMS {rms:.4g} µm"
-    panel.set(
-        title=f"{angle:.4g}°   {text}",
-        xlim=(-reach_um, reach_um),
-        ylim=(-reach_um, reach_um),
-        aspect="equal",
-    )
 
 
 @chart

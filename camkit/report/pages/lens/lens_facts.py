@@ -25,6 +25,7 @@ from camkit.models_def.optics.analysis.spots import (
     max_from_chief,
     rms_about_centroid,
     rms_about_chief,
+    rms_of_all_waves,
     spot_diagram,
 )
 from camkit.models_def.optics.analysis.state_facts import StateFacts
@@ -59,6 +60,7 @@ class LensFacts:
         airy_mm: (wavelength,).
         spots: Rays on the sensor.
         rms_mm: About the centroid.
+        rms_all_mm: (field,), of all wavelengths alike about their common centroid.
         rms_chief_mm: About the chief ray.
         max_mm: From the chief ray.
         chief_mm: Heights of chief rays.
@@ -81,6 +83,7 @@ class LensFacts:
     airy_mm: Tensor
     spots: Spots
     rms_mm: Tensor
+    rms_all_mm: Tensor
     rms_chief_mm: Tensor
     max_mm: Tensor
     chief_mm: Tensor
@@ -199,6 +202,7 @@ def analyse(
         airy_mm=torch.tensor([airy_radius_mm(lens, w) for w in lens.wavelengths_um]),
         spots=spots,
         rms_mm=rms_about_centroid(spots),
+        rms_all_mm=rms_of_all_waves(spots),
         rms_chief_mm=rms_about_chief(spots),
         max_mm=max_from_chief(spots),
         chief_mm=chief_landings(lens, slopes, waves, definition),

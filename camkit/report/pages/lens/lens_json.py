@@ -83,6 +83,10 @@ def to_json(facts: LensFacts) -> dict[str, Any]:
         for i in range(len(facts.lens.field_angles_rad))
         for j in range(len(facts.lens.wavelengths_um))
     ]
+    result["all_wavelengths"] = [
+        _plain(_all_waves(facts, i), partial(_all_waves_reason, facts, i))
+        for i in range(len(facts.lens.field_angles_rad))
+    ]
     result["encircled_energy"] = [
         _plain(_encircled(facts, i), partial(_light_reason, facts, i))
         for i in range(len(facts.lens.field_angles_rad))
@@ -136,6 +140,17 @@ def _why_field(facts: LensFacts, i: int, j: int) -> Callable[[str], str]:
         return facts.reasons.get(_FACTS.get(name, ""), _WHOLE_LENS.get(name, _NO_NUMBER))
 
     return why
+
+
+def _all_waves(facts: LensFacts, i: int) -> dict[str, Any]:
+    return {
+        "field_angle_deg": round(to_degrees(facts.lens.field_angles_rad[i]), 12),
+        "spot_rms_mm": float(facts.rms_all_mm[i]),
+    }
+
+
+def _all_waves_reason(facts: LensFacts, i: int, name: str) -> str:
+    return facts.dark_reason(i) or _WHOLE_LENS[name]
 
 
 def _light_reason(facts: LensFacts, i: int, _name: str = "") -> str:

@@ -17,10 +17,10 @@ from camkit.report.pages.lens.lens_charts import (
     draw_field,
     draw_mtf,
     draw_seidel,
-    draw_spots,
 )
 from camkit.report.pages.lens.lens_facts import LensFacts
 from camkit.report.pages.lens.lens_image import SHARES
+from camkit.report.pages.lens.spot_charts import OtherLens, draw_spots
 from camkit.report.pages.page import Cell, Page, Part, Picture, Section, Table, Words, write_page
 from camkit.units import UM_PER_MM, to_degrees
 
@@ -47,7 +47,8 @@ _CAPTIONS: Final = {
     "layout": "Rays of the reference wavelength; of many fields, five.",
     "mtf": "Tangential: lines across the meridian; sagittal: along it. Of many fields, five.",
     "spots": "About the chief ray of the reference wavelength, all fields to one scale; circle: "
-    "Airy disc. RMS about the centroid at the wavelength of the file nearest to the reference.",
+    "Airy disc. RMS about the centroid at the wavelength of the file nearest to the reference, "
+    "and of all wavelengths, with equal weight, about their common centroid.",
     "field": "T tangential (solid), S sagittal (dashed) focus of close rays. Distortion against "
     "the paraxial chief ray on the sensor. Light is traced with every ray aimed at the stop.",
     "psf": "The image of a point about the chief ray of the reference wavelength, all wavelengths "
@@ -91,8 +92,16 @@ _BY_SAMPLING: Final = (
 )
 
 
-def write_lens_page(facts: LensFacts, folder: Path, name: str) -> list[Path]:
+def write_lens_page(
+    facts: LensFacts, folder: Path, name: str, other: OtherLens | None = None
+) -> list[Path]:
     """Write NAME.html, and NAME-CHART.svg and .png beside it; return the files, the page first.
+
+    Args:
+        facts: Of the lens.
+        folder: For the files.
+        name: NAME.
+        other: A lens to draw the spots of as well.
 
     Raises:
         UnsupportedError: If matplotlib is not installed.
@@ -102,6 +111,7 @@ def write_lens_page(facts: LensFacts, folder: Path, name: str) -> list[Path]:
         for chart, draw in _CHARTS.items()
         if chart != "seidel" or facts.seidel is not None
     }
+    charts["spots"] = partial(draw_spots, facts, name, other)
     return write_page(folder, name, charts, partial(lens_page, facts))
 
 
@@ -288,6 +298,10 @@ def _fields(facts: LensFacts) -> Table:
                     ", ".join(f"{n} {name.replace('_', ' ')}" for name, n in losses.items()) or "0",
                 )
             )
+        if len(facts.wavelengths_um) > 1:
+            rms = _number(float(facts.rms_all_mm[i]) * UM_PER_MM, 5)
+            blank = [""] * (len(_FIELDS) - 4)
+            rows.append((f"{to_degrees(angle_rad):.4g}°", "all", "", rms, *blank))
     return Table(header=_FIELDS, rows=rows)
 
 

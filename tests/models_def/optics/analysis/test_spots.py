@@ -13,6 +13,7 @@ from camkit.models_def.optics.analysis.spots import (
     max_from_chief,
     rms_about_centroid,
     rms_about_chief,
+    rms_of_all_waves,
     spot_convergence,
     spot_diagram,
 )
@@ -49,6 +50,49 @@ def test_rms_radius_follows_the_definition_of_the_pupil(
 ) -> None:
     found = rms_about_centroid(_spots(definition))[:, 1].tolist()
     assert found == pytest.approx(expected_mm, abs=tolerance_mm)
+
+
+def _by_hand_mm(spots: Spots, field: int) -> float:
+    """Return the RMS radius of all wavelengths ray by ray; each wavelength weighs 1."""
+    rays = []
+    for wave in torch.stack([spots.x_mm, spots.y_mm, spots.weight], dim=-1)[field]:
+        total = float(wave[:, 2].sum())
+        rays += [(x, y, weight / total) for x, y, weight in wave.tolist() if weight > 0]
+    whole = sum(share for *_, share in rays)
+    middle_x, middle_y = (sum(ray[axis] * ray[2] for ray in rays) / whole for axis in (0, 1))
+    square = sum(share * ((x - middle_x) ** 2 + (y - middle_y) ** 2) for x, y, share in rays)
+    return math.sqrt(square / whole)
+
+
+def test_all_wavelengths_together_are_what_a_sum_over_rays_says_with_rays_lost() -> None:
+    rim = replace(_cooke().surfaces[0], semi_diameter_mm=4.7)
+    lens = replace(_cooke(), surfaces=(rim, *_cooke().surfaces[1:]))
+    waves = torch.tensor(lens.wavelengths_um, dtype=torch.float64)
+    spots = spot_diagram(lens, field_slopes(lens), waves, Pupil(sampling="fibonacci:64"))
+    kept = (spots.weight > 0).sum(-1)
+    assert kept[0].tolist() != kept[2].tolist()
+    expected_mm = [_by_hand_mm(spots, field) for field in range(len(ANGLES_RAD))]
+    assert rms_of_all_waves(spots).tolist() == pytest.approx(expected_mm, rel=1e-12)
+
+
+@pytest.mark.parametrize("light", [1.0, 0.3])
+def test_lateral_colour_alone_adds_half_its_size_in_squares(light: float) -> None:
+    """Two wavelengths, alike but for a shift d: RMS^2 = r^2 + (d / 2)^2, with unequal light too."""
+    d_mm, radius_mm, rays = 0.012, 0.004, 10
+    angle = torch.arange(rays, dtype=torch.float64) * (2 * math.pi / rays)
+    x, y = (radius_mm * f(angle).expand(1, 2, -1) for f in (torch.cos, torch.sin))
+    weight = torch.ones(1, 2, rays, dtype=torch.float64)
+    weight[:, 1] = light
+    spots = Spots(
+        x_mm=x,
+        y_mm=y + torch.tensor([-d_mm / 2, d_mm / 2], dtype=torch.float64)[:, None],
+        weight=weight,
+        chief_y_mm=torch.zeros(1, dtype=torch.float64),
+        fate=torch.zeros(1, 2, rays, dtype=torch.int8),
+    )
+    assert rms_about_centroid(spots)[0].tolist() == pytest.approx([radius_mm] * 2, rel=1e-12)
+    expected_mm = math.hypot(radius_mm, d_mm / 2)
+    assert float(rms_of_all_waves(spots)[0]) == pytest.approx(expected_mm, rel=1e-12)
 
 
 def test_real_marginal_ray_meets_the_stop_where_the_independent_tracer_says() -> None:

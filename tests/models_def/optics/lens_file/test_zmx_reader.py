@@ -294,6 +294,16 @@ def test_real_image_height_is_met_by_the_chief_ray() -> None:
     assert chief_heights(lens, slopes).tolist() == pytest.approx([0, 5], abs=1e-9)
 
 
+def test_weights_of_wavelengths_that_differ_are_noted_and_one_of_0_does_not_count() -> None:
+    text = LA1131.replace("4.861E-1 1", "4.861E-1 0.25").replace("6.563E-1 1", "6.563E-1 0")
+    found = parse_zmx(text)
+    assert found.lens.wavelengths_um == (0.4861, 0.5876)
+    assert [note for note in found.notes if "weights" in note] == [
+        "wavelength weights 0.25, 1 left out: all wavelengths count alike"
+    ]
+    assert not any("weights" in note for note in parse_zmx(LA1131).notes)
+
+
 def test_wavelengths_without_a_count_lose_the_filling_of_the_table() -> None:
     text = _changed(("FTYP 0 0 1 3 0 0 0", "FTYP 0 0"))
     assert parse_zmx(text).lens.wavelengths_um == (0.4861, 0.5876, 0.6563)

@@ -84,3 +84,9 @@ def test_a_page_goes_where_it_is_asked_for_and_every_file_is_printed(
     assert all(name.startswith(page.removesuffix(".html")) for name in there)
     if "--json" not in more:
         assert set(capsys.readouterr().out.split()) == there
+
+
+def test_a_lens_is_compared_on_the_page_alone(camkit_command) -> None:
+    refused = camkit_command("lens", "show", LENS, "--compare", "duet", "--json")
+    assert refused.code == ExitCode.USAGE
+    assert "--out-dir" in refused.err

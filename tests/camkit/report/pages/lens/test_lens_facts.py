@@ -51,6 +51,20 @@ def test_note_says_that_few_rings_overstate_the_spot() -> None:
     assert any("hexapolar:6" in note and "+15%" in note for note in facts.notes)
 
 
+def test_all_wavelengths_together_stand_in_page_and_json() -> None:
+    lens = replace(_cooke(0, 20), wavelengths_um=(0.48, 0.55, 0.65))
+    facts = analyse(lens, Pupil(sampling="gauss:8x16"), image=False)
+    rows = to_json(facts)["all_wavelengths"]
+    assert [row["field_angle_deg"] for row in rows] == [0, 20]
+    axis_mm, edge_mm = (row["spot_rms_mm"] for row in rows)
+    # the mean square of the wavelengths, and beside the axis the distances of their centroids
+    each_mm = facts.rms_mm.square().mean(1).sqrt().tolist()
+    assert axis_mm == pytest.approx(each_mm[0], rel=1e-9)
+    assert edge_mm > 1.0001 * each_mm[1]
+    page = str(lens_page(facts, {}))
+    assert f"'20°', 'all', '', '{1000 * edge_mm:.5g}'" in page
+
+
 def _blocked() -> Lens:
     lens = _cooke(0, 35)
     rims = (5.2, math.inf, math.inf, 3.9, math.inf, 5.2)

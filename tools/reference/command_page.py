@@ -1,14 +1,11 @@
-"""Write docs/reference/commands.md from the command line itself.
-
-    python -m tools.reference
+"""The page docs/reference/commands.md, from the command line itself.
 
 Purpose, usage and options are the help texts of the commands; to change the page, change those.
 `GUIDES` names the page that explains a command, or a group of commands.
 """
 
 import re
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, Final
 
 import typer
@@ -16,7 +13,6 @@ import typer
 from camkit.cli.app import app
 from camkit.cli.groups import JUDGE, MAKE, MEASURE, USE
 
-PAGE: Final = Path(__file__).resolve().parents[1] / "docs" / "reference" / "commands.md"
 GUIDES: Final = {
     "process": "pictures.md",
     "plan": "plan.md",
@@ -82,13 +78,7 @@ This page lists every command with its options, as `camkit COMMAND --help` print
 """
 
 
-def main() -> None:
-    """Write the page."""
-    PAGE.write_text(reference(), encoding="utf-8")
-    print(f"wrote {PAGE}")
-
-
-def reference() -> str:
+def command_page() -> str:
     """Return the page: the commands by group, in the order of `camkit --help`."""
     commands: dict[str, Any] = typer.main.get_command(app).commands  # type: ignore[attr-defined]
     parts = [INTRODUCTION]
@@ -108,11 +98,8 @@ def _sections(name: str, command: Any, *, level: int) -> Iterator[str]:
     if guide:
         text.append(f"Guide: [{guide.removesuffix('.md')}](../guides/{guide}).")
     if subcommands:
-        rows = [
-            f"| [`{n}`](#camkit-{name}-{n}) | {_cell(_purpose(c))} |"
-            for n, c in subcommands.items()
-        ]
-        text.append("\n".join(["| command | purpose |", "|---|---|", *rows]))
+        rows = [(f"[`{n}`](#camkit-{name}-{n})", _purpose(c)) for n, c in subcommands.items()]
+        text.append(table(("command", "purpose"), rows).rstrip())
     else:
         text += [f"```text\n{_usage(name, command)}\n```", _options(name, command)]
     yield "\n\n".join(text) + "\n"
@@ -147,21 +134,27 @@ def _options(name: str, command: Any) -> str:
     if other:
         return f"Arguments and options: those of [`{other}`](#camkit-{other}) that fit."
     rows = [_row(p) for p in command.params if not EVERYWHERE & set(p.opts) and not p.hidden]
-    return "\n".join(["| option | value | default | meaning |", "|---|---|---|---|", *rows])
+    return table(("option", "value", "default", "meaning"), rows).rstrip()
 
 
-def _row(parameter: Any) -> str:
+def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a table in Markdown, with the end of its last line."""
+    lines = [f"| {' | '.join(map(_cell, row))} |\n" for row in (header, *rows)]
+    lines.insert(1, f"|{'---|' * len(header)}\n")
+    return "".join(lines)
+
+
+def _row(parameter: Any) -> tuple[str, ...]:
     text = parameter.help.replace("\\[", "[").removesuffix(".")
     meaning, _, default = text.partition(DEFAULT)
     is_argument = parameter.param_type_name == "argument"
     names = [_argument(parameter)] if is_argument else [*parameter.opts, *parameter.secondary_opts]
-    cells = (
+    return (
         ", ".join(f"`{name}`" for name in names),
         _value(parameter),
         default or _default(parameter),
         f"{meaning}.",
     )
-    return f"| {' | '.join(map(_cell, cells))} |"
 
 
 def _default(parameter: Any) -> str:
@@ -193,7 +186,3 @@ def _cell(text: str) -> str:
     """Return a text for a table: one line, its pipes escaped, options as code."""
     line = " ".join(text.split()).replace("|", "\\|").replace("<", "&lt;")
     return FLAG.sub(r"`\g<0>`", line)
-
-
-if __name__ == "__main__":
-    main()
