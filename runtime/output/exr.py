@@ -122,8 +122,8 @@ class ExrWriter(PictureWriter):
 
 
 def _patch_chromaticities(path: Path, values: tuple[float, ...]) -> None:
-    # OpenEXR.OutputFile accepts the attribute but writes eight zeros (3.5.3), and a file without
-    # true chromaticities is taken for Rec.709: the numbers are put in place afterwards.
+    # OpenEXR.OutputFile cuts the attribute to whole numbers (3.5.3), and a file without true
+    # chromaticities is taken for Rec.709: the numbers are put in place afterwards.
     marker = b"chromaticities\0chromaticities\0" + struct.pack("<i", 32)
     with path.open("r+b") as file:
         start = file.read(HEADER_BYTES).find(marker)

@@ -240,8 +240,8 @@ def _notes(
         more = ", ..." if len(others) > 5 else ""
         notes.append(f"parts not read: {', '.join(others[:5])}{more}")
     chromaticities = part.header.get("chromaticities")
-    if chromaticities is not None and not np.any(np.asarray(chromaticities)):
-        notes.append("chromaticities of the EXR are all zero: Rec.709 is assumed")
+    if chromaticities is not None and _is_cut(chromaticities):
+        notes.append("chromaticities of the EXR are cut to whole numbers: Rec.709 is assumed")
     return (*notes, window.note) if window.note else tuple(notes)
 
 
@@ -251,13 +251,19 @@ def _points(chromaticities: Any) -> list[tuple[float, float]] | None:
     Raises:
         DecodeError: If they are not believable.
     """
-    if chromaticities is None or not np.any(np.asarray(chromaticities)):
+    if chromaticities is None or _is_cut(chromaticities):
         return None
     values = np.asarray(chromaticities, dtype=np.float64).ravel()
     # primaries may be imaginary (of ACES 2065-1, of XYZ itself); the white may not
     if values.shape != (8,) or not np.isfinite(values).all() or values[-1] <= 0:
         raise DecodeError(f"EXR chromaticities are not believable: {values.tolist()}")
     return [(float(x), float(y)) for x, y in values.reshape(4, 2)]
+
+
+def _is_cut(chromaticities: Any) -> bool:
+    """Return whether OpenEXR.OutputFile (3.5.3) wrote them: whole numbers, of white zeros."""
+    values = np.asarray(chromaticities, dtype=np.float64).ravel()
+    return np.array_equal(values, np.trunc(values)) and not np.any(values[6:])
 
 
 def _space(chromaticities: Any) -> ColorSpace | None:

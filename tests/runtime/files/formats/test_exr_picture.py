@@ -149,9 +149,12 @@ def test_primaries_of_xyz_itself_are_believed(tmp_path):
     assert np.abs(read_scene(path) - PLANES).max() < 1e-4
 
 
-def test_chromaticities_of_zeros_are_told(tmp_path):
-    path = write(tmp_path / "a.exr", rgb(), chromaticities=(0.0,) * 8)
-    assert "all zero" in read_picture(path).notes[0]
+@pytest.mark.parametrize("green_y", [0.0, 1.0], ids=["acescg", "aces-2065-1"])
+def test_chromaticities_that_were_cut_to_whole_numbers_are_told(tmp_path, green_y):
+    """OpenEXR.OutputFile 3.5.3 cuts them (findings/openexr_written_numbers.sh)."""
+    points = (0.0, 0.0, 0.0, green_y, 0.0, 0.0, 0.0, 0.0)
+    path = write(tmp_path / "a.exr", rgb(), chromaticities=points)
+    assert "cut to whole numbers" in read_picture(path).notes[0]
     assert np.array_equal(read_scene(path), PLANES)
 
 
