@@ -211,6 +211,7 @@ def compare(arguments: argparse.Namespace, bundle: Bundle) -> None:
         "commands": [*(c for c in commands if c != command), command],
         "json_name": arguments.out.name,
         "machine": {"cpu": processor_name(), "cores": available_threads()},
+        "earlier_runs": earlier.get("earlier_runs", {}) if arguments.resume else {},
         "bundle": {"name": bundle.manifest.name, "sha256": bundle.sha256},
         "rivals": {rival.label: rival.bundle.sha256 for rival in rivals},
         "tuned": tuned,

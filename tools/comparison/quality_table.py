@@ -185,6 +185,10 @@ def _protocol_lines(report: Mapping[str, Any]) -> list[str]:
         f"Written by {', then '.join(f'`{command}`' for command in report['commands'])} on "
         f"{machine['cpu']} with {machine['cores']} cores.",
         "",
+        *(
+            f"- An earlier run on {cpu} measured {' and '.join(map(title_of, names))}."
+            for cpu, names in report.get("earlier_runs", {}).items()
+        ),
         *(f"- {line}" for line in protocol["text"]),
         f"- Parameters of the classical methods, tuned on `{report['tuned']['data']}`: {tuned}.",
     ]

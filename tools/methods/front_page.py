@@ -8,7 +8,8 @@ from tools.tables.records import markdown_table
 TITLE: Final = "# Modern methods beside camkit's"
 INTRO: Final = (
     "Decibels against CPU-seconds of methods that were trained from scratch for the same "
-    "{minutes:g} CPU-minutes on the same samples, and judged on the same captures of `duet`."
+    "{minutes:g} CPU-minutes on the same samples, and judged on the same captures of `duet`; "
+    "those as shipped were trained longer."
 )
 HOW: Final = (
     "Written by `python -m tools.methods judge`; `python -m tools.methods chart` draws it.",
@@ -24,9 +25,9 @@ HOW: Final = (
         "`camkit train`."
     ),
     (
-        "- **S and M** are those of the recipe; as shipped, they were trained longer. XS has half "
-        "the work of S (2.4 kMAC/px); taught, it is fitted to M's result as much as to the truth. "
-        "The U-Net on the capture is M with three planes."
+        "- **S and M** are those of the recipe. XS has half the work of S (2.4 kMAC/px); taught, "
+        "it is fitted to M's result as much as to the truth. The U-Net on the capture is M with "
+        "three planes."
     ),
     (
         "- **NAFNet** has width 16 and one block a scale (20.3 kMAC/px; the published depth takes "

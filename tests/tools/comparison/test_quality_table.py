@@ -44,6 +44,7 @@ def report(measurements: list[Measurement]) -> dict[str, object]:
         "json_name": "quality.json",
         "bundle": {"name": "tiny"},
         "machine": {"cpu": "a processor", "cores": 2},
+        "earlier_runs": {"another processor": ["input", "admm_tv"]},
         "protocol": {"text": ["as stated"]},
         "tuned": {
             "data": "valid",
@@ -92,6 +93,7 @@ def test_the_page_holds_every_number_and_says_which_aims_were_reached() -> None:
     assert "1 (5.0 mm), n = 2" in page
     assert "the bundle's own PSF" in page
     assert "ADMM-TV: weight 20, iterations 12 at ISO 100." in page
+    assert "run on another processor measured input (developed only) and ADMM-TV." in page
     assert "`python -m tools.quality --psf fresh`, then `python -m tools.quality --resume`" in page
 
 
