@@ -6,13 +6,12 @@ from pathlib import Path
 from typing import Any, Final
 
 from camkit.errors import DecodeError
+from camkit.report.view.record_shape import record_fault
 from camkit.runtime.files.in_memory import FilePath
 from camkit.runtime.output.sidecar import SIDECAR_SUFFIX, read_sidecar, sidecar_path
 from camkit.runtime.raw import file_sha256
 
 ARCHIVE_SUFFIX: Final = ".npz"
-_TYPES: Final = {"seconds": dict, "plan": dict, "options": dict, "warnings": list, "output": str}
-"""Of what a page reads in a sidecar."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,8 +95,10 @@ def read_record(sidecar: Path) -> dict[str, Any]:
     if not sidecar.is_file():
         raise DecodeError(f"cannot read {sidecar}: there is no such file")
     record = read_sidecar(_any_output(sidecar))
-    if record is None or any(not isinstance(record.get(k), v) for k, v in _TYPES.items()):
+    if record is None:
         raise DecodeError(f"{sidecar} is damaged, or not a sidecar of this version of camkit")
+    if (fault := record_fault(record)) is not None:
+        raise DecodeError(f"{sidecar} was edited: {fault}")
     return record
 
 
