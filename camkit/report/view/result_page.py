@@ -197,7 +197,8 @@ def _map_note(maps: Sequence[ValueMap]) -> str:
     part = "" if maps[0].stride == 1 else f" One of {maps[0].stride} px along each side is shown."
     return (
         f"The map has {width} x {height} px, {maps[0].valid:.1%} of them valid; others are grey."
-        f"{part} Colours run between the percentiles 2 and 98, values beyond have the colours of the ends."
+        f"{part} Colours run between the percentiles 2 and 98, values beyond have the colours of "
+        "the ends."
     )
 
 

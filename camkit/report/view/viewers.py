@@ -117,8 +117,8 @@ def map_viewer(name: str, maps: Sequence[ValueMap]) -> Widget:
     controls = [
         _buttons("Map", [one.name for one in maps]),
         f'<div class="stage" tabindex="0" role="group" aria-label="{escaped(name)}: arrow keys '
-        'move the cross, the values stand below"><div class="layers"><canvas class="values" role="img">'
-        '</canvas><div class="cross" hidden></div></div></div>',
+        'move the cross, the values stand below"><div class="layers">'
+        '<canvas class="values" role="img"></canvas><div class="cross" hidden></div></div></div>',
         '<div class="scale"><output class="low"></output><canvas class="ramp" width="256" '
         'height="1" aria-hidden="true"></canvas><output class="high"></output></div>',
         '<p class="readout" aria-live="polite">Point at a pixel, or press an arrow key in the map, '
