@@ -13,6 +13,7 @@ from camkit.export.foreign import adding, inspection
 from camkit.export.foreign.contract import Contract, read_contract, to_contract
 from camkit.export.foreign.inspection import Inspection
 from camkit.export.foreign.onnx_file import ForeignModel, read_model
+from camkit.extras import require_packages
 from camkit.field_types import checked
 from camkit.models_def.face.torch_need import require_torch
 from camkit.progress import working
@@ -85,10 +86,12 @@ def add_network(
 
     Raises:
         ContractError: If network, contract and camera do not go together; names all of it.
-        UnsupportedError: If operators of the network cannot be taken; names all of them.
+        UnsupportedError: If operators of the network cannot be taken; names all of them. If what
+            draws the preview is not installed.
         ParityError: If a proof fails; nothing is written then.
     """
     refuse_existing([Path(out)], overwrite=overwrite)
+    require_packages(f"{command_text('network add')} needs", "judge", ("matplotlib",))
     terms = _contract(contract)
     if pairs is not None:
         terms = replace(terms, pairs=Path(pairs))
@@ -127,7 +130,7 @@ def _model(path: Path, module: str | None, config: Mapping[str, Any], command: s
         if module is not None:
             raise ContractError(f"{option_text('module')} belongs to a state dict, not to an ONNX")
         return read_model(path)
-    require_torch(command_text(command))
+    require_torch(command_text(command), "onnxscript")
     with working(f"loading torch for {path.name}"):
         from camkit.export.foreign.state_dict import model_of_state_dict
 

@@ -4,7 +4,6 @@ import json
 import os
 import platform
 import sys
-from importlib import util
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -12,6 +11,7 @@ from typing import Any
 from camkit.cli.choices import Debug, Json
 from camkit.cli.say import say
 from camkit.errors import CamkitError
+from camkit.extras import JUDGE, install_text, missing_packages
 
 PACKAGES = [
     "numpy",
@@ -33,8 +33,8 @@ PACKAGES = [
     "onnxscript",
 ]
 PURPOSES = {
-    "charts, pages and scores of pictures": ("judge", ("matplotlib", "skimage")),
-    "design, training and export": ("train", ("torch", "onnxscript")),
+    "charts, pages and scores of pictures": ("judge", JUDGE),
+    "design, training and export": ("train", ("torch", "onnxscript", *JUDGE)),
     "photon files (.h5, .mat, .ptu, .sdt)": ("spad", ("h5py", "ptufile", "sdtfile")),
     "TIFFs of rare codecs": ("tiff", ("imagecodecs",)),
     "batches on many machines": ("batch", ("distributed",)),
@@ -101,8 +101,8 @@ def ready_for() -> dict[str, str]:
         cameras = ", ".join(missing)
         states[f"the cameras {cameras}"] = "not installed: pip install camkit-bundles"
     for purpose, (extra, modules) in PURPOSES.items():
-        missing = [module for module in modules if util.find_spec(module) is None]
-        states[purpose] = f"not installed: pip install 'camkit[{extra}]'" if missing else "ready"
+        is_ready = not missing_packages(modules)
+        states[purpose] = "ready" if is_ready else f"not installed: {install_text(extra)}"
     return states
 
 
