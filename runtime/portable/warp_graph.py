@@ -138,25 +138,18 @@ def warp_graph(facts: CameraFacts, *, limited: bool) -> GraphBuilder:
 
 
 def _limited(graph: GraphBuilder, planes: Value, at: Value, values: Value) -> Value:
-    """Return values within the range of their samples, see `resampled_limited`.
-
-    Whether samples lie on both sides of white is asked at the nearest place within the capture.
-    """
+    """Return values within the range of their samples, see `resampled_limited`."""
     pads = np.array([0, 0, BORDER_PX, BORDER_PX] * 2, np.int64)
     wide = graph.node("Pad", planes, pads, mode="edge")
-    first = BORDER_PX - 1.0
-    whole = at.floor() + first
-    sides = graph.node("Cast", graph.node("Shape", planes).gather(np.array([3, 2]), 0), to=1)
-    inside = graph.node("Min", whole.at_least(first), _long_row(graph, sides + (first - 1.0)))
-    highest = graph.node("MaxPool", wide, kernel_shape=[4, 4])
-    lowest = graph.node("MaxPool", wide * -1.0, kernel_shape=[4, 4]) * -1.0
-    is_lit, is_dark = (
-        graph.node("Greater", highest, WHITE),
-        graph.node("LessOrEqual", lowest, WHITE),
-    )
-    rims = graph.node("Cast", graph.node("And", is_lit, is_dark), to=1)
-    rim = graph.node("Greater", _sampled(graph, rims, inside, "nearest"), 0.5)
-    low, high = (_sampled(graph, planes, whole, "nearest") for planes in (lowest, highest))
+    whole = at.floor() + (BORDER_PX - 1.0)
+
+    def most(samples: Value) -> Value:
+        pooled = graph.node("MaxPool", samples, kernel_shape=[4, 4])
+        return _sampled(graph, pooled, whole, "nearest")
+
+    high, low = most(wide), most(wide * -1.0) * -1.0
+    is_lit, is_dark = graph.node("Greater", high, WHITE), graph.node("LessOrEqual", low, WHITE)
+    rim = graph.node("And", is_lit, is_dark)
     limited = graph.node("Or", rim, graph.node("Less", values, FLOOR))
     return graph.node("Where", limited, values.at_least(low).at_most(high), values)
 
