@@ -94,12 +94,19 @@ def examine() -> dict[str, Any]:
 
 def ready_for() -> dict[str, str]:
     """Return what can be done here, and what is missing for the rest."""
-    from camkit.bundle.reader import missing_bundles
+    from camkit import __version__
+    from camkit.bundle.reader import install_bundles_text, missing_bundles
+    from camkit.report.bench.machine import package_version
 
     states = {"pictures of captures": "ready"}
     if missing := missing_bundles():
         cameras = ", ".join(missing)
-        states[f"the cameras {cameras}"] = "not installed: pip install camkit-bundles"
+        states[f"the cameras {cameras}"] = f"not installed: {install_bundles_text()}"
+    installed_version = package_version("camkit-bundles")
+    if installed_version not in {None, __version__}:
+        states["the cameras of camkit-bundles"] = (
+            f"of camkit {installed_version}, this is {__version__}: {install_bundles_text()}"
+        )
     for purpose, (extra, modules) in PURPOSES.items():
         is_ready = not missing_packages(modules)
         states[purpose] = "ready" if is_ready else f"not installed: {install_text(extra)}"
