@@ -137,7 +137,7 @@ def photons_before(result: ViewedResult, shape: tuple[int, int]) -> tuple[Any | 
     try:
         developed = load("none", kind="spad", product="intensity", **choices).run(source)
         photons = developed.arrays["intensity"]
-    except (CamkitError, KeyError) as error:
+    except (CamkitError, OSError, KeyError) as error:
         return None, f"There is no before: {error}."
     times = shape[0] // photons.shape[-2]
     large = photons.repeat(times, axis=-2).repeat(times, axis=-1) if times else photons

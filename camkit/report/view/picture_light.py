@@ -12,7 +12,7 @@ from camkit.arrays import FloatArray
 from camkit.bundle.reader import find_bundle, open_bundle
 from camkit.caller import option_text
 from camkit.errors import CamkitError, ContractError, DecodeError
-from camkit.report.view.result_search import ViewedResult
+from camkit.report.view.result_search import ViewedResult, is_there
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.files.picture import read_orientation, read_scene
 from camkit.runtime.geometry.turning import turn
@@ -106,7 +106,7 @@ def _own_original(result: ViewedResult, capture: Path | None, size_px: tuple[int
     bundle = _bundle_of(result.record)
     try:
         light = _developed(source, *_settings(result.record, bundle), bundle=bundle)
-    except CamkitError as error:
+    except (CamkitError, OSError) as error:
         return Original(light=None, note=f"There is no before: {error}; {_advice()}.")
     if light.shape[1:] != size_px:
         sizes = f"it is {_size_text(light.shape[1:])}, the result {_size_text(size_px)}"
@@ -124,7 +124,7 @@ def _is_capture(file: Path, record: Mapping[str, Any] | None) -> bool:
     """Return whether a file is the very capture of a sidecar, wherever it lies now."""
     if record is None or not file.is_file():
         return False
-    return file_sha256(file) == record["input_sha256"]
+    return bool(file_sha256(file) == record["input_sha256"])
 
 
 def _bundle_of(record: Mapping[str, Any]) -> str:
@@ -134,7 +134,7 @@ def _bundle_of(record: Mapping[str, Any]) -> str:
         return _NONE
     try:
         bundle = open_bundle(find_bundle(str(name)))
-    except CamkitError:
+    except (CamkitError, OSError):
         return _NONE
     return str(bundle.path) if bundle.sha256 == record["bundle_sha256"] else _NONE
 
@@ -155,12 +155,15 @@ def find_capture(result: ViewedResult) -> tuple[Path | None, str]:
         base / named_file.name,
         base.parent / named_file.name,
     )
-    files = [place for place in places if place.is_file()]
+    files = [place for place in places if is_there(place)]
     if not files:
         return None, f"the capture {named_file} is not there"
-    for file in files:
-        if file_sha256(file) == record.get("input_sha256"):
-            return file, ""
+    try:
+        for file in files:
+            if file_sha256(file) == record.get("input_sha256"):
+                return file, ""
+    except OSError as error:
+        return None, f"the capture cannot be read: {error.strerror}"
     return None, f"{files[0]} is not the capture that was processed: its hash differs"
 
 

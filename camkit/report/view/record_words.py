@@ -95,7 +95,7 @@ def _ranges(record: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
         return {}
     try:
         bundle = open_bundle(find_bundle(str(name)))
-    except CamkitError:
+    except (CamkitError, OSError):
         return {}
     if bundle.sha256 != record["bundle_sha256"]:
         return {}

@@ -81,6 +81,14 @@ def _result_of(path: Path) -> ViewedResult:
     return _believed_result(path, read_record(file), is_sidecar=is_sidecar)
 
 
+def is_there(path: Path) -> bool:
+    """Return whether a file that a sidecar names is there, for this user."""
+    try:
+        return path.is_file()
+    except OSError:
+        return False
+
+
 def is_sidecar_name(path: Path) -> bool:
     """Return whether a file has the name of a sidecar."""
     return path.name.endswith(SIDECAR_SUFFIX)
@@ -113,7 +121,7 @@ def _believed_result(path: Path, record: dict[str, Any], *, is_sidecar: bool) ->
     if not is_sidecar and path.name not in {main.name, *names}:
         note = f"the sidecar beside it names {main.name}, not this file"
         return ViewedResult(path=path, record=record, notes=(note,))
-    if not main.is_file():
+    if not is_there(main):
         raise DecodeError(f"cannot read {main}, which its sidecar names: there is no such file")
     changed = record["output_sha256"] != file_sha256(main)
     note = "the file was changed after it was made: its hash is not that of the sidecar"

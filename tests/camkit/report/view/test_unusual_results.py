@@ -22,7 +22,7 @@ from camkit.report.view.result_search import ViewedResult, find_results, read_re
 from camkit.runtime.output.sidecar import sidecar_path
 from tests.dng_factory import write_scene
 
-CHANGES: Final = (None, "word", "", -1, [], {"word": None}, float("nan"))
+CHANGES: Final = (None, "word", "a" * 5000, "", -1, [], {"word": None}, float("nan"))
 
 
 def _write_png(path: Path, height: int = 20, width: int = 30) -> Path:
