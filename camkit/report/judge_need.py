@@ -3,7 +3,7 @@
 `camkit process` uses none of them, so they are an extra.
 """
 
-from camkit.extras import JUDGE, require_packages
+from camkit.entry_points import JUDGE, require_packages
 
 
 def require_judge() -> None:

@@ -8,12 +8,12 @@ from typing import Any
 
 from camkit.bundle.reader import find_bundle, open_bundle
 from camkit.caller import command_text, option_text
+from camkit.entry_points import require_packages
 from camkit.errors import ContractError
 from camkit.export.foreign import adding, inspection
 from camkit.export.foreign.contract import Contract, read_contract, to_contract
 from camkit.export.foreign.inspection import Inspection
 from camkit.export.foreign.onnx_file import ForeignModel, read_model
-from camkit.extras import require_packages
 from camkit.field_types import checked
 from camkit.models_def.face.torch_need import require_torch
 from camkit.progress import working

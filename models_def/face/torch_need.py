@@ -1,6 +1,6 @@
 """The check that torch is there, and what comes with it."""
 
-from camkit.extras import require_packages
+from camkit.entry_points import require_packages
 
 
 def require_torch(command: str, *others: str) -> None:

@@ -10,8 +10,8 @@ from typing import Any
 
 from camkit.cli.choices import Debug, Json
 from camkit.cli.say import say
+from camkit.entry_points import JUDGE, install_text, missing_packages
 from camkit.errors import CamkitError
-from camkit.extras import JUDGE, install_text, missing_packages
 
 PACKAGES = [
     "numpy",

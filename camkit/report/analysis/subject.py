@@ -30,8 +30,8 @@ from camkit.bundle.reader import (
     open_bundle,
 )
 from camkit.bundle.sensor import BayerSensor, ColorSensor
+from camkit.entry_points import install_text
 from camkit.errors import ContractError, UnsupportedError
-from camkit.extras import install_text
 from camkit.radial import RadialDistortion
 from camkit.report.analysis.frozen_image import frozen_images, sensor_heights_mm
 from camkit.report.analysis.physical import write_camera

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from camkit.caller import command_text, option_text
+from camkit.entry_points import JUDGE
 from camkit.errors import ContractError
-from camkit.extras import JUDGE
 from camkit.field_types import checked
 from camkit.models_def.face.recipe_writing import CameraWords
 from camkit.models_def.face.torch_need import require_torch

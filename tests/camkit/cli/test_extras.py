@@ -10,7 +10,8 @@ import pytest
 import typer.main
 
 from camkit.cli.app import app
-from camkit.extras import JUDGE, install_text
+from camkit.entry_points import JUDGE, install_text
+from tests.data_folder import ROOT
 
 BLOCKED: Final = (*JUDGE, "torch", "onnxscript")
 FREE: Final = (
@@ -78,6 +79,7 @@ def _run(folder: Path, lines: list[str], blocked: tuple[str, ...]) -> dict[str, 
     """Return what a fresh process without these modules says on stderr, by line."""
     code = (
         "import contextlib, importlib.machinery, io, json, sys, traceback\n"
+        f"sys.path.insert(0, {str(ROOT)!r})\n"
         "class Finder(importlib.machinery.PathFinder):\n"
         "    @classmethod\n"
         "    def find_spec(cls, name, *args):\n"

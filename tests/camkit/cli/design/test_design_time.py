@@ -12,7 +12,7 @@ from safetensors.numpy import load
 import camkit
 from camkit.bundle.psf_file import read_source
 from camkit.cli.exit_code import ExitCode
-from camkit.extras import install_text
+from camkit.entry_points import install_text
 from camkit.stopwatch import Stopwatch
 
 RECIPE = Path(__file__).resolve().parents[4] / "models_def" / "recipes" / "duet.toml"
