@@ -57,8 +57,7 @@ def show(
     from camkit.report.judge_need import require_judge
 
     require_torch("camkit lens show")
-    folder, name = out_dir if out_dir is not None or json_ else Path(), file.stem
-    if folder is not None:
+    if out_dir is not None or not json_:
         require_judge()
     from camkit.models_def.optics.analysis.sampling import DEFAULT_SAMPLING, Pupil
     from camkit.models_def.optics.analysis.state_facts import state_facts
@@ -72,6 +71,7 @@ def show(
     from camkit.report.pages.page import page_path
 
     asked_pupil = Pupil(definition=pupil or "stop", sampling=sampling or DEFAULT_SAMPLING)  # type: ignore[arg-type]
+    folder, name = out_dir if out_dir is not None or json_ else Path(), file.stem
     if folder is not None and folder.suffix.lower() == PAGE and not folder.is_dir():
         folder, name = folder.parent, folder.stem
     if folder is not None:
