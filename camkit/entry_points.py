@@ -1,14 +1,21 @@
-"""Entry points of installed packages: all that camkit imports by a name that it did not know.
+"""Installed packages: entry points that camkit imports by name, and the packages of extras.
 
 A name is looked up among those that are installed and is never imported itself, so that no file
-can choose a module.
+can choose a module. What needs an extra says so before it computes anything.
 """
 
+from collections.abc import Iterable
 from functools import cache
 from importlib import import_module, metadata, util
 from types import ModuleType
+from typing import Final
 
-from camkit.errors import ContractError
+from camkit.errors import ContractError, UnsupportedError
+
+JUDGE: Final = ("matplotlib", "skimage")
+"""Modules of charts, pages and scores of pictures."""
+_NAMES: Final = {"skimage": "scikit-image"}
+"""Import name -> name to install, where it is another one."""
 
 
 @cache
@@ -59,3 +66,30 @@ def has_module(name: str) -> bool:
         if f"{name}.".startswith(f"{error.name}."):
             return False
         raise
+
+
+def install_text(extra: str) -> str:
+    """Return the command that installs an extra."""
+    return f"pip install 'camkit[{extra}]'"
+
+
+def missing_packages(modules: Iterable[str]) -> list[str]:
+    """Return the names of the packages that are not installed, of modules by their import name."""
+    return [_NAMES.get(name, name) for name in modules if util.find_spec(name) is None]
+
+
+def require_packages(need: str, extra: str, modules: Iterable[str]) -> None:
+    """Raise an error that says how to install what is missing.
+
+    Args:
+        need: What needs them, with its verb: "camkit export needs".
+        extra: Which brings them.
+        modules: Their import names.
+
+    Raises:
+        UnsupportedError: If one cannot be imported.
+    """
+    if missing := missing_packages(modules):
+        raise UnsupportedError(
+            f"{need} {' and '.join(missing)}; install with: {install_text(extra)}"
+        )

@@ -73,9 +73,10 @@ def bundle(
     Raises:
         ContractError: If parts are missing or contradict each other, or `out` exists.
         ParityError: If torch and ONNX, or the bundle and its golden cases, disagree.
-        UnsupportedError: If torch is not installed.
+        UnsupportedError: If torch or what draws the preview is not installed.
     """
-    require_torch(command_text("export"))
+    tracing = ("onnxscript",) if network else ()
+    require_torch(command_text("export"), "matplotlib", *tracing)
     refuse_existing([Path(out)], overwrite=overwrite)
     several = [checkpoints] if isinstance(checkpoints, str | PathLike) else checkpoints
     paths = tuple(map(Path, several))

@@ -11,6 +11,7 @@ import hashlib
 import importlib.resources
 import importlib.util
 import math
+import sys
 import tomllib
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -499,6 +500,13 @@ def missing_bundles() -> list[str]:
     return sorted(listed.keys() - built_in_bundles().keys())
 
 
+def install_bundles_text() -> str:
+    """Return the command that installs the built-in bundles of this version, whatever is there."""
+    # the face imports all that lies above, so that it is named here, not imported
+    version = sys.modules["camkit"].__dict__["__version__"]
+    return f"pip install camkit-bundles=={version}"
+
+
 def is_built_in(bundle: Bundle) -> bool:
     """Return whether a bundle lies where those that come with camkit do."""
     path = built_in_bundles().get(bundle.path.stem)
@@ -519,9 +527,10 @@ def find_bundle(name_or_path: str | Path) -> Path:
         return path
     if path.suffix == SUFFIX or path.name != text:
         raise BundleError(f"there is no bundle file {text}")
-    if text in missing_bundles():
-        raise BundleError(f"{text} is not installed: pip install camkit-bundles")
-    near = difflib.get_close_matches(text, bundles, n=3)
+    missing = missing_bundles()
+    if text in missing:
+        raise BundleError(f"{text} is not installed: {install_bundles_text()}")
+    near = difflib.get_close_matches(text, [*bundles, *missing], n=3)
     hint = f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(bundles)}."
     raise BundleError(
         f"no built-in bundle is called {text!r}; {hint if bundles else 'there is none.'} "

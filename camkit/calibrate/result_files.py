@@ -6,12 +6,14 @@ from pathlib import Path
 from typing import Final
 
 from camkit.errors import ContractError
+from camkit.report.judge_need import require_judge
 from camkit.runtime.files.in_memory import FilePath, optional_path
 from camkit.runtime.output.part_file import refuse_existing, write_together
 
+PAGE: Final = ".html"
 KINDS: Final = {
     ".camkit": "a bundle is a CAMKIT file",
-    ".html": "a page is HTML",
+    PAGE: "a page is HTML",
     ".safetensors": "a PSF is safetensors",
     ".toml": "a calibration is TOML",
     ".xml": "an entry of lensfun is XML",
@@ -23,11 +25,14 @@ def check_result(path: FilePath | None, suffix: str, *, overwrite: bool) -> Path
 
     Raises:
         ContractError: If its name is of another kind, or it exists and may not be replaced.
+        UnsupportedError: If it is a page, and what draws charts is not installed.
     """
     file = optional_path(path)
     if file is not None and file.suffix.lower() != suffix:
         raise ContractError(f"{KINDS[suffix]}; expected a name in {suffix}, got {file}")
     refuse_existing([file], overwrite=overwrite)
+    if file is not None and suffix == PAGE:
+        require_judge()
     return file
 
 
@@ -37,7 +42,7 @@ def check_results(
     """Return the paths of a result and of its page; see `check_result`."""
     return (
         check_result(out, suffix, overwrite=overwrite),
-        check_result(page, ".html", overwrite=overwrite),
+        check_result(page, PAGE, overwrite=overwrite),
     )
 
 

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 else:  # matplotlib is imported by what draws
     Panel = Figure = object
 
-require_judge()
-
 FIELD_COLORS: Final = ("#1f6fb4", "#2e8b57", "#c8452f", "#8855aa", "#b8860b", "#008b8b")
 CHANNEL_COLORS: Final = {"R": "#c8452f", "G": "#2e8b57", "B": "#1f6fb4"}
 MARKS: Final = ("o", "+", "x", "s", "^", "d")
@@ -78,6 +76,7 @@ def chart(draw: Callable[_P, Figure]) -> Callable[_P, Figure]:
 
     @wraps(draw)
     def styled(*args: _P.args, **kwargs: _P.kwargs) -> Figure:
+        require_judge()
         from matplotlib import rc_context
 
         with rc_context(STYLE):
@@ -93,6 +92,7 @@ def chart(draw: Callable[_P, Figure]) -> Callable[_P, Figure]:
 
 def new_figure(width_in: float, height_in: float) -> Figure:
     """Return an empty figure that belongs to no window."""
+    require_judge()
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -1,21 +1,9 @@
-"""The packages that charts, pages and scores of pictures need, and the way to install them.
+"""The check that the packages are there which charts, pages and scores of pictures need.
 
-`camkit process` uses neither, so they are an extra.
+`camkit process` uses none of them, so they are an extra.
 """
 
-from importlib import util
-from typing import Final
-
-from camkit.errors import UnsupportedError
-
-INSTALLED_BY: Final = "pip install 'camkit[judge]'"
-PACKAGES: Final = {"matplotlib": "matplotlib", "skimage": "scikit-image"}
-"""Import name -> name to install."""
-
-
-def missing_packages() -> list[str]:
-    """Return the names of those that are not installed."""
-    return [name for module, name in PACKAGES.items() if util.find_spec(module) is None]
+from camkit.entry_points import JUDGE, require_packages
 
 
 def require_judge() -> None:
@@ -24,8 +12,4 @@ def require_judge() -> None:
     Raises:
         UnsupportedError: If matplotlib or scikit-image cannot be imported.
     """
-    if missing := missing_packages():
-        raise UnsupportedError(
-            f"pages, charts and scores of pictures need {' and '.join(missing)}; "
-            f"install with: {INSTALLED_BY}"
-        )
+    require_packages("pages, charts and scores of pictures need", "judge", JUDGE)

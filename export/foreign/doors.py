@@ -8,6 +8,7 @@ from typing import Any
 
 from camkit.bundle.reader import find_bundle, open_bundle
 from camkit.caller import command_text, option_text
+from camkit.entry_points import require_packages
 from camkit.errors import ContractError
 from camkit.export.foreign import adding, inspection
 from camkit.export.foreign.contract import Contract, read_contract, to_contract
@@ -85,10 +86,12 @@ def add_network(
 
     Raises:
         ContractError: If network, contract and camera do not go together; names all of it.
-        UnsupportedError: If operators of the network cannot be taken; names all of them.
+        UnsupportedError: If operators of the network cannot be taken; names all of them. If what
+            draws the preview is not installed.
         ParityError: If a proof fails; nothing is written then.
     """
     refuse_existing([Path(out)], overwrite=overwrite)
+    require_packages(f"{command_text('network add')} needs", "judge", ("matplotlib",))
     terms = _contract(contract)
     if pairs is not None:
         terms = replace(terms, pairs=Path(pairs))
@@ -127,7 +130,7 @@ def _model(path: Path, module: str | None, config: Mapping[str, Any], command: s
         if module is not None:
             raise ContractError(f"{option_text('module')} belongs to a state dict, not to an ONNX")
         return read_model(path)
-    require_torch(command_text(command))
+    require_torch(command_text(command), "onnxscript")
     with working(f"loading torch for {path.name}"):
         from camkit.export.foreign.state_dict import model_of_state_dict
 

@@ -1,19 +1,16 @@
-"""The check that torch is there, and the way to install it."""
+"""The check that torch is there, and what comes with it."""
 
-from importlib import util
-from typing import Final
-
-from camkit.errors import UnsupportedError
-
-INSTALLED_BY: Final = "pip install 'camkit[train]'"
-"""What the design side needs."""
+from camkit.entry_points import require_packages
 
 
-def require_torch(command: str) -> None:
+def require_torch(command: str, *others: str) -> None:
     """Raise an error that says how to install torch, if it is not there.
 
+    Args:
+        command: What needs it.
+        others: Modules that it needs too, by their import names.
+
     Raises:
-        UnsupportedError: If torch cannot be imported.
+        UnsupportedError: If one cannot be imported.
     """
-    if util.find_spec("torch") is None:
-        raise UnsupportedError(f"{command} needs torch; install with: {INSTALLED_BY}")
+    require_packages(f"{command} needs", "train", ("torch", *others))

@@ -72,8 +72,11 @@ def design(
 ) -> None:
     """Design a lens together with the network that removes its blur (needs torch)."""
     from camkit.cli.design.design_time import require_torch
+    from camkit.report.judge_need import require_judge
 
     require_torch("camkit design")
+    if pictures:
+        require_judge()
     from camkit.models_def.design.design_recipe import read_design, with_choices
     from camkit.models_def.design.run import DesignOptions, DesignRun
 

@@ -87,9 +87,6 @@ def make(
     page. After an interruption the same command repeats no finished step.
     """
     from camkit.models_def.face.recipe_writing import CameraWords
-    from camkit.models_def.face.torch_need import require_torch
-
-    require_torch("camkit make")
     from camkit.report.making.camera_making import make as make_camera
 
     camera = CameraWords(

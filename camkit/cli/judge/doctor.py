@@ -4,13 +4,13 @@ import json
 import os
 import platform
 import sys
-from importlib import util
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 from camkit.cli.choices import Debug, Json
 from camkit.cli.say import say
+from camkit.entry_points import JUDGE, install_text, missing_packages
 from camkit.errors import CamkitError
 
 PACKAGES = [
@@ -33,8 +33,8 @@ PACKAGES = [
     "onnxscript",
 ]
 PURPOSES = {
-    "charts, pages and scores of pictures": ("judge", ("matplotlib", "skimage")),
-    "design, training and export": ("train", ("torch", "onnxscript")),
+    "charts, pages and scores of pictures": ("judge", JUDGE),
+    "design, training and export": ("train", ("torch", "onnxscript", *JUDGE)),
     "photon files (.h5, .mat, .ptu, .sdt)": ("spad", ("h5py", "ptufile", "sdtfile")),
     "TIFFs of rare codecs": ("tiff", ("imagecodecs",)),
     "batches on many machines": ("batch", ("distributed",)),
@@ -94,15 +94,22 @@ def examine() -> dict[str, Any]:
 
 def ready_for() -> dict[str, str]:
     """Return what can be done here, and what is missing for the rest."""
-    from camkit.bundle.reader import missing_bundles
+    from camkit import __version__
+    from camkit.bundle.reader import install_bundles_text, missing_bundles
+    from camkit.report.bench.machine import package_version
 
     states = {"pictures of captures": "ready"}
     if missing := missing_bundles():
         cameras = ", ".join(missing)
-        states[f"the cameras {cameras}"] = "not installed: pip install camkit-bundles"
+        states[f"the cameras {cameras}"] = f"not installed: {install_bundles_text()}"
+    installed_version = package_version("camkit-bundles")
+    if installed_version not in {None, __version__}:
+        states["the cameras of camkit-bundles"] = (
+            f"of camkit {installed_version}, this is {__version__}: {install_bundles_text()}"
+        )
     for purpose, (extra, modules) in PURPOSES.items():
-        missing = [module for module in modules if util.find_spec(module) is None]
-        states[purpose] = f"not installed: pip install 'camkit[{extra}]'" if missing else "ready"
+        is_ready = not missing_packages(modules)
+        states[purpose] = "ready" if is_ready else f"not installed: {install_text(extra)}"
     return states
 
 

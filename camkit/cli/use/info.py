@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
+from camkit.caller import command_text
 from camkit.cli.choices import Debug, Json
 from camkit.cli.say import say
 from camkit.cli.use.mosaic import BlackLevel, MosaicCfa, WhiteLevel, mosaic_options
@@ -17,6 +18,11 @@ if TYPE_CHECKING:
 PSF_SUFFIX: Final = ".safetensors"
 LONGEST: Final = 300
 """Characters of a value of a part of a list that are printed."""
+ELSEWHERE: Final = {
+    **dict.fromkeys((".zmx", ".json"), ("a lens", "lens show")),
+    **dict.fromkeys((".onnx", ".pt", ".pth"), ("a network", "network inspect")),
+}
+"""Suffix of a file that another command describes -> what it is, the command."""
 
 
 def info(
@@ -78,6 +84,12 @@ def _describe(file: str, mosaic: Any) -> dict[str, Any]:
         return _describe_bundle(file)
     if path.suffix.lower() == PSF_SUFFIX:
         return _describe_psf_file(path)
+    if path.suffix.lower() in ELSEWHERE:
+        what, command = ELSEWHERE[path.suffix.lower()]
+        raise ContractError(
+            f"{file} is {what} by its name; `{command_text(command)}` describes it. This command "
+            "describes bundles, PSFs, captures and sidecars"
+        )
     if not (path.exists() or path.suffix):
         from camkit.bundle.reader import find_bundle
 

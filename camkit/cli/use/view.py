@@ -15,7 +15,7 @@ def view(
         list[str],
         typer.Argument(help="Results, sidecars or folders with sidecars.", metavar="RESULT..."),
     ],
-    out: Annotated[Path, typer.Option("-o", "--out", help="Page to write (.html).")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="Page to write, NAME.html.")],
     before_file: Annotated[
         Path | None,
         typer.Option(

@@ -26,9 +26,11 @@ from camkit.bundle.reader import (
     Bundle,
     built_in_bundles,
     find_bundle,
+    missing_bundles,
     open_bundle,
 )
 from camkit.bundle.sensor import BayerSensor, ColorSensor
+from camkit.entry_points import install_text
 from camkit.errors import ContractError, UnsupportedError
 from camkit.radial import RadialDistortion
 from camkit.report.analysis.frozen_image import frozen_images, sensor_heights_mm
@@ -84,7 +86,9 @@ def find_subject(name: str, like: ColorSensor | None = None) -> Subject:
         BundleError: If a bundle or a frozen PSF is missing or damaged.
         UnsupportedError: If a bundle counts photons, or a lens needs torch and there is none.
     """
-    if name in built_in_bundles() or name.lower().endswith(SUFFIX):
+    # a lens of the same name must not stand for a bundle that is not installed
+    is_bundle = name in {*built_in_bundles(), *missing_bundles()}
+    if is_bundle or name.lower().endswith(SUFFIX):
         return _of_bundle(name)
     sensor = usual_sensor() if like is None else like
     if name.lower().endswith(PSF_SUFFIX):
@@ -92,7 +96,7 @@ def find_subject(name: str, like: ColorSensor | None = None) -> Subject:
     if util.find_spec("torch") is None:
         raise UnsupportedError(
             f"{name} is no bundle and no frozen optics; lenses and pinholes are traced, which "
-            "needs torch: pip install torch"
+            f"needs torch: {install_text('train')}"
         )
     hole = PINHOLE.fullmatch(name)
     return _of_lens(name, sensor) if hole is None else _of_hole(name, hole, sensor)

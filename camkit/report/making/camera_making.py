@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from camkit.caller import command_text, option_text
+from camkit.entry_points import JUDGE
 from camkit.errors import ContractError
 from camkit.field_types import checked
 from camkit.models_def.face.recipe_writing import CameraWords
@@ -72,7 +73,7 @@ def make(
         ContractError: If a word is wrong, or files exist that other words made.
         UnsupportedError: If torch is not installed, or the lens holds what camkit does not trace.
     """
-    require_torch(command_text("make"))
+    require_torch(command_text("make"), "onnxscript", *JUDGE)
     path = Path(out)
     work_path = path.with_suffix(WORK_SUFFIX) if work_dir is None else Path(work_dir)
     if minutes < 0:

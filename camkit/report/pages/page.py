@@ -203,17 +203,22 @@ def _begun(note: str) -> str:
     return note if "." in note.split(maxsplit=1)[0].rstrip(".") else note[0].upper() + note[1:]
 
 
+def escaped(text: str) -> str:
+    """Return a text of any origin as markup; what UTF-8 cannot write is a visible escape."""
+    return escape(text.encode("utf-8", "backslashreplace").decode())
+
+
 def to_html(page: Page) -> str:
     """Return the text of a page."""
-    parts = [f"<h1>{escape(page.title)}</h1>", *map(_part, page.lead)]
+    parts = [f"<h1>{escaped(page.title)}</h1>", *map(_part, page.lead)]
     for section in page.sections:
-        place = f' id="{escape(section.anchor)}"' if section.anchor else ""
-        parts.append(f"<section{place}><h2>{escape(section.title)}</h2>")
+        place = f' id="{escaped(section.anchor)}"' if section.anchor else ""
+        parts.append(f"<section{place}><h2>{escaped(section.title)}</h2>")
         parts += [*map(_part, section.parts), "</section>"]
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width">'
-        f"<title>{escape(page.title)}</title><style>{STYLE}{page.style}</style></head>\n<body>"
+        f"<title>{escaped(page.title)}</title><style>{STYLE}{page.style}</style></head>\n<body>"
         + "\n".join(part for part in parts if part)
         + f"\n<script>{SCRIPT}{page.script}</script></body></html>\n"
     )
@@ -223,20 +228,20 @@ def _part(part: Part) -> str:
     if part is None:
         return ""
     if isinstance(part, str):
-        return f"<p>{escape(part)}</p>"
+        return f"<p>{escaped(part)}</p>"
     if isinstance(part, Words):
-        text = escape(part.text)
+        text = escaped(part.text)
         return f"<h3>{text}</h3>" if part.look == "head" else f'<p class="{part.look}">{text}</p>'
     if isinstance(part, Widget):
         return part.html
     if isinstance(part, Details):
-        title = escape(part.title)
+        title = escaped(part.title)
         return f"<details><summary>{title}</summary>{_table(part.table)}</details>"
     return _table(part) if isinstance(part, Table) else _picture(part)
 
 
 def _picture(picture: Picture) -> str:
-    is_png, caption = isinstance(picture.data, bytes), escape(picture.caption)
+    is_png, caption = isinstance(picture.data, bytes), escaped(picture.caption)
     data = picture.data if isinstance(picture.data, bytes) else picture.data.encode()
     source = f"data:image/{'png' if is_png else 'svg+xml'};base64,{base64.b64encode(data).decode()}"
     return (
@@ -246,9 +251,9 @@ def _picture(picture: Picture) -> str:
 
 
 def _table(table: Table) -> str:
-    titles = [f' title="{escape(text)}"' for text in table.meanings] or [""] * len(table.header)
+    titles = [f' title="{escaped(text)}"' for text in table.meanings] or [""] * len(table.header)
     heads = "".join(
-        f"<th{title}>{escape(text)}</th>" for text, title in zip(table.header, titles, strict=True)
+        f"<th{title}>{escaped(text)}</th>" for text, title in zip(table.header, titles, strict=True)
     )
     body = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in table.rows)
     head = f"<thead><tr>{heads}</tr></thead>" if heads else ""
@@ -257,12 +262,12 @@ def _table(table: Table) -> str:
 
 def _cell(cell: str | Cell) -> str:
     if isinstance(cell, str):
-        return f"<td>{escape(cell)}</td>"
-    text = escape(cell.text)
+        return f"<td>{escaped(cell)}</td>"
+    text = escaped(cell.text)
     if cell.anchor:
-        text = f'<a href="#{escape(cell.anchor)}">{text}</a>'
+        text = f'<a href="#{escaped(cell.anchor)}">{text}</a>'
     look = f' class="{cell.look}"' if cell.look else ""
-    value = "" if cell.value is None else f' data-value="{escape(str(cell.value))}"'
+    value = "" if cell.value is None else f' data-value="{escaped(str(cell.value))}"'
     return f"<td{look}{value}>{text}</td>"
 
 

@@ -34,6 +34,8 @@ def spared_cells(
         return None
     side, rows = int(cells["side_px"]), cells["rows"]
     height, width = size_px if orientation < 5 else size_px[::-1]
+    if len({*map(len, rows)}) != 1:
+        return None
     grid = np.array([list(row) for row in rows])
     if grid.shape != (-(-height // side), -(-width // side)):
         return None

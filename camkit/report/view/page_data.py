@@ -49,7 +49,8 @@ def light_scale(peak: float) -> LightScale:
 
 def coded_light(light: FloatArray, scale: LightScale) -> str:
     """Return light (3, h, w) as codes of its logarithm; differences along rows, then packed."""
-    place = np.log2(np.maximum(light, DARKEST / 2) / DARKEST) * (TOP_CODE - 1) / scale.stops
+    stops = np.log2(np.maximum(light, DARKEST / 2)) - np.log2(DARKEST)
+    place = stops * (TOP_CODE - 1) / scale.stops
     codes = np.clip(np.rint(place) + 1, 0, TOP_CODE).astype(np.uint16)
     steps = np.diff(codes, axis=2, prepend=np.uint16(0))
     halves = (steps & 0xFF).astype(np.uint8).tobytes() + (steps >> 8).astype(np.uint8).tobytes()

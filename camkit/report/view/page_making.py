@@ -15,6 +15,7 @@ from camkit.runtime.files.in_memory import FilePath, list_paths, optional_path
 from camkit.runtime.output.part_file import refuse_existing, write_together
 
 MOST_MB: Final = 150
+SUFFIXES: Final = frozenset({".html", ".htm"})
 _BYTES_PER_MB: Final = 1e6
 
 
@@ -55,7 +56,7 @@ def view(
     Args:
         results: Pictures (EXR, TIFF, PNG, JPEG, linear DNG) or archives of photons (NPZ) with the
             sidecars beside them, the sidecars, or folders of them.
-        out: The page to write, one HTML file.
+        out: The page to write, one file NAME.html.
         before_file: Picture or capture that stands on the left of the slider, for one picture;
             None for the capture that the sidecar names, developed alone.
         crops: (x, y) in px of parts to show at 100 %, beside those that are chosen.
@@ -63,10 +64,14 @@ def view(
 
     Raises:
         DecodeError: If a result cannot be read; names it.
-        ContractError: If the page exists or would be larger than `MOST_MB`, a part lies outside, or
-            `before_file` fits no result.
+        ContractError: If the page exists, is not NAME.html or would be larger than `MOST_MB`, a
+            part lies outside, or `before_file` fits no result.
     """
     path = Path(out)
+    if (
+        path.suffix.lower() not in SUFFIXES
+    ):  # of no result or capture, which a page must not replace
+        raise ContractError(f"the page must be named NAME.html; got {path}")
     refuse_existing([path], overwrite=overwrite)
     viewed = find_results(list_paths(results))
     if not viewed:
@@ -75,12 +80,9 @@ def view(
         raise ContractError(
             f"{option_text('before_file')} is for one result; there are {len(viewed)}"
         )
-    text = _with_size(result_page(viewed, optional_path(before_file), crops))
+    page = result_page(viewed, optional_path(before_file), crops, most_bytes=MOST_MB * 10**6)
+    text = _with_size(page)
     megabytes = len(text) / _BYTES_PER_MB
-    if megabytes > MOST_MB:
-        raise ContractError(
-            f"the page would have {megabytes:.0f} MB, more than {MOST_MB}: show fewer results on it"
-        )
     write_together({path: text})
     return ViewPage(path=path, results=tuple(one.path for one in viewed), megabytes=megabytes)
 

@@ -1,15 +1,12 @@
 """Maps and films of the archives that photons become."""
 
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.errors import DecodeError
 from camkit.report.view.picture_light import find_capture
 from camkit.report.view.result_search import ViewedResult
 from camkit.runtime.kinds.spad.products.preview import (
@@ -34,6 +31,8 @@ class ValueMap:
         name: What it shows.
         unit: Of the values.
         values: (h, w); NaN where there is none.
+        size_px: (height, width) of the whole map.
+        valid: Share of the pixels of the whole map that have a value.
         low, high: Between which its colours run.
         colours: Name of its colour map.
         is_turned: Whether low values have the colours of high ones: near is red.
@@ -43,6 +42,8 @@ class ValueMap:
     name: str
     unit: str
     values: NDArray[Any]
+    size_px: tuple[int, int]
+    valid: float
     low: float
     high: float
     colours: str
@@ -65,26 +66,6 @@ class Film:
     codes: NDArray[np.uint8]
     labels: tuple[str, ...]
     note: str
-
-
-def read_archive(path: Path) -> dict[str, NDArray[Any]]:
-    """Read the arrays of a result.
-
-    Raises:
-        DecodeError: If it is no archive of arrays, or holds none that photons become.
-    """
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise DecodeError(f"cannot read {path}: {error}") from error
-    products = {"depth_m", "lifetime_ps", "intensity", "frames", "transient"}
-    if not products & arrays.keys():
-        names = ", ".join(sorted(arrays)) or "nothing"
-        raise DecodeError(
-            f"{path} holds {names}; a result has one of {', '.join(sorted(products))}"
-        )
-    return arrays
 
 
 def maps_of(arrays: Mapping[str, NDArray[Any]]) -> list[ValueMap]:
@@ -156,7 +137,7 @@ def photons_before(result: ViewedResult, shape: tuple[int, int]) -> tuple[Any | 
     try:
         developed = load("none", kind="spad", product="intensity", **choices).run(source)
         photons = developed.arrays["intensity"]
-    except (CamkitError, KeyError) as error:
+    except (CamkitError, OSError, KeyError) as error:
         return None, f"There is no before: {error}."
     times = shape[0] // photons.shape[-2]
     large = photons.repeat(times, axis=-2).repeat(times, axis=-1) if times else photons
@@ -180,13 +161,16 @@ def _layers(
 
 def _map(name: str, unit: str, values: NDArray[Any], colours: str, *, is_turned: bool) -> ValueMap:
     stride = -(-max(values.shape) // MOST_SIDE_PX)
-    plane = np.asarray(values[::stride, ::stride], dtype=np.float64)
-    finite = plane[np.isfinite(plane)]
+    is_known = np.isfinite(values)
+    plane = np.where(is_known, values, np.nan)[::stride, ::stride]
+    finite = values[is_known]
     low, high = np.percentile(finite, PERCENTILES) if finite.size else (0.0, 1.0)
     return ValueMap(
         name=name,
         unit=unit,
         values=plane,
+        size_px=(values.shape[0], values.shape[1]),
+        valid=float(is_known.mean()),
         low=float(low),
         high=float(max(high, low + 1e-9)),
         colours=colours,

@@ -12,7 +12,7 @@ from camkit.arrays import FloatArray
 from camkit.bundle.reader import find_bundle, open_bundle
 from camkit.caller import option_text
 from camkit.errors import CamkitError, ContractError, DecodeError
-from camkit.report.view.result_search import ViewedResult
+from camkit.report.view.result_search import ViewedResult, is_there
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.files.picture import read_orientation, read_scene
 from camkit.runtime.geometry.turning import turn
@@ -27,6 +27,11 @@ _SAME_OF_BUNDLE: Final = (
 )
 """Likewise those that mean something with its bundle alone."""
 _NONE: Final = "none"
+READ_AS: Final = (
+    "Its codes are read by the colour space that the file states, else as sRGB; floats as linear "
+    "light"
+)
+"""How a picture is read of which no sidecar says more."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,41 +68,63 @@ def find_original(
 
     Args:
         result: The result.
-        before_file: A picture or capture that stands for it; None for that which the sidecar names.
+        before_file: A picture or capture that stands for it, or the very capture where it lies
+            elsewhere now; None for that which the sidecar names.
         size_px: (height, width) that it must have.
 
     Raises:
         ContractError: If what is given is of another size.
         DecodeError: If what is given cannot be read.
     """
-    if before_file is not None:
-        light = read_result(before_file)
-        if light.shape[1:] != size_px:
-            raise ContractError(
-                f"{before_file} is {_size_text(light.shape[1:])}, the result "
-                f"{_size_text(size_px)}: {option_text('before_file')} must be of the same size"
-            )
-        return Original(light=light, note=f"Before is {before_file.name}.")
+    if before_file is None or _is_capture(before_file, result.record):
+        original = _own_original(result, before_file, size_px)
+        if original.light is not None or before_file is None:
+            return original
+    light = read_result(before_file)
+    if light.shape[1:] != size_px:
+        raise ContractError(
+            f"{before_file} is {_size_text(light.shape[1:])}, the result "
+            f"{_size_text(size_px)}: {option_text('before_file')} must be of the same size"
+        )
+    reading = f" {READ_AS}." if is_picture(before_file) else ""
+    return Original(light=light, note=f"Before is {before_file.name}.{reading}")
+
+
+def _own_original(result: ViewedResult, capture: Path | None, size_px: tuple[int, int]) -> Original:
+    """Return the capture of a result, developed as the result was.
+
+    Args:
+        result: The result.
+        capture: Where its capture lies now; None for where the sidecar says.
+        size_px: (height, width) that it must have.
+    """
     if result.record is None:
         return Original(light=None, note=f"There is no before: {_advice()}.")
-    source, reason = find_capture(result)
+    source, reason = (capture, "") if capture is not None else find_capture(result)
     if source is None:
         return Original(light=None, note=f"There is no before: {reason}; {_advice()}.")
     bundle = _bundle_of(result.record)
     try:
         light = _developed(source, *_settings(result.record, bundle), bundle=bundle)
-    except CamkitError as error:
+    except (CamkitError, OSError) as error:
         return Original(light=None, note=f"There is no before: {error}; {_advice()}.")
     if light.shape[1:] != size_px:
         sizes = f"it is {_size_text(light.shape[1:])}, the result {_size_text(size_px)}"
         return Original(light=None, note=f"There is no before: {sizes}; {_advice()}.")
-    is_same = bundle != _NONE
+    is_same = bundle != _NONE or not result.record.get("bundle")
     geometry = "as in the result" if is_same else "not corrected, so that edges may be shifted"
     return Original(
         light=light,
         note=f"Before is {source.name}, only developed: demosaicked, white balance and colour "
         f"applied, nothing restored; vignetting and distortion are {geometry}.",
     )
+
+
+def _is_capture(file: Path, record: Mapping[str, Any] | None) -> bool:
+    """Return whether a file is the very capture of a sidecar, wherever it lies now."""
+    if record is None or not file.is_file():
+        return False
+    return bool(file_sha256(file) == record["input_sha256"])
 
 
 def _bundle_of(record: Mapping[str, Any]) -> str:
@@ -107,7 +134,7 @@ def _bundle_of(record: Mapping[str, Any]) -> str:
         return _NONE
     try:
         bundle = open_bundle(find_bundle(str(name)))
-    except CamkitError:
+    except (CamkitError, OSError):
         return _NONE
     return str(bundle.path) if bundle.sha256 == record["bundle_sha256"] else _NONE
 
@@ -128,12 +155,15 @@ def find_capture(result: ViewedResult) -> tuple[Path | None, str]:
         base / named_file.name,
         base.parent / named_file.name,
     )
-    files = [place for place in places if place.is_file()]
+    files = [place for place in places if is_there(place)]
     if not files:
         return None, f"the capture {named_file} is not there"
-    for file in files:
-        if file_sha256(file) == record.get("input_sha256"):
-            return file, ""
+    try:
+        for file in files:
+            if file_sha256(file) == record.get("input_sha256"):
+                return file, ""
+    except OSError as error:
+        return None, f"the capture cannot be read: {error.strerror}"
     return None, f"{files[0]} is not the capture that was processed: its hash differs"
 
 

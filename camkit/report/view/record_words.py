@@ -9,6 +9,8 @@ from camkit.report.pages.page import Cell, Part, Row, Table, Words, sentences
 from camkit.runtime.envelope import OPEN_HIGH, QUANTITIES
 
 _SLOWEST: Final = 3
+_SHORT_S: Final = 0.26
+"""Up to which an exposure is a fraction, as on cameras: 0.4 s would be 1/2."""
 _HIGHLIGHTS: Final = {
     "regions": "groups of clipped lights that were recovered: {:.0f}",
     "saturated_fraction": "{:.2%} of the samples were saturated",
@@ -93,7 +95,7 @@ def _ranges(record: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
         return {}
     try:
         bundle = open_bundle(find_bundle(str(name)))
-    except CamkitError:
+    except (CamkitError, OSError):
         return {}
     if bundle.sha256 != record["bundle_sha256"]:
         return {}
@@ -106,7 +108,8 @@ def _camera(record: Mapping[str, Any]) -> str:
     if record.get("iso") is not None:
         parts.append(f"ISO {record['iso']:g}")
     if exposure_s := record.get("exposure_time_s"):
-        text = f"1/{1 / exposure_s:.0f}" if exposure_s < 1 / 2 else f"{exposure_s:.3g}"
+        is_short = exposure_s <= _SHORT_S
+        text = f"1/{1 / exposure_s:.0f}" if is_short else f"{exposure_s:.3g}"
         parts.append(f"exposure {text} s")
     lens = record.get("metadata", {}).get("lens_model") if record.get("metadata") else None
     parts += [f"lens {lens}"] if lens else []

@@ -11,16 +11,16 @@ import numpy as np
 from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.progress import counted
-from camkit.report.pages.page import Cell, Details, Page, Part, Section, Table, Words
+from camkit.report.pages.page import Cell, Details, Page, Part, Section, Table, Widget, Words
 from camkit.report.view.cell_map import TIER_WORDS, spared_cells
+from camkit.report.view.photon_archive import read_archive
 from camkit.report.view.photon_arrays import (
     ValueMap,
     film_of,
     maps_of,
     photons_before,
-    read_archive,
 )
-from camkit.report.view.picture_light import find_original, read_result
+from camkit.report.view.picture_light import READ_AS, find_original, read_result
 from camkit.report.view.record_words import (
     decision_table,
     key_table,
@@ -44,7 +44,11 @@ KEYS: Final = (
 
 
 def result_page(
-    results: Sequence[ViewedResult], before_file: Path | None, crops: Sequence[tuple[int, int]]
+    results: Sequence[ViewedResult],
+    before_file: Path | None,
+    crops: Sequence[tuple[int, int]],
+    *,
+    most_bytes: int,
 ) -> Page:
     """Return the page of results.
 
@@ -52,12 +56,14 @@ def result_page(
         results: At least one.
         before_file: Picture or capture that stands for the capture of the one result.
         crops: (x, y) of parts to show at 100 %.
+        most_bytes: Of the viewers.
 
     Raises:
         DecodeError: If a result cannot be read; names it.
-        ContractError: If a part lies outside, or `before_file` fits no result.
+        ContractError: If a part lies outside, `before_file` fits no result, or the viewers become
+            larger.
     """
-    sections, titles = [], _titles(results)
+    sections, titles, size = [], _titles(results), 0
     for number, result in enumerate(counted(results, "reading", "results"), start=1):
         parts: list[Part] = [Words(f"Note: {note}.", "note") for note in result.notes]
         if result.is_archive:
@@ -65,6 +71,12 @@ def result_page(
             parts += _photon_parts(result)
         else:
             parts += _picture_parts(result, before_file, crops)
+        size += sum(len(part.html) for part in parts if isinstance(part, Widget))
+        if size > most_bytes:
+            raise ContractError(
+                f"the page would have more than {most_bytes / 1e6:.0f} MB with {result.path.name}, "
+                f"result {number} of {len(results)}: show fewer results on it"
+            )
         sections.append(
             Section(titles[number - 1], [*parts, *_record_parts(result)], f"result-{number}")
         )
@@ -115,6 +127,8 @@ def _picture_parts(
     is_bright = peak > BRIGHT
     cells = None if result.record is None else spared_cells(result.record, (height, width))
     facts = f"The picture has {width} x {height} px."
+    if result.record is None:
+        facts += f" {READ_AS}."
     if is_bright:
         facts += (
             f" Its brightest sample is {peak:.4g} times white: lower the exposure to look into "
@@ -161,7 +175,7 @@ def _photon_parts(result: ViewedResult) -> list[Part]:
 
 def _photon_picture(result: ViewedResult, photons: np.ndarray) -> list[Part]:
     coarse, note = photons_before(result, photons.shape)
-    white = max(white_of(photons), 1e-9)
+    white = white_of(photons) or 1.0
     times = max(1, PHOTON_SIDE_PX // max(photons.shape))
 
     def light_of(values: np.ndarray) -> np.ndarray:
@@ -179,12 +193,12 @@ def _photon_picture(result: ViewedResult, photons: np.ndarray) -> list[Part]:
 
 
 def _map_note(maps: Sequence[ValueMap]) -> str:
-    height, width = maps[0].values.shape
-    valid = np.isfinite(maps[0].values).mean()
+    height, width = maps[0].size_px
     part = "" if maps[0].stride == 1 else f" One of {maps[0].stride} px along each side is shown."
     return (
-        f"The map has {width} x {height} px, {valid:.1%} of them valid; others are grey.{part} "
-        "Colours run between the percentiles 2 and 98, values beyond have the colours of the ends."
+        f"The map has {width} x {height} px, {maps[0].valid:.1%} of them valid; others are grey."
+        f"{part} Colours run between the percentiles 2 and 98, values beyond have the colours of "
+        "the ends."
     )
 
 

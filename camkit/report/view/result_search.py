@@ -6,13 +6,12 @@ from pathlib import Path
 from typing import Any, Final
 
 from camkit.errors import DecodeError
+from camkit.report.view.record_shape import record_fault
 from camkit.runtime.files.in_memory import FilePath
 from camkit.runtime.output.sidecar import SIDECAR_SUFFIX, read_sidecar, sidecar_path
 from camkit.runtime.raw import file_sha256
 
 ARCHIVE_SUFFIX: Final = ".npz"
-_TYPES: Final = {"seconds": dict, "plan": dict, "options": dict, "warnings": list, "output": str}
-"""Of what a page reads in a sidecar."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,6 +81,14 @@ def _result_of(path: Path) -> ViewedResult:
     return _believed_result(path, read_record(file), is_sidecar=is_sidecar)
 
 
+def is_there(path: Path) -> bool:
+    """Return whether a file that a sidecar names is there, for this user."""
+    try:
+        return path.is_file()
+    except OSError:
+        return False
+
+
 def is_sidecar_name(path: Path) -> bool:
     """Return whether a file has the name of a sidecar."""
     return path.name.endswith(SIDECAR_SUFFIX)
@@ -96,8 +103,10 @@ def read_record(sidecar: Path) -> dict[str, Any]:
     if not sidecar.is_file():
         raise DecodeError(f"cannot read {sidecar}: there is no such file")
     record = read_sidecar(_any_output(sidecar))
-    if record is None or any(not isinstance(record.get(k), v) for k, v in _TYPES.items()):
+    if record is None:
         raise DecodeError(f"{sidecar} is damaged, or not a sidecar of this version of camkit")
+    if (fault := record_fault(record)) is not None:
+        raise DecodeError(f"{sidecar} was edited: {fault}")
     return record
 
 
@@ -112,7 +121,7 @@ def _believed_result(path: Path, record: dict[str, Any], *, is_sidecar: bool) ->
     if not is_sidecar and path.name not in {main.name, *names}:
         note = f"the sidecar beside it names {main.name}, not this file"
         return ViewedResult(path=path, record=record, notes=(note,))
-    if not main.is_file():
+    if not is_there(main):
         raise DecodeError(f"cannot read {main}, which its sidecar names: there is no such file")
     changed = record["output_sha256"] != file_sha256(main)
     note = "the file was changed after it was made: its hash is not that of the sidecar"

@@ -62,7 +62,7 @@ def choose_crops(
         ContractError: If a centre lies outside.
     """
     _, height, width = after.shape
-    step = -(-max(height, width) // WHOLE_PX)
+    step = min(-(-max(height, width) // WHOLE_PX), height, width)
     name = "Whole picture" + ("" if step == 1 else f", 1 : {step}")
     crops = [Crop(name=name, left=0, top=0, width=width, height=height, step=step)]
     if step > 1:
@@ -102,7 +102,8 @@ def _changed(after: FloatArray, before: FloatArray) -> tuple[int, int]:
     codes = [encode_uint8(picture, tone="srgb").max(axis=0) for picture in (after, before)]
     difference = cv2.absdiff(*codes)
     difference[(codes[0] == np.iinfo(np.uint8).max) | (codes[1] == np.iinfo(np.uint8).max)] = 0
-    size = (difference.shape[1] // _LOOKED_PX, difference.shape[0] // _LOOKED_PX)
+    height, width = difference.shape
+    size = (max(1, width // _LOOKED_PX), max(1, height // _LOOKED_PX))
     coarse = cv2.resize(difference.astype(np.float32), size, interpolation=cv2.INTER_AREA)
     window = (max(1, CROP_PX[0] // _LOOKED_PX), max(1, CROP_PX[1] // _LOOKED_PX))
     mean = cv2.blur(coarse, window, borderType=cv2.BORDER_CONSTANT)

@@ -2,13 +2,12 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from html import escape
 from typing import Any, Final
 
 import numpy as np
 
 from camkit.arrays import FloatArray
-from camkit.report.pages.page import Widget
+from camkit.report.pages.page import Widget, escaped
 from camkit.report.view.cell_map import TIER_WORDS
 from camkit.report.view.page_data import (
     coded_bytes,
@@ -80,7 +79,7 @@ def picture_viewer(
             'right"><span>After</span></label>'
         )
     if is_bright:
-        low = -int(np.ceil(np.log2(peak))) - 1
+        low = -int(np.ceil(np.log2(max(peak, 1.0)))) - 1
         controls.append(
             f'<label class="control"><span>Exposure</span><input class="exposure" type="range" '
             f'min="{low}" max="{MOST_EV}" step="0.25" value="0"><output>0 EV</output></label>'
@@ -117,9 +116,9 @@ def map_viewer(name: str, maps: Sequence[ValueMap]) -> Widget:
     }
     controls = [
         _buttons("Map", [one.name for one in maps]),
-        f'<div class="stage" tabindex="0" role="group" aria-label="{escape(name)}: arrow keys move '
-        'the cross, the values stand below"><div class="layers"><canvas class="values" role="img">'
-        '</canvas><div class="cross" hidden></div></div></div>',
+        f'<div class="stage" tabindex="0" role="group" aria-label="{escaped(name)}: arrow keys '
+        'move the cross, the values stand below"><div class="layers">'
+        '<canvas class="values" role="img"></canvas><div class="cross" hidden></div></div></div>',
         '<div class="scale"><output class="low"></output><canvas class="ramp" width="256" '
         'height="1" aria-hidden="true"></canvas><output class="high"></output></div>',
         '<p class="readout" aria-live="polite">Point at a pixel, or press an arrow key in the map, '
@@ -137,7 +136,7 @@ def film_viewer(name: str, film: Film) -> Widget:
         "labels": film.labels,
         "frames": coded_bytes(film.codes),
     }
-    label = f"{escape(name)}: {escape(film.name)}"
+    label = f"{escaped(name)}: {escaped(film.name)}"
     controls = [
         f'<div class="stage"><div class="layers"><canvas class="values" role="img" '
         f'aria-label="{label}"></canvas></div></div>',
@@ -154,7 +153,7 @@ def _stage(name: str, *, has_before: bool) -> str:
     canvases = "".join(f'<canvas class="{side}" role="img"></canvas>' for side in sides)
     line = '<div class="line"><span></span></div>' if has_before else ""
     return (
-        f'<div class="stage" tabindex="0" role="group" aria-label="{escape(name)}: {text}">'
+        f'<div class="stage" tabindex="0" role="group" aria-label="{escaped(name)}: {text}">'
         f'<div class="layers">{canvases}<canvas class="cover" aria-hidden="true" hidden></canvas>'
         f"{line}</div></div>"
     )
@@ -164,7 +163,7 @@ def _buttons(label: str, names: Sequence[str]) -> str:
     if len(names) < 2:
         return ""
     buttons = "".join(
-        f'<button type="button" aria-pressed="{str(not number).lower()}">{escape(text)}</button>'
+        f'<button type="button" aria-pressed="{str(not number).lower()}">{escaped(text)}</button>'
         for number, text in enumerate(names)
     )
     return f'<div class="choice" role="group" aria-label="{label}">{buttons}</div>'

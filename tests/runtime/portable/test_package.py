@@ -14,6 +14,8 @@ from camkit.bundle.manifest import GoldenCase, format_of
 from camkit.bundle.reader import GOLDEN, Bundle, built_in_bundles, open_bundle
 from camkit.bundle.stages import Network, Undistort, Wiener
 from camkit.errors import ContractError, UnsupportedError
+from camkit.runtime.options import Options
+from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.portable.folder import write_files
 from camkit.runtime.portable.package import write_portable
 from tests.runtime.portable.beside_camkit import bundle_with_rules, camkit_light, decibels
@@ -63,6 +65,24 @@ def test_a_reader_agrees_with_camkit(bundle: Bundle, camera: Any, name: str) -> 
     expected = camkit_light(bundle, capture, case)
     allowed = case.atol + case.rtol * max(1.0, float(np.abs(expected).max()))
     assert np.abs(camera.develop(*facts) - expected).max() <= allowed
+
+
+def test_blacks_of_single_sites_are_scaled_to_one(bundle: Bundle, camera: Any) -> None:
+    """As docs/guides/portable.md says, for a file that states several."""
+    blacks, white = np.array([[256.0, 250], [262, 270]]), 4095.0
+    case, capture = _cases(bundle)["typical"]
+    pipeline = Pipeline(bundle, Options(size="S", threads=1))
+    prepared = pipeline.capture_of(
+        capture, iso=case.iso, white_balance=case.white_balance, origin_px=case.origin_px
+    )
+    prepared = replace(prepared, black_level=blacks.astype(np.float32))
+    expected = np.asarray(pipeline.start(prepared).fill(product="image"))
+    height, width = capture.shape
+    site = np.tile(blacks, (height // 2 + 1, width // 2 + 1))[:height, :width]
+    black = blacks[0, 0]
+    scaled = black + (capture - site) * (white - black) / (white - site)
+    facts = scaled, case.iso, case.white_balance, case.origin_px
+    assert decibels(camera.develop(*facts, levels=(black, white)), expected) >= LEAST_DB
 
 
 def test_graphs_keep_to_the_default_domain_of_opset_18_without_control_flow(folder: Path) -> None:

@@ -65,8 +65,11 @@ def show(
     Without -o and --json NAME.html and its pictures are written to the current folder.
     """
     from camkit.cli.design.design_time import refuse_existing, require_torch
+    from camkit.report.judge_need import require_judge
 
     require_torch("camkit lens show")
+    if out_dir is not None or not json_:
+        require_judge()
     from camkit.models_def.optics.analysis.sampling import DEFAULT_SAMPLING, Pupil
     from camkit.models_def.optics.analysis.state_facts import state_facts
     from camkit.models_def.optics.lens_file.lens_file import read_configured_lens

@@ -61,8 +61,12 @@ def tolerance(
     Without -o and --json the chart is written to the current folder.
     """
     from camkit.cli.design.design_time import refuse_existing, require_torch
+    from camkit.report.judge_need import require_judge
 
     require_torch("camkit lens tolerance")
+    folder = out_dir if out_dir is not None or json_ else Path()
+    if folder is not None:
+        require_judge()
     import torch
 
     # the arrays are small: more threads mostly wait for each other
@@ -71,7 +75,6 @@ def tolerance(
     from camkit.models_def.optics.lens_file.lens_file import read_noted_lens
     from camkit.report.pages.lens.yield_chart import chart_paths, to_json, to_text, write_tolerance
 
-    folder = out_dir if out_dir is not None or json_ else Path()
     if folder is not None:
         refuse_existing(chart_paths(folder, file.stem), overwrite=overwrite)
     lens, notes = read_noted_lens(file, glass or (), catalogue, configuration)

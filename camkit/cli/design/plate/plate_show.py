@@ -45,8 +45,12 @@ def show(
     Without -o and --json the page NAME.html is written to the current folder.
     """
     from camkit.cli.design.design_time import refuse_existing, require_torch
+    from camkit.report.judge_need import require_judge
 
     require_torch("camkit plate show")
+    folder = out_dir if out_dir is not None or json_ else Path()
+    if folder is not None:
+        require_judge()
     from camkit.models_def.optics.diffraction.plate import read_plate
     from camkit.report.pages.page import page_path
     from camkit.report.pages.plate.plate_facts import Look, analyse, to_json
@@ -54,7 +58,6 @@ def show(
 
     if depth_m is not None and not depth_m > 0:
         raise ContractError(f"--depth-m must be > 0; got {depth_m:g}")
-    folder = out_dir if out_dir is not None or json_ else Path()
     if folder is not None:
         refuse_existing([page_path(folder, plate.stem)], overwrite=overwrite)
     depth_mm = None if depth_m is None else math.inf if math.isinf(depth_m) else depth_m * MM_PER_M

@@ -45,8 +45,13 @@ def grey_picture(photons: NDArray[np.floating], white: float) -> Codes:
 
 
 def white_of(photons: NDArray[np.floating]) -> float:
-    """Return how many photons are shown white in a picture (h, w)."""
-    return float(np.percentile(photons, BRIGHTEST)) if photons.size else 1.0
+    """Return how many photons are shown white in a picture (h, w).
+
+    Where so few pixels have any that the percentile is 0, it is the brightest pixel.
+    """
+    if not photons.size:
+        return 1.0
+    return float(np.percentile(photons, BRIGHTEST)) or float(photons.max())
 
 
 def white_of_flight(frames: NDArray[np.floating]) -> float:

@@ -7,9 +7,12 @@ from pathlib import Path
 
 import pytest
 
+from camkit import __version__
 from camkit.bundle import reader
 from camkit.cli.judge.doctor import PURPOSES, ready_for
 from camkit.errors import BundleError, DecodeError, UnsupportedError
+from camkit.report.analysis.subject import find_subject
+from camkit.report.bench import machine
 from camkit.report.judge_need import require_judge
 from tests.bundle_factory import write_tiny_bundle
 
@@ -59,10 +62,23 @@ def test_cameras_of_the_other_package_are_found_or_named(
     monkeypatch.setattr(reader, "MORE_BUNDLES", "absent_bundles")
     with pytest.raises(BundleError, match="tiny is not installed: pip install camkit-bundles"):
         reader.find_bundle("tiny")
-    assert "the cameras tiny" in ready_for()
+    assert ready_for()["the cameras tiny"].endswith(f"camkit-bundles=={__version__}")
+    with pytest.raises(BundleError, match="did you mean tiny"):
+        reader.find_bundle("tinny")
+    with pytest.raises(BundleError, match="tiny is not installed"):
+        find_subject("tiny")  # no lens of that name stands for it
     monkeypatch.setattr(reader, "MORE_BUNDLES", "more_bundles")
     assert reader.find_bundle("tiny") == more / "tiny.camkit"
     assert not reader.missing_bundles()
+
+
+def test_cameras_of_another_version_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pip alone would find camkit-bundles installed already."""
+    monkeypatch.setattr(machine, "package_version", lambda _: "0.1.0")
+    state = ready_for()["the cameras of camkit-bundles"]
+    assert state.startswith(f"of camkit 0.1.0, this is {__version__}: pip install camkit-bundles==")
+    monkeypatch.setattr(machine, "package_version", lambda _: __version__)
+    assert "the cameras of camkit-bundles" not in ready_for()
 
 
 def test_doctor_says_when_the_decoder_fails(camkit_command, monkeypatch) -> None:

@@ -43,6 +43,17 @@ def test_a_bundle_is_described_without_its_list_of_hashes(captures, camkit_comma
     assert "  pixel_pitch_um: 6.0" in text
 
 
+@pytest.mark.parametrize(
+    ("name", "command"), [("a.zmx", "camkit lens show"), ("a.onnx", "camkit network inspect")]
+)
+def test_a_file_of_another_command_names_that_command(
+    name: str, command: str, camkit_command
+) -> None:
+    outcome = camkit_command("info", name)
+    assert outcome.code == ExitCode.USAGE
+    assert command in outcome.err
+
+
 def test_numbers_that_fill_lines_are_cut_for_people_alone(camkit_command) -> None:
     text = camkit_command("info", "duet").out
     (bank,) = [line for line in text.splitlines() if "type wiener" in line]

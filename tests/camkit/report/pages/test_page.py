@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from camkit import entry_points
 from camkit.errors import ContractError, UnsupportedError
-from camkit.report import judge_need
 from camkit.report.figure import Figure, chart, new_figure
 from camkit.report.pages import page as writer
 from camkit.report.pages.page import (
@@ -155,7 +155,7 @@ def test_a_page_is_written_with_its_charts(tmp_path: Path) -> None:
 def test_without_matplotlib_no_page_with_charts_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(judge_need.util, "find_spec", lambda _: None)
+    monkeypatch.setattr(entry_points.util, "find_spec", lambda _: None)
     with pytest.raises(UnsupportedError, match=r"pip install 'camkit\[judge\]'"):
         write_page(tmp_path / "new", "one", {}, lambda _: Page(title="", sections=[]))
     assert not (tmp_path / "new").exists()
