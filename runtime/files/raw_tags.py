@@ -55,8 +55,8 @@ class SensorPlace:
         """Return the JSON that `place_of_text` reads; empty without records."""
         facts = self.facts
         record = {"bundle": facts.pop("bundle_name")} | facts
-        stated = {name: value for name, value in record.items() if value is not None}
-        return json.dumps({"camkit": stated}) if stated else ""
+        known_facts = {name: value for name, value in record.items() if value is not None}
+        return json.dumps({"camkit": known_facts}) if known_facts else ""
 
 
 def camera_name(tags: TiffTags, metadata: Metadata) -> str:
