@@ -10,6 +10,7 @@
     face/                      `camkit.freeze` and `camkit.train`
     toml_table, torch_file     what people wrote, what torch wrote, checked
     model_faults               what pydantic finds in it, in words of camkit
+    time_limit                 the limit of a run, which long preparation asks about
     torch_threads              work of many small steps on one thread
 
 Design time calls the runtime where no gradient is needed; the runtime never imports design time.

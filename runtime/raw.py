@@ -45,7 +45,8 @@ DEFAULT_MAX_MEMORY_MB: Final = 4096
 MAX_HEADER_BYTES: Final = 1 << 20
 PIPE_BYTES: Final = 1 << 20
 _SET_PIPE_SIZE: Final = 1031  # F_SETPIPE_SZ of Linux; other systems keep their own size
-_PICTURE_MAGIC: Final = (b"\x89PNG\r\n\x1a\n", b"\x76\x2f\x31\x01", b"#?RADIANCE", b"#?RGBE")
+EXR_MAGIC: Final = b"\x76\x2f\x31\x01"
+_PICTURE_MAGIC: Final = (b"\x89PNG\r\n\x1a\n", EXR_MAGIC, b"#?RADIANCE", b"#?RGBE")
 _PICTURE_SUFFIXES: Final = frozenset(
     {".jpg", ".jpeg", ".jpe", ".jfif", ".mpo", ".hdr", ".png", ".exr", ".bmp"}
 )
@@ -161,8 +162,13 @@ def named_bundle(path: str | os.PathLike[str]) -> str | None:
     Reads the tags only, so a long list of files can be planned before any is decoded.
     """
     try:
-        check_regular(Path(path))
-        return sensor_place(read_tiff_tags(Path(path))).bundle_name
+        file = Path(path)
+        check_regular(file)
+        if not _head(file).startswith(EXR_MAGIC):
+            return sensor_place(read_tiff_tags(file)).bundle_name
+        from camkit.runtime.files.formats.exr_picture import read_exr_place
+
+        return read_exr_place(file).bundle_name
     except (OSError, DecodeError):
         return None  # reading the capture tells what is wrong with the file
 

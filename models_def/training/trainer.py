@@ -16,6 +16,7 @@ from camkit.bundle.stages.network import DEFAULT_ROLE
 from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.models_def.networks.catalog import check_patch
+from camkit.models_def.time_limit import limited
 from camkit.models_def.training.checkpoint import (
     Checkpoint,
     State,
@@ -107,12 +108,13 @@ def train(
         recipe_path: TOML recipe.
         options: Where, how long and with what.
         material: What samples are made with; None has the kind prepare it (kernels of a lens take
-            about a minute, and are kept in `out_dir`).
+            minutes, and are kept in `out_dir`).
         refinement: Later training; None fits a new network to the recipe's loss.
         stopwatch: What budgets of time count by; None begins now.
 
     Raises:
-        ContractError: If recipe, options or the checkpoint to resume do not fit.
+        ContractError: If recipe, options or the checkpoint to resume do not fit, or a limit of
+            time ends before the kernels are prepared.
         UnsupportedError: If cameras of this kind cannot be trained.
     """
     stopwatch = stopwatch or Stopwatch()
@@ -154,7 +156,8 @@ def train(
         )
     options.out_dir.mkdir(parents=True, exist_ok=True)
     if material is None:
-        with working(f"preparing the kernels of {recipe.name}"):
+        limits = options.max_minutes, options.max_cpu_minutes
+        with working(f"preparing the kernels of {recipe.name}"), limited(stopwatch, *limits):
             material = kind.prepare(recipe, recipe_path.parent, options.out_dir)
     # A pool of its own: another size may be trained beside this one.
     samples = options.out_dir / f"samples_{_label(role, options.size)}"

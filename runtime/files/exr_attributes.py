@@ -1,7 +1,8 @@
 """The metadata of a photograph as standard attributes of an OpenEXR file, and back.
 
 Reference: OpenEXR, "Standard Attributes". Numbers are 32 bits there, the UTC offset is UTC less
-local time, and there is no attribute for the artist.
+local time, and there is no attribute for the artist. The comments hold camkit's record of the
+place on the sensor, as the description of a DNG does.
 """
 
 import math
@@ -9,6 +10,7 @@ import re
 from collections.abc import Mapping
 from typing import Any, Final
 
+from camkit.runtime.files.raw_tags import SensorPlace, place_of_text
 from camkit.runtime.metadata import Metadata
 
 TEXTS: Final = {
@@ -29,6 +31,7 @@ NUMBERS: Final = {
     "altitude_m": "altitude",
 }
 UTC_OFFSET: Final = "utcOffset"
+COMMENTS: Final = "comments"
 _HALF_MINUTE_S: Final = 30
 
 
@@ -49,6 +52,12 @@ def metadata_of_exr(header: Mapping[str, Any]) -> Metadata:
     fields: dict[str, Any] = {key: header.get(name) for key, name in TEXTS.items()}
     fields |= {key: _short(header.get(name)) for key, name in NUMBERS.items()}
     return Metadata.believable(**fields, utc_offset=_offset(header.get(UTC_OFFSET)))
+
+
+def place_of_exr(header: Mapping[str, Any]) -> SensorPlace:
+    """Return camkit's record of the place on the sensor; all None in other files."""
+    text = header.get(COMMENTS)
+    return place_of_text(text) if isinstance(text, str) else SensorPlace()
 
 
 def _short(value: Any) -> Any:

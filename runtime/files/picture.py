@@ -31,6 +31,7 @@ from camkit.runtime.files.formats.color_space import SRGB, ColorSpace, power_cur
 from camkit.runtime.files.formats.decoded import Decoded
 from camkit.runtime.files.formats.opencv_picture import decode_picture
 from camkit.runtime.files.formats.tiff_picture import decode_tiff
+from camkit.runtime.files.raw_tags import SensorPlace
 from camkit.runtime.files.tiff_tags import TiffTags, read_tiff_tags
 from camkit.runtime.files.white_level import check_said_white
 from camkit.runtime.metadata import Metadata
@@ -57,6 +58,7 @@ class _Picture:
     decoded: Decoded
     orientation: int = 1
     metadata: Metadata = field(default_factory=Metadata)
+    place: SensorPlace = field(default_factory=SensorPlace)
 
 
 def read_picture(path: Path, reading: PictureReading = AS_STATED) -> Capture:
@@ -89,6 +91,7 @@ def read_picture(path: Path, reading: PictureReading = AS_STATED) -> Capture:
         window=decoded.window,
         rounding=None if reading.keep_codes else _rounding(decoded, reading.tone),
         notes=(*notes, *light_notes, *channel_notes),
+        **picture.place.facts,
     )
 
 
@@ -414,8 +417,8 @@ def _head(path: Path) -> bytes:
 def _decode(path: Path) -> _Picture:
     foreign.check_not_foreign(_head(path))
     if _begins(path, exr_picture.MAGIC):
-        decoded, metadata = exr_picture.decode_exr(path)
-        return _Picture(decoded=decoded, metadata=metadata)
+        decoded, metadata, place = exr_picture.decode_exr(path)
+        return _Picture(decoded=decoded, metadata=metadata, place=place)
     tags = read_tiff_tags(path)
     if tags.directories:
         raw_checks.check_chunks_inside(tags)

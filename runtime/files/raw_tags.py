@@ -6,8 +6,8 @@ Tag numbers and meanings: DNG specification 1.7, chapter 4; Exif 2.32, section 4
 
 import json
 import re
-from dataclasses import dataclass
-from typing import Any, Final
+from dataclasses import dataclass, fields
+from typing import Any, Final, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,13 +29,34 @@ _BUNDLE_IN_MODEL: Final = re.compile(r"camkit ([A-Za-z0-9_.-]{1,64})")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SensorPlace:
-    """Records that camkit leaves in a capture of its own; all None for other files."""
+    """Records that camkit leaves in a capture of its own; all None for other files.
+
+    Attributes are those of a `Capture`.
+    """
 
     bundle_name: str | None = None
     psf_sha256: str | None = None
     origin_px: tuple[int, int] | None = None
     sensor_size_px: tuple[int, int] | None = None
     pixel_pitch_um: float | None = None
+
+    @classmethod
+    def of(cls, capture: Any) -> Self:
+        """Return the records of a capture."""
+        return cls(**{f.name: getattr(capture, f.name) for f in fields(cls)})
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """Return the records by the names that they have in a `Capture`."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+    @property
+    def text(self) -> str:
+        """Return the JSON that `place_of_text` reads; empty without records."""
+        facts = self.facts
+        record = {"bundle": facts.pop("bundle_name")} | facts
+        known_facts = {name: value for name, value in record.items() if value is not None}
+        return json.dumps({"camkit": known_facts}) if known_facts else ""
 
 
 def camera_name(tags: TiffTags, metadata: Metadata) -> str:
@@ -90,9 +111,18 @@ def _pairs_by_color(
 def sensor_place(tags: TiffTags) -> SensorPlace:
     """Return camkit's record in ImageDescription, else the bundle of UniqueCameraModel."""
     match = _BUNDLE_IN_MODEL.fullmatch(tags.text(UNIQUE_CAMERA_MODEL) or "")
-    model_bundle = match.group(1) if match else None
+    return place_of_text(tags.text(IMAGE_DESCRIPTION) or "", match.group(1) if match else None)
+
+
+def place_of_text(text: str, model_bundle: str | None = None) -> SensorPlace:
+    """Return the records in a text that a file holds.
+
+    Args:
+        text: JSON of camkit, or anything else.
+        model_bundle: The bundle where the text names none.
+    """
     try:
-        record = json.loads(tags.text(IMAGE_DESCRIPTION) or "")["camkit"]
+        record = json.loads(text)["camkit"]
         bundle = record.get("bundle", model_bundle)
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return SensorPlace(bundle_name=model_bundle)

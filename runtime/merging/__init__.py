@@ -9,5 +9,6 @@ known_curves    curves of few numbers that may explain it as well
 exposures   exposures that differ from the stated times
 average     the weighted mean over frames, each sample as long as it did not clip
 merge       frames one after the other into that mean
+agreement   what all frames state alike
 result      the mean as an EXR, developed where it is RAW
 """

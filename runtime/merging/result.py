@@ -18,9 +18,12 @@ from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.runtime.capture import Capture
 from camkit.runtime.color import color_stage
+from camkit.runtime.files.raw_tags import SensorPlace
+from camkit.runtime.merging.agreement import common_metadata, common_place
 from camkit.runtime.merging.merge import Merged, choose_response, merge
 from camkit.runtime.merging.response import ResponseName
 from camkit.runtime.merging.survey import Frame, Survey
+from camkit.runtime.metadata import Metadata
 from camkit.runtime.options import Options
 from camkit.runtime.output.origin import Origin
 from camkit.runtime.output.part_file import atomic_outputs
@@ -97,15 +100,20 @@ def merge_to_exr(
     frame = reference_frame(survey, reference)
     curve, note = choose_response(survey, response)
     merged = merge(survey, curve)
+    place, place_note = common_place(survey)
+    metadata, metadata_note = common_metadata(survey)
+    facts = _Facts(
+        metadata=replace(metadata, exposure_time_s=_metadata_time_s(frame.time_s)), place=place
+    )
     luminance = _Luminance(
         None if preview is None else ToneMappedPreview(*survey.like.plane_shape[1:])
     )
     warnings: tuple[str, ...] = ()
     with atomic_outputs(out, *([] if preview is None else [preview])) as (part, *parts):
         if survey.is_raw:
-            warnings = _develop(part, survey, merged, frame, luminance)
+            warnings = _develop(part, survey, merged, frame, facts, luminance)
         else:
-            _write_picture(part, survey, merged, frame, luminance)
+            _write_picture(part, survey, merged, frame, facts, luminance)
         if luminance.preview is not None:
             luminance.preview.write(parts[0], color_stage(None), survey.like.orientation)
     return Report(
@@ -115,7 +123,11 @@ def merge_to_exr(
         reference=frame.path.name,
         range_stops=luminance.stops,
         clipped_fraction=merged.clipped_fraction,
-        notes=tuple(dict.fromkeys((*survey.notes, *([note] if note else []), *warnings))),
+        notes=tuple(
+            dict.fromkeys(
+                (*survey.notes, *filter(None, (note, place_note, metadata_note)), *warnings)
+            )
+        ),
     )
 
 
@@ -136,17 +148,31 @@ def reference_frame(survey: Survey, name: str | None) -> Frame:
     return matches[0]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Facts:
+    """Facts that the EXR states: of the photograph, and its place on the sensor."""
+
+    metadata: Metadata
+    place: SensorPlace | None
+
+
 def _write_picture(
-    path: Path, survey: Survey, merged: Merged, frame: Frame, luminance: "_Luminance"
+    path: Path,
+    survey: Survey,
+    merged: Merged,
+    frame: Frame,
+    facts: _Facts,
+    luminance: "_Luminance",
 ) -> None:
     gain = np.float32(merged.times_s[survey.frames.index(frame)] / merged.times_s[0])
     light, like = merged.light, survey.like
     bands = (light[:, top : top + _ROWS] * gain for top in range(0, like.height, _ROWS))
     origin = Origin(
         camera=like.camera,
-        metadata=replace(like.metadata, exposure_time_s=_metadata_time_s(frame.time_s)),
+        metadata=facts.metadata,
         orientation=like.orientation,
         window=like.window,
+        place=facts.place,
     )
     picture = PictureFormat(
         width=like.width,
@@ -161,7 +187,12 @@ def _write_picture(
 
 
 def _develop(
-    path: Path, survey: Survey, merged: Merged, frame: Frame, luminance: "_Luminance"
+    path: Path,
+    survey: Survey,
+    merged: Merged,
+    frame: Frame,
+    facts: _Facts,
+    luminance: "_Luminance",
 ) -> tuple[str, ...]:
     """Develop light of a sensor; return the warnings."""
     longest_s, shortest_s = survey.frames[0].time_s, survey.frames[-1].time_s
@@ -176,10 +207,10 @@ def _develop(
         white_balance=like.white_balance,
         color_matrix=like.color_matrix,
         orientation=like.orientation,
-        iso=like.iso,
-        exposure_time_s=_metadata_time_s(frame.time_s),
+        iso=None if facts.metadata.iso is None else like.iso,
+        exposure_time_s=facts.metadata.exposure_time_s,
         camera=like.camera,
-        metadata=replace(like.metadata, exposure_time_s=_metadata_time_s(frame.time_s)),
+        metadata=facts.metadata,
     )
     options = Options(exposure_ev=math.log2(frame.time_s / shortest_s))
     work = Pipeline(None, options).start(capture)
@@ -189,7 +220,7 @@ def _develop(
         color=work.color,
         orientation=like.orientation,
         full_float=True,
-        origin=work.origin,
+        origin=replace(work.origin, place=facts.place),
     )
     with open_writer(path, "exr", picture) as writer:
         _write(writer, work.bands(), luminance)

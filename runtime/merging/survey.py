@@ -6,7 +6,7 @@ bracket takes the memory of one frame.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
@@ -18,6 +18,8 @@ from camkit.errors import ContractError, DecodeError
 from camkit.noise import NoiseModel
 from camkit.picture_window import PictureWindow, common_box
 from camkit.runtime.capture import Capture, MosaicOptions
+from camkit.runtime.files.raw_tags import SensorPlace
+from camkit.runtime.metadata import Metadata
 from camkit.runtime.raw import is_picture, read_capture
 
 SAMPLED_PIXELS: Final = 20_000
@@ -37,6 +39,8 @@ class Frame:
         noise: As the file states it.
         file_time_s: Exposure time as the file states it; None where it states none.
         window: Where its pixels lie in a larger picture; None if not stated.
+        place: Its bundle and its place on the sensor, as the file states them.
+        metadata: What the file says of its photograph.
     """
 
     path: Path
@@ -45,6 +49,8 @@ class Frame:
     noise: NoiseModel | None
     file_time_s: float | None = None
     window: PictureWindow | None = None
+    place: SensorPlace = field(default_factory=SensorPlace)
+    metadata: Metadata = field(default_factory=Metadata)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,6 +121,8 @@ def survey(
             noise=capture.noise,
             file_time_s=file_time_s,
             window=capture.window,
+            place=SensorPlace.of(capture),
+            metadata=capture.metadata,
         )
         if records:
             check_alike(records[0][1], records[0][0].path, capture, path)

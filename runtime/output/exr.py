@@ -11,7 +11,7 @@ import OpenEXR
 
 from camkit.arrays import FloatArray
 from camkit.errors import ContractError
-from camkit.runtime.files.exr_attributes import exr_attributes
+from camkit.runtime.files.exr_attributes import COMMENTS, exr_attributes
 from camkit.runtime.output.picture_writer import UPRIGHT, Codes, PictureFormat, PictureWriter
 
 HALF_MAX: Final = 65504.0
@@ -73,6 +73,10 @@ class ExrWriter(PictureWriter):
         header["whiteLuminance"] = WHITE_LUMINANCE
         for name, value in exr_attributes(self.picture.origin.metadata).items():
             header[name] = value
+        place = self.picture.origin.place
+        # a picture that was turned no longer lies as the sensor does
+        if place is not None and place.text and self.picture.orientation == UPRIGHT:
+            header[COMMENTS] = place.text.encode()
         return OpenEXR.OutputFile(str(self.path), header)
 
     def _place(self, header: Any) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.picture_window import PictureWindow
+from camkit.runtime.files.raw_tags import SensorPlace
 from camkit.runtime.metadata import Metadata
 from camkit.runtime.unit import Unit
 
@@ -25,6 +26,7 @@ class Origin:
         bundle_sha256: Its hash.
         unit: The camera body; None if not known.
         window: Where the pixels of the capture lie in a larger picture; None if not stated.
+        place: Place on the sensor of a picture that is not restored yet; None for all others.
     """
 
     camera: str = ""
@@ -36,6 +38,7 @@ class Origin:
     bundle_sha256: str | None = None
     unit: Unit | None = None
     window: PictureWindow | None = None
+    place: SensorPlace | None = None
 
     def stripped(self) -> Self:
         """Return the same without what tells of photographer, camera, date and place.

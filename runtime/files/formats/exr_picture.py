@@ -21,10 +21,11 @@ from camkit.arrays import FloatArray
 from camkit.colorimetry import D65, REC709_PRIMARIES, Matrix, rgb_to_xyz
 from camkit.errors import DecodeError
 from camkit.picture_window import PictureWindow
-from camkit.runtime.files.exr_attributes import metadata_of_exr
+from camkit.runtime.files.exr_attributes import metadata_of_exr, place_of_exr
 from camkit.runtime.files.formats.color_space import ColorSpace, matrix_to_rec709, power_curve
 from camkit.runtime.files.formats.decoded import Decoded
 from camkit.runtime.files.raw_checks import MAX_PIXELS
+from camkit.runtime.files.raw_tags import SensorPlace
 from camkit.runtime.metadata import Metadata
 
 MAGIC: Final = b"\x76\x2f\x31\x01"
@@ -58,8 +59,10 @@ class _Part:
     unread: tuple[str, ...]
 
 
-def decode_exr(path: Path) -> tuple[Decoded, Metadata]:
+def decode_exr(path: Path) -> tuple[Decoded, Metadata, SensorPlace]:
     """Decode a file: float32 samples of its data window, and what it says of the photograph.
+
+    The last is its place on the sensor, as `merge` leaves it.
 
     Raises:
         DecodeError: If it is damaged, deep, or holds no colour; says which.
@@ -84,7 +87,21 @@ def decode_exr(path: Path) -> tuple[Decoded, Metadata]:
         window=window,
         notes=(*_notes(parts, part, window), *([_WHOLE] if is_whole else [])),
     )
-    return decoded, metadata_of_exr(part.header)
+    return decoded, metadata_of_exr(part.header), place_of_exr(part.header)
+
+
+def read_exr_place(path: Path) -> SensorPlace:
+    """Read the place on the sensor alone, without samples.
+
+    Raises:
+        DecodeError: If the header is damaged, or holds no picture.
+        OSError: If the file cannot be read.
+    """
+    with _lock, contextlib.redirect_stdout(sys.stderr):
+        try:
+            return place_of_exr(_picture_of(_headers(path)).header)
+        except _DAMAGED as error:
+            raise DecodeError(f"the EXR is damaged: {error}") from error
 
 
 def _headers(path: Path) -> list[dict[str, Any]]:

@@ -209,12 +209,21 @@ class SampledPulse:
     def __post_init__(self) -> None:
         times, values = self.times_ps, self.values
         if times.ndim != 1 or times.shape != values.shape or len(times) < 3:
-            raise ContractError("a measured pulse needs a value for each of at least 3 times")
+            raise ContractError(
+                "a measured pulse needs a value for each of at least 3 times; got times of shape "
+                f"{times.shape} and values of {values.shape}"
+            )
         if not (np.isfinite(times).all() and np.isfinite(values).all()):
-            raise ContractError("a measured pulse must hold finite numbers")
+            first = int(np.argmin(np.isfinite(times) & np.isfinite(values)))
+            raise ContractError(
+                f"a measured pulse must hold finite numbers; got {values[first]:g} at "
+                f"{times[first]:g} ps"
+            )
         if (np.diff(times) <= 0).any() or (values < 0).any() or not values.any():
             raise ContractError(
-                "a measured pulse needs increasing times and values >= 0 that are not all 0"
+                "a measured pulse needs increasing times and values >= 0 that are not all 0; got "
+                f"times with steps of {np.diff(times).min():g} ps and more, values of "
+                f"{values.min():g} to {values.max():g}"
             )
 
     @property

@@ -36,8 +36,14 @@ class TimeAxis:
             raise ContractError(
                 f"times need at least {LEAST_BINS} bins; got {max(0, edges.size - 1)}"
             )
-        if not np.isfinite(edges).all() or (np.diff(edges) < 0).any() or edges[0] == edges[-1]:
-            raise ContractError("edges of time bins must be finite and increase")
+        with np.errstate(invalid="ignore"):
+            steps = np.diff(edges)
+        if not np.isfinite(edges).all() or (steps < 0).any() or edges[0] == edges[-1]:
+            first = int(np.argmax(~(np.isfinite(steps) & (steps >= 0))))
+            raise ContractError(
+                f"edges of time bins must be finite and increase; got {edges[first + 1]:g} ps "
+                f"after {edges[first]:g} ps"
+            )
 
     @classmethod
     def regular(
@@ -55,7 +61,7 @@ class TimeAxis:
             ContractError: If there are too few, or the width is not > 0.
         """
         if not 0 < time_bin_ps < 1e12:
-            raise ContractError(f"time_bin_ps must be > 0; got {time_bin_ps}")
+            raise ContractError(f"time_bin_ps must be > 0 and < 1e12; got {time_bin_ps}")
         edges = first_ps + (np.arange(bins + 1, dtype=np.float64) - 0.5) * time_bin_ps
         return cls(orientation=orientation, edges_ps=edges)
 

@@ -132,8 +132,9 @@ class Timing(_Table):
         axis_orientation = times.orientation or orientation
         if axis_orientation is None:
             raise ContractError(
-                "nothing says whether times are those of a gate or of a histogram; state [timing] "
-                f'orientation = "gate" or "histogram" in a file for {option_text("timing")}'
+                f"{_bins_text(bins)}nothing says whether times are those of a gate or of a "
+                'histogram; state [timing] orientation = "gate" or "histogram" in a file for '
+                f"{option_text('timing')}"
             )
         edges = times.bin_edges_ps
         stated_bins = times.bins if edges is None else len(edges) - 1
@@ -149,8 +150,8 @@ class Timing(_Table):
             )
         if times.time_bin_ps is None:
             raise ContractError(
-                "nothing says how wide a time bin is; state [timing] time_bin_ps (or bin_edges_ps) "
-                f"in a file for {option_text('timing')}"
+                f"{_bins_text(bins)}nothing says how wide a time bin is; state [timing] "
+                f"time_bin_ps (or bin_edges_ps) in a file for {option_text('timing')}"
             )
         count = bins if bins is not None else stated_bins
         if count is None:
@@ -194,7 +195,10 @@ class Timing(_Table):
         dark_map = read_map(self.folder / dark, "the map of dark counts").astype(np.float64)
         _check_map(dark_map, shape, "dark counts")
         if (dark_map < 0).any():
-            raise ContractError("the map of dark counts holds negative numbers")
+            raise ContractError(
+                f"the map of dark counts holds negative numbers, down to {dark_map.min():g}; "
+                "expected counts >= 0"
+            )
         return dark_map
 
     def hot(self, shape: tuple[int, int]) -> NDArray[np.bool_]:
@@ -291,6 +295,10 @@ def _checked(tables: Mapping[str, Any], folder: Path, what: str) -> Timing:
             text = f"{first['msg'][0].lower()}{first['msg'][1:]}; got {first['input']!r:.60}"
         name = f"[{place[0]}] {' '.join(place[1:2])}".rstrip()
         raise ContractError(f"{what}: {name}: {text}") from error
+
+
+def _bins_text(bins: int | None) -> str:
+    return "" if bins is None else f"the capture has {bins} time bins, and "
 
 
 def _only_edges(times: Times) -> None:

@@ -7,9 +7,12 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from camkit import stopwatch as stopwatch_module
+from camkit.errors import ContractError
+from camkit.models_def.kinds.bayer import lens_bank
 from camkit.models_def.kinds.bayer.validation import BayerJudge
 from camkit.models_def.training import trainer
 from camkit.models_def.training.fitter import Fitter
@@ -113,6 +116,31 @@ def test_kernels_that_are_traced_count(tmp_path, recipe_path, material, monkeypa
     monkeypatch.setattr(type(kind), "prepare", prepare)
     result = train(recipe_path, _options(tmp_path, stop_at_step=1))
     assert result.cpu_s == pytest.approx(PART_S)
+
+
+def test_a_limit_ends_the_tracing_of_kernels_and_a_repeat_goes_on_from_those_that_are_kept(
+    tmp_path, recipe_path, monkeypatch, clock
+) -> None:
+    traced: list[float] = []
+
+    def spot(lens: Any, _: Any, heights_mm: Any, *, size_px: int, **__: Any) -> Any:
+        clock.spend()
+        traced.append(lens.object_distance_mm)
+        kernels = np.zeros((heights_mm.size, 3, size_px, size_px), np.float32)
+        kernels[..., size_px // 2, size_px // 2] = 1
+        return kernels, 1.0
+
+    monkeypatch.setattr(lens_bank, "colour_kernels", spot)
+    lens = read_recipe(recipe_path).lens
+    total = 1 + lens.copies + lens.validation_copies
+    short = _options(tmp_path, max_cpu_minutes=2.5 * PART_S / 60)
+    text = rf"after 20 s of .* 2 of {total} copies .* another takes 10 s; .* other {total - 2} in"
+    with pytest.raises(ContractError, match=text):
+        train(recipe_path, short)
+    assert len(traced) == 2
+    assert train(recipe_path, _options(tmp_path, stop_at_step=1)).steps == 1
+    assert len(traced) == total
+    assert not [*tmp_path.glob("bank-*.npy")]
 
 
 def test_what_was_spent_before_the_call_counts_by_the_stopwatch_of_the_command(

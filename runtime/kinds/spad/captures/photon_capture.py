@@ -98,7 +98,10 @@ class PhotonCapture:
             ContractError: If the capture has no times.
         """
         if self.axis is None:
-            raise ContractError(f"{self.file.path.name} holds no times of photons")
+            raise ContractError(
+                f"{self.file.path.name} holds no times of photons: {self.file.bins} frames of "
+                "counts alone"
+            )
         return self.axis
 
     def plane(self, sensor_plane: Plane | None) -> Plane:

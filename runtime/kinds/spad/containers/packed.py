@@ -79,8 +79,12 @@ def member_bytes(
 def _mapped(path: Path, member: zipfile.ZipInfo) -> mmap.mmap:
     with path.open("rb") as file:
         data = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
-    if member.header_offset + LOCAL_HEADER + member.file_size > len(data):
-        raise DecodeError(f"{path.name} is cut off")
+    end = member.header_offset + LOCAL_HEADER + member.file_size
+    if end > len(data):
+        raise DecodeError(
+            f"{path.name} is cut off: {member.filename} ends at byte {end} or later, the file has "
+            f"{len(data)}"
+        )
     return data
 
 

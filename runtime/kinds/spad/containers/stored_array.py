@@ -33,11 +33,13 @@ def read_columns(path: Path, what: str) -> NDArray[np.float64]:
     try:
         text = data.decode("utf-8").replace(",", " ")
         rows = [line.split() for line in text.splitlines() if line.strip() and line[0] != "#"]
-        columns = np.array(rows, dtype=np.float64)
+        odd = next((row for row in rows if len(row) != 2), None)
+        columns = np.array(rows if odd is None else [], dtype=np.float64)
     except ValueError as error:
         raise ContractError(f"{what} {path} must be lines of two numbers: {error}") from error
-    if columns.ndim != 2 or columns.shape[1] != 2:
-        raise ContractError(f"{what} {path} must be lines of two numbers")
+    if columns.ndim != 2:
+        came = "none" if odd is None else f"{len(odd)} in {' '.join(odd)[:60]!r}"
+        raise ContractError(f"{what} {path} must be lines of two numbers; got {came}")
     return np.ascontiguousarray(columns.T)
 
 

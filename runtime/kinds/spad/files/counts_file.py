@@ -126,7 +126,7 @@ def checked_bins(path: Path, bins: int, pixels: int, kind: CountsKind) -> int:
     """
     name = "frames" if kind == "counts" else "time bins"
     if bins < 1:
-        raise DecodeError(f"{path.name} has no {name}")
+        raise DecodeError(f"{path.name} has no {name}: 0 for {pixels} pixels; expected some")
     if kind != "counts" and bins > MOST_BINS:
         raise DecodeError(
             f"{path.name} has {bins} time bins; expected at most {MOST_BINS}: put bins together, "

@@ -39,7 +39,13 @@ def counts_of(path: Path, file: Any, hints: Hints, *, is_matlab: bool) -> Counts
     tree = tree_of(path, file)
     large = {n: d for n, d in tree.sets.items() if d.ndim > 1 and min(d.shape) > 0 and _is_cube(d)}
     _check_links(path, tree, large, hints)
-    name = chosen_name(path, large, hints, "data sets")
+    name = chosen_name(
+        path,
+        {n: d.shape for n, d in large.items()},
+        hints,
+        "data sets",
+        {n: d.shape or () for n, d in tree.sets.items()},
+    )
     data_set = large[name]
     check_readable(path, name, data_set)
     stated_times = _stated_times(tree, file, data_set)
@@ -118,7 +124,9 @@ def _cells(
     path: Path, file: Any, cells: Any, stated_times: dict[str, object], hints: Hints
 ) -> CountsFile:
     if cells.ndim != 2:
-        raise DecodeError(f"{path.name}: cells of time stamps must be (rows, columns)")
+        raise DecodeError(
+            f"{path.name}: cells of time stamps must be (rows, columns); got {cells.shape}"
+        )
     _check_pieces(path, cells.name, cells, hints)
     width, height = cells.shape
 

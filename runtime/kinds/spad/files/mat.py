@@ -59,7 +59,9 @@ def open_mat(path: Path, hints: Hints) -> CountsFile:
     kinds = {name: (shape, kind) for name, shape, kind in listed if min(shape, default=0) > 0}
     large = [name for name, (shape, kind) in kinds.items() if _may_be(name, shape, kind)]
     matches = [name for name in kinds if name == hints.key]
-    name = chosen_name(path, matches or large, hints, "variables")
+    shapes = {name: shape for name, (shape, _) in kinds.items()}
+    candidates = {name: shapes[name] for name in matches or large}
+    name = chosen_name(path, candidates, hints, "variables", {n: s for n, s, _ in listed})
     most = TIMES * hints.max_bytes
     size = 0 if kinds[name][1] == "cell" else _listed_bytes(*kinds[name])
     if is_walked and size <= most:
@@ -83,7 +85,9 @@ def open_mat(path: Path, hints: Hints) -> CountsFile:
         raise DecodeError(f"{path.name} is damaged: {error}") from error
     if values.dtype == object:
         if values.ndim != 2:
-            raise DecodeError(f"{path.name}: cells of time stamps must be (rows, columns)")
+            raise DecodeError(
+                f"{path.name}: cells of time stamps must be (rows, columns); got {values.shape}"
+            )
         return StampsFile(
             path,
             values.shape,

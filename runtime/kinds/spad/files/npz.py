@@ -28,10 +28,11 @@ def open_npz(path: Path, hints: Hints) -> CountsFile:
     with opened_zip(path) as archive:
         members = {i.filename.removesuffix(SUFFIX): i for i in archive.infolist()}
         if not members:
-            raise DecodeError(f"{path.name} holds no arrays")
+            raise DecodeError(f"{path.name} holds 0 arrays; expected one of counts at least")
         headers = {name: _header(archive, info) for name, info in members.items()}
-        large = [name for name, (shape, _, _) in headers.items() if len(shape) > 1]
-        name = chosen_name(path, large, hints)
+        shapes = {name: shape for name, (shape, _, _) in headers.items()}
+        large = {name: shape for name, shape in shapes.items() if len(shape) > 1}
+        name = chosen_name(path, large, hints, others=shapes)
         small = {
             other: _array(archive, members[other], headers[other], SMALL_BYTES)
             for other, (shape, _, _) in headers.items()

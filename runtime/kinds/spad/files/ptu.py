@@ -71,7 +71,10 @@ def _check_whole(path: Path, file: Any) -> None:
 def _histograms(path: Path, file: Any, hints: Hints) -> NDArray[Any]:
     """Return (y, x, t) of one channel and, of several frames, of one."""
     if not file.is_t3:
-        raise DecodeError(f"{path.name} is no T3 measurement: it has no times within a cycle")
+        raise DecodeError(
+            f"{path.name} is no T3 measurement: its Measurement_Mode is "
+            f"{file.tags['Measurement_Mode']}, expected 3, with times within a cycle"
+        )
     active = [int(number) for number in file.active_channels]
     numbers: dict[str, Sequence[int]] = {"channel": active}
     if file.is_image:

@@ -64,7 +64,7 @@ def _open_plain(path: Path, plain: Path, hints: Hints) -> CountsFile:
     except BROKEN as error:
         raise DecodeError(f"{path.name} is damaged, or no SDT: {error}") from error
     if not blocks:
-        raise DecodeError(f"{path.name} holds no histograms")
+        raise DecodeError(f"{path.name} holds 0 blocks of histograms; expected one at least")
     number = chosen_places(path, {"block": range(len(blocks))}, hints.key)["block"]
     values, seconds = np.asarray(blocks[number]), np.asarray(times[number], dtype=np.float64)
     if values.ndim == 1:
@@ -72,7 +72,10 @@ def _open_plain(path: Path, plain: Path, hints: Hints) -> CountsFile:
     if values.ndim == 2:
         values = values[None]
     if len(seconds) < 2 or len(seconds) != values.shape[-1]:
-        raise DecodeError(f"{path.name}: {len(seconds)} times for {values.shape[-1]} bins")
+        raise DecodeError(
+            f"{path.name}: {len(seconds)} times for {values.shape[-1]} bins; expected one for each "
+            "bin, and two at least"
+        )
     width_ps = float((seconds[-1] - seconds[0]) / (len(seconds) - 1) * PS_PER_S)
     return ArrayFile(
         path,

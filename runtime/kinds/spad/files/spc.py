@@ -49,7 +49,10 @@ def checked_records(data: NDArray[np.uint8]) -> NDArray[np.uint32]:
         raise DecodeError(f"{len(data)} bytes are no whole records of {RECORD_BYTES}")
     records = data.view("<u4")
     if not records[0] & NO_PHOTON:
-        raise DecodeError("the first record is no header of an SPC-130 or SPC-150")
+        raise DecodeError(
+            "the first record is no header of an SPC-130 or SPC-150: expected bit 31, got "
+            f"{int(records[0]):#010x}"
+        )
     return np.asarray(records[1:])
 
 

@@ -91,6 +91,9 @@ def _numbers(path: Path, cell: NDArray[Any]) -> NDArray[np.float64]:
     if cell.size and cell.dtype.kind not in "biuf":
         raise DecodeError(f"{path.name}: a cell holds {cell.dtype}; expected time stamps")
     stamps = cell.astype(np.float64) if cell.size else np.empty(0)
-    if not np.isfinite(stamps).all():
-        raise DecodeError(f"{path.name} holds time stamps that are not finite")
+    if bad := int(stamps.size - np.count_nonzero(np.isfinite(stamps))):
+        raise DecodeError(
+            f"{path.name} holds time stamps that are not finite: {bad} of the {stamps.size} of a "
+            "pixel; expected numbers"
+        )
     return np.asarray(stamps)

@@ -46,19 +46,26 @@ def _stack(path: Path, file: tifffile.TiffFile, hints: Hints) -> tuple[str | Non
             f"{path.name} holds pages of {shape}; expected rows and columns of counts"
         )
     series, places = _series(path, file, hints)
-    if series is None and any(page.shape != shape for page in file.pages):
-        raise DecodeError(f"{path.name} holds pages of several sizes; expected one")
+    other = next((page.shape for page in file.pages if page.shape != shape), None)
+    if series is None and other is not None:
+        raise DecodeError(f"{path.name} holds pages of several sizes, {shape} and {other}")
     whole = (len(file.pages), *shape) if series is None else series.shape
     size = math.prod(whole) * np.dtype(first.dtype).itemsize
     if size > MOST_UNPACKED:
-        raise DecodeError(f"{path.name} unpacks to {size / 1e9:.1f} GB; store it as HDF5")
+        raise DecodeError(
+            f"{path.name} unpacks to {size / 1e9:.1f} GB; expected at most "
+            f"{MOST_UNPACKED / 1e9:g} GB: store it as HDF5"
+        )
     check_whole(path, file)
     axes = hints.axes
     if series is not None and axes is None:
         axes = stack_axes(path, series.axes, series.shape, places)
     if series is not None and series.dataoffset is not None:
-        if series.dataoffset + size > path.stat().st_size:
-            raise DecodeError(f"{path.name} is cut off")
+        if series.dataoffset + size > (file_bytes := path.stat().st_size):
+            raise DecodeError(
+                f"{path.name} is cut off: {series.dataoffset + size} bytes are announced, "
+                f"{file_bytes} are there"
+            )
         return axes, np.memmap(path, series.dtype, "r", series.dataoffset, series.shape)
     pages = file.pages if series is None else series
     check_pages(path, pages, hints.max_bytes)

@@ -102,7 +102,10 @@ def check_whole(path: Path, file: tifffile.TiffFile) -> None:
     in_series = sum(len(one) for one in file.series)
     is_mapped = all(one.dataoffset is not None for one in file.series)
     if pixels < announced or (not is_mapped and len(file.pages) != in_series):
-        raise DecodeError(f"{path.name} is cut off: its pages are not those that it announces")
+        raise DecodeError(
+            f"{path.name} is cut off: {max(announced, pixels)} pixels on {in_series} pages are "
+            f"announced, {pixels} on {len(file.pages)} pages are there"
+        )
 
 
 def check_pages(path: Path, pages: Iterable[Any], max_bytes: int) -> None:
@@ -132,5 +135,6 @@ def check_pages(path: Path, pages: Iterable[Any], max_bytes: int) -> None:
                 data = unpacker().decompress(file.read(min(size, 2 * max_bytes)), piece_bytes + 1)
             if len(data) > piece_bytes:
                 raise DecodeError(
-                    f"{path.name} is damaged: a piece of its pixels unpacks to more than they are"
+                    f"{path.name} is damaged: a piece of its pixels unpacks to more than the "
+                    f"{piece_bytes} bytes that they are"
                 )

@@ -1,8 +1,8 @@
 """Choice of the variable of a file that holds the counts, and the times that others state."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -11,23 +11,37 @@ from camkit.errors import ContractError, DecodeError
 from camkit.runtime.kinds.spad.files.counts_file import KEYS, Hints
 from camkit.runtime.kinds.spad.timing import TABLE_OF
 
+MOST_LISTED: Final = 5
 
-def chosen_name(path: Path, names: Iterable[str], hints: Hints, what: str = "arrays") -> str:
+Shape = Sequence[int]
+
+
+def chosen_name(
+    path: Path,
+    shapes: Mapping[str, Shape],
+    hints: Hints,
+    what: str = "arrays",
+    others: Mapping[str, Shape] | None = None,
+) -> str:
     """Return the variable to read.
 
     Args:
         path: The file, for errors.
-        names: Of all variables that could be one.
+        shapes: Of all variables that could be one.
         hints: The caller's choice.
         what: How the file calls them.
+        others: Shapes of all that the file holds, for errors.
 
     Raises:
         ContractError: If the choice is none of them, or nobody chose among several.
         DecodeError: If there are none.
     """
-    variables = sorted(names)
+    variables = sorted(shapes)
     if not variables:
-        raise DecodeError(f"{path.name} holds no {what} of counts, histograms or time stamps")
+        raise DecodeError(
+            f"{path.name} holds no {what} of counts, histograms or time stamps: expected numbers "
+            f"by rows and columns, or by time, rows and columns; it holds {_listed(others or {})}"
+        )
     if hints.key is not None:
         if hints.key not in variables:
             raise ContractError(
@@ -39,9 +53,17 @@ def chosen_name(path: Path, names: Iterable[str], hints: Hints, what: str = "arr
     if len(candidates) > 1:
         raise ContractError(
             f"{path.name} holds several {what}: {', '.join(candidates)}; choose one by [array] key "
-            f"in a file for {option_text('timing')}"
+            f"in a file for {option_text('timing')}; their shapes are "
+            f"{', '.join(str(tuple(shapes[name])) for name in candidates[:MOST_LISTED])}"
         )
     return candidates[0]
+
+
+def _listed(shapes: Mapping[str, Shape]) -> str:
+    """Return names with their shapes, as a text."""
+    items = [f"{name} {tuple(shape)}" for name, shape in sorted(shapes.items())]
+    more = f" and {len(items) - MOST_LISTED} more" if len(items) > MOST_LISTED else ""
+    return (", ".join(items[:MOST_LISTED]) or "none") + more
 
 
 def stated_values(values: Mapping[str, Any]) -> dict[str, object]:

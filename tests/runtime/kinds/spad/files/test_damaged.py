@@ -17,9 +17,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from camkit.errors import CamkitError, ContractError, DecodeError
+from camkit.runtime.kinds.spad.containers.stored_array import read_columns
 from camkit.runtime.kinds.spad.files.bundle_name import named_bundle
 from camkit.runtime.kinds.spad.files.counts_file import Hints
 from camkit.runtime.kinds.spad.files.open_counts import open_counts
+from camkit.runtime.kinds.spad.pulse import SampledPulse
+from camkit.runtime.kinds.spad.time_axis import TimeAxis
+from camkit.runtime.kinds.spad.timing import Timing
 from tests.spad_files import AXES, STAMPS, WRITERS, small_cube
 
 EVERY = {**WRITERS, **STAMPS}
@@ -290,6 +294,44 @@ def test_data_that_lie_in_other_files_are_refused(tmp_path: Path) -> None:
             open_counts(tmp_path / name, Hints())
     with pytest.raises(DecodeError, match="holds no data sets"):
         open_counts(tmp_path / "c.h5", Hints())
+
+
+def test_refusals_state_what_came(tmp_path: Path) -> None:
+    """Shapes, bins, widths and bytes stand in the line, not only what was expected."""
+    np.savez(tmp_path / "line.npz", a=np.ones(9))
+    np.savez(tmp_path / "two.npz", a=np.ones((4, 5)), b=np.ones((3, 4, 5)))
+    np.savez(tmp_path / "no_time.npz", histogram=np.ones((0, 2, 3)))
+    cells = np.empty((1, 2), object)
+    cells[0, 0], cells[0, 1] = np.ones(3), np.array([1.0, np.nan])
+    scipy.io.savemat(tmp_path / "cells.mat", {"timestamps": cells})
+    with tifffile.TiffWriter(tmp_path / "sizes.tif") as file:
+        for side in (4, 5):
+            file.write(np.zeros((side, side), np.uint8), photometric="minisblack")
+    stack = np.zeros((9, 40, 40), np.uint8)
+    tifffile.imwrite(tmp_path / "cut.tif", stack, photometric="minisblack")
+    whole = (tmp_path / "cut.tif").read_bytes()
+    (tmp_path / "cut.tif").write_bytes(whole[: len(whole) // 2])
+    for name, came in (
+        ("line.npz", r"it holds a \(9,\)"),
+        ("two.npz", r"shapes are \(4, 5\), \(3, 4, 5\)"),
+        ("no_time.npz", "no time bins: 0 for 6 pixels"),
+        ("cells.mat", "1 of the 2 of a pixel"),
+        ("sizes.tif", r"\(4, 4\) and \(5, 5\)"),
+        ("cut.tif", r"\d+ .* are announced, \d+ .*are there"),
+    ):
+        with pytest.raises((DecodeError, ContractError), match=came):
+            open_counts(tmp_path / name, Hints()).rows(0, 1, np.arange(9.0))
+    with pytest.raises(ContractError, match="got 3 ps after 7 ps"):
+        TimeAxis(orientation="gate", edges_ps=np.array([*range(8), 3.0]))
+    with pytest.raises(ContractError, match=r"times of shape \(2,\) and values of \(3,\)"):
+        SampledPulse(times_ps=np.zeros(2), values=np.ones(3))
+    with pytest.raises(ContractError, match=r"steps of -1 ps .* values of 1 to 2"):
+        SampledPulse(times_ps=np.array([0.0, 2.0, 1.0]), values=np.array([1.0, 2.0, 1.0]))
+    with pytest.raises(ContractError, match="has 70 time bins, and nothing says how"):
+        Timing(folder=tmp_path).axis(orientation="gate", bins=70)
+    (tmp_path / "irf.csv").write_text("1 2\n3\n", encoding="utf-8")
+    with pytest.raises(ContractError, match="two numbers; got 1 in '3'"):
+        read_columns(tmp_path / "irf.csv", "the pulse")
 
 
 def test_arrays_that_are_no_cubes_are_refused(tmp_path: Path) -> None:
