@@ -1,7 +1,7 @@
 """Laws of photographs, held against cameras that break one of them each."""
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from camkit.runtime.proof.laws import photographs
 from camkit.runtime.proof.laws.darkroom import Exposed
 from camkit.runtime.proof.laws.law import Law
+from camkit.runtime.twin.exposure import Setting
 from camkit.scenes.charts import lamp_chart, patch_chart
 
 Array = NDArray[np.float32]
@@ -27,9 +28,11 @@ class Room:
     front: Camera
     isos: tuple[float, float] = (100.0, 6400.0)
 
-    def expose(self, scene: Array, place: str, **_: Any) -> Exposed:
-        made, front = self.network(scene.copy()), self.front(scene.copy())
-        return Exposed(truth=scene, network=made, front=front, light=made, front_light=front)
+    def expose(self, scene: Array, place: str, settings: Sequence[Setting]) -> Iterator[Exposed]:
+        for setting in settings:
+            truth = scene * np.float32(setting.exposure)
+            made, front = self.network(truth.copy()), self.front(truth.copy())
+            yield Exposed(truth=truth, network=made, front=front, light=made, front_light=front)
 
 
 @pytest.fixture(autouse=True, scope="module")
