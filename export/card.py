@@ -149,6 +149,7 @@ def _networks(bundle: Bundle) -> list[str]:
 
 def preview_png(bundle: Bundle, golden: Mapping[str, GoldenArrays]) -> bytes:
     """Draw PSFs and MTFs over the field, and the golden cases with their references."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     psf = bundle.psf
@@ -181,7 +182,7 @@ def preview_png(bundle: Bundle, golden: Mapping[str, GoldenArrays]) -> bytes:
     for axis in (*axes[0, fields.size :], *axes[1, fields.size :], *axes[2]):
         axis.axis("off")
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", metadata={"Software": None})
+    FigureCanvasAgg(figure).print_png(buffer, metadata={"Software": None})
     return buffer.getvalue()
 
 
