@@ -20,7 +20,7 @@ from tests.data_folder import ROOT, data_path
 from tests.network_graphs import GRAPHS, nafnet, unet
 from tests.small_network import small_network
 
-CAP_MB = 930
+CAP_MB = 600
 MORE_MB = 8
 """Memory of a run besides: threads, tables."""
 

@@ -43,7 +43,17 @@ def test_a_lens_becomes_a_proved_filter_and_a_page(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     out = tmp_path / "mine.camkit"
-    words = ["make", "double-gauss-f2", "--sensor", SENSOR, "--focus-m", "inf", "-o", str(out), "--json"]
+    words = [
+        "make",
+        "double-gauss-f2",
+        "--sensor",
+        SENSOR,
+        "--focus-m",
+        "inf",
+        "-o",
+        str(out),
+        "--json",
+    ]
     assert run([*words, "--minutes", "0"]) == 0
     told = capsys.readouterr()
     facts = json.loads(told.out)
