@@ -113,9 +113,10 @@ def to_svg(figure: Figure) -> str:
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
     stream, dpi = io.StringIO(), figure.dpi
+    canvas: Any = FigureCanvasSVG(figure)
     with rc_context({"svg.fonttype": "none", "svg.hashsalt": "camkit"}):
         # `savefig` draws twice: once to find the places, which this drawing finds as well
-        FigureCanvasSVG(figure).print_svg(stream, metadata={"Date": None, "Creator": None})
+        canvas.print_svg(stream, metadata={"Date": None, "Creator": None})
     figure.set_dpi(dpi)  # an SVG is drawn at 72
     return stream.getvalue()
 
@@ -125,7 +126,8 @@ def to_png(figure: Figure) -> bytes:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     stream = io.BytesIO()
-    FigureCanvasAgg(figure).print_png(stream, metadata={"Software": None})
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.print_png(stream, metadata={"Software": None})
     return stream.getvalue()
 
 
