@@ -142,14 +142,14 @@ def _flat(room: Darkroom, ranges: _Ranges) -> Law:
     charts = [patch_chart(level) for level in LEVELS]
     labels = charts[0].labels
     inside = [labels == number for number in range(1, len(charts[0].names) + 1)]
-    taken = list(product(charts, room.isos))
+    exposures = list(product(charts, room.isos))
     settings = [
         Setting(iso=iso, exposure=level / LEVELS[0], seed=SEED)
         for level, iso in product(LEVELS, room.isos)
     ]
     for place in PLACES:
         shots = room.expose(charts[0].scene, place, settings)
-        for (chart, iso), shot in zip(taken, shots, strict=True):
+        for (chart, iso), shot in zip(exposures, shots, strict=True):
             ranges.add([shot])
             for where, name in zip(inside, chart.names, strict=True):
                 true, network, front = (
