@@ -28,7 +28,7 @@ test: tidy  ## set-up with everything, gate, tests with branch coverage; types b
 
 watched: $(DEV_STAMP)  # tests/conftest.py names the tests that the coverage gate counts
 	$(DEV)/bin/python -m coverage erase
-	OMP_NUM_THREADS=1 $(DEV)/bin/python -m coverage run -m pytest -q -n auto --dist loadfile
+	OMP_NUM_THREADS=1 $(DEV)/bin/python -m coverage run -m pytest -q -n auto --dist loadfile --no-loadscope-reorder
 	$(DEV)/bin/python -m coverage combine -q
 	$(DEV)/bin/python -m tools.coverage_gate
 

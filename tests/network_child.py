@@ -1,7 +1,7 @@
 """A network or a picture in a process of its own; prints the memory as JSON.
 
 python -m tests.network_child run NAME SIDE...        windows of some sides
-python -m tests.network_child picture NAME MAX_MB  a picture of 2400x1600 px
+python -m tests.network_child picture NAME MAX_MB  a picture of 2400x800 px
 """
 
 import json
@@ -39,14 +39,14 @@ def run(name: str, sides: list[int]) -> dict[str, float]:
 
 
 def picture(name: str, max_mb: int) -> dict[str, float]:
-    """Process noise of the size of the sensor."""
+    """Process noise of half the sensor, whose windows take what those of all of it take."""
     with tempfile.TemporaryDirectory() as folder:
         bundle = open_bundle(write_network_bundle(Path(folder), {"M": GRAPHS[name]()}))
     extent = bundle.manifest.sensor.known_extent
-    size = extent.height_px, extent.width_px
+    size = extent.height_px // 2, extent.width_px
     given = np.random.default_rng(1).integers(64, 1000, size, dtype=np.uint16)
     pipeline = Pipeline(bundle, Options(threads=1, max_mem_bytes=max_mb * 10**6))
-    made = pipeline.process_array(given, iso=100, white_balance=None)
+    made = pipeline.process_array(given, iso=100, white_balance=None, origin_px=(0, 0))
     return {"peak_mb": peak_rss_mb() - made.nbytes / 1e6}
 
 

@@ -9,7 +9,6 @@ import os
 import stat
 import tempfile
 import zipfile
-import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -29,6 +28,8 @@ from camkit.bundle.stages import Stage
 
 _EPOCH: Final = (1980, 1, 1, 0, 0, 0)
 _DEFLATE_LEVEL: Final = 9
+_ZLIB_FRAME: Final = 6
+"""Bytes that a stream of zlib has beside its deflated content."""
 
 
 def bundle_to_bytes(manifest: Manifest, members: Mapping[str, bytes]) -> bytes:
@@ -44,23 +45,34 @@ def bundle_to_bytes(manifest: Manifest, members: Mapping[str, bytes]) -> bytes:
     }
     full = manifest.model_copy(update={"members": facts})
     contents = {MANIFEST: manifest_to_bytes(full)} | dict(sorted(members.items()))
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w") as archive:
-        for name, data in contents.items():
-            _write_member(archive, name, data)
-    return buffer.getvalue()
+    stored: set[str] = set()
+    while True:
+        buffer = io.BytesIO()
+        with zipfile.ZipFile(buffer, "w") as archive:
+            for name, data in contents.items():
+                _write_member(archive, name, data, is_stored=name in stored)
+        swollen = {info.filename for info in archive.infolist() if not _shrinks(info)} - stored
+        if not swollen:
+            return buffer.getvalue()
+        stored |= swollen
 
 
-def _write_member(archive: zipfile.ZipFile, name: str, data: bytes) -> None:
+def _write_member(archive: zipfile.ZipFile, name: str, data: bytes, *, is_stored: bool) -> None:
     info = zipfile.ZipInfo(name, _EPOCH)
     info.create_system = 3
     info.external_attr = (stat.S_IFREG | 0o644) << 16
-    packed = len(zlib.compress(data, _DEFLATE_LEVEL))
-    # Near-empty members (kernels with wide zero borders) would pass the ratio that readers
-    # refuse; those, and what does not shrink, are stored.
-    shrinks = packed < len(data) and len(data) < MAX_RATIO * packed * 4 // 5
-    info.compress_type = zipfile.ZIP_DEFLATED if shrinks else zipfile.ZIP_STORED
+    info.compress_type = zipfile.ZIP_STORED if is_stored else zipfile.ZIP_DEFLATED
     archive.writestr(info, data, compresslevel=_DEFLATE_LEVEL)
+
+
+def _shrinks(info: zipfile.ZipInfo) -> bool:
+    """Return whether a member is compressed, and no further than readers admit.
+
+    Near-empty members (kernels with wide zero borders) would pass the ratio that readers refuse;
+    those, and what does not shrink, are stored.
+    """
+    packed = info.compress_size + _ZLIB_FRAME
+    return packed < info.file_size < MAX_RATIO * packed * 4 // 5
 
 
 def write_bundle(path: Path, manifest: Manifest, members: Mapping[str, bytes]) -> Bundle:

@@ -110,17 +110,24 @@ def hide_ticks(panel: Panel) -> None:
 def to_svg(figure: Figure) -> str:
     """Return the SVG text of a figure; its text stays text."""
     from matplotlib import rc_context
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
 
-    stream = io.StringIO()
+    stream, dpi = io.StringIO(), figure.dpi
+    canvas: Any = FigureCanvasSVG(figure)
     with rc_context({"svg.fonttype": "none", "svg.hashsalt": "camkit"}):
-        figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
+        # `savefig` draws twice: once to find the places, which this drawing finds as well
+        canvas.print_svg(stream, metadata={"Date": None, "Creator": None})
+    figure.set_dpi(dpi)  # an SVG is drawn at 72
     return stream.getvalue()
 
 
 def to_png(figure: Figure) -> bytes:
     """Return the PNG of a figure."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
     stream = io.BytesIO()
-    figure.savefig(stream, format="png", metadata={"Software": None})
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.print_png(stream, metadata={"Software": None})
     return stream.getvalue()
 
 

@@ -121,7 +121,8 @@ class TileLayout:
     def needed_bytes(self, cost: "PixelCost") -> int:
         """Estimate the memory of a run: one window and its arena, row buffer, output bands."""
         window = self.window_height_px, self.window_width_px
-        return _needed_bytes(window, self.rows, self.padded_width_px, cost)
+        band = max(span.stop_px - span.start_px for span in self.rows)
+        return _needed_bytes(window, band, self.padded_width_px, cost)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,10 +147,7 @@ class PixelCost:
         return self.outputs * self.scale * self.scale
 
 
-def _needed_bytes(
-    window: tuple[int, int], rows: tuple[Span, ...], width_px: int, cost: PixelCost
-) -> int:
-    band = max(span.stop_px - span.start_px for span in rows)
+def _needed_bytes(window: tuple[int, int], band: int, width_px: int, cost: PixelCost) -> int:
     row_bytes = FLOAT_BYTES * width_px
     ends = FLOAT_BYTES * (cost.channels + cost.out_values)
     arena = int(window[0] * window[1] * (cost.arena_bytes + ends))
@@ -169,12 +167,21 @@ def _ceil_to(value: int, step: int) -> int:
     return -(-value // step) * step
 
 
+def _window_count(size: int, window: int, halo: int) -> int:
+    """Return how many windows of one size cover a padded axis."""
+    return 1 if window >= size else -(-(size - 2 * halo) // (window - 2 * halo))
+
+
+def _longest_span(size: int, window: int, halo: int) -> int:
+    """Return the most pixels that a window of `_axis` keeps: the last one has one halo."""
+    return size if window >= size else window - halo
+
+
 def _axis(size: int, window: int, halo: int) -> tuple[Span, ...]:
     """Place windows of one size along a padded axis."""
     if window >= size:
         return (Span(origin_px=0, start_px=0, stop_px=size),)
-    step = window - 2 * halo
-    count = -(-(size - 2 * halo) // step)
+    step, count = window - 2 * halo, _window_count(size, window, halo)
     origins = [min(i * step, size - window) for i in range(count)]
     starts = [0, *(origin + halo for origin in origins[1:])]
     stops = [*starts[1:], size]
@@ -268,16 +275,16 @@ def _least_work(size: tuple[int, int], halo: int, limits: TileLimits) -> tuple[i
         heights, widths = {size[0]}, {size[1]}
     else:
         heights, widths = (_equal_windows(n, halo, limits.stride_px) for n in size)
-    rows = {h: _axis(size[0], h, halo) for h in heights}
-    columns = {w: len(_axis(size[1], w, halo)) for w in widths}
+    rows = {h: (_window_count(size[0], h, halo), _longest_span(size[0], h, halo)) for h in heights}
+    columns = {w: _window_count(size[1], w, halo) for w in widths}
     costs = {
         (h, w): (
-            len(rows[h]) * columns[w] * h * w,
-            len(rows[h]) * columns[w],
-            _needed_bytes((h, w), rows[h], size[1], limits.cost),
+            down * across * h * w,
+            down * across,
+            _needed_bytes((h, w), band, size[1], limits.cost),
         )
-        for h in rows
-        for w in columns
+        for h, (down, band) in rows.items()
+        for w, across in columns.items()
     }
     fitting = [window for window in costs if costs[window][2] <= limits.max_bytes]
     if not fitting:

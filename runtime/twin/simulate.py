@@ -3,6 +3,7 @@
 scene -> light through the optics (twin.light) -> exposure by the sensor (twin.exposure)
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -117,6 +118,33 @@ def simulate(
         ContractError: If the scene is not as stated or does not lie on the sensor, or the PSF
             does not reach the depth.
     """
+    (simulation,) = simulate_series(scene, sensor, psf, options, [_setting(options)], haze=haze)
+    return simulation
+
+
+def simulate_series(
+    scene: FloatArray,
+    sensor: ColorSensor,
+    psf: FrozenPsf,
+    options: SimulationOptions,
+    settings: Sequence[Setting],
+    *,
+    haze: Haze | None = None,
+) -> list[Simulation]:
+    """Photograph a scene several times, with its light projected once; see `simulate`.
+
+    Args:
+        scene: As that of `simulate`.
+        sensor: Likewise.
+        psf: Likewise.
+        options: Placement and which effects to apply.
+        settings: ISO, seed, noise and bits of every capture in place of those of the options, and
+            another factor on the light.
+        haze: As that of `simulate`.
+
+    Raises:
+        ContractError: As `simulate`.
+    """
     window = scene_window(
         scene, sensor, options.origin_px, scale=options.scale, surround_px=options.surround_px
     )
@@ -134,17 +162,19 @@ def simulate(
             workers=options.workers,
         ),
     )
-    setting = _setting(options)
-    return Simulation(
-        samples=expose(light, sensor, setting),
-        clean=light.clean,
-        white_balance=light.gains,
-        window=window,
-        iso=options.iso,
-        depth_mm=options.depth_mm if psf.depths_mm.size > 1 else None,
-        levels=None if options.bits is None else levels_of(sensor, setting),
-        plate=options.plate,
-    )
+    return [
+        Simulation(
+            samples=expose(light, sensor, setting),
+            clean=light.clean if setting.exposure == 1 else light.clean * setting.exposure,
+            white_balance=light.gains,
+            window=window,
+            iso=setting.iso,
+            depth_mm=options.depth_mm if psf.depths_mm.size > 1 else None,
+            levels=None if setting.bits is None else levels_of(sensor, setting),
+            plate=options.plate,
+        )
+        for setting in settings
+    ]
 
 
 def _setting(options: SimulationOptions) -> Setting:
@@ -162,9 +192,18 @@ def photograph(scene: FloatArray, bundle: Bundle, options: SimulationOptions) ->
         bundle: The camera.
         options: ISO, exposure, seed and place on the sensor.
     """
+    (simulation,) = photograph_series(scene, bundle, options, [_setting(options)])
+    return simulation
+
+
+def photograph_series(
+    scene: FloatArray, bundle: Bundle, options: SimulationOptions, settings: Sequence[Setting]
+) -> list[Simulation]:
+    """Photograph a scene several times as `photograph` does; see `simulate_series`."""
     psf = bundle.psf if options.plate else bare_psf(bundle)
     haze = bundle.haze if bundle.manifest.has_haze else None
-    return simulate(scene, bundle.manifest.light_sensor, psf, options, haze=haze)
+    sensor = bundle.manifest.light_sensor
+    return simulate_series(scene, sensor, psf, options, settings, haze=haze)
 
 
 def bare_psf(bundle: Bundle) -> FrozenPsf:

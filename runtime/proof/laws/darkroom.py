@@ -1,6 +1,7 @@
 """Scenes photographed by a bundle's twin, and what networks and their front end make of them."""
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final
 
@@ -10,13 +11,14 @@ from camkit.arrays import FloatArray
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Color, Undistort
 from camkit.runtime.job.choices import known_options
-from camkit.runtime.kind import part_of
+from camkit.runtime.kind import part_of, photograph_by_twin
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.plan.decision import Work
 from camkit.runtime.plan.ways import without_networks
+from camkit.runtime.twin.exposure import Setting
 from camkit.runtime.twin.light import stated_balance
-from camkit.runtime.twin.simulate import Simulation, SimulationOptions
+from camkit.runtime.twin.simulate import Simulation, SimulationOptions, photograph_series
 from camkit.runtime.twin.truth import light_sensor, true_picture
 
 PLACES: Final = {"middle": 0.0, "half-way": 0.5, "corner": 1.0}
@@ -97,27 +99,34 @@ class Darkroom:
         return left, top
 
     def expose(
-        self, scene: FloatArray, place: str, *, iso: float, seed: int = 1, noise: bool = True
-    ) -> Exposed:
-        """Photograph a scene and make both pictures of it."""
+        self, scene: FloatArray, place: str, settings: Sequence[Setting]
+    ) -> Iterator[Exposed]:
+        """Photograph a scene with every setting, and make both pictures of each capture."""
         options = SimulationOptions(
-            iso=iso,
-            seed=seed,
-            noise=noise,
             origin_px=self.origin_px(place, scene.shape[1:]),
             depth_mm=self.depth_mm,
             distort=False,  # parts of a chart stay where they are drawn
         )
-        simulation = part_of(self.bundle.manifest).simulate(scene, self.bundle, options)
-        network, light = self._pictures(self._networks, simulation)
-        front, front_light = self._pictures(self._front, simulation)
-        return Exposed(
-            truth=true_picture(simulation.clean, light_sensor(self.bundle.manifest)),
-            network=network,
-            front=front,
-            light=light,
-            front_light=front_light,
-        )
+        for simulation in self._photographs(scene, options, settings):
+            network, light = self._pictures(self._networks, simulation)
+            front, front_light = self._pictures(self._front, simulation)
+            yield Exposed(
+                truth=true_picture(simulation.clean, light_sensor(self.bundle.manifest)),
+                network=network,
+                front=front,
+                light=light,
+                front_light=front_light,
+            )
+
+    def _photographs(
+        self, scene: FloatArray, options: SimulationOptions, settings: Sequence[Setting]
+    ) -> Iterable[Simulation]:
+        simulate = part_of(self.bundle.manifest).simulate
+        if simulate is photograph_by_twin:  # whose light is projected once
+            return photograph_series(scene, self.bundle, options, settings)
+        words = ("iso", "exposure", "seed", "noise")
+        every = ({word: getattr(setting, word) for word in words} for setting in settings)
+        return (simulate(scene, self.bundle, replace(options, **some)) for some in every)
 
     def _pictures(
         self, pipeline: Pipeline, simulation: Simulation

@@ -13,8 +13,12 @@ import pytest
 import tifffile
 
 from camkit.cli.exit_code import ExitCode
+from camkit.report.figure import encode_png
+from camkit.report.stress import stress_run
 from tests.toy_camera.bundle import HEIGHT_PX, SCALE, WIDTH_PX, write_toy_bundle
 from tests.toy_camera.install import toy_installed  # noqa: F401
+
+PNG = encode_png(np.zeros((1, 1, 3), np.uint8))
 
 pytestmark = pytest.mark.usefixtures("toy_installed")
 
@@ -148,8 +152,11 @@ def test_pictures_of_a_folder_are_photographed_as_fine_as_its_picture(
 
 
 def test_every_scenario_that_is_for_it_runs_and_its_own_among_them(
-    toy: Path, tmp_path: Path, camkit_command
+    toy: Path, tmp_path: Path, camkit_command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    drawn = []
+    # 27 charts take two thirds of the time to become PNGs; tests of `stress` make those
+    monkeypatch.setattr(stress_run, "to_png", lambda figure: drawn.append(figure) or PNG)
     outcome = camkit_command(
         "stress", toy, "--quick", "--scenes", "1", "--out-dir", tmp_path, "--json"
     )
@@ -163,6 +170,7 @@ def test_every_scenario_that_is_for_it_runs_and_its_own_among_them(
     assert rows["haze"]["chi2"]["S"][0] == pytest.approx(1, abs=0.01)
     assert rows["tile_seams"]["extra"]["seam_max_abs"]["S"][0] == 0
     assert rows["stuck_rows"]["break_point"] < 8
+    assert len(drawn) == len(rows) - len(left_out)
     assert (tmp_path / "stress.html").is_file()
     assert not rows["noise"]["faults"]
 

@@ -20,7 +20,7 @@ from tests.data_folder import ROOT, data_path
 from tests.network_graphs import GRAPHS, nafnet, unet
 from tests.small_network import small_network
 
-CAP_MB = 930
+CAP_MB = 600
 MORE_MB = 8
 """Memory of a run besides: threads, tables."""
 
@@ -44,7 +44,7 @@ def _some(names: Iterable[str], often: set[str]) -> list[Any]:
 
 @pytest.mark.parametrize("name", _some(GRAPHS, {"unet", "nafnet"}))
 def test_a_run_takes_no_more_than_is_counted_whatever_sizes_its_windows_have(name: str) -> None:
-    seen = _child("run", name, "512", "640", "448")
+    seen = _child("run", name, "384", "480", "336")
     assert seen["rose_mb"] < seen["counted_mb"] + MORE_MB
 
 

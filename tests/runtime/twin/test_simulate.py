@@ -14,8 +14,14 @@ from camkit.errors import ContractError, UnsupportedError
 from camkit.psf import FrozenPsf
 from camkit.runtime.geometry.illumination import illumination_band
 from camkit.runtime.raw import read_capture
-from camkit.runtime.twin.exposure import sample_mosaic
-from camkit.runtime.twin.simulate import Simulation, SimulationOptions, simulate, write_capture
+from camkit.runtime.twin.exposure import Setting, sample_mosaic
+from camkit.runtime.twin.simulate import (
+    Simulation,
+    SimulationOptions,
+    simulate,
+    simulate_series,
+    write_capture,
+)
 from tests.bundle_factory import tiny_sensor
 from tests.camera_factory import delta_psf, make_psf, make_sensor, whole_window
 from tests.deep_bundle import deep_psf
@@ -43,6 +49,23 @@ def test_perfect_camera_records_the_scene() -> None:
     np.testing.assert_allclose(found.clean, planes, atol=1e-5)
     expected = sample_mosaic(planes, "RGGB", gains).clip(0, 1)
     np.testing.assert_allclose(signal(found), expected, atol=0.51 * ONE_DN)
+
+
+def test_captures_of_a_series_are_those_that_are_taken_alone() -> None:
+    picture, psf = scene(), make_psf(SENSOR)
+    settings = [
+        Setting(iso=400.0, seed=3),
+        Setting(iso=100.0, seed=4, exposure=0.25, noise=False, bits=10),
+    ]
+    series = simulate_series(picture, SENSOR, psf, SimulationOptions(vignette=False), settings)
+    for setting, found in zip(settings, series, strict=True):
+        facts = {
+            name: getattr(setting, name) for name in ("iso", "seed", "exposure", "noise", "bits")
+        }
+        alone = simulate(picture, SENSOR, psf, SimulationOptions(vignette=False, **facts))
+        np.testing.assert_allclose(found.clean, alone.clean, rtol=1e-5, atol=1e-6)
+        assert np.abs(found.samples.astype(int) - alone.samples).max() <= 1 - setting.noise
+        assert (found.iso, found.levels) == (alone.iso, alone.levels)
 
 
 def test_flat_scene_becomes_the_relative_illumination() -> None:

@@ -6,6 +6,7 @@ import sys
 from html.parser import HTMLParser
 from pathlib import Path
 
+import cv2
 import pytest
 
 from camkit import entry_points
@@ -148,6 +149,7 @@ def test_a_page_is_written_with_its_charts(tmp_path: Path) -> None:
     assert files == [page_path(tmp_path / "new", "one"), *files[1:]]
     assert [path.name for path in files] == ["one.html", "one-a.svg", "one-a.png"]
     assert files[2].read_bytes().startswith(writer.PNG_START)
+    assert cv2.imread(str(files[2])).shape == (260, 260, 3)  # of 2 inches at 130 dpi
     again = write_page(tmp_path / "again", "one", {"a": _drawn}, page)
     assert [path.read_bytes() for path in again] == [path.read_bytes() for path in files]
 

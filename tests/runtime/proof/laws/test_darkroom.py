@@ -9,6 +9,7 @@ from camkit.bundle.reader import find_bundle, open_bundle
 from camkit.bundle.writer import write_bundle
 from camkit.runtime.proof.laws.darkroom import PLACES, Darkroom, reason_not_judged
 from camkit.runtime.proof.laws.photographs import picture_laws
+from camkit.runtime.twin.exposure import Setting
 from camkit.scenes.procedural import procedural_scene
 from tests.bundle_factory import tiny_manifest, tiny_members, write_tiny_bundle
 
@@ -28,7 +29,7 @@ def test_places_go_from_the_middle_of_the_sensor_to_its_corner(room: Darkroom) -
 
 def test_both_pictures_are_of_one_capture_and_lie_where_the_scene_does(room: Darkroom) -> None:
     scene = procedural_scene(5_300_009, 256, 320)
-    seen = room.expose(scene, "corner", iso=100.0)
+    (seen,) = room.expose(scene, "corner", [Setting(seed=1)])
 
     def off(picture: np.ndarray) -> float:
         gap = np.clip(picture, 0, 1) - np.clip(seen.truth, 0, 1)
