@@ -122,9 +122,9 @@ class _Linear:
         flat = rest.reshape(len(poses), -1, 1)
         if not usable:
             slopes, flat = np.zeros_like(slopes), np.zeros_like(flat)
-        turned = slopes.swapaxes(1, 2)
+        columns = slopes.swapaxes(1, 2)
         with np.errstate(over="ignore", invalid="ignore"):
-            normal, side = turned @ slopes, (turned @ flat)[..., 0]
+            normal, side = columns @ slopes, (columns @ flat)[..., 0]
         return cls(
             rest=rest,
             square=square if usable else np.inf,
@@ -137,13 +137,13 @@ class _Linear:
 
     def step(self, damping: float, *, lens: bool) -> tuple[FloatGrid, FloatGrid]:
         """Return the steps of intrinsics and of poses."""
-        poses_only = _damped(self.pose_block, damping)
+        poses_only = _with_damping(self.pose_block, damping)
         if not lens:
             own_step = _solve(poses_only, self.own_side[..., None])[..., 0]
             return np.zeros_like(self.shared_side), own_step
         own = _solve(poses_only, np.concatenate([self.mixed, self.own_side[..., None]], axis=-1))
         own_mixed, own_step = own[..., :-1], own[..., -1]
-        shared = _damped(self.shared, damping)
+        shared = _with_damping(self.shared, damping)
         reduced = shared - np.einsum("vki,vkj->ij", self.mixed, own_mixed)
         reduced_side = self.shared_side - np.einsum("vki,vk->i", self.mixed, own_step)
         lens_step = _solve(reduced, reduced_side[:, None])[:, 0]
@@ -158,12 +158,12 @@ class _Linear:
         return _solve(reduced, np.eye(len(reduced)))
 
 
-def _damped(squares: FloatGrid, damping: float) -> FloatGrid:
+def _with_damping(squares: FloatGrid, damping: float) -> FloatGrid:
     """Return matrices whose diagonals are larger by a share of themselves."""
-    damped = squares.copy()
-    lines = np.einsum("...ii->...i", damped)
+    sums = squares.copy()
+    lines = np.einsum("...ii->...i", sums)
     lines += damping * np.maximum(lines, _TINY)
-    return damped
+    return sums
 
 
 def _solve(left: FloatGrid, right: FloatGrid) -> FloatGrid:

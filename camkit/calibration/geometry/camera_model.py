@@ -145,8 +145,8 @@ def project_views(
     the slopes g of the picture by q.
     """
     turns, axes = _turns(poses)
-    turned = points @ turns.swapaxes(1, 2)
-    before = turned + poses[:, None, 3:]
+    offsets = points @ turns.swapaxes(1, 2)
+    before = offsets + poses[:, None, 3:]
     k, model, shape = camera.coefficients, camera.model, before.shape[:2]
     line, still = before.reshape(1, -1, 3), np.zeros(3)
     if model.fisheye:
@@ -157,7 +157,7 @@ def project_views(
         shifts, lens, others = table[:, 3:6], table[:, 6:10], table[:, 10:]
     at = np.asarray(places, dtype=np.float64).reshape(*shape, 2)
     at[(before[..., 2] <= 0).any(axis=1)] = np.nan
-    arms = np.cross(np.repeat(turned.reshape(-1, 3), 2, axis=0), shifts)
+    arms = np.cross(np.repeat(offsets.reshape(-1, 3), 2, axis=0), shifts)
     slopes = np.empty((len(poses), 2 * len(points), POSE_NUMBERS + camera.intrinsics.size))
     slopes[..., :3] = arms.reshape(len(poses), -1, 3) @ axes
     rows = slopes.reshape(len(table), -1)
