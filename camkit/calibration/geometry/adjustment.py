@@ -141,8 +141,10 @@ class _Linear:
         if not lens:
             own_step = _solve(poses_only, self.own_side[..., None])[..., 0]
             return np.zeros_like(self.shared_side), own_step
-        own = _solve(poses_only, np.concatenate([self.mixed, self.own_side[..., None]], axis=-1))
-        own_mixed, own_step = own[..., :-1], own[..., -1]
+        solutions = _solve(
+            poses_only, np.concatenate([self.mixed, self.own_side[..., None]], axis=-1)
+        )
+        own_mixed, own_step = solutions[..., :-1], solutions[..., -1]
         shared = _with_damping(self.shared, damping)
         reduced = shared - np.einsum("vki,vkj->ij", self.mixed, own_mixed)
         reduced_side = self.shared_side - np.einsum("vki,vk->i", self.mixed, own_step)

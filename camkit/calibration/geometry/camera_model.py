@@ -146,9 +146,9 @@ def project_views(
     """
     turns, axes = _turns(poses)
     offsets = points @ turns.swapaxes(1, 2)
-    before = offsets + poses[:, None, 3:]
-    k, model, shape = camera.coefficients, camera.model, before.shape[:2]
-    line, still = before.reshape(1, -1, 3), np.zeros(3)
+    places_3d = offsets + poses[:, None, 3:]
+    k, model, shape = camera.coefficients, camera.model, places_3d.shape[:2]
+    line, still = places_3d.reshape(1, -1, 3), np.zeros(3)
     if model.fisheye:
         places, table = cv2.fisheye.projectPoints(line, still, still, camera.matrix, k)
         shifts, lens, others = table[:, 11:14], table[:, :4], table[:, 4:8]
@@ -156,7 +156,7 @@ def project_views(
         places, table = cv2.projectPoints(line, still, still, camera.matrix, k)
         shifts, lens, others = table[:, 3:6], table[:, 6:10], table[:, 10:]
     at = np.asarray(places, dtype=np.float64).reshape(*shape, 2)
-    at[(before[..., 2] <= 0).any(axis=1)] = np.nan
+    at[(places_3d[..., 2] <= 0).any(axis=1)] = np.nan
     arms = np.cross(np.repeat(offsets.reshape(-1, 3), 2, axis=0), shifts)
     slopes = np.empty((len(poses), 2 * len(points), POSE_NUMBERS + camera.intrinsics.size))
     slopes[..., :3] = arms.reshape(len(poses), -1, 3) @ axes
