@@ -52,9 +52,8 @@ def to_onnx(network: nn.Module, *, channels: int = 6, scale: int = 1) -> bytes:
     was_training = network.training
     network.eval()
     try:
-        model = _stripped(
-            _traced(network, channels, stride), _output_planes(network, channels, scale), scale
-        )
+        outputs = _output_planes(network, channels, scale)
+        model = _stripped(_traced(network, channels, stride), outputs, scale)
         check_parity(network, model, _random_windows(channels, stride), scale=scale)
     finally:
         network.train(was_training)

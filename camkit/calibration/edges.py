@@ -298,14 +298,16 @@ def fit_line(
         if profile is None:
             return None
         near = np.abs(distance) < reach_px
+        distance, position, light = distance[near], position[near], values[near]
+        variance = float(light.var())
         is_outside = not (0 <= line.y <= size[0] and 0 <= line.x <= size[1])
-        if is_outside or not values[near].var() > 0:
+        if is_outside or not variance > 0:
             return None
         slope = np.gradient(profile.value, profile.distance_px)
-        rise = np.interp(distance, profile.distance_px, slope)[near]
-        rest = values[near] - np.interp(distance, profile.distance_px, profile.value)[near]
-        explained = 1 - float(rest.var() / values[near].var())
-        table = np.stack([rise, rise * position[near]], axis=1)
+        rise = np.interp(distance, profile.distance_px, slope)
+        rest = light - np.interp(distance, profile.distance_px, profile.value)
+        explained = 1 - float(rest.var()) / variance
+        table = np.stack([rise, rise * position], axis=1)
         (move, turn), *_ = np.linalg.lstsq(table, rest, rcond=None)
         down, right = line.normal
         line = Line(y=line.y - move * down, x=line.x - move * right, angle=line.angle + turn)

@@ -249,36 +249,42 @@ def hazy_parts(tmp_path_factory: pytest.TempPathFactory) -> Parts:
     )
 
 
-def test_a_camera_with_a_haze_is_exported_with_its_case_of_cells(
-    hazy_parts: Parts, tmp_path: Path
+@pytest.fixture(scope="module")
+def stress_parts(hazy_parts: Parts, tmp_path_factory: pytest.TempPathFactory) -> Parts:
+    """The same with what it is at other distances."""
+    folder = tmp_path_factory.mktemp("stress")
+    stress, beside = (folder / f"{name}.safetensors" for name in ("psf", "haze"))
+    write_psf(stress, _psf())
+    write_haze(beside, tiny_haze(_psf(), share=0.4))
+    return replace(hazy_parts, stress_psf=stress, stress_haze=beside)
+
+
+def test_a_camera_with_a_haze_is_exported_with_its_case_of_cells_and_other_distances(
+    stress_parts: Parts, tmp_path: Path
 ) -> None:
-    report = export_bundle(hazy_parts, tmp_path / "hazy.camkit")
+    report = export_bundle(stress_parts, tmp_path / "hazy.camkit")
     bundle = open_bundle(tmp_path / "hazy.camkit")
     assert bundle.manifest.format_version == "2.12"
     types = [stage.type for stage in bundle.manifest.stages]
     assert types[types.index("demosaic") + 1 :][:3] == ["haze", "wiener", "network"]
     assert HAZE_GOLDEN in bundle.names
     assert any("the haze of 80 x 70 cells" in str(line) for line in report.values())
-
-
-def test_what_it_is_at_other_distances_goes_with_its_haze(
-    parts: Parts, hazy_parts: Parts, tmp_path: Path
-) -> None:
-    stress = tmp_path / "stress_psf.safetensors"
-    beside = tmp_path / "stress_haze.safetensors"
-    write_psf(stress, _psf())
-    write_haze(beside, tiny_haze(_psf(), share=0.4))
-    both = replace(hazy_parts, stress_psf=stress, stress_haze=beside)
-    export_bundle(both, tmp_path / "hazy.camkit")
-    found = open_bundle(tmp_path / "hazy.camkit").stress_haze()
+    found = bundle.stress_haze()
     assert found is not None
     np.testing.assert_array_equal(found.kernels, tiny_haze(_psf(), share=0.4).kernels)
-    for bad in (replace(both, stress_psf=None), replace(parts, stress_haze=beside)):
+
+
+def test_a_haze_of_other_distances_goes_with_its_psf_and_a_haze(
+    parts: Parts, stress_parts: Parts, tmp_path: Path
+) -> None:
+    beside = stress_parts.stress_haze
+    for bad in (replace(stress_parts, stress_psf=None), replace(parts, stress_haze=beside)):
         with pytest.raises(ContractError, match="haze of kernels off the design point"):
             export_bundle(bad, tmp_path / "x.camkit")
-    write_haze(beside, tiny_haze(deep_psf()))
+    write_haze(tmp_path / "deep.safetensors", tiny_haze(deep_psf()))
+    deep = replace(stress_parts, stress_haze=tmp_path / "deep.safetensors")
     with pytest.raises(ContractError, match=r"different (depths|field_heights)_mm"):
-        export_bundle(both, tmp_path / "x.camkit")
+        export_bundle(deep, tmp_path / "x.camkit")
     assert not (tmp_path / "x.camkit").exists()
 
 

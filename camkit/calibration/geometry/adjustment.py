@@ -15,7 +15,7 @@ from camkit.calibration.geometry.camera_model import (
     POSE_NUMBERS,
     Camera,
     FloatGrid,
-    project,
+    project_views,
 )
 
 MOST_STEPS: Final = 200
@@ -24,6 +24,8 @@ LEAST_GAIN: Final = 1e-9
 _FIRST_DAMPING: Final = 1e-3
 _MOST_DAMPING: Final = 1e12
 _TINY: Final = 1e-12
+_SINGULAR: Final = 1e-15
+"""Of the largest eigenvalue, up to which one counts as none."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -110,32 +112,40 @@ class _Linear:
     def at(
         cls, camera: Camera, poses: FloatGrid, corners: FloatGrid, points: FloatGrid
     ) -> "_Linear":
-        projections = [project(camera, pose, points) for pose in poses]
-        rest = corners - np.stack([at for at, _ in projections])
-        slopes = np.stack([slope.reshape(2 * len(points), -1) for _, slope in projections])
-        flat = rest.reshape(len(poses), -1)
-        square = float(np.square(flat).sum())
+        places, by_number = project_views(camera, poses, points)
+        rest = corners - places
+        slopes = by_number.reshape(len(poses), 2 * len(points), -1)
+        with np.errstate(over="ignore"):
+            square = float(np.square(rest).sum())
         usable = np.isfinite(square) and bool(np.isfinite(slopes).all())
-        by_pose, by_lens = slopes[..., :POSE_NUMBERS], slopes[..., POSE_NUMBERS:]
-        by_lens[..., list(camera.fixed)] = 0
+        slopes[..., [POSE_NUMBERS + number for number in camera.fixed]] = 0
+        flat = rest.reshape(len(poses), -1, 1)
+        if not usable:
+            slopes, flat = np.zeros_like(slopes), np.zeros_like(flat)
+        columns = slopes.swapaxes(1, 2)
+        with np.errstate(over="ignore", invalid="ignore"):
+            normal, side = columns @ slopes, (columns @ flat)[..., 0]
         return cls(
             rest=rest,
             square=square if usable else np.inf,
-            pose_block=np.einsum("vni,vnj->vij", by_pose, by_pose),
-            mixed=np.einsum("vni,vnj->vij", by_pose, by_lens),
-            shared=np.einsum("vni,vnj->ij", by_lens, by_lens),
-            own_side=np.einsum("vni,vn->vi", by_pose, flat),
-            shared_side=np.einsum("vni,vn->i", by_lens, flat),
+            pose_block=normal[:, :POSE_NUMBERS, :POSE_NUMBERS],
+            mixed=normal[:, :POSE_NUMBERS, POSE_NUMBERS:],
+            shared=normal[:, POSE_NUMBERS:, POSE_NUMBERS:].sum(axis=0),
+            own_side=side[:, :POSE_NUMBERS],
+            shared_side=side[:, POSE_NUMBERS:].sum(axis=0),
         )
 
     def step(self, damping: float, *, lens: bool) -> tuple[FloatGrid, FloatGrid]:
         """Return the steps of intrinsics and of poses."""
-        poses_only = self.pose_block + damping * _diagonals(self.pose_block)
-        own_step = _solve(poses_only, self.own_side[..., None])[..., 0]
+        poses_only = _with_damping(self.pose_block, damping)
         if not lens:
+            own_step = _solve(poses_only, self.own_side[..., None])[..., 0]
             return np.zeros_like(self.shared_side), own_step
-        own_mixed = _solve(poses_only, self.mixed)
-        shared = self.shared + damping * _diagonals(self.shared)
+        solutions = _solve(
+            poses_only, np.concatenate([self.mixed, self.own_side[..., None]], axis=-1)
+        )
+        own_mixed, own_step = solutions[..., :-1], solutions[..., -1]
+        shared = _with_damping(self.shared, damping)
         reduced = shared - np.einsum("vki,vkj->ij", self.mixed, own_mixed)
         reduced_side = self.shared_side - np.einsum("vki,vk->i", self.mixed, own_step)
         lens_step = _solve(reduced, reduced_side[:, None])[:, 0]
@@ -150,14 +160,19 @@ class _Linear:
         return _solve(reduced, np.eye(len(reduced)))
 
 
-def _diagonals(squares: FloatGrid) -> FloatGrid:
-    lines = np.einsum("...ii->...i", squares)
-    return np.asarray(np.maximum(lines, _TINY)[..., None] * np.eye(squares.shape[-1]))
+def _with_damping(squares: FloatGrid, damping: float) -> FloatGrid:
+    """Return matrices whose diagonals are larger by a share of themselves."""
+    sums = squares.copy()
+    lines = np.einsum("...ii->...i", sums)
+    lines += damping * np.maximum(lines, _TINY)
+    return sums
 
 
 def _solve(left: FloatGrid, right: FloatGrid) -> FloatGrid:
     """Solve; where numbers cannot be separated, take the least change."""
-    scale = 1 / np.sqrt(np.maximum(np.einsum("...ii->...i", left), _TINY))
-    even = left * scale[..., :, None] * scale[..., None, :]
-    inverse = np.linalg.pinv(even, rcond=1e-15, hermitian=True)
-    return np.asarray(scale[..., :, None] * (inverse @ (scale[..., :, None] * right)))
+    scale = 1 / np.sqrt(np.maximum(np.einsum("...ii->...i", left), _TINY))[..., None]
+    values, vectors = np.linalg.eigh(left * scale * scale.swapaxes(-1, -2))
+    sizes = np.abs(values)
+    clear = sizes > _SINGULAR * sizes.max(axis=-1, keepdims=True)
+    inverse = np.divide(1, values, out=np.zeros_like(values), where=clear)[..., None]
+    return np.asarray(scale * (vectors @ (inverse * (vectors.swapaxes(-1, -2) @ (scale * right)))))

@@ -131,19 +131,48 @@ def project(camera: Camera, pose: FloatGrid, points: FloatGrid) -> tuple[FloatGr
         (point, 2) x, y in px; and (point, 2, 6 + intrinsics) derivatives by pose and intrinsics.
         Not finite where a point lies behind the camera.
     """
-    turn, shift = pose[:3], pose[3:]
-    k, model = camera.coefficients, camera.model
+    places, slopes = project_views(camera, pose[None], points)
+    return places[0], slopes[0]
+
+
+def project_views(
+    camera: Camera, poses: FloatGrid, points: FloatGrid
+) -> tuple[FloatGrid, FloatGrid]:
+    """Return what `project` does, for every pose (view, 6): places and slopes (view, point, ...).
+
+    All views go through OpenCV at once, as points before a camera that is not turned. A rotation by
+    a small angle about an axis w moves a turned point q by w x q, so g (w x q) = w (q x g) px for
+    the slopes g of the picture by q.
+    """
+    turns, axes = _turns(poses)
+    offsets = points @ turns.swapaxes(1, 2)
+    places_3d = offsets + poses[:, None, 3:]
+    k, model, shape = camera.coefficients, camera.model, places_3d.shape[:2]
+    line, still = places_3d.reshape(1, -1, 3), np.zeros(3)
     if model.fisheye:
-        places, table = cv2.fisheye.projectPoints(points[None], turn, shift, camera.matrix, k)
-        poses, lens, others = table[:, 8:14], table[:, :4], table[:, 4:8]
+        places, table = cv2.fisheye.projectPoints(line, still, still, camera.matrix, k)
+        shifts, lens, others = table[:, 11:14], table[:, :4], table[:, 4:8]
     else:
-        places, table = cv2.projectPoints(points, turn, shift, camera.matrix, k)
-        poses, lens, others = table[:, :6], table[:, 6:10], table[:, 10:]
-    at = np.asarray(places, dtype=np.float64).reshape(-1, 2)
-    columns = [poses, lens[:, :1] + lens[:, 1:2], lens[:, 2:4], others[:, list(model.free)]]
-    if (depths(pose, points) <= 0).any():
-        at = np.full_like(at, np.nan)
-    return at, np.hstack(columns).reshape(len(points), 2, -1)
+        places, table = cv2.projectPoints(line, still, still, camera.matrix, k)
+        shifts, lens, others = table[:, 3:6], table[:, 6:10], table[:, 10:]
+    at = np.asarray(places, dtype=np.float64).reshape(*shape, 2)
+    at[(places_3d[..., 2] <= 0).any(axis=1)] = np.nan
+    arms = np.cross(np.repeat(offsets.reshape(-1, 3), 2, axis=0), shifts)
+    slopes = np.empty((len(poses), 2 * len(points), POSE_NUMBERS + camera.intrinsics.size))
+    slopes[..., :3] = arms.reshape(len(poses), -1, 3) @ axes
+    rows = slopes.reshape(len(table), -1)
+    rows[:, 3:POSE_NUMBERS] = shifts
+    rows[:, POSE_NUMBERS] = lens[:, 0] + lens[:, 1]
+    rows[:, POSE_NUMBERS + 1 : POSE_NUMBERS + LENS_NUMBERS] = lens[:, 2:4]
+    rows[:, POSE_NUMBERS + LENS_NUMBERS :] = others.take(model.free, axis=1)
+    return at, slopes.reshape(*shape, 2, -1)
+
+
+def _turns(poses: FloatGrid) -> tuple[FloatGrid, FloatGrid]:
+    """Return rotations (view, 3, 3), and by number of the vector the axes (view, xyz, number)."""
+    turns, slopes = (np.stack(part) for part in zip(*(cv2.Rodrigues(one[:3]) for one in poses), strict=True))  # noqa: E501 # fmt: skip
+    spins = slopes.reshape(-1, 3, 3, 3) @ turns.swapaxes(1, 2)[:, None]
+    return turns, np.stack([spins[..., 2, 1], spins[..., 0, 2], spins[..., 1, 0]], axis=1)
 
 
 def depths(pose: FloatGrid, points: FloatGrid) -> FloatGrid:

@@ -7,9 +7,9 @@ one catalogue has it; "F2", which Schott and Hikari make from different melts, i
 
 import difflib
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, lru_cache
 from importlib import resources
 from typing import Any, Final
 
@@ -136,11 +136,6 @@ def _glass(row: Sequence[Any], suffix: str, source: str) -> Glass:
     )
 
 
-def _all(catalogues: Iterable[GlassCatalogue]) -> Iterator[Glass]:
-    for catalogue in (*catalogues, *builtin_catalogues()):
-        yield from catalogue.glasses
-
-
 def find_glass(
     name: str,
     catalogues: Sequence[GlassCatalogue] = (),
@@ -188,12 +183,35 @@ def own_glass(glass: Glass, catalogues: Iterable[GlassCatalogue]) -> Glass | Non
 
 def _near_names(name: str, catalogues: Sequence[GlassCatalogue]) -> list[str]:
     folded_name = name.casefold()
-    parts = (folded_name, folded_name.rpartition("-")[0])  # a maker may follow
+    user_glasses = (glass for catalogue in catalogues for glass in catalogue.glasses)
+    pairs = [*_near(folded_name, user_glasses), *_builtin_near(folded_name)]
+    return [glass_name for _, glass_name in sorted(pairs, key=lambda pair: -pair[0])[:_NEAR]]
 
-    def likeness(glass: Glass) -> float:
+
+@lru_cache(maxsize=256)
+def _builtin_near(folded_name: str) -> list[tuple[float, str]]:
+    """Return the near ones of camkit's: names that are no glass of it come again and again."""
+    return _near(folded_name, (glass for c in builtin_catalogues() for glass in c.glasses))
+
+
+def _near(folded_name: str, glasses: Iterable[Glass]) -> list[tuple[float, str]]:
+    """Return how like the names of glasses are to one, and the names; without unlike ones."""
+    parts = {folded_name, folded_name.rpartition("-")[0]}  # a maker may follow
+    matchers = [difflib.SequenceMatcher(None, "", part) for part in parts]
+    near = []
+    for glass in glasses:
         trade_name = trade_name_of(glass).casefold()
-        ratios = [difflib.SequenceMatcher(None, trade_name, part).ratio() for part in parts]
-        return max(*ratios, 0.99 * (glass.name.casefold() == folded_name))
+        ratios = [_likeness(matcher, trade_name) for matcher in matchers]
+        likeness = max(*ratios, 0.99 * (glass.name.casefold() == folded_name), 0.0)
+        if likeness >= _LEAST_LIKENESS:
+            near.append((likeness, glass.name))
+    return near
 
-    ranked = sorted(_all(catalogues), key=likeness, reverse=True)
-    return [glass.name for glass in ranked[:_NEAR] if likeness(glass) >= _LEAST_LIKENESS]
+
+def _likeness(matcher: difflib.SequenceMatcher[str], text: str) -> float:
+    """Return the ratio of a text, or 0 where a bound that takes less time lies below the least."""
+    matcher.set_seq1(text)
+    bounds = (matcher.real_quick_ratio, matcher.quick_ratio)
+    if any(bound() < _LEAST_LIKENESS for bound in bounds):
+        return 0.0
+    return matcher.ratio()

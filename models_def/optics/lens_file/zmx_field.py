@@ -103,6 +103,8 @@ def with_field_points(
 
 def _heights_within(lens: Lens, heights_mm: list[float]) -> tuple[list[float], tuple[str, ...]]:
     """Return the image heights to which the lens can be aimed, and a note on the others."""
+    if not any(heights_mm):
+        return heights_mm, ()
     path = chief_path(lens)
     widest_mm = abs(float(path.heights_mm[path.outermost]))
     heights_beyond = [height for height in heights_mm if height > widest_mm]

@@ -10,6 +10,7 @@ from torch import nn
 
 from camkit.errors import ContractError, DecodeError
 from camkit.export.foreign.canonical import canonical_graph
+from camkit.export.foreign.published import published_network
 from camkit.export.foreign.state_dict import model_of_state_dict
 from camkit.runtime.network.engine import NetworkEngine
 from tests.foreign_networks import DnCNN, NAFNet, Sid, seeded
@@ -38,9 +39,21 @@ def test_a_dncnn_is_known_by_its_keys(tmp_path: Path, wrapper: str | None) -> No
 
 
 def test_a_nafnet_is_known_by_its_keys(tmp_path: Path) -> None:
-    network = seeded(NAFNet, enc_blk_nums=(1, 2), dec_blk_nums=(1, 1), middle_blk_num=2)
+    network = seeded(NAFNet, enc_blk_nums=(1,), dec_blk_nums=(1,))
     path = _saved(tmp_path / "a.pth", {"params": network.state_dict(), "iter": 3})
     assert _difference(path, network) < 1e-5
+
+
+def test_every_block_of_a_nafnet_is_counted() -> None:
+    network = seeded(NAFNet, enc_blk_nums=(1, 2), dec_blk_nums=(3, 1), middle_blk_num=2)
+    published = published_network(network.state_dict())
+    assert published is not None
+    name, counted, weights = published
+    assert name == "NAFNet"
+    counted.load_state_dict(weights)
+    window = torch.rand(1, 3, 32, 48, generator=torch.Generator().manual_seed(0))
+    with torch.no_grad():
+        assert torch.allclose(counted.eval()(window), network(window), atol=1e-5)
 
 
 def test_a_class_that_is_named_is_filled(tmp_path: Path) -> None:

@@ -184,7 +184,7 @@ def test_a_design_begins_at_a_library_lens_and_goes_on_without_a_second_search(
     table["vary"] += [
         {"kind": "curvature", "surface": i, "low": -0.1, "high": 0.1} for i in (1, 2, 3)
     ]
-    table["optics"] |= {"efl_mm": 50.0, "solved_surface": 4}
+    table["optics"] |= {"efl_mm": 50.0, "solved_surface": 4, "psf_model": "rays"}
     # two steps make this crude lens no match for a triplet
     table["starts"] = {"library": True, "elements": 3, "scout_steps": 1, "dls_steps": 1}
     recipe = to_design(table)

@@ -46,7 +46,7 @@ def test_a_stopped_run_goes_on_and_leaves_lens_log_and_checkpoint(
 def test_a_resumed_run_takes_its_start_from_the_checkpoint(
     recipe: DesignRecipe, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    searching = replace(recipe, starts=Starts(count=6, spread=0.3))
+    searching = replace(recipe, starts=Starts(count=4, spread=0.3, scout_steps=1, dls_steps=1))
     whole = finish(searching, DesignOptions(out_dir=tmp_path / "a"))
     assert whole.searched_s > 0
     options = DesignOptions(out_dir=tmp_path / "b")

@@ -33,10 +33,18 @@ def equal(one, two):
     return one.keys() == two.keys() and all(torch.equal(one[k], two[k]) for k in one)
 
 
-@pytest.mark.parametrize("name", ["lean_s", "lean_m", "lean_l"])
-def test_export_keeps_every_weight_under_its_name(name):
-    network = trained(name, bias=True)
-    assert equal(state_of_onnx(to_onnx(network)), network.state_dict())
+@pytest.fixture(scope="module")
+def network():
+    return trained("lean_s", bias=True)
+
+
+@pytest.fixture(scope="module")
+def graph(network):
+    return to_onnx(network)
+
+
+def test_export_keeps_every_weight_under_its_name(network, graph):
+    assert equal(state_of_onnx(graph), network.state_dict())
 
 
 def test_bundle_of_a_network_with_prelus_sends_to_its_checkpoint():
@@ -106,8 +114,8 @@ def test_what_is_no_checkpoint_is_an_error(tmp_path):
         read_first_weights(path, "M")
 
 
-def test_weights_outside_the_model_are_refused():
-    model = onnx.load_from_string(to_onnx(trained("lean_s")))
+def test_weights_outside_the_model_are_refused(graph):
+    model = onnx.load_from_string(graph)
     external_data_helper.set_external_data(model.graph.initializer[0], location="weights.bin")
     with pytest.raises(ContractError, match="lies in another file"):
         state_of_onnx(model.SerializeToString())

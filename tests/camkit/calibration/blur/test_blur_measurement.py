@@ -76,8 +76,9 @@ def test_clipped_photographs_say_so():
     ],
 )
 def test_photographs_of_several_cameras_or_settings_are_refused(change, words):
-    other = replace(taken(1), **change)
-    photos = [("a.dng", partial(taken, 0)), ("b.dng", lambda: other)]
+    # a corner of it is searched for edges in no time
+    corner = replace(taken(0), samples=taken(0).samples[:64, :64])
+    photos = [("a.dng", lambda: corner), ("b.dng", lambda: replace(corner, **change))]
     with pytest.raises(DecodeError, match=words):
         measure_blur(photos, BlurOptions(reach_px=REACH_PX))
 

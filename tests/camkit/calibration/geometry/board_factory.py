@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import cv2
@@ -43,6 +44,7 @@ class Shot:
     fine: int = 3
 
 
+@lru_cache(maxsize=4)
 def directions(camera: Camera, size: tuple[int, int], fine: int) -> FloatGrid:
     """Give (h, w, 2) X/Z, Y/Z of every fine pixel, by inverting the camera's own projection."""
     width, height = size
@@ -88,6 +90,7 @@ def photograph(
 PLACES = ((0, 0), (-1, -1), (1, 1), (1, -1), (-1, 1), (1, 0), (-1, 0), (0, 1), (0, -1))
 
 
+@lru_cache(maxsize=32)
 def poses_around(
     camera: Camera,
     size: tuple[int, int],

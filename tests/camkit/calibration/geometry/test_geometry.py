@@ -105,8 +105,11 @@ CAMERAS = {
 }
 
 
-@pytest.mark.parametrize("name", CAMERAS)
-@pytest.mark.parametrize("shot", [Shot(), HAZY], ids=["sharp", "strong blur in haze"])
+@pytest.mark.parametrize(
+    ("name", "shot"),
+    [*((name, Shot()) for name in CAMERAS), ("fisheye", HAZY)],
+    ids=[*CAMERAS, "fisheye, strong blur in haze"],
+)
 def test_distortion_of_any_kind_is_found(tmp_path: Path, name: str, shot: Shot) -> None:
     camera = CAMERAS[name]
     files = write_photographs(tmp_path, camera, poses_around(camera, shot.size, 10, seed=1), shot)
@@ -134,10 +137,10 @@ def _with(photographs: list[Path], extra: FloatGrid | np.ndarray, folder: Path) 
     return [*photographs, path]
 
 
-@pytest.mark.parametrize("shot", [Shot(stretch=1.1), Shot(skew=0.08)], ids=["pitch", "skew"])
 def test_a_picture_of_another_board_is_named(
-    photographs: list[Path], barrel: Camera, tmp_path: Path, shot: Shot
+    photographs: list[Path], barrel: Camera, tmp_path: Path
 ) -> None:
+    shot = Shot(stretch=1.1)
     pose = poses_around(barrel, shot.size, 12, seed=3)[10]
     files = _with(photographs, photograph(barrel, pose, shot), tmp_path)
     with pytest.raises(DecodeError, match=r"does not fit odd\.png \("):

@@ -10,6 +10,8 @@ from camkit.errors import CamkitError, ContractError, DecodeError, UnsupportedEr
 from camkit.models_def.optics.glass.agf import parse_agf
 from camkit.models_def.optics.glass.catalogue import preferred_catalogues
 from camkit.models_def.optics.glass.encoding import read_text
+from camkit.models_def.optics.lens_file.lens_file import find_lens
+from camkit.models_def.optics.lens_file.zmx_field import FieldType, with_field_points
 from camkit.models_def.optics.lens_file.zmx_glass import GlassRule
 from camkit.models_def.optics.lens_file.zmx_reader import parse_zmx, read_zmx
 from camkit.models_def.optics.paraxial import focal_lengths, paraxial_data, paraxial_image
@@ -302,6 +304,15 @@ def test_weights_of_wavelengths_that_differ_are_noted_and_one_of_0_does_not_coun
         "wavelength weights 0.25, 1 left out: all wavelengths count alike"
     ]
     assert not any("weights" in note for note in parse_zmx(LA1131).notes)
+
+
+def test_image_heights_beyond_the_reach_of_the_lens_are_left_out_with_a_note() -> None:
+    heights = [(0.0, 0.0), (0.0, 5.0), (0.0, 300.0)]
+    lens, notes = with_field_points(
+        find_lens("cooke-triplet"), FieldType.REAL_IMAGE_HEIGHT, heights
+    )
+    assert len(lens.field_angles_rad) == 2
+    assert "fields at 300 mm are left out: the lens is aimed to" in notes[0]
 
 
 def test_wavelengths_without_a_count_lose_the_filling_of_the_table() -> None:
