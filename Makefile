@@ -19,8 +19,9 @@ demo: $(RUNTIME_STAMP)  ## main job on the demo capture, runtime only (no torch)
 	@echo "2 of 2: two scenes with duet, photographed, planned, restored, compared (about a minute)"
 	$(VENV)/bin/python -m tools.demo --out-dir out
 
-pictures: $(RUNTIME_STAMP)  ## the pictures of the README and of docs/gallery.md
+pictures: $(RUNTIME_STAMP)  ## the pictures of README, gallery and guides
 	$(VENV)/bin/python -m tools.pictures.gallery --out-dir docs/images
+	$(VENV)/bin/python -m tools.pictures.guides --out-dir docs/images
 
 test: tidy  ## set-up with everything, gate, tests with branch coverage; types beside the tests
 	@echo "Running all tests: about half an hour on two cores"

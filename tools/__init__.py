@@ -20,7 +20,7 @@ They are not in the wheel. A file here is a command; a folder holds what command
     coverage_gate       refuses a test run that covers too little
 
     capture/            simulated captures, for the tools that judge pictures
-    pictures/           pictures of README and gallery; `hdr/` those of nights, and `deglare`
+    pictures/           pictures of README, gallery, guides; `hdr/` those of nights, and `deglare`
     comparison/         parts of `quality`
     plan/               parts of `plan_report`
     start/              parts of `design_start`
