@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
+import camkit
 from camkit.bundle.manifest import LIGHT_VERSION
 from camkit.bundle.reader import Bundle, open_bundle
 from camkit.runtime.proof.laws.darkroom import Exposed
@@ -73,7 +74,7 @@ def test_a_bracket_loses_lamps_that_one_exposure_keeps(
 ) -> None:
     path = write_hdr_bundle(tmp_path).path
     monkeypatch.setattr(guides, "find_bundle", lambda _: path)
-    monkeypatch.setattr(guides.camkit, "load", lambda _, load=guides.camkit.load: load(path))
+    monkeypatch.setattr(camkit, "load", lambda _, load=camkit.load: load(path))
     monkeypatch.setattr(guides, "NIGHT_PX", 128)
     monkeypatch.setattr(guides, "NIGHT_CROP", np.s_[:, 32:96, 32:96])
     monkeypatch.setattr(guides, "MOVING", (((60.0, 56.0), (0.0, 10.0), 4.0, 100.0),))
