@@ -200,9 +200,9 @@ def write_chain(path: Path, _folder: Path) -> None:
 PICTURES: Final[Mapping[str, Callable[[Path, Path], None]]] = MappingProxyType(
     {
         "photons-depth.png": write_depth,
-        "laws.jpg": write_law,
         "moving-lamps.jpg": write_moving_lamps,
         "portable-chain.png": write_chain,
+        "laws.jpg": write_law,  # last: it needs the whole history
     }
 )
 
