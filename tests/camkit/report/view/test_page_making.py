@@ -125,6 +125,12 @@ def test_a_capture_that_is_another_is_shown_with_a_note(folder: Path, tmp_path: 
         assert not page.notes
 
 
+def test_a_capture_itself_is_shown_developed(folder: Path, tmp_path: Path) -> None:
+    text = _text(folder.parent / "png.dng", tmp_path)
+    assert "RAW files are developed, not restored" in text
+    assert "Its codes are read" not in text
+
+
 def test_what_is_doubtful_is_said(folder: Path, tmp_path: Path) -> None:
     path = _copied(folder, tmp_path)
     path.write_bytes((folder / "tiff.tif").read_bytes())
