@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Final, Protocol
 
-from camkit.errors import CamkitError
+from camkit.errors import CamkitError, ContractError
 
 POLL_S: Final = 0.1
 
@@ -25,6 +25,18 @@ Cancel = Callable[[], bool] | Flag
 
 class Cancelled(CamkitError):  # noqa: N818 - a wish, not an error
     """The caller asked to stop."""
+
+
+def check_cancel(cancel: object) -> None:
+    """Refuse what cannot be asked whether its caller wants to stop, such as True.
+
+    Raises:
+        ContractError: If it is neither None, nor a function, nor an event.
+    """
+    if not (cancel is None or callable(cancel) or callable(getattr(cancel, "is_set", None))):
+        raise ContractError(
+            f"cancel must be a function, or an event such as threading.Event(); got {cancel!r}"
+        )
 
 
 def is_cancelled(cancel: Cancel | None) -> bool:
@@ -87,7 +99,12 @@ _WISH: ContextVar[Cancel | None] = ContextVar("camkit_cancel", default=None)
 
 @contextmanager
 def cancellable(cancel: Cancel | None) -> Iterator[None]:
-    """Set the wish that functions called in the block can read (see `current_wish`)."""
+    """Set the wish that functions called in the block can read (see `current_wish`).
+
+    Raises:
+        ContractError: If it cannot be asked; see `check_cancel`.
+    """
+    check_cancel(cancel)
     token = _WISH.set(cancel)
     try:
         yield

@@ -124,6 +124,7 @@ def make_file(
     mosaic: MosaicOptions | None = None,
     progress: Progress | None = None,
     cancel: Cancel | None = None,
+    place: str = "out_dir",
 ) -> FileResult:
     """Process one capture to its files and a sidecar; either all appear or nothing changes.
 
@@ -135,6 +136,7 @@ def make_file(
         mosaic: How to read a headerless mosaic.
         progress: Called with (work done, work in all).
         cancel: Asked ten times a second; true raises `Cancelled`.
+        place: Name of the option by which the caller said where the files go.
 
     Raises:
         DecodeError: If the capture cannot be read.
@@ -153,7 +155,7 @@ def make_file(
         estimate = None if pipeline.options.max_seconds is None else work.explain()
         files = outputs.files(work, write)
         paths = [target.with_suffix(suffix) for suffix in files.suffixes]
-        _check_free(source, paths, write)
+        _check_free(source, paths, write, place)
         with atomic_outputs(sidecar_path(target), *paths) as (proof, *parts):
             write_s = files.write(parts)
             main, *extra_hashes = (file_sha256(part) for part in parts)
@@ -197,7 +199,7 @@ def _extent(record: Mapping[str, Any]) -> str:
     return f"{count} {name}, {record['width']}x{record['height']} pixels"
 
 
-def _check_free(source: Path, paths: list[Path], write: WriteOptions) -> None:
+def _check_free(source: Path, paths: list[Path], write: WriteOptions, place: str) -> None:
     """Refuse to replace the capture itself, or what nobody said may be replaced.
 
     Raises:
@@ -206,12 +208,12 @@ def _check_free(source: Path, paths: list[Path], write: WriteOptions) -> None:
     for path in paths:
         if path.resolve() == source.resolve():
             raise ContractError(
-                f"{source} would overwrite itself; choose another {option_text('out_dir')}"
+                f"{source} would overwrite itself; choose another {option_text(place)}"
             )
         if path.exists() and not (write.overwrite or write.resume):
             raise ContractError(
-                f"{path} exists; add {option_text('overwrite')}, or another "
-                f"{option_text('out_dir')}"
+                f"{path} exists; add {option_text('overwrite', value=True)}, or another "
+                f"{option_text(place)}"
             )
 
 

@@ -1,8 +1,9 @@
 """The caller's options of a reconstruction, checked once."""
 
 import difflib
-from collections.abc import Mapping, Set
+from collections.abc import Callable, Mapping, Set
 from dataclasses import dataclass, fields, replace
+from inspect import Parameter, signature
 from operator import index
 from os import PathLike
 from pathlib import Path
@@ -185,17 +186,24 @@ def kind_option_names() -> list[str]:
     return sorted({option.name for kind in all_kinds() for option in kind.options})
 
 
-def with_choices(options: Options, choices: Mapping[str, object]) -> Options:
+def with_choices(
+    options: Options, choices: Mapping[str, object], call: Callable[..., object] | None = None
+) -> Options:
     """Return options with single ones chosen by name, those that a kind brings among them.
 
     A camera body may be given by its TOML file, a tone curve by its name or its file.
+
+    Args:
+        options: The others.
+        choices: Name -> value.
+        call: See `check_names`.
 
     Raises:
         ContractError: If one is unknown, or cannot be what it was given.
     """
     check_value("options", options, Options)
     kind_names = kind_option_names()
-    check_names(choices, {*plain_names(), *kind_names})
+    check_names(choices, {*plain_names(), *kind_names}, call)
     plain = {name: value for name, value in choices.items() if name not in kind_names}
     if isinstance(body := plain.get("unit"), str | PathLike):
         plain["unit"] = read_unit(Path(body))
@@ -213,13 +221,23 @@ def plain_names() -> list[str]:
     return [name for name in Options.__dataclass_fields__ if name != "of_kind"]
 
 
-def check_names(choices: Mapping[str, object], names: Set[str]) -> None:
+def check_names(
+    choices: Mapping[str, object], names: Set[str], call: Callable[..., object] | None = None
+) -> None:
     """Refuse names that are no options.
+
+    Args:
+        choices: Name -> value.
+        names: Of the options.
+        call: What they were given to, whose other parameters are options too.
 
     Raises:
         ContractError: Names them, and near names or all there are.
     """
     if unknown := sorted(set(choices) - names):
+        if call is not None:
+            parameters = signature(call).parameters.values()
+            names = names | {p.name for p in parameters if p.kind is not Parameter.VAR_KEYWORD}
         near = {n for name in unknown for n in difflib.get_close_matches(name, names, n=2)}
         hint = f"did you mean {' or '.join(sorted(near))}? " if near else ""
         raise ContractError(

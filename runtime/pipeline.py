@@ -521,7 +521,7 @@ def load(
     """
     check_value("bundle", bundle, str | PathLike | None)
     check_value("kind", kind, str | None)
-    settings = with_choices(Options() if options is None else options, choices)
+    settings = with_choices(Options() if options is None else options, choices, load)
     if bundle is None or str(bundle).lower() == "none":
         return Pipeline(None, settings, None if kind is None else find_kind(kind))
     if kind is not None:

@@ -9,7 +9,7 @@ import pickle
 import subprocess
 import sys
 from concurrent.futures import Future
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import IO, Final, cast
 
 from camkit.caller import option_text
@@ -110,7 +110,7 @@ class WorkerProcess:
             except PIPE_ERRORS:
                 how = self.end()
             else:
-                return answer
+                return _with_note(answer, how)
             if job.is_stopped:
                 break
         with contextlib.suppress(OSError), claimed(job.order.target):
@@ -153,6 +153,14 @@ class WorkerProcess:
         with contextlib.suppress(*PIPE_ERRORS):  # whoever waits for it hears of that
             _send(self._setup, child)
         return child
+
+
+def _with_note(answer: FileResult | Exception, how: str) -> FileResult | Exception:
+    """Return an answer that says how a process ended before, if one did."""
+    if not how or isinstance(answer, Exception):
+        return answer
+    note = f"a first worker {how}; a second one made this capture"
+    return replace(answer, warnings=(*answer.warnings, note))
 
 
 def _send(message: object, child: subprocess.Popen[bytes]) -> None:

@@ -9,12 +9,13 @@ Messages are pickles, between a program and its own child alone. The end of stdi
 parent: the capture under way is given up, and the process ends.
 """
 
+import contextlib
 import os
 import pickle
 import queue
 import threading
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO, Final
 
@@ -23,6 +24,7 @@ from camkit.runtime.batch.making import ELSEWHERE
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.development import FileResult, make_file
 from camkit.runtime.output.claim import claimed
+from camkit.runtime.output.writer import SUFFIXES
 from camkit.runtime.pipeline import Pipeline, load
 from camkit.runtime.write_options import WriteOptions
 
@@ -99,8 +101,11 @@ def _answer_to(order: Order, pipeline: Pipeline, talk: _Talk) -> FileResult | Ex
         return _make(order, pipeline, talk)
     except BrokenPipeError:
         raise
-    except (CamkitError, OSError) as error:
+    except CamkitError as error:
         return error
+    except OSError as error:
+        text = f"cannot write the picture: {error.strerror or error}"
+        return OSError(error.errno, text, str(order.target))
     except MemoryError as error:
         return WorkerError(f"not enough memory: {error}".rstrip(": "))
     except Exception as error:  # noqa: BLE001 - raised by the parent
@@ -108,11 +113,13 @@ def _answer_to(order: Order, pipeline: Pipeline, talk: _Talk) -> FileResult | Ex
 
 
 def _make(order: Order, pipeline: Pipeline, talk: _Talk) -> FileResult:
-    name = pipeline.part.outputs.names(order.source, pipeline.options, order.write)[0]
-    if order.target.suffix != Path(name).suffix:
+    _check_suffix(order, pipeline)
+    try:
+        order.target.parent.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
         raise ContractError(
-            f"{order.source.name} becomes a file in {Path(name).suffix}; got {order.target.name}"
-        )
+            f"{order.target.parent} is no folder; {order.target.name} needs one"
+        ) from None
     with claimed(order.target) as ours:
         if not ours:
             raise ContractError(f"{order.target}: {ELSEWHERE}")
@@ -124,4 +131,27 @@ def _make(order: Order, pipeline: Pipeline, talk: _Talk) -> FileResult:
             mosaic=order.mosaic,
             progress=lambda done, total: talk.answer((done, total)),
             cancel=talk.stop,
+            place="picture",
         )
+
+
+def _check_suffix(order: Order, pipeline: Pipeline) -> None:
+    """Refuse a picture whose suffix is not that of its format.
+
+    Raises:
+        ContractError: Names the suffix; without a format, each that the capture may have.
+    """
+    write, outputs = order.write, pipeline.part.outputs
+    name = outputs.names(order.source, pipeline.options, write)[0]
+    suffixes = {Path(name).suffix}
+    if order.target.suffix in suffixes:
+        return
+    for format_ in SUFFIXES if write.format is None else ():
+        with contextlib.suppress(ContractError):
+            other = replace(write, format=format_)
+            name = outputs.names(order.source, pipeline.options, other)[0]
+            suffixes.add(Path(name).suffix)
+    raise ContractError(
+        f"{order.source.name} becomes a file in {' or '.join(sorted(suffixes))}; "
+        f"got {order.target.name}"
+    )

@@ -17,7 +17,7 @@ from camkit.runtime.batch.batch_progress import PictureCount
 from camkit.runtime.batch.making import Common, FileProgress, Pipelines, run_task
 from camkit.runtime.batch.sources import expand, unmatched_text
 from camkit.runtime.batch.tasks import NO_BUNDLE, Task, list_tasks
-from camkit.runtime.cancel import Cancel
+from camkit.runtime.cancel import Cancel, check_cancel
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.development import FileResult
 from camkit.runtime.face.keywords import ProcessKeywords
@@ -82,6 +82,7 @@ def process(  # noqa: PLR0913 - each says one thing to its caller
     """
     check_value("bundle", bundle, str | PathLike | None)
     check_value("mosaic", mosaic, MosaicOptions | None)
+    check_cancel(cancel)
     options, write = _with_choices(
         Options() if options is None else options,
         WriteOptions() if write is None else write,
@@ -156,7 +157,7 @@ def _with_choices(
 ) -> tuple[Options, WriteOptions]:
     check_value("write", write, WriteOptions)
     names = set(WriteOptions.__dataclass_fields__)
-    check_names(choices, names.union(plain_names(), kind_option_names()))
+    check_names(choices, names.union(plain_names(), kind_option_names()), process)
     if isinstance(out_dir := choices.get("out_dir"), str | PathLike):
         choices = {**choices, "out_dir": Path(out_dir)}
     return (

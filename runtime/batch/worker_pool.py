@@ -21,7 +21,7 @@ from camkit.field_types import check_value
 from camkit.runtime.batch.pool_process import PIPE_ERRORS, STOPPED, Job, WorkerProcess
 from camkit.runtime.batch.pool_worker import GRACE_S, STOP, Order
 from camkit.runtime.batch.tasks import NO_BUNDLE
-from camkit.runtime.cancel import POLL_S, Cancel, Cancelled
+from camkit.runtime.cancel import POLL_S, Cancel, Cancelled, check_cancel
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.development import FileResult
 from camkit.runtime.face.keywords import LoadKeywords, PictureKeywords
@@ -62,7 +62,8 @@ class WorkerPool:
         if workers < 1:
             raise ContractError(f"{option_text('workers')} must be >= 1; got {workers}")
         threads = max(1, available_threads(None) // workers)
-        settings = with_absolute_files(with_choices(Options(threads=threads), options))
+        settings = with_choices(Options(threads=threads), options, WorkerPool)
+        settings = with_absolute_files(settings)
         if bundle is not None and str(bundle).lower() != NO_BUNDLE:
             bundle = find_bundle(str(bundle)).absolute()
         self._queue: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
@@ -104,7 +105,7 @@ class WorkerPool:
         Args:
             source: The capture.
             picture: The file to write, whose suffix is that of a format, such as .jpg; its folder
-                exists.
+                is made if it is not there.
             mosaic: How to read a headerless mosaic, or levels in place of a RAW file's.
             progress: Called with (work done, work in all) from a thread of the pool; a second try
                 begins anew.
@@ -115,7 +116,8 @@ class WorkerPool:
         Returns:
             A future of the result, which carries the warnings; `asyncio.wrap_future` takes it. Its
             `cancel()` works at any time but does not wait for the process to let go of the files,
-            as the end of `cancel` does.
+            as the end of `cancel` does, and its `result` raises `CancelledError` of
+            `concurrent.futures` then.
 
         Raises:
             ContractError: If the pool is closed, or an option is wrong. The future raises what else
@@ -126,7 +128,8 @@ class WorkerPool:
         check_value("source", source, str | PathLike)
         check_value("picture", picture, str | PathLike)
         check_value("mosaic", mosaic, MosaicOptions | None)
-        check_names(write, PictureKeywords.__annotations__.keys())
+        check_cancel(cancel)
+        check_names(write, PictureKeywords.__annotations__.keys(), self.submit)
         target = Path(picture).absolute()
         suffix = target.suffix.lower().removeprefix(".")
         name = OTHER_NAMES.get(suffix, suffix)

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from camkit.runtime.cancel import Cancel, check_cancelled
+from camkit.runtime.cancel import Cancel, check_cancel, check_cancelled
 from camkit.runtime.network.tiling import Progress
 from camkit.runtime.rows import Rows, RowSource
 
@@ -15,6 +15,7 @@ class Meter:
     """Counts the work of one capture; belongs to one thread."""
 
     def __init__(self, progress: Progress | None, cancel: Cancel | None) -> None:
+        check_cancel(cancel)
         self._progress = progress
         self._cancel = cancel
         self._shares: dict[str, float] = {}

@@ -1,8 +1,11 @@
 import threading
 import time
+from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
+import camkit
 from camkit.runtime.cancel import (
     Cancelled,
     cancellable,
@@ -21,6 +24,26 @@ def test_a_wish_is_a_call_or_a_flag() -> None:
     flag.set()
     with pytest.raises(Cancelled):
         check_cancelled(flag)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda path, **cancel: camkit.load(None).process(path, **cancel),
+        lambda path, **cancel: camkit.load(None).stream(path, print, **cancel),
+        lambda path, **cancel: camkit.load(None).plan(path, **cancel),
+        lambda path, **cancel: camkit.load(None).start(path, **cancel),
+        lambda path, **cancel: camkit.process(path, bundle="none", **cancel),
+        lambda path, **cancel: camkit.WorkerPool.submit(object(), path, path, **cancel),
+    ],
+)
+def test_what_cannot_be_asked_is_refused_by_every_call(
+    tmp_path: Path, call: Callable[..., object]
+) -> None:
+    """The start of an array, as `process_array` begins, included; no file is needed."""
+    for wish in (True, False, "stop", 3):
+        with pytest.raises(camkit.ContractError, match=f"^cancel must be a function.*got {wish!r}"):
+            call(tmp_path / "a.dng", cancel=wish)
 
 
 def test_what_runs_long_is_stopped_soon_after_the_wish() -> None:

@@ -42,5 +42,7 @@ def view(
     if json_:
         say(json.dumps(page.to_json()))
         return
+    for note in page.notes:
+        say(f"note: {note}", err=True)
     count = len(page.results)
     say(f"{page.path}: {count} result{'s' * (count > 1)}, {page.megabytes:.1f} MB")

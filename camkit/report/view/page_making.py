@@ -9,6 +9,7 @@ from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.field_types import checked
 from camkit.report.pages.page import Page, Words, to_html
+from camkit.report.view.picture_light import doubt_of
 from camkit.report.view.result_page import result_page
 from camkit.report.view.result_search import find_results
 from camkit.runtime.files.in_memory import FilePath, list_paths, optional_path
@@ -27,11 +28,13 @@ class ViewPage:
         path: Its file.
         results: The results on it, in their order.
         megabytes: Its size in MB.
+        notes: What is doubtful of the results; it stands on the page too.
     """
 
     path: Path
     results: tuple[Path, ...]
     megabytes: float
+    notes: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Return plain JSON values."""
@@ -39,6 +42,7 @@ class ViewPage:
             "path": str(self.path),
             "results": [str(path) for path in self.results],
             "megabytes": round(self.megabytes, 2),
+            "notes": list(self.notes),
         }
 
 
@@ -80,11 +84,20 @@ def view(
         raise ContractError(
             f"{option_text('before_file')} is for one result; there are {len(viewed)}"
         )
-    page = result_page(viewed, optional_path(before_file), crops, most_bytes=MOST_MB * 10**6)
+    file = optional_path(before_file)
+    if file is not None:
+        notes = (*viewed[0].notes, *doubt_of(file, viewed[0]))
+        viewed = [replace(viewed[0], notes=notes)]
+    page = result_page(viewed, file, crops, most_bytes=MOST_MB * 10**6)
     text = _with_size(page)
     megabytes = len(text) / _BYTES_PER_MB
     write_together({path: text})
-    return ViewPage(path=path, results=tuple(one.path for one in viewed), megabytes=megabytes)
+    return ViewPage(
+        path=path,
+        results=tuple(one.path for one in viewed),
+        megabytes=megabytes,
+        notes=tuple(f"{one.path.name}: {note}" for one in viewed for note in one.notes),
+    )
 
 
 def _with_size(page: Page) -> bytes:

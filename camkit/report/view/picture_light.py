@@ -90,6 +90,28 @@ def find_original(
     return Original(light=light, note=f"Before is {before_file.name}.{reading}")
 
 
+def doubt_of(before_file: Path, result: ViewedResult) -> tuple[str, ...]:
+    """Return a note where a capture stands for another one than that of the sidecar; else none.
+
+    Raises:
+        DecodeError: If the file cannot be read.
+    """
+    record = result.record
+    if record is None or _is_capture(before_file, record):
+        return ()
+    try:
+        is_capture = before_file.is_file() and not is_picture(before_file)
+    except OSError as error:
+        raise DecodeError(f"cannot read {before_file}: {error.strerror or error}") from error
+    named_file = Path(str(record["input"]))
+    if not is_capture and before_file.suffix.lower() != named_file.suffix.lower():
+        return ()  # a picture that somebody developed
+    return (
+        f"{before_file.name} is not the capture {named_file.name} that the sidecar names: its hash "
+        "differs, and before may be another scene",
+    )
+
+
 def _own_original(result: ViewedResult, capture: Path | None, size_px: tuple[int, int]) -> Original:
     """Return the capture of a result, developed as the result was.
 

@@ -31,6 +31,7 @@ from camkit.report.view.result_search import ViewedResult
 from camkit.report.view.view_crops import choose_crops
 from camkit.report.view.viewers import film_viewer, map_viewer, picture_viewer
 from camkit.runtime.kinds.spad.products.preview import white_of
+from camkit.runtime.raw import is_picture
 
 BRIGHT: Final = 1.02
 """Light from which on a picture gets an exposure slider: white itself scatters a little."""
@@ -128,7 +129,8 @@ def _picture_parts(
     cells = None if result.record is None else spared_cells(result.record, (height, width))
     facts = f"The picture has {width} x {height} px."
     if result.record is None:
-        facts += f" {READ_AS}."
+        reading = READ_AS if is_picture(result.path) else "RAW files are developed, not restored"
+        facts += f" {reading}."
     if is_bright:
         facts += (
             f" Its brightest sample is {peak:.4g} times white: lower the exposure to look into "

@@ -123,9 +123,11 @@ def test_a_capture_that_ends_a_process_gets_one_more_and_then_an_error(
 ) -> None:
     once, twice, behind = (Caller(shared, folder, name) for name in ("die-once", "die", "a"))
     assert once.future.result(20).output == once.picture
+    assert "a first worker ended with signal 9; a second one" in once.future.result().warnings[-1]
     assert isinstance(twice.error(), camkit.WorkerError)
     assert "die.dng: 2 workers ended, the last one ended with signal 9" in str(twice.error())
     assert behind.future.result(20).status == "ok"
+    assert not any("worker" in warning for warning in behind.future.result().warnings)
     assert not [*folder.glob("die.jpg*"), *folder.glob("*.part"), *folder.glob("*.claim")]
 
 
@@ -169,10 +171,31 @@ def test_wrong_arguments_are_refused_before_any_work(
         shared.submit("a.dng", "a.jpg", jpeg_quality="best")  # type: ignore[arg-type]
     with pytest.raises(camkit.ContractError, match=r"a file in \.jpg; got a\.jpeg"):
         shared.submit(folder / "a.dng", folder / "a.jpeg").result(20)
+    with pytest.raises(camkit.ContractError, match=r"\.dng or \.exr or \.jpg .*; got a\.bmp"):
+        shared.submit(folder / "a.dng", folder / "a.bmp").result(20)
+    with pytest.raises(camkit.ContractError, match=r"did you mean workers\? known .* bundle,"):
+        camkit.WorkerPool("duet", worker=2)  # type: ignore[call-arg]
     with pytest.raises(camkit.ContractError, match="workers must be >= 1"):
         camkit.WorkerPool("duet", workers=0)
     with pytest.raises(camkit.BundleError, match="no built-in bundle"):
         camkit.WorkerPool("no-such-camera")
+
+
+def test_a_folder_is_made_and_what_is_in_the_way_is_said_of_the_picture(
+    shared: camkit.WorkerPool, folder: Path
+) -> None:
+    new = folder / "made" / "below"
+    made = shared.submit(folder / "a.dng", new / "s.jpg").result(20)
+    assert made.output == new / "s.jpg"
+    in_the_way = shared.submit(folder / "a.dng", new / "s.jpg")
+    with pytest.raises(camkit.ContractError, match=r"add overwrite=True, or another picture$"):
+        in_the_way.result(20)
+    with pytest.raises(camkit.ContractError, match=r"s\.jpg is no folder; t\.jpg needs one"):
+        shared.submit(folder / "a.dng", new / "s.jpg" / "t.jpg").result(20)
+    long = new / ("s" * 251 + ".jpg")  # a name that the system refuses with the claim's suffix
+    with pytest.raises(OSError, match="cannot write the picture: File name too long") as caught:
+        shared.submit(folder / "a.dng", long).result(20)
+    assert caught.value.filename == str(long)
 
 
 def test_a_bundle_that_is_refused_refuses_the_pool(

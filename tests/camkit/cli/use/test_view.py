@@ -25,6 +25,12 @@ def test_the_command_states_the_page_its_results_and_its_size(
     again = camkit_command("view", str(out), "-o", str(page))
     assert again.code == ExitCode.USAGE
     assert "add --overwrite" in again.err
+    write_scene(tmp_path / "other.dng", black=255)
+    other = camkit_command(
+        *("view", str(out), "--before", str(tmp_path / "other.dng"), "-o", str(page), "--overwrite")
+    )
+    assert other.code == 0
+    assert "note: a.exr: other.dng is not the capture a.dng" in other.err
     gone = camkit_command("view", str(out / "b.exr"), "-o", str(tmp_path / "b.html"))
     assert gone.code == ExitCode.INPUT_FAILED
     assert "b.exr" in gone.err

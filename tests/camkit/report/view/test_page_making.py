@@ -110,6 +110,27 @@ def test_without_its_capture_a_line_says_why_and_before_may_be_given(
     assert "Before is exr.exr" in given
 
 
+def test_a_capture_that_is_another_is_shown_with_a_note(folder: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other.dng"
+    write_scene(other, black=255)
+    page = camkit.view(folder / "png.png", tmp_path / "page.html", before_file=other)
+    (note,) = page.notes
+    assert "other.dng is not the capture png.dng that the sidecar names: its hash differs" in note
+    text = page.path.read_text(encoding="utf-8")
+    assert note.removeprefix("png.png: ") in text
+    assert 'class="split"' in text
+    own = folder.parent / "png.dng"
+    for file in (own, folder / "exr.exr"):  # the capture itself, and a picture on purpose
+        page = camkit.view(folder / "png.png", page.path, before_file=file, overwrite=True)
+        assert not page.notes
+
+
+def test_a_capture_itself_is_shown_developed(folder: Path, tmp_path: Path) -> None:
+    text = _text(folder.parent / "png.dng", tmp_path)
+    assert "RAW files are developed, not restored" in text
+    assert "Its codes are read" not in text
+
+
 def test_what_is_doubtful_is_said(folder: Path, tmp_path: Path) -> None:
     path = _copied(folder, tmp_path)
     path.write_bytes((folder / "tiff.tif").read_bytes())
