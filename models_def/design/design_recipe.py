@@ -67,8 +67,8 @@ class OpticsRecipe:
         azimuths_deg: Directions of the fields from +y towards +x, traced through the whole pupil,
             as a lens that is not round needs. Empty for +y alone.
         psf_model: Model of the PSF; empty for waves where the blur of the lens at the start is
-            below 7 Airy radii, else rays. A step by waves takes @RATIO@ times as long or more: try a
-            recipe with `rays` first. `azimuths_deg` takes no waves.
+            below 7 Airy radii, else rays. A step by waves may take 100 times as long: begin with
+            `rays`. `azimuths_deg` takes no waves.
     """
 
     half_field_deg: float
@@ -304,7 +304,7 @@ def to_design(table: Mapping[str, Any]) -> DesignRecipe:
         front=_table("front", Front, table.get("front", {})),
         network=_table("network", NetworkChoice, table.get("network", {})),
         loss=_table("loss", DesignLoss, table.get("loss", {})),
-        schedule=_table("schedule", DesignSchedule, _held(table)),
+        schedule=_table("schedule", DesignSchedule, table.get("schedule", {})),
         data=_table("data", SceneRecipe, table.get("data", {})),
         starts=_table("starts", Starts, table.get("starts", {})),
         fabrication=_optional("fabrication", FabricationErrors, table),
@@ -332,14 +332,6 @@ def _variable(where: str, table: Any) -> JointVariable:
     state = typed(f"{where}.{STATE_KEY}", table[STATE_KEY], str)
     rest = {key: value for key, value in table.items() if key != STATE_KEY}
     return JointVariable(variable=_table(where, Variable, rest), state=state)
-
-
-def _held(table: Mapping[str, Any]) -> Any:
-    """Return the table of the schedule; a lens without a network has nothing to wait for."""
-    schedule, network = table.get("schedule", {}), table.get("network", {})
-    if isinstance(schedule, Mapping) and isinstance(network, Mapping) and not network.get("name"):
-        return {"hold_steps": 0, **schedule}
-    return schedule
 
 
 def _table(where: str, kind: type[T], table: Any) -> T:

@@ -18,8 +18,8 @@ class DesignSchedule:
         network_rate: Learning rate of the network; at least 0.
         epoch_steps: Steps after which both rates are multiplied by `decay`; at least 1.
         decay: Factor of both rates after every `epoch_steps`; more than 0, at most 1.
-        hold_steps: First steps in which the lens stays, until the network follows; at least 0. A
-            recipe without a network has 0 by default.
+        hold_steps: First steps in which the lens stays, until the network follows; at least 0.
+            Without a network the lens moves at once.
         freeze_share: Last share of the steps in which the lens stays, 0 to 1.
         penalty_weight: Weight of `[limits]` in the loss, and in dB in the choice of the best lens.
         valid_steps: Steps between validations, at least 1; the last step has one too.
@@ -50,7 +50,7 @@ class DesignSchedule:
         if not 0 < self.decay <= 1:
             raise ContractError(f"decay must be more than 0, at most 1; got {self.decay}")
 
-    def moves_lens(self, step: int) -> bool:
-        """Return whether the lens moves in a step: it does not at first, nor at last."""
+    def moves_lens(self, step: int, *, has_network: bool) -> bool:
+        """Return whether the lens moves in a step: it waits for a network, and rests at last."""
         last = self.steps - round(self.freeze_share * self.steps)
-        return self.lens_rate > 0 and self.hold_steps <= step < last
+        return self.lens_rate > 0 and self.hold_steps * has_network <= step < last

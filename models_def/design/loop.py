@@ -150,7 +150,7 @@ class DesignLoop:
 
     def _one_step(self) -> float:
         schedule, parts = self.schedule, self.parts
-        moving = schedule.moves_lens(self.step)
+        moving = schedule.moves_lens(self.step, has_network=parts.network is not None)
         decay = schedule.decay ** (self.step // schedule.epoch_steps)
         for group, rate in zip(self._optimizer.param_groups, self._rates, strict=True):
             group["lr"] = rate * decay

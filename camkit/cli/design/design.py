@@ -168,12 +168,16 @@ def _first_lines(run: "DesignRun", *, resume: bool) -> Iterator[str]:
         yield f"resumes at step {run.loop.step} of {schedule.steps}"
     elif resume:
         yield f"there is no {run.files.checkpoint} to resume: begins at step 0"
-    rests = not any(map(schedule.moves_lens, range(schedule.steps)))
-    if rests and schedule.lens_rate:
+    has_network = run.loop.parts.network is not None
+    steps = range(schedule.steps)
+    moves = any(schedule.moves_lens(step, has_network=has_network) for step in steps)
+    if schedule.lens_rate and not moves:
+        keys = f"freeze_share ({schedule.freeze_share:g})"
+        if has_network:
+            keys = f"hold_steps ({schedule.hold_steps}) or {keys}"
         yield (
-            f"the lens stays as it is in all {schedule.steps} steps: lower schedule.hold_steps "
-            f"({schedule.hold_steps}) or freeze_share ({schedule.freeze_share:g}), or take more "
-            "steps"
+            f"the lens stays as it is in all {schedule.steps} steps: lower schedule.{keys}, or "
+            "take more steps"
         )
 
 
@@ -185,7 +189,10 @@ def _note_limits(run: "DesignRun", first: "Progress") -> None:
     names = dict.fromkeys(key for view in views for key in broken_limits(*view))
     if not names:
         return
-    cost = f", which counts as {first.valid_db - first.merit:.3g} dB against it"
+    cost = (
+        f", which counts as {first.valid_db - first.merit:.3g} dB against it: a lens that breaks "
+        "less of them may win with fewer dB"
+    )
     say(
         f"the lens at the start is outside its [limits] ({', '.join(names)})"
         + (cost if run.recipe.loss.is_psnr else ""),

@@ -49,6 +49,14 @@ def test_the_lens_is_held_at_first_and_frozen_at_last(recipe: DesignRecipe) -> N
     assert torch.equal(seen[3], seen[5])
 
 
+def test_without_a_network_the_lens_waits_for_none(recipe: DesignRecipe) -> None:
+    schedule = replace(recipe.schedule, hold_steps=2)
+    network = replace(recipe.network, name="", config={})
+    loop = make_loop(replace(recipe, schedule=schedule, network=network))
+    finish(loop, last_step=1)
+    assert bool(loop.parts.lens.moves.detach().any())
+
+
 def test_a_rate_of_zero_trains_the_network_alone(recipe: DesignRecipe) -> None:
     schedule = replace(recipe.schedule, lens_rate=0.0, hold_steps=0)
     loop = make_loop(replace(recipe, schedule=schedule))

@@ -55,7 +55,7 @@ def test_a_design_says_what_it_does(
     camkit_command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     recipe, out = tmp_path / "tiny.toml", tmp_path / "out"
-    text = RECIPE.replace("hold_steps = 0", "hold_steps = 9") + "[limits]\nmin_bfl_mm = 60.0\n"
+    text = RECIPE.replace("hold_steps = 0", "freeze_share = 1.0") + "[limits]\nmin_bfl_mm = 60.0\n"
     recipe.write_text(text)
     command = ("design", recipe, "--out-dir", out, "--steps", "4")
     one_step = DesignLoop._one_step
@@ -70,7 +70,7 @@ def test_a_design_says_what_it_does(
     assert outcome.code == 130
     lines = (
         *("PSF by ", "times the Airy radius", "step 0: validation", "outside its [limits]"),
-        *("min_bfl_mm", "stays as it is in all 4 steps", "hold_steps (9)", "--resume"),
+        *("min_bfl_mm", "stays as it is in all 4 steps", "freeze_share (1)", "--resume"),
     )
     assert [line for line in lines if line not in outcome.err] == []
     monkeypatch.undo()
